@@ -1,0 +1,52 @@
+"""Every error that a user may see: what is wrong, where, and what to do next."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+
+
+class KbsError(Exception):
+    """An error that ends the command with one clear message and `exit_status`."""
+
+    exit_status = 2
+
+    def __init__(self, what: str, *, where: str = "", remedy: str = "") -> None:
+        super().__init__(what)
+        self.what = what
+        self.where = where
+        self.remedy = remedy
+
+    def __str__(self) -> str:
+        place = f"{self.where}: " if self.where else ""
+        remedy = f"\n  -> {self.remedy}" if self.remedy else ""
+        return f"{place}{self.what}{remedy}"
+
+
+class ConfigError(KbsError):
+    """A campaign's TOML file is missing, malformed or contradicts itself."""
+
+
+class RecordingError(KbsError):
+    """A recording cannot be read, or lacks what the campaign needs from it."""
+
+
+class FitError(KbsError):
+    """The recordings do not determine what a fit is asked for."""
+
+
+class SimulationError(KbsError):
+    """The plant's solution is not finite, or its parameters make no sense."""
+
+
+class OutputError(KbsError):
+    """Results cannot be written; what was there before is untouched."""
+
+
+def did_you_mean(word: str, known: Iterable[str]) -> str:
+    """Return " (did you mean 'x'?)" for the closest of `known`, or the whole list where none is close."""
+    names = sorted(known)
+    close = get_close_matches(word, names, n=1, cutoff=0.6)
+    if close:
+        return f"did you mean '{close[0]}'?"
+    return "known: " + ", ".join(names) if names else "nothing is known here"

@@ -1,0 +1,198 @@
+"""The rig: a serial chain of joints and bodies on (or under) a six-component transducer.
+
+A rig is data. It names links: the laboratory `lab`, the transducer's top plate `T`, and one link a
+joint, called like the joint. Each joint turns its link about `axis` with respect to its parent; bodies
+are fixed to links. A pointing mechanism on a test bench is lab -> T -> az -> el; an instrumented wheel,
+whose transducer turns with it, is lab -> wheel -> T.
+
+The wrench is what everything beyond T (seen from the laboratory) exerts on the transducer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, fields, is_dataclass
+from typing import Literal
+
+import numpy as np
+
+from kbs_process.signals.records import Array
+
+LAB = "lab"
+TRANSDUCER = "T"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Quantity:
+    """A physical number or array in SI units, with its standard uncertainty and where it comes from."""
+
+    name: str  # dotted path in the parameter files: "joint.el.drive.Ka"
+    value: Array  # shape () or (n,) or (n, m)
+    unit: str  # SI
+    sigma: Array  # same shape, one standard deviation; 0 is exact by definition
+    source: str
+
+    def __float__(self) -> float:
+        return float(self.value)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        return self.value.shape
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Body:
+    """A rigid body fixed to a link; its numbers are in that link's axes."""
+
+    name: str
+    on: str  # link
+    mass: Quantity  # kg
+    cog: Quantity  # (3,) m, from the link's origin
+    inertia: Quantity  # (6,) kg m^2 about its CoG: xx, yy, zz, xy, xz, yz (tensor elements, not products with a minus)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Encoder:
+    """An absolute encoder on a joint: reading = round((angle + offset) / step) * step."""
+
+    step: Quantity  # rad, one code; 0 is unquantised
+    offset: Quantity  # rad
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Drive:
+    """Motor and gearbox of a joint; `parameters` are those that the effects of the plant ask for by name."""
+
+    ratio: Quantity  # R
+    rotor_inertia: Quantity  # kg m^2
+    steps_per_turn: Quantity  # microsteps of the field in a motor turn
+    parameters: dict[str, Quantity]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Joint:
+    """A revolute joint: its link turns by the joint angle about `axis` (parent's axes, right-handed)."""
+
+    name: str
+    parent: str  # "lab", "T" or another joint
+    axis: tuple[float, float, float]  # unit vector
+    origin: Quantity  # (3,) m, the link's origin in the parent's axes
+    misalignment: Quantity  # (3,) rad, small rotation of the axis with respect to the parent
+    encoder: Encoder | None
+    drive: Drive | None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Amplifier:
+    """The transducer's anti-alias low-pass: Butterworth of `order` with its corner at `corner` Hz."""
+
+    order: int
+    corner: Quantity  # Hz
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Transducer:
+    """raw = (I + cross_coupling) wrench + bias + noise, quantised to `resolution`."""
+
+    on: str  # "lab" or a joint
+    channels: tuple[str, ...]  # those recorded, a subset of WRENCH_CHANNELS
+    tilt: Quantity  # (2,) rad, tx about x and ty about y
+    stiffness: Quantity | None  # (3,) N m/rad about x, y, z; None: rigid
+    damping: Quantity | None  # (3,) N m s/rad
+    cross_coupling: Quantity  # (6, 6)
+    bias: Quantity  # (6,)
+    noise: Quantity  # (6,) rms a sample at the recorded rate
+    resolution: Quantity  # (6,)
+    amplifier: Amplifier | None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Controller:
+    """The pointing controller; gains may differ from joint to joint."""
+
+    cycle: Quantity  # s, real-time cycle
+    loop: Literal["open", "closed"]
+    Kp: Quantity  # (joints,)
+    Ki: Quantity  # (joints,) 1/s
+    latency: int  # cycles
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Spacecraft:
+    """Where the wrench is referred to: centre of mass and attitude with respect to T."""
+
+    position: Quantity  # (3,) m, of the centre of mass from T's origin, in T
+    attitude: Quantity  # (3,) rad, rotation vector that turns T's axes into S's
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rig:
+    """Everything about the hardware that the pipeline knows."""
+
+    gravity: Quantity  # m/s^2, magnitude; 0 in flight
+    transducer: Transducer
+    bodies: tuple[Body, ...]
+    joints: tuple[Joint, ...]  # from the laboratory outwards
+    controller: Controller | None
+    spacecraft: Spacecraft | None
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        return tuple(joint.name for joint in self.joints)
+
+    def joint(self, name: str) -> Joint:
+        """Return the joint of that name."""
+        return next(joint for joint in self.joints if joint.name == name)
+
+    def quantities(self) -> dict[str, Quantity]:
+        """Return every quantity of the rig by its dotted name."""
+        return {quantity.name: quantity for quantity in _walk(self)}
+
+
+def _walk(node: object) -> Iterator[Quantity]:
+    if isinstance(node, Quantity):
+        yield node
+    elif isinstance(node, dict):
+        for value in node.values():
+            yield from _walk(value)
+    elif isinstance(node, tuple):
+        for value in node:
+            yield from _walk(value)
+    elif is_dataclass(node):
+        for entry in fields(node):
+            yield from _walk(getattr(node, entry.name))
+
+
+def substitute(
+    rig: Rig, values: dict[str, Array | float], sigmas: dict[str, Array | float] | None = None
+) -> Rig:
+    """Return `rig` with new values (and sigmas, where given) for some quantities, named by dotted path.
+
+    Raises KeyError for a name that the rig does not have and ValueError for a value of another shape.
+    """
+    unknown = set(values) - set(rig.quantities())
+    if unknown:
+        raise KeyError(f"the rig has no {sorted(unknown)}")
+    replaced = _substitute(rig, values, sigmas or {})
+    assert isinstance(replaced, Rig)
+    return replaced
+
+
+def _substitute(node: object, values: dict[str, Array | float], sigmas: dict[str, Array | float]) -> object:
+    if isinstance(node, Quantity):
+        if node.name not in values:
+            return node
+        value = np.asarray(values[node.name], dtype=float)
+        sigma = np.asarray(sigmas.get(node.name, node.sigma), dtype=float)
+        if value.shape != node.shape or sigma.shape != node.shape:
+            raise ValueError(f"{node.name} has shape {node.shape}, not {value.shape}")
+        return Quantity(node.name, value, node.unit, sigma, node.source)
+    if isinstance(node, dict):
+        return {key: _substitute(value, values, sigmas) for key, value in node.items()}
+    if isinstance(node, tuple):
+        return tuple(_substitute(value, values, sigmas) for value in node)
+    if is_dataclass(node) and not isinstance(node, type):
+        return type(node)(
+            **{entry.name: _substitute(getattr(node, entry.name), values, sigmas) for entry in fields(node)}
+        )
+    return node

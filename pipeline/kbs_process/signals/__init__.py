@@ -1,0 +1,1 @@
+"""Records that flow through the pipeline, and the frames they are expressed in."""

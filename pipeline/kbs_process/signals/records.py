@@ -1,0 +1,147 @@
+"""What flows through the pipeline: immutable arrays with their channels, units, frame and history."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Stamps = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+
+WRENCH_CHANNELS = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
+WRENCH_UNITS = ("N", "N", "N", "N m", "N m", "N m")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Block:
+    """A contiguous piece of one stream at its full rate, in the order of the file."""
+
+    stamp: Stamps  # (n,) sensor clock, ns
+    log: Stamps  # (n,) recorder clock, ns
+    values: Array  # (n, c) one column for each channel asked for
+
+    def __len__(self) -> int:
+        return len(self.stamp)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Signal:
+    """Uniformly sampled channels in one frame.
+
+    `valid` is False where a sample was invented (a gap) or where a filter's edge still shows.
+    `history` lists, oldest first, what was done to the samples.
+    """
+
+    t0: float  # s, first sample, on the recording's own time axis
+    dt: float  # s
+    values: Array  # (n, c)
+    channels: tuple[str, ...]
+    units: tuple[str, ...]
+    frame: str  # "T", "S", "joint", ...
+    valid: Mask  # (n,)
+    history: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        n, c = self.values.shape
+        if len(self.channels) != c or len(self.units) != c or len(self.valid) != n:
+            raise ValueError(
+                f"{n} x {c} values with {len(self.channels)} channels, {len(self.units)} units, {len(self.valid)} flags"
+            )
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    @property
+    def t(self) -> Array:
+        """Time of each sample, s, shape (n,)."""
+        return self.t0 + self.dt * np.arange(len(self.values))
+
+    @property
+    def rate(self) -> float:
+        """Sampling rate, Hz."""
+        return 1.0 / self.dt
+
+    def column(self, channel: str) -> Array:
+        """Samples of one channel, shape (n,)."""
+        column: Array = self.values[:, self.channels.index(channel)]
+        return column
+
+    def derive(
+        self, values: Array, step: str, *, frame: str | None = None, valid: Mask | None = None
+    ) -> Signal:
+        """Return the same channels with new values, `step` added to the history."""
+        return replace(
+            self,
+            values=values,
+            frame=self.frame if frame is None else frame,
+            valid=self.valid if valid is None else valid,
+            history=(*self.history, step),
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Events:
+    """A slow stream kept sample by sample: commands, field positions, temperatures."""
+
+    t: Array  # (n,) s on the recording's own time axis
+    values: Array  # (n, c)
+    channels: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Loss:
+    """Something that a recording should hold and does not, or holds twice, or holds damaged."""
+
+    kind: str  # "gap", "repeat", "out of order", "crc", "truncated", "undecodable", "non-finite", ...
+    where: str  # file and topic
+    count: int  # messages or blocks concerned
+    start_s: float | None = None  # on the recording's own time axis, where known
+    end_s: float | None = None
+    detail: str = ""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Spectrum:
+    """One-sided cross-spectral density matrix of a stream at its full rate (Welch)."""
+
+    f: Array  # (m,) Hz
+    S: NDArray[np.complex128]  # (m, c, c), units of channel i times channel j per Hz
+    channels: tuple[str, ...]
+    averages: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Envelope:
+    """Least and greatest value of every channel in equal stretches of time, for plots of the full rate."""
+
+    t: Array  # (m,) s, middle of each stretch
+    low: Array  # (m, c)
+    high: Array  # (m, c)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Run:
+    """One recording (or the prediction of one), reduced to the working rate on one clock.
+
+    All signals share t0 and dt. A channel that the rig does not have is None.
+    """
+
+    name: str
+    wrench: Signal | None  # channels: a subset of WRENCH_CHANNELS, on the transducer, about T's origin
+    angle: Signal | None  # encoder angle of each joint, rad
+    command: Events | None  # desired position and rate of each joint: "az", "el", "az.rate", "el.rate"
+    field: Events | None  # field position of each motor, motor rad
+    temperature: Signal | None  # degC
+    encoder: Events | None  # encoder angles at their own rate, where the controller needs them
+    spectrum: Spectrum | None  # of the wrench
+    envelope: Envelope | None  # of the wrench
+    epoch_ns: int  # sensor clock at the recording's time zero
+    rates: dict[str, float] = field(default_factory=dict)  # Hz, measured, by stream
+    losses: tuple[Loss, ...] = ()
+
+    def with_wrench(self, wrench: Signal) -> Run:
+        """Return the same run with another wrench."""
+        return replace(self, wrench=wrench)
