@@ -48,7 +48,7 @@ class Body:
     on: str  # link
     mass: Quantity  # kg
     cog: Quantity  # (3,) m, from the link's origin
-    inertia: Quantity  # (6,) kg m^2 about its CoG: xx, yy, zz, xy, xz, yz (tensor elements, not products with a minus)
+    inertia: Quantity  # (6,) kg m^2, tensor elements about its CoG: xx, yy, zz, xy, xz, yz
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+import dataclasses
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,7 +49,7 @@ class Signal:
         n, c = self.values.shape
         if len(self.channels) != c or len(self.units) != c or len(self.valid) != n:
             raise ValueError(
-                f"{n} x {c} values with {len(self.channels)} channels, {len(self.units)} units, {len(self.valid)} flags"
+                f"{n} x {c} values with channels {self.channels}, units {self.units}, {len(self.valid)} flags"
             )
 
     def __len__(self) -> int:
@@ -57,7 +58,8 @@ class Signal:
     @property
     def t(self) -> Array:
         """Time of each sample, s, shape (n,)."""
-        return self.t0 + self.dt * np.arange(len(self.values))
+        t: Array = self.t0 + self.dt * np.arange(len(self.values), dtype=np.float64)
+        return t
 
     @property
     def rate(self) -> float:
@@ -132,6 +134,7 @@ class Run:
     name: str
     wrench: Signal | None  # channels: a subset of WRENCH_CHANNELS, on the transducer, about T's origin
     angle: Signal | None  # encoder angle of each joint, rad
+    rate: Signal | None  # measured rate of each joint, rad/s, on rigs that record that
     command: Events | None  # desired position and rate of each joint: "az", "el", "az.rate", "el.rate"
     field: Events | None  # field position of each motor, motor rad
     temperature: Signal | None  # degC
@@ -139,7 +142,7 @@ class Run:
     spectrum: Spectrum | None  # of the wrench
     envelope: Envelope | None  # of the wrench
     epoch_ns: int  # sensor clock at the recording's time zero
-    rates: dict[str, float] = field(default_factory=dict)  # Hz, measured, by stream
+    rates: dict[str, float] = dataclasses.field(default_factory=dict)  # Hz, measured, by stream
     losses: tuple[Loss, ...] = ()
 
     def with_wrench(self, wrench: Signal) -> Run:
