@@ -1,0 +1,1 @@
+"""The correlation report: shows results.json and the tables, computes nothing."""

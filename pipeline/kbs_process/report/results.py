@@ -1,0 +1,370 @@
+"""What a processed campaign has to say: the contents of results.json, typed.
+
+These records are the contract between the pipeline, which fills them, and the report, which shows
+them; schemas/results.schema.json is generated from them (`python -m kbs_process.report.results`).
+Units are SI and part of a field's name, or stand beside the value in `unit`. A number that could not
+be determined is None (null), never NaN. Every `sigma` is one standard deviation.
+"""
+
+# ruff: noqa: N815  (units keep their case: high_pass_Hz)
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any, Literal
+
+import msgspec
+
+from kbs_process.errors import OutputError
+
+SCHEMA_VERSION: Literal[1] = 1
+
+Verdict = Literal["pass", "fail", "undecided"]
+Status = Literal["pass", "fail", "undecided", "none"]
+Frame = Literal["T", "S"]
+Role = Literal["calibration", "fit", "held-out"]
+Severity = Literal["info", "warning", "error"]
+Statistic = Literal["peak", "rms"]
+
+
+class Record(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """An immutable entry of results.json; an unknown key is an error."""
+
+
+class CampaignSummary(Record, frozen=True, kw_only=True):
+    """Which campaign this is."""
+
+    name: str
+    title: str
+    article: str
+    configuration: str
+    drive: Literal["command", "motion"]  # what drives the plant: the commands, or the measured angles
+
+
+class Conclusion(Record, frozen=True, kw_only=True):
+    """The campaign's verdict ("none": it has no requirement), in a word and in a sentence."""
+
+    status: Status
+    sentence: str
+
+
+class ChannelResult(Record, frozen=True, kw_only=True):
+    """A requirement's statistic on one channel, over all recordings that count."""
+
+    channel: str
+    value: float | None  # measured, in the requirement's unit
+    sigma: float | None
+    predicted: float | None
+    recording: str | None  # where the measured value occurs
+    time_s: float | None
+
+
+class Requirement(Record, frozen=True, kw_only=True):
+    """A requirement and what was found: the worst recording and channel decide."""
+
+    name: str
+    quantity: Literal["torque", "force"]
+    frame: Frame
+    statistic: Statistic
+    band: str  # name of a Band
+    band_Hz: tuple[float | None, float | None]  # None: open on that side
+    limit: float
+    unit: str
+    value: float | None  # measured
+    sigma: float | None
+    margin: float | None  # limit less value, in `unit`
+    verdict: Verdict
+    recording: str | None = None
+    channel: str | None = None
+    time_s: float | None = None
+    predicted_value: float | None = None  # the same statistic of the prediction
+    predicted_sigma: float | None = None
+    channels: tuple[ChannelResult, ...] = ()
+    source: str = ""
+
+
+class Notice(Record, frozen=True, kw_only=True):
+    """Something that a reader of the verdict must know, and what can be done about it."""
+
+    severity: Severity
+    what: str
+    where: str = ""
+    remedy: str = ""
+
+
+class LossEntry(Record, frozen=True, kw_only=True):
+    """Samples or messages that a recording lacks, holds twice, or holds damaged."""
+
+    kind: str
+    where: str
+    count: int
+    start_s: float | None = None
+    end_s: float | None = None
+    detail: str = ""
+
+
+class Clock(Record, frozen=True, kw_only=True):
+    """A stream's sensor clock against the recording's time axis: t = stamp (1 + skew) + offset."""
+
+    stream: str
+    offset_s: float
+    skew: float  # s/s
+    sigma_s: float | None = None
+
+
+class Recording(Record, frozen=True, kw_only=True):
+    """One recording, as it was read."""
+
+    name: str  # the stem of its tables
+    file: str
+    trajectory: str
+    role: Role
+    repeat: int
+    sha256: str
+    duration_s: float
+    rates: dict[str, float] = {}  # Hz, by stream
+    losses: tuple[LossEntry, ...] = ()
+    clocks: tuple[Clock, ...] = ()
+
+
+class Convention(Record, frozen=True, kw_only=True):
+    """A self-test of signs and frames on this campaign's own data."""
+
+    check: str
+    expected: str
+    found: str
+    ok: bool
+
+
+class FittedParameter(Record, frozen=True, kw_only=True):
+    """A parameter before (prior) and after a fit."""
+
+    name: str
+    unit: str
+    prior: float | None
+    prior_sigma: float | None
+    value: float
+    sigma: float
+
+
+class Check(Record, frozen=True, kw_only=True):
+    """A named check on a fit."""
+
+    name: str
+    ok: bool
+    detail: str = ""
+
+
+class GravityChannel(Record, frozen=True, kw_only=True):
+    """How much gravity there was on a channel, and how much of it is left."""
+
+    channel: str
+    unit: str
+    static_peak: float | None  # greatest magnitude of the static model
+    residual_rms: float | None  # measured less static
+    encoder_sigma: float | None  # of the static wrench, from the angles' uncertainty
+    model_sigma: float | None = None  # of the static wrench, from the fitted parameters' covariance
+
+
+class Gravity(Record, frozen=True, kw_only=True):
+    """The gravity (and where identified, inertia) fit."""
+
+    parameters: tuple[FittedParameter, ...]
+    channels: tuple[GravityChannel, ...]
+    checks: tuple[Check, ...] = ()
+    samples: int = 0
+    reduced_chi_square: float | None = None
+    feasible: str = ""  # a sentence: is computed gravity compensation feasible?
+
+
+class Contribution(Record, frozen=True, kw_only=True):
+    """A standard deviation or rms that one cause contributes to one channel."""
+
+    channel: str
+    unit: str
+    value: float
+
+
+class CrossCoupling(Record, frozen=True, kw_only=True):
+    """raw = (I + matrix) wrench: rows are raw channels, columns true ones; SI units by channel pair."""
+
+    channels: tuple[str, ...]
+    matrix: tuple[tuple[float, ...], ...]
+    sigma: tuple[tuple[float, ...], ...]
+    largest: str  # a sentence: the largest coupling and its effect
+    contributions: tuple[Contribution, ...] = ()  # rms taken away from each channel
+
+
+class Band(Record, frozen=True, kw_only=True):
+    """A frequency band and how it was cut out."""
+
+    name: str  # as in the tables' file names
+    label: str
+    high_pass_Hz: float | None
+    low_pass_Hz: float | None
+    method: str
+    edge_s: float = 0.0  # at each end, where the filter's transient exceeds `edge_error`
+    edge_error: float | None = None  # relative to the signal
+
+
+class Repeatability(Record, frozen=True, kw_only=True):
+    """Signal and noise of one channel over the repeats of a trajectory, rms in `unit`."""
+
+    trajectory: str
+    band: str
+    frame: Frame
+    channel: str
+    unit: str
+    signal_rms: float | None
+    noise_rms: float | None
+    ratio: float | None
+    n: int
+
+
+class Merit(Record, frozen=True, kw_only=True):
+    """Figures of merit of a prediction on one channel of one recording, in one band."""
+
+    recording: str
+    role: Role
+    band: str
+    frame: Frame
+    channel: str
+    unit: str
+    measured_rms: float | None
+    predicted_rms: float | None
+    residual_rms: float | None
+    measured_peak: float | None
+    predicted_peak: float | None
+    correlation: float | None
+    fraction_of_variance: float | None  # 1 - var(measured - predicted) / var(measured)
+    spectral_ratio: float | None  # predicted over measured power within the band
+    pessimism: float | None  # predicted over measured peak
+    sigma: float | None = None  # of the measured channel in this band
+
+
+class Resonance(Record, frozen=True, kw_only=True):
+    """A resonance of the article on the transducer."""
+
+    axis: str
+    frequency_Hz: float
+    source: str
+    sigma_Hz: float | None = None
+
+
+class BudgetItem(Record, frozen=True, kw_only=True):
+    """One stage's part in a channel's uncertainty."""
+
+    stage: str
+    source: str
+    sigma: float
+
+
+class Budget(Record, frozen=True, kw_only=True):
+    """The uncertainty budget of one channel in one band; `total` is the root sum of squares."""
+
+    channel: str
+    unit: str
+    frame: Frame
+    band: str
+    contributions: tuple[BudgetItem, ...]
+    total: float
+
+
+class Constant(Record, frozen=True, kw_only=True):
+    """A constant that the processing used; arrays are printed as text."""
+
+    name: str
+    value: float | str
+    unit: str
+    sigma: float | str | None
+    source: str
+
+
+class InputFile(Record, frozen=True, kw_only=True):
+    """A file that the results depend on."""
+
+    file: str
+    sha256: str
+
+
+class Provenance(Record, frozen=True, kw_only=True):
+    """What made these results."""
+
+    version: str
+    python: str
+    libraries: dict[str, str]
+    platform: str
+    command: str
+    commit: str = ""
+    inputs: tuple[InputFile, ...] = ()
+
+
+class Results(Record, frozen=True, kw_only=True):
+    """results.json."""
+
+    campaign: CampaignSummary
+    verdict: Conclusion
+    provenance: Provenance
+    schema: Literal[1] = SCHEMA_VERSION
+    requirements: tuple[Requirement, ...] = ()
+    warnings: tuple[Notice, ...] = ()
+    recordings: tuple[Recording, ...] = ()
+    conventions: tuple[Convention, ...] = ()
+    gravity: Gravity | None = None
+    cross_coupling: CrossCoupling | None = None
+    bands: tuple[Band, ...] = ()
+    repeatability: tuple[Repeatability, ...] = ()
+    merit: tuple[Merit, ...] = ()
+    resonances: tuple[Resonance, ...] = ()
+    budget: tuple[Budget, ...] = ()
+    methods: str = ""  # paragraphs, separated by empty lines
+    parameters: tuple[Constant, ...] = ()
+    notes: tuple[str, ...] = ()  # assumptions to be said aloud: how torques were moved to S, for one
+
+
+def encode(results: Results) -> bytes:
+    """Return results.json: indented, the same bytes for the same results; NaN and infinities become null."""
+    compact = msgspec.json.encode(results, order="deterministic")
+    return msgspec.json.format(compact, indent=2) + b"\n"
+
+
+def decode(content: bytes, where: str = "results.json") -> Results:
+    """Return the results in `content`, or say which field is wrong."""
+    try:
+        return msgspec.json.decode(content, type=Results)
+    except (msgspec.ValidationError, msgspec.DecodeError) as error:
+        raise OutputError(
+            f"not a results file of this version: {error}",
+            where=where,
+            remedy="process the campaign again: kbs-process CAMPAIGN",
+        ) from None
+
+
+def load(folder: Path) -> Results:
+    """Return the results of a results folder."""
+    path = folder / "results.json"
+    try:
+        content = path.read_bytes()
+    except FileNotFoundError:
+        raise OutputError(
+            "no results here",
+            where=str(path),
+            remedy="give a results folder (reports/NAME), or process the campaign first",
+        ) from None
+    return decode(content, str(path))
+
+
+def schema() -> dict[str, Any]:
+    """Return the JSON Schema of results.json."""
+    (entry,), definitions = msgspec.json.schema_components((Results,), ref_template="#/$defs/{name}")
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "Results of a processed campaign",
+        **entry,
+        "$defs": definitions,
+    }
+
+
+if __name__ == "__main__":
+    print(json.dumps(schema(), indent=2))
