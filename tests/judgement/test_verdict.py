@@ -11,7 +11,7 @@ from kbs_process.stages.verdict import extremes, judge
     ("value", "sigma", "verdict"),
     [
         (0.04, 0.005, "pass"),
-        (0.05, 0.005, "pass"),
+        (0.0499, 0.005, "pass"),
         (0.0501, 0.005, "undecided"),
         (0.0699, 0.005, "undecided"),
         (0.0701, 0.005, "fail"),
