@@ -1,0 +1,158 @@
+"""The drives' physics, compiled: one real-time cycle of motors and gearboxes around MuJoCo's rigid bodies.
+
+Time stepping is the leapfrog that MuJoCo's semi-implicit Euler step is: velocities at t_n, positions and
+forces at t_n + dt/2. Every force that changes abruptly is taken as its mean over the step:
+
+- the field's microsteps by the time that each of them lasts within the step,
+- the edges of a stiction zone by the part of the step that lies within.
+
+Friction is implicit (Moreau): the rate at the end of the step solves
+
+    Jr (w1 - w0)/dt = T - b_m (w0 + w1)/2 - c clip((w0 + w1)/2 / w_dyn, -1, 1) - tau,  tau in Ts0 Sgn(w1)
+
+exactly, case by case: it slides forwards, it slides backwards, or it sticks (w1 = 0) and tau is
+whatever holds it. No regularisation, no threshold speed.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+
+from engine.hardware import Hardware
+
+_STEPS = 200  # electrical and tooth cycles: T_cog and T_stat repeat 200 times a motor turn
+_ELECTRICAL = np.pi / 64  # electrical angle of a microstep, rad
+
+
+class DriveNumbers(NamedTuple):
+    """One axis's motor and gearbox, SI; symbols as in docs/plant's drive equations."""
+
+    Jr: float
+    R: float
+    microsteps: float  # a motor turn
+    Tmax: float
+    Kangle: float
+    tcog: float
+    phi_cog: float
+    b_m: float
+    d0: float
+    d1: float
+    phi_dyn: float
+    w_dyn: float
+    Ts0: float
+    delta: float
+    phi_stat: float
+    fsv: float
+    Ka: float
+
+
+def drive_numbers(hardware: Hardware, axis: str) -> DriveNumbers:
+    """Collect the numbers of one axis's drive."""
+    named = {"Jr": "rotor_inertia", "R": "ratio", "microsteps": "steps_per_turn"}
+    return DriveNumbers(*(hardware.drive(axis, named.get(field, field)) for field in DriveNumbers._fields))
+
+
+@njit(error_model="numpy")
+def motor_torque(p: DriveNumbers, th_r: float, field_0: float, field_1: float) -> float:
+    """Mean of Tmax sin(pi/64 NN - Kangle th_r) while the field moves from field_0 to field_1 (motor rad), N m.
+
+    NN is the whole microstep nearest to the field at every instant.
+    """
+    x0 = field_0 * p.microsteps / (2 * np.pi)
+    x1 = field_1 * p.microsteps / (2 * np.pi)
+    low, high = min(x0, x1), max(x0, x1)
+    first, last = np.floor(low + 0.5), np.floor(high + 0.5)
+    if first == last:
+        return p.Tmax * np.sin(_ELECTRICAL * first - p.Kangle * th_r)
+    total = 0.0
+    for k in range(int(last - first) + 1):
+        NN = first + k
+        lasts = min(high, NN + 0.5) - max(low, NN - 0.5)
+        total += lasts * np.sin(_ELECTRICAL * NN - p.Kangle * th_r)
+    return p.Tmax * total / (high - low)
+
+
+@njit(error_model="numpy")
+def stiction_level(p: DriveNumbers, th_r: float, w: float, dt: float) -> float:
+    """Mean over the step of the Coulomb torque's level: Ts0 inside a tooth's zone, else 0, N m."""
+    phase = _STEPS * th_r + p.phi_stat
+    distance = p.delta - abs(phase - 2 * np.pi * np.round(phase / (2 * np.pi)))
+    width = max(_STEPS * abs(w) * dt, 1e-12)
+    return p.Ts0 * min(max(distance / width + 0.5, 0.0), 1.0)
+
+
+@njit(error_model="numpy")
+def _sliding_rate(p: DriveNumbers, rhs: float, w0: float, c: float, h: float) -> float:
+    """Solve w1 + h (b_m (w0 + w1)/2 + c clip((w0 + w1)/2 / w_dyn, -1, 1)) = rhs for w1, rad/s."""
+    b = 0.5 * h * p.b_m
+    s = 0.5 * h * c / p.w_dyn
+    w1 = (rhs - (b + s) * w0) / (1 + b + s)
+    mean = 0.5 * (w0 + w1)
+    if abs(mean) <= p.w_dyn:
+        return w1
+    return (rhs - b * w0 - h * c * np.sign(mean)) / (1 + b)
+
+
+@njit(error_model="numpy")
+def friction_torque(p: DriveNumbers, T: float, th_r: float, w0: float, dt: float) -> float:
+    """Return T_motf + T_dyn + T_stat over one step, given the torque T of everything else, N m."""
+    h = dt / p.Jr
+    c = p.d0 + p.d1 * np.sin(2 * th_r + p.phi_dyn)
+    level = stiction_level(p, th_r, w0, dt)
+    free = w0 + h * T
+    w1 = 0.0
+    forwards = _sliding_rate(p, free - h * level, w0, c, h)
+    if forwards > 0:
+        w1 = forwards
+    else:
+        backwards = _sliding_rate(p, free + h * level, w0, c, h)
+        if backwards < 0:
+            w1 = backwards
+    return (free - w1) / h
+
+
+@njit(error_model="numpy")
+def bungee_force(cord: tuple[float, float, float, float, float], at: Any, force: Any) -> None:
+    """Write into `force` what a cord (anchor x, y, z, stiffness, free length) pulls at a point with, N."""
+    x, y, z = cord[0] - at[0], cord[1] - at[1], cord[2] - at[2]
+    length = np.sqrt(x * x + y * y + z * z)
+    tension = cord[3] * max(length - cord[4], 0.0)
+    force[0], force[1], force[2] = tension * x / length, tension * y / length, tension * z / length
+
+
+@njit(error_model="numpy")
+def run_cycle(
+    mj_step: Any, model: int, data: int, state: Any, az: DriveNumbers, el: DriveNumbers, cord: Any, field: Any,
+    dt: float, wrench: Any, q: Any,
+) -> None:  # fmt: skip
+    """Integrate one real-time cycle while each field moves linearly from field[0] to field[1].
+
+    `state` holds views of MuJoCo's own qpos, qvel, qacc, qfrc_applied, sensordata, the antenna's xipos
+    and its row of xfrc_applied. Row n of `wrench` (n, 6) and `q` (n, 7) belongs to t = (n + 1/2) dt.
+    """
+    qpos, qvel, qacc, qfrc, sensor, xipos, xfrc = state
+    steps = len(wrench)
+    for n in range(steps):
+        for axis in range(2):
+            p = az if axis == 0 else el
+            rotor = 3 + 2 * axis
+            th_r, th_l = qpos[rotor], qpos[rotor + 1]
+            w_r = qvel[rotor] + 0.5 * dt * qacc[rotor]
+            w_l = qvel[rotor + 1] + 0.5 * dt * qacc[rotor + 1]
+            T_gear = p.fsv * (w_r / p.R - w_l) + p.Ka * (th_r / p.R - th_l)
+            travel = field[1, axis] - field[0, axis]
+            T = motor_torque(
+                p, th_r, field[0, axis] + travel * (n / steps), field[0, axis] + travel * ((n + 1) / steps)
+            )
+            T += p.tcog * np.sin(_STEPS * th_r + p.phi_cog) - T_gear / p.R
+            qfrc[rotor] = T - friction_torque(p, T, th_r, qvel[rotor], dt)
+            qfrc[rotor + 1] = T_gear
+        if cord[3] > 0:
+            bungee_force(cord, xipos, xfrc)
+        q[n] = qpos
+        mj_step(model, data)
+        for channel in range(6):
+            wrench[n, channel] = -sensor[channel]

@@ -1,0 +1,207 @@
+"""The paper's test trajectories (table 2) as commands: desired position and rate, one a real-time cycle.
+
+Each axis follows a list of stretches of constant acceleration, so that positions and rates are
+exact and limits can be read off. Numbers in this file are in degrees; commands are in radians.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from engine.hardware import Array
+
+CYCLE = 0.1  # s
+RATE_LIMIT = 2.0  # deg/s
+ACCELERATION_LIMIT = 0.015  # deg/s^2, in normal operation
+RANGE = {"az": (-165.0, 165.0), "el": (-30.0, 90.0)}  # deg
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Commands:
+    """Desired angles and rates, one row a real-time cycle."""
+
+    t: Array  # (n,) s
+    position: Array  # (n, 2) rad: az, el
+    rate: Array  # (n, 2) rad/s
+
+    def until(self, t: float) -> Commands:
+        """Return the commands up to and including time t."""
+        keep = self.t <= t + 1e-9
+        return Commands(self.t[keep], self.position[keep], self.rate[keep])
+
+
+@dataclass(frozen=True, slots=True)
+class Axis:
+    """One axis's profile: where it starts, then stretches (duration s, acceleration deg/s^2)."""
+
+    start: float  # deg
+    stretches: tuple[tuple[float, float], ...] = ()
+
+    def rest(self, duration: float) -> Axis:
+        """Keep the present rate (zero after a move) for `duration`."""
+        return replace(self, stretches=(*self.stretches, (duration, 0.0)))
+
+    def accelerate(self, rate: float, acceleration: float = ACCELERATION_LIMIT) -> Axis:
+        """Change to `rate` (deg/s) at a constant acceleration."""
+        change = rate - self.now()[1]
+        stretch = (abs(change) / acceleration, float(np.copysign(acceleration, change)))
+        return replace(self, stretches=(*self.stretches, stretch))
+
+    def move(
+        self, distance: float, rate: float = RATE_LIMIT, acceleration: float = ACCELERATION_LIMIT
+    ) -> Axis:
+        """Move by `distance` (deg) from rest to rest: accelerate, coast at `rate` where it is reached, brake."""
+        peak = min(rate, float(np.sqrt(abs(distance) * acceleration)))
+        ramp = peak / acceleration
+        coast = abs(distance) / peak - ramp
+        a = float(np.copysign(acceleration, distance))
+        return replace(self, stretches=(*self.stretches, (ramp, a), (coast, 0.0), (ramp, -a)))
+
+    def now(self) -> tuple[float, float]:
+        """Position (deg) and rate (deg/s) after the last stretch."""
+        position, rate = self.start, 0.0
+        for duration, a in self.stretches:
+            position += rate * duration + 0.5 * a * duration**2
+            rate += a * duration
+        return position, rate
+
+    def duration(self) -> float:
+        """Time until the end of the last stretch, s."""
+        return sum(duration for duration, _ in self.stretches)
+
+    def stopped(self, t: float, acceleration: float = ACCELERATION_LIMIT) -> Axis:
+        """Cut the profile at time t and ramp its rate to zero: the controller's stop mode."""
+        kept: list[tuple[float, float]] = []
+        left = t
+        for duration, a in self.stretches:
+            kept.append((min(duration, left), a))
+            left -= duration
+            if left <= 0:
+                break
+        return replace(self, stretches=tuple(kept)).accelerate(0.0, acceleration)
+
+    def sampled(self, t: Array) -> tuple[Array, Array]:
+        """Position (deg) and rate (deg/s) at times t."""
+        position, rate = np.empty_like(t), np.empty_like(t)
+        x, v, begin = self.start, 0.0, 0.0
+        for duration, a in (*self.stretches, (np.inf, 0.0)):
+            inside = t >= begin
+            s = t[inside] - begin
+            position[inside] = x + v * s + 0.5 * a * s**2
+            rate[inside] = v + a * s
+            if np.isfinite(duration):
+                x, v, begin = x + v * duration + 0.5 * a * duration**2, v + a * duration, begin + duration
+                v = 0.0 if abs(v) < 1e-12 else v
+        return position, rate
+
+
+def commands(az: Axis, el: Axis, duration: float) -> Commands:
+    """Sample both axes once a real-time cycle, from 0 to `duration` (s). Raises ValueError beyond the range."""
+    t = CYCLE * np.arange(round(duration / CYCLE) + 1)
+    sampled = [az.sampled(t), el.sampled(t)]
+    position, rate = (np.column_stack([axis[k] for axis in sampled]) for k in (0, 1))
+    for name, column in zip(RANGE, position.T, strict=True):
+        low, high = RANGE[name]
+        if column.min() < low or column.max() > high:
+            raise ValueError(f"{name} runs from {column.min():.2f} to {column.max():.2f} deg")
+    if np.abs(rate).max() > RATE_LIMIT * (1 + 1e-9):
+        raise ValueError(f"rate of {np.abs(rate).max():.3f} deg/s")
+    return Commands(t, np.radians(position), np.radians(rate))
+
+
+def azps_ata() -> Commands:
+    """Pseudo-static azimuth sweeps at elevations 70, 78.5 and 87 deg: calibration, CoG, orthogonality.
+
+    Sweeps over +-150 deg at 0.015 deg/s^2 would take 1000 s. Here, out of the flight's envelope, at
+    0.15 deg/s^2 and up to 2 deg/s: the motion's own wrench stays below 2e-3 N and 3e-3 N m.
+    """
+    quick = 0.15  # deg/s^2
+    az, el = Axis(-150.0).rest(5.0), Axis(70.0).rest(5.0)
+    for sweep, elevation in enumerate((78.5, 87.0, None)):
+        az = az.move(300.0 if sweep % 2 == 0 else -300.0, acceleration=quick).rest(3.0)
+        el = el.rest(az.duration() - el.duration())
+        if elevation is not None:
+            el = el.move(elevation - el.now()[0], acceleration=quick).rest(3.0)
+            az = az.rest(el.duration() - az.duration())
+    return commands(az, el, az.duration())
+
+
+def _aesing() -> tuple[Axis, Axis]:
+    az = Axis(-60.0).rest(10.0).move(120.0)
+    half = np.sqrt(120.0 / ACCELERATION_LIMIT)  # s: azimuth is fastest when elevation is highest
+    a = 4 * 9.0 / half**2
+    el = Axis(80.0).rest(10.0).move(9.0, acceleration=a).move(-9.0, acceleration=a)
+    return az, el
+
+
+def aesing00() -> Commands:
+    """A pass close to the singularity: elevation 80 to 89 deg and back, azimuth -60 to 60 deg, fastest on top."""
+    return commands(*_aesing(), 200.0)
+
+
+def aestpp00() -> Commands:
+    """AESING00 with a stop just after the greatest elevation rate."""
+    az, el = _aesing()
+    return commands(az.stopped(70.0), el.stopped(70.0), 150.0)
+
+
+def _el089() -> tuple[Axis, Axis]:
+    return Axis(0.0), Axis(70.0).rest(60.0).move(17.0, rate=0.3)
+
+
+def el089p00() -> Commands:
+    """Elevation pre-pointing, 70 to 87 deg at 0.3 deg/s and 0.015 deg/s^2, between rests; 200 s."""
+    return commands(*_el089(), 200.0)
+
+
+def elstpp00() -> Commands:
+    """EL089P00 with a stop in the middle of the coasting part."""
+    az, el = _el089()
+    return commands(az, el.stopped(98.0), 150.0)
+
+
+def acq600() -> Commands:
+    """Hand-over: track one relay satellite slowly, slew to the other on both axes, track it, at high elevation."""
+    az = Axis(-35.0).rest(20.0).accelerate(0.06).rest(36.0).accelerate(0.0).move(70.0, rate=1.0)
+    az = az.accelerate(-0.03).rest(60.0)
+    el = Axis(74.0).rest(20.0).accelerate(0.03).rest(38.0).accelerate(0.0).move(10.0, rate=0.4)
+    return commands(az, el.accelerate(0.02).rest(60.0), 280.0)
+
+
+_BUNGEE_ACCELERATION = (
+    0.25  # deg/s^2: the paper, too, left the flight's limit to reach 2 deg/s within +-12 deg
+)
+
+
+def _al012() -> tuple[Axis, Axis]:
+    az = Axis(-12.0).rest(15.0)
+    for sweep in range(6):
+        az = az.move(24.0 if sweep % 2 == 0 else -24.0, acceleration=_BUNGEE_ACCELERATION).rest(8.0)
+    return az, Axis(0.0)
+
+
+def al012m00() -> Commands:
+    """Azimuth between -12 and 12 deg at up to 2 deg/s, elevation 0, on the bungee."""
+    az, el = _al012()
+    return commands(az, el, az.duration())
+
+
+def alstpp00() -> Commands:
+    """AL012M00 with a stop in the middle of the third sweep."""
+    az, el = _al012()
+    return commands(az.stopped(81.0, _BUNGEE_ACCELERATION), el, 120.0)
+
+
+TRAJECTORIES: dict[str, Callable[[], Commands]] = {
+    "AZPS_ATA": azps_ata,
+    "AESING00": aesing00,
+    "AESTPP00": aestpp00,
+    "EL089P00": el089p00,
+    "ELSTPP00": elstpp00,
+    "ACQ600": acq600,
+    "AL012M00": al012m00,
+    "ALSTPP00": alstpp00,
+}
