@@ -1,0 +1,54 @@
+"""The chain of links, from the laboratory outwards: lab -> T -> az -> el."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from kbs_process.campaign.documents import Key, Merged, Tree
+from kbs_process.campaign.problems import Problems
+from kbs_process.errors import did_you_mean
+from kbs_process.rig.model import LAB, TRANSDUCER
+
+
+def order(
+    joints: Mapping[str, Tree], transducer_on: str, tables: Merged, problems: Problems
+) -> tuple[str, ...]:
+    """Return the names of the joints from the laboratory outwards.
+
+    Notes a parent that does not exist, two links on one parent, and links that do not lead to the laboratory.
+    """
+    parents = {TRANSDUCER: transducer_on} | {name: table["parent"] for name, table in joints.items()}
+    places: dict[str, Key] = {name: ("joint", name, "parent") for name in joints}
+    places[TRANSDUCER] = ("transducer", "on")
+
+    for reserved in {LAB, TRANSDUCER} & set(joints):
+        problems.add(
+            tables.place(("joint", reserved)), f"'{reserved}' is a reserved name", "rename the joint"
+        )
+    children: dict[str, str] = {}
+    for link, parent in parents.items():
+        place = tables.place(places[link])
+        known = {LAB, *parents} - {link}
+        if parent not in known:
+            problems.add(place, f"'{parent}' is no other link", did_you_mean(parent, known))
+        elif parent in children:
+            problems.add(
+                place,
+                f"'{parent}' carries '{children[parent]}' already: the links must form one chain",
+                f"mount '{link}' on the last link of the chain, or '{children[parent]}' on '{link}'",
+            )
+        else:
+            children[parent] = link
+
+    chain: list[str] = []
+    link = LAB
+    while link in children:
+        link = children[link]
+        chain.append(link)
+    for link in parents.keys() - set(chain) if not problems.found else ():
+        problems.add(
+            tables.place(places[link]),
+            f"'{link}' is not connected to the laboratory",
+            f"let one link be mounted on '{LAB}' (transducer.on = \"{LAB}\", or a joint's parent)",
+        )
+    return tuple(link for link in chain if link != TRANSDUCER) or tuple(joints)

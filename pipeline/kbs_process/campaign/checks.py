@@ -1,0 +1,155 @@
+"""What no schema can check: that the parts of a campaign agree with each other and with the disk."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from kbs_process.campaign.config import Campaign, RecordingEntry
+from kbs_process.campaign.documents import Document, Key, Merged, shown
+from kbs_process.campaign.problems import Problems
+from kbs_process.campaign.provenance import sha256
+from kbs_process.errors import did_you_mean
+from kbs_process.plant.effects import CATALOGUE
+from kbs_process.rig.model import Joint
+
+
+def check_campaign(
+    campaign: Campaign, document: Document, tables: Merged, problems: Problems, *, checksums: bool
+) -> None:
+    """Note everything in which the campaign contradicts itself or the files on disk."""
+    _check_effects(document, problems)
+    _check_drive(campaign, document, tables, problems)
+    _check_topics(campaign, document, problems)
+    _check_bands(campaign, document, problems)
+    for index, entry in enumerate(campaign.recordings):
+        _check_recording(campaign, index, entry, document, problems)
+    if checksums and not problems.found:
+        for index, entry in enumerate(campaign.recordings):
+            _check_checksum(index, entry, document, problems)
+
+
+def _check_effects(document: Document, problems: Problems) -> None:
+    known = {effect.name for effect in CATALOGUE}
+    for index, name in enumerate(document.tree.get("model", {}).get("effects", [])):
+        if name not in known:
+            place = document.place(("model", "effects", index))
+            problems.add(place, f"there is no effect '{name}'", did_you_mean(name, known))
+
+
+def _check_drive(campaign: Campaign, document: Document, tables: Merged, problems: Problems) -> None:
+    """Commands drive a controller and a drive on every joint; a motion is measured angles or rates."""
+    topics, rig = campaign.topics, campaign.rig
+    place = document.place(("drive",))
+    if campaign.drive == "motion":
+        if topics.angle is None and topics.rate is None:
+            remedy = "name the topic of the encoders or of the rates under [topics]"
+            problems.add(place, '"motion" needs measured angles or rates', remedy)
+        return
+    if topics.command is None:
+        problems.add(
+            place, '"command" needs commands', 'name their topic under [topics], or set drive = "motion"'
+        )
+    if topics.angle is None:
+        problems.add(
+            place, '"command" needs encoder angles to compare with', "name their topic under [topics]"
+        )
+    if not campaign.effects:
+        remedy = "name the effects of the nominal model under [model]"
+        problems.add(place, '"command" needs a model of the drives', remedy)
+    if rig.controller is None:
+        problems.add(tables.place(("controller",)), "is missing", 'describe it, or set drive = "motion"')
+    for joint in rig.joints:
+        _check_joint(joint, campaign.effects, tables, problems)
+
+
+def _check_joint(joint: Joint, effects: tuple[str, ...], tables: Merged, problems: Problems) -> None:
+    key: Key = ("joint", joint.name, "drive")
+    if joint.drive is None:
+        problems.add(tables.place(key), "is missing", 'describe the drive, or set drive = "motion"')
+        return
+    for effect in CATALOGUE:
+        for parameter in effect.parameters:
+            place = tables.place((*key, "parameters", parameter.name))
+            quantity = joint.drive.parameters.get(parameter.name)
+            if quantity is None and effect.name in effects:
+                remedy = f"give it ({parameter.description}, {parameter.unit}), or leave the effect out"
+                problems.add(place, f"is missing, although the model contains '{effect.name}'", remedy)
+            low, high = parameter.bounds
+            if quantity is not None and not low <= float(quantity) <= high:
+                what = f"{float(quantity):g} {parameter.unit} is out of bounds"
+                problems.add(place, what, f"give {low:g} to {high:g} {parameter.unit}")
+
+
+def _check_topics(campaign: Campaign, document: Document, problems: Problems) -> None:
+    names = {"angle": "encoder"}
+    for topic in campaign.topics.present():
+        if len(topic.fields) != len(topic.channels):
+            problems.add(
+                document.place(("topics", names.get(topic.key, topic.key), "fields")),
+                f"lists {len(topic.fields)} fields for {len(topic.channels)} channels",
+                f"give one for each of {', '.join(topic.channels)}",
+            )
+
+
+def _check_bands(campaign: Campaign, document: Document, problems: Problems) -> None:
+    bands = campaign.bands
+    place = document.place(("bands", "low_pass_Hz"))
+    if bands.low_pass[0] <= bands.high_pass:
+        what = f"{bands.low_pass[0]:g} Hz is not above the high-pass, {bands.high_pass:g} Hz"
+        problems.add(place, what, "give greater edges, or lower high_pass_Hz")
+    if bands.low_pass[-1] >= bands.working_rate / 2.0:
+        what = (
+            f"{bands.low_pass[-1]:g} Hz is not below half the working rate, {bands.working_rate / 2.0:g} Hz"
+        )
+        problems.add(place, what, "raise working_rate_Hz (10 times the greatest edge is plenty)")
+    for index, requirement in enumerate(campaign.requirements):
+        low, high = requirement.band
+        place = document.place(("requirement", index, "band_Hz"))
+        if not low < high:
+            problems.add(place, f"[{low:g}, {high:g}] is empty", "give the lower edge first")
+        elif low < bands.high_pass or high > bands.low_pass[-1]:
+            wide = f"{bands.high_pass:g} to {bands.low_pass[-1]:g} Hz"
+            problems.add(place, f"reaches beyond the [bands], {wide}", "widen the bands, or narrow this one")
+        if requirement.frame == "S" and campaign.rig.spacecraft is None:
+            place = document.place(("requirement", index, "frame"))
+            what = '"S" needs to know where the spacecraft\'s centre of mass is'
+            problems.add(place, what, 'describe [spacecraft] in a parameter file, or use frame = "T"')
+
+
+def _check_recording(
+    campaign: Campaign, index: int, entry: RecordingEntry, document: Document, problems: Problems
+) -> None:
+    key: Key = ("recording", index)
+    if not entry.path.is_file():
+        place = document.place((*key, "file"))
+        problems.add(place, f"the recording '{shown(entry.path)}' does not exist", _neighbour(entry.path))
+    if entry.start is not None and entry.end is not None and entry.end <= entry.start:
+        place = document.place((*key, "end_s"))
+        problems.add(place, f"{entry.end:g} is not after start_s, {entry.start:g}", "give a later end")
+    for other in campaign.recordings[:index]:
+        if other.name == entry.name:
+            place = document.place((*key, "file"))
+            what = f"a recording before it is called '{entry.name}' too, and results are named by it"
+            problems.add(place, what, "rename one of the files, or list it once")
+        elif (other.trajectory, other.repeat) == (entry.trajectory, entry.repeat):
+            place = document.place((*key, "repeat"))
+            what = f"run {entry.repeat} of {entry.trajectory} is '{other.name}' already"
+            problems.add(place, what, "number the repeats 1, 2, 3")
+
+
+def _neighbour(missing: Path) -> str:
+    """Return a remedy for a file that is missing: a name like it in its folder, or where to put it."""
+    if not missing.parent.is_dir():
+        return f"the folder '{shown(missing.parent)}' does not exist either: put the recordings there"
+    others = [path.name for path in missing.parent.iterdir() if path.is_file()]
+    return did_you_mean(missing.name, others) if others else "its folder is empty: put the recordings there"
+
+
+def _check_checksum(index: int, entry: RecordingEntry, document: Document, problems: Problems) -> None:
+    if entry.sha256 is None or (found := sha256(entry.path)) == entry.sha256:
+        return
+    problems.add(
+        document.place(("recording", index, "sha256")),
+        f"'{shown(entry.path)}' has the SHA-256 {found}, not {entry.sha256} as stated",
+        "fetch the recording again, or, if it is the right one, state its checksum here",
+    )

@@ -1,0 +1,105 @@
+"""A campaign as frozen data: what `load` makes of campaign.toml and the parameter files."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from kbs_process.rig.model import Rig
+
+
+@dataclass(frozen=True, slots=True)
+class Requirement:
+    """A limit on the disturbance; every axis must meet it alone."""
+
+    name: str
+    quantity: Literal["torque", "force"]
+    frame: Literal["S", "T"]  # at the spacecraft's centre of mass, or at the transducer
+    statistic: Literal["peak", "rms"]
+    limit: float  # in `unit`
+    unit: str  # "N m" or "N"
+    band: tuple[float, float]  # Hz
+    source: str
+
+
+@dataclass(frozen=True, slots=True)
+class Bands:
+    """The frequency bands in which histories are compared."""
+
+    high_pass: float  # Hz, lower edge of all bands; 0 is none
+    low_pass: tuple[float, ...]  # Hz, upper edges, ascending
+    working_rate: float  # Hz, sampling rate of all stages
+
+
+@dataclass(frozen=True, slots=True)
+class Topic:
+    """Where a stream of the pipeline is in a recording."""
+
+    key: str  # the stream: "wrench", "angle", "rate", "command", "field" or "temperature"
+    topic: str
+    fields: tuple[str, ...]  # place of each channel in a message: "wrench.force.x", "position[az]"
+    channels: tuple[str, ...]  # names of the channels: "Fx"; "az"; "az.rate"
+
+
+@dataclass(frozen=True, slots=True)
+class Topics:
+    """The streams of a campaign's recordings; None where the rig records no such thing."""
+
+    wrench: Topic
+    angle: Topic | None
+    rate: Topic | None
+    command: Topic | None
+    field: Topic | None
+    temperature: Topic | None
+
+    def present(self) -> tuple[Topic, ...]:
+        """Return the streams that the campaign names, wrench first."""
+        streams = (self.wrench, self.angle, self.rate, self.command, self.field, self.temperature)
+        return tuple(stream for stream in streams if stream is not None)
+
+    def channels(self) -> Mapping[str, tuple[str, ...]]:
+        """Return the names of the channels by stream key."""
+        return {stream.key: stream.channels for stream in self.present()}
+
+
+@dataclass(frozen=True, slots=True)
+class RecordingEntry:
+    """One recording of a campaign, and what it is used for."""
+
+    name: str  # the file's stem; names the tables of this run
+    path: Path
+    trajectory: str
+    role: Literal["calibration", "fit", "held-out"]
+    repeat: int
+    sha256: str | None  # as the campaign states it, already found right
+    start: float | None  # s from the recording's start; what is before is left out
+    end: float | None  # s from the recording's start; what is after is left out
+
+
+@dataclass(frozen=True, slots=True)
+class Campaign:
+    """A campaign that passed every check."""
+
+    folder: Path
+    name: str
+    title: str
+    article: str
+    configuration: str
+    drive: Literal["command", "motion"]
+    requirements: tuple[Requirement, ...]
+    bands: Bands
+    topics: Topics
+    effects: tuple[str, ...]  # of the nominal model, in the catalogue's order
+    recordings: tuple[RecordingEntry, ...]
+    rig: Rig
+    inputs: tuple[Path, ...]  # files of the description: campaign.toml, parameter files, CSV matrices
+
+    def recording(self, name: str) -> RecordingEntry:
+        """Return the recording of that name."""
+        return next(entry for entry in self.recordings if entry.name == name)
+
+    def with_role(self, *roles: str) -> tuple[RecordingEntry, ...]:
+        """Return the recordings that have one of `roles`, in the campaign's order."""
+        return tuple(entry for entry in self.recordings if entry.role in roles)

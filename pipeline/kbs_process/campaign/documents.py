@@ -1,0 +1,189 @@
+"""TOML files as read: their text, their tables, and where in them a key stands."""
+
+from __future__ import annotations
+
+import math
+import re
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from kbs_process.campaign.problems import Problems
+from kbs_process.errors import ConfigError
+
+Tree = dict[str, Any]
+Key = tuple[str | int, ...]  # ("recording", 2, "file")
+
+_HEADER = re.compile(r"^\s*(\[\[?)\s*([^\[\]]+?)\s*\]\]?\s*(?:#.*)?$")
+_ASSIGNMENT = re.compile(r"^\s*([A-Za-z0-9_.\-\"' ]+?)\s*=")
+
+
+@dataclass(frozen=True, slots=True)
+class Document:
+    """One TOML file."""
+
+    path: Path
+    text: str
+    tree: Tree
+
+    def place(self, key: Key) -> str:
+        """Return "file:line: dotted key", the line being that of the key's nearest ancestor that has one."""
+        line = _line_of(self.text, key)
+        file = f"{shown(self.path)}:{line}" if line else shown(self.path)
+        return f"{file}: {dotted(key)}" if key else file
+
+
+def shown(path: Path) -> str:
+    """Return the path as a user would type it: relative to the working directory where it is below."""
+    path = path.absolute()
+    return str(path.relative_to(Path.cwd())) if path.is_relative_to(Path.cwd()) else str(path)
+
+
+def dotted(key: Key) -> str:
+    """Return the key in the notation of the error messages: "recording[2].file", counted from 1."""
+    text = ""
+    for part in key:
+        text += f"[{part + 1}]" if isinstance(part, int) else f".{part}" if text else part
+    return text
+
+
+def read(path: Path, *, role: str, remedy: str) -> Document:
+    """Read one TOML file; `role` says what it is for in the message when it is missing."""
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (FileNotFoundError, NotADirectoryError) as error:
+        raise ConfigError(f"{role} does not exist", where=shown(path), remedy=remedy) from error
+    except UnicodeDecodeError as error:
+        raise ConfigError(
+            f"is not UTF-8 text (byte {error.start})", where=shown(path), remedy="save the file as UTF-8"
+        ) from error
+    except OSError as error:
+        raise ConfigError(
+            f"cannot be read: {error.strerror}",
+            where=shown(path),
+            remedy="check the file and its permissions",
+        ) from error
+    try:
+        return Document(path, text, tomllib.loads(text))
+    except tomllib.TOMLDecodeError as error:
+        message, line = _decode_error(str(error), text)
+        raise ConfigError(
+            f"is not valid TOML: {message}", where=f"{shown(path)}:{line}", remedy="correct this line"
+        ) from error
+
+
+def _decode_error(message: str, text: str) -> tuple[str, int]:
+    """Split "Invalid value (at line 3, column 5)" into the message and the line."""
+    match = re.search(r"\s*\(at (?:line (\d+), column (\d+)|end of document)\)$", message)
+    if match is None:
+        return message, 1
+    bare = message[: match.start()]
+    if match.group(1) is None:
+        return f"{bare} at the end of the file", text.count("\n") + 1
+    return f"{bare} (column {match.group(2)})", int(match.group(1))
+
+
+def check_finite(document: Document, problems: Problems) -> None:
+    """Refuse the NaN and infinities that TOML allows: no number of a campaign may be either."""
+    for key, value in _leaves(document.tree):
+        if isinstance(value, float) and not math.isfinite(value):
+            problems.add(
+                document.place(key), f"{value} is not a finite number", "give the number, or ask its source"
+            )
+
+
+def _leaves(node: Any, key: Key = ()) -> Iterator[tuple[Key, Any]]:
+    if isinstance(node, dict):
+        for name, value in node.items():
+            yield from _leaves(value, (*key, name))
+    elif isinstance(node, list):
+        for index, value in enumerate(node):
+            yield from _leaves(value, (*key, index))
+    else:
+        yield key, node
+
+
+@dataclass(frozen=True, slots=True)
+class Merged:
+    """Several documents as one tree that remembers which file each key comes from."""
+
+    tree: Tree
+    documents: tuple[Document, ...]
+
+    def place(self, key: Key) -> str:
+        """Return where `key` stands, or, where no file has it, the files and the key."""
+        document = max(self.documents, key=lambda document: _depth(document.tree, key))
+        if _depth(document.tree, key) == 0:
+            return f"{', '.join(shown(document.path) for document in self.documents)}: {dotted(key)}"
+        return document.place(key)
+
+
+def merge(documents: Sequence[Document], problems: Problems) -> Merged:
+    """Merge tables key by key; a value given twice is an error that names both places."""
+    tree: Tree = {}
+    for index, document in enumerate(documents):
+        for key in _merge_into(tree, document.tree, ()):
+            first = next(other for other in documents[:index] if _depth(other.tree, key) == len(key))
+            problems.add(
+                document.place(key),
+                f"is given in {first.place(key)} too",
+                "keep one of the two, delete the other",
+            )
+    return Merged(tree, tuple(documents))
+
+
+def _is_table(value: object) -> bool:
+    """Say whether a value is a table whose keys may be spread over files; a quantity is not."""
+    return isinstance(value, dict) and "value" not in value
+
+
+def _merge_into(tree: Tree, other: Mapping[str, Any], key: Key) -> Iterator[Key]:
+    for name, value in other.items():
+        if name not in tree:
+            tree[name] = _copied(value)
+        elif _is_table(tree[name]) and _is_table(value):
+            yield from _merge_into(tree[name], value, (*key, name))
+        else:
+            yield (*key, name)
+
+
+def _copied(value: Any) -> Any:
+    return {name: _copied(child) for name, child in value.items()} if isinstance(value, dict) else value
+
+
+def _depth(node: Any, key: Key) -> int:
+    """Return how many leading parts of `key` the tree has."""
+    for depth, part in enumerate(key):
+        in_table = isinstance(node, dict) and part in node
+        in_array = isinstance(node, list) and isinstance(part, int) and part < len(node)
+        if not (in_table or in_array):
+            return depth
+        node = node[part]
+    return len(key)
+
+
+def _line_of(text: str, key: Key) -> int | None:
+    """Return the line of the longest leading part of `key` that a header or an assignment spells out."""
+    best, best_line = 0, None
+    table: Key = ()
+    counts: dict[Key, int] = {}
+    for number, line in enumerate(text.splitlines(), start=1):
+        if header := _HEADER.match(line):
+            table = _split(header.group(2))
+            if header.group(1) == "[[":
+                index = counts[table] = counts.get(table, -1) + 1
+                table = (*table, index)
+            candidate = table
+        elif assignment := _ASSIGNMENT.match(line):
+            candidate = (*table, *_split(assignment.group(1)))
+        else:
+            continue
+        if len(candidate) > best and key[: len(candidate)] == candidate:
+            best, best_line = len(candidate), number
+    return best_line
+
+
+def _split(name: str) -> Key:
+    return tuple(part.strip().strip("\"'") for part in name.split("."))

@@ -1,0 +1,170 @@
+"""From a campaign's folder to a checked Campaign."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from kbs_process.campaign.checks import check_campaign
+from kbs_process.campaign.config import Bands, Campaign, RecordingEntry, Requirement, Topic, Topics
+from kbs_process.campaign.documents import Document, Merged, Tree, check_finite, merge, read
+from kbs_process.campaign.problems import Problems
+from kbs_process.campaign.rig_builder import RigBuilder
+from kbs_process.campaign.schema import violations
+from kbs_process.campaign.units import UnitMismatchError, factor
+from kbs_process.plant.effects import CATALOGUE
+from kbs_process.rig.model import Rig
+
+CAMPAIGN_FILE = "campaign.toml"
+
+
+def load_campaign(folder: Path, *, checksums: bool = True) -> Campaign:
+    """Read and check the campaign in `folder`.
+
+    Raises ConfigError with the file, the key and the remedy of up to five faults. `checksums` says
+    whether recordings are read through to compare the SHA-256 that the campaign states.
+    """
+    folder = folder.absolute()
+    problems = Problems(subject=str(folder))
+    document = read(
+        folder / CAMPAIGN_FILE,
+        role="the campaign's description",
+        remedy="name a folder that holds a campaign.toml",
+    )
+    check_finite(document, problems)
+    _check_schema(document, "campaign", problems)
+    problems.raise_any()
+
+    tables = _read_parameters(folder, document.tree["parameters"]["files"], problems)
+    units = {parameter.name: parameter.unit for effect in CATALOGUE for parameter in effect.parameters}
+    rig = RigBuilder(tables, folder, units, problems).build()
+    problems.raise_any()
+
+    campaign = _campaign(folder, document, tables, rig, problems)
+    check_campaign(campaign, document, tables, problems, checksums=checksums)
+    problems.raise_any()
+    return campaign
+
+
+def _check_schema(document: Document, schema: str, problems: Problems) -> None:
+    for violation in violations(document.tree, schema):
+        problems.add(document.place(violation.key), violation.what, violation.remedy)
+
+
+def _read_parameters(folder: Path, files: Iterable[str], problems: Problems) -> Merged:
+    """Read all parameter files as one tree, each checked alone and then all together."""
+    remedy = f"correct [parameters] files in {CAMPAIGN_FILE}, or add the file"
+    documents = [read(folder / name, role="the parameter file", remedy=remedy) for name in files]
+    for document in documents:
+        check_finite(document, problems)
+        _check_schema(document, "parameters", problems)
+    tables = merge(documents, problems)
+    if not problems.found:
+        for violation in violations(tables.tree, "parameters", "complete"):
+            problems.add(tables.place(violation.key), violation.what, violation.remedy)
+    problems.raise_any()
+    return tables
+
+
+def _campaign(folder: Path, document: Document, tables: Merged, rig: Rig, problems: Problems) -> Campaign:
+    tree = document.tree
+    effects = tree.get("model", {}).get("effects", [])
+    requirements = (
+        _requirement(index, table, document, problems)
+        for index, table in enumerate(tree.get("requirement", []))
+    )
+    bands = tree["bands"]
+    return Campaign(
+        folder=folder,
+        name=tree["name"],
+        title=tree["title"],
+        article=tree.get("article", ""),
+        configuration=tree.get("configuration", ""),
+        drive=tree["drive"],
+        requirements=tuple(requirements),
+        bands=Bands(
+            high_pass=float(bands["high_pass_Hz"]),
+            low_pass=tuple(sorted(float(edge) for edge in bands["low_pass_Hz"])),
+            working_rate=float(bands["working_rate_Hz"]),
+        ),
+        topics=_topics(tree["topics"], rig),
+        effects=tuple(effect.name for effect in CATALOGUE if effect.name in effects),
+        recordings=tuple(_recording(folder, table) for table in tree["recording"]),
+        rig=rig,
+        inputs=(document.path, *(entry.path for entry in tables.documents), *_matrices(folder, tables.tree)),
+    )
+
+
+def _requirement(index: int, table: Tree, document: Document, problems: Problems) -> Requirement:
+    unit = "N m" if table["quantity"] == "torque" else "N"
+    scale = 1.0
+    try:
+        scale = factor(table["limit"]["unit"], unit)
+    except UnitMismatchError as error:
+        problems.add(document.place(("requirement", index, "limit", "unit")), str(error), error.remedy)
+    low, high = table["band_Hz"]
+    return Requirement(
+        name=table["name"],
+        quantity=table["quantity"],
+        frame=table["frame"],
+        statistic=table["statistic"],
+        limit=table["limit"]["value"] * scale,
+        unit=unit,
+        band=(float(low), float(high)),
+        source=table["source"],
+    )
+
+
+def _topics(tree: Tree, rig: Rig) -> Topics:
+    joints = rig.joint_names
+    position = tuple(f"position[{name}]" for name in joints)
+    velocity = tuple(f"velocity[{name}]" for name in joints)
+    wrench = tuple(
+        f"wrench.{'force' if channel[0] == 'F' else 'torque'}.{channel[1]}"
+        for channel in rig.transducer.channels
+    )
+
+    def topic(name: str, key: str, fields: tuple[str, ...], channels: tuple[str, ...]) -> Topic | None:
+        given = tree.get(name)
+        if given is None:
+            return None
+        if isinstance(given, str):
+            return Topic(key, given, fields, channels)
+        return Topic(key, given["topic"], tuple(given.get("fields", fields)), channels)
+
+    measured = topic("wrench", "wrench", wrench, rig.transducer.channels)
+    assert measured is not None  # by the schema
+    return Topics(
+        wrench=measured,
+        angle=topic("encoder", "angle", position, joints),
+        rate=topic("rate", "rate", velocity, joints),
+        command=topic(
+            "command", "command", position + velocity, joints + tuple(f"{name}.rate" for name in joints)
+        ),
+        field=topic("field", "field", position, joints),
+        temperature=topic("temperature", "temperature", ("temperature",), ("temperature",)),
+    )
+
+
+def _recording(folder: Path, table: Tree) -> RecordingEntry:
+    path = folder / table["file"]
+    return RecordingEntry(
+        name=path.stem,
+        path=path,
+        trajectory=table["trajectory"],
+        role=table["role"],
+        repeat=table.get("repeat", 1),
+        sha256=table.get("sha256"),
+        start=table.get("start_s"),
+        end=table.get("end_s"),
+    )
+
+
+def _matrices(folder: Path, node: object) -> tuple[Path, ...]:
+    """Return the CSV files that quantities refer to."""
+    if not isinstance(node, dict):
+        return ()
+    if "value" in node:
+        files = (node[key] for key in ("value", "sigma") if isinstance(node[key], str))
+        return tuple(folder / name for name in files)
+    return tuple(path for child in node.values() for path in _matrices(folder, child))

@@ -1,0 +1,34 @@
+"""Collects what is wrong with a campaign, so that a user sees several faults at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from kbs_process.errors import ConfigError
+
+SHOWN = 5
+
+
+@dataclass(slots=True)
+class Problems:
+    """Errors found so far, in the order in which they were found."""
+
+    subject: str  # what is being checked: the campaign's folder
+    found: list[ConfigError] = field(default_factory=list)
+
+    def add(self, where: str, what: str, remedy: str = "") -> None:
+        """Note one error; the same words are noted once."""
+        error = ConfigError(what, where=where, remedy=remedy)
+        if str(error) not in map(str, self.found):
+            self.found.append(error)
+
+    def raise_any(self) -> None:
+        """Raise one error that tells the first few of those found; return if there are none."""
+        if not self.found:
+            return
+        if len(self.found) == 1:
+            raise self.found[0]
+        lines = [f"{len(self.found)} things are wrong", *map(str, self.found[:SHOWN])]
+        if len(self.found) > SHOWN:
+            lines.append(f"and {len(self.found) - SHOWN} more")
+        raise ConfigError("\n".join(lines), where=self.subject)

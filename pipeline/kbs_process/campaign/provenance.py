@@ -1,0 +1,120 @@
+"""What results were made from and with; nothing that changes from one run to the next."""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+import subprocess
+from functools import lru_cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import kbs_process
+from kbs_process.campaign.config import Campaign
+from kbs_process.errors import RecordingError
+from kbs_process.rig.model import Quantity, Rig
+
+# Libraries that compute, read or write; a report names their versions.
+LIBRARIES = (
+    "numpy",
+    "scipy",
+    "numba",
+    "pandas",
+    "pyarrow",
+    "mcap",
+    "zstandard",
+    "lz4",
+    "msgspec",
+    "matplotlib",
+)
+
+
+def sha256(path: Path) -> str:
+    """Return the file's SHA-256 in hexadecimal; a file that has not changed is read once."""
+    try:
+        status = path.stat()
+        return _sha256(path, status.st_size, status.st_mtime_ns)
+    except OSError as error:
+        raise RecordingError(
+            f"cannot be read: {error.strerror}", where=str(path), remedy="check the file and its permissions"
+        ) from error
+
+
+@lru_cache(maxsize=4096)
+def _sha256(path: Path, size: int, modified_ns: int) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def software() -> dict[str, Any]:
+    """Return the versions of everything that computes, and the commit if this is a checkout."""
+    return {
+        "kbs-process": kbs_process.__version__,
+        "commit": _commit(Path(kbs_process.__file__).parent),
+        "python": platform.python_version(),
+        "platform": f"{platform.system()} {platform.machine()}",
+        "libraries": {name: _version(name) for name in LIBRARIES},
+    }
+
+
+def inputs(campaign: Campaign) -> list[dict[str, str]]:
+    """Return every file that the results depend on, relative to the campaign's folder, with its SHA-256."""
+    files = dict.fromkeys((*campaign.inputs, *(entry.path for entry in campaign.recordings)))
+    return [{"file": _relative(path, campaign.folder), "sha256": sha256(path)} for path in files]
+
+
+def parameters(rig: Rig) -> list[dict[str, Any]]:
+    """Return every quantity of the rig in SI, as it was used."""
+    return [
+        {
+            "name": quantity.name,
+            "value": quantity.value.tolist(),
+            "unit": quantity.unit,
+            "sigma": quantity.sigma.tolist(),
+            "source": quantity.source,
+        }
+        for quantity in _sorted(rig)
+    ]
+
+
+def _sorted(rig: Rig) -> list[Quantity]:
+    quantities = rig.quantities()
+    return [quantities[name] for name in sorted(quantities)]
+
+
+def _relative(path: Path, folder: Path) -> str:
+    return path.relative_to(folder).as_posix() if path.is_relative_to(folder) else str(path)
+
+
+def _version(library: str) -> str:
+    try:
+        return version(library)
+    except PackageNotFoundError:
+        return "not installed"
+
+
+def _commit(package: Path) -> str | None:
+    """Return the commit of the package's files, "+" where they differ from it; None outside git."""
+    inside = ["git", "-C", str(package)]
+    try:
+        head = subprocess.run(
+            [*inside, "rev-parse", "HEAD"], capture_output=True, text=True, timeout=10, check=True
+        )
+        # A package installed below someone else's repository is not part of it.
+        subprocess.run(
+            [*inside, "ls-files", "--error-unmatch", "__init__.py"],
+            capture_output=True,
+            timeout=10,
+            check=True,
+        )
+        changed = subprocess.run(
+            [*inside, "status", "--porcelain", "--untracked-files=no", "--", "."],
+            capture_output=True,
+            text=True,
+            timeout=10,
+            check=True,
+        )
+    except (OSError, subprocess.SubprocessError):
+        return None
+    return head.stdout.strip() + ("+" if changed.stdout.strip() else "")

@@ -1,0 +1,145 @@
+"""One quantity of a parameter file: { value, unit, sigma, source } to SI."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from kbs_process.campaign.units import UnitMismatchError, factor
+from kbs_process.errors import ConfigError
+from kbs_process.rig.model import Quantity
+from kbs_process.signals.records import WRENCH_CHANNELS, WRENCH_UNITS, Array
+
+CHANNELWISE = "SI by channel"  # N for forces, N m for torques
+PAIRWISE = "SI by channel pair"  # N/N, N/(N m), (N m)/N, (N m)/(N m)
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """What a key expects: SI unit, shape, bound; for a number a wrench channel, the channels recorded."""
+
+    unit: str
+    shape: tuple[int, ...]
+    low: float | None = None
+    strict: bool = False  # `low` itself is refused
+    channels: tuple[str, ...] = ()
+
+
+def read_quantity(name: str, table: dict[str, Any], kind: Kind, folder: Path) -> Quantity:
+    """Return the quantity in SI.
+
+    Raises ConfigError, its `where` being the key inside the table at fault.
+    """
+    given = _array(table["value"], "value", folder)
+    value = _shaped(given, kind, "value", scalar_fills=not given.any())
+    sigma = _shaped(_array(table["sigma"], "sigma", folder), kind, "sigma", scalar_fills=True)
+    scale = _scale(table["unit"], kind)
+    value, sigma = value * scale, sigma * scale
+    if (sigma < 0.0).any():
+        raise ConfigError("a standard deviation is negative", where="sigma", remedy="give 0 or more")
+    if kind.low is not None and ((value <= kind.low) if kind.strict else (value < kind.low)).any():
+        least = f"{'more than' if kind.strict else 'at least'} {kind.low:g}"
+        raise ConfigError(f"{table['value']} is out of bounds", where="value", remedy=f"give {least}")
+    return Quantity(name, value, kind.unit, sigma, table["source"])
+
+
+def _array(given: Any, key: str, folder: Path) -> Array:
+    if isinstance(given, str):
+        return _from_csv(folder / given, key)
+    try:
+        array = np.asarray(given, dtype=np.float64)
+    except ValueError as error:
+        raise ConfigError("rows differ in length", where=key, remedy="give rows of equal length") from error
+    return array
+
+
+def _from_csv(path: Path, key: str) -> Array:
+    """Read a matrix of numbers from a comma-separated file; '#' begins a comment."""
+    try:
+        array = np.loadtxt(path, delimiter=",", ndmin=2)
+    except FileNotFoundError as error:
+        raise ConfigError(
+            f"the CSV file '{path}' does not exist", where=key, remedy="check its name"
+        ) from error
+    except (ValueError, UnicodeDecodeError) as error:
+        remedy = "one row a line, numbers separated by commas, '#' before comments"
+        raise ConfigError(f"the CSV file '{path}' is no matrix: {error}", where=key, remedy=remedy) from error
+    if not np.isfinite(array).all():
+        raise ConfigError(
+            f"the CSV file '{path}' holds NaN or infinities", where=key, remedy="correct the file"
+        )
+    matrix: Array = array[0] if len(array) == 1 else array
+    return matrix
+
+
+def _shaped(array: Array, kind: Kind, key: str, *, scalar_fills: bool) -> Array:
+    """Return the array in the expected shape; channels that are not recorded get 0."""
+    if array.shape == kind.shape:
+        return array
+    if array.shape == () and scalar_fills:
+        return np.full(kind.shape, float(array))
+    if kind.channels and array.shape == (len(kind.channels),):
+        full = np.zeros(kind.shape)
+        full[[WRENCH_CHANNELS.index(channel) for channel in kind.channels]] = array
+        return full
+    wanted = _in_words(kind.shape)
+    if kind.channels and len(kind.channels) < len(WRENCH_CHANNELS):
+        wanted += f", or {len(kind.channels)}, one for each of {', '.join(kind.channels)}"
+    raise ConfigError(
+        f"is {_in_words(array.shape)}, where {wanted} is expected", where=key, remedy=f"give {wanted}"
+    )
+
+
+def _in_words(shape: tuple[int, ...]) -> str:
+    match shape:
+        case ():
+            return "one number"
+        case (n,):
+            return f"an array of {n}"
+        case _:
+            return f"a matrix of {' x '.join(map(str, shape))}"
+
+
+def _scale(unit: str | list[str], kind: Kind) -> Array:
+    """Return the factors to SI: one for all elements, or one for each."""
+    if unit == kind.unit:
+        return np.asarray(1.0)
+    if kind.unit == PAIRWISE:
+        raise ConfigError(
+            f"unit '{unit}' is not known here", where="unit", remedy=f'give unit = "{PAIRWISE}"'
+        )
+    if isinstance(unit, str):
+        expected = set(_expected(kind, len(kind.channels)))
+        if len(expected) == 1:
+            return np.asarray(_factor(unit, expected.pop()))
+        remedy = f'give a list, such as ["N", "N", "N", "N m", "N m", "N m"], or "{CHANNELWISE}"'
+        raise ConfigError(
+            f"unit '{unit}' does not go for forces and torques alike", where="unit", remedy=remedy
+        )
+    expected_units = _expected(kind, len(unit))
+    if len(unit) != len(expected_units):
+        remedy = f"give one unit, or {len(expected_units)}"
+        raise ConfigError(
+            f"lists {len(unit)} units for {len(expected_units)} elements", where="unit", remedy=remedy
+        )
+    factors = [_factor(one, si) for one, si in zip(unit, expected_units, strict=True)]
+    return _shaped(np.array(factors), kind, "unit", scalar_fills=False)
+
+
+def _expected(kind: Kind, count: int) -> tuple[str, ...]:
+    """Return the SI unit of each element, where a list of `count` is given."""
+    if kind.unit != CHANNELWISE:
+        return (kind.unit,) * (kind.shape[0] if kind.shape else 1)
+    if count == len(kind.channels):
+        return tuple(WRENCH_UNITS[WRENCH_CHANNELS.index(channel)] for channel in kind.channels)
+    return WRENCH_UNITS
+
+
+def _factor(unit: str, expected: str) -> float:
+    try:
+        return factor(unit, expected)
+    except UnitMismatchError as error:
+        raise ConfigError(str(error), where="unit", remedy=error.remedy) from error

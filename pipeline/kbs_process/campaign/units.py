@@ -1,0 +1,86 @@
+"""Units that a campaign may write, by dimension, with their factor to SI: the core computes in SI alone."""
+
+from __future__ import annotations
+
+from math import pi
+
+from kbs_process.errors import did_you_mean
+
+# dimension -> unit -> factor; the first unit of each dimension is the SI unit.
+DIMENSIONS: dict[str, dict[str, float]] = {
+    "pure number": {"1": 1.0, "%": 1e-2},
+    "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6},
+    "mass": {"kg": 1.0, "g": 1e-3},
+    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0},
+    "frequency": {"Hz": 1.0, "kHz": 1e3},
+    "rate of growth": {"1/s": 1.0, "1/min": 1.0 / 60.0},
+    "velocity": {"m/s": 1.0, "mm/s": 1e-3, "km/h": 1.0 / 3.6},
+    "acceleration": {"m/s^2": 1.0, "mm/s^2": 1e-3},
+    "angle": {
+        "rad": 1.0,
+        "mrad": 1e-3,
+        "urad": 1e-6,
+        "deg": pi / 180.0,
+        "arcmin": pi / 10800.0,
+        "arcsec": pi / 648000.0,
+    },
+    "angular rate": {"rad/s": 1.0, "mrad/s": 1e-3, "deg/s": pi / 180.0, "rpm": pi / 30.0},
+    "angular acceleration": {"rad/s^2": 1.0, "deg/s^2": pi / 180.0},
+    "force": {"N": 1.0, "mN": 1e-3, "kN": 1e3},
+    "torque": {"N m": 1.0, "mN m": 1e-3, "N mm": 1e-3, "N cm": 1e-2, "kN m": 1e3},
+    "moment of inertia": {
+        "kg m^2": 1.0,
+        "kg cm^2": 1e-4,
+        "kg mm^2": 1e-6,
+        "g m^2": 1e-3,
+        "g cm^2": 1e-7,
+        "g mm^2": 1e-9,
+    },
+    "rotational stiffness": {
+        "N m/rad": 1.0,
+        "kN m/rad": 1e3,
+        "N mm/rad": 1e-3,
+        "N m/mrad": 1e3,
+        "N m/deg": 180.0 / pi,
+    },
+    "rotational damping": {
+        "N m s/rad": 1.0,
+        "N mm s/rad": 1e-3,
+        "N m s/deg": 180.0 / pi,
+        "N m/rpm": 30.0 / pi,
+    },
+    "temperature": {"degC": 1.0},
+}
+
+_DIMENSION_OF = {unit: dimension for dimension, units in DIMENSIONS.items() for unit in units}
+
+
+class UnitMismatchError(ValueError):
+    """A unit is unknown, or belongs to another dimension; `remedy` says which would do."""
+
+    def __init__(self, what: str, remedy: str) -> None:
+        super().__init__(what)
+        self.remedy = remedy
+
+
+def factor(unit: str, expected: str) -> float:
+    """Return what turns a number in `unit` into the SI unit `expected`.
+
+    Raises UnitMismatchError where `unit` is of another dimension than `expected`, or not in the table.
+    """
+    if unit == expected:
+        return 1.0
+    dimension = _DIMENSION_OF.get(expected)
+    allowed = DIMENSIONS[dimension] if dimension else {expected: 1.0}
+    if unit in allowed:
+        return allowed[unit]
+    wanted = f"{dimension} ({expected})" if dimension else f"'{expected}'"
+    examples = ", ".join(f"'{name}'" for name in allowed)
+    if unit in _DIMENSION_OF:
+        raise UnitMismatchError(
+            f"unit '{unit}' is a unit of {_DIMENSION_OF[unit]}, where {wanted} is expected",
+            f"use one of {examples}",
+        )
+    hint = did_you_mean(unit, allowed)
+    remedy = hint if hint.startswith("did") else f"use one of {examples}"
+    raise UnitMismatchError(f"unit '{unit}' is not known, where {wanted} is expected", remedy)
