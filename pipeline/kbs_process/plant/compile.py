@@ -1,0 +1,96 @@
+"""Compile the generated plant once and keep it in the user's cache, across processes and versions."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import inspect
+import os
+import sys
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numba
+
+from kbs_process.plant import kernels
+from kbs_process.plant.generate import module_text
+from kbs_process.plant.structure import Structure
+
+
+@dataclass(frozen=True, slots=True)
+class Compiled:
+    """The two entries of a generated module; see its text at `path`."""
+
+    path: Path
+    balance: Callable[..., Any]
+    advance: Callable[..., Any]
+
+
+@cache
+def compiled_plant(structure: Structure) -> Compiled:
+    """Return the compiled plant of `structure`, from this process, from the cache, or made now."""
+    text = module_text(structure)
+    name = f"plant_{_fingerprint(text, structure)}"
+    path = _written(name, text)
+    spec = importlib.util.spec_from_file_location(name, path)
+    if spec is None or spec.loader is None:
+        raise ImportError(f"no loader for {path}")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    spec.loader.exec_module(module)
+    return Compiled(path, module.balance, module.advance)
+
+
+def cache_folder() -> Path:
+    """Return where compiled plants are kept: $KBS_CACHE, or the platform's folder for caches."""
+    if chosen := os.environ.get("KBS_CACHE"):
+        return Path(chosen)
+    if sys.platform == "win32":
+        return (
+            Path(os.environ.get("LOCALAPPDATA", Path.home() / "AppData" / "Local")) / "kbs-process" / "Cache"
+        )
+    if sys.platform == "darwin":
+        return Path.home() / "Library" / "Caches" / "kbs-process"
+    return Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "kbs-process"
+
+
+def _fingerprint(text: str, structure: Structure) -> str:
+    """Hash everything that decides the machine code: numba does not notice edits in imported files."""
+    modules = [kernels, *(inspect.getmodule(effect.equation) for effect in structure.effects)]
+    sources = [inspect.getsource(module) for module in modules if module is not None]
+    parts = [text, *sources, numba.__version__, sys.version]
+    return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:24]
+
+
+def _written(name: str, text: str) -> Path:
+    """Return the file with `text`, writing it aside and renaming, so that processes may race."""
+    try:
+        return _write(cache_folder(), name, text)
+    except OSError:  # a read-only home: compile for this process alone
+        return _write(_process_folder(), name, text)
+
+
+@cache
+def _process_folder() -> Path:
+    folder = tempfile.TemporaryDirectory(prefix="kbs-process-")
+    _KEPT.append(folder)  # removed when the interpreter ends
+    return Path(folder.name)
+
+
+_KEPT: list[tempfile.TemporaryDirectory[str]] = []
+
+
+def _write(folder: Path, name: str, text: str) -> Path:
+    path = folder / f"{name}.py"
+    folder.mkdir(parents=True, exist_ok=True)
+    if path.is_file() and path.read_text(encoding="utf-8") == text:
+        return path  # a new time of modification would void the machine code beside it
+    handle, aside = tempfile.mkstemp(dir=folder, prefix=name, suffix=".tmp")
+    with os.fdopen(handle, "w", encoding="utf-8") as file:
+        file.write(text)
+    Path(aside).replace(path)
+    return path

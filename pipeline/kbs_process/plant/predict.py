@@ -1,0 +1,113 @@
+"""Predict a recording: the plant driven by the commands, sampled as the transducer and the encoders would."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+
+from kbs_process.errors import SimulationError
+from kbs_process.plant.effects import select
+from kbs_process.plant.schedule import Schedule
+from kbs_process.plant.simulation import Simulation
+from kbs_process.rig.model import Rig
+from kbs_process.signals.records import Array, Block
+
+__all__ = ["DEFAULT_STEP", "Schedule", "predict"]
+
+DEFAULT_STEP = 1e-4  # s; tests/plant/test_convergence.py shows what halving it changes
+BLOCK_S = 10.0
+
+
+def predict(
+    rig: Rig,
+    effects: Sequence[str],
+    schedule: Schedule,
+    *,
+    rate_Hz: float,
+    angle_rate_Hz: float,
+    duration_s: float,
+    step_s: float | None = None,
+    quantise: bool = True,
+    progress: Callable[[float], None] | None = None,
+) -> Iterator[tuple[str, Block]]:
+    """Return the streams "wrench", "angle" and "field" of a predicted recording, a block of each at a time.
+
+    "wrench": (n, 6) force and torque on the transducer about T's origin in the plate's own axes, behind the
+    amplifier, without cross-coupling, bias and noise, at `rate_Hz`. "angle": (n, joints) encoder readings at
+    `angle_rate_Hz`, offset included, rounded to the encoder's codes where `quantise`. "field": (n, joints)
+    field position at the start of each cycle, motor rad, not rounded to microsteps.
+
+    Samples lie at 0, 1/rate, ... before `duration_s`; stamps count from the recording's time zero. The run starts
+    in static equilibrium at the first command; where that precedes time zero, the time between is simulated too.
+    `step_s` bounds the step, which divides the wrench's sampling interval. `progress` gets the share done.
+    """
+    if not (min(rate_Hz, angle_rate_Hz, duration_s) > 0.0 and (step_s is None or step_s > 0.0)):
+        raise SimulationError("rates, duration and step have to be positive", where="predict")
+    per_sample = max(1, int(np.ceil(1.0 / (rate_Hz * (step_s or DEFAULT_STEP)) - 1e-9)))
+    simulation = Simulation(
+        rig,
+        select(effects),
+        schedule,
+        step=1.0 / (rate_Hz * per_sample),
+        per_sample=per_sample,
+        angle_rate=angle_rate_Hz,
+        end=duration_s,
+    )
+    return _blocks(simulation, rate_Hz, duration_s, quantise, progress)
+
+
+def _blocks(
+    simulation: Simulation,
+    rate: float,
+    duration: float,
+    quantise: bool,
+    progress: Callable[[float], None] | None,
+) -> Iterator[tuple[str, Block]]:
+    a_rate, per_sample = simulation.angle_rate, simulation.per_sample
+    samples = int(np.ceil(duration * rate - 1e-9))
+    angles = int(np.ceil(duration * a_rate - 1e-9))
+    block = max(1, int(BLOCK_S * rate))
+    while simulation.first < 0:  # what precedes the recording
+        simulation.advance(min(-simulation.first, block * per_sample), 0)
+    cycle = int(np.searchsorted(simulation.knots, -1e-9))
+    # The sample at time zero ends no step.
+    start = _encoded(simulation.part("q")[None, :], simulation.encoder, quantise)
+    yield "angle", _block(np.zeros(1), start)
+    done = angle_done = 0
+    angle_done = 1
+    while done < samples:
+        count = min(block, samples - done)
+        wrench, angle = simulation.advance(count * per_sample, angle_done)
+        angle = angle[: angles - angle_done]
+        yield "wrench", _block((done + np.arange(count)) / rate, wrench)
+        if len(angle):
+            yield (
+                "angle",
+                _block(
+                    (angle_done + np.arange(len(angle))) / a_rate,
+                    _encoded(angle, simulation.encoder, quantise),
+                ),
+            )
+        until = min(simulation.controlled, int(np.searchsorted(simulation.knots, duration - 1e-9)))
+        if until > cycle:
+            field = simulation.fields[cycle:until] / simulation.microsteps
+            yield "field", _block(simulation.knots[cycle:until], field)
+        done, angle_done, cycle = done + count, angle_done + len(angle), max(cycle, until)
+        if progress is not None:
+            progress(done / samples)
+
+
+def _encoded(angle: Array, encoder: Array, quantise: bool) -> Array:
+    """Return encoder readings: offset added, rounded to the nearest code; step 0 does not round."""
+    step, offset = encoder
+    reading: Array = angle + offset
+    if not quantise:
+        return reading
+    code = np.where(step > 0.0, step, 1.0)
+    return np.where(step > 0.0, np.floor(reading / code + 0.5) * code, reading)
+
+
+def _block(t: Array, values: Array) -> Block:
+    stamp = np.rint(t * 1e9).astype(np.int64)
+    return Block(stamp, stamp, np.ascontiguousarray(values))

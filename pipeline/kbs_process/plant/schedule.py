@@ -1,0 +1,90 @@
+"""What drives a plant: the commands of every real-time cycle, and what the drive electronics recorded of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+
+from kbs_process.errors import SimulationError
+from kbs_process.signals.records import Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Schedule:
+    """Commands at the start of each cycle, on the recording's time axis, columns in the rig's order of joints.
+
+    With `field` the motors follow the recorded field position, whatever the controller; otherwise, with
+    `encoder`, a closed loop is fed these readings instead of its own.
+    """
+
+    t: Array  # (n,) s, increasing
+    position: Array  # (n, joints) rad, desired
+    rate: Array  # (n, joints) rad/s, desired
+    field: Array | None = None  # (n, joints) motor rad
+    encoder: Array | None = None  # (n, joints) rad
+
+
+def covering(schedule: Schedule, joints: int, cycle: float | None, end: float) -> Schedule:
+    """Return `schedule` without gaps, from time 0 or earlier to beyond `end`.
+
+    Cycles that a recording lost are interpolated linearly: the field moved on while nobody recorded, and holding
+    it would end every gap with a jump. Before the first and after the last cycle the command is held.
+    `cycle` is the controller's real-time cycle, s; without it, it is the median of the recorded ones.
+    """
+    given = _checked(schedule, joints)
+    gaps = np.diff(given.t)
+    if cycle is None:
+        if not len(gaps):
+            raise SimulationError("one command and no controller", remedy="give the rig's [controller] cycle")
+        cycle = float(np.median(gaps))
+    lost = np.maximum(np.rint(gaps / cycle).astype(np.int64) - 1, 0)
+    pieces = [
+        a + np.arange(m + 1) * (b - a) / (m + 1) for a, b, m in zip(given.t, given.t[1:], lost, strict=False)
+    ]
+    before = max(0, int(np.ceil(given.t[0] / cycle)))
+    after = max(0, int(np.ceil((end - given.t[-1]) / cycle))) + 2
+    lead = given.t[0] - cycle * np.arange(before, 0, -1)
+    t = np.concatenate([lead, *pieces, given.t[-1] + cycle * np.arange(after + 1)])
+    whole = _at(given, t)
+    whole.rate[(t < given.t[0]) | (t > given.t[-1])] = 0.0
+    return whole
+
+
+def _checked(schedule: Schedule, joints: int) -> Schedule:
+    """Return the schedule with missing values interpolated, or say why it cannot drive the plant."""
+    t = schedule.t
+    if not len(t) or not np.isfinite(t).all() or not (np.diff(t) > 0.0).all():
+        raise SimulationError(
+            "command times are empty, not finite or not increasing",
+            remedy="look at the recording with 'inspect'",
+        )
+    for entry in fields(schedule):
+        values = getattr(schedule, entry.name)
+        if entry.name == "t" or values is None:
+            continue
+        if values.shape != (len(t), joints):
+            raise SimulationError(
+                f"{entry.name} has shape {values.shape}, not {(len(t), joints)}: cycles by joints of the rig"
+            )
+        if not np.isfinite(values).any(axis=0).all():
+            raise SimulationError(
+                f"{entry.name} of a joint holds no number", remedy="check the recording's topic"
+            )
+    return _at(schedule, t)
+
+
+def _at(schedule: Schedule, t: Array) -> Schedule:
+    """Return the schedule interpolated at `t`, held outside."""
+
+    def interpolated(values: Array | None) -> Array | None:
+        if values is None:
+            return None
+        columns = []
+        for column in values.T:
+            good = np.isfinite(column)
+            columns.append(np.interp(t, schedule.t[good], column[good]))
+        return np.ascontiguousarray(np.stack(columns, axis=1))
+
+    changed = {e.name: interpolated(getattr(schedule, e.name)) for e in fields(schedule) if e.name != "t"}
+    return replace(schedule, t=t, **changed)

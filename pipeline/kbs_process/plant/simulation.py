@@ -1,0 +1,102 @@
+"""A plant in motion: its state, and the samples that its sensors take of it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kbs_process.errors import SimulationError
+from kbs_process.plant.amplifier import discretised, steady
+from kbs_process.plant.compile import compiled_plant
+from kbs_process.plant.effect import Effect
+from kbs_process.plant.equilibrium import at_rest
+from kbs_process.plant.generate import state_layout
+from kbs_process.plant.schedule import Schedule, covering
+from kbs_process.plant.structure import JOINTS, MICROSTEP, RATIO, parameters, structure_of
+from kbs_process.rig.model import Rig
+from kbs_process.signals.records import Array
+
+
+class Simulation:
+    """The plant of `rig` with `effects`, at rest under the first command; `advance` moves it on.
+
+    Time is counted in whole steps from the recording's time zero, so that nothing drifts over a day.
+    """
+
+    def __init__(
+        self,
+        rig: Rig,
+        effects: tuple[Effect, ...],
+        schedule: Schedule,
+        *,
+        step: float,
+        per_sample: int,
+        angle_rate: float,
+        end: float,
+    ) -> None:
+        self.step, self.per_sample, self.angle_rate = step, per_sample, angle_rate
+        self.structure = structure_of(rig, effects)
+        self.plant = compiled_plant(self.structure)
+        self.p = parameters(rig, self.structure)
+        n = self.structure.joints
+        controller = rig.controller
+        cycles = covering(schedule, n, float(controller.cycle) if controller else None, end)
+        offsets = JOINTS + np.arange(n) * self.structure.stride
+        self.microsteps = self.p[offsets + MICROSTEP]  # a radian of the motor
+        per_output = self.microsteps * self.p[offsets + RATIO]
+        self.knots = cycles.t
+        self.fields = cycles.position * per_output if cycles.field is None else cycles.field * self.microsteps
+        self.first = int(np.ceil(self.knots[0] / step / per_sample - 1e-9)) * per_sample
+        self._cycles = cycles
+        self._closed = cycles.field is None and controller is not None and controller.loop == "closed"
+        self._recorded = cycles.encoder is not None
+        self._latency = controller.latency if controller else 0
+        gains = (controller.Kp.value, controller.Ki.value) if controller else (0.0, 0.0)
+        self._gains = np.stack([np.broadcast_to(gains[0], n), np.broadcast_to(gains[1], n), per_output])
+        self.encoder = np.array(
+            [
+                [float(joint.encoder.step) if joint.encoder else 0.0 for joint in rig.joints],
+                [float(joint.encoder.offset) if joint.encoder else 0.0 for joint in rig.joints],
+            ]
+        )
+        self._readings = np.zeros_like(self.fields) if cycles.encoder is None else cycles.encoder
+        self._sums = np.zeros(n)
+        self._cursor = np.zeros(2, dtype=np.int64)
+        self.state, self.wrench = at_rest(self.plant, self.structure, self.p, self.fields[0])
+        self._low_pass, self._drive_in = discretised(rig.transducer.amplifier, step)
+        self._amplified = steady(len(self._drive_in), self.wrench)
+
+    @property
+    def controlled(self) -> int:
+        """Cycles whose field motion is settled; `fields` holds one row more."""
+        return int(self._cursor[1])
+
+    def part(self, name: str) -> Array:
+        """Return a view of one part of the state vector: see `generate.state_layout`."""
+        view: Array = self.state[state_layout(self.structure)[name]]
+        return view
+
+    def advance(self, steps: int, angle_first: int) -> tuple[Array, Array]:
+        """Move on by `steps` (whole sample intervals); return the wrench and angle samples taken.
+
+        The wrench, shape (n, 6), is that at the steps that `per_sample` divides; angles, shape (m, joints), are
+        unquantised, from sample number `angle_first` on, at times after the start and up to the end.
+        """
+        n = self.structure.joints
+        wrench = np.empty((-(-steps // self.per_sample), 6))
+        span = steps * self.step
+        angle = np.empty((int(span * self.angle_rate) + 2, n))
+        taken = self.plant.advance(
+            self.first, steps, self.step, self.p, self.state, self._cursor, self._closed, self._recorded,
+            self._latency, self._cycles.position, self._cycles.rate, self.encoder, self._readings, self._gains,
+            self._sums, self.knots, self.fields, self.per_sample, self.wrench, self._low_pass, self._drive_in,
+            self._amplified, wrench, self.angle_rate, angle_first, angle,
+        )  # fmt: skip
+        self.first += steps
+        angle = angle[:taken]
+        if not (np.isfinite(self.state).all() and np.isfinite(wrench).all() and np.isfinite(angle).all()):
+            raise SimulationError(
+                f"the solution is no longer finite before {self.first * self.step:.3f} s",
+                where="plant",
+                remedy="check stiffness, damping and inertia of the parameters, or take a smaller step",
+            )
+        return wrench, angle
