@@ -124,6 +124,18 @@ class Envelope:
     high: Array  # (m, c)
 
 
+@dataclass(frozen=True, slots=True)
+class Clock:
+    """How one stream's stamps map to the run's time axis: t = offset_s + (1 + skew) (stamp - first stamp)."""
+
+    offset_s: float  # s, where the stream's first sample lies
+    skew: float  # rate of the stream's clock against the axis, less 1
+    sigma_offset_s: float  # s, at the middle of the recording; nan where the clocks cannot be compared
+    sigma_skew: float
+    latency_s: float  # s, mean latency of the recorder above the least seen
+    source: str  # "reference", "fitted", "same as ...", "recorder", "not comparable"
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Run:
     """One recording (or the prediction of one), reduced to the working rate on one clock.
@@ -144,6 +156,7 @@ class Run:
     epoch_ns: int  # sensor clock at the recording's time zero
     rates: dict[str, float] = dataclasses.field(default_factory=dict)  # Hz, measured, by stream
     losses: tuple[Loss, ...] = ()
+    clocks: dict[str, Clock] = dataclasses.field(default_factory=dict)  # by stream
 
     def with_wrench(self, wrench: Signal) -> Run:
         """Return the same run with another wrench."""

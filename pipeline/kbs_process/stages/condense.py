@@ -1,0 +1,219 @@
+"""One recording, chunk by chunk, to one clock and the working rate.
+
+Every stream is put in order, laid on a uniform grid of its own clock and decimated as it passes; only about
+twice the working rate is kept. When the recording has been read, clocks are known, and the kept samples are
+interpolated at the instants of one common axis. So a clock is fitted to the whole recording although no
+sample at the full rate is ever kept, and a clock's offset and skew cost no second interpolation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from kbs_process.errors import RecordingError
+from kbs_process.signals.records import (
+    WRENCH_CHANNELS,
+    WRENCH_UNITS,
+    Array,
+    Block,
+    Clock,
+    Envelope,
+    Events,
+    Loss,
+    Run,
+    Signal,
+)
+from kbs_process.stages.clocks import align
+from kbs_process.stages.resample import Kept, design
+from kbs_process.stages.stream import Collected, Timeline, Uniform
+
+Progress = Callable[[str, int], None]  # stream, samples just taken
+
+SAMPLED = ("wrench", "angle", "rate")  # brought to the working rate; the first one present is the reference
+SLOW = ("command", "field", "temperature")  # kept sample by sample: one a control cycle, or slower
+DOUBT = 1e-3  # largest weight of invented samples in a valid one
+
+
+@dataclass(frozen=True, slots=True)
+class CondenseSettings:
+    """What is kept of a recording."""
+
+    working_rate_Hz: float = 20.0
+    spectrum_resolution_Hz: float = 0.1  # at least as fine
+    spectrum_limit_Hz: float = 100.0
+    envelope_stretches: int = 2000
+    encoder_limit_Hz: float = 200.0  # encoders sampled faster are not kept sample by sample
+
+
+def condense(
+    name: str,
+    blocks: Iterable[tuple[str, Block]],
+    channels: Mapping[str, tuple[str, ...]],
+    settings: CondenseSettings,
+    progress: Progress | None = None,
+) -> Run:
+    """Reduce a recording to a `Run`; `channels` names the columns of every stream that `blocks` brings.
+
+    Time zero is the reference stream's first sample (the wrench's, where there is one), and the axis covers
+    that stream. Samples that lean on invented input (gaps, the ends' continuation, times at which a stream
+    had not begun or had ended) by more than `DOUBT` of the filter's weight are flagged.
+
+    Raises RecordingError where a sampled stream is empty or shorter than the filters.
+    """
+    streams: dict[str, Uniform | Collected] = {
+        key: _stream(name, key, columns, settings) for key, columns in channels.items()
+    }
+    for key, block in blocks:
+        if len(block):
+            streams[key].push(block)
+            if progress is not None:
+                progress(key, len(block))
+    sampled = {key: s for key in SAMPLED if isinstance(s := streams.get(key), Uniform)}
+    slow = {key: s for key in SLOW if isinstance(s := streams.get(key), Collected)}
+    kept = {key: _finished(key, stream, settings) for key, stream in sampled.items()}
+    collected = {key: stream.finish() for key, stream in slow.items()}
+    if not kept:
+        raise RecordingError(
+            "the recording brings neither wrench nor joint angles",
+            where=name,
+            remedy="check the [topics] of campaign.toml",
+        )
+    reference = next(iter(kept))
+    present = {key: s.line for key, s in streams.items() if s.line.samples}
+    clocks = align({key: line.clock() for key, line in present.items()}, reference)
+
+    dt = 1.0 / settings.working_rate_Hz
+    count = int(np.floor(sampled[reference].line.span / dt * (1.0 + 1e-12))) + 1
+    signals = {key: _signal(key, kept[key], channels[key], clocks[key], dt, count) for key in kept}
+    events = {
+        key: Events(_on_axis(own, clocks[key]), values, channels[key])
+        for key, (own, values) in collected.items()
+        if len(own)
+    }
+    encoder = sampled["angle"].samples() if "angle" in sampled else None
+    wrench = sampled.get("wrench")
+    return Run(
+        name=name,
+        wrench=signals.get("wrench"),
+        angle=signals.get("angle"),
+        rate=signals.get("rate"),
+        command=events.get("command"),
+        field=events.get("field"),
+        temperature=_temperature(events["temperature"], dt, count) if "temperature" in events else None,
+        encoder=Events(_on_axis(encoder[0], clocks["angle"]), encoder[1], channels["angle"])
+        if encoder
+        else None,
+        spectrum=wrench.welch.result() if wrench and wrench.welch else None,
+        envelope=_envelope(wrench) if wrench else None,
+        epoch_ns=present[reference].first_stamp,
+        rates={key: line.grid.rate for key, line in present.items() if line.grid is not None},
+        losses=(*_losses(present, clocks), *(_missing(s.line) for s in slow.values() if not s.line.samples)),
+        clocks=clocks,
+    )
+
+
+def _losses(lines: dict[str, Timeline], clocks: dict[str, Clock]) -> list[Loss]:
+    return [
+        loss
+        for key, line in lines.items()
+        for loss in line.losses(clocks[key].offset_s, 1.0 + clocks[key].skew)
+    ]
+
+
+def _missing(line: Timeline) -> Loss:
+    return Loss("missing", line.where, 0, detail="not one sample")
+
+
+def _stream(name: str, key: str, columns: tuple[str, ...], settings: CondenseSettings) -> Uniform | Collected:
+    where = f"{name}: {key}"
+    if key in SLOW:
+        return Collected(where, len(columns))
+    if key not in SAMPLED:
+        raise KeyError(f"no stream is called {key!r}")
+    if key == "wrench":
+        return Uniform(
+            where,
+            columns,
+            settings.working_rate_Hz,
+            spectrum=(settings.spectrum_resolution_Hz, settings.spectrum_limit_Hz),
+            stretches=settings.envelope_stretches,
+        )
+    angle = key == "angle"
+    return Uniform(
+        where,
+        columns,
+        settings.working_rate_Hz,
+        unwrap=angle,
+        keep_below=settings.encoder_limit_Hz if angle else 0.0,
+    )
+
+
+def _finished(key: str, stream: Uniform, settings: CondenseSettings) -> Kept:
+    kept = stream.finish()
+    if kept is not None:
+        return kept
+    line = stream.line
+    if line.grid is None:
+        raise RecordingError(
+            f"{line.samples} samples are no signal",
+            where=line.where,
+            remedy=f"check the topic of {key} in campaign.toml, and the file with `kbs-process inspect`",
+        )
+    least = design(line.grid.rate, settings.working_rate_Hz).extension + 1
+    raise RecordingError(
+        f"{line.samples} samples in {line.span:.3g} s are too few: the filters to"
+        f" {settings.working_rate_Hz:g} Hz need {least} ({least / line.grid.rate:.3g} s)",
+        where=line.where,
+        remedy="record longer, or leave this recording out of campaign.toml",
+    )
+
+
+def _on_axis(own: Array, clock: Clock) -> Array:
+    t: Array = clock.offset_s + (1.0 + clock.skew) * own
+    return t
+
+
+def _signal(key: str, kept: Kept, columns: tuple[str, ...], clock: Clock, dt: float, count: int) -> Signal:
+    t = dt * np.arange(count, dtype=np.float64)
+    values, doubt = kept.at((t - clock.offset_s) / (1.0 + clock.skew))
+    units, frame = _meaning(key, columns)
+    return Signal(0.0, dt, values, columns, units, frame, doubt <= DOUBT, (_story(kept, clock, dt),))
+
+
+def _meaning(key: str, columns: tuple[str, ...]) -> tuple[tuple[str, ...], str]:
+    if key == "wrench":
+        return tuple(WRENCH_UNITS[WRENCH_CHANNELS.index(channel)] for channel in columns), "T"
+    return ("rad" if key == "angle" else "rad/s",) * len(columns), "joint"
+
+
+def _story(kept: Kept, clock: Clock, dt: float) -> str:
+    d = kept.design
+    aligned = f"clock: {clock.source}"
+    if clock.source == "fitted":
+        aligned += (
+            f", offset {clock.offset_s:.6f} s +- {1e3 * clock.sigma_offset_s:.2g} ms,"
+            f" skew {1e6 * clock.skew:.2f} +- {1e6 * clock.sigma_skew:.2g} ppm"
+        )
+    return (
+        f"{d.rate:.6g} Hz to {1.0 / dt:g} Hz by linear-phase Kaiser filters: gain error <= 1e-5 up to"
+        f" {d.passband:.3g} Hz, aliases into that <= -120 dB; {aligned}"
+    )
+
+
+def _envelope(stream: Uniform) -> Envelope | None:
+    grid = stream.line.grid
+    if stream.envelope is None or grid is None:
+        return None
+    return stream.envelope.result(0.0, grid.period_ns * 1e-9)
+
+
+def _temperature(events: Events, dt: float, count: int) -> Signal:
+    """Interpolate linearly: a temperature follows its sensor's time constant, far below the working rate."""
+    t = dt * np.arange(count, dtype=np.float64)
+    values = np.column_stack([np.interp(t, events.t, column) for column in events.values.T])
+    valid = (t >= events.t[0]) & (t <= events.t[-1])
+    units = ("degC",) * len(events.channels)
+    return Signal(0.0, dt, values, events.channels, units, "T", valid, ("linear interpolation",))

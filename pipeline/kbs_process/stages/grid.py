@@ -1,0 +1,140 @@
+"""From samples at their own times to a uniform grid at the stream's own rate, gaps filled and flagged."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+
+from kbs_process.signals.records import Array, Mask, Stamps
+
+GAP = 1.5  # nominal periods: a longer step is a gap
+LEFT, RIGHT = 3, 3  # neighbours that the six-point interpolation needs on either side
+PIECE = 65536  # grid points made at a time, which bounds what a long gap costs in memory
+
+
+@dataclass(frozen=True, slots=True)
+class Grid:
+    """Uniform times first_ns + k period_ns."""
+
+    first_ns: int
+    period_ns: float
+
+    @property
+    def rate(self) -> float:
+        """Hz."""
+        return 1e9 / self.period_ns
+
+    def periods(self, stamp: Stamps) -> Array:
+        """Time of each stamp in periods from the grid's first point."""
+        u: Array = (stamp - self.first_ns) / self.period_ns
+        return u
+
+
+def nominal_grid(stamp: Stamps) -> Grid:
+    """Find the grid of increasing stamps (n >= 2).
+
+    The median step tells how many periods each step is; a line through the stamps over those counts then
+    averages jitter and rounding: on 8192 stamps rounded to 1 ns the period is good to 1e-9 of itself and
+    better, so the grid stays on the samples of a steady clock for days.
+    """
+    step = np.diff(stamp)
+    count = np.maximum(np.rint(step / np.median(step)), 1.0)
+    index = np.concatenate(([0.0], np.cumsum(count)))
+    x = index - index.mean()
+    y = (stamp - stamp[0]).astype(np.float64)
+    period = float(x @ (y - y.mean()) / (x @ x))
+    return Grid(int(stamp[0]), period)
+
+
+class Regridder:
+    """Interpolate a stream onto its grid, block by block.
+
+    Samples that lie on the grid pass unchanged. Between samples: Lagrange's polynomial through the six
+    nearest, where their spacing is regular to half a period, else a straight line. Worst gain error of the
+    former, half way between samples, 5/1024 (2 pi f T)^6: 8e-5 at 8 Hz sampled at 100 Hz, 3e-7 at 240 Hz;
+    of the latter (2 pi f T)^2/8. Points in steps of more than `GAP` periods are flagged as invented.
+    """
+
+    def __init__(self, grid: Grid) -> None:
+        self._on_grid = max(1e-6, 1.0 / grid.period_ns)  # periods; stamps are rounded to 1 ns
+        self._u: Array = np.empty(0)
+        self._x: Array = np.empty((0, 0))
+        self._next = 0  # grid index to be made next
+
+    def push(self, u: Array, values: Array) -> Iterator[tuple[Array, Mask | None]]:
+        """Take samples (n, c) at increasing times u (n,) in periods; yield grid rows and their flags."""
+        if len(u) == 0:
+            return
+        if len(self._u):
+            u = np.concatenate((self._u, u))
+            values = np.concatenate((self._x, values))
+        end = len(u) - RIGHT  # grid points up to this sample have their neighbours
+        if end >= 1:
+            yield from self._fill(u, values, int(np.floor(u[end - 1] + self._on_grid)) + 1)
+        keep = max(end - LEFT, 0)
+        self._u, self._x = u[keep:].copy(), values[keep:].copy()
+
+    def flush(self) -> Iterator[tuple[Array, Mask | None]]:
+        if len(self._u):
+            yield from self._fill(self._u, self._x, int(np.floor(self._u[-1] + self._on_grid)) + 1)
+
+    def _fill(self, u: Array, x: Array, stop: int) -> Iterator[tuple[Array, Mask | None]]:
+        n = stop - self._next
+        if n <= 0:
+            return
+        first = int(np.searchsorted(u, self._next - self._on_grid))
+        if first + n <= len(u):
+            straight = u[first : first + n]
+            if np.abs(straight - np.arange(self._next, stop)).max() <= self._on_grid:
+                self._next = stop
+                yield x[first : first + n], None
+                return
+        while self._next < stop:
+            n = min(stop - self._next, PIECE)
+            rows, invented = np.empty((n, x.shape[1])), np.zeros(n, dtype=np.bool_)
+            _interpolate(u, x, self._next, self._on_grid, rows, invented)
+            self._next += n
+            yield rows, invented if invented.any() else None
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _interpolate(u: Array, x: Array, first: int, on_grid: float, rows: Array, invented: Mask) -> None:
+    last = len(u) - 1
+    weight = np.empty(6)
+    i = 0
+    for k in range(len(rows)):
+        at = float(first + k)
+        if at < u[0] - on_grid:  # the recording's first samples were unusable
+            rows[k] = x[0]
+            invented[k] = True
+            continue
+        while i < last and u[i + 1] <= at:
+            i += 1
+        near = i if at - u[i] <= on_grid or i == last else (i + 1 if u[i + 1] - at <= on_grid else -1)
+        if near >= 0:
+            rows[k] = x[near]
+            continue
+        step = u[i + 1] - u[i]
+        regular = i >= 2 and i + 3 <= last
+        if regular:
+            for j in range(i - 2, i + 3):
+                regular = regular and 0.5 <= u[j + 1] - u[j] <= 1.5
+        if regular:
+            for j in range(6):
+                weight[j] = 1.0
+                for m in range(6):
+                    if m != j:
+                        weight[j] *= (at - u[i - 2 + m]) / (u[i - 2 + j] - u[i - 2 + m])
+            for c in range(x.shape[1]):
+                total = 0.0
+                for j in range(6):
+                    total += weight[j] * x[i - 2 + j, c]
+                rows[k, c] = total
+        else:
+            invented[k] = step > GAP
+            share = (at - u[i]) / step
+            for c in range(x.shape[1]):
+                rows[k, c] = x[i, c] + share * (x[i + 1, c] - x[i, c])

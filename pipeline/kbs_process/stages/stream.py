@@ -1,0 +1,268 @@
+"""One stream of a recording on its way to the working rate: ordered, timed, regridded, reduced."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from kbs_process.signals.records import Array, Block, Loss, Mask, Stamps
+from kbs_process.stages.clocks import ClockData, LatencyFloor
+from kbs_process.stages.envelope import MinMax
+from kbs_process.stages.grid import GAP, Grid, Regridder, nominal_grid
+from kbs_process.stages.ordering import Orderer, Reblock, finite_rows, judge
+from kbs_process.stages.resample import Kept, Reducer, design
+from kbs_process.stages.spectrum import Welch
+
+GAPS_LISTED = 20  # one by one; the others in one line
+
+
+@dataclass(frozen=True, slots=True)
+class Gap:
+    """A step of more than `GAP` nominal periods."""
+
+    start: float  # s on the stream's own clock, last sample before
+    end: float  # first sample after
+    missing: int
+
+
+@dataclass(slots=True)
+class Timeline:
+    """Order, clock, gaps and losses of one stream, common to fast and slow ones."""
+
+    where: str
+    grid: Grid | None = None
+    by_recorder: bool = False
+    gaps: list[Gap] = field(default_factory=list)
+    gaps_unlisted: int = 0
+    missing_unlisted: int = 0
+    non_finite: int = 0
+    samples: int = 0
+    _reblock: Reblock = field(default_factory=Reblock)
+    _orderer: Orderer | None = None
+    _floor: LatencyFloor | None = None
+    _first: int = 0
+    _last: int = 0
+
+    def push(self, chunk: Block) -> list[Block]:
+        """Take a chunk in file order; return ordered blocks that nothing can precede any more."""
+        return [ready for block in self._reblock.push(chunk) for ready in self._order(block)]
+
+    def flush(self) -> list[Block]:
+        """Return what was held back."""
+        ready = [ready for block in self._reblock.flush() for ready in self._order(block)]
+        last = self._orderer.flush() if self._orderer else None
+        if last is not None:
+            ready.append(self._timed(last))
+        return ready
+
+    def _order(self, block: Block) -> list[Block]:
+        if self._orderer is None:
+            sense = judge(block)
+            self.by_recorder = not sense.stamp and sense.log
+            self._orderer = Orderer(sense)
+        if self.by_recorder:
+            block = Block(block.log, block.log, block.values)
+        released = self._orderer.push(block)
+        return [] if released is None else [self._timed(released)]
+
+    def _timed(self, block: Block) -> Block:
+        if self._floor is None:
+            self._floor = LatencyFloor(int(block.stamp[0]), int(block.log[0]))
+            self._first = self._last = int(block.stamp[0])
+        if self.grid is None and len(block) > 1:
+            self.grid = nominal_grid(block.stamp)
+        self._floor.push(block.stamp, block.log)
+        if self.grid is not None:
+            self._find_gaps(block.stamp, self.grid)
+        self._last = int(block.stamp[-1])
+        self.samples += len(block)
+        return block
+
+    def _find_gaps(self, stamp: Stamps, grid: Grid) -> None:
+        steps = np.diff(stamp, prepend=np.int64(self._last))
+        for index in np.flatnonzero(steps > GAP * grid.period_ns):
+            missing = max(round(float(steps[index]) / grid.period_ns) - 1, 1)
+            if len(self.gaps) < GAPS_LISTED:
+                end = int(stamp[index])
+                self.gaps.append(Gap(self.own_one(end - int(steps[index])), self.own_one(end), missing))
+            else:
+                self.gaps_unlisted += 1
+                self.missing_unlisted += missing
+
+    def own_one(self, stamp: int) -> float:
+        """Time of one stamp, s from the stream's first."""
+        return (stamp - self._first) * 1e-9
+
+    def own(self, stamp: Stamps) -> Array:
+        """Times of stamps, s from the stream's first."""
+        return (stamp - self._first).astype(np.float64) * 1e-9
+
+    @property
+    def first_stamp(self) -> int:
+        return self._first
+
+    @property
+    def span(self) -> float:
+        """From the first sample to the last, s."""
+        return self.own_one(self._last)
+
+    def clock(self) -> ClockData:
+        """What the stream tells about its clock."""
+        assert self._floor is not None
+        return ClockData(self._first, self._floor.first_log, self.span, self._floor.line(), self.by_recorder)
+
+    def losses(self, offset: float, rate: float) -> list[Loss]:
+        """Everything that was wrong, on the run's time axis t = offset + rate own."""
+        found = [
+            Loss("gap", self.where, gap.missing, offset + rate * gap.start, offset + rate * gap.end)
+            for gap in self.gaps
+        ]
+        if self.gaps_unlisted:
+            detail = f"{self.gaps_unlisted} more gaps"
+            found.append(Loss("gap", self.where, self.missing_unlisted, detail=detail))
+        if self.non_finite:
+            found.append(Loss("non-finite", self.where, self.non_finite, detail="interpolated"))
+        if self.by_recorder:
+            detail = "the sensor's stamps do not advance: the recorder's clock is used"
+            found.append(Loss("clock", self.where, self.samples, detail=detail))
+        if self._orderer is not None:
+            found += self._disorder(self._orderer)
+        return found
+
+    def _disorder(self, orderer: Orderer) -> list[Loss]:
+        found = []
+        if orderer.repeats:
+            found.append(Loss("repeat", self.where, orderer.repeats, detail="same stamp: the first is kept"))
+        if orderer.displaced:
+            detail = (
+                f"put in order; {orderer.late} too late for that and dropped"
+                if orderer.late
+                else "put in order"
+            )
+            found.append(Loss("out of order", self.where, orderer.displaced, detail=detail))
+        if orderer.stray:
+            detail = "stamps more than 10 s off the recorder's clock: dropped"
+            found.append(Loss("clock", self.where, orderer.stray, detail=detail))
+        return found
+
+
+class Collected:
+    """A slow stream, kept sample by sample."""
+
+    def __init__(self, where: str, width: int) -> None:
+        self.line = Timeline(where)
+        self._width = width
+        self._own: list[Array] = []
+        self._values: list[Array] = []
+
+    def push(self, chunk: Block) -> None:
+        self._take(self.line.push(chunk))
+
+    def finish(self) -> tuple[Array, Array]:
+        """Return times (n,), s from the stream's first sample, and values (n, c)."""
+        self._take(self.line.flush())
+        if not self._own:
+            return np.empty(0), np.empty((0, self._width))
+        return np.concatenate(self._own), np.concatenate(self._values)
+
+    def _take(self, blocks: list[Block]) -> None:
+        for block in blocks:
+            good = finite_rows(block.values)
+            own, values = self.line.own(block.stamp), block.values
+            if good is not None:
+                self.line.non_finite += len(own) - int(np.count_nonzero(good))
+                own, values = own[good], values[good]
+            self._own.append(own)
+            self._values.append(values)
+
+
+class Uniform:
+    """A fast stream, reduced to a little more than twice the working rate as it passes."""
+
+    def __init__(
+        self,
+        where: str,
+        channels: tuple[str, ...],
+        working_rate: float,
+        *,
+        unwrap: bool = False,
+        spectrum: tuple[float, float] | None = None,
+        stretches: int = 0,
+        keep_below: float = 0.0,
+    ) -> None:
+        """`spectrum`: (resolution, limit), Hz; below a rate of `keep_below`, Hz, samples are kept as such."""
+        self.line = Timeline(where)
+        self.welch: Welch | None = None
+        self.envelope = MinMax(len(channels), stretches) if stretches else None
+        self._channels = channels
+        self._working_rate = working_rate
+        self._spectrum = spectrum
+        self._keep_below = keep_below
+        self._turns = np.zeros(len(channels)) if unwrap else None
+        self._before: Array | None = None
+        self._regrid: Regridder | None = None
+        self._reduce: Reducer | None = None
+        self._own: list[Array] = []
+        self._values: list[Array] = []
+
+    def push(self, chunk: Block) -> None:
+        for block in self.line.push(chunk):
+            self._take(block)
+
+    def finish(self) -> Kept | None:
+        """Return the reduced stream, or None where it is too short for the filters."""
+        for block in self.line.flush():
+            self._take(block)
+        if self._regrid is None or self._reduce is None:
+            return None
+        for rows, invented in self._regrid.flush():
+            self._pass_on(rows, invented)
+        return self._reduce.finish()
+
+    def samples(self) -> tuple[Array, Array] | None:
+        """Return times (n,) and values (n, c) of a stream slow enough to be kept."""
+        return (np.concatenate(self._own), np.concatenate(self._values)) if self._own else None
+
+    def _take(self, block: Block) -> None:
+        grid = self.line.grid
+        if grid is None:
+            return
+        if self._regrid is None:
+            self._regrid = Regridder(grid)
+            self._reduce = Reducer(design(grid.rate, self._working_rate))
+            if self._spectrum:
+                self.welch = Welch(grid.rate, *self._spectrum, self._channels)
+        stamp, values = block.stamp, block.values
+        good = finite_rows(values)
+        if good is not None:
+            self.line.non_finite += len(stamp) - int(np.count_nonzero(good))
+            stamp, values = stamp[good], values[good]
+        if self._turns is not None and len(values):
+            values = self._unwrapped(values, self._turns)
+        if grid.rate <= self._keep_below:
+            self._own.append(self.line.own(stamp))
+            self._values.append(values)
+        for rows, invented in self._regrid.push(grid.periods(stamp), values):
+            self._pass_on(rows, invented)
+
+    def _pass_on(self, rows: Array, invented: Mask | None) -> None:
+        assert self._reduce is not None
+        self._reduce.push(rows, invented)
+        if self.welch is not None:
+            self.welch.push(rows, invented)
+        if self.envelope is not None:
+            self.envelope.push(rows)
+
+    def _unwrapped(self, values: Array, turned: Array) -> Array:
+        """Continue angles through full turns: no joint turns by half a turn between samples."""
+        first = values[:1] if self._before is None else self._before
+        whole = np.concatenate((first, values))
+        self._before = values[-1:].copy()
+        jumps = -np.rint(np.diff(whole, axis=0) / (2.0 * np.pi))
+        if not jumps.any() and not turned.any():
+            return values
+        turns = turned + np.cumsum(jumps, axis=0)
+        self._turns = turns[-1]
+        unwrapped: Array = values + 2.0 * np.pi * turns
+        return unwrapped
