@@ -1,0 +1,65 @@
+"""Which folder a user means, and where its results go."""
+
+from __future__ import annotations
+
+from pathlib import Path, PurePath
+
+from kbs_process.errors import ConfigError, OutputError, did_you_mean
+
+CAMPAIGNS = "campaigns"
+REPORTS = "reports"
+
+
+def find_campaign(name: str) -> Path:
+    """Return the folder of a campaign: a path, or `campaign/NAME` for campaigns/NAME here or above.
+
+    Raises ConfigError that lists the campaigns there are.
+    """
+    path = Path(name)
+    if path.is_file() and path.name == "campaign.toml":
+        return path.absolute().parent
+    if path.is_dir():
+        return path.absolute()
+    parts = PurePath(name).parts
+    if len(parts) == 2 and parts[0] in ("campaign", CAMPAIGNS):
+        for root in (Path.cwd(), *Path.cwd().parents):
+            if (root / CAMPAIGNS / parts[1]).is_dir():
+                return root / CAMPAIGNS / parts[1]
+    raise ConfigError(f"there is no campaign '{name}'", remedy=_remedy(name))
+
+
+def _remedy(name: str) -> str:
+    known = known_campaigns()
+    if not known:
+        return "name the folder of a campaign, or work where there is a folder campaigns/"
+    return did_you_mean(f"campaign/{PurePath(name).name}", [f"campaign/{entry}" for entry in known])
+
+
+def known_campaigns() -> tuple[str, ...]:
+    """Return the names in the nearest folder campaigns/, here or above."""
+    for root in (Path.cwd(), *Path.cwd().parents):
+        if (root / CAMPAIGNS).is_dir():
+            return tuple(sorted(path.parent.name for path in (root / CAMPAIGNS).glob("*/campaign.toml")))
+    return ()
+
+
+def results_folder(campaign: Path, output: Path | None, suffix: str = "") -> Path:
+    """Return where results go: X/reports/NAME for X/campaigns/NAME, else reports/NAME here, or `output`.
+
+    Raises OutputError for a place inside the campaign's own folder, or around it.
+    """
+    campaign = campaign.absolute()
+    if output is not None:
+        target = output.absolute()
+    elif campaign.parent.name == CAMPAIGNS:
+        target = campaign.parents[1] / REPORTS / (campaign.name + suffix)
+    else:
+        target = Path.cwd() / REPORTS / (campaign.name + suffix)
+    inner, outer = target.resolve(), campaign.resolve()
+    if inner.is_relative_to(outer) or outer.is_relative_to(inner):
+        raise OutputError(
+            "results cannot go into the campaign's folder, nor replace a folder that holds it",
+            where=str(target),
+            remedy="name another folder with --output",
+        )
+    return target

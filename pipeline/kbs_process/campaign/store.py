@@ -1,0 +1,184 @@
+"""Results on disk: written aside, then put in place in one step, by one process at a time.
+
+Beside the target T lie, while its results are written,
+    .T.lock      locked (flock) by the process that writes; stays, empty of meaning once unlocked
+    .T.new-XXXX  the new results, growing
+    .T.old       the old results, where the system cannot exchange two folders in one step
+A process that is killed leaves the last two behind; the next one that holds the lock cleans up.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import errno
+import fcntl
+import os
+import shutil
+import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import NoReturn
+
+from kbs_process.errors import OutputError
+
+RESULTS = "results.json"  # a folder that holds this file is one that may be replaced
+
+_FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
+_REFUSED = {errno.EACCES, errno.EPERM, errno.EROFS}
+
+
+@contextmanager
+def writing(target: Path, *, marker: str = RESULTS) -> Iterator[Path]:
+    """Yield an empty private folder that replaces `target`, whole, when the block ends well.
+
+    Until then, and whenever the block fails or the process dies, `target` stays as it was. A folder that is
+    not empty is replaced only if it holds `marker`, which every set of results has to contain.
+
+    Raises OutputError if the place cannot be written, is full, holds something else, or is being written.
+    """
+    target = target.absolute()
+    with _locked(target):
+        _recover(target)
+        _refuse_foreign(target, marker)
+        private = _private_folder(target)
+        try:
+            yield private
+            if not (private / marker).is_file():
+                raise RuntimeError(f"results without {marker}")
+            _flush(private)
+            _put_in_place(private, target)
+        except OSError as error:
+            _explain(error, target)
+        finally:
+            shutil.rmtree(private, ignore_errors=True)
+
+
+@contextmanager
+def _locked(target: Path) -> Iterator[None]:
+    """Hold the lock of `target`, or say who does."""
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        descriptor = os.open(_beside(target, "lock"), os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+    except OSError as error:
+        _explain(error, target)
+    try:
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            holder = os.read(descriptor, 200).decode(errors="replace").strip() or "another process"
+            raise OutputError(
+                f"{holder} is writing results there",
+                where=str(target),
+                remedy="wait until it is done, or name another folder with --output",
+            ) from error
+        os.ftruncate(descriptor, 0)
+        os.write(descriptor, f"process {os.getpid()} on {os.uname().nodename}".encode())
+        yield
+        os.ftruncate(descriptor, 0)
+    except OSError as error:
+        _explain(error, target)
+    finally:
+        os.close(descriptor)
+
+
+def _beside(target: Path, suffix: str) -> Path:
+    return target.with_name(f".{target.name}.{suffix}")
+
+
+def _recover(target: Path) -> None:
+    """Undo or finish what a process that died has left; only for the holder of the lock."""
+    old = _beside(target, "old")
+    if old.is_dir() and not target.exists():
+        old.rename(target)
+    for leftover in (old, *target.parent.glob(f".{target.name}.new-*")):
+        shutil.rmtree(leftover, ignore_errors=True)
+
+
+def _refuse_foreign(target: Path, marker: str) -> None:
+    if not target.exists() or (target / marker).is_file():
+        return
+    if not target.is_dir() or any(target.iterdir()):
+        raise OutputError(
+            f"is there already, and holds no results (no {marker})",
+            where=str(target),
+            remedy="name a new or an empty folder with --output",
+        )
+
+
+def _private_folder(target: Path) -> Path:
+    private = Path(tempfile.mkdtemp(prefix=f".{target.name}.new-", dir=target.parent))
+    # mkdtemp is for secrets; results are as readable as any folder made here.
+    umask = os.umask(0)
+    os.umask(umask)
+    private.chmod(0o777 & ~umask)
+    return private
+
+
+def _flush(folder: Path) -> None:
+    """Make the system write every file to the disk, and the folders that name them."""
+    for root, _, files in os.walk(folder):
+        for path in (*(Path(root) / name for name in files), Path(root)):
+            _fsync(path)
+
+
+def _fsync(path: Path) -> None:
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def _put_in_place(private: Path, target: Path) -> None:
+    """Let `private` become `target`; the old results, if any, end up in `private` or are gone."""
+    if not target.exists():
+        private.rename(target)
+    elif not _exchange(private, target):
+        # Two steps: a death between them leaves the old results in .T.old, where _recover finds them.
+        old = _beside(target, "old")
+        target.rename(old)
+        private.rename(target)
+        shutil.rmtree(old)
+    _fsync(target.parent)
+
+
+def _exchange(one: Path, other: Path) -> bool:
+    """Exchange two folders in one step; False where the system or the file system cannot."""
+    if not sys.platform.startswith("linux"):
+        return False
+    renameat2 = getattr(ctypes.CDLL(None, use_errno=True), "renameat2", None)
+    if renameat2 is None:
+        return False
+    at_working_directory, rename_exchange = -100, 2
+    paths = (os.fsencode(one), os.fsencode(other))
+    if renameat2(at_working_directory, paths[0], at_working_directory, paths[1], rename_exchange) == 0:
+        return True
+    code = ctypes.get_errno()
+    if code in (errno.EINVAL, errno.ENOSYS, errno.ENOTSUP):
+        return False
+    raise OSError(code, os.strerror(code), str(other))
+
+
+def _explain(error: OSError, target: Path) -> NoReturn:
+    """Raise what a user can act upon: a place that is full or refuses to be written."""
+    if error.errno in _FULL:
+        raise OutputError(
+            f"the disk is full ({error.strerror}); the results of before are whole",
+            where=str(target),
+            remedy="make room, or name a folder on another disk with --output",
+        ) from error
+    if error.errno in _REFUSED and _concerns(error, target):
+        raise OutputError(
+            f"cannot be written: {error.strerror}",
+            where=str(target),
+            remedy="name a folder that you may write to with --output",
+        ) from error
+    raise error
+
+
+def _concerns(error: OSError, target: Path) -> bool:
+    """Say whether an error is about the place of the results, and not about a file that was being read."""
+    name = error.filename
+    return name is None or Path(os.fsdecode(name)).absolute().is_relative_to(target.parent)

@@ -1,0 +1,255 @@
+"""The command line. Thin: it parses, calls, prints, and turns errors into messages and exit statuses.
+
+Nothing that computes is imported at the top, so that `--help` answers at once.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from kbs_process import __version__
+from kbs_process.errors import KbsError, did_you_mean
+
+if TYPE_CHECKING:
+    from kbs_process.campaign.progress import Progress
+
+NOT_MET, BAD_INPUT, INTERNAL, INTERRUPTED = 1, 2, 70, 130
+
+EXISTING_FILE = click.Path(path_type=Path, exists=True, dir_okay=False)
+FOLDER = click.Path(path_type=Path, file_okay=False)
+
+
+class CampaignGroup(click.Group):
+    """A group of verbs; where the first word is none of them, it is a campaign to be processed."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        if args and args[0] not in self.commands and args[0] not in ("--help", "-h", "--version"):
+            self._refuse_misspelt_verb(args[0], ctx)
+            args = ["process", *args]
+        return super().parse_args(ctx, args)
+
+    def _refuse_misspelt_verb(self, word: str, ctx: click.Context) -> None:
+        hint = did_you_mean(word, self.commands)
+        if hint.startswith("did") and not Path(word).exists():
+            raise click.UsageError(f"There is no verb '{word}': {hint}", ctx)
+
+
+def examples(*lines: str) -> str:
+    """Return an epilog that click prints as it is."""
+    return "\b\nExamples:\n" + "\n".join(f"  kbs-process {line}" for line in lines)
+
+
+@click.group(
+    cls=CampaignGroup,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+    epilog=examples("campaign/EL089", "campaign/EL089 --check", "validate campaign/EL089", "VERB --help")
+    + "\n\nExit status: 0 done; 1 a requirement is not met, or a recording has losses (only with --check); "
+    "2 bad input. With --debug, any error shows its traceback.",
+    subcommand_metavar="CAMPAIGN | VERB ...",
+)
+@click.version_option(__version__, prog_name="kbs-process")
+def cli() -> None:
+    """Disturbance torque of a pointing mechanism: from raw force/torque recordings to a correlation report.
+
+    Without a verb, CAMPAIGN is processed. campaign/NAME is the folder campaigns/NAME, here or above; any other
+    folder that holds a campaign.toml goes as well.
+    """
+
+
+campaign_argument = click.argument("campaign")
+output_option = click.option(
+    "--output", "-o", type=FOLDER, metavar="FOLDER", help="Where results go [default: reports/NAME]."
+)
+quiet_option = click.option("--quiet", "-q", is_flag=True, help="No progress.")
+pdf_option = click.option(
+    "--pdf/--no-pdf", default=None, help="A report.pdf beside the page [default: if WeasyPrint is installed]."
+)
+
+
+@cli.command(epilog=examples("campaign/EL089", "process campaign/EL089 --check --output /data/EL089"))
+@campaign_argument
+@output_option
+@pdf_option
+@click.option("--check", is_flag=True, help="Exit with 1 when a requirement is not met.")
+@quiet_option
+def process(campaign: str, output: Path | None, pdf: bool | None, check: bool, quiet: bool) -> None:
+    """Process CAMPAIGN: fit, compare with the prediction, and write the report."""
+    from kbs_process.campaign import run
+    from kbs_process.campaign.load import load_campaign
+    from kbs_process.campaign.locate import find_campaign, results_folder
+
+    folder = find_campaign(campaign)
+    target = results_folder(folder, output)
+    loaded = load_campaign(folder)
+    outcome = run.process(loaded, target, progress=_progress(quiet), pdf=_wants_pdf(pdf))
+    for line in outcome.verdict_lines:
+        click.echo(line)
+    click.echo(f"Report: {outcome.report}")
+    if check and outcome.requirement_met is False:
+        sys.exit(NOT_MET)
+
+
+@cli.command(epilog=examples("validate campaign/EL089", "validate campaign/EL089 --check"))
+@campaign_argument
+@click.option("--check", is_flag=True, help="Exit with 1 when a recording has losses.")
+@quiet_option
+def validate(campaign: str, check: bool, quiet: bool) -> None:
+    """Check CAMPAIGN's description, and read all its recordings through.
+
+    Exits with 0 if all is well or can be processed, with 2 if something cannot be read.
+    """
+    from kbs_process.campaign.load import load_campaign
+    from kbs_process.campaign.locate import find_campaign
+    from kbs_process.campaign.validate import describe, read_through
+
+    loaded = load_campaign(find_campaign(campaign))
+    findings = read_through(loaded, _progress(quiet))
+    click.echo("\n".join(describe(loaded, findings)))
+    if any(finding.error for finding in findings):
+        sys.exit(BAD_INPUT)
+    if check and any(finding.losses for finding in findings):
+        sys.exit(NOT_MET)
+
+
+@cli.command(epilog=examples("inspect recording.mcap", "inspect --check campaigns/EL089/recordings/*.mcap"))
+@click.argument("files", nargs=-1, required=True, type=EXISTING_FILE, metavar="FILE...")
+@click.option("--check", is_flag=True, help="Exit with 1 when a recording has losses.")
+def inspect(files: tuple[Path, ...], check: bool) -> None:
+    """Show what is in recordings: topics, rates, gaps, ranges, damage."""
+    from kbs_process.ingest.inspection import inspect_recording
+
+    lossy = False
+    for path in files:
+        inspection = inspect_recording(path)
+        click.echo(inspection.text())
+        lossy = lossy or bool(inspection.losses)
+    if check and lossy:
+        sys.exit(NOT_MET)
+
+
+@cli.command(
+    epilog=examples(
+        "simulate campaign/EL089 --trajectory EL089P00", "simulate campaign/EL089 --command slew.csv --rate 200"
+    )
+)
+@campaign_argument
+@click.option("--trajectory", metavar="NAME", help="Commands of the first recording of this trajectory.")
+@click.option(
+    "--command",
+    type=EXISTING_FILE,
+    help="CSV or Parquet file with columns t (s), and for each joint its angle JOINT (rad) and, if known, "
+    "its rate JOINT.rate (rad/s).",
+)
+@click.option(
+    "--rate",
+    type=click.FloatRange(min=0, min_open=True),
+    metavar="HZ",
+    help="Sampling rate of the wrench [default: the recording's; 100 with --command].",
+)
+@output_option
+@quiet_option
+def simulate(
+    campaign: str,
+    trajectory: str | None,
+    command: Path | None,
+    rate: float | None,
+    output: Path | None,
+    quiet: bool,
+) -> None:
+    """Run CAMPAIGN's plant on commands alone, through its controller.
+
+    Writes wrench, angles and field as Parquet and as simulated.mcap.
+    """
+    if trajectory is not None and command is not None:
+        raise click.UsageError("Give --trajectory or --command, not both.")
+    from kbs_process.campaign.load import load_campaign
+    from kbs_process.campaign.locate import find_campaign, results_folder
+    from kbs_process.campaign.simulate import simulate_commands, simulate_trajectory
+
+    folder = find_campaign(campaign)
+    target = results_folder(folder, output, suffix="-simulated")
+    loaded = load_campaign(folder, checksums=False)
+    if command is not None:
+        written = simulate_commands(loaded, command, target, rate_Hz=rate or 100.0, progress=_progress(quiet))
+    else:
+        written = simulate_trajectory(loaded, trajectory, target, rate_Hz=rate, progress=_progress(quiet))
+    click.echo(f"Simulated: {written}")
+
+
+@cli.command(epilog=examples("predict campaign/EL089 EL089P00_1", "predict campaign/EL089 other.mcap -o /tmp/other"))
+@campaign_argument
+@click.argument("recording")
+@output_option
+@quiet_option
+def predict(campaign: str, recording: str, output: Path | None, quiet: bool) -> None:
+    """Predict one RECORDING: a name from CAMPAIGN, or any MCAP file with the same topics.
+
+    The plant follows what was recorded: field positions, encoders and commands, or, for a campaign that is
+    driven by motion, the measured angles. Writes the prediction as Parquet and as predicted.mcap.
+    """
+    from kbs_process.campaign.load import load_campaign
+    from kbs_process.campaign.locate import find_campaign, results_folder
+    from kbs_process.campaign.simulate import predict_recording
+
+    folder = find_campaign(campaign)
+    target = results_folder(folder, output, suffix="-predicted")
+    loaded = load_campaign(folder, checksums=False)
+    click.echo(f"Predicted: {predict_recording(loaded, recording, target, progress=_progress(quiet))}")
+
+
+@cli.command(epilog=examples("report reports/EL089", "report reports/EL089 --no-pdf"))
+@click.argument("results", type=click.Path(path_type=Path))
+@pdf_option
+def report(results: Path, pdf: bool | None) -> None:
+    """Render the report again from stored RESULTS, computing nothing."""
+    from kbs_process.report.build import build
+
+    build(results, pdf=_wants_pdf(pdf))
+    click.echo(f"Report: {results / 'index.html'}")
+
+
+def _progress(quiet: bool) -> Progress:
+    from kbs_process.campaign.progress import SilentProgress, progress_for_terminal
+
+    return SilentProgress() if quiet else progress_for_terminal()
+
+
+def _wants_pdf(pdf: bool | None) -> bool:
+    return find_spec("weasyprint") is not None if pdf is None else pdf
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command line and exit."""
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    debug = "--debug" in words
+    try:
+        cli.main([word for word in words if word != "--debug"], prog_name="kbs-process", standalone_mode=False)
+    except click.ClickException as error:
+        error.show()
+        sys.exit(error.exit_code)
+    except click.Abort:
+        _complain("interrupted; results of before are whole")
+        sys.exit(INTERRUPTED)
+    except KbsError as error:
+        if debug:
+            raise
+        _complain(f"error: {error}")
+        sys.exit(error.exit_status)
+    except Exception as error:  # noqa: BLE001 (the last one to speak: a user gets words, not a traceback)
+        if debug:
+            raise
+        _complain(
+            f"error: {type(error).__name__}: {error}\n"
+            "  -> this is a fault of kbs-process: please report it with what the same command prints with --debug"
+        )
+        sys.exit(INTERNAL)
+
+
+def _complain(message: str) -> None:
+    click.echo(message, err=True)
