@@ -1,0 +1,49 @@
+"""From a recording's file to a run at the working rate."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from kbs_process.campaign.config import Campaign, RecordingEntry
+from kbs_process.ingest import Stream, open_recording
+from kbs_process.signals.records import Block, Run
+from kbs_process.stages.condense import CondenseSettings, condense
+
+# A recorder need not have these; everything else that the campaign names has to be there.
+OPTIONAL_STREAMS = frozenset({"field", "temperature"})
+
+
+def read_run(campaign: Campaign, entry: RecordingEntry) -> Run:
+    """Read one recording chunk by chunk and reduce it; what it lost is listed in the run's losses."""
+    source = open_recording(entry.path)
+    there = {summary.topic for summary in source.topics}
+    topics = [
+        topic
+        for topic in campaign.topics.present()
+        if topic.topic in there or topic.key not in OPTIONAL_STREAMS
+    ]
+    blocks = source.read([Stream(topic.key, topic.topic, topic.fields) for topic in topics])
+    run = condense(
+        entry.name,
+        _within(blocks, entry.start, entry.end),
+        {topic.key: topic.channels for topic in topics},
+        CondenseSettings(working_rate_Hz=campaign.bands.working_rate),
+    )
+    return replace(run, losses=(*source.losses, *run.losses))
+
+
+def _within(
+    blocks: Iterator[tuple[str, Block]], start: float | None, end: float | None
+) -> Iterator[tuple[str, Block]]:
+    """Leave out what the recorder wrote before `start` or after `end`, s from its first message."""
+    first: int | None = None
+    for key, block in blocks:
+        if first is None and len(block):
+            first = int(block.log[0])
+        since = (block.log - (first or 0)) * 1e-9
+        inside = (since >= (start or 0.0)) & (since < (end or float("inf")))
+        yield (
+            key,
+            block if inside.all() else Block(block.stamp[inside], block.log[inside], block.values[inside]),
+        )

@@ -1,0 +1,100 @@
+"""The tables of a results folder, written: Parquet with units, frame and history in the file's metadata."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from kbs_process.signals.grid import overlap
+from kbs_process.signals.records import Array, Envelope, Mask, Signal, Spectrum
+
+
+@dataclass(frozen=True, slots=True)
+class TableWriter:
+    """Writes the tables of one recording below `folder`/tables."""
+
+    folder: Path
+    recording: str
+
+    def aligned(self, wrench: Signal, others: Mapping[str, Signal]) -> None:
+        """Raw wrench at the working rate, beside the signals of the joints ("angle", "command")."""
+        signals = overlap(wrench, *others.values())
+        base, joints = signals[0], dict(zip(others, signals[1:], strict=True))
+        columns: dict[str, Array | Mask] = {"t": base.t, "valid": base.valid}
+        units = {"t": "s"}
+        for channel, unit in zip(base.channels, base.units, strict=True):
+            columns[channel], units[channel] = base.column(channel), unit
+        for kind, signal in joints.items():
+            for channel, unit in zip(signal.channels, signal.units, strict=True):
+                name = f"{kind}.{channel}"
+                columns[name], units[name] = signal.column(channel), unit
+        self._write("aligned", self.recording, columns, units, base.frame, base.history)
+
+    def gravity(self, measured: Signal, static: Signal, residual: Signal) -> None:
+        """Decoupled wrench, the static model, and what is left."""
+        self._together(
+            "gravity", self.recording, {"measured": measured, "static": static, "residual": residual}
+        )
+
+    def band(self, kind: str, band: str, measured: Signal, predicted: Signal | None) -> None:
+        """Measured and predicted wrench in one band; `kind` is "bands" (frame T) or "spacecraft" (frame S)."""
+        signals = {"measured": measured} | ({} if predicted is None else {"predicted": predicted})
+        self._together(kind, f"{self.recording}.{band}", signals)
+
+    def envelope(self, envelope: Envelope, channels: Sequence[str], units: Sequence[str]) -> None:
+        """Least and greatest values of the decoupled wrench at its full rate."""
+        columns: dict[str, Array | Mask] = {"t": envelope.t}
+        named = {"t": "s"}
+        for index, (channel, unit) in enumerate(zip(channels, units, strict=True)):
+            for side, values in (("low", envelope.low), ("high", envelope.high)):
+                columns[f"{channel}.{side}"], named[f"{channel}.{side}"] = values[:, index], unit
+        self._write("envelope", self.recording, columns, named, "T", ())
+
+    def spectrum(self, measured: Spectrum, predicted: Spectrum | None, units: Mapping[str, str]) -> None:
+        """Power spectral densities on the measurement's frequencies, up to where both have them."""
+        columns: dict[str, Array | Mask] = {"f": measured.f}
+        named = {"f": "Hz"}
+        for kind, spectrum in (("measured", measured), ("predicted", predicted)):
+            if spectrum is None:
+                continue
+            for index, channel in enumerate(spectrum.channels):
+                density = np.real(spectrum.S[:, index, index])
+                name = f"{channel}.{kind}"
+                columns[name] = np.interp(measured.f, spectrum.f, density, right=np.nan)
+                named[name] = f"({units[channel]})^2/Hz"
+        self._write("spectrum", self.recording, columns, named, "T", ())
+
+    def _together(self, kind: str, stem: str, signals: Mapping[str, Signal]) -> None:
+        common = dict(zip(signals, overlap(*signals.values()), strict=True))
+        first = next(iter(common.values()))
+        columns: dict[str, Array | Mask] = {
+            "t": first.t,
+            "valid": np.logical_and.reduce([signal.valid for signal in common.values()]),
+        }
+        units = {"t": "s"}
+        for name, signal in common.items():
+            for channel, unit in zip(signal.channels, signal.units, strict=True):
+                columns[f"{channel}.{name}"], units[f"{channel}.{name}"] = signal.column(channel), unit
+        self._write(kind, stem, columns, units, first.frame, first.history)
+
+    def _write(
+        self,
+        kind: str,
+        stem: str,
+        columns: Mapping[str, Array | Mask],
+        units: Mapping[str, str],
+        frame: str,
+        history: Sequence[str],
+    ) -> None:
+        about = {"recording": self.recording, "frame": frame, "units": units, "history": list(history)}
+        table = pa.table({name: pa.array(values) for name, values in columns.items()})
+        table = table.replace_schema_metadata({"kbs": json.dumps(about, sort_keys=True)})
+        directory = self.folder / "tables" / kind
+        directory.mkdir(parents=True, exist_ok=True)
+        pq.write_table(table, directory / f"{stem}.parquet", compression="zstd")
