@@ -48,14 +48,14 @@ def sigma_of_pose(wrench: Signal, spacecraft: Spacecraft) -> Array:
 
     A shift dp of the centre of mass changes the torque by -dp x F; a turn da turns force and torque alike.
     """
-    valid = wrench.values[wrench.valid]
+    R_ST, _ = pose(spacecraft)
+    moved = to_spacecraft(wrench, spacecraft).values[wrench.valid]
     variance = np.zeros(6)
     for axis in range(3):
-        unit = np.eye(3)[axis]
-        shift = spacecraft.position.sigma[axis] * np.cross(unit, valid[:, :3])
-        variance[3:] += np.mean(shift**2, axis=0)
+        shift = R_ST[:, axis] * spacecraft.position.sigma[axis]
+        variance[3:] += np.mean(np.cross(shift, moved[:, :3]) ** 2, axis=0)
+        turn = R_ST[:, axis] * spacecraft.attitude.sigma[axis]
         for part in (slice(0, 3), slice(3, 6)):
-            turn = spacecraft.attitude.sigma[axis] * np.cross(unit, valid[:, part])
-            variance[part] += np.mean(turn**2, axis=0)
+            variance[part] += np.mean(np.cross(turn, moved[:, part]) ** 2, axis=0)
     rms: Array = np.sqrt(variance)
     return rms
