@@ -6,8 +6,6 @@ Units are SI and part of a field's name, or stand beside the value in `unit`. A 
 be determined is None (null), never NaN. Every `sigma` is one standard deviation.
 """
 
-# ruff: noqa: N815  (units keep their case: high_pass_Hz)
-
 from __future__ import annotations
 
 import json

@@ -1,0 +1,195 @@
+"use strict";
+// Interactive time histories: one uPlot a channel, all of a figure with the same time axis and cursor.
+(() => {
+  const COLORS = { measured: "#1f4e79", static: "#d97706", predicted: "#d97706", residual: "#7c8591" };
+  const ABSENT = -32768;
+  const WHEEL = 0.8;
+
+  const unpack = ({ middle, scale, codes }) => {
+    const bytes = Uint8Array.from(atob(codes), (character) => character.charCodeAt(0));
+    const data = new DataView(bytes.buffer);
+    return Array.from({ length: bytes.length / 2 }, (_, i) => {
+      const code = data.getInt16(2 * i, true);
+      return code === ABSENT ? null : middle + scale * code;
+    });
+  };
+
+  const shown = (value) => (value === null || value === undefined ? "–" : value.toPrecision(4).replace("-", "−"));
+  const tidy = (unit) => unit.replace("^2", "²").replaceAll(" ", "\u00a0");
+
+  const element = (name, text, className) => {
+    const made = document.createElement(name);
+    if (text) made.textContent = text;
+    if (className) made.className = className;
+    return made;
+  };
+
+  const chooser = (label, options, changed) => {
+    const frame = element("label", label);
+    const select = element("select");
+    options.forEach((option) => select.append(new Option(option, option)));
+    select.addEventListener("change", changed);
+    frame.append(select);
+    return { frame, select };
+  };
+
+  function figure(root) {
+    const { key, names, views } = JSON.parse(document.getElementById(`live-${root.dataset.key}`).textContent);
+    const box = root.querySelector(".plots");
+    const reading = root.querySelector(".reading");
+    const unique = (field) => [...new Set(views.map((view) => view[field]))];
+    let plots = [];
+    let view = null;
+    let mark = null; // index of the sample from which differences are read
+
+    const zoom = (min, max) => plots.forEach((plot) => plot.setScale("x", { min, max }));
+    const redraw = () => plots.forEach((plot) => plot.redraw(false));
+
+    const under = (plot) => {
+      const { ctx, bbox } = plot;
+      ctx.save();
+      ctx.beginPath();
+      ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
+      ctx.clip();
+      ctx.fillStyle = "#e6e9ed";
+      for (const [start, end] of view.shaded) {
+        const left = plot.valToPos(start, "x", true);
+        ctx.fillRect(left, bbox.top, Math.max(1, plot.valToPos(end, "x", true) - left), bbox.height);
+      }
+      ctx.restore();
+    };
+
+    const over = (plot, limit) => {
+      const { ctx, bbox } = plot;
+      const line = (x0, y0, x1, y1, color, dash) => {
+        ctx.strokeStyle = color;
+        ctx.setLineDash(dash);
+        ctx.beginPath();
+        ctx.moveTo(x0, y0);
+        ctx.lineTo(x1, y1);
+        ctx.stroke();
+      };
+      ctx.save();
+      ctx.beginPath();
+      ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
+      ctx.clip();
+      ctx.lineWidth = devicePixelRatio;
+      for (const level of limit === null ? [] : [-limit, limit]) {
+        const y = plot.valToPos(level, "y", true);
+        line(bbox.left, y, bbox.left + bbox.width, y, "#b3261e", [6, 4]);
+      }
+      if (mark !== null) {
+        const x = plot.valToPos(plot.data[0][mark], "x", true);
+        line(x, bbox.top, x, bbox.top + bbox.height, "#20262e", [2, 3]);
+      }
+      ctx.restore();
+    };
+
+    const read = (index) => {
+      if (mark === null || index === null || index === undefined) {
+        reading.textContent = "";
+        return;
+      }
+      const between = (values) => (values[index] === null || values[mark] === null ? null : values[index] - values[mark]);
+      const parts = plots.map((plot, i) => {
+        const channel = view.channels[i];
+        return `Δ${channel.name} ${shown(between(plot.data[1]))} ${tidy(channel.unit)}`;
+      });
+      reading.textContent = [`From the mark: Δt ${shown(between(plots[0].data[0]))} s`, ...parts].join("  ·  ");
+    };
+
+    const wheel = (plot) => {
+      plot.over.addEventListener("wheel", (event) => {
+        if (!event.shiftKey) return;
+        event.preventDefault();
+        const turn = event.deltaY || event.deltaX;
+        const factor = turn < 0 ? WHEEL : 1 / WHEEL;
+        const { min, max } = plot.scales.x;
+        const t = plot.data[0];
+        const centre = plot.posToVal(plot.cursor.left, "x");
+        zoom(Math.max(t[0], centre - (centre - min) * factor), Math.min(t.at(-1), centre + (max - centre) * factor));
+      }, { passive: false });
+      let pressed = 0;
+      plot.over.addEventListener("mousedown", (event) => { pressed = event.clientX; });
+      plot.over.addEventListener("click", (event) => {
+        if (Math.abs(event.clientX - pressed) > 3) return;
+        mark = mark === plot.cursor.idx ? null : plot.cursor.idx;
+        read(plot.cursor.idx);
+        redraw();
+      });
+    };
+
+    const make = (channel, t, last) => {
+      const data = [t, ...channel.curves.map(unpack)];
+      const peak = Math.max(...data.slice(1).map((curve) => curve.reduce((most, v) => Math.max(most, Math.abs(v)), 0)));
+      const limit = channel.limit !== null && peak > 0.25 * channel.limit ? channel.limit : null;
+      const range = (_, low, high) => {
+        const [bottom, top] = limit === null ? [low, high] : [Math.min(low, -limit), Math.max(high, limit)];
+        const pad = 0.06 * (top - bottom) || 1e-9;
+        return [bottom - pad, top + pad];
+      };
+      const plot = new uPlot({
+        width: box.clientWidth,
+        height: last ? 176 : 140,
+        legend: { live: true },
+        cursor: { sync: { key, setSeries: false }, drag: { x: true, y: false, dist: 4 }, points: { size: 5 } },
+        scales: { x: { time: false }, y: { range } },
+        series: [
+          { label: "t / s", value: (_, v) => (v === null ? "–" : v.toFixed(2)) },
+          ...channel.curves.map((_, i) => ({
+            label: names[i],
+            stroke: COLORS[names[i]],
+            width: 1,
+            points: { show: false },
+            value: (__, v) => shown(v),
+          })),
+        ],
+        axes: [
+          { label: last ? "time / s" : undefined, labelSize: 20, size: last ? 34 : 24, grid: { stroke: "#eceff2" }, font: "11px sans-serif" },
+          { label: `${channel.name} / ${tidy(channel.unit)}`, labelSize: 20, size: 62, grid: { stroke: "#eceff2" }, font: "11px sans-serif" },
+        ],
+        hooks: { drawClear: [under], draw: [(plot) => over(plot, limit)], setCursor: [(plot) => read(plot.cursor.idx)] },
+      }, data, box);
+      wheel(plot);
+      return plot;
+    };
+
+    const show = () => {
+      const found = views.find((v) => v.recording === recordings.select.value && v.choice === choices.select.value);
+      plots.forEach((plot) => plot.destroy());
+      plots = [];
+      mark = null;
+      read(null);
+      view = found || null;
+      notes.textContent = "";
+      if (!view) {
+        notes.textContent = "Not in this page; see the tables.";
+        return;
+      }
+      const t = unpack(view.channels[0].curves[0]).map((_, i) => view.t0 + i * view.step);
+      if (view.bin_s !== null) notes.textContent = `Each pair of points is the least and greatest value in ${view.bin_s.toPrecision(3)} s.`;
+      plots = view.channels.map((channel, i) => make(channel, t, i === view.channels.length - 1));
+    };
+
+    const recordings = chooser("Recording", unique("recording"), show);
+    const choices = chooser("Band and frame", unique("choice"), show);
+    const all = element("button", "See all");
+    const notes = element("span", "", "hint");
+    all.type = "button";
+    all.addEventListener("click", () => plots.length && zoom(plots[0].data[0][0], plots[0].data[0].at(-1)));
+    root.querySelector(".choices").append(recordings.frame, choices.frame, all, notes);
+    root.hidden = false;
+    root.parentElement.classList.add("live-on");
+    show();
+    new ResizeObserver(() => plots.forEach((plot) => plot.setSize({ width: box.clientWidth, height: plot.height }))).observe(box);
+  }
+
+  // A figure is drawn when it comes near the window, so that the page opens at once.
+  const watcher = new IntersectionObserver((entries) => entries.filter((entry) => entry.isIntersecting).forEach((entry) => {
+    watcher.unobserve(entry.target);
+    figure(entry.target.querySelector(".live"));
+  }), { rootMargin: "600px" });
+  document.querySelectorAll(".live").forEach((root) => watcher.observe(root.parentElement));
+
+  addEventListener("beforeprint", () => document.querySelectorAll("details").forEach((fold) => { fold.open = true; }));
+})();

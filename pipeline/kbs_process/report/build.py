@@ -1,0 +1,33 @@
+"""Render the report of a results folder."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from kbs_process.errors import OutputError
+from kbs_process.report import pdf as paper
+from kbs_process.report.results import load
+from kbs_process.report.tables import Tables
+
+
+def build(results: Path, pdf: bool | None = None) -> Path:
+    """Write index.html, and report.pdf where possible, into a results folder; return the page's path.
+
+    `pdf`: True demands the PDF, False leaves it out, None makes it where weasyprint is installed.
+    """
+    found = load(results)
+    from kbs_process.report import page  # draws: matplotlib costs most of a second to import
+
+    sections = page.panels(found, Tables(results))
+    target = results / "index.html"
+    try:
+        target.write_text(page.render(found, sections, "screen"), encoding="utf-8", newline="\n")
+        if pdf or (pdf is None and paper.available()):
+            paper.write(page.render(found, sections, "paper"), results / "report.pdf")
+    except OSError as error:
+        raise OutputError(
+            f"cannot write the report: {error.strerror or error}",
+            where=str(error.filename or results),
+            remedy="free space on the disk, or check the folder's permissions",
+        ) from None
+    return target

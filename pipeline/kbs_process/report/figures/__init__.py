@@ -1,0 +1,1 @@
+"""The report's figures: the only modules that import matplotlib."""

@@ -1,0 +1,137 @@
+"""What a section of the report is made of; the template knows how each block looks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+from kbs_process.report.results import Results
+from kbs_process.report.tables import Tables
+
+Tone = Literal["", "pass", "fail", "undecided", "muted"]
+
+
+@dataclass(frozen=True, slots=True)
+class Caption:
+    """How to read a figure."""
+
+    shown: str
+    good: str
+    bad: str
+    do: str
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """An image as a data URI."""
+
+    uri: str
+    alt: str
+    title: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Channel:
+    """Curves of one channel for the interactive plots, each packed by `series.pack`."""
+
+    name: str
+    unit: str
+    limit: float | None
+    curves: tuple[dict[str, object], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """One choice of the interactive plots: a recording, in one band and frame."""
+
+    recording: str
+    choice: str  # band and frame, in words
+    t0: float  # s
+    step: float  # s
+    bin_s: float | None  # each pair of points is the least and greatest value in so many seconds
+    shaded: tuple[tuple[float, float], ...]  # s, stretches without valid samples
+    channels: tuple[Channel, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Live:
+    """Interactive time histories; the figure's pictures stand in for them on paper."""
+
+    key: str
+    names: tuple[str, ...]  # of a channel's curves, in their order
+    views: tuple[View, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """One or more pictures that are read in the same way."""
+
+    title: str
+    pictures: tuple[Picture, ...]
+    caption: Caption
+    live: Live | None = None
+    kind: Literal["figure"] = "figure"
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """A table's cell with a tone."""
+
+    text: str
+    tone: Tone = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Grid:
+    """A table; `align` holds one of "l", "r" or "c" a column."""
+
+    title: str
+    head: tuple[str, ...]
+    rows: tuple[tuple[str | Cell, ...], ...]
+    align: str
+    note: str = ""
+    kind: Literal["grid"] = "grid"
+
+
+@dataclass(frozen=True, slots=True)
+class Text:
+    """A paragraph, or with `items` a list under it."""
+
+    text: str
+    items: tuple[str, ...] = ()
+    tone: Tone = ""
+    kind: Literal["text"] = "text"
+
+
+@dataclass(frozen=True, slots=True)
+class Notices:
+    """Warnings, each with its severity, place and remedy."""
+
+    entries: tuple[tuple[str, str, str, str], ...]  # severity, what, where, remedy
+    kind: Literal["notices"] = "notices"
+
+
+@dataclass(frozen=True, slots=True)
+class Fold:
+    """Blocks that a reader opens on demand; open on paper."""
+
+    title: str
+    blocks: tuple[Block, ...]
+    kind: Literal["fold"] = "fold"
+
+
+Block = Figure | Grid | Text | Notices | Fold
+
+
+@dataclass(frozen=True, slots=True)
+class Panel:
+    """A section of the report: the question it answers, and the answer."""
+
+    key: str
+    title: str
+    question: str
+    blocks: tuple[Block, ...]
+
+
+PanelMaker = Callable[[Results, Tables], Panel]

@@ -1,0 +1,107 @@
+"""Is every requirement met, and what qualifies the answer?"""
+
+from __future__ import annotations
+
+from kbs_process.report.figures import bars
+from kbs_process.report.panel import Block, Caption, Cell, Figure, Fold, Grid, Notices, Panel, Text
+from kbs_process.report.panels.choose import frame_label
+from kbs_process.report.results import Notice, Requirement, Results
+from kbs_process.report.tables import Tables
+from kbs_process.report.text import MISSING, band_hz, count, measure, number, percent, unit
+
+_CAPTION = Caption(
+    shown="The largest measured value of each channel over all recordings that count, with two standard "
+    "deviations, the prediction's, and the limit.",
+    good="Every bar with its uncertainty ends left of the limit, and the prediction is a little above "
+    "the measurement.",
+    bad="An error bar that reaches the limit: the verdict is then undecided. A prediction well below the "
+    "measurement: it must not be used to extrapolate to flight.",
+    do="For the channel nearest to its limit, go to its time history, then to the uncertainty budget for "
+    "what would narrow the bar.",
+)
+
+
+def panel(results: Results, tables: Tables) -> Panel:
+    """Compliance table, warnings and data losses right under it, and the channels behind the verdict."""
+    blocks: list[Block] = [_table(results)] if results.requirements else []
+    if not results.requirements:
+        blocks.append(Text("This campaign states no requirement; the report compares, and gives no verdict."))
+    blocks.append(_qualified(results))
+    serious = tuple(_entry(notice) for notice in _sorted(results.warnings) if notice.severity != "info")
+    if serious:
+        blocks.append(Notices(serious))
+    remarks = tuple(_entry(notice) for notice in results.warnings if notice.severity == "info")
+    if remarks:
+        blocks.append(Fold(count(len(remarks), "remark"), (Notices(remarks),)))
+    if results.notes:
+        blocks.append(Text("Assumptions behind these figures:", results.notes))
+    blocks.extend(_figure(requirement) for requirement in results.requirements if requirement.channels)
+    return Panel(
+        "compliance", "Compliance", "Is every requirement met, and what qualifies the answer?", tuple(blocks)
+    )
+
+
+def _table(results: Results) -> Grid:
+    rows = tuple(
+        (
+            f"{entry.name} ({entry.statistic}, {entry.frame})",
+            band_hz(*entry.band_Hz),
+            f"{measure(entry.value, entry.sigma)} {unit(entry.unit)}",
+            f"{number(entry.limit)} {unit(entry.unit)}",
+            _margin(entry),
+            _where(entry),
+            f"{measure(entry.predicted_value, entry.predicted_sigma, 3)}",
+            Cell(entry.verdict, entry.verdict),
+        )
+        for entry in results.requirements
+    )
+    head = ("Requirement", "Band", "Measured", "Limit", "Margin", "Worst case", "Predicted", "Verdict")
+    note = "± is one standard deviation throughout this report. Margin: limit less measured value."
+    sources = "; ".join(dict.fromkeys(entry.source for entry in results.requirements if entry.source))
+    return Grid("Compliance", head, rows, "llrrrlrc", f"{note} Source: {sources}." if sources else note)
+
+
+def _margin(entry: Requirement) -> str:
+    if entry.margin is None:
+        return MISSING
+    return f"{number(entry.margin)} {unit(entry.unit)} ({percent(entry.margin / entry.limit, 2)})"
+
+
+def _where(entry: Requirement) -> str:
+    parts = [part for part in (entry.channel, entry.recording) if part]
+    if entry.time_s is not None:
+        parts.append(f"at {entry.time_s:.1f}\u00a0s")
+    return ", ".join(parts) or MISSING
+
+
+def _qualified(results: Results) -> Text:
+    severities = [notice.severity for notice in results.warnings]
+    lossy = [recording for recording in results.recordings if recording.losses]
+    losses = sum(len(recording.losses) for recording in lossy)
+    broken = [convention for convention in results.conventions if not convention.ok]
+    parts = [
+        count(severities.count("error"), "error"),
+        count(severities.count("warning"), "warning"),
+        f"{count(losses, 'data loss', 'data losses')} in {len(lossy)} of {len(results.recordings)} runs",
+    ]
+    if results.conventions:
+        parts.append(f"{len(broken)} of {count(len(results.conventions), 'sign and frame self-test')} failed")
+    clean = not losses and not broken and not {"error", "warning"} & set(severities)
+    return Text(" · ".join(parts) + ".", tone="muted" if clean else "undecided")
+
+
+def _sorted(notices: tuple[Notice, ...]) -> list[Notice]:
+    return sorted(notices, key=lambda notice: ("error", "warning", "info").index(notice.severity))
+
+
+def _entry(notice: Notice) -> tuple[str, str, str, str]:
+    return notice.severity, notice.what, notice.where, notice.remedy
+
+
+def _figure(requirement: Requirement) -> Figure:
+    title = f"{requirement.name}: {requirement.statistic} by channel, frame {frame_label(requirement.frame)}"
+    found = ", ".join(f"{row.channel} {number(row.value)}" for row in requirement.channels)
+    alt = (
+        f"Measured {requirement.statistic} in {requirement.unit}: {found}; limit {number(requirement.limit)}"
+    )
+    return Figure(title, (bars.against_limit(requirement, alt),), _CAPTION)

@@ -1,0 +1,103 @@
+"""Measured disturbance next to the predicted one, band by band, at the transducer and at the spacecraft."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from kbs_process.report import series
+from kbs_process.report.figures import histories
+from kbs_process.report.panel import Block, Caption, Figure, Live, Panel, Picture, Text
+from kbs_process.report.panels.choose import (
+    band_label,
+    band_names,
+    by_role,
+    frame_label,
+    main_band,
+    main_frame,
+    peak_limit,
+)
+from kbs_process.report.panels.static import PLATES
+from kbs_process.report.panels.views import Scene, views
+from kbs_process.report.results import Frame, Results
+from kbs_process.report.tables import Table, Tables
+
+_CAPTION = Caption(
+    shown="The disturbance of each channel after gravity and cross-coupling are taken away and the band "
+    "is cut out: measured, predicted by the plant's model through the same processing, and their "
+    "difference on the same scale. Dashed: the limit on the peak, where one applies. Shaded: lost "
+    "samples and filter edges, which count for nothing.",
+    good="The prediction has the bursts of the measurement at the same times and is a little larger; the "
+    "difference is no larger than the uncertainty budget's total.",
+    bad="A burst that only one of the two has, a difference in phase that grows with time, or a measured "
+    "peak above the predicted one: the prediction is then not pessimistic.",
+    do="Compare repeats first: what does not repeat is not the mechanism's. Then look where on the "
+    "trajectory (speed, tooth passing, resonance) the difference sits, and at the spectra.",
+)
+
+
+def panel(results: Results, tables: Tables) -> Panel:
+    """Interactive view of every recording, band and frame; the requirement's band on plates for paper."""
+    question = "Does the predicted disturbance look like the measured one, and is it the larger of the two?"
+    found = list(_found(results, tables))
+    if not found:
+        return Panel("disturbance", "Disturbance", question, (Text("No band table to show."),))
+    scenes = [_scene(results, *entry) for entry in found]
+    band = main_band(results)
+    plates = [entry for entry in found if entry[1] == band]
+    main = main_frame(results)
+    chosen = [entry for entry in plates if entry[2] == main][:PLATES]
+    others = [entry for entry in plates if entry[2] != main][:PLATES]
+    live = views(scenes)
+    figure = Figure(
+        f"Disturbance, measured and predicted ({band_label(results, band)} on paper)",
+        tuple(_plate(results, *entry) for entry in (*chosen, *others)),
+        _CAPTION,
+        Live("disturbance", ("measured", "predicted", "residual"), live),
+    )
+    blocks: list[Block] = [figure]
+    if len(live) < len(scenes):
+        left_out = f"{len(scenes) - len(live)} of {len(scenes)} combinations of recording, band and frame"
+        blocks.append(Text(f"To keep the page small, {left_out} are in the tables only.", tone="muted"))
+    return Panel("disturbance", "Disturbance", question, tuple(blocks))
+
+
+def _found(results: Results, tables: Tables) -> Iterator[tuple[str, str, Frame, Table]]:
+    """Every table there is, in the order of interest: band, frame, recording."""
+    main = main_frame(results)
+    frames: tuple[Frame, Frame] = ("S", "T") if main == "S" else ("T", "S")
+    for band in band_names(results):
+        for frame in frames:
+            for recording in by_role(results.recordings):
+                table = tables.band(recording.name, band, frame)
+                if table is not None and table.channels:
+                    yield recording.name, band, frame, table
+
+
+def _traces(results: Results, band: str, frame: Frame, table: Table) -> tuple[series.Trace, ...]:
+    traces = []
+    for channel in table.channels:
+        measured = table.columns[f"{channel}.measured"]
+        predicted = table.columns.get(f"{channel}.predicted")
+        residual = None if predicted is None else measured - predicted
+        unit = table.unit(channel)
+        limit = peak_limit(results, band, frame, channel, unit)
+        traces.append(series.Trace(channel, unit, measured, predicted, residual, limit))
+    return tuple(traces)
+
+
+def _scene(results: Results, name: str, band: str, frame: Frame, table: Table) -> Scene:
+    choice = f"{band_label(results, band)}, {frame_label(frame)}"
+    return Scene(name, choice, table.columns["t"], table.valid, _traces(results, band, frame, table))
+
+
+def _plate(results: Results, name: str, band: str, frame: Frame, table: Table) -> Picture:
+    title = f"{name}, {band_label(results, band)}, {frame_label(frame)}"
+    return histories.strips(
+        table.columns["t"],
+        _traces(results, band, frame, table),
+        series.stretches(table.columns["t"], ~table.valid),
+        computed_name="predicted",
+        same_scale=True,
+        alt=f"{title}: measured and predicted disturbance with their difference",
+        title=title,
+    )

@@ -1,0 +1,80 @@
+"""The gravity fit: what was fitted, how well it is known, and what is left."""
+
+from __future__ import annotations
+
+from kbs_process.report.figures import bars
+from kbs_process.report.panel import Block, Caption, Cell, Figure, Grid, Panel, Text
+from kbs_process.report.results import Gravity, Results
+from kbs_process.report.tables import Tables
+from kbs_process.report.text import count, measure, number, unit
+
+_CAPTION = Caption(
+    shown="How far each fitted parameter moved from what the parameter files said, in standard "
+    "deviations of the latter. The bar is the fitted value's own standard deviation.",
+    good="Points within the shaded band, with bars much shorter than it: the recordings agree with the "
+    "drawing and know better.",
+    bad="A point outside the band: the prior, the calibration or the model is wrong. A bar as long as "
+    "the band: these recordings say nothing about that parameter.",
+    do="For a point outside, weigh or measure that quantity again before the value is used elsewhere. "
+    "For a long bar, record a pseudo-static run over a wider range of angles.",
+)
+
+
+def panel(results: Results, tables: Tables) -> Panel:
+    """Parameters with prior and posterior, checks, and the residual of every channel."""
+    question = "Which masses explain the static wrench, and is computed compensation feasible?"
+    gravity = results.gravity
+    if gravity is None:
+        text = Text("Nothing was fitted: the static wrench is that of the parameter files.")
+        return Panel("gravity", "Gravity fit", question, (text,))
+    blocks: list[Block] = []
+    if gravity.feasible:
+        blocks.append(Text(gravity.feasible))
+    blocks.append(_parameters(gravity))
+    if any(entry.prior is not None and entry.prior_sigma for entry in gravity.parameters):
+        alt = "Fitted parameters against their priors, in prior sigma"
+        picture = bars.shifts(gravity.parameters, alt)
+        blocks.append(Figure("Fitted parameters against their priors", (picture,), _CAPTION))
+    blocks.append(_channels(gravity))
+    if gravity.checks:
+        rows = tuple(
+            (entry.name, Cell("ok" if entry.ok else "not met", "pass" if entry.ok else "fail"), entry.detail)
+            for entry in gravity.checks
+        )
+        blocks.append(Grid("Checks on the fit", ("Check", "Outcome", "Detail"), rows, "lcl"))
+    return Panel("gravity", "Gravity fit", question, tuple(blocks))
+
+
+def _parameters(gravity: Gravity) -> Grid:
+    rows = tuple(
+        (
+            entry.name,
+            measure(entry.prior, entry.prior_sigma),
+            measure(entry.value, entry.sigma),
+            unit(entry.unit),
+        )
+        for entry in gravity.parameters
+    )
+    quality = ""
+    if gravity.samples:
+        quality = (
+            f"{count(gravity.samples, 'sample')}; reduced chi-square {number(gravity.reduced_chi_square)}."
+        )
+    return Grid("Fitted parameters", ("Parameter", "Before (prior)", "Fitted", "Unit"), rows, "lrrl", quality)
+
+
+def _channels(gravity: Gravity) -> Grid:
+    rows = tuple(
+        (
+            entry.channel,
+            number(entry.static_peak),
+            number(entry.residual_rms),
+            number(entry.encoder_sigma, 2),
+            number(entry.model_sigma, 2),
+            unit(entry.unit),
+        )
+        for entry in gravity.channels
+    )
+    head = ("Channel", "Static peak", "Residual rms", "σ from angles", "σ from the fit", "Unit")
+    note = "σ from angles: encoder noise and quantisation times the static wrench's slope over the angle."
+    return Grid("Static wrench and what is left of it", head, rows, "lrrrrl", note)

@@ -1,0 +1,50 @@
+"""How the figures were obtained, with every constant."""
+
+from __future__ import annotations
+
+from kbs_process.report.panel import Block, Fold, Grid, Panel, Text
+from kbs_process.report.panels.choose import band_range
+from kbs_process.report.results import Results
+from kbs_process.report.tables import Tables
+from kbs_process.report.text import MISSING, count, measure, number, percent, unit
+
+
+def panel(results: Results, tables: Tables) -> Panel:
+    """The methods paragraphs, the bands and their edges, and the constants."""
+    paragraphs = [" ".join(part.split()) for part in results.methods.split("\n\n") if part.strip()]
+    blocks: list[Block] = [Text(paragraph) for paragraph in paragraphs]
+    if results.bands:
+        blocks.append(_bands(results))
+    if results.parameters:
+        title = f"Constants ({count(len(results.parameters), 'parameter')})"
+        blocks.append(Fold(title, (_constants(results),)))
+    return Panel("methods", "Methods", "How were these figures obtained?", tuple(blocks))
+
+
+def _bands(results: Results) -> Grid:
+    rows = tuple(
+        (
+            band.label,
+            band_range(band),
+            band.method,
+            f"{number(band.edge_s, 3)}\u00a0s" if band.edge_s else MISSING,
+            percent(band.edge_error, 2),
+        )
+        for band in results.bands
+    )
+    note = "Within the edge, at both ends, the filter's transient exceeds the error given (of the signal)."
+    return Grid("Bands", ("Band", "Range", "Method", "Edge", "Edge error"), rows, "lllrr", note)
+
+
+def _constants(results: Results) -> Grid:
+    rows = tuple(
+        (entry.name, *_value(entry.value, entry.sigma), unit(entry.unit), entry.source)
+        for entry in results.parameters
+    )
+    return Grid("Constants used", ("Name", "Value", "Unit", "Source"), rows, "lrll")
+
+
+def _value(value: float | str, sigma: float | str | None) -> tuple[str]:
+    if isinstance(value, str) or isinstance(sigma, str):
+        return (f"{value} ± {sigma}" if sigma not in (None, "") else f"{value}",)
+    return (measure(value, sigma),)

@@ -1,0 +1,84 @@
+"""Numbers and units as a reader wants to see them."""
+
+from __future__ import annotations
+
+import math
+
+MISSING = "–"
+_SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_TIDY = {"^2": "²", "^3": "³", "*": "·", " ": "\u00a0"}
+
+
+def number(value: float | None, digits: int = 3) -> str:
+    """Return `value` to `digits` significant digits, or a dash where there is none."""
+    if value is None or not math.isfinite(value):
+        return MISSING
+    if value == 0.0:
+        return "0"
+    exponent = _exponent(value)
+    if _readable(exponent):
+        return _sign(f"{value:.{max(0, digits - 1 - exponent)}f}")
+    return f"{_sign(f'{value / 10.0**exponent:.{digits - 1}f}')}\u00a0×\u00a010{_raised(exponent)}"
+
+
+def measure(value: float | None, sigma: float | None, digits: int = 4) -> str:
+    """Return "value ± sigma" with sigma to two significant digits and value to the same decimal."""
+    if value is None or not math.isfinite(value):
+        return MISSING
+    if sigma is None or not math.isfinite(sigma) or sigma <= 0.0:
+        return number(value, digits)
+    exponent = _exponent(max(abs(value), sigma))
+    scale = 1.0 if _readable(exponent) else 10.0**exponent
+    decimals = min(9, max(0, 1 - _exponent(sigma / scale)))
+    pair = f"{_sign(f'{value / scale:.{decimals}f}')}\u00a0±\u00a0{sigma / scale:.{decimals}f}"
+    return pair if scale == 1.0 else f"({pair})\u00a0×\u00a010{_raised(exponent)}"
+
+
+def percent(value: float | None, digits: int = 3) -> str:
+    """Return a fraction in percent."""
+    return MISSING if value is None else f"{number(100.0 * value, digits)}\u00a0%"
+
+
+def unit(name: str) -> str:
+    """Return an SI unit with raised powers and without line breaks."""
+    for plain, tidy in _TIDY.items():
+        name = name.replace(plain, tidy)
+    return name
+
+
+def band_hz(low: float | None, high: float | None) -> str:
+    """Return a frequency band in words."""
+    if low is None and high is None:
+        return "unfiltered"
+    if low is None:
+        return f"below {number(high)}\u00a0Hz"
+    if high is None:
+        return f"above {number(low)}\u00a0Hz"
+    return f"{number(low, 2)} to {number(high, 2)}\u00a0Hz"
+
+
+def count(n: int, noun: str, plural: str = "") -> str:
+    """Return "1 warning" or "3 warnings"."""
+    return f"{n} {noun if n == 1 else plural or noun + 's'}"
+
+
+def label(text: str, longest: int = 48) -> str:
+    """Return `text` fit for a figure: printable, on one line, not too long."""
+    line = "".join(character if character.isprintable() else " " for character in text)
+    return line if len(line) <= longest else line[: longest - 1] + "…"
+
+
+def _exponent(value: float) -> int:
+    return math.floor(math.log10(abs(value)))
+
+
+def _readable(exponent: int) -> bool:
+    return -4 <= exponent < 5
+
+
+def _raised(exponent: int) -> str:
+    return str(exponent).translate(_SUPERSCRIPT)
+
+
+def _sign(text: str) -> str:
+    return text.replace("-", "−")
