@@ -1,0 +1,127 @@
+"""Delimited text: CSV, TSV, and what data acquisition programs call TXT."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from kbs_process.campaign.importers.mapping import Text
+from kbs_process.campaign.importers.tables import CHUNK_ROWS, Cells, Column
+from kbs_process.errors import RecordingError
+
+DELIMITERS = "\t;,|"
+_HEAD_LINES = 32
+
+
+class TextTable:
+    """A delimited text file; numbers are parsed to the nearest double."""
+
+    def __init__(self, path: Path, options: Text) -> None:
+        self.path = path
+        self._options = options
+        head = self._head()
+        self._delimiter = options.delimiter or sniff_delimiter(head)
+        cells = [_split(line, self._delimiter) for line in head]
+        named = not all(map(self._is_number, cells[0])) if options.header is None else options.header
+        self._first_data_row = options.skip_rows + named + options.units_row
+        names = _unique(cells[0]) if named else tuple(str(1 + i) for i in range(len(cells[0])))
+        units = cells[named] if options.units_row and len(cells) > named else [""] * len(names)
+        self.columns = tuple(
+            Column(name, unit.strip("()[] "))
+            for name, unit in itertools.zip_longest(names, units[: len(names)], fillvalue="")
+        )
+
+    def chunks(self, names: Sequence[str]) -> Iterator[tuple[Cells, ...]]:
+        every = [column.name for column in self.columns]
+        try:
+            with pd.read_csv(
+                self.path,
+                sep=self._delimiter if self._delimiter != " " else r"\s+",
+                header=None,
+                names=every,
+                usecols=list(dict.fromkeys(names)),
+                index_col=False,
+                skiprows=self._first_data_row,
+                chunksize=CHUNK_ROWS,
+                # pandas' default parser is off by one unit in the last place now and then.
+                float_precision="round_trip",
+                decimal=self._options.decimal,
+                comment=self._options.comment,
+                encoding=self._options.encoding,
+                skipinitialspace=True,
+            ) as reader:
+                for frame in reader:
+                    yield tuple(_cells(frame[name]) for name in names)
+        except pd.errors.EmptyDataError:
+            return
+        except (pd.errors.ParserError, UnicodeDecodeError) as error:
+            raise RecordingError(
+                f"not a table of {len(every)} columns: {error}",
+                where=str(self.path),
+                remedy="check delimiter, skip_rows and encoding in the mapping's [text]",
+            ) from error
+
+    def _head(self) -> list[str]:
+        """Return the first lines that hold data or names."""
+        comment = self._options.comment
+        try:
+            with self.path.open(encoding=self._options.encoding, newline=None) as file:
+                lines = itertools.islice(file, self._options.skip_rows, None)
+                bounded = (line.rstrip("\n")[:1_000_000] for line in lines)
+                kept = (
+                    line for line in bounded if line.strip() and not (comment and line.startswith(comment))
+                )
+                head = list(itertools.islice(kept, _HEAD_LINES))
+        except (UnicodeDecodeError, LookupError) as error:
+            raise RecordingError(
+                f"not text in {self._options.encoding}: {error}",
+                where=str(self.path),
+                remedy="set encoding in the mapping's [text], or format where the file is no text at all",
+            ) from error
+        if not head:
+            raise RecordingError("the file is empty", where=str(self.path))
+        return head
+
+    def _is_number(self, cell: str) -> bool:
+        if not cell:
+            return True
+        try:
+            float(cell.replace(self._options.decimal, "."))
+        except ValueError:
+            return False
+        return True
+
+
+def sniff_delimiter(lines: Sequence[str]) -> str:
+    """Return the delimiter that splits all `lines` into most columns; "," where none does, " " for blanks."""
+    best = max(DELIMITERS, key=lambda delimiter: min(line.count(delimiter) for line in lines))
+    if min(line.count(best) for line in lines):
+        return best
+    return " " if min(len(line.split()) for line in lines) > 1 else ","
+
+
+def _split(line: str, delimiter: str) -> list[str]:
+    cells = line.split() if delimiter == " " else line.split(delimiter)
+    return [cell.strip().strip('"') for cell in cells]
+
+
+def _unique(names: Sequence[str]) -> tuple[str, ...]:
+    """Return `names` with " (2)", " (3)"... added to those that come again, and a number to those left empty."""
+    seen: dict[str, int] = {}
+    unique = []
+    for position, name in enumerate(names, start=1):
+        name = name or str(position)
+        seen[name] = seen.get(name, 0) + 1
+        unique.append(name if seen[name] == 1 else f"{name} ({seen[name]})")
+    return tuple(unique)
+
+
+def _cells(series: pd.Series[float]) -> Cells:
+    """Return a parsed column as numbers where pandas found nothing else in this piece, else as text."""
+    if series.dtype.kind in "iuf":
+        return series.to_numpy()
+    return np.array(["" if pd.isna(cell) else str(cell) for cell in series], dtype=np.str_)
