@@ -10,11 +10,13 @@ from kbs_process.signals.records import Array
 
 
 def discretised(amplifier: Amplifier | None, step: float) -> tuple[Array, Array]:
-    """Return (A, b), shapes (order, order) and (order,), of state' = A state + b input; the output is the last.
+    """Return (A, b), shapes (order, order) and (order,): next = A state + b input; the last is the output.
 
-    A chain of second-order sections u -> (v, y): v' = w (u - y - 2 zeta v), y' = w v, with zeta = sin(pi (2k - 1) /
-    (2 order)), behind one of first order where the order is odd. In a steady state every y is u and every v 0.
-    Units: Hz, s. Validity: any order and corner; an input that varies within a step counts with its mean.
+    Equation: a chain of sections u -> (v, y), v' = w (u - y - 2 zeta v), y' = w v, with
+        zeta = sin(pi (2k - 1) / (2 order)), behind one of first order where the order is odd.
+    Units: Hz, s. In a steady state every y is u and every v is 0.
+    Validity: any order and corner; an input that varies within a step counts with its mean.
+    Source: S. Butterworth (1930); exact discretisation by the matrix exponential.
     """
     if amplifier is None:
         return np.zeros((0, 0)), np.zeros(0)

@@ -100,7 +100,7 @@ class Effect:
         where = f"effect '{self.name}'"
         if not self.name.isidentifier():
             raise TypeError(f"{where}: the name is not an identifier")
-        own = [entry.name for entry in (*self.states, *self.parameters)]
+        own = [state.name for state in self.states] + [parameter.name for parameter in self.parameters]
         if clash := (set(own) & set(SIGNALS)) | {name for name in own if own.count(name) > 1}:
             raise TypeError(f"{where}: {sorted(clash)} declared twice, or named like a signal of the plant")
         if unknown := set(self.arguments) - set(SIGNALS) - set(own):

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TypeVar, cast
+from typing import Any, TypeVar, cast
 
 from numba import njit
 
@@ -24,9 +24,13 @@ Spatial = tuple[float, float, float, float, float, float]
 Inertia = tuple[float, float, float, float, float, float, float, float, float, float]
 
 
+# Only compiled code calls these: no entry from Python, which saves a third of the time to compile.
+OPTIONS: dict[str, Any] = {"error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+
+
 def compiled(function: F) -> F:
     """Compile `function` when generated code first calls it."""
-    return cast(F, njit(error_model="numpy")(function))
+    return cast(F, njit(**OPTIONS)(function))
 
 
 @compiled
@@ -36,15 +40,15 @@ def dot3(a: Vector, b: Vector) -> float:
 
 
 @compiled
-def cross3(a: Vector, b: Vector) -> Vector:
-    """a x b"""
-    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
-
-
-@compiled
 def add3(a: Vector, b: Vector) -> Vector:
     """a + b"""
     return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
+
+
+@compiled
+def drift(a: Vector, rate: Vector, h: float) -> Vector:
+    """a + h rate"""
+    return (a[0] + h * rate[0], a[1] + h * rate[1], a[2] + h * rate[2])
 
 
 @compiled
@@ -81,7 +85,7 @@ def triple(p: Array, k: int) -> Vector:
 
 @compiled
 def joint_rotation(p: Array, k: int, angle: float) -> Matrix:
-    """Orientation of a joint's link in its parent: P0 + P1 cos(angle) + P2 sin(angle), see `structure.turn`."""
+    """Orientation of a joint's link in its parent: P0 + P1 cos(angle) + P2 sin(angle)."""
     c = math.cos(angle)
     s = math.sin(angle)
     return (
@@ -235,6 +239,19 @@ def cross_force(v: Spatial, f: Spatial) -> Spatial:
         v[1] * f[5] - v[2] * f[4],
         v[2] * f[3] - v[0] * f[5],
         v[0] * f[4] - v[1] * f[3],
+    )
+
+
+@compiled
+def rotor_moment(v: Spatial, a: Vector, drag: float, h: float) -> Spatial:
+    """Force that changes a rotor's angular momentum h a by drag a + h w x a, its carrier moving with `v`."""
+    return (
+        drag * a[0] + h * (v[1] * a[2] - v[2] * a[1]),
+        drag * a[1] + h * (v[2] * a[0] - v[0] * a[2]),
+        drag * a[2] + h * (v[0] * a[1] - v[1] * a[0]),
+        0.0,
+        0.0,
+        0.0,
     )
 
 

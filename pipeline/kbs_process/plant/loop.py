@@ -1,14 +1,16 @@
 """The time loop that every generated plant module ends with, as text: it calls that module's own `step`."""
 
-LOOP = '''@njit(error_model="numpy")
+LOOP = '''@compiled
 def field_at(time, cycle, knots, fields, joint):
     """Field position of a motor, in microsteps, linear between the cycles' starts."""
     share = (time - knots[cycle]) / (knots[cycle + 1] - knots[cycle])
     return fields[cycle, joint] + share * (fields[cycle + 1, joint] - fields[cycle, joint])
 
 
-@njit(error_model="numpy")
-def control(cycle, angle, closed, recorded, latency, command, rate, encoder, readings, gains, sums, knots, fields):
+@compiled
+def control(
+    cycle, angle, closed, recorded, latency, command, rate, encoder, readings, gains, sums, knots, fields
+):
     """Read the encoders at the start of a cycle and set the field's motion over it.
 
     `encoder` rows: code in rad, offset in rad; `gains` rows: Kp, Ki, microsteps a rad of output.
@@ -33,8 +35,9 @@ def advance(
 ):
     """Advance `count` steps from step number `first`; return how many samples of the angles were taken.
 
-    Step i covers i H to (i + 1) H of the recording's time. `cursor` holds the last step's cycle and the number of cycles controlled,
-    `held` the wrench of the step before. Without an amplifier (`drive_in` is empty) a sample is the mean of the two steps beside it.
+    Step i covers i H to (i + 1) H of the recording's time. `cursor` holds the last step's cycle and the
+    number of cycles controlled, `held` the wrench of the step before. Without an amplifier (`drive_in` is empty) a
+    sample is the mean of the two steps beside it.
     """
     n = angle.shape[1]
     order = drive_in.shape[0]
@@ -53,8 +56,8 @@ def advance(
             for j in range(n):
                 now[j] = x[q + j] + lag * x[q + n + j]
             control(
-                cursor[1], now, closed, recorded, latency, command, rate, encoder, readings, gains, sums, knots,
-                fields,
+                cursor[1], now, closed, recorded, latency, command, rate, encoder, readings, gains, sums,
+                knots, fields,
             )
             cursor[1] += 1
         while cursor[0] < cursor[1] - 1 and knots[cursor[0] + 1] <= time:

@@ -15,7 +15,7 @@ from kbs_process.signals.records import Array, Block
 
 __all__ = ["DEFAULT_STEP", "Schedule", "predict"]
 
-DEFAULT_STEP = 1e-4  # s; tests/plant/test_convergence.py shows what halving it changes
+DEFAULT_STEP = 2e-4  # s; tests/plant/test_convergence.py shows what halving it changes
 BLOCK_S = 10.0
 
 
@@ -38,9 +38,10 @@ def predict(
     `angle_rate_Hz`, offset included, rounded to the encoder's codes where `quantise`. "field": (n, joints)
     field position at the start of each cycle, motor rad, not rounded to microsteps.
 
-    Samples lie at 0, 1/rate, ... before `duration_s`; stamps count from the recording's time zero. The run starts
-    in static equilibrium at the first command; where that precedes time zero, the time between is simulated too.
-    `step_s` bounds the step, which divides the wrench's sampling interval. `progress` gets the share done.
+    Samples lie at 0, 1/rate, ... before `duration_s`; stamps count from the recording's time zero. The run
+    starts in static equilibrium at the first command; where that precedes time zero, the time between is
+    simulated too. `step_s` bounds the step, which divides the wrench's sampling interval. `progress` gets the
+    share done.
     """
     if not (min(rate_Hz, angle_rate_Hz, duration_s) > 0.0 and (step_s is None or step_s > 0.0)):
         raise SimulationError("rates, duration and step have to be positive", where="predict")

@@ -1,8 +1,8 @@
-"""What drives a plant: the commands of every real-time cycle, and what the drive electronics recorded of them."""
+"""What drives a plant: the commands of every real-time cycle, and what was recorded of the drive."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from kbs_process.signals.records import Array
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Schedule:
-    """Commands at the start of each cycle, on the recording's time axis, columns in the rig's order of joints.
+    """Commands at the start of each cycle, on the recording's time axis; columns are the rig's joints.
 
     With `field` the motors follow the recorded field position, whatever the controller; otherwise, with
     `encoder`, a closed loop is fed these readings instead of its own.
@@ -28,8 +28,8 @@ class Schedule:
 def covering(schedule: Schedule, joints: int, cycle: float | None, end: float) -> Schedule:
     """Return `schedule` without gaps, from time 0 or earlier to beyond `end`.
 
-    Cycles that a recording lost are interpolated linearly: the field moved on while nobody recorded, and holding
-    it would end every gap with a jump. Before the first and after the last cycle the command is held.
+    Cycles that a recording lost are interpolated linearly: the field moved on while nobody recorded, and
+    holding it would end every gap with a jump. Before the first and after the last cycle the command is held.
     `cycle` is the controller's real-time cycle, s; without it, it is the median of the recorded ones.
     """
     given = _checked(schedule, joints)
@@ -77,14 +77,15 @@ def _checked(schedule: Schedule, joints: int) -> Schedule:
 def _at(schedule: Schedule, t: Array) -> Schedule:
     """Return the schedule interpolated at `t`, held outside."""
 
-    def interpolated(values: Array | None) -> Array | None:
-        if values is None:
-            return None
-        columns = []
-        for column in values.T:
-            good = np.isfinite(column)
-            columns.append(np.interp(t, schedule.t[good], column[good]))
+    def interpolated(values: Array) -> Array:
+        finite = [np.isfinite(column) for column in values.T]
+        columns = [np.interp(t, schedule.t[good], c[good]) for c, good in zip(values.T, finite, strict=True)]
         return np.ascontiguousarray(np.stack(columns, axis=1))
 
-    changed = {e.name: interpolated(getattr(schedule, e.name)) for e in fields(schedule) if e.name != "t"}
-    return replace(schedule, t=t, **changed)
+    return Schedule(
+        t,
+        interpolated(schedule.position),
+        interpolated(schedule.rate),
+        None if schedule.field is None else interpolated(schedule.field),
+        None if schedule.encoder is None else interpolated(schedule.encoder),
+    )

@@ -78,8 +78,8 @@ class Simulation:
     def advance(self, steps: int, angle_first: int) -> tuple[Array, Array]:
         """Move on by `steps` (whole sample intervals); return the wrench and angle samples taken.
 
-        The wrench, shape (n, 6), is that at the steps that `per_sample` divides; angles, shape (m, joints), are
-        unquantised, from sample number `angle_first` on, at times after the start and up to the end.
+        The wrench, shape (n, 6), is that at the steps that `per_sample` divides; angles, shape (m, joints),
+        are unquantised, from sample number `angle_first` on, at times after the start and up to the end.
         """
         n = self.structure.joints
         wrench = np.empty((-(-steps // self.per_sample), 6))
@@ -87,9 +87,9 @@ class Simulation:
         angle = np.empty((int(span * self.angle_rate) + 2, n))
         taken = self.plant.advance(
             self.first, steps, self.step, self.p, self.state, self._cursor, self._closed, self._recorded,
-            self._latency, self._cycles.position, self._cycles.rate, self.encoder, self._readings, self._gains,
-            self._sums, self.knots, self.fields, self.per_sample, self.wrench, self._low_pass, self._drive_in,
-            self._amplified, wrench, self.angle_rate, angle_first, angle,
+            self._latency, self._cycles.position, self._cycles.rate, self.encoder, self._readings,
+            self._gains, self._sums, self.knots, self.fields, self.per_sample, self.wrench, self._low_pass,
+            self._drive_in, self._amplified, wrench, self.angle_rate, angle_first, angle,
         )  # fmt: skip
         self.first += steps
         angle = angle[:taken]

@@ -75,7 +75,7 @@ def structure_of(rig: Rig, effects: Sequence[Effect]) -> Structure:
 def turn(joint: Joint) -> tuple[Array, Array]:
     """Return the axis in the parent's axes (3,) and P (3, 3, 3) of R(q) = P0 + P1 cos(q) + P2 sin(q).
 
-    Rodrigues' formula behind the misalignment: R(q) = exp(misalignment) (a a^T + (1 - a a^T) cos q + [a]x sin q).
+    Rodrigues' formula behind the misalignment: R(q) = exp(mis) (a a^T + (1 - a a^T) cos q + [a]x sin q).
     """
     a = np.asarray(joint.axis, dtype=float)
     R = Rotation.from_rotvec(joint.misalignment.value).as_matrix()
@@ -136,7 +136,7 @@ def _joint(rig: Rig, joint: Joint, structure: Structure) -> Array:
         for parameter in effect.parameters:
             if parameter.name not in drive.parameters:
                 raise ConfigError(
-                    f"effect '{effect.name}' needs '{parameter.name}' ({parameter.description}, {parameter.unit})",
+                    f"'{effect.name}' needs '{parameter.name}' ({parameter.description}, {parameter.unit})",
                     where=f"[joint.{joint.name}.drive.parameters]",
                     remedy=did_you_mean(parameter.name, drive.parameters),
                 )
