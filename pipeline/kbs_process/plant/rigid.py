@@ -1,0 +1,194 @@
+"""Inverse dynamics of the rig's rigid bodies: from measured angles to the wrench on the transducer.
+
+Vectorised over time. Everything is first expressed in the laboratory's axes and then turned into T's. An
+acceleration here has gravity taken off (what an accelerometer would read), so weight and inertia are one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from kbs_process.rig.model import LAB, TRANSDUCER, Rig
+from kbs_process.signals.frames import about_axis, from_rotation_vector, from_tilt, from_xyz, rotate
+from kbs_process.signals.records import Array
+
+INERTIAL = ("m", "mcx", "mcy", "mcz", "Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz")
+_SAG_ROUNDS = 3  # each round takes the error down by weight * height / stiffness, 1 % on the paper's rig
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LinkMotion:
+    """Pose and motion of a link in the laboratory's axes, (n, ...)."""
+
+    R: Array  # (n, 3, 3) R_L,link
+    r: Array  # (n, 3) origin, m
+    omega: Array  # (n, 3) rad/s
+    alpha: Array  # (n, 3) rad/s^2
+    accel: Array  # (n, 3) of the origin, gravity taken off, m/s^2
+
+
+def inverse_dynamics(rig: Rig, q: Array, qd: Array, qdd: Array, *, sag: bool = True) -> Array:
+    """Wrench [F, M] (n, 6), N and N m, that all beyond T exerts on the transducer, about T's origin, in T.
+
+    `q`, `qd`, `qdd` (n, joints) are the joints' true angles and their rates, in the order of `rig.joints`. At rest
+    and level F = (0, 0, -weight). With `sag` an elastic transducer deflects quasi-statically, its angles
+    being K^-1 times the torque, about x, then y, then z; its own rates are left out (valid well below
+    its resonance). Rotors turn with `ratio` times their joint's rate on top of their carrier's rotation.
+    """
+    angles = np.zeros((len(q), 3))
+    wrench = _wrench(rig, kinematics(rig, q, qd, qdd, angles))
+    if not sag or rig.transducer.stiffness is None:
+        return wrench
+    stiffness = rig.transducer.stiffness.value
+    for _ in range(_SAG_ROUNDS):
+        wrench = _wrench(rig, kinematics(rig, q, qd, qdd, wrench[:, 3:] / stiffness))
+    return wrench
+
+
+def static_wrench(rig: Rig, q: Array, *, sag: bool = True) -> Array:
+    """`inverse_dynamics` with all joints at rest."""
+    rest = np.zeros_like(q)
+    return inverse_dynamics(rig, q, rest, rest, sag=sag)
+
+
+def regressor(rig: Rig, q: Array, qd: Array, qdd: Array) -> Array:
+    """Y (n, 6, 10 bodies) with Y @ theta = wrench of the bodies on a rigid transducer, without the rotors.
+
+    theta stacks (m, m c, I) of each body, `INERTIAL`: I about the link's origin, in the link's axes.
+    """
+    links = kinematics(rig, q, qd, qdd, np.zeros((len(q), 3)))
+    beyond = links_beyond(rig)
+    T = links[TRANSDUCER]
+    Y = np.zeros((len(q), 6, 10 * len(rig.bodies)))
+    for index, body in enumerate(rig.bodies):
+        if body.on in beyond:
+            force, moment = _link_regressor(links[body.on])
+            lever = (links[body.on].r - T.r)[:, :, None]
+            moment = moment + np.cross(lever, force, axis=1)
+            columns = slice(10 * index, 10 * index + 10)
+            Y[:, :3, columns] = np.swapaxes(T.R, 1, 2) @ force
+            Y[:, 3:, columns] = np.swapaxes(T.R, 1, 2) @ moment
+    return Y
+
+
+def inertial_parameters(rig: Rig) -> Array:
+    """theta (10 bodies,) of `regressor`."""
+    theta = []
+    for body in rig.bodies:
+        m, c = float(body.mass), body.cog.value
+        origin = inertia_matrix(body.inertia.value) + m * (c @ c * np.eye(3) - np.outer(c, c))
+        theta += [m, *(m * c), *np.diag(origin), origin[0, 1], origin[0, 2], origin[1, 2]]
+    return np.array(theta)
+
+
+def inertia_matrix(elements: Array) -> Array:
+    """Symmetric tensor (3, 3) from its elements xx, yy, zz, xy, xz, yz."""
+    xx, yy, zz, xy, xz, yz = elements
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+def links_beyond(rig: Rig) -> frozenset[str]:
+    """T and the links that hang on it: what their bodies do is what the transducer feels."""
+    beyond = {TRANSDUCER}
+    for joint in rig.joints:
+        if joint.parent in beyond:
+            beyond.add(joint.name)
+    return frozenset(beyond)
+
+
+def kinematics(rig: Rig, q: Array, qd: Array, qdd: Array, deflection: Array) -> dict[str, LinkMotion]:
+    """Motion of every link; `deflection` (n, 3) rad turns T on what carries it."""
+    n = len(q)
+    upward = np.broadcast_to([0.0, 0.0, float(rig.gravity)], (n, 3))
+    still = np.zeros((n, 3))
+    links = {LAB: LinkMotion(np.broadcast_to(np.eye(3), (n, 3, 3)), still, still, still, upward)}
+
+    def place_transducer(carrier: str) -> None:
+        base = links[carrier]
+        R = base.R @ from_tilt(rig.transducer.tilt.value) @ from_xyz(deflection)
+        links[TRANSDUCER] = LinkMotion(R, base.r, base.omega, base.alpha, base.accel)
+
+    if rig.transducer.on == LAB:
+        place_transducer(LAB)
+    for index, joint in enumerate(rig.joints):
+        parent = links[joint.parent]
+        R_J = from_rotation_vector(joint.misalignment.value)
+        axis = np.asarray(joint.axis, dtype=float)
+        e = rotate(parent.R, R_J @ axis)
+        rate = e * qd[:, index, None]
+        d = rotate(parent.R, joint.origin.value)
+        links[joint.name] = LinkMotion(
+            R=parent.R @ R_J @ about_axis(axis, q[:, index]),
+            r=parent.r + d,
+            omega=parent.omega + rate,
+            alpha=parent.alpha + e * qdd[:, index, None] + np.cross(parent.omega, rate),
+            accel=_accel_at(parent, d),
+        )
+        if rig.transducer.on == joint.name:
+            place_transducer(joint.name)
+    return links
+
+
+def _accel_at(link: LinkMotion, d: Array) -> Array:
+    """Acceleration of the link's point at `d` (n, 3) from its origin."""
+    accel: Array = link.accel + np.cross(link.alpha, d) + np.cross(link.omega, np.cross(link.omega, d))
+    return accel
+
+
+def _wrench(rig: Rig, links: dict[str, LinkMotion]) -> Array:
+    beyond = links_beyond(rig)
+    T = links[TRANSDUCER]
+    force, moment = np.zeros_like(T.r), np.zeros_like(T.r)
+    for body in rig.bodies:
+        if body.on not in beyond:
+            continue
+        link = links[body.on]
+        c = rotate(link.R, body.cog.value)
+        F = -float(body.mass) * _accel_at(link, c)
+        I_link = link.R @ inertia_matrix(body.inertia.value) @ np.swapaxes(link.R, 1, 2)
+        spin = rotate(I_link, link.alpha) + np.cross(link.omega, rotate(I_link, link.omega))
+        force += F
+        moment += np.cross(link.r + c - T.r, F) - spin
+    moment += _rotors(rig, links, beyond)
+    R_TL = np.swapaxes(T.R, 1, 2)
+    return np.concatenate([rotate(R_TL, force), rotate(R_TL, moment)], axis=1)
+
+
+def _rotors(rig: Rig, links: dict[str, LinkMotion], beyond: frozenset[str]) -> Array:
+    """Moment (n, 3) of the rotors' spin, h = Jr (omega . e + R qd) e with e fixed in the carrier: -dh/dt."""
+    moment = np.zeros_like(links[TRANSDUCER].r)
+    for joint in rig.joints:
+        if joint.drive is None or joint.parent not in beyond:
+            continue
+        carrier, link = links[joint.parent], links[joint.name]
+        Jr, ratio = float(joint.drive.rotor_inertia), float(joint.drive.ratio)
+        e = rotate(carrier.R, from_rotation_vector(joint.misalignment.value) @ np.asarray(joint.axis))
+        rate = _along(link.omega - carrier.omega, e)
+        acceleration = _along(link.alpha - carrier.alpha, e)
+        spin = _along(carrier.omega, e) + ratio * rate
+        spin_rate = _along(carrier.alpha, e) + ratio * acceleration
+        moment -= Jr * (spin_rate * e + spin * np.cross(carrier.omega, e))
+    return moment
+
+
+def _along(a: Array, e: Array) -> Array:
+    component: Array = np.sum(a * e, axis=1, keepdims=True)
+    return component
+
+
+def _link_regressor(link: LinkMotion) -> tuple[Array, Array]:
+    """Force and moment about the link's origin, laboratory's axes, (n, 3, 10) each, linear in `INERTIAL`."""
+    R_t = np.swapaxes(link.R, 1, 2)
+    a, w, alpha = (rotate(R_t, x) for x in (link.accel, link.omega, link.alpha))
+    n = len(a)
+    force, moment = np.zeros((n, 3, 10)), np.zeros((n, 3, 10))
+    for column, unit in enumerate(np.eye(3), start=1):
+        force[:, :, column] = -(np.cross(alpha, unit) + np.cross(w, np.cross(w, unit)))
+        moment[:, :, column] = -np.cross(unit, a)
+    force[:, :, 0] = -a
+    for column, unit in enumerate(np.eye(6), start=4):
+        element = inertia_matrix(unit)
+        moment[:, :, column] = -(alpha @ element + np.cross(w, w @ element))
+    return link.R @ force, link.R @ moment

@@ -1,0 +1,81 @@
+"""Rotations, vectorised over leading axes. `R_GT` maps the components of a vector from T's axes into G's."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kbs_process.signals.records import Array
+
+
+def skew(a: Array) -> Array:
+    """Matrix of the cross product: skew(a) @ b = a x b; (..., 3) -> (..., 3, 3)."""
+    a = np.asarray(a, dtype=float)
+    S = np.zeros((*a.shape[:-1], 3, 3))
+    S[..., 0, 1], S[..., 0, 2] = -a[..., 2], a[..., 1]
+    S[..., 1, 0], S[..., 1, 2] = a[..., 2], -a[..., 0]
+    S[..., 2, 0], S[..., 2, 1] = -a[..., 1], a[..., 0]
+    return S
+
+
+def about_axis(axis: Array, angle: Array | float) -> Array:
+    """R_PC of a link C that turned by `angle` (...) rad about the unit vector `axis` (3,) of its parent P.
+
+    Rodrigues: R = I + sin(q) S + (1 - cos(q)) S^2, S = skew(axis).
+    """
+    S = skew(np.asarray(axis, dtype=float))
+    q = np.asarray(angle, dtype=float)[..., None, None]
+    R: Array = np.eye(3) + np.sin(q) * S + 2.0 * np.sin(q / 2.0) ** 2 * (S @ S)
+    return R
+
+
+def from_rotation_vector(phi: Array) -> Array:
+    """Rotation by |phi| rad about phi / |phi|; (..., 3) -> (..., 3, 3); exact down to |phi| = 0."""
+    phi = np.asarray(phi, dtype=float)
+    angle = np.linalg.norm(phi, axis=-1)[..., None, None]
+    S = skew(phi)
+    R: Array = np.eye(3) + np.sinc(angle / np.pi) * S + 0.5 * np.sinc(angle / (2.0 * np.pi)) ** 2 * (S @ S)
+    return R
+
+
+def to_rotation_vector(R: Array) -> Array:
+    """Rotation vector of R, (..., 3, 3) -> (..., 3), rad; angles up to pi (excluded), by the quaternion."""
+    R = np.asarray(R, dtype=float)
+    # Each candidate is the quaternion (w, x, y, z) times one of its own elements; the largest is the soundest.
+    trace = np.trace(R, axis1=-2, axis2=-1)
+    K = np.empty((*R.shape[:-2], 4, 4))
+    K[..., 0, 0] = 1.0 + trace
+    off = np.stack([R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]], -1)
+    K[..., 0, 1:] = K[..., 1:, 0] = off
+    K[..., 1:, 1:] = R + np.swapaxes(R, -1, -2) + (1.0 - trace)[..., None, None] * np.eye(3)
+    best = np.argmax(np.diagonal(K, axis1=-2, axis2=-1), axis=-1)
+    quaternion = np.take_along_axis(K, best[..., None, None], axis=-2)[..., 0, :]
+    quaternion /= np.linalg.norm(quaternion, axis=-1, keepdims=True)
+    quaternion = np.where(quaternion[..., :1] < 0.0, -quaternion, quaternion)
+    sine = np.linalg.norm(quaternion[..., 1:], axis=-1)
+    half = np.arctan2(sine, quaternion[..., 0])
+    # 2 half / sin(half), which tends to 2 at zero.
+    phi: Array = 2.0 / np.sinc(half / np.pi)[..., None] * quaternion[..., 1:]
+    return phi
+
+
+def from_tilt(tilt: Array) -> Array:
+    """R_LT of a transducer inclined by tilt = (tx about x, ty about y), rad: R_y(ty) R_x(tx).
+
+    Gravity in T is then g (sin ty, -sin tx cos ty, -cos tx cos ty).
+    """
+    tx, ty = np.asarray(tilt, dtype=float)
+    return about_axis(np.array([0.0, 1.0, 0.0]), ty) @ about_axis(np.array([1.0, 0.0, 0.0]), tx)
+
+
+def from_xyz(angles: Array) -> Array:
+    """Turns about x, then about the new y, then about the new z: R_x(a) R_y(b) R_z(c); (..., 3) rad."""
+    a = np.asarray(angles, dtype=float)
+    x, y, z = np.eye(3)
+    R: Array = about_axis(x, a[..., 0]) @ about_axis(y, a[..., 1]) @ about_axis(z, a[..., 2])
+    return R
+
+
+def rotate(R: Array, a: Array) -> Array:
+    """R @ a for stacks of matrices (..., 3, 3) and vectors (..., 3)."""
+    b: Array = np.einsum("...ij,...j->...i", R, a)
+    return b
