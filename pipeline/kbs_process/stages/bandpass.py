@@ -1,0 +1,192 @@
+"""Bands of the working-rate signals: zero phase, gains and edges known and stated."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from scipy.signal import butter, fftconvolve, sosfiltfilt
+
+from kbs_process.signals.records import Array, Mask, Signal
+from kbs_process.stages.lowfrequency import METHOD, high_pass, high_pass_gain
+
+ORDER = 4  # of the low-pass, run forwards and backwards
+TOLERANCE = 1e-3  # an edge ends where the error is this part of the signal's rms
+
+
+@dataclass(frozen=True, slots=True)
+class Band:
+    """Frequencies that pass; None is no limit on that side."""
+
+    name: str
+    high_pass_Hz: float | None
+    low_pass_Hz: float | None
+
+
+UNFILTERED = Band("unfiltered", None, None)
+
+
+@dataclass(frozen=True, slots=True)
+class BandStatement:
+    """What a report says about a band filter on a record of given length.
+
+    The errors are rms over the samples not flagged, as a part of the rms of the filtered signal, against the
+    same filter on an endless record: for a signal with a flat spectrum, and for one that drifts like a random
+    walk, between which recordings lie. They come from what happened before and after the record, which nobody
+    knows. Two signals filtered alike (measured, predicted) are wrong alike: their difference is filtered as
+    if it had been taken first.
+    """
+
+    name: str
+    low_Hz: float | None
+    high_Hz: float | None
+    method: str
+    edge_s: float  # s from either end until both errors are below 0.1 %
+    flagged_s: float  # s at either end that `apply` flags: the low-pass would need samples beyond it
+    edge_error: float  # flat spectrum
+    edge_error_drift: float  # random walk
+
+
+def gain(band: Band, f: Array, dt: float) -> Array:
+    """Gain at f (n,), Hz; the phase is zero. Half at either limit.
+
+    High-pass: 1 / (1 + (f0 / f)^4); low-pass: 1 / (1 + (f / f1)^8), f standing for sin(pi f dt) and tan(pi f dt).
+    """
+    g = np.ones_like(f)
+    if band.high_pass_Hz is not None:
+        g = g * high_pass_gain(f, band.high_pass_Hz, dt)
+    if band.low_pass_Hz is not None:
+        warped = np.tan(np.pi * f * dt) / np.tan(np.pi * band.low_pass_Hz * dt)
+        g = g / (1.0 + warped ** (2 * ORDER))
+    return g
+
+
+def apply(signal: Signal, band: Band) -> Signal:
+    """Return the signal's part in the band; samples that lean on unknown ones by more than 0.1 % are flagged.
+
+    The high-pass comes first: the low-pass then has no trend left to continue beyond the ends.
+    """
+    values, valid = signal.values, signal.valid
+    if band.high_pass_Hz is not None:
+        values = high_pass(values, band.high_pass_Hz, signal.dt)
+    if band.low_pass_Hz is not None:
+        values = _low_pass(values, band.low_pass_Hz, signal.dt)
+        valid = _known(valid, band.low_pass_Hz, signal.dt)
+    return signal.derive(values, _step(band), valid=valid)
+
+
+def _step(band: Band) -> str:
+    parts = []
+    if band.high_pass_Hz is not None:
+        parts.append(f"above {band.high_pass_Hz:g} Hz by {METHOD}")
+    if band.low_pass_Hz is not None:
+        parts.append(f"below {band.low_pass_Hz:g} Hz by zero-phase Butterworth, order {ORDER} x 2")
+    return f"band {band.name}: " + (", ".join(parts) or "as it is")
+
+
+def _low_pass(values: Array, f1: float, dt: float) -> Array:
+    sos = butter(ORDER, f1, output="sos", fs=1.0 / dt)
+    pad = min(len(values) - 1, len(_low_pass_kernel(f1, dt)) // 2)
+    filtered: Array = sosfiltfilt(sos, values, axis=0, padtype="odd", padlen=pad)
+    return filtered
+
+
+@lru_cache(maxsize=32)
+def _low_pass_kernel(f1: float, dt: float) -> Array:
+    """Impulse response, symmetric, cut where what is left of its absolute sum is 1e-9."""
+    reach = int(np.ceil(12.0 / (f1 * dt)))
+    impulse = np.zeros(2 * reach + 1)
+    impulse[reach] = 1.0
+    h: Array = sosfiltfilt(butter(ORDER, f1, output="sos", fs=1.0 / dt), impulse, padtype=None)
+    tail = np.cumsum(np.abs(h[: reach + 1]))
+    cut = int(np.searchsorted(tail, 1e-9))
+    return h[cut : len(h) - cut]
+
+
+def _known(valid: Mask, f1: float, dt: float) -> Mask:
+    """Flag samples in which invalid ones, and those beyond the ends, weigh more than `TOLERANCE`."""
+    h = np.abs(_low_pass_kernel(f1, dt))
+    unknown = np.concatenate((np.ones(len(h) // 2), ~valid, np.ones(len(h) // 2)))
+    known: Mask = fftconvolve(unknown, h, mode="valid") <= TOLERANCE
+    return known
+
+
+def edge_seconds(band: Band, dt: float) -> float:
+    """Time from an end until the filter errs by less than 0.1 % there, however long the record, s."""
+    slowest = _slowest(band, dt)
+    if slowest is None:
+        return 0.0
+    n = 2 * int(np.ceil(4.0 / (slowest * dt))) + 1
+    return statement(band, dt, n).edge_s
+
+
+def _slowest(band: Band, dt: float) -> float | None:
+    limits = [f for f in (band.high_pass_Hz, band.low_pass_Hz) if f is not None]
+    return min(limits) if limits else None
+
+
+@lru_cache(maxsize=64)
+def statement(band: Band, dt: float, n: int) -> BandStatement:
+    """Compute the statement for records of n samples from the filter's own impulse responses.
+
+    Row t of the filter on n samples, less row t of the filter on an endless record, weighs the unknown; its
+    norm is the error at t for a flat spectrum, the norm of its running sum that for a random walk.
+    """
+    slowest = _slowest(band, dt)
+    if slowest is None:
+        return BandStatement(band.name, None, None, "as it is", 0.0, 0.0, 0.0, 0.0)
+    margin = int(np.ceil((16.0 if band.high_pass_Hz is None else 4.0) / (slowest * dt)))
+    at = np.unique(np.concatenate(([0], np.geomspace(1, max(n // 2, 2), 40).astype(int))))
+    at = at[at < n]
+    short, endless = _low_pass_rows(band, dt, n, at, margin)
+    if band.high_pass_Hz is not None:  # symmetric, so that it acts on rows as on columns
+        short, endless = high_pass(short, band.high_pass_Hz, dt), high_pass(endless, band.high_pass_Hz, dt)
+    unknown = -endless
+    unknown[margin : margin + n] += short
+    middle = endless[:, -1:]
+    flat = _norm(unknown) / _norm(middle)
+    drift = flat
+    if band.high_pass_Hz is not None:
+        drift = _norm(np.cumsum(unknown, axis=0)) / _norm(np.cumsum(middle, axis=0))
+    over = np.flatnonzero(np.maximum(flat, drift) > TOLERANCE)
+    edge = at[min(over[-1] + 1, len(at) - 1)] * dt if len(over) else 0.0
+    flagged = 0.0
+    if band.low_pass_Hz is not None:
+        known = _known(np.ones(n, dtype=np.bool_), band.low_pass_Hz, dt)
+        flagged = float(np.argmax(known)) if known.any() else float(n)
+    valid = at >= min(flagged, float(at[-1]))
+    return BandStatement(
+        name=band.name,
+        low_Hz=band.high_pass_Hz,
+        high_Hz=band.low_pass_Hz,
+        method=_step(band),
+        edge_s=float(edge),
+        flagged_s=flagged * dt,
+        edge_error=_root_mean_square(at[valid], flat[valid]),
+        edge_error_drift=_root_mean_square(at[valid], drift[valid]),
+    )
+
+
+def _low_pass_rows(band: Band, dt: float, n: int, at: Array, margin: int) -> tuple[Array, Array]:
+    """Rows `at` of the low-pass on n samples, odd beyond its ends, and on an endless record: columns."""
+    short, endless = np.zeros((n, len(at))), np.zeros((n + 2 * margin, len(at)))
+    h = np.ones(1) if band.low_pass_Hz is None else _low_pass_kernel(band.low_pass_Hz, dt)
+    for column, t in enumerate(at):
+        index = np.arange(len(h)) - len(h) // 2 + t
+        endless[index + margin, column] = h
+        before, after = index < 0, index >= n
+        np.add.at(short[:, column], index[~before & ~after], h[~before & ~after])
+        for outside, end, mirrored in ((before, 0, -index), (after, n - 1, 2 * (n - 1) - index)):
+            short[end, column] += 2.0 * h[outside].sum()  # x(-m) = 2 x(0) - x(m)
+            np.add.at(short[:, column], np.clip(mirrored[outside], 0, n - 1), -h[outside])
+    return short, endless
+
+
+def _norm(x: Array) -> Array:
+    norm: Array = np.sqrt(np.sum(x**2, axis=0))
+    return norm
+
+
+def _root_mean_square(at: Array, error: Array) -> float:
+    return float(np.sqrt(np.trapezoid(error**2, at) / (at[-1] - at[0]))) if len(at) > 1 else float(error[0])
