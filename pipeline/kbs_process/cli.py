@@ -5,9 +5,9 @@ Nothing that computes is imported at the top, so that `--help` answers at once.
 
 from __future__ import annotations
 
+import functools
 import sys
 from collections.abc import Sequence
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -87,7 +87,7 @@ def process(campaign: str, output: Path | None, pdf: bool | None, check: bool, q
     folder = find_campaign(campaign)
     target = results_folder(folder, output)
     loaded = load_campaign(folder)
-    outcome = run.process(loaded, target, progress=_progress(quiet), pdf=_wants_pdf(pdf))
+    outcome = run.process(loaded, target, progress=_progress(quiet), pdf=pdf)
     for line in outcome.verdict_lines:
         click.echo(line)
     click.echo(f"Report: {outcome.report}")
@@ -121,21 +121,28 @@ def validate(campaign: str, check: bool, quiet: bool) -> None:
 @click.argument("files", nargs=-1, required=True, type=EXISTING_FILE, metavar="FILE...")
 @click.option("--check", is_flag=True, help="Exit with 1 when a recording has losses.")
 def inspect(files: tuple[Path, ...], check: bool) -> None:
-    """Show what is in recordings: topics, rates, gaps, ranges, damage."""
+    """Show what is in recordings: topics, rates, gaps, ranges, damage.
+
+    Exits with 2 if one of them cannot be read at all.
+    """
+    from kbs_process.campaign.listing import describe_inspection
     from kbs_process.ingest.inspection import inspect_recording
 
-    lossy = False
+    states = set()
     for path in files:
         inspection = inspect_recording(path)
-        click.echo(inspection.text())
-        lossy = lossy or bool(inspection.losses)
-    if check and lossy:
+        states.add(inspection.state)
+        click.echo("\n".join(describe_inspection(inspection)))
+    if "unreadable" in states:
+        sys.exit(BAD_INPUT)
+    if check and "lossy" in states:
         sys.exit(NOT_MET)
 
 
 @cli.command(
     epilog=examples(
-        "simulate campaign/EL089 --trajectory EL089P00", "simulate campaign/EL089 --command slew.csv --rate 200"
+        "simulate campaign/EL089 --trajectory EL089P00",
+        "simulate campaign/EL089 --command slew.csv --rate 200",
     )
 )
 @campaign_argument
@@ -182,7 +189,9 @@ def simulate(
     click.echo(f"Simulated: {written}")
 
 
-@cli.command(epilog=examples("predict campaign/EL089 EL089P00_1", "predict campaign/EL089 other.mcap -o /tmp/other"))
+@cli.command(
+    epilog=examples("predict campaign/EL089 EL089P00_1", "predict campaign/EL089 other.mcap -o /tmp/other")
+)
 @campaign_argument
 @click.argument("recording")
 @output_option
@@ -208,10 +217,50 @@ def predict(campaign: str, recording: str, output: Path | None, quiet: bool) -> 
 @pdf_option
 def report(results: Path, pdf: bool | None) -> None:
     """Render the report again from stored RESULTS, computing nothing."""
+    from kbs_process.campaign.store import revising
     from kbs_process.report.build import build
 
-    build(results, pdf=_wants_pdf(pdf))
-    click.echo(f"Report: {results / 'index.html'}")
+    with revising(results, without=("index.html", "report.pdf")) as folder:
+        page = build(folder, pdf)
+    click.echo(f"Report: {results / page.name}")
+
+
+@cli.command(
+    "import",
+    epilog=examples(
+        "import --describe bench.tdms > mapping.toml", "import mapping.toml /data/bench campaigns/BENCH"
+    ),
+)
+@click.argument("mapping", required=False)
+@click.argument("source", required=False, type=click.Path(path_type=Path, exists=True))
+@click.argument("campaign", required=False, type=FOLDER)
+@click.option(
+    "--describe",
+    "file",
+    type=EXISTING_FILE,
+    metavar="FILE",
+    help="Print the beginning of a mapping for FILE.",
+)
+@quiet_option
+def import_(
+    mapping: str | None, source: Path | None, campaign: Path | None, file: Path | None, quiet: bool
+) -> None:
+    """Convert CSV, Parquet, HDF5, TDMS or MDF4 files in SOURCE into a new folder CAMPAIGN.
+
+    MAPPING is a TOML file that says which columns are which channels, or the name of a preset.
+    """
+    from kbs_process.campaign import importers
+
+    if file is not None:
+        click.echo(importers.describe(file), nl=False)
+        return
+    if mapping is None or source is None or campaign is None:
+        raise click.UsageError(
+            f"Give MAPPING, SOURCE and CAMPAIGN, or --describe FILE. Presets: {', '.join(importers.preset_names())}"
+        )
+    notice = functools.partial(click.echo, err=True)
+    made = importers.import_recordings(mapping, source, campaign, progress=_progress(quiet), notice=notice)
+    click.echo(f"Campaign: {made}")
 
 
 def _progress(quiet: bool) -> Progress:
@@ -220,16 +269,14 @@ def _progress(quiet: bool) -> Progress:
     return SilentProgress() if quiet else progress_for_terminal()
 
 
-def _wants_pdf(pdf: bool | None) -> bool:
-    return find_spec("weasyprint") is not None if pdf is None else pdf
-
-
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line and exit."""
     words = list(sys.argv[1:] if arguments is None else arguments)
     debug = "--debug" in words
     try:
-        cli.main([word for word in words if word != "--debug"], prog_name="kbs-process", standalone_mode=False)
+        cli.main(
+            [word for word in words if word != "--debug"], prog_name="kbs-process", standalone_mode=False
+        )
     except click.ClickException as error:
         error.show()
         sys.exit(error.exit_code)
@@ -241,7 +288,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             raise
         _complain(f"error: {error}")
         sys.exit(error.exit_status)
-    except Exception as error:  # noqa: BLE001 (the last one to speak: a user gets words, not a traceback)
+    except Exception as error:  # the last one to speak: a user gets words, not a traceback
         if debug:
             raise
         _complain(

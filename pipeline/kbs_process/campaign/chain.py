@@ -51,4 +51,6 @@ def order(
             f"'{link}' is not connected to the laboratory",
             f"let one link be mounted on '{LAB}' (transducer.on = \"{LAB}\", or a joint's parent)",
         )
-    return tuple(link for link in chain if link != TRANSDUCER) or tuple(joints)
+    if len(chain) != len(parents):
+        return tuple(joints)
+    return tuple(link for link in chain if link != TRANSDUCER)

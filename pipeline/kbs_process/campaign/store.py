@@ -16,7 +16,7 @@ import os
 import shutil
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import NoReturn
@@ -53,6 +53,29 @@ def writing(target: Path, *, marker: str = RESULTS) -> Iterator[Path]:
             _explain(error, target)
         finally:
             shutil.rmtree(private, ignore_errors=True)
+
+
+@contextmanager
+def revising(target: Path, *, without: Collection[str] = (), marker: str = RESULTS) -> Iterator[Path]:
+    """Yield a private folder with the files of `target`, save those `without`, that replaces it like `writing`.
+
+    The files are links to the old ones: the block may add files, and must not write into those it finds.
+    """
+    if not (target / marker).is_file():
+        raise OutputError(
+            f"holds no results (no {marker})", where=str(target), remedy="process the campaign first"
+        )
+    with writing(target, marker=marker) as private:
+        shutil.copytree(
+            target,
+            private,
+            copy_function=os.link,
+            dirs_exist_ok=True,
+            ignore=lambda folder, names: [
+                name for name in names if name in without and Path(folder) == target
+            ],
+        )
+        yield private
 
 
 @contextmanager

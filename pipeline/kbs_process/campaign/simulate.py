@@ -1,0 +1,114 @@
+"""One prediction at a time: from commands before a test, or of one recording after it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from kbs_process.campaign.commands import read_commands
+from kbs_process.campaign.config import Campaign, RecordingEntry
+from kbs_process.campaign.predicting import schedule_of
+from kbs_process.campaign.prediction_files import write_prediction
+from kbs_process.campaign.progress import Progress
+from kbs_process.campaign.reading import read_run
+from kbs_process.errors import ConfigError, did_you_mean
+from kbs_process.plant.predict import Schedule, predict
+from kbs_process.signals.records import Block, Run
+
+
+def simulate_commands(
+    campaign: Campaign, commands: Path, target: Path, *, rate_Hz: float, progress: Progress
+) -> Path:
+    """Simulate the commands of a CSV or Parquet file through the controller; return `target`."""
+    schedule = read_commands(commands, campaign.rig.joint_names)
+    schedule = replace(schedule, t=schedule.t - schedule.t[0])
+    with progress.task(f"Simulating {commands.name}") as task:
+        streams = _command_driven(campaign, schedule, rate_Hz, rate_Hz, float(schedule.t[-1]), task.update)
+        return write_prediction(campaign, streams, target, "simulated", commands.stem, (commands,))
+
+
+def simulate_trajectory(
+    campaign: Campaign, trajectory: str | None, target: Path, *, rate_Hz: float | None, progress: Progress
+) -> Path:
+    """Simulate the commands recorded in a trajectory's first run (default: the last one listed)."""
+    first = {entry.trajectory: entry for entry in reversed(campaign.recordings)}
+    name = trajectory or campaign.recordings[-1].trajectory
+    if name not in first:
+        raise ConfigError(
+            f"there is no trajectory '{name}'", where=campaign.name, remedy=did_you_mean(name, first)
+        )
+    run = _read(campaign, first[name], progress)
+    # Before a test nobody knows what field and encoders will do: the controller is simulated too.
+    schedule = replace(schedule_of(run, campaign.rig), field=None, encoder=None)
+    with progress.task(f"Simulating {name}") as task:
+        rates = rate_Hz or run.rates["wrench"], run.rates.get("angle", run.rates["wrench"])
+        streams = _command_driven(campaign, schedule, *rates, _duration(run), task.update)
+        return write_prediction(
+            campaign, streams, target, "simulated", name, (first[name].path,), epoch_ns=run.epoch_ns
+        )
+
+
+def predict_recording(campaign: Campaign, recording: str, target: Path, *, progress: Progress) -> Path:
+    """Predict one recording, driven by whatever was recorded of it; return `target`."""
+    entry = _entry(campaign, recording)
+    run = _read(campaign, entry, progress)
+    with progress.task(f"Predicting {entry.name}") as task:
+        schedule = schedule_of(run, campaign.rig)
+        rates = run.rates["wrench"], run.rates.get("angle", run.rates["wrench"])
+        streams = _command_driven(campaign, schedule, *rates, _duration(run), task.update)
+        return write_prediction(
+            campaign, streams, target, "predicted", entry.name, (entry.path,), epoch_ns=run.epoch_ns
+        )
+
+
+def _command_driven(
+    campaign: Campaign,
+    schedule: Schedule,
+    rate_Hz: float,
+    angle_rate_Hz: float,
+    duration_s: float,
+    update: Callable[[float], None],
+) -> Iterable[tuple[str, Block]]:
+    if campaign.drive == "motion":
+        raise ConfigError(
+            "its plant is driven by motion: without a recording there is nothing to simulate",
+            where=campaign.name,
+            remedy="use 'predict' with a recording",
+        )
+    return predict(
+        campaign.rig,
+        campaign.effects,
+        schedule,
+        rate_Hz=rate_Hz,
+        angle_rate_Hz=angle_rate_Hz,
+        duration_s=duration_s,
+        progress=update,
+    )
+
+
+def _entry(campaign: Campaign, recording: str) -> RecordingEntry:
+    """Return the campaign's recording of that name, or one for any other file."""
+    names = [entry.name for entry in campaign.recordings]
+    if recording in names:
+        return campaign.recording(recording)
+    path = Path(recording)
+    if path.is_file():
+        return RecordingEntry(path.stem, path.absolute(), path.stem, "held-out", 1, None, None, None)
+    raise ConfigError(
+        f"there is no recording '{recording}', and no such file",
+        where=campaign.name,
+        remedy=did_you_mean(recording, names),
+    )
+
+
+def _read(campaign: Campaign, entry: RecordingEntry, progress: Progress) -> Run:
+    with progress.task(f"Reading {entry.name}"):
+        return read_run(campaign, entry)
+
+
+def _duration(run: Run) -> float:
+    signals: Sequence[float] = [
+        signal.t0 + len(signal) * signal.dt for signal in (run.wrench, run.angle) if signal is not None
+    ]
+    return max(signals)

@@ -1,0 +1,189 @@
+"""Every fault of a campaign is refused with file, line, key and remedy."""
+
+# ruff: noqa: E501  (a table reads best with a fault a line)
+
+from __future__ import annotations
+
+import hashlib
+
+import pytest
+
+from campaign.campaign_folder import CampaignFolder
+from kbs_process.campaign.load import load_campaign
+from kbs_process.errors import ConfigError
+
+RIG, DRIVES, CAMPAIGN = "parameters/rig.toml", "parameters/drives.toml", "campaign.toml"
+
+# file, text, what it becomes, and what the message has to say besides file and line
+FAULTS = {
+    "unknown key": (CAMPAIGN, "high_pass_Hz =", "highpass_Hz =", ["bands.highpass_Hz", "did you mean 'high_pass_Hz'"]),
+    "unknown table": (CAMPAIGN, "[model]", "[modell]", ["modell", "did you mean 'model'"]),
+    "unknown role": (CAMPAIGN, 'role = "held-out"', 'role = "heldout"', ["recording[3].role", "did you mean 'held-out'"]),
+    "unknown drive": (CAMPAIGN, 'drive = "command"', 'drive = "comand"', ["drive", "did you mean 'command'"]),
+    "text for a number": (CAMPAIGN, "high_pass_Hz = 0.01", 'high_pass_Hz = "0.01"', ["is a text, not a number"]),
+    "number for a text": (CAMPAIGN, 'trajectory = "AZPS_ATA"', "trajectory = 3", ["recording[1].trajectory"]),
+    "unknown effect": (CAMPAIGN, '"cogging"', '"coging"', ["model.effects[2]", "did you mean 'cogging'"]),
+    "NaN": (CAMPAIGN, "working_rate_Hz = 20.0", "working_rate_Hz = nan", ["bands.working_rate_Hz", "not a finite"]),
+    "version": (CAMPAIGN, "schema = 1", "schema = 7", ["is 7, not 1"]),
+    "limit in another dimension": (
+        CAMPAIGN,
+        'limit = { value = 0.06, unit = "N m" }',
+        'limit = { value = 0.06, unit = "N" }',
+        ["requirement[1].limit.unit", "unit of force", "torque (N m) is expected", "'N mm'"],
+    ),
+    "band beyond the bands": (CAMPAIGN, "band_Hz = [0.01, 1.0]", "band_Hz = [0.01, 5.0]", ["beyond", "0.01 to 2 Hz"]),
+    "empty band": (CAMPAIGN, "band_Hz = [0.01, 1.0]", "band_Hz = [1.0, 0.01]", ["is empty"]),
+    "rate too low": (CAMPAIGN, "working_rate_Hz = 20.0", "working_rate_Hz = 3.0", ["half the working rate"]),
+    "repeat twice": (CAMPAIGN, "repeat = 3", "repeat = 2", ["run 2 of EL089P00 is 'EL089P00_2' already"]),
+    "recording twice": (CAMPAIGN, "EL089P00_3.mcap", "EL089P00_2.mcap", ["called 'EL089P00_2' too"]),
+    "missing recording": (
+        CAMPAIGN,
+        "recordings/EL089P00_1.mcap",
+        "recordings/EL089P01_1.mcap",
+        ["recording[2].file", "does not exist", "did you mean 'EL089P00_1.mcap'"],
+    ),
+    "wrong number of fields": (
+        CAMPAIGN,
+        'encoder = "/encoder"',
+        'encoder = { topic = "/encoder", fields = ["position[az]"] }',
+        ["topics.encoder.fields", "1 fields for 2 channels", "az, el"],
+    ),
+    "no commands": (CAMPAIGN, 'command = "/command"', "", ["needs commands", "motion"]),
+    "missing parameter file": (CAMPAIGN, "parameters/rig.toml", "parameters/rg.toml", ["does not exist"]),
+    "no sigma": (RIG, 'unit = "kg", sigma = 0.05, source', 'unit = "kg", source', ["body.base.mass.sigma", "is missing"]),
+    "no unit": (RIG, 'value = 8.0, unit = "kg",', "value = 8.0,", ["body.base.mass.unit", "is missing"]),
+    "no source": (RIG, ', source = "standard gravity"', "", ["gravity.magnitude.source", "say where"]),
+    "negative sigma": (RIG, "sigma = 0.05", "sigma = -0.05", ["body.base.mass.sigma", "less than 0"]),
+    "infinite": (RIG, "value = 8.0", "value = inf", ["body.base.mass.value", "inf is not a finite"]),
+    "NaN in an array": (RIG, "[0.07, 0.06, -0.02]", "[0.07, nan, -0.02]", ["body.antenna.cog.value[2]"]),
+    "other dimension": (
+        RIG,
+        'cog = { value = [0.0, 0.0, 0.06], unit = "m"',
+        'cog = { value = [0.0, 0.0, 0.06], unit = "kg"',
+        ["body.base.cog.unit", "unit of mass", "length (m) is expected", "'mm'"],
+    ),
+    "misspelt unit": (DRIVES, 'unit = "N m"', 'unit = "Nm"', ["joint.az.drive.parameters.Tmax.unit", "did you mean 'N m'"]),
+    "one unit for forces and torques": (
+        RIG,
+        'bias = { value = [0, 0, 0, 0, 0, 0], unit = ["N", "N", "N", "N m", "N m", "N m"]',
+        'bias = { value = [0, 0, 0, 0, 0, 0], unit = "N"',
+        ["transducer.bias.unit", "forces and torques alike"],
+    ),
+    "units swapped": (
+        RIG,
+        'unit = ["N", "N", "N", "N m", "N m", "N m"], sigma = [5',
+        'unit = ["N m", "N m", "N m", "N", "N", "N"], sigma = [5',
+        ["transducer.bias.unit", "unit of torque, where force (N) is expected"],
+    ),
+    "wrong shape": (RIG, "[4000, 4000, 6000]", "[4000, 6000]", ["transducer.stiffness.value", "array of 3"]),
+    "negative mass": (RIG, "value = 8.0", "value = -8.0", ["body.base.mass.value", "out of bounds"]),
+    "impossible inertia": (RIG, "[0.7, 0.9, 0.8, 0.0", "[0.7, 0.9, 0.8, 2.0", ["body.antenna.inertia", "no body"]),
+    "unknown link": (RIG, 'on = "el"', 'on = "ell"', ["body.antenna.on", "no link", "did you mean 'el'"]),
+    "unknown parent": (RIG, 'parent = "az"', 'parent = "ax"', ["joint.el.parent", "no other link", "known: T, az, lab"]),
+    "branching chain": (RIG, 'parent = "az"', 'parent = "T"', ["joint.el.parent", "one chain"]),
+    "loop": (RIG, 'parent = "T"', 'parent = "el"', ["not connected to the laboratory"]),
+    "axis without direction": (RIG, "axis = [0, 0, 1]", "axis = [0, 0, 0]", ["joint.az.axis", "no direction"]),
+    "unknown channel": (RIG, '"Tz"]', '"Mz"]', ["transducer.channels[6]", "'Mz' is not allowed"]),
+    "stiffness without damping": (RIG, "damping =", "#", ["transducer.damping", "although stiffness is given"]),
+    "given twice": (
+        DRIVES,
+        "[controller]",
+        '[gravity]\nmagnitude = { value = 0, unit = "m/s^2", sigma = 0, source = "flight" }\n[controller]',
+        ["gravity.magnitude", "is given in", "parameters/rig.toml:5"],
+    ),
+    "absent drive parameter": (DRIVES, "Ka = ", "# ", ["joint.az.drive.parameters.Ka", "'flexspline'", "N m/rad"]),
+    "unknown drive parameter": (DRIVES, "Tmax =", "Tmx =", ["joint.az.drive.parameters.Tmx", "did you mean 'Tmax'"]),
+    "drive parameter out of bounds": (DRIVES, "delta = { value = 0.5", "delta = { value = 5.0", ["delta", "out of bounds"]),
+    "gains of another rig": (DRIVES, "Kp = { value = [0.05, 0.05]", "Kp = { value = [0.05]", ["controller.Kp.value", "array of 2"]),
+    "no controller": (DRIVES, "loop = ", "# ", ["controller.loop", "is missing"]),
+}  # fmt: skip
+
+# Told at another line than that which was changed: the key is gone, or another one shows the fault.
+ELSEWHERE = {
+    "unknown effect", "rate too low", "repeat twice", "recording twice", "no commands", "loop", "given twice",
+    "missing parameter file", "stiffness without damping", "absent drive parameter", "no controller",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_fault_is_refused(folder: CampaignFolder, fault: str) -> None:
+    file, old, new, words = FAULTS[fault]
+    line = folder.replace(file, old, new)
+    error = folder.refusal()
+    message = str(error)
+    for word in words:
+        assert word in message
+    assert error.remedy or "\n  -> " in message
+    assert file in message
+    if fault not in ELSEWHERE:
+        assert f"{file}:{line}: " in message
+
+
+def test_no_campaign_file(folder: CampaignFolder) -> None:
+    (folder.path / CAMPAIGN).unlink()
+    error = folder.refusal()
+    assert "does not exist" in str(error)
+    assert error.where.endswith(CAMPAIGN)
+
+
+@pytest.mark.parametrize(
+    ("text", "place"),
+    [
+        ("name = \n", "campaign.toml:1"),
+        ("a = 1\na = 2\n", "campaign.toml:2"),
+        ("x = [1,\n", "campaign.toml:2"),
+    ],
+)
+def test_malformed_toml_names_the_line(folder: CampaignFolder, text: str, place: str) -> None:
+    (folder.path / CAMPAIGN).write_text(text)
+    error = folder.refusal()
+    assert error.where.endswith(place)
+    assert "is not valid TOML" in error.what
+
+
+def test_text_that_is_not_utf8(folder: CampaignFolder) -> None:
+    (folder.path / CAMPAIGN).write_bytes(b'name = "\xff"\n')
+    assert "not UTF-8" in str(folder.refusal())
+
+
+def test_wrong_checksum_names_both(folder: CampaignFolder) -> None:
+    stated = "0" * 64
+    folder.replace(CAMPAIGN, 'role = "fit"', f'role = "fit"\nsha256 = "{stated}"')
+    message = str(folder.refusal())
+    assert stated in message
+    assert hashlib.sha256(b"").hexdigest() in message
+    assert "EL089P00_1.mcap" in message
+    load_campaign(folder.path, checksums=False)
+
+
+def test_requirement_at_the_spacecraft_needs_a_spacecraft(folder: CampaignFolder) -> None:
+    text = (folder.path / RIG).read_text()
+    first, last = text.index("[spacecraft]"), text.index("[body.base]")
+    (folder.path / RIG).write_text(text[:first] + text[last:])
+    assert "spacecraft's centre of mass" in str(folder.refusal())
+
+
+def test_several_faults_are_told_at_once(folder: CampaignFolder) -> None:
+    for name in ("base", "azimuth", "antenna"):
+        folder.replace(RIG, f"[body.{name}]", f"[body.{name}]\ncolour = 'red'")
+    for name in ("az", "el"):
+        folder.replace(RIG, f"[joint.{name}]", f"[joint.{name}]\ncolour = 'red'")
+        folder.replace(DRIVES, f"[joint.{name}.drive]", f"[joint.{name}.drive]\ncolour = 'red'")
+    error = folder.refusal()
+    assert error.what.startswith("7 things are wrong")
+    assert error.what.count("colour: is not a key that is known here") == 5
+    assert "and 2 more" in error.what
+
+
+def test_csv_matrix_with_nan_is_refused(folder: CampaignFolder) -> None:
+    (folder.path / "tilt.csv").write_text("0.0, nan\n")
+    folder.replace(RIG, "tilt = { value = [0.0, 0.0]", 'tilt = { value = "tilt.csv"')
+    message = str(folder.refusal())
+    assert "tilt.csv" in message
+    assert "NaN" in message
+
+
+def test_error_is_a_bad_input(folder: CampaignFolder) -> None:
+    (folder.path / CAMPAIGN).unlink()
+    assert ConfigError.exit_status == 2
+    assert folder.refusal().exit_status == 2
