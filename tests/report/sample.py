@@ -381,7 +381,7 @@ def _gravity_result() -> r.Gravity:
         ),
         samples=26000,
         reduced_chi_square=1.04,
-        feasible="Computed gravity compensation is feasible: the static torque is known to 0.003 N m, 5 % of the limit.",
+        feasible="Computed gravity compensation is feasible: its error is 0.003 N m, 5 % of the limit.",
     )
 
 

@@ -29,6 +29,7 @@ class Picture:
     uri: str
     alt: str
     title: str = ""
+    width: int = 100  # % of the text's width
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +62,7 @@ class Live:
     key: str
     names: tuple[str, ...]  # of a channel's curves, in their order
     views: tuple[View, ...]
+    two_scales: bool  # the residual has an axis of its own
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +86,7 @@ class Cell:
 
 @dataclass(frozen=True, slots=True)
 class Grid:
-    """A table; `align` holds one of "l", "r" or "c" a column."""
+    """A table; `align` holds a letter a column: l(eft), r(ight), c(entre) or k(ey, left and on one line)."""
 
     title: str
     head: tuple[str, ...]

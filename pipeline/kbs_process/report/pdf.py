@@ -26,7 +26,7 @@ def write(html: str, target: Path) -> None:
     except (ImportError, OSError) as error:  # OSError: its shared libraries are missing
         raise OutputError(f"no PDF without weasyprint: {error}", where=str(target), remedy=_REMEDY) from None
     with _fixed_date():
-        target.write_bytes(weasyprint.HTML(string=html).write_pdf())
+        target.write_bytes(weasyprint.HTML(string=html).write_pdf(presentational_hints=True))
 
 
 @contextmanager

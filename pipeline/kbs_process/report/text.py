@@ -34,6 +34,11 @@ def measure(value: float | None, sigma: float | None, digits: int = 4) -> str:
     return pair if scale == 1.0 else f"({pair})\u00a0×\u00a010{_raised(exponent)}"
 
 
+def exact(value: float) -> str:
+    """Return a number that somebody chose, a limit or a band's edge, as it was written."""
+    return _sign(f"{value:.12g}")
+
+
 def percent(value: float | None, digits: int = 3) -> str:
     """Return a fraction in percent."""
     return MISSING if value is None else f"{number(100.0 * value, digits)}\u00a0%"
@@ -48,13 +53,11 @@ def unit(name: str) -> str:
 
 def band_hz(low: float | None, high: float | None) -> str:
     """Return a frequency band in words."""
-    if low is None and high is None:
-        return "unfiltered"
     if low is None:
-        return f"below {number(high)}\u00a0Hz"
+        return "unfiltered" if high is None else f"below {exact(high)}\u00a0Hz"
     if high is None:
-        return f"above {number(low)}\u00a0Hz"
-    return f"{number(low, 2)} to {number(high, 2)}\u00a0Hz"
+        return f"above {exact(low)}\u00a0Hz"
+    return f"{exact(low)} to {exact(high)}\u00a0Hz"
 
 
 def count(n: int, noun: str, plural: str = "") -> str:
@@ -66,6 +69,15 @@ def label(text: str, longest: int = 48) -> str:
     """Return `text` fit for a figure: printable, on one line, not too long."""
     line = "".join(character if character.isprintable() else " " for character in text)
     return line if len(line) <= longest else line[: longest - 1] + "…"
+
+
+def power(value: float) -> str:
+    """Return a short label for a tick of a logarithmic axis: 0.5, 20, 10⁻⁵, 5·10⁻⁵."""
+    exponent = _exponent(value * 1.000001)  # a decade's own rounding must not put it below itself
+    mantissa = round(value / 10.0**exponent)
+    if -3 <= exponent < 4:
+        return number(value, 1)
+    return f"{'' if mantissa == 1 else f'{mantissa}·'}10{_raised(exponent)}"
 
 
 def _exponent(value: float) -> int:

@@ -1,7 +1,14 @@
 "use strict";
 // Interactive time histories: one uPlot a channel, all of a figure with the same time axis and cursor.
 (() => {
-  const COLORS = { measured: "#1f4e79", static: "#d97706", predicted: "#d97706", residual: "#7c8591" };
+  // The computed curve is broad and pale under the measured one, so that both show where they agree.
+  const LOOKS = {
+    measured: { stroke: "#1f4e79", width: 1 },
+    static: { stroke: "#f0a94a", width: 2.5 },
+    predicted: { stroke: "#f0a94a", width: 2.5 },
+    residual: { stroke: "#7c8591", width: 1 },
+  };
+  const LOWEST_FIRST = [1, 0, 2]; // computed, measured, residual: the order in which curves are drawn
   const ABSENT = -32768;
   const WHEEL = 0.8;
 
@@ -34,7 +41,7 @@
   };
 
   function figure(root) {
-    const { key, names, views } = JSON.parse(document.getElementById(`live-${root.dataset.key}`).textContent);
+    const { key, names, views, two_scales: twoScales } = JSON.parse(document.getElementById(`live-${root.dataset.key}`).textContent);
     const box = root.querySelector(".plots");
     const reading = root.querySelector(".reading");
     const unique = (field) => [...new Set(views.map((view) => view[field]))];
@@ -93,7 +100,7 @@
       const between = (values) => (values[index] === null || values[mark] === null ? null : values[index] - values[mark]);
       const parts = plots.map((plot, i) => {
         const channel = view.channels[i];
-        return `Δ${channel.name} ${shown(between(plot.data[1]))} ${tidy(channel.unit)}`;
+        return `Δ${channel.name} ${shown(between(plot.data[plot.measured]))} ${tidy(channel.unit)}`;
       });
       reading.textContent = [`From the mark: Δt ${shown(between(plots[0].data[0]))} s`, ...parts].join("  ·  ");
     };
@@ -120,36 +127,42 @@
     };
 
     const make = (channel, t, last) => {
-      const data = [t, ...channel.curves.map(unpack)];
-      const peak = Math.max(...data.slice(1).map((curve) => curve.reduce((most, v) => Math.max(most, Math.abs(v)), 0)));
+      const order = LOWEST_FIRST.filter((i) => i < channel.curves.length);
+      const curves = order.map((i) => unpack(channel.curves[i]));
+      const apart = twoScales && channel.curves.length === 3;
+      const peak = Math.max(...curves.map((curve) => curve.reduce((most, v) => Math.max(most, Math.abs(v)), 0)));
+      const highest = curves.at(-1).reduce((most, v) => Math.max(most, v), 0); // of the residual
       const limit = channel.limit !== null && peak > 0.25 * channel.limit ? channel.limit : null;
-      const range = (_, low, high) => {
+      // Room below and above the curves, in parts of their range: a residual apart runs beneath the others.
+      const range = (below, above) => (_, low, high) => {
         const [bottom, top] = limit === null ? [low, high] : [Math.min(low, -limit), Math.max(high, limit)];
-        const pad = 0.06 * (top - bottom) || 1e-9;
-        return [bottom - pad, top + pad];
+        const span = top - bottom || Math.abs(top) || 1;
+        return [bottom - below * span, top + above * span];
       };
+      const axis = { grid: { stroke: "#eceff2", width: 1 }, font: "11px sans-serif", labelFont: "12px sans-serif", labelSize: 20, stroke: "#3a434d" };
       const plot = new uPlot({
         width: box.clientWidth,
-        height: last ? 176 : 140,
-        legend: { live: true },
+        height: last ? 176 : 146,
         cursor: { sync: { key, setSeries: false }, drag: { x: true, y: false, dist: 4 }, points: { size: 5 } },
-        scales: { x: { time: false }, y: { range } },
+        scales: { x: { time: false }, y: { range: apart ? range(0.8, 0.06) : range(0.06, 0.06) }, r: { range: range(0.06, 2) } },
         series: [
           { label: "t / s", value: (_, v) => (v === null ? "–" : v.toFixed(2)) },
-          ...channel.curves.map((_, i) => ({
+          ...order.map((i) => ({
+            ...LOOKS[names[i]],
             label: names[i],
-            stroke: COLORS[names[i]],
-            width: 1,
+            scale: apart && i === 2 ? "r" : "y",
             points: { show: false },
-            value: (__, v) => shown(v),
+            value: (_, v) => shown(v),
           })),
         ],
         axes: [
-          { label: last ? "time / s" : undefined, labelSize: 20, size: last ? 34 : 24, grid: { stroke: "#eceff2" }, font: "11px sans-serif" },
-          { label: `${channel.name} / ${tidy(channel.unit)}`, labelSize: 20, size: 62, grid: { stroke: "#eceff2" }, font: "11px sans-serif" },
+          { ...axis, label: last ? "time / s" : undefined, size: last ? 34 : 24 },
+          { ...axis, label: `${channel.name} / ${tidy(channel.unit)}`, size: 62 },
+          ...(apart ? [{ ...axis, scale: "r", side: 1, label: "residual", size: 62, grid: { show: false }, stroke: "#7c8591", filter: (_, splits) => splits.map((v) => (v > highest ? null : v)) }] : []),
         ],
         hooks: { drawClear: [under], draw: [(plot) => over(plot, limit)], setCursor: [(plot) => read(plot.cursor.idx)] },
-      }, data, box);
+      }, [t, ...curves], box);
+      plot.measured = 1 + order.indexOf(0);
       wheel(plot);
       return plot;
     };

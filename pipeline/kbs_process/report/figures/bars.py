@@ -17,7 +17,7 @@ def against_limit(requirement: Requirement, alt: str) -> Picture:
     """Draw each channel's measured (with two sigma) and predicted value, and the limit."""
     rows = requirement.channels
     with draw.style():
-        figure, (axis,) = draw.canvas(0.75 + 0.36 * len(rows))
+        figure, axis = draw.canvas(0.75 + 0.36 * len(rows))
         place = np.arange(len(rows), dtype=float)
         axis.barh(
             place - 0.19,
@@ -49,14 +49,15 @@ def against_limit(requirement: Requirement, alt: str) -> Picture:
 def signal_and_noise(rows: Sequence[Repeatability], alt: str, title: str) -> Picture:
     """Draw rms of signal and of noise of every channel, on a logarithmic axis."""
     with draw.style():
-        figure, (axis,) = draw.canvas(0.8 + 0.3 * len(rows))
+        figure, axis = draw.canvas(0.8 + 0.3 * len(rows))
         place = np.arange(len(rows), dtype=float)
         for values, offset, color, name in (
             ([row.signal_rms or np.nan for row in rows], -0.18, draw.MEASURED, "signal"),
             ([row.noise_rms or np.nan for row in rows], 0.18, draw.RESIDUAL, "noise"),
         ):
             axis.barh(place + offset, values, 0.34, color=color, label=name)
-        axis.set_xscale("log")
+        found = [value for row in rows for value in (row.signal_rms, row.noise_rms) if value]
+        draw.logarithmic(axis, "x", 0.5 * min(found, default=0.1), 1.5 * max(found, default=1.0))
         axis.set_yticks(place, [f"{label(row.channel)} / {unit(row.unit)}" for row in rows])
         axis.invert_yaxis()
         axis.grid(visible=False, axis="y")
@@ -69,7 +70,7 @@ def variance_shares(budgets: Sequence[Budget], alt: str) -> Picture:
     """Draw each stage's share of each channel's variance; the total stands beside the bar."""
     stages = list(dict.fromkeys(item.stage for budget in budgets for item in budget.contributions))
     with draw.style():
-        figure, (axis,) = draw.canvas(0.95 + 0.34 * len(budgets))
+        figure, axis = draw.canvas(0.95 + 0.34 * len(budgets))
         for row, budget in enumerate(budgets):
             variance = sum(item.sigma**2 for item in budget.contributions) or 1.0
             left = 0.0
@@ -99,7 +100,7 @@ def shifts(parameters: Sequence[FittedParameter], alt: str) -> Picture:
     """Draw how far each fitted parameter moved from its prior, in the prior's sigma."""
     moved = [entry for entry in parameters if entry.prior is not None and entry.prior_sigma]
     with draw.style():
-        figure, (axis,) = draw.canvas(0.7 + 0.2 * len(moved))
+        figure, axis = draw.canvas(0.7 + 0.2 * len(moved))
         place = np.arange(len(moved), dtype=float)
         prior = np.array([entry.prior for entry in moved], dtype=float)
         width = np.array([entry.prior_sigma for entry in moved], dtype=float)

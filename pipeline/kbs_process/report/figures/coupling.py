@@ -17,7 +17,7 @@ def matrix(coupling: CrossCoupling, alt: str) -> Picture:
     significance = np.divide(np.abs(values), sigma, out=np.zeros_like(values), where=known)
     n = len(coupling.channels)
     with draw.style():
-        figure, (axis,) = draw.canvas(0.6 + 0.42 * n, width=min(draw.WIDTH, 1.2 + 1.0 * n))
+        figure, axis = draw.canvas(0.6 + 0.42 * n, width=min(draw.WIDTH, 1.2 + 1.0 * n))
         axis.imshow(np.minimum(significance, 10.0), cmap="Blues", vmin=0.0, vmax=16.0, aspect="auto")
         for row in range(n):
             for column in range(n):

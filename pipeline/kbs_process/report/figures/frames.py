@@ -17,7 +17,7 @@ _AXES = (("x", draw.SERIES[5]), ("y", draw.SERIES[2]), ("z", draw.SERIES[0]))
 def frames(alt: str, *, gravity: bool, spacecraft: bool) -> Picture:
     """Draw T on the transducer's top plate, positive torques, the weight, and S where there is one."""
     with draw.style():
-        figure, (axis,) = draw.canvas(2.5, width=4.6)
+        figure, axis = draw.canvas(1.9, width=4.6)
         axis.set_axis_off()
         axis.set_aspect("equal")
         _plate(axis)

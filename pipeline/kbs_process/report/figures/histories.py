@@ -27,19 +27,18 @@ def strips(
     """Draw one row a channel; on `same_scale` the residual shares its row's axis."""
     paired = any(row.residual is not None for row in rows)
     columns = 2 if paired else 1
-    height = 0.55 + (1.05 if len(rows) > 1 else 1.9) * len(rows)
     with draw.style():
-        figure, axes = draw.canvas(height, len(rows), columns)
+        figure, axes = draw.ladder(len(rows), columns, 0.98 if len(rows) > 1 else 1.9, gap=0.12)
         for index, row in enumerate(rows):
             left = axes[index * columns]
-            _curve(left, t, row.measured, draw.MEASURED, "measured")
+            _curve(left, t, row.measured, "measured")
             if row.computed is not None:
-                _curve(left, t, row.computed, draw.PREDICTED, computed_name)
+                _curve(left, t, row.computed, computed_name)
             _limit(left, row)
             left.set_ylabel(f"{row.channel} / {unit(row.unit)}")
             if paired and row.residual is not None:
                 right = axes[index * columns + 1]
-                _curve(right, t, row.residual, draw.RESIDUAL, "residual")
+                _curve(right, t, row.residual, "residual")
                 if same_scale:
                     right.set_ylim(left.get_ylim())
         for axis in axes:
@@ -62,11 +61,11 @@ def shows_limit(peak: float, limit: float) -> bool:
     return peak > 0.25 * limit
 
 
-def _curve(axis: Axes, t: Array, values: Array, color: str, label: str) -> None:
+def _curve(axis: Axes, t: Array, values: Array, name: str) -> None:
     size = series.stride(len(values), _POINTS)
     first, step = series.times(t, size)
     points = series.envelope(values, size)
-    axis.plot(first + step * np.arange(len(points)), points, color=color, label=label, linewidth=0.7)
+    axis.plot(first + step * np.arange(len(points)), points, label=name, **draw.LINES[name])
 
 
 def _limit(axis: Axes, row: series.Trace) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from kbs_process.report.figures import draw
 from kbs_process.report.panel import Picture
@@ -19,7 +20,9 @@ def peaks(rows: Sequence[Merit], alt: str) -> Picture:
     units = list(dict.fromkeys(row.unit for row in rows))
     channels = list(dict.fromkeys(row.channel for row in rows))
     with draw.style():
-        figure, axes = draw.canvas(3.1, 1, len(units), width=draw.WIDTH if len(units) > 1 else 4.2)
+        width = draw.WIDTH if len(units) > 1 else 4.2
+        figure = Figure(figsize=(width, 3.1), layout="constrained")
+        axes = figure.subplots(1, len(units), squeeze=False)[0]
         for axis, name in zip(axes, units, strict=True):
             shown = [row for row in rows if row.unit == name]
             measured = np.array([row.measured_peak for row in shown], dtype=float)
@@ -42,8 +45,9 @@ def peaks(rows: Sequence[Merit], alt: str) -> Picture:
                     color=draw.SERIES[index % len(draw.SERIES)],
                     label=label(channel),
                 )
-            axis.set(xscale="log", yscale="log", xlim=(low, high), ylim=(low, high))
+            draw.logarithmic(axis, "x", low, high)
+            draw.logarithmic(axis, "y", low, high)
             axis.set_xlabel(f"measured peak / {unit(name)}")
             axis.set_ylabel(f"predicted peak / {unit(name)}")
-            axis.legend(loc="center left", fontsize=6.5)
+            axis.legend(loc="center left", bbox_to_anchor=(0.0, 0.62), fontsize=6.5)
         return draw.picture(figure, alt)

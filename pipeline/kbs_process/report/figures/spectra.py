@@ -24,27 +24,40 @@ def spectra(
     channels = table.channels
     columns = 2 if len(channels) > 1 else 1
     rows = math.ceil(len(channels) / columns)
-    f = table.columns["f"]
     with draw.style():
-        figure, axes = draw.canvas(0.5 + (1.75 if rows > 1 else 2.4) * rows, rows, columns)
+        figure, axes = draw.ladder(rows, columns, 1.35 if rows > 1 else 2.2, gap=0.12)
         # The drawn order runs down the columns: forces left, torques right.
         grid = np.reshape(np.array(axes, dtype=object), (rows, columns)).T.ravel()
         for axis, channel in zip(grid, channels, strict=False):
-            for kind, color in (("measured", draw.MEASURED), ("predicted", draw.PREDICTED)):
-                density = table.columns.get(f"{channel}.{kind}")
-                if density is not None:
-                    axis.plot(*_thinned(f, density), color=color, label=kind, linewidth=0.7)
-            _marks(axis, resonances, edges)
-            axis.set(xscale="log", yscale="log")
+            _curves(axis, table, channel)
+            _marks(axis, resonances, edges, named=axis is grid[0])
             axis.set_ylabel(f"{channel} / ({unit(table.unit(channel))})²/Hz")
         for axis in grid[len(channels) :]:
             axis.remove()
         for column in range(columns):
             bottom = min((column + 1) * rows, len(channels)) - 1
+            for axis in grid[column * rows : bottom]:
+                axis.tick_params(labelbottom=False)
             if bottom >= column * rows:
                 grid[bottom].set_xlabel("frequency / Hz")
         grid[0].legend(loc="lower left", fontsize=6.5)
         return draw.picture(figure, alt, title)
+
+
+def _curves(axis: Axes, table: Table, channel: str) -> None:
+    """Draw the channel's densities; noughts, which a logarithmic axis cannot show, are left out."""
+    f = table.columns["f"]
+    shown = [
+        (kind, *_thinned(f, table.columns[f"{channel}.{kind}"]))
+        for kind in ("predicted", "measured")
+        if f"{channel}.{kind}" in table.columns
+    ]
+    for kind, frequency, density in shown:
+        axis.plot(frequency, density, label=kind, **draw.LINES[kind])
+    densities = np.concatenate([density for _, _, density in shown])
+    if densities.size:
+        draw.logarithmic(axis, "x", float(f[f > 0].min()), float(f.max()))
+        draw.logarithmic(axis, "y", 0.5 * float(densities.min()), 2.0 * float(densities.max()))
 
 
 def _thinned(f: Array, density: Array) -> tuple[Array, Array]:
@@ -60,20 +73,24 @@ def _thinned(f: Array, density: Array) -> tuple[Array, Array]:
     return f[keep], density[keep]
 
 
-def _marks(axis: Axes, resonances: tuple[Resonance, ...], edges: tuple[float, ...]) -> None:
+def _marks(axis: Axes, resonances: tuple[Resonance, ...], edges: tuple[float, ...], *, named: bool) -> None:
     for edge in edges:
-        axis.axvline(edge, color=draw.RESIDUAL, linewidth=0.7, linestyle=(0, (1, 1.5)))
-    for resonance in resonances:
-        axis.axvline(resonance.frequency_Hz, color=draw.LIMIT, linewidth=0.7, linestyle=(0, (4, 2)))
-        axis.annotate(
-            f"{label(resonance.axis, 12)} {number(resonance.frequency_Hz)} Hz",
-            (resonance.frequency_Hz, 1.0),
-            xycoords=("data", "axes fraction"),
-            xytext=(-1.5, -2),
-            textcoords="offset points",
-            rotation=90,
-            ha="right",
-            va="top",
-            fontsize=5.5,
-            color=draw.LIMIT,
-        )
+        axis.axvline(edge, color=draw.INK, linewidth=0.7, linestyle=(0, (1, 1.5)), zorder=1)
+    ordered = sorted(resonances, key=lambda resonance: resonance.frequency_Hz)
+    for index, resonance in enumerate(ordered):
+        axis.axvline(resonance.frequency_Hz, color=draw.LIMIT, linewidth=0.7, linestyle=(0, (4, 2)), zorder=1)
+        if named:
+            # Neighbours stand on opposite sides of their lines, as the first two are often close.
+            side = -1 if index % 2 == 0 else 1
+            axis.annotate(
+                f"{label(resonance.axis, 12)} {number(resonance.frequency_Hz)} Hz",
+                (resonance.frequency_Hz, 1.0),
+                xycoords=("data", "axes fraction"),
+                xytext=(1.5 * side, -1),
+                textcoords="offset points",
+                rotation=90,
+                ha="right" if side < 0 else "left",
+                va="top",
+                fontsize=5.5,
+                color=draw.LIMIT,
+            )

@@ -7,7 +7,7 @@ from kbs_process.report.panel import Block, Caption, Cell, Figure, Fold, Grid, N
 from kbs_process.report.panels.choose import frame_label
 from kbs_process.report.results import Notice, Requirement, Results
 from kbs_process.report.tables import Tables
-from kbs_process.report.text import MISSING, band_hz, count, measure, number, percent, unit
+from kbs_process.report.text import MISSING, band_hz, count, exact, measure, number, percent, unit
 
 _CAPTION = Caption(
     shown="The largest measured value of each channel over all recordings that count, with two standard "
@@ -47,7 +47,7 @@ def _table(results: Results) -> Grid:
             f"{entry.name} ({entry.statistic}, {entry.frame})",
             band_hz(*entry.band_Hz),
             f"{measure(entry.value, entry.sigma)} {unit(entry.unit)}",
-            f"{number(entry.limit)} {unit(entry.unit)}",
+            f"{exact(entry.limit)} {unit(entry.unit)}",
             _margin(entry),
             _where(entry),
             f"{measure(entry.predicted_value, entry.predicted_sigma, 3)}",
@@ -70,7 +70,7 @@ def _margin(entry: Requirement) -> str:
 def _where(entry: Requirement) -> str:
     parts = [part for part in (entry.channel, entry.recording) if part]
     if entry.time_s is not None:
-        parts.append(f"at {entry.time_s:.1f}\u00a0s")
+        parts.append(f"at {entry.time_s:.2f}\u00a0s")
     return ", ".join(parts) or MISSING
 
 
@@ -101,7 +101,5 @@ def _entry(notice: Notice) -> tuple[str, str, str, str]:
 def _figure(requirement: Requirement) -> Figure:
     title = f"{requirement.name}: {requirement.statistic} by channel, frame {frame_label(requirement.frame)}"
     found = ", ".join(f"{row.channel} {number(row.value)}" for row in requirement.channels)
-    alt = (
-        f"Measured {requirement.statistic} in {requirement.unit}: {found}; limit {number(requirement.limit)}"
-    )
+    alt = f"Measured {requirement.statistic} in {requirement.unit}: {found}; limit {exact(requirement.limit)}"
     return Figure(title, (bars.against_limit(requirement, alt),), _CAPTION)

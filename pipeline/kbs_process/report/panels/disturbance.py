@@ -52,7 +52,7 @@ def panel(results: Results, tables: Tables) -> Panel:
         f"Disturbance, measured and predicted ({band_label(results, band)} on paper)",
         tuple(_plate(results, *entry) for entry in (*chosen, *others)),
         _CAPTION,
-        Live("disturbance", ("measured", "predicted", "residual"), live),
+        Live("disturbance", ("measured", "predicted", "residual"), live, two_scales=False),
     )
     blocks: list[Block] = [figure]
     if len(live) < len(scenes):

@@ -35,6 +35,7 @@ _NOTE = (
 )
 _HEAD = (
     "Recording",
+    "Role",
     "Channel",
     "Measured rms",
     "Predicted rms",
@@ -78,15 +79,23 @@ def _rank(results: Results, row: Merit, main: tuple[str, str]) -> tuple[bool, in
 
 def _table(results: Results, band: str, frame: str, rows: tuple[Merit, ...]) -> Grid:
     title = f"Figures of merit, {band_label(results, band)}, {frame_label(frame)}"
-    return Grid(title, _HEAD, tuple(_row(row) for row in rows), "llrrrrrrrrr", _NOTE)
+    return Grid(title, _HEAD, _rows(rows), "kkkrrrrrrrrr", _NOTE)
 
 
-def _row(row: Merit) -> tuple[str | Cell, ...]:
+def _rows(rows: tuple[Merit, ...]) -> tuple[tuple[str | Cell, ...], ...]:
+    """Name a recording in the first of its rows only."""
+    named = [("", "")] + [(row.recording, row.role) for row in rows]
+    return tuple(
+        (*(("", "") if name == before else name), *_figures(row))
+        for row, name, before in zip(rows, named[1:], named, strict=False)
+    )
+
+
+def _figures(row: Merit) -> tuple[str | Cell, ...]:
     explained = percent(row.fraction_of_variance, 2)
     poor = row.fraction_of_variance is not None and row.fraction_of_variance < 0.0
     optimistic = row.pessimism is not None and row.pessimism < 1.0
     return (
-        f"{row.recording} ({row.role})",
         f"{row.channel} / {unit(row.unit)}",
         measure(row.measured_rms, row.sigma, 3),
         number(row.predicted_rms),

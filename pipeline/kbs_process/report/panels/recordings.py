@@ -37,7 +37,7 @@ def _recordings(recordings: tuple[Recording, ...]) -> Grid:
         for entry in recordings
     )
     head = ("Recording", "Trajectory", "Role", "Repeat", "Duration", "Rates / Hz", "Losses")
-    return Grid("Recordings", head, rows, "lllrrll", "Files and checksums: see provenance.")
+    return Grid("Recordings", head, rows, "kkkrrlk", "Files and checksums: see provenance.")
 
 
 def _loss_count(entry: Recording) -> str:
@@ -52,7 +52,7 @@ def _losses(recordings: tuple[Recording, ...]) -> Grid:
     )
     head = ("Recording", "Kind", "Where", "Count", "Time", "Detail")
     return Grid(
-        "Data losses", head, rows, "lllrll", "Count: messages or blocks. Time: on the recording's own axis."
+        "Data losses", head, rows, "kklrkl", "Count: messages or blocks. Time: on the recording's own axis."
     )
 
 

@@ -62,4 +62,4 @@ def _table(results: Results, rows: tuple[Repeatability, ...], title: str) -> Gri
         )
         for row in rows
     )
-    return Grid(title, head, body, "lllcrrrrl")
+    return Grid(title, head, body, "kkckrrrrk")

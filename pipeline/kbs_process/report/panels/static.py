@@ -41,7 +41,7 @@ def panel(results: Results, tables: Tables) -> Panel:
         "Measured and static wrench at the transducer (frame T), unfiltered",
         pictures,
         _CAPTION,
-        Live("static", ("measured", "static", "residual"), views(scenes)),
+        Live("static", ("measured", "static", "residual"), views(scenes), two_scales=True),
     )
     blocks: list[Block] = [figure]
     if len(found) > PLATES:

@@ -11,7 +11,7 @@ from kbs_process.report import series
 from kbs_process.report.panel import Channel, View
 from kbs_process.signals.records import Array, Mask
 
-BUDGET = 1_200_000  # points of all curves of one figure: 3.2 MB of page
+BUDGET = 800_000  # points of all curves of one figure: 2.1 MB of page
 FEWEST = 600  # points a curve, below which it says too little
 
 
