@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
+
+import numpy as np
 
 from kbs_process.campaign.commands import read_commands
 from kbs_process.campaign.config import Campaign, RecordingEntry
@@ -14,7 +16,9 @@ from kbs_process.campaign.progress import Progress
 from kbs_process.campaign.reading import read_run
 from kbs_process.errors import ConfigError, did_you_mean
 from kbs_process.plant.predict import Schedule, predict
+from kbs_process.plant.rigid import inverse_dynamics
 from kbs_process.signals.records import Block, Run
+from kbs_process.stages.motion import MotionSettings, estimate
 
 
 def simulate_commands(
@@ -54,12 +58,25 @@ def predict_recording(campaign: Campaign, recording: str, target: Path, *, progr
     entry = _entry(campaign, recording)
     run = _read(campaign, entry, progress)
     with progress.task(f"Predicting {entry.name}") as task:
-        schedule = schedule_of(run, campaign.rig)
-        rates = run.rates["wrench"], run.rates.get("angle", run.rates["wrench"])
-        streams = _command_driven(campaign, schedule, *rates, _duration(run), task.update)
+        if campaign.drive == "motion":
+            streams = _motion_driven(campaign, run)
+        else:
+            rates = run.rates["wrench"], run.rates.get("angle", run.rates["wrench"])
+            streams = _command_driven(
+                campaign, schedule_of(run, campaign.rig), *rates, _duration(run), task.update
+            )
         return write_prediction(
             campaign, streams, target, "predicted", entry.name, (entry.path,), epoch_ns=run.epoch_ns
         )
+
+
+def _motion_driven(campaign: Campaign, run: Run) -> Iterator[tuple[str, Block]]:
+    """Yield the rigid-body wrench of the measured motion, at the working rate."""
+    motion = estimate(run, campaign.rig, MotionSettings(band_Hz=campaign.bands.low_pass[-1]))
+    stamp = np.rint((motion.t0 + motion.dt * np.arange(len(motion))) * 1e9).astype(np.int64)
+    wrench = inverse_dynamics(campaign.rig, motion.q, motion.qd, motion.qdd)
+    yield "wrench", Block(stamp, stamp, wrench)
+    yield "angle", Block(stamp, stamp, motion.q + motion.offset)
 
 
 def _command_driven(
