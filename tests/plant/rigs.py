@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from kbs_process.plant.predict import predict
+from kbs_process.plant.schedule import Schedule
 from kbs_process.rig.model import (
     Amplifier,
     Body,
@@ -17,6 +19,7 @@ from kbs_process.rig.model import (
     Rig,
     Transducer,
 )
+from kbs_process.signals.records import Array
 
 NOMINAL = (
     "synchronous_motor",
@@ -164,3 +167,11 @@ def three_axis(**settings: Any) -> Rig:
         joint("three", "two", (0.6, 0.0, 0.8), (0.2, 0.02, 0.0)),
     )
     return rig(bodies, joints, **settings)
+
+
+def streams(of: Rig, effects: tuple[str, ...], schedule: Schedule, **settings: Any) -> dict[str, Array]:
+    """Predict and return the values of each stream in one piece."""
+    blocks: dict[str, list[Array]] = {}
+    for key, block in predict(of, effects, schedule, **settings):
+        blocks.setdefault(key, []).append(block.values)
+    return {key: np.concatenate(values) for key, values in blocks.items()}

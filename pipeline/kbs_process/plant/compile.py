@@ -87,6 +87,8 @@ _KEPT: list[tempfile.TemporaryDirectory[str]] = []
 def _write(folder: Path, name: str, text: str) -> Path:
     path = folder / f"{name}.py"
     folder.mkdir(parents=True, exist_ok=True)
+    if not os.access(folder, os.W_OK):
+        raise PermissionError(f"{folder} cannot be written, and machine code belongs beside its source")
     if path.is_file() and path.read_text(encoding="utf-8") == text:
         return path  # a new time of modification would void the machine code beside it
     handle, aside = tempfile.mkstemp(dir=folder, prefix=name, suffix=".tmp")

@@ -22,7 +22,7 @@ class Schedule:
     position: Array  # (n, joints) rad, desired
     rate: Array  # (n, joints) rad/s, desired
     field: Array | None = None  # (n, joints) motor rad
-    encoder: Array | None = None  # (n, joints) rad
+    encoder: Array | None = None  # (n, joints) rad, readings at the cycles' starts
 
 
 def covering(schedule: Schedule, joints: int, cycle: float | None, end: float) -> Schedule:

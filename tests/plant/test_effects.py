@@ -1,0 +1,110 @@
+"""Conformance of every effect of the catalogue, and errors of wiring when an effect is declared."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from kbs_process.errors import ConfigError
+from kbs_process.plant.effect import SIGNALS, Effect, LogNormal, Normal, Parameter, Port, State, Uniform
+from kbs_process.plant.effects import CATALOGUE, select
+
+UNITS = {"1", "rad", "rad/s", "N m", "N m/rad", "N m s/rad", "s", "1/s", "K"}
+
+
+def typical(parameter: Parameter) -> float:
+    match parameter.prior:
+        case Normal(mean, _):
+            return mean
+        case LogNormal(median, _):
+            return median
+        case Uniform(low, high):
+            return 0.5 * (low + high)
+
+
+@pytest.mark.parametrize("effect", CATALOGUE, ids=lambda effect: effect.name)
+class TestCatalogue:
+    def test_declaration(self, effect: Effect) -> None:
+        assert effect.reference
+        for parameter in effect.parameters:
+            assert parameter.unit in UNITS
+            assert parameter.description
+            low, high = parameter.bounds
+            assert low <= typical(parameter) <= high
+
+    def test_docstring_says_what_a_reviewer_asks(self, effect: Effect) -> None:
+        text = effect.equation.__doc__ or ""
+        for heading in ("Equation:", "Units:", "Validity:", "Source:"):
+            assert heading in text
+
+    def test_states_have_units(self, effect: Effect) -> None:
+        assert all(state.unit in UNITS and math.isfinite(state.initial) for state in effect.states)
+
+    @given(data=st.data())
+    def test_finite_and_passive_where_claimed(self, effect: Effect, data: st.DataObject) -> None:
+        near = st.floats(-1e3, 1e3)
+        values = {name: data.draw(near, name) for name in effect.arguments if name in SIGNALS}
+        values |= {state.name: data.draw(near, state.name) for state in effect.states}
+        values |= {parameter.name: typical(parameter) for parameter in effect.parameters}
+        if "ratio" in values:
+            values["ratio"] = 100.0
+        result = effect.equation(**values)
+        torque = result[0] if effect.states else result
+        assert np.isfinite(result).all()
+        if effect.port is Port.MOTOR_FRICTION:
+            assert torque >= 0.0  # the plant opposes motion with it
+        elif effect.passive:
+            rate = "joint_rate" if effect.port is Port.JOINT_TORQUE else "rotor_rate"
+            assert torque * values[rate] <= 0.0
+
+
+def test_names_are_unique_and_ordered_as_summed() -> None:
+    names = [effect.name for effect in CATALOGUE]
+    assert len(set(names)) == len(names)
+    assert [effect.name for effect in select(names[::-1])] == names
+
+
+def test_unknown_effect_is_answered_with_the_closest() -> None:
+    with pytest.raises(ConfigError, match="did you mean 'cogging'"):
+        select(["coging"])
+
+
+def linear(rotor_rate: float, b: float) -> float:
+    return -b * rotor_rate
+
+
+def misspelt(rotor_rat: float, b: float) -> float:
+    return -b * rotor_rat
+
+
+def untyped(rotor_rate, b: float) -> float:  # type: ignore[no-untyped-def]
+    return -b * rotor_rate
+
+
+def leaky(z: float, b: float) -> float:
+    return -b * z
+
+
+B = Parameter("b", "N m s/rad", LogNormal(1.0, 0.1), "damping", (0.0, 10.0))
+SPARE = Parameter("c", "N m", LogNormal(1.0, 0.1), "unused", (0.0, 10.0))
+CLASH = Parameter("rotor_rate", "rad/s", LogNormal(1.0, 0.1), "a signal's name", (0.0, 10.0))
+Z = State("z", "N m", 0.0, "memory")
+
+
+@pytest.mark.parametrize(
+    ("equation", "parameters", "states", "message"),
+    [
+        (misspelt, (B,), (), "rotor_rat"),
+        (linear, (B, SPARE), (), "not an argument"),
+        (linear, (B, CLASH), (), "twice, or named like a signal"),
+        (untyped, (B,), (), "not float"),
+        (leaky, (B,), (Z,), "the result is not"),
+    ],
+)
+def test_wrong_wiring_is_an_error_at_import(equation, parameters, states, message) -> None:  # type: ignore[no-untyped-def]
+    with pytest.raises(TypeError, match=message):
+        Effect("trial", Port.MOTOR_TORQUE, equation, parameters, "test", states=states)
