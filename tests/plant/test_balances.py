@@ -7,7 +7,7 @@ from typing import Any
 import energetics as lab
 import numpy as np
 import pytest
-from rigs import NOMINAL, body, joint, one_axis, rig, three_axis, two_axis
+from plant_rigs import NOMINAL, body, joint, one_axis, rig, three_axis, two_axis
 from scipy.linalg import eigh
 
 from kbs_process.plant.effects import select

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rigs import DRIVE, body, joint, quantity, rig
+from plant_rigs import DRIVE, body, joint, quantity, rig
 
 from kbs_process.plant import compile as compiling
 from kbs_process.plant.effect import Effect, LogNormal, Parameter, Port, State

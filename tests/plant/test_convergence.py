@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from rigs import NOMINAL, streams, two_axis
+from plant_rigs import NOMINAL, streams, two_axis
 
 from engine import TRAJECTORIES
 from kbs_process.plant.predict import DEFAULT_STEP

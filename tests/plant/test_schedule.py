@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rigs import NOMINAL, streams, two_axis
+from plant_rigs import NOMINAL, streams, two_axis
 
 from kbs_process.errors import SimulationError
 from kbs_process.plant.schedule import Schedule, covering

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from rigs import CODE, NOMINAL, one_axis, quantity, streams, two_axis
+from plant_rigs import CODE, NOMINAL, one_axis, quantity, streams, two_axis
 from scipy.signal import butter, freqs
 
 from kbs_process.errors import ConfigError, SimulationError
