@@ -18,7 +18,7 @@ _HEAD_LINES = 32
 
 
 class TextTable:
-    """A delimited text file; numbers are parsed to the nearest double."""
+    """A delimited text file; pandas parses numbers to the nearest double (before 3.1 it did not)."""
 
     def __init__(self, path: Path, options: Text) -> None:
         self.path = path
@@ -28,11 +28,12 @@ class TextTable:
         cells = [_split(line, self._delimiter) for line in head]
         named = not all(map(self._is_number, cells[0])) if options.header is None else options.header
         self._first_data_row = options.skip_rows + named + options.units_row
-        names = _unique(cells[0]) if named else tuple(str(1 + i) for i in range(len(cells[0])))
-        units = cells[named] if options.units_row and len(cells) > named else [""] * len(names)
+        # Rows may end with a delimiter where the line of names does not.
+        width = max(len(cells[0]), len(cells[min(named + options.units_row, len(cells) - 1)]))
+        names = _unique(_widened(cells[0] if named else [], width))
+        units = _widened(cells[named] if options.units_row and len(cells) > named else [], width)
         self.columns = tuple(
-            Column(name, unit.strip("()[] "))
-            for name, unit in itertools.zip_longest(names, units[: len(names)], fillvalue="")
+            Column(name, unit.strip("()[] ")) for name, unit in zip(names, units, strict=True)
         )
 
     def chunks(self, names: Sequence[str]) -> Iterator[tuple[Cells, ...]]:
@@ -42,13 +43,10 @@ class TextTable:
                 self.path,
                 sep=self._delimiter if self._delimiter != " " else r"\s+",
                 header=None,
-                names=every,
-                usecols=list(dict.fromkeys(names)),
+                names=every,  # all are parsed: with `usecols`, surplus cells would be dropped without a word
                 index_col=False,
                 skiprows=self._first_data_row,
                 chunksize=CHUNK_ROWS,
-                # pandas' default parser is off by one unit in the last place now and then.
-                float_precision="round_trip",
                 decimal=self._options.decimal,
                 comment=self._options.comment,
                 encoding=self._options.encoding,
@@ -107,6 +105,10 @@ def sniff_delimiter(lines: Sequence[str]) -> str:
 def _split(line: str, delimiter: str) -> list[str]:
     cells = line.split() if delimiter == " " else line.split(delimiter)
     return [cell.strip().strip('"') for cell in cells]
+
+
+def _widened(cells: Sequence[str], width: int) -> list[str]:
+    return [*cells, *[""] * (width - len(cells))]
 
 
 def _unique(names: Sequence[str]) -> tuple[str, ...]:

@@ -1,0 +1,77 @@
+"""The presets on the recordings that they are for, where those are at hand."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from importer_files import read_streams
+
+from kbs_process.campaign import importers
+from kbs_process.campaign.importers.mapping import find_mapping, load_mapping
+from kbs_process.campaign.load import load_campaign
+from kbs_process.ingest import Stream
+from kbs_process.signals.records import Array, Stamps
+
+DATA = Path(__file__).parents[3] / "shared" / "data"
+
+
+def _source(name: str) -> Path:
+    folder = DATA / name
+    if not folder.is_dir():
+        pytest.skip(f"the public recordings are not at hand in {folder}")
+    return folder
+
+
+def _read(campaign: Path, recording: str, key: str) -> tuple[Stamps, Array]:
+    loaded = load_campaign(campaign)
+    topic = next(topic for topic in loaded.topics.present() if topic.key == key)
+    stream = Stream(key, topic.topic, topic.fields)
+    return read_streams(loaded.recording(recording).path, [stream])[key]
+
+
+@pytest.mark.parametrize("name", importers.preset_names())
+def test_presets_are_sound(name: str) -> None:
+    preset = load_mapping(find_mapping(name))
+    assert preset.template.is_file()
+    assert preset.source.origin.startswith("github.com/")
+    assert {part.role for part in preset.parts} == {"fit", "held-out"}
+
+
+def test_smartwheel(tmp_path: Path) -> None:
+    source = _source("smartwheel")
+    folder = importers.import_recordings("smartwheel", source, tmp_path / "smartwheel")
+    raw = pd.read_csv(source / "pushrimkinetics_offsets_baseline.csv", header=None).to_numpy()
+    parts = ("baseline_1", "baseline_2")
+    stamp, wrench = map(np.concatenate, zip(*(_read(folder, part, "wrench") for part in parts), strict=True))
+    _, angle = map(np.concatenate, zip(*(_read(folder, part, "angle") for part in parts), strict=True))
+    np.testing.assert_array_equal(stamp, np.rint(raw[:, 1] / 240.0 * 1e9))
+    assert np.abs(np.diff(angle[:, 0])).max() < np.radians(1.1)  # no jump of a turn
+    np.testing.assert_allclose(np.degrees(angle[:, 0]) % 360.0, raw[:, 3], atol=1e-9)
+    # Turned on by the angle, the wrench is in the hub's axes again, as the file has it.
+    c, s = np.cos(angle[:, 0]), np.sin(angle[:, 0])
+    for first, sign in ((0, -1.0), (3, 1.0)):
+        x, y, z = wrench[:, first : first + 3].T
+        hub = np.column_stack([sign * (c * x - s * y), s * x + c * y, z])
+        np.testing.assert_allclose(hub, raw[:, 18 + first : 21 + first], atol=1e-12)
+    assert len(_read(folder, "propulsion_1", "wrench")[0]) == 7682
+
+
+@pytest.mark.parametrize("speed", ["fast", "slow"])
+def test_treadmill(tmp_path: Path, speed: str) -> None:
+    source = _source("treadmill_pitch")
+    notices: list[str] = []
+    folder = importers.import_recordings(
+        f"treadmill_{speed}", source, tmp_path / "treadmill", notice=notices.append
+    )
+    for trial in (1, 2):
+        raw = pd.read_csv(source / f"Random{speed.title()}Speed{trial}.txt", sep="\t").to_numpy()
+        stamp, moment = _read(folder, f"random_{speed}_{trial}", "wrench")
+        _, rate = _read(folder, f"random_{speed}_{trial}", "rate")
+        np.testing.assert_array_equal(stamp, np.rint(raw[:, 0] * 1e9))
+        np.testing.assert_array_equal(moment[:, 0], raw[:, 1])
+        np.testing.assert_allclose(rate[:, 0], raw[:, 2] / 0.1, rtol=1e-15)
+    repeats = [notice for notice in notices if "'wrench' repeat" in notice]
+    assert len(repeats) == {"fast": 2, "slow": 1}[speed]
