@@ -37,12 +37,13 @@ STREAMS = (
 
 
 def campaign(encoding: Encoding, n: int) -> list[OutStream]:
-    """A wrench at 1 kHz on a grid of 1/64 N and two joints, smooth as recordings are."""
+    """A wrench at 1 kHz with all bits of noise, as a calibration matrix leaves it, and two encoders."""
     rng = np.random.default_rng(89)
-    stamp = 1_700_000_000_000_000_000 + 1_000_000 * np.arange(n)
+    stamp = 1_700_000_000_000_000_000 + 1_000_000 * np.arange(n) + rng.integers(0, 20_000, n)
     t = np.arange(n)[:, None] / 1000
-    wrench = np.round(640 * np.sin(t * [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]) + rng.normal(size=(n, 6))) / 64
-    joints = np.round(2**20 * np.cos(t * [0.01, 0.02, 0.01, 0.02])) * 2.0**-20
+    wrench = 10 * np.sin(t * [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]) + 0.02 * rng.normal(size=(n, 6))
+    angle = np.round(2**20 * np.cos(t * [0.01, 0.02])) * 2.0**-20
+    joints = np.hstack([angle, -np.sin(t * [0.01, 0.02]) * [0.01, 0.02]])
     log = stamp + 20_000
     return [
         OutStream("/wrench", "wrench", stamp, log, wrench, encoding=encoding, frame="transducer"),

@@ -7,7 +7,7 @@ import numpy as np
 import zstandard
 
 from kbs_process.ingest.framing import MalformedError
-from kbs_process.ingest.kernels import PADDING, Bytes
+from kbs_process.ingest.kernels import Bytes
 
 LARGEST = 1 << 28  # bytes of one chunk, compressed or not
 # The ratio keeps the work proportional to the file: sensor data reach 50, a bomb of zstd 32 000.
@@ -16,63 +16,57 @@ ALLOWANCE = 1 << 16  # bytes that any chunk may declare
 
 
 class Decompressor:
-    """Decompresses chunks into one buffer, used again for each; its content holds until the next call."""
+    """Decompresses chunks; the result of one holds until the next."""
 
     def __init__(self) -> None:
-        self._buffer = np.zeros(PADDING, dtype=np.uint8)
+        self._buffer = np.zeros(0, dtype=np.uint8)
         self._zstd = zstandard.ZstdDecompressor(max_window_size=LARGEST)
 
-    def buffer(self, size: int) -> Bytes:
-        """Return a buffer of at least `size` bytes and the padding."""
-        if len(self._buffer) < size + PADDING:
-            self._buffer = np.zeros(size + size // 4 + PADDING, dtype=np.uint8)
-        return self._buffer
-
     def __call__(self, compression: str, compressed: memoryview, declared: int) -> Bytes:
-        """Return a buffer whose first `declared` bytes are the decompressed chunk.
+        """Return the `declared` bytes of a chunk.
 
         Raises `MalformedError` where the bytes are damaged, or are more or fewer than declared.
         """
         if declared > LARGEST or declared > ALLOWANCE + RATIO * len(compressed):
             raise MalformedError(f"{len(compressed)} bytes that declare {declared}")
-        buffer = self.buffer(declared)
-        target = memoryview(buffer)[:declared]  # type: ignore[arg-type]
-        if compression == "zstd":
-            self._decompress_zstd(compressed, target)
+        if compression == "":
+            result = np.frombuffer(compressed, dtype=np.uint8)
+        elif not declared and not compressed:
+            result = np.zeros(0, dtype=np.uint8)
+        elif compression == "zstd":
+            result = self._decompress_zstd(compressed, declared)
         elif compression == "lz4":
-            target[:] = _decompress_lz4(compressed, declared)
-        elif compression == "":
-            if len(compressed) != declared:
-                raise MalformedError(f"{len(compressed)} bytes instead of the {declared} declared")
-            target[:] = compressed
+            result = _decompress_lz4(compressed, declared)
         else:
             raise MalformedError(f"unknown compression {compression!r}")
-        return buffer
+        if len(result) != declared:
+            raise MalformedError(f"{len(result)} bytes instead of the {declared} declared")
+        return result
 
-    def _decompress_zstd(self, compressed: memoryview, target: memoryview) -> None:
-        if not target and not compressed:
-            return
+    def _decompress_zstd(self, compressed: memoryview, declared: int) -> Bytes:
+        if len(self._buffer) < declared:
+            self._buffer = np.zeros(declared + declared // 4, dtype=np.uint8)
+        target = memoryview(self._buffer)[:declared]  # type: ignore[arg-type]
+        size = 0
         try:
             with self._zstd.stream_reader(compressed, read_across_frames=True) as reader:
-                size = 0
-                while size < len(target) and (step := reader.readinto(target[size:])):
+                while size < declared and (step := reader.readinto(target[size:])):
                     size += step
                 more = reader.read(1)
         except zstandard.ZstdError as error:
             raise MalformedError(str(error)) from error
-        if size != len(target) or more:
-            raise MalformedError(f"{'more' if more else 'fewer'} bytes than the {len(target)} declared")
+        if more:
+            raise MalformedError(f"more than the {declared} bytes declared")
+        return self._buffer[:size]
 
 
-def _decompress_lz4(compressed: memoryview, declared: int) -> bytes:
-    if not declared and not compressed:
-        return b""
-    decompressor = lz4.frame.LZ4FrameDecompressor()
+def _decompress_lz4(compressed: memoryview, declared: int) -> Bytes:
+    context = lz4.frame.create_decompression_context()
     try:
         # One byte more than declared: a frame that has it to give is refused.
-        result: bytes = decompressor.decompress(compressed, max_length=declared + 1)
-    except (RuntimeError, EOFError) as error:
+        result, used, ended = lz4.frame.decompress_chunk(context, compressed, max_length=declared + 1)
+    except RuntimeError as error:
         raise MalformedError(str(error)) from error
-    if len(result) != declared or not decompressor.eof or decompressor.unused_data:
+    if not ended or used != len(compressed):
         raise MalformedError(f"the frame does not end after the {declared} bytes declared")
-    return result
+    return np.frombuffer(result, dtype=np.uint8)

@@ -8,7 +8,6 @@ resumes at the next chunk (or message outside a chunk) that is consistent in its
 from __future__ import annotations
 
 import re
-import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,14 +16,15 @@ from typing import BinaryIO
 import numpy as np
 
 from kbs_process.ingest import framing as mcap
+from kbs_process.ingest.checksum import crc32
 from kbs_process.ingest.compression import LARGEST, Decompressor
 from kbs_process.ingest.framing import MalformedError
-from kbs_process.ingest.kernels import PADDING, Bytes, Words, walk
+from kbs_process.ingest.kernels import Bytes, Words, walk
 from kbs_process.signals.records import Loss
 
-WINDOW = 1 << 22  # bytes read at a time
+WINDOW = 1 << 20  # bytes read at a time: they stay in the processor's cache until used
 CANDIDATE = re.compile(rb"(?=([\x05\x06]).{5}\x00\x00\x00)", re.DOTALL)  # a chunk or message below 2^40 bytes
-OPCODE, CHANNEL, LOG, AT, SIZE = range(5)  # columns of the rows that `walk` returns
+OPCODE, CHANNEL, LOG, AT, SIZE = range(5)  # rows of the table that `walk` returns
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,7 +32,7 @@ class Segment:
     """Messages in one buffer, which holds until the next segment is asked for."""
 
     buffer: Bytes
-    rows: Words  # (n, 5): OPCODE, CHANNEL, LOG, AT, SIZE
+    table: Words  # (5, n): OPCODE, CHANNEL, LOG, AT, SIZE
 
 
 class Container:
@@ -46,9 +46,10 @@ class Container:
         self.origin = origin  # log time of the recording's first message, ns: zero of the losses' times
         self._last: int | None = None
         self._decompress = Decompressor()
-        self._buffer = np.zeros(WINDOW + PADDING, dtype=np.uint8)
+        self._buffer = np.zeros(WINDOW, dtype=np.uint8)
         self._at = 0  # in the file, of the buffer's first byte
         self._left = 0  # bytes carried over from the window before
+        self._crc: int | None = crc32(mcap.MAGIC)  # of all before the buffer; None where some was skipped
         self._loose = False  # the file has messages outside chunks
 
     def lose(
@@ -63,22 +64,26 @@ class Container:
 
     def segments(self) -> Iterator[Segment]:
         """Yield the messages of the file, in its order."""
-        with self.path.open("rb") as file:
+        with self.path.open("rb", buffering=0) as file:
             self._seek(file, len(mcap.MAGIC))
             while (stop := self._fill(file)) > 0:
-                rows = walk(self._buffer, np.uint64(0), np.uint64(stop))
-                end, rows = int(rows[-1, AT]), rows[:-1]
-                ends = np.flatnonzero((rows[:, OPCODE] == mcap.DATA_END_OP) & (rows[:, SIZE] == 4))
+                end, table = self._walk(self._buffer, stop)
+                ends = np.flatnonzero((table[OPCODE] == mcap.DATA_END_OP) & (table[SIZE] == 4))
+                yield from self._window(table[:, : ends[0]] if len(ends) else table)
                 if len(ends):
-                    rows = rows[: ends[0]]
-                yield from self._window(rows)
-                if len(ends):
+                    self._check_data_section(int(table[AT, ends[0]]))
                     return
                 if end == 0:
                     self._oversized(file, stop)
                 else:
                     self._carry(end, stop)
         self._truncated(self._at, b"")
+
+    @staticmethod
+    def _walk(buffer: Bytes, stop: int) -> tuple[int, Words]:
+        """Return where the records in buffer[:stop] end, and their table."""
+        table = walk(buffer, np.uint64(0), np.uint64(stop))
+        return int(table[AT, -1]), table[:, :-1]
 
     # The window over the file
 
@@ -88,10 +93,11 @@ class Container:
 
     def _fill(self, file: BinaryIO) -> int:
         """Read on behind the bytes carried over; return how many the buffer holds."""
-        room = memoryview(self._buffer)[self._left : len(self._buffer) - PADDING]  # type: ignore[arg-type]
+        room = memoryview(self._buffer)[self._left :]  # type: ignore[arg-type]
         return self._left + file.readinto(room)  # type: ignore[attr-defined, no-any-return]
 
     def _carry(self, end: int, stop: int) -> None:
+        self._add_crc(self._buffer[:end])
         self._left = stop - end
         self._buffer[: self._left] = self._buffer[end:stop].copy()
         self._at += end
@@ -107,63 +113,75 @@ class Container:
         end = self._at + mcap.RECORD_HEAD.size + length
         if end > self.size or (opcode == mcap.MESSAGE_OP and length < 22):
             self._resume(file, head)
-        elif stop == len(self._buffer) - PADDING and length <= LARGEST:
-            self._buffer = np.zeros(mcap.RECORD_HEAD.size + length + PADDING, dtype=np.uint8)
+        elif stop == len(self._buffer) and length <= LARGEST:
+            self._buffer = np.zeros(mcap.RECORD_HEAD.size + length, dtype=np.uint8)
             self._seek(file, self._at)
-        elif stop < len(self._buffer) - PADDING:
+        elif stop < len(self._buffer):
             self._truncated(self._at, head)  # the file has become shorter meanwhile
             self._seek(file, self.size)
         else:
             self._pass_over(file, opcode, length)
-            self._seek(file, end)
 
     def _pass_over(self, file: BinaryIO, opcode: int, length: int) -> None:
         """Check an attachment that is too large for memory; anything else of that size is lost."""
         if opcode != mcap.ATTACHMENT_OP:
             self.lose("undecodable", f"a record of {length} bytes at byte {self._at}")
-            return
-        file.seek(self._at + mcap.RECORD_HEAD.size)
+        file.seek(self._at)
+        self._add_crc(file.read(mcap.RECORD_HEAD.size))
         crc, left = 0, length - 4
         while left and (piece := file.read(min(left, WINDOW))):
-            crc, left = zlib.crc32(piece, crc), left - len(piece)
-        self._check_attachment(crc, int.from_bytes(file.read(4), "little"))
+            crc, left = crc32(piece, crc), left - len(piece)
+            self._add_crc(piece)
+        tail = file.read(4)
+        self._add_crc(tail)
+        if opcode == mcap.ATTACHMENT_OP:
+            self._check_attachment(crc, int.from_bytes(tail, "little"))
+        self._seek(file, self._at + mcap.RECORD_HEAD.size + length)
+
+    def _add_crc(self, piece: Bytes | bytes) -> None:
+        if self._crc is not None:
+            self._crc = crc32(piece, self._crc)
+
+    def _check_data_section(self, at: int) -> None:
+        """Check the CRC over all records before the one whose content begins at `at`, where there is one."""
+        expected = int.from_bytes(self._buffer[at : at + 4].tobytes(), "little")
+        self._add_crc(self._buffer[: at - mcap.RECORD_HEAD.size])
+        if expected and self._crc not in (None, expected):
+            self.lose("crc", "the data section's CRC is wrong: something in the file has changed")
 
     # Records
 
-    def _window(self, rows: Words) -> Iterator[Segment]:
-        opcodes = rows[:, OPCODE]
-        others = np.flatnonzero(opcodes != mcap.MESSAGE_OP)
+    def _window(self, table: Words) -> Iterator[Segment]:
         first = 0
-        for i in others:
-            if opcodes[i] == mcap.CHUNK_OP:
-                yield from self._loose_messages(rows[first:i])
-                first = int(i)
-                yield from self._chunk(self._content(self._buffer, rows[i]))
+        for i in np.flatnonzero(table[OPCODE] != mcap.MESSAGE_OP).tolist():
+            opcode, content = int(table[OPCODE, i]), self._content(self._buffer, table[:, i])
+            if opcode == mcap.CHUNK_OP:
+                yield from self._loose_messages(table[:, first:i])
+                first = i
+                yield from self._chunk(content)
             else:
-                self._record(int(opcodes[i]), rows[i])
-        yield from self._loose_messages(rows[first:])
+                self._record(opcode, content, self._at + int(table[AT, i]))
+        yield from self._loose_messages(table[:, first:])
 
-    def _loose_messages(self, rows: Words) -> Iterator[Segment]:
-        messages = rows[rows[:, OPCODE] == mcap.MESSAGE_OP]
-        if len(messages):
+    def _loose_messages(self, table: Words) -> Iterator[Segment]:
+        messages = table[OPCODE] == mcap.MESSAGE_OP
+        if messages.any():
             self._loose = True
-            yield self._segment(self._buffer, messages)
+            yield self._segment(self._buffer, table[:, messages])
 
-    def _segment(self, buffer: Bytes, messages: Words) -> Segment:
+    def _segment(self, buffer: Bytes, table: Words) -> Segment:
         if self.origin is None:
-            self.origin = int(messages[0, LOG])
-        self._last = int(messages[-1, LOG])
-        return Segment(buffer, messages)
+            self.origin = int(table[LOG, 0])
+        self._last = int(table[LOG, -1])
+        return Segment(buffer, table)
 
     @staticmethod
-    def _content(buffer: Bytes, row: Words) -> memoryview:
-        at = int(row[AT])
-        return memoryview(buffer)[at : at + int(row[SIZE])]  # type: ignore[arg-type]
+    def _content(buffer: Bytes, column: Words) -> memoryview:
+        at = int(column[AT])
+        return memoryview(buffer)[at : at + int(column[SIZE])]  # type: ignore[arg-type]
 
-    def _record(self, opcode: int, row: Words) -> None:
+    def _record(self, opcode: int, content: memoryview, place: int) -> None:
         """Check a record that is no message and no chunk, and learn schemas and channels from it."""
-        content = self._content(self._buffer, row)
-        place = self._at + int(row[AT])
         try:
             if opcode in (mcap.SCHEMA_OP, mcap.CHANNEL_OP):
                 self.dictionary.add(opcode, bytes(content))
@@ -171,7 +189,7 @@ class Container:
                 mcap.parse_message_index(bytes(content))
             elif opcode == mcap.ATTACHMENT_OP:
                 crc = int.from_bytes(content[-4:], "little")
-                self._check_attachment(zlib.crc32(content[:-4]), crc)
+                self._check_attachment(crc32(content[:-4]), crc)
             elif opcode == mcap.HEADER_OP and place != len(mcap.MAGIC) + mcap.RECORD_HEAD.size:
                 raise MalformedError("a second header")
             elif opcode not in (mcap.HEADER_OP, mcap.METADATA_OP) and opcode < mcap.PRIVATE_OP:
@@ -196,27 +214,27 @@ class Container:
         except MalformedError as error:
             self.lose("undecodable", f"chunk: {error}", **span)
             return
-        if head.crc and zlib.crc32(memoryview(buffer)[: head.size]) != head.crc:  # type: ignore[arg-type]
+        if head.crc and crc32(memoryview(buffer)[: head.size]) != head.crc:  # type: ignore[arg-type]
             self.lose("crc", "chunk with a wrong CRC", **span)
             return
-        rows = walk(buffer, np.uint64(0), np.uint64(head.size))
-        end, rows = int(rows[-1, AT]), rows[:-1]
+        end, table = self._walk(buffer, head.size)
         if end != head.size:
             self.lose("undecodable", f"chunk: its last {head.size - end} bytes are no records", **span)
-        loose = rows[:, OPCODE] == mcap.MESSAGE_OP
-        for row in rows[~loose]:
+        others = np.flatnonzero(table[OPCODE] != mcap.MESSAGE_OP)
+        for i in others:
             try:
-                self.dictionary.add(int(row[OPCODE]), bytes(self._content(buffer, row)))
+                self.dictionary.add(int(table[OPCODE, i]), bytes(self._content(buffer, table[:, i])))
             except MalformedError as error:
                 self.lose("undecodable", f"record in a chunk: {error}", **span)
-        if loose.any():
-            yield self._segment(buffer, rows if loose.all() else rows[loose])
+        if len(others) < table.shape[1]:
+            yield self._segment(buffer, np.delete(table, others, axis=1) if len(others) else table)
 
     # Damage
 
     def _resume(self, file: BinaryIO, head: bytes) -> None:
         """Go on at the next consistent chunk or loose message, or end the pass as truncated."""
         broken = self._at
+        self._crc = None
         for place in self._candidates(file, broken + 1):
             if self._consistent(file, place):
                 self.lose(

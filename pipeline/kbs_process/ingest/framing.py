@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import struct
-import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import BinaryIO
+
+from kbs_process.ingest.checksum import crc32
 
 MAGIC = b"\x89MCAP0\r\n"
 RECORD_HEAD = struct.Struct("<BQ")  # opcode, length of the content
@@ -14,8 +15,6 @@ CHUNK_HEAD = struct.Struct("<QQQII")  # start, end, uncompressed size, CRC, leng
 CHUNK_HEAD_MAX = CHUNK_HEAD.size + 16 + 8  # no compression has a longer name
 FOOTER = struct.Struct("<QQI")  # summary start, summary offset start, CRC
 FOOTER_SIZE = RECORD_HEAD.size + FOOTER.size + len(MAGIC)
-DATA_END = struct.Struct("<BQI")  # a whole record: opcode, length, CRC
-DATA_END_SIZE = DATA_END.size
 
 HEADER_OP, FOOTER_OP, SCHEMA_OP, CHANNEL_OP, MESSAGE_OP, CHUNK_OP, MESSAGE_INDEX_OP = range(1, 8)
 CHUNK_INDEX_OP, ATTACHMENT_OP, ATTACHMENT_INDEX_OP, STATISTICS_OP, METADATA_OP = range(8, 13)
@@ -89,7 +88,6 @@ class Summary:
     dictionary: Dictionary
     counts: dict[int, int] | None  # messages of each channel, by the recorder's own count
     start: int | None  # log time of the first message, ns
-    section: int  # where the summary starts in the file
 
 
 class Fields:
@@ -185,11 +183,11 @@ def read_summary(file: BinaryIO, size: int) -> Summary | None:
     end = size - FOOTER_SIZE
     if section == 0:
         return None
-    if not len(MAGIC) + DATA_END_SIZE <= section <= end or end - section > LARGEST_SUMMARY:
+    if not len(MAGIC) <= section <= end or end - section > LARGEST_SUMMARY:
         raise MalformedError("the footer points outside the file")
     file.seek(section)
     content = file.read(end - section)
-    if crc and zlib.crc32(tail[: -len(MAGIC) - 4], zlib.crc32(content)) != crc:
+    if crc and crc32(tail[: -len(MAGIC) - 4], crc32(content)) != crc:
         raise MalformedError("the summary's CRC is wrong")
     dictionary, start, counts = Dictionary(), None, None
     for opcode, record in records(content):
@@ -197,4 +195,4 @@ def read_summary(file: BinaryIO, size: int) -> Summary | None:
             start, counts = parse_statistics(record)
         else:
             dictionary.add(opcode, record)
-    return Summary(dictionary, counts, start if counts else None, section)
+    return Summary(dictionary, counts, start if counts else None)

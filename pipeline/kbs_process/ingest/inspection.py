@@ -41,7 +41,7 @@ class TopicInspection:
     count: int
     start_ns: int | None
     end_ns: int | None
-    rate_Hz: float | None  # of the median interval  # noqa: N815
+    rate_Hz: float | None  # of the median interval
     gaps: int  # intervals above 1.5 medians
     longest_interval_s: float
     repeats: int  # messages with the stamp of the one before

@@ -72,14 +72,14 @@ def _visit(node: object, path: str, named: bool, depth: int, found: dict[str, Fi
 class JsonDecoder:
     """Decodes the numbers at `steps` and the stamp of each message."""
 
-    def __init__(self, steps: Sequence[Step], stamp: tuple[str, str] | None) -> None:
+    def __init__(self, steps: Sequence[Step], stamp: tuple[str, ...]) -> None:
         self._steps = tuple(steps)
         scalars = [step.path for step in steps if step.key is None]
         lists = {step.path for step in steps if step.key is not None}
         named = {sibling(step.path) for step in steps if isinstance(step.key, str)}
         types: dict[str, Any] = dict.fromkeys(scalars, float | None)
         types |= dict.fromkeys(lists, list[float | None]) | dict.fromkeys(named, list[str])
-        types |= dict.fromkeys(stamp or (), SECONDS)
+        types |= dict.fromkeys(stamp, SECONDS)
         self._decode = msgspec.json.Decoder(_struct("Message", types)).decode
         self._scalars = [i for i, step in enumerate(steps) if step.key is None]
         self._lists = [i for i, step in enumerate(steps) if step.key is not None]

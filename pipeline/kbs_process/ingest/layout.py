@@ -8,62 +8,54 @@ by construction; any other is traced itself. So there is one parser, and no assu
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kbs_process.ingest.framing import MalformedError
-from kbs_process.ingest.kernels import Bytes, Words, gather, matches
+from kbs_process.ingest.kernels import FLOAT64, MISSING, UNSIGNED, ZERO, Bytes, Words, decode
 from kbs_process.signals.records import Array, Mask, Stamps
 
-LITTLE, BIG, VARINT, ABSENT = range(4)
-KNOWN_LAYOUTS = 32  # kept for a stream; more are traced one by one
-
-NUMBERS: dict[str, np.dtype[Any]] = {  # name of a number's type -> NumPy's
-    "f8": np.dtype(np.float64),
-    "f4": np.dtype(np.float32),
-    "i1": np.dtype(np.int8),
-    "i2": np.dtype(np.int16),
-    "i4": np.dtype(np.int32),
-    "i8": np.dtype(np.int64),
-    "u1": np.dtype(np.uint8),
-    "u2": np.dtype(np.uint16),
-    "u4": np.dtype(np.uint32),
-    "u8": np.dtype(np.uint64),
-}
-ZIGZAG = "z8"
+KNOWN_LAYOUTS = 32  # kept for a stream
 
 
-@dataclass(frozen=True, slots=True)
-class Cell:
-    """A number of type `kind` in `size` bytes at byte `at` of a message."""
+class Cell(NamedTuple):
+    """Where a number sits in a message: `size` bytes from byte `at`, in one of the kernels' forms and kinds."""
 
-    kind: str
     at: int
     size: int
     form: int
+    kind: int
 
 
-ZERO = Cell("u8", 0, 0, ABSENT)  # what proto3 leaves out
+LEFT_OUT = Cell(0, 0, ZERO, UNSIGNED)  # a zero, which proto3 does not write
+LACKING = Cell(0, 0, MISSING, FLOAT64)  # a number that the message should have and has not
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Layout:
-    """The cells of messages that have `length` bytes and satisfy the guards; a None cell is missing."""
+    """The cells of messages that have `length` bytes and satisfy the guards."""
 
     length: int
     guards: Words  # (g, 3): offset, mask, expected
-    stamp: tuple[Cell, Cell] | None  # s, ns
-    cells: tuple[Cell | None, ...]
+    clock: Words  # (2, 4), cells of seconds and nanoseconds, or (0, 4)
+    cells: Words  # (c, 4)
+    lacks: Mask  # (c,)
 
 
-class Tracer(Protocol):
-    """Finds the layout of one message; raises `MalformedError` where the message contradicts its schema."""
+def layout(payload: bytes, guards: Guards, clock: Sequence[Cell], cells: Sequence[Cell]) -> Layout:
+    """Put a layout together; `clock` has the cells of seconds and nanoseconds, or none."""
+    for cell in (*clock, *cells):
+        if cell.at + cell.size > len(payload):
+            raise MalformedError("a number ends behind its message")
+    lacks = np.array([cell is LACKING for cell in cells], dtype=np.bool_)
+    return Layout(len(payload), guards.words(), _table(clock), _table(cells), lacks)
 
-    def __call__(self, payload: bytes) -> Layout: ...
+
+def _table(cells: Sequence[Cell]) -> Words:
+    return np.array(cells, dtype=np.uint64).reshape(-1, len(Cell._fields))
 
 
 class Guards:
@@ -103,86 +95,48 @@ class Decoded:
 
 
 class LayoutDecoder:
-    """Decodes a stream by the layouts met so far, the latest first."""
+    """Decodes a stream by the layouts met so far, the latest first.
 
-    def __init__(self, tracer: Tracer, columns: int) -> None:
-        self._tracer = tracer
+    `trace` returns the layout of one message, and raises `MalformedError` where that contradicts its schema.
+    """
+
+    def __init__(self, trace: Callable[[bytes], Layout], columns: int) -> None:
+        self._trace = trace
         self._columns = columns
         self._layouts: list[Layout] = []
 
     def __call__(self, buffer: Bytes, at: Words, size: Words, log: Stamps) -> Decoded:
         n = len(at)
-        stamp, values = log.copy(), np.zeros((n, self._columns))
+        stamp, values = log.copy(), np.empty((n, self._columns))
         good, todo = np.ones(n, dtype=np.bool_), np.ones(n, dtype=np.bool_)
-        present, lacking = np.zeros(self._columns, dtype=np.bool_), 0
+        present, lacking, left = np.zeros(self._columns, dtype=np.bool_), 0, n
 
-        def apply(layout: Layout, which: Mask | slice, places: Words) -> None:
-            nonlocal lacking
-            if layout.stamp is not None:
-                seconds, nanoseconds = read_integers(buffer, places, layout.stamp).T
-                stamp[which] = seconds * 1_000_000_000 + nanoseconds
-            values[which] = read_numbers(buffer, places, layout.cells)
-            for column, cell in enumerate(layout.cells):
-                present[column] |= cell is not None
-            lacking += len(places) if None in layout.cells else 0
+        def apply(known: Layout, part: slice) -> int:
+            nonlocal lacking, present
+            args = (np.uint64(known.length), known.guards, known.clock, known.cells)
+            done = decode(buffer, at[part], size[part], *args, todo[part], stamp[part], values[part])
+            if done:
+                present |= ~known.lacks
+                lacking += done if known.lacks.any() else 0
+            return done
 
-        for layout in self._layouts:
-            which = matches(buffer, at, size, np.uint64(layout.length), layout.guards) & todo
-            if which.all():
-                apply(layout, slice(None), at)
+        for known in self._layouts:
+            left -= apply(known, slice(None))
+            if not left:
                 return Decoded(stamp, values, good, present, lacking)
-            if which.any():
-                apply(layout, which, at[which])
-                todo &= ~which
         fresh = 0
-        while todo.any():
-            first = int(np.argmax(todo))
+        for first in np.flatnonzero(todo).tolist():
+            if not todo[first]:
+                continue
             start = int(at[first])
             try:
-                layout = self._tracer(buffer[start : start + int(size[first])].tobytes())
+                traced = self._trace(buffer[start : start + int(size[first])].tobytes())
             except MalformedError:
                 good[first] = todo[first] = False
                 continue
-            which = np.zeros(n, dtype=np.bool_)
-            which[first] = True
-            if fresh < KNOWN_LAYOUTS:  # beyond that, comparing costs more than tracing
-                which = matches(buffer, at, size, np.uint64(layout.length), layout.guards) & todo
-                self._layouts = [layout, *self._layouts[: KNOWN_LAYOUTS - 1]]
-                fresh += 1
-            apply(layout, which, at[which])
-            todo &= ~which
+            # With too many layouts in a segment, comparing all messages with each would cost more than tracing.
+            fresh += 1
+            apply(traced, slice(first, None if fresh <= KNOWN_LAYOUTS else first + 1))
+            if fresh <= KNOWN_LAYOUTS:
+                self._layouts = [traced, *self._layouts[: KNOWN_LAYOUTS - 1]]
         return Decoded(stamp, values, good, present, lacking)
-
-
-def read_numbers(buffer: Bytes, at: Words, cells: Sequence[Cell | None]) -> Array:
-    """Read the cells of the messages at `at`, shape (messages, cells); NaN where a cell is None."""
-    bits = gather(buffer, at, _rows(cells))
-    if all(cell is not None and cell.kind == "f8" for cell in cells):
-        return bits.view(np.float64)
-    values = np.full(bits.shape, np.nan)
-    for column, cell in enumerate(cells):
-        if cell is not None:
-            values[:, column] = _interpret(bits[:, column], cell.kind)
-    return values
-
-
-def read_integers(buffer: Bytes, at: Words, cells: Sequence[Cell]) -> Stamps:
-    """Read integer cells of the messages at `at`, shape (messages, cells)."""
-    bits = gather(buffer, at, _rows(cells))
-    values = np.zeros(bits.shape, dtype=np.int64)
-    for column, cell in enumerate(cells):
-        values[:, column] = _interpret(bits[:, column], cell.kind)
-    return values
-
-
-def _rows(cells: Sequence[Cell | None]) -> Words:
-    rows = [(0, 0, ABSENT) if cell is None else (cell.at, cell.size, cell.form) for cell in cells]
-    return np.array(rows, dtype=np.uint64).reshape(-1, 3)
-
-
-def _interpret(bits: Words, kind: str) -> NDArray[Any]:
-    """Read the low bytes of each word as a number of type `kind`."""
-    if kind == ZIGZAG:
-        return (bits >> np.uint64(1)).view(np.int64) ^ -(bits & np.uint64(1)).view(np.int64)
-    dtype = NUMBERS[kind]
-    return bits.astype(np.dtype(f"u{dtype.itemsize}")).view(dtype)

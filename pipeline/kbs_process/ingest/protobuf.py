@@ -11,25 +11,26 @@ from dataclasses import dataclass
 
 from kbs_process.ingest.fields import Elements, Field, Step, find_stamp, sibling
 from kbs_process.ingest.framing import MalformedError
-from kbs_process.ingest.layout import LITTLE, VARINT, ZERO, ZIGZAG, Cell, Guards, Layout, LayoutDecoder
+from kbs_process.ingest.kernels import FLOAT32, FLOAT64, LITTLE, SIGNED, UNSIGNED, VARINT, ZIGZAG
+from kbs_process.ingest.layout import LACKING, LEFT_OUT, Cell, Guards, Layout, LayoutDecoder, layout
 
 WIRE_VARINT, WIRE_64, WIRE_BYTES, WIRE_32 = 0, 1, 2, 5
 FIXED_SIZE = {WIRE_64: 8, WIRE_32: 4}
 REPEATED = 3
 STRING, MESSAGE = 9, 11
 KINDS = {  # descriptor.proto, FieldDescriptorProto.Type -> kind of cell, wire type
-    1: ("f8", WIRE_64),
-    2: ("f4", WIRE_32),
-    3: ("i8", WIRE_VARINT),
-    4: ("u8", WIRE_VARINT),
-    5: ("i8", WIRE_VARINT),  # a negative int32 is ten bytes long
-    6: ("u8", WIRE_64),
-    7: ("u4", WIRE_32),
-    8: ("u8", WIRE_VARINT),
-    13: ("u8", WIRE_VARINT),
-    14: ("i8", WIRE_VARINT),
-    15: ("i4", WIRE_32),
-    16: ("i8", WIRE_64),
+    1: (FLOAT64, WIRE_64),
+    2: (FLOAT32, WIRE_32),
+    3: (SIGNED, WIRE_VARINT),
+    4: (UNSIGNED, WIRE_VARINT),
+    5: (SIGNED, WIRE_VARINT),  # a negative int32 is ten bytes long
+    6: (UNSIGNED, WIRE_64),
+    7: (UNSIGNED, WIRE_32),
+    8: (UNSIGNED, WIRE_VARINT),
+    13: (UNSIGNED, WIRE_VARINT),
+    14: (SIGNED, WIRE_VARINT),
+    15: (SIGNED, WIRE_32),
+    16: (SIGNED, WIRE_64),
     17: (ZIGZAG, WIRE_VARINT),
     18: (ZIGZAG, WIRE_VARINT),
 }
@@ -159,13 +160,12 @@ class ProtobufMessage:
     def decoder(self, steps: tuple[Step, ...]) -> LayoutDecoder:
         """Return a decoder of the numbers at `steps`."""
         stamp = find_stamp(self.fields)
-        wanted = _ancestry([*(step.path for step in steps), *(stamp or ())])
+        wanted = _ancestry([*(step.path for step in steps), *stamp])
 
         def trace(payload: bytes) -> Layout:
             walk = self._walk(payload, wanted)
-            cells = tuple(walk.cell(step) for step in steps)
-            pair = None if stamp is None else (walk.scalar(stamp[0]), walk.scalar(stamp[1]))
-            return Layout(len(payload), walk.guards.words(), pair, cells)
+            cells = [walk.cell(step) for step in steps]
+            return layout(payload, walk.guards, [walk.scalar(path) for path in stamp], cells)
 
         return LayoutDecoder(trace, len(steps))
 
@@ -199,20 +199,20 @@ class _Walk:
         self.sequences: dict[str, list[Cell]] = {}
         self.names: dict[str, list[bytes]] = {}
 
-    def cell(self, step: Step) -> Cell | None:
+    def cell(self, step: Step) -> Cell:
         if step.key is None:
             return self.scalar(step.path)
         index = step.key
         if isinstance(index, str):
             names = self.names.get(sibling(step.path), [])
             if index.encode() not in names:
-                return None
+                return LACKING
             index = names.index(index.encode())
         sequence = self.sequences.get(step.path, [])
-        return sequence[index] if index < len(sequence) else None
+        return sequence[index] if index < len(sequence) else LACKING
 
     def scalar(self, path: str) -> Cell:
-        return self.scalars.get(path, ZERO)
+        return self.scalars.get(path, LEFT_OUT)
 
     def message(self, name: str, prefix: str, start: int, end: int) -> None:
         members = self.descriptors[name]
@@ -244,7 +244,7 @@ class _Walk:
         else:
             self.scalars[path] = _cell(kind, wire, item.at, item.end)
 
-    def packed(self, kind: str, wire: int, item: Item) -> list[Cell]:
+    def packed(self, kind: int, wire: int, item: Item) -> list[Cell]:
         cells, at = [], item.at
         while at < item.end:
             if wire == WIRE_VARINT:
@@ -259,5 +259,5 @@ class _Walk:
         return cells
 
 
-def _cell(kind: str, wire: int, at: int, end: int) -> Cell:
-    return Cell(kind, at, end - at, VARINT if wire == WIRE_VARINT else LITTLE)
+def _cell(kind: int, wire: int, at: int, end: int) -> Cell:
+    return Cell(at, end - at, VARINT if wire == WIRE_VARINT else LITTLE, kind)

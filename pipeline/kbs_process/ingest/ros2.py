@@ -12,22 +12,23 @@ from dataclasses import dataclass
 
 from kbs_process.ingest.fields import Elements, Field, Key, Step, find_stamp, sibling
 from kbs_process.ingest.framing import MalformedError
-from kbs_process.ingest.layout import BIG, LITTLE, Cell, Guards, Layout, LayoutDecoder
+from kbs_process.ingest.kernels import BIG, FLOAT32, FLOAT64, LITTLE, SIGNED, UNSIGNED
+from kbs_process.ingest.layout import LACKING, Cell, Guards, Layout, LayoutDecoder, layout
 
-PRIMITIVES = {
-    "bool": "u1",
-    "byte": "u1",
-    "char": "u1",
-    "int8": "i1",
-    "uint8": "u1",
-    "int16": "i2",
-    "uint16": "u2",
-    "int32": "i4",
-    "uint32": "u4",
-    "int64": "i8",
-    "uint64": "u8",
-    "float32": "f4",
-    "float64": "f8",
+PRIMITIVES = {  # type -> kind of cell, bytes
+    "bool": (UNSIGNED, 1),
+    "byte": (UNSIGNED, 1),
+    "char": (UNSIGNED, 1),
+    "int8": (SIGNED, 1),
+    "uint8": (UNSIGNED, 1),
+    "int16": (SIGNED, 2),
+    "uint16": (UNSIGNED, 2),
+    "int32": (SIGNED, 4),
+    "uint32": (UNSIGNED, 4),
+    "int64": (SIGNED, 8),
+    "uint64": (UNSIGNED, 8),
+    "float32": (FLOAT32, 4),
+    "float64": (FLOAT64, 8),
 }
 BUILTIN = {
     "builtin_interfaces/Time": "int32 sec\nuint32 nanosec",
@@ -139,9 +140,8 @@ class Ros2Message:
 
         def trace(payload: bytes) -> Layout:
             walk = self._walk(payload)
-            cells = tuple(walk.cell(step) for step in steps)
-            pair = None if stamp is None else (walk.scalars[stamp[0]], walk.scalars[stamp[1]])
-            return Layout(len(payload), walk.guards.words(), pair, cells)
+            cells = [walk.cell(step) for step in steps]
+            return layout(payload, walk.guards, [walk.scalars[path] for path in stamp], cells)
 
         return LayoutDecoder(trace, len(steps))
 
@@ -150,7 +150,7 @@ class Ros2Message:
         walk = self._walk(payload)
         names = walk.strings.get(sibling(path), [])
         texts = [payload[at : at + length].rstrip(b"\0").decode(errors="replace") for at, length in names]
-        return Elements(tuple(texts), walk.sequences[path][2])
+        return Elements(tuple(texts), walk.sequences[path][1])
 
     def _walk(self, payload: bytes) -> _Walk:
         walk = _Walk(payload, self._definitions)
@@ -171,18 +171,17 @@ class _Walk:
         self.guards.add(0, 2)
         self.at = 4
         self.scalars: dict[str, Cell] = {}
-        self.sequences: dict[str, tuple[str, int, int]] = {}  # path -> kind, first byte, count
+        self.sequences: dict[str, tuple[Cell, int]] = {}  # path -> first element, count
         self.strings: dict[str, list[tuple[int, int]]] = {}  # path -> first byte and length of each
 
-    def cell(self, step: Step) -> Cell | None:
+    def cell(self, step: Step) -> Cell:
         if step.key is None:
             return self.scalars[step.path]
-        kind, first, count = self.sequences[step.path]
+        first, count = self.sequences[step.path]
         index = self.index(step.path, step.key)
         if index is None or index >= count:
-            return None
-        size = int(kind[1])
-        return Cell(kind, first + index * size, size, self.form)
+            return LACKING
+        return first._replace(at=first.at + index * first.size)
 
     def index(self, path: str, key: Key) -> int | None:
         """Return the place of `key` in the sequence `path`; names are looked up in its sibling `name`."""
@@ -205,7 +204,7 @@ class _Walk:
             path = f"{prefix}{member.name}"
             count = self.length() if member.count == -1 else member.count
             if member.base in PRIMITIVES:
-                self.numbers(path, PRIMITIVES[member.base], count)
+                self.numbers(path, member.base, count)
             elif member.base in self.definitions:
                 for _ in range(1 if count is None else count):
                     self.message(member.base, f"{path}." if count is None else f"{path}[].")
@@ -227,15 +226,16 @@ class _Walk:
         self.guards.add(at, 4)
         return int.from_bytes(self.payload[at : at + 4], "little" if self.form == LITTLE else "big")
 
-    def numbers(self, path: str, kind: str, count: int | None) -> None:
-        size = int(kind[1])
+    def numbers(self, path: str, base: str, count: int | None) -> None:
+        kind, size = PRIMITIVES[base]
         if count != 0:  # an empty sequence is not aligned for its elements
             self.align(size)
         at = self.skip(size * (1 if count is None else count))
+        cell = Cell(at, size, self.form, kind)
         if count is None:
-            self.scalars[path] = Cell(kind, at, size, self.form)
+            self.scalars[path] = cell
         else:
-            self.sequences[path] = (kind, at, count)
+            self.sequences[path] = (cell, count)
 
     def texts(self, path: str, base: str, count: int) -> None:
         if base == "wstring":

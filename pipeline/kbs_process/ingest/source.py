@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
@@ -13,7 +12,7 @@ import numpy as np
 
 from kbs_process.errors import RecordingError, did_you_mean
 from kbs_process.ingest import framing as mcap
-from kbs_process.ingest.container import AT, CHANNEL, SIZE, WINDOW, Container, Segment
+from kbs_process.ingest.container import AT, CHANNEL, SIZE, Container, Segment
 from kbs_process.ingest.streams import SAMPLES, Reading, Sample, Stream, payloads, type_of
 from kbs_process.signals.records import Block, Loss, Stamps
 
@@ -36,7 +35,7 @@ class Counter:
 
     def add(self, segment: Segment) -> None:
         """Count the messages of a segment."""
-        found = np.bincount(segment.rows[:, CHANNEL].view(np.int64))
+        found = np.bincount(segment.table[CHANNEL].view(np.int64))
         self.counts[: len(found)] += found
 
     def found(self) -> dict[int, int]:
@@ -104,7 +103,6 @@ class Source:
         container, counter = self._container(), Counter()
         if self._indexed:
             self._require_topics(streams, container.dictionary)
-        self._check_data_section(container)
         readings = [Reading(stream, container) for stream in streams]
         for segment in container.segments():
             counter.add(segment)
@@ -124,13 +122,13 @@ class Source:
         container = self._container()
         for segment in container.segments():
             channels = container.dictionary.channels
-            numbers, firsts = np.unique(segment.rows[:, CHANNEL], return_index=True)
+            numbers, firsts = np.unique(segment.table[CHANNEL], return_index=True)
             for number, first in zip(numbers.tolist(), firsts.tolist(), strict=True):
                 if number in channels and channels[number].topic not in found:
-                    rows = segment.rows[first:]
-                    rows = rows[rows[:, CHANNEL] == number]
+                    table = segment.table[:, first:]
+                    table = table[:, table[CHANNEL] == np.uint64(number)]
                     topic = channels[number].topic
-                    texts = list(islice(payloads(segment.buffer, rows[:, AT], rows[:, SIZE]), SAMPLES))
+                    texts = list(islice(payloads(segment.buffer, table[AT], table[SIZE]), SAMPLES))
                     try:
                         found[topic] = Sample(
                             type_of(container.dictionary, number, iter(texts), topic), texts[0]
@@ -163,23 +161,6 @@ class Source:
                 raise RecordingError(
                     f"there is no topic '{stream.topic}'", where=str(self.path), remedy=remedy
                 )
-
-    def _check_data_section(self, container: Container) -> None:
-        """Check the CRC over everything before the summary, where the recorder wrote one."""
-        if self._summary is None:
-            return
-        with self.path.open("rb") as file:
-            size = self._summary.section - mcap.DATA_END_SIZE
-            file.seek(size)
-            opcode, length, expected = mcap.DATA_END.unpack(file.read(mcap.DATA_END_SIZE))
-            if (opcode, length) != (mcap.DATA_END_OP, 4) or expected == 0:
-                return
-            file.seek(0)
-            crc, left = 0, size
-            while left and (piece := file.read(min(left, WINDOW))):
-                crc, left = zlib.crc32(piece, crc), left - len(piece)
-        if crc != expected:
-            container.lose("crc", "the data section's CRC is wrong: something in the file has changed")
 
     def _conclude(self, container: Container, counter: Counter) -> None:
         """Note what only shows at the end of a pass."""

@@ -76,7 +76,7 @@ class Reading:
         channels = self._container.dictionary.channels
         parts = []
         for number in [n for n, channel in channels.items() if channel.topic == self.stream.topic]:
-            chosen = np.flatnonzero(segment.rows[:, CHANNEL] == number)
+            chosen = np.flatnonzero(segment.table[CHANNEL] == np.uint64(number))
             if len(chosen):
                 parts.append(self._decode(number, segment, chosen))
         if len(parts) < 2:
@@ -97,9 +97,8 @@ class Reading:
             yield Loss(kind, self._where, count, seconds(first), seconds(last))
 
     def _decode(self, number: int, segment: Segment, chosen: Stamps) -> tuple[Stamps, Block]:
-        rows = segment.rows if len(chosen) == len(segment.rows) else segment.rows[chosen]
-        at, size = rows[:, AT].copy(), rows[:, SIZE].copy()
-        log = rows[:, LOG].astype(np.int64)
+        at, size = segment.table[AT][chosen], segment.table[SIZE][chosen]
+        log = segment.table[LOG][chosen].view(np.int64)
         if not self.stream.fields:  # messages of any type can be counted
             return chosen, Block(log, log, np.empty((len(log), 0)))
         fresh = number not in self._plans
