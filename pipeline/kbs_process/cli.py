@@ -80,14 +80,16 @@ pdf_option = click.option(
 @quiet_option
 def process(campaign: str, output: Path | None, pdf: bool | None, check: bool, quiet: bool) -> None:
     """Process CAMPAIGN: fit, compare with the prediction, and write the report."""
-    from kbs_process.campaign import run
     from kbs_process.campaign.load import load_campaign
     from kbs_process.campaign.locate import find_campaign, results_folder
 
     folder = find_campaign(campaign)
     target = results_folder(folder, output)
     loaded = load_campaign(folder)
-    outcome = run.process(loaded, target, progress=_progress(quiet), pdf=pdf)
+    # Bad input is told before all that computes is imported.
+    from kbs_process.campaign.run import process as run
+
+    outcome = run(loaded, target, progress=_progress(quiet), pdf=pdf)
     for line in outcome.verdict_lines:
         click.echo(line)
     click.echo(f"Report: {outcome.report}")

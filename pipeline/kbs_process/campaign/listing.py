@@ -36,7 +36,7 @@ def _topic(topic: TopicInspection) -> Iterator[str]:
     width = max((len(entry.field) for entry in topic.ranges), default=0)
     for entry in topic.ranges:
         bad = f"  {entry.not_finite} not finite" if entry.not_finite else ""
-        yield f"    {entry.field:<{width}}  {entry.low:>13.6g} to {entry.high:<13.6g}{bad}".rstrip()
+        yield f"    {entry.field:<{width}}  {entry.low + 0.0:>13.6g} to {entry.high + 0.0:<13.6g}{bad}".rstrip()
 
 
 def _clock(stamp_ns: int) -> str:

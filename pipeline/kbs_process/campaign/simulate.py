@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -70,7 +70,7 @@ def predict_recording(campaign: Campaign, recording: str, target: Path, *, progr
         )
 
 
-def _motion_driven(campaign: Campaign, run: Run) -> Iterator[tuple[str, Block]]:
+def _motion_driven(campaign: Campaign, run: Run) -> Iterable[tuple[str, Block]]:
     """Yield the rigid-body wrench of the measured motion, at the working rate."""
     motion = estimate(run, campaign.rig, MotionSettings(band_Hz=campaign.bands.low_pass[-1]))
     stamp = np.rint((motion.t0 + motion.dt * np.arange(len(motion))) * 1e9).astype(np.int64)

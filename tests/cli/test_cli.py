@@ -1,0 +1,314 @@
+"""The command line as a user meets it: output, errors, exit statuses."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from campaign.campaign_folder import EXAMPLE, CampaignFolder, make_folder
+from kbs_process import cli
+from kbs_process.errors import RecordingError
+from kbs_process.ingest.encoding import OutStream
+from kbs_process.ingest.writer import write_mcap
+
+VERBS = ("process", "validate", "inspect", "simulate", "predict", "import", "report")
+RATE = 100.0
+
+
+def run(*arguments: str) -> int:
+    """Run the command line in this process and return its exit status."""
+    with pytest.raises(SystemExit) as caught:
+        cli.main(arguments)
+        sys.exit(0)
+    return int(caught.value.code or 0)
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> CampaignFolder:
+    """The example's description with four seconds of recordings."""
+    folder = make_folder(tmp_path / "campaigns" / "EL089")
+    for path in (folder.path / "recordings").iterdir():
+        record(path)
+    return folder
+
+
+def record(path: Path, *, nan: bool = False) -> None:
+    """Write four seconds: elevation at 1.3 rad, then moving slowly; a constant wrench."""
+    stamp = np.arange(400) * 10_000_000
+    cycle = np.arange(41) * 100_000_000
+    wrench = np.tile([0.0, 0.0, -274.0, -6.0, 5.0, 0.0], (400, 1))
+    if nan:
+        wrench[200:210, 2] = np.nan
+    el = np.clip(np.array([stamp * 1e-9 - 2.0]).T * 1e-3, 0.0, None) + 1.3
+    command = np.clip(cycle * 1e-9 - 2.0, 0.0, None) * 1e-3 + 1.3
+    rate = np.where(cycle * 1e-9 > 2.0, 1e-3, 0.0)
+    zero = np.zeros_like(command)
+    write_mcap(
+        path,
+        [
+            OutStream("/transducer/wrench", "wrench", stamp, stamp, wrench),
+            OutStream("/encoder", "joints", stamp, stamp, np.hstack([0.0 * el, el]), ("az", "el")),
+            OutStream(
+                "/command",
+                "joints",
+                cycle,
+                cycle,
+                np.stack([zero, command, zero, rate], axis=1),
+                ("az", "el"),
+            ),
+        ],
+    )
+
+
+@pytest.fixture
+def processed(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
+    """Replaces the pipeline; `met` and `error` say how it ends, `called` what it was asked."""
+    state = SimpleNamespace(met=True, error=None, called=None)
+
+    def process(campaign: Any, target: Path, *, progress: Any, pdf: bool | None) -> SimpleNamespace:
+        state.called = (campaign.name, target, pdf)
+        if state.error is not None:
+            raise state.error
+        return SimpleNamespace(
+            verdict_lines=("torque 0.04 N m, limit 0.06 N m: met",),
+            requirement_met=state.met,
+            report=target / "index.html",
+        )
+
+    fake = ModuleType("kbs_process.campaign.run")
+    fake.process = process  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, fake.__name__, fake)
+    return state
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_every_verb_explains_itself_with_examples(verb: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(verb, "--help") == 0
+    text = capsys.readouterr().out
+    assert "Examples:" in text
+    assert f"kbs-process {'campaign/EL089' if verb == 'process' else verb}" in text
+
+
+def test_help_names_every_verb(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("--help") == 0
+    text = capsys.readouterr().out
+    assert all(f"\n  {verb} " in text for verb in VERBS)
+
+
+def test_help_imports_nothing_that_computes() -> None:
+    code = (
+        "import sys\nfrom kbs_process import cli\n"
+        "try:\n    cli.main(['--help'])\nexcept SystemExit:\n    pass\n"
+        "print(sorted({name.split('.')[0] for name in sys.modules}), file=sys.stderr)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    heavy = {
+        "numpy",
+        "scipy",
+        "pandas",
+        "pyarrow",
+        "numba",
+        "matplotlib",
+        "rich",
+        "jsonschema",
+        "jinja2",
+        "msgspec",
+    }
+    assert not [name for name in heavy if f"'{name}'" in done.stderr]
+
+
+def test_a_campaign_without_a_verb_is_processed(
+    folder: CampaignFolder, processed: SimpleNamespace, monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    monkeypatch.chdir(folder.path.parents[1])
+    assert run("campaign/EL089") == 0
+    target = folder.path.parents[1] / "reports" / "EL089"
+    assert processed.called == ("EL089", target, None)
+    out = capsys.readouterr().out.splitlines()
+    assert out == ["torque 0.04 N m, limit 0.06 N m: met", f"Report: {target / 'index.html'}"]
+
+
+@pytest.mark.parametrize(
+    ("met", "options", "status"),
+    [(True, ["--check"], 0), (False, [], 0), (False, ["--check"], 1), (None, ["--check"], 0)],
+)
+def test_a_requirement_not_met_is_a_status_only_when_asked(
+    folder: CampaignFolder, processed: SimpleNamespace, met: bool | None, options: list[str], status: int
+) -> None:
+    processed.met = met
+    assert run(*options, str(folder.path), "-o", str(folder.path.parents[1] / "out"), "--no-pdf") == status
+    assert processed.called[1:] == (folder.path.parents[1] / "out", False)
+
+
+def test_bad_input_is_a_message_and_status_2(
+    folder: CampaignFolder, processed: SimpleNamespace, capsys: pytest.CaptureFixture[str]
+) -> None:
+    processed.error = RecordingError("has no wrench", where="a.mcap", remedy="record one")
+    assert run(str(folder.path), "-o", str(folder.path.parents[1] / "out")) == 2
+    assert capsys.readouterr().err.endswith("error: a.mcap: has no wrench\n  -> record one\n")
+
+
+def test_a_fault_of_the_program_is_told_apart(
+    folder: CampaignFolder, processed: SimpleNamespace, capsys: pytest.CaptureFixture[str]
+) -> None:
+    processed.error = ZeroDivisionError("float division by zero")
+    arguments = (str(folder.path), "-o", str(folder.path.parents[1] / "out"))
+    assert run(*arguments) == cli.INTERNAL
+    message = capsys.readouterr().err
+    assert "fault of kbs-process" in message
+    assert "Traceback" not in message
+    with pytest.raises(ZeroDivisionError):
+        cli.main([*arguments, "--debug"])
+
+
+def test_an_interrupt_is_status_130(
+    folder: CampaignFolder, processed: SimpleNamespace, capsys: pytest.CaptureFixture[str]
+) -> None:
+    processed.error = KeyboardInterrupt()
+    assert run(str(folder.path), "-o", str(folder.path.parents[1] / "out")) == 130
+    assert "interrupted" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("validte", "campaign/EL089"), "did you mean 'validate'?"),
+        (("campaign/NOWHERE",), "there is no campaign 'campaign/NOWHERE'"),
+        (("validate",), "Missing argument 'CAMPAIGN'"),
+        (("inspect", "nowhere.mcap"), "does not exist"),
+        (("import",), "Presets: "),
+        (("report", "nowhere"), "holds no results"),
+        (("campaign/EL089", "--chek"), "No such option"),
+    ],
+)
+def test_wrong_words_are_status_2(
+    arguments: tuple[str, ...], words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(*arguments) == 2
+    message = capsys.readouterr().err
+    assert words in message
+    assert "Traceback" not in message
+
+
+def test_validate_finds_sound_recordings_clean(
+    folder: CampaignFolder, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run("validate", str(folder.path), "--check") == 0
+    out = capsys.readouterr().out
+    assert "EL089P00_1  fit          clean" in out
+    assert "wrench 100 Hz" in out
+    assert "4 recordings: 0 unreadable, 0 with losses" in out
+
+
+def test_validate_tells_losses_and_fails_only_when_asked(
+    folder: CampaignFolder, capsys: pytest.CaptureFixture[str]
+) -> None:
+    record(folder.path / "recordings" / "EL089P00_2.mcap", nan=True)
+    assert run("validate", str(folder.path)) == 0
+    assert run("validate", str(folder.path), "--check") == 1
+    out = capsys.readouterr().out
+    assert "EL089P00_2  held-out     lossy" in out
+    assert "EL089P00_3  held-out     clean" in out
+
+
+def test_validate_refuses_what_it_cannot_read(
+    folder: CampaignFolder, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (folder.path / "recordings" / "EL089P00_2.mcap").write_bytes(b"")
+    folder.replace("campaign.toml", 'wrench = "/transducer/wrench"', 'wrench = "/transducer/wrnch"')
+    assert run("validate", str(folder.path), "-q") == 2
+    out = capsys.readouterr().out
+    assert "the file is empty" in out
+    assert "did you mean '/transducer/wrench'?" in out
+    assert "4 unreadable" in out
+
+
+def test_inspect_shows_what_is_in_a_recording(
+    folder: CampaignFolder, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = folder.path / "recordings" / "EL089P00_1.mcap"
+    assert run("inspect", str(path)) == 0
+    out = capsys.readouterr().out
+    assert f"{path}: clean" in out
+    assert "/transducer/wrench  geometry_msgs/msg/WrenchStamped  cdr" in out
+    assert "400 messages at 100 Hz, 3.990 s" in out
+    (line,) = [line for line in out.splitlines() if "wrench.force.z" in line]
+    assert line.split()[1:] == ["-274", "to", "-274"]
+
+
+def test_inspect_tells_an_unreadable_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "a.mcap").write_bytes(b"PK\x03\x04" * 100)
+    assert run("inspect", str(tmp_path / "a.mcap")) == 2
+    assert "unreadable" in capsys.readouterr().out
+
+
+def test_predict_writes_what_reads_back(
+    folder: CampaignFolder, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    target = tmp_path / "predicted"
+    assert run("predict", str(folder.path), "EL089P00_1", "-o", str(target)) == 0
+    table = pq.read_table(target / "wrench.parquet")
+    about = json.loads(table.schema.metadata[b"kbs"])
+    assert about["frame"] == "T"
+    assert about["units"]["Tz"] == "N m"
+    assert table.num_rows == 400
+    weight = (8.0 + 6.0 + 14.0) * 9.80665
+    np.testing.assert_allclose(table["Fz"].to_numpy(), -weight, rtol=1e-3)
+    assert run("inspect", str(target / "predicted.mcap")) == 0
+    assert "/transducer/wrench" in capsys.readouterr().out
+    # Once more: the same bytes, in the place of the old ones.
+    before = {path.name: path.read_bytes() for path in target.iterdir()}
+    assert run("predict", str(folder.path), "EL089P00_1", "-o", str(target)) == 0
+    assert {path.name: path.read_bytes() for path in target.iterdir()} == before
+
+
+def test_simulate_a_command_file(folder: CampaignFolder, tmp_path: Path) -> None:
+    t = np.arange(0.0, 3.01, 0.1)
+    rows = [f"{time:.1f},0.0,{1.3 + 1e-3 * max(0.0, time - 1.0):.6f}" for time in t]
+    (tmp_path / "slew.csv").write_text("t,az,el\n" + "\n".join(rows) + "\n")
+    target = tmp_path / "simulated"
+    arguments = ("simulate", str(folder.path), "--command", str(tmp_path / "slew.csv"), "--rate", "50")
+    assert run(*arguments, "-o", str(target)) == 0
+    angle = pq.read_table(target / "angle.parquet")
+    assert angle.num_rows == 150
+    # The joint goes where it is told, within one code of its encoder and the flexspline's sag under gravity.
+    assert angle["el"].to_numpy()[-1] == pytest.approx(1.302, abs=2e-3)
+
+
+def test_a_command_file_without_a_joint_is_refused(
+    folder: CampaignFolder, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "slew.csv").write_text("t,az,elevation\n0,0,1\n0.1,0,1\n")
+    arguments = ("simulate", str(folder.path), "--command", str(tmp_path / "slew.csv"))
+    assert run(*arguments, "-o", str(tmp_path / "out")) == 2
+    assert "has no column 'el'" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_simulate_an_unknown_trajectory(folder: CampaignFolder, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("simulate", str(folder.path), "--trajectory", "EL089P01") == 2
+    assert "did you mean 'EL089P00'?" in capsys.readouterr().err
+
+
+def test_results_never_go_into_the_campaign(
+    folder: CampaignFolder, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = sorted(folder.path.rglob("*"))
+    assert run("predict", str(folder.path), "EL089P00_1", "-o", str(folder.path / "out")) == 2
+    assert "campaign's folder" in capsys.readouterr().err
+    assert sorted(folder.path.rglob("*")) == before
+
+
+def test_the_installed_command_runs() -> None:
+    command = [sys.executable, "-m", "kbs_process", "--version"]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=EXAMPLE)
+    assert done.stdout.startswith("kbs-process, version ")
