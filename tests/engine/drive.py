@@ -57,9 +57,9 @@ def drive_numbers(hardware: Hardware, axis: str) -> DriveNumbers:
 
 @njit(error_model="numpy")
 def motor_torque(p: DriveNumbers, th_r: float, field_0: float, field_1: float) -> float:
-    """Mean of Tmax sin(pi/64 NN - Kangle th_r) while the field moves from field_0 to field_1 (motor rad), N m.
+    """Mean of Tmax sin(pi/64 NN - Kangle th_r) while the field moves from field_0 to field_1, N m.
 
-    NN is the whole microstep nearest to the field at every instant.
+    Field in motor rad; NN is the whole microstep nearest to the field at every instant.
     """
     x0 = field_0 * p.microsteps / (2 * np.pi)
     x1 = field_1 * p.microsteps / (2 * np.pi)
@@ -125,8 +125,8 @@ def bungee_force(cord: tuple[float, float, float, float, float], at: Any, force:
 
 @njit(error_model="numpy")
 def run_cycle(
-    mj_step: Any, model: int, data: int, state: Any, az: DriveNumbers, el: DriveNumbers, cord: Any, field: Any,
-    dt: float, wrench: Any, q: Any,
+    mj_step: Any, model: int, data: int, state: Any, az: DriveNumbers, el: DriveNumbers, cord: Any,
+    field: Any, dt: float, wrench: Any, q: Any,
 ) -> None:  # fmt: skip
     """Integrate one real-time cycle while each field moves linearly from field[0] to field[1].
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +21,14 @@ Array = NDArray[np.float64]
 AXES = ("az", "el")
 BODIES = ("base", "azimuth", "antenna")
 
-_SI = {"mrad": 1e-3, "deg": np.pi / 180, "arcsec": np.pi / 648000, "mm": 1e-3, "g": 1e-3, "kHz": 1e3}
+# Factor to SI of every unit that the archive's parameter files use; another one is a KeyError.
+_SI = {"mrad": 1e-3, "deg": np.pi / 180, "mm": 1e-3} | dict.fromkeys(
+    (
+        "1", "rad", "m", "s", "kg", "N", "N m", "Hz", "1/s", "m/s^2", "rad/s", "kg m^2", "N m/rad",
+        "N m s/rad", "SI by channel pair",
+    ),
+    1.0,
+)  # fmt: skip
 
 # What no campaign would call hardware: nothing is drawn for these.
 _NOT_DRAWN = ("gravity.", "spacecraft.", "controller.", "transducer.noise", "transducer.resolution")
@@ -39,6 +46,10 @@ class Bungee:
     stiffness: float  # N/m
     free_length: float  # m
 
+    def as_dict(self) -> dict[str, Any]:
+        """Its numbers by name."""
+        return asdict(self)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Hardware:
@@ -50,7 +61,6 @@ class Hardware:
     latency: int = 1  # cycles
     amplifier_order: int = 2
     bungee: Bungee | None = None
-    text: Mapping[str, str] = field(default_factory=dict)
 
     @classmethod
     def from_campaign(
@@ -150,6 +160,6 @@ def _quantity(leaf: Mapping[str, Any]) -> tuple[Array, Array]:
     """Value and sigma of one number or array, in SI, of the same shape."""
     value = np.asarray(leaf["value"], dtype=float)
     units = leaf["unit"]
-    factor: Any = [_SI.get(unit, 1.0) for unit in units] if isinstance(units, list) else _SI.get(units, 1.0)
+    factor: Any = [_SI[unit] for unit in units] if isinstance(units, list) else _SI[units]
     sigma = np.broadcast_to(np.asarray(leaf["sigma"], dtype=float), value.shape)
     return value * np.asarray(factor), sigma * np.asarray(factor)

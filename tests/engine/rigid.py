@@ -52,7 +52,7 @@ def build(hardware: Hardware, timestep: float) -> RigidModel:
         root, "option", timestep=repr(timestep), integrator="Euler", gravity=_text(gravity_in_plate(hardware))
     )
     off = ("contact", "constraint", "eulerdamp", "warmstart", "actuation")
-    ET.SubElement(option, "flag", {name: "disable" for name in off})
+    ET.SubElement(option, "flag", dict.fromkeys(off, "disable"))
     world = ET.SubElement(root, "worldbody")
 
     base = ET.SubElement(world, "body", name="base")

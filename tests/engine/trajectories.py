@@ -16,6 +16,8 @@ from engine.hardware import Array
 CYCLE = 0.1  # s
 RATE_LIMIT = 2.0  # deg/s
 ACCELERATION_LIMIT = 0.015  # deg/s^2, in normal operation
+# The controller's words are fixed-point: 1/8000 of a microstep in position, 1e-8 rad/s in rate.
+_POSITION_BIT, _RATE_BIT = 2.0**-24, 2.0**-26  # rad, rad/s
 RANGE = {"az": (-165.0, 165.0), "el": (-30.0, 90.0)}  # deg
 
 
@@ -53,7 +55,7 @@ class Axis:
     def move(
         self, distance: float, rate: float = RATE_LIMIT, acceleration: float = ACCELERATION_LIMIT
     ) -> Axis:
-        """Move by `distance` (deg) from rest to rest: accelerate, coast at `rate` where it is reached, brake."""
+        """Move by `distance` (deg) from rest to rest: accelerate, coast at `rate` if reached, brake."""
         peak = min(rate, float(np.sqrt(abs(distance) * acceleration)))
         ramp = peak / acceleration
         coast = abs(distance) / peak - ramp
@@ -99,7 +101,10 @@ class Axis:
 
 
 def commands(az: Axis, el: Axis, duration: float) -> Commands:
-    """Sample both axes once a real-time cycle, from 0 to `duration` (s). Raises ValueError beyond the range."""
+    """Sample both axes once a real-time cycle, from 0 to `duration` (s).
+
+    Raises ValueError beyond the axes' range or rate.
+    """
     t = CYCLE * np.arange(round(duration / CYCLE) + 1)
     sampled = [az.sampled(t), el.sampled(t)]
     position, rate = (np.column_stack([axis[k] for axis in sampled]) for k in (0, 1))
@@ -109,19 +114,23 @@ def commands(az: Axis, el: Axis, duration: float) -> Commands:
             raise ValueError(f"{name} runs from {column.min():.2f} to {column.max():.2f} deg")
     if np.abs(rate).max() > RATE_LIMIT * (1 + 1e-9):
         raise ValueError(f"rate of {np.abs(rate).max():.3f} deg/s")
-    return Commands(t, np.radians(position), np.radians(rate))
+    return Commands(t, _fixed_point(position, _POSITION_BIT), _fixed_point(rate, _RATE_BIT))
+
+
+def _fixed_point(degrees: Array, bit: float) -> Array:
+    return np.asarray(np.round(np.radians(degrees) / bit) * bit)
 
 
 def azps_ata() -> Commands:
     """Pseudo-static azimuth sweeps at elevations 70, 78.5 and 87 deg: calibration, CoG, orthogonality.
 
-    Sweeps over +-150 deg at 0.015 deg/s^2 would take 1000 s. Here, out of the flight's envelope, at
-    0.15 deg/s^2 and up to 2 deg/s: the motion's own wrench stays below 2e-3 N and 3e-3 N m.
+    Sweeps over +-150 deg at 0.015 deg/s^2 would take 800 s. Here, out of the flight's envelope, at
+    0.15 deg/s^2 and up to 2 deg/s: the motion's own wrench stays below a few mN and mN m.
     """
     quick = 0.15  # deg/s^2
     az, el = Axis(-150.0).rest(5.0), Axis(70.0).rest(5.0)
-    for sweep, elevation in enumerate((78.5, 87.0, None)):
-        az = az.move(300.0 if sweep % 2 == 0 else -300.0, acceleration=quick).rest(3.0)
+    for sweep, elevation in ((300.0, 78.5), (-150.0, 87.0), (-150.0, None)):
+        az = az.move(sweep, acceleration=quick).rest(3.0)
         el = el.rest(az.duration() - el.duration())
         if elevation is not None:
             el = el.move(elevation - el.now()[0], acceleration=quick).rest(3.0)
@@ -138,7 +147,7 @@ def _aesing() -> tuple[Axis, Axis]:
 
 
 def aesing00() -> Commands:
-    """A pass close to the singularity: elevation 80 to 89 deg and back, azimuth -60 to 60 deg, fastest on top."""
+    """A pass close to the singularity: el 80 to 89 deg and back, az -60 to 60 deg, fastest on top."""
     return commands(*_aesing(), 200.0)
 
 
@@ -164,11 +173,11 @@ def elstpp00() -> Commands:
 
 
 def acq600() -> Commands:
-    """Hand-over: track one relay satellite slowly, slew to the other on both axes, track it, at high elevation."""
+    """Hand-over at high elevation: track one relay satellite slowly, slew to the other, track that one."""
     az = Axis(-35.0).rest(20.0).accelerate(0.06).rest(36.0).accelerate(0.0).move(70.0, rate=1.0)
     az = az.accelerate(-0.03).rest(60.0)
     el = Axis(74.0).rest(20.0).accelerate(0.03).rest(38.0).accelerate(0.0).move(10.0, rate=0.4)
-    return commands(az, el.accelerate(0.02).rest(60.0), 280.0)
+    return commands(az, el.accelerate(0.02).rest(60.0), 240.0)
 
 
 _BUNGEE_ACCELERATION = (
@@ -178,7 +187,7 @@ _BUNGEE_ACCELERATION = (
 
 def _al012() -> tuple[Axis, Axis]:
     az = Axis(-12.0).rest(15.0)
-    for sweep in range(6):
+    for sweep in range(4):
         az = az.move(24.0 if sweep % 2 == 0 else -24.0, acceleration=_BUNGEE_ACCELERATION).rest(8.0)
     return az, Axis(0.0)
 
@@ -192,7 +201,7 @@ def al012m00() -> Commands:
 def alstpp00() -> Commands:
     """AL012M00 with a stop in the middle of the third sweep."""
     az, el = _al012()
-    return commands(az.stopped(81.0, _BUNGEE_ACCELERATION), el, 120.0)
+    return commands(az.stopped(81.0, _BUNGEE_ACCELERATION), el, 105.0)
 
 
 TRAJECTORIES: dict[str, Callable[[], Commands]] = {

@@ -1,0 +1,147 @@
+"""What the archive holds: campaigns, their recordings, and how each was made."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from engine.hardware import Bungee, Hardware
+from engine.mcap_file import Format
+
+CAMPAIGNS_FOLDER = Path(__file__).resolve().parents[2] / "campaigns"
+
+SMALL = Format(message_index=False)
+
+# The cord hangs from 3 m above the CoG that the nominal numbers give at az = el = 0 and carries
+# the antenna's weight, 137 N, there.
+ABOVE_ANTENNA = Bungee(anchor=(0.07, 0.06, 3.2), stiffness=60.0, free_length=3.0 - 137.3 / 60.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """One recording of a campaign."""
+
+    file: str
+    trajectory: str
+    wrench_hz: float = 100.0
+    encoder_hz: float = 50.0
+    form: Format = SMALL
+    gaps: tuple[tuple[str, float, float], ...] = ()  # stream, start and end (s after its first message)
+    bungee: Bungee | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Campaign:
+    """One campaign: hardware drawn with `seed` around the nominal numbers of its parameter files."""
+
+    name: str
+    seed: int
+    day: int  # of the test programme
+    runs: tuple[Run, ...]
+
+    @property
+    def folder(self) -> Path:
+        return CAMPAIGNS_FOLDER / self.name
+
+    def hardware(self) -> Hardware:
+        """Return the campaign's true hardware."""
+        return Hardware.from_campaign(self.folder, seed=self.seed)
+
+
+_CALIBRATION = Run("AZPS_ATA.mcap", "AZPS_ATA", wrench_hz=50.0, encoder_hz=20.0)
+
+_ALL = (
+    Campaign(
+        "EL089",
+        seed=89,
+        day=0,
+        runs=(
+            Run("AZPS_ATA.mcap", "AZPS_ATA", encoder_hz=100.0),
+            Run("EL089P00_1.mcap", "EL089P00", encoder_hz=100.0, form=Format()),
+            Run("EL089P00_2.mcap", "EL089P00", encoder_hz=100.0),
+            Run("EL089P00_3.mcap", "EL089P00", encoder_hz=100.0),
+        ),
+    ),
+    Campaign(
+        "AZPS_ATA",
+        seed=101,
+        day=1,
+        runs=(
+            _CALIBRATION,
+            Run("AZPS_ATA_1.mcap", "AZPS_ATA", wrench_hz=50.0, encoder_hz=20.0),
+            Run("AZPS_ATA_2.mcap", "AZPS_ATA", wrench_hz=50.0, encoder_hz=20.0),
+        ),
+    ),
+    Campaign(
+        "AESING00",
+        seed=102,
+        day=2,
+        runs=(
+            _CALIBRATION,
+            Run("AESING00_1.mcap", "AESING00"),
+            Run("AESING00_2.mcap", "AESING00", gaps=(("wrench", 61.0, 61.4), ("encoder", 130.0, 130.2))),
+        ),
+    ),
+    Campaign(
+        "AESTPP00",
+        seed=103,
+        day=3,
+        runs=(
+            _CALIBRATION,
+            Run("AESTPP00_1.mcap", "AESTPP00"),
+            Run("AESTPP00_2.mcap", "AESTPP00"),
+        ),
+    ),
+    Campaign(
+        "ELSTPP00",
+        seed=104,
+        day=4,
+        runs=(
+            _CALIBRATION,
+            Run("ELSTPP00_1.mcap", "ELSTPP00"),
+            Run("ELSTPP00_2.mcap", "ELSTPP00", form=Format(compression="lz4", message_index=False)),
+        ),
+    ),
+    Campaign(
+        "ACQ600",
+        seed=105,
+        day=5,
+        runs=(
+            _CALIBRATION,
+            Run("ACQ600_1.mcap", "ACQ600"),
+            Run("ACQ600_2.mcap", "ACQ600", form=Format(message_index=False, kept=0.85)),
+        ),
+    ),
+    Campaign(
+        "AL012M00",
+        seed=106,
+        day=6,
+        runs=(
+            _CALIBRATION,
+            Run("AL012M00_1.mcap", "AL012M00", bungee=ABOVE_ANTENNA),
+            Run("AL012M00_2.mcap", "AL012M00", bungee=ABOVE_ANTENNA),
+        ),
+    ),
+    Campaign(
+        "ALSTPP00",
+        seed=107,
+        day=7,
+        runs=(
+            _CALIBRATION,
+            Run(
+                "ALSTPP00_1.mcap",
+                "ALSTPP00",
+                bungee=ABOVE_ANTENNA,
+                form=Format(encoding="json", message_index=False),
+            ),
+            Run(
+                "ALSTPP00_2.mcap",
+                "ALSTPP00",
+                bungee=ABOVE_ANTENNA,
+                form=Format(encoding="json", message_index=False),
+            ),
+        ),
+    ),
+)
+
+CAMPAIGNS = {campaign.name: campaign for campaign in _ALL}
