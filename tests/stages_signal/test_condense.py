@@ -6,11 +6,11 @@ import dataclasses
 
 import numpy as np
 import pytest
-from stages_signal.recordings import EPOCH, chunks, rows, stream
 
 from kbs_process.errors import RecordingError
 from kbs_process.signals.records import WRENCH_CHANNELS, Block, Run
 from kbs_process.stages.condense import CondenseSettings, condense
+from stages_signal.recordings import EPOCH, chunks, rows, stream
 
 CHANNELS = {"wrench": WRENCH_CHANNELS, "angle": ("az", "el"), "command": ("az", "el"), "temperature": ("T",)}
 SETTINGS = CondenseSettings()
@@ -164,10 +164,14 @@ def test_an_absolute_encoder_is_followed_through_full_turns() -> None:
     def turning(t: np.ndarray) -> np.ndarray:
         return np.column_stack((np.mod(2.0 * t, 2.0 * np.pi), np.mod(-3.0 * t, 2.0 * np.pi)))
 
-    run = condense("wheel", [("angle", stream(turning, 240.0, 30.0))], {"angle": ("wheel", "other")}, SETTINGS)
+    run = condense(
+        "wheel", [("angle", stream(turning, 240.0, 30.0))], {"angle": ("wheel", "other")}, SETTINGS
+    )
     assert run.angle is not None and run.wrench is None and run.spectrum is None and run.encoder is None
     np.testing.assert_allclose(run.angle.values[50:-50, 0], 2.0 * run.angle.t[50:-50], atol=1e-4)
-    np.testing.assert_allclose(run.angle.values[50:-50, 1], 2 * np.pi - 3.0 * run.angle.t[50:-50], atol=2 * np.pi + 1e-4)
+    np.testing.assert_allclose(
+        run.angle.values[50:-50, 1], 2 * np.pi - 3.0 * run.angle.t[50:-50], atol=2 * np.pi + 1e-4
+    )
 
 
 def test_a_stream_that_begins_late_is_flagged_until_it_does() -> None:

@@ -26,7 +26,7 @@ def test_tones_in_the_passband_keep_gain_and_phase(rate: float) -> None:
 
 
 @pytest.mark.parametrize("rate", [31.0, 100.0, 240.0, 1000.0, 1000.03, 10000.0])
-def test_tones_that_would_alias_are_120_dB_down(rate: float) -> None:
+def test_tones_that_would_alias_are_120_db_down(rate: float) -> None:
     frequencies = np.geomspace(12.0, 0.499 * rate, 60)
     alias = np.abs(frequencies - WORKING * np.round(frequencies / WORKING))
     y = resample(tones(rate, frequencies, 40.0), rate, WORKING)[100:-100]
@@ -92,9 +92,10 @@ def test_the_weight_of_invented_samples_is_carried_through_both_filters() -> Non
     assert kept is not None
     t = np.arange(400) / WORKING
     _, doubt = kept.at(t)
+    away = np.minimum(np.abs(t - 10.05), np.minimum(t, t[-1] - t))  # s from the gap or from an end
     assert doubt[201] > 0.5  # in the gap's middle
-    assert np.all(doubt[np.abs(t - 10.05) > 1.2] < 1e-3 + (t < 1.2)[np.abs(t - 10.05) > 1.2] + (t > 18.8)[np.abs(t - 10.05) > 1.2])
-    assert doubt[0] > 0.1  # half the filter looks before the beginning
+    assert doubt[0] > 0.5  # half of the filter looks before the beginning
+    assert doubt[away > 1.2].max() < 1e-6 < doubt[away < 0.9].min()
 
 
 def test_too_few_samples_are_refused() -> None:
