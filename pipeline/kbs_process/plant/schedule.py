@@ -38,14 +38,14 @@ def covering(schedule: Schedule, joints: int, cycle: float | None, end: float) -
         if not len(gaps):
             raise SimulationError("one command and no controller", remedy="give the rig's [controller] cycle")
         cycle = float(np.median(gaps))
-    lost = np.maximum(np.rint(gaps / cycle).astype(np.int64) - 1, 0)
-    pieces = [
-        a + np.arange(m + 1) * (b - a) / (m + 1) for a, b, m in zip(given.t, given.t[1:], lost, strict=False)
-    ]
+    counts = np.maximum(np.rint(gaps / cycle).astype(np.int64), 1)  # cycles from one command to the next
+    start = np.repeat(np.arange(len(gaps)), counts)
+    since = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+    within = given.t[start] + since * (gaps / counts)[start]
     before = max(0, int(np.ceil(given.t[0] / cycle)))
     after = max(0, int(np.ceil((end - given.t[-1]) / cycle))) + 2
     lead = given.t[0] - cycle * np.arange(before, 0, -1)
-    t = np.concatenate([lead, *pieces, given.t[-1] + cycle * np.arange(after + 1)])
+    t = np.concatenate([lead, within, given.t[-1] + cycle * np.arange(after + 1)])
     whole = _at(given, t)
     whole.rate[(t < given.t[0]) | (t > given.t[-1])] = 0.0
     return whole
