@@ -49,6 +49,7 @@ FAULTS = {
         ["topics.encoder.fields", "1 fields for 2 channels", "az, el"],
     ),
     "no commands": (CAMPAIGN, 'command = "/command"', "", ["needs commands", "motion"]),
+    "one table for a list": (CAMPAIGN, "[[requirement]]", "[requirement]", ["requirement", "write [[requirement]]"]),
     "missing parameter file": (CAMPAIGN, "parameters/rig.toml", "parameters/rg.toml", ["does not exist"]),
     "no sigma": (RIG, 'unit = "kg", sigma = 0.05, source', 'unit = "kg", source', ["body.base.mass.sigma", "is missing"]),
     "no unit": (RIG, 'value = 8.0, unit = "kg",', "value = 8.0,", ["body.base.mass.unit", "is missing"]),

@@ -257,6 +257,19 @@ def test_a_read_only_file_system(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
         write(tmp_path / "A", "new")
 
 
+def test_a_full_disk_that_a_writer_reports_in_its_own_words(tmp_path: Path) -> None:
+    def write_elaborately() -> None:
+        with writing(tmp_path / "A"):
+            try:
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+            except OSError as error:
+                raise OutputError("cannot be written", where="processed.mcap") from error
+
+    with pytest.raises(OutputError, match="the disk is full") as caught:
+        write_elaborately()
+    assert caught.value.where == str(tmp_path / "A")
+
+
 def test_a_file_that_cannot_be_read_is_not_blamed_on_the_results(tmp_path: Path) -> None:
     def read_elsewhere() -> None:
         with writing(tmp_path / "reports" / "A"):

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from typing import Any
@@ -282,6 +284,30 @@ def test_simulate_a_command_file(folder: CampaignFolder, tmp_path: Path) -> None
     assert angle.num_rows == 150
     # The joint goes where it is told, within one code of its encoder and the flexspline's sag under gravity.
     assert angle["el"].to_numpy()[-1] == pytest.approx(1.302, abs=2e-3)
+
+
+def test_an_interrupted_simulation_leaves_the_old_one(folder: CampaignFolder, tmp_path: Path) -> None:
+    target = tmp_path / "simulated"
+    target.mkdir()
+    (target / "provenance.json").write_text("old")
+    (tmp_path / "long.csv").write_text("t,az,el\n0,0,1.3\n1,0,1.3\n200000,0,1.31\n")
+    command = [sys.executable, "-m", "kbs_process", "simulate", str(folder.path), "-o", str(target)]
+    process = subprocess.Popen(
+        [*command, "--command", str(tmp_path / "long.csv")],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stderr is not None
+    assert process.stderr.readline() == "Simulating long.csv\n"
+    while not list(tmp_path.glob(".simulated.new-*")):
+        time.sleep(0.01)
+    process.send_signal(signal.SIGINT)
+    _, message = process.communicate(timeout=60)
+    assert process.returncode == 130, message
+    assert "interrupted" in message
+    assert (target / "provenance.json").read_text() == "old"
+    assert not list(tmp_path.glob(".simulated.new-*"))
 
 
 def test_a_command_file_without_a_joint_is_refused(

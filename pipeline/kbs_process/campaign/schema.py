@@ -78,6 +78,10 @@ def _explain(error: ValidationError) -> Iterator[Violation]:
             yield Violation(
                 key, f"is {_show(found)}, not {_show(rule)}", f"this version reads {_show(rule)} only"
             )
+        case "type" if rule == "array" and isinstance(found, dict):
+            yield Violation(
+                key, "is one table, not a list of tables", f"write [[{key[-1]}]], in double brackets"
+            )
         case "type":
             allowed = " or ".join(_TYPES[kind] for kind in ([rule] if isinstance(rule, str) else rule))
             yield Violation(key, f"{_show(found)} is {_kind(found)}, not {allowed}", f"write {allowed}")

@@ -19,7 +19,6 @@ import tempfile
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import NoReturn
 
 from kbs_process.errors import OutputError
 
@@ -39,7 +38,7 @@ def writing(target: Path, *, marker: str = RESULTS) -> Iterator[Path]:
     Raises OutputError if the place cannot be written, is full, holds something else, or is being written.
     """
     target = target.absolute()
-    with _locked(target):
+    with _explaining(target), _locked(target):
         _recover(target)
         _refuse_foreign(target, marker)
         private = _private_folder(target)
@@ -49,8 +48,6 @@ def writing(target: Path, *, marker: str = RESULTS) -> Iterator[Path]:
                 raise RuntimeError(f"results without {marker}")
             _flush(private)
             _put_in_place(private, target)
-        except OSError as error:
-            _explain(error, target)
         finally:
             shutil.rmtree(private, ignore_errors=True)
 
@@ -69,7 +66,7 @@ def revising(target: Path, *, without: Collection[str] = (), marker: str = RESUL
         shutil.copytree(
             target,
             private,
-            copy_function=os.link,
+            copy_function=_link,
             dirs_exist_ok=True,
             ignore=lambda folder, names: [
                 name for name in names if name in without and Path(folder) == target
@@ -78,14 +75,19 @@ def revising(target: Path, *, without: Collection[str] = (), marker: str = RESUL
         yield private
 
 
+def _link(source: str, target: str) -> None:
+    """Link a file where the file system can, copy it elsewhere."""
+    try:
+        os.link(source, target)
+    except OSError:
+        shutil.copy2(source, target)
+
+
 @contextmanager
 def _locked(target: Path) -> Iterator[None]:
     """Hold the lock of `target`, or say who does."""
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        descriptor = os.open(_beside(target, "lock"), os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
-    except OSError as error:
-        _explain(error, target)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    descriptor = os.open(_beside(target, "lock"), os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
     try:
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -100,8 +102,6 @@ def _locked(target: Path) -> Iterator[None]:
         os.write(descriptor, f"process {os.getpid()} on {os.uname().nodename}".encode())
         yield
         os.ftruncate(descriptor, 0)
-    except OSError as error:
-        _explain(error, target)
     finally:
         os.close(descriptor)
 
@@ -115,8 +115,10 @@ def _recover(target: Path) -> None:
     old = _beside(target, "old")
     if old.is_dir() and not target.exists():
         old.rename(target)
-    for leftover in (old, *target.parent.glob(f".{target.name}.new-*")):
-        shutil.rmtree(leftover, ignore_errors=True)
+    private = _beside(target, "new-").name
+    for path in target.parent.iterdir():
+        if path == old or path.name.startswith(private):
+            shutil.rmtree(path, ignore_errors=True)
 
 
 def _refuse_foreign(target: Path, marker: str) -> None:
@@ -184,21 +186,29 @@ def _exchange(one: Path, other: Path) -> bool:
     raise OSError(code, os.strerror(code), str(other))
 
 
-def _explain(error: OSError, target: Path) -> NoReturn:
-    """Raise what a user can act upon: a place that is full or refuses to be written."""
-    if error.errno in _FULL:
-        raise OutputError(
-            f"the disk is full ({error.strerror}); the results of before are whole",
-            where=str(target),
-            remedy="make room, or name a folder on another disk with --output",
-        ) from error
-    if error.errno in _REFUSED and _concerns(error, target):
-        raise OutputError(
-            f"cannot be written: {error.strerror}",
-            where=str(target),
-            remedy="name a folder that you may write to with --output",
-        ) from error
-    raise error
+@contextmanager
+def _explaining(target: Path) -> Iterator[None]:
+    """Turn errors of the system into what a user can act upon: a place that is full, or refuses to be written."""
+    try:
+        yield
+    except (OSError, OutputError) as error:
+        cause = error.__cause__ if isinstance(error, OutputError) else error
+        if not isinstance(cause, OSError) or cause.errno is None:
+            raise
+        reason = os.strerror(cause.errno)
+        if cause.errno in _FULL:
+            raise OutputError(
+                f"the disk is full ({reason}); the results of before are whole",
+                where=str(target),
+                remedy="make room, or name a folder on another disk with --output",
+            ) from error
+        if cause.errno in _REFUSED and _concerns(cause, target):
+            raise OutputError(
+                f"cannot be written: {reason}",
+                where=str(target),
+                remedy="name a folder that you may write to with --output",
+            ) from error
+        raise
 
 
 def _concerns(error: OSError, target: Path) -> bool:
