@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from importer_files import (
+    CAMPAIGN,
     MAPPING,
     Writer,
     read_back,
@@ -23,6 +24,7 @@ from importer_files import (
 
 from kbs_process.campaign import importers
 from kbs_process.campaign.importers import isolated
+from kbs_process.campaign.load import load_campaign
 from kbs_process.errors import ConfigError, KbsError, OutputError, RecordingError
 
 
@@ -173,6 +175,17 @@ def test_a_reader_that_dies_or_hangs(
         importers.describe(tmp_path / "run.tdms")
 
 
+def test_a_small_file_that_declares_endless_data(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import h5py
+
+    with h5py.File(tmp_path / "bomb.h5", "w") as file:
+        file.create_dataset("x", shape=(10**12,), dtype="f8", chunks=(1 << 16,))
+    assert (tmp_path / "bomb.h5").stat().st_size < 10_000
+    monkeypatch.setattr(isolated, "DATA_FLOOR", 1 << 22)
+    with pytest.raises(RecordingError, match="far more samples"):
+        importers.describe(tmp_path / "bomb.h5")
+
+
 def test_missing_library_names_the_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def absent(name: str) -> ModuleSpec | None:
         return None
@@ -189,3 +202,27 @@ def test_description_is_a_mapping_to_start_from(tmp_path: Path) -> None:
     assert tomllib.loads(described)["recording"][0]["source"] == "run.h5"
     row = next(line for line in described.splitlines() if line.endswith("  t"))
     assert row.split()[2:6] == ["100", "0", "0", "49.5"]
+
+
+def test_the_description_is_taken_whole_and_from_its_folder_only(tmp_path: Path) -> None:
+    write_csv(tmp_path / "run.csv", signals(20))
+    plan = write_mapping(tmp_path, "run.csv")
+    rig, campaign = tmp_path / "description/parameters/rig.toml", tmp_path / "description/campaign.toml"
+    coupled = rig.read_text().replace("cross_coupling = { value = 0.0", 'cross_coupling = { value = "x.csv"')
+
+    rig.write_text(coupled)
+    with pytest.raises(ConfigError, match=r"'x\.csv' does not exist"):
+        importers.import_recordings(plan, tmp_path, tmp_path / "campaign")
+    np.savetxt(tmp_path / "description" / "x.csv", np.eye(6) * 0.01, delimiter=",")
+    folder = importers.import_recordings(plan, tmp_path, tmp_path / "campaign")
+    assert load_campaign(folder).rig.transducer.cross_coupling.value[2, 2] == 0.01
+
+    rig.rename(tmp_path / "rig.toml")
+    for name, said in {
+        "parameters/rig.toml": "does not exist",
+        "../rig.toml": "outside the campaign",
+    }.items():
+        campaign.write_text(CAMPAIGN.replace("parameters/rig.toml", name))
+        with pytest.raises(ConfigError, match=said):
+            importers.import_recordings(plan, tmp_path, tmp_path / "other")
+    assert not (tmp_path / "other").exists()

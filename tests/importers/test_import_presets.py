@@ -75,3 +75,13 @@ def test_treadmill(tmp_path: Path, speed: str) -> None:
         np.testing.assert_allclose(rate[:, 0], raw[:, 2] / 0.1, rtol=1e-15)
     repeats = [notice for notice in notices if "'wrench' repeat" in notice]
     assert len(repeats) == {"fast": 2, "slow": 1}[speed]
+
+
+def test_documented_mapping_is_one(tmp_path: Path) -> None:
+    page = (Path(__file__).parents[2] / "docs" / "import.md").read_text()
+    example = page.partition("<!-- mapping -->\n```toml\n")[2].partition("```")[0]
+    (tmp_path / "mapping.toml").write_text(example)
+    mapping = load_mapping(tmp_path / "mapping.toml")
+    assert [stream.key for stream in mapping.streams] == ["wrench", "encoder", "command", "temperature"]
+    for name in importers.preset_names():
+        assert f"`{name}`" in page

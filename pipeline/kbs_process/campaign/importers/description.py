@@ -7,6 +7,7 @@ import re
 import shutil
 import tomllib
 from collections import Counter
+from collections.abc import Iterator
 from collections.abc import Mapping as MappingOf
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +17,7 @@ from kbs_process.campaign.config import Campaign
 from kbs_process.campaign.documents import Document, read, shown
 from kbs_process.campaign.importers.mapping import Mapping
 from kbs_process.campaign.load import CAMPAIGN_FILE, load_campaign
+from kbs_process.campaign.reading import OPTIONAL_STREAMS
 from kbs_process.errors import ConfigError, did_you_mean
 
 _HEADER = re.compile(r"^\s*\[")
@@ -45,14 +47,14 @@ def prepare(mapping: Mapping, folder: Path) -> Campaign:
         mapping.template, role="the mapping's campaign", remedy="correct `campaign` in the mapping"
     )
     for name in _parameter_files(template):
-        source, target = mapping.template.parent / name, folder / name
-        if not target.resolve().is_relative_to(folder.resolve()):
-            raise ConfigError(
-                f"the parameter file '{name}' lies outside the campaign",
-                where=shown(mapping.template),
-                remedy="copy it into the campaign's folder",
-            )
-        _copy(source, target)
+        parameters = read(
+            template.path.parent / name,
+            role="the campaign's parameter file",
+            remedy=f"correct [parameters] files in {shown(template.path)}",
+        )
+        _copy(template, name, folder)
+        for matrix in _matrices(parameters.tree):
+            _copy(template, matrix, folder)
     for part in mapping.parts:
         placeholder = folder / recording_file(part.stem)
         placeholder.parent.mkdir(parents=True, exist_ok=True)
@@ -105,14 +107,33 @@ def _parameter_files(template: Document) -> list[str]:
     return [name for name in files if isinstance(name, str)]
 
 
-def _copy(source: Path, target: Path) -> None:
+def _matrices(node: Any) -> Iterator[str]:
+    """Yield the names of the CSV files that hold values or sigmas of quantities."""
+    for name, value in node.items() if isinstance(node, dict) else ():
+        if name in ("value", "sigma") and isinstance(value, str):
+            yield value
+        else:
+            yield from _matrices(value)
+
+
+def _copy(template: Document, name: str, folder: Path) -> None:
+    """Copy a file of the template's folder to the same place in `folder`."""
+    source, target = template.path.parent / name, folder / name
+    if not target.resolve().is_relative_to(folder.resolve()):
+        raise ConfigError(
+            f"'{name}' lies outside the campaign",
+            where=shown(template.path),
+            remedy="copy it into the campaign's folder",
+        )
     target.parent.mkdir(parents=True, exist_ok=True)
     try:
         shutil.copyfile(source, target)
-    except FileNotFoundError as error:
+    except (FileNotFoundError, IsADirectoryError) as error:
         beside = [path.name for path in source.parent.iterdir()] if source.parent.is_dir() else []
         raise ConfigError(
-            "the parameter file does not exist", where=shown(source), remedy=did_you_mean(source.name, beside)
+            f"the campaign's file '{name}' does not exist",
+            where=shown(template.path),
+            remedy=did_you_mean(source.name, beside),
         ) from error
 
 
@@ -154,6 +175,8 @@ def _check_streams(mapping: Mapping, campaign: Campaign) -> None:
             remedy="name different topics",
         )
     for key in sorted(wanted.keys() | given.keys()):
+        if key in OPTIONAL_STREAMS - given.keys():
+            continue
         missing = set(wanted.get(key, ())) - given.get(key, set())
         unread = given.get(key, set()) - set(wanted.get(key, ()))
         if missing:

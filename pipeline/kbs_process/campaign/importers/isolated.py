@@ -27,6 +27,8 @@ from kbs_process.errors import KbsError, RecordingError
 LIBRARIES = {"parquet": "pyarrow", "hdf5": "h5py", "tdms": "nptdms", "mdf": "asammdf"}
 MODULE = "kbs_process.campaign.importers.isolated"
 SILENCE_S = 300.0  # a child that sends nothing for so long hangs
+DATA_FLOOR = 1 << 30  # bytes that a file of any size may expand to
+DATA_BY_SIZE = 1000  # and so many times its size: the best that compression makes of constants
 MEMORY_FLOOR = 4 << 30  # bytes of address space; the libraries themselves take less than one quarter of it
 MEMORY_BY_SIZE = 8  # and so many times the file's size
 
@@ -52,12 +54,20 @@ class IsolatedTable:
             raise RecordingError("holds no column of numbers", where=str(path))
 
     def chunks(self, names: Sequence[str]) -> Iterator[tuple[Cells, ...]]:
+        left = DATA_FLOOR + DATA_BY_SIZE * self.path.stat().st_size
         with self._child(names) as child:
             while True:
                 received = [_receive(child) for _ in names]
                 cells = tuple(one for one in received if one is not None)
                 if len(cells) < len(names):
                     return  # the end; if it came too soon, leaving the context raises
+                left -= sum(one.nbytes for one in cells)
+                if left < 0:
+                    raise RecordingError(
+                        "declares far more samples than a file of its size can hold",
+                        where=str(self.path),
+                        remedy="export it again; what it declares was not recorded",
+                    )
                 yield cells
 
     @contextmanager
