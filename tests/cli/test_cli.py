@@ -290,7 +290,7 @@ def test_an_interrupted_simulation_leaves_the_old_one(folder: CampaignFolder, tm
     target = tmp_path / "simulated"
     target.mkdir()
     (target / "provenance.json").write_text("old")
-    (tmp_path / "long.csv").write_text("t,az,el\n0,0,1.3\n1,0,1.3\n200000,0,1.31\n")
+    (tmp_path / "long.csv").write_text("t,az,el\n0,0,1.3\n1,0,1.3\n20000,0,1.31\n")
     command = [sys.executable, "-m", "kbs_process", "simulate", str(folder.path), "-o", str(target)]
     process = subprocess.Popen(
         [*command, "--command", str(tmp_path / "long.csv")],
