@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from kbs_process.signals import frames, spatial
 from scipy.spatial.transform import Rotation
+
+from kbs_process.signals import frames, spatial
 
 vectors = arrays(float, 3, elements=st.floats(-3, 3))
 sixes = arrays(float, 6, elements=st.floats(-10, 10))

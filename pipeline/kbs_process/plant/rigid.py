@@ -11,7 +11,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from kbs_process.rig.model import LAB, TRANSDUCER, Rig
-from kbs_process.signals.frames import about_axis, from_rotation_vector, from_tilt, from_xyz, rotate
+from kbs_process.signals.frames import (
+    about_axis,
+    cross,
+    from_rotation_vector,
+    from_tilt,
+    from_xyz,
+    rotate,
+    skew,
+)
 from kbs_process.signals.records import Array
 
 INERTIAL = ("m", "mcx", "mcy", "mcz", "Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz")
@@ -34,17 +42,15 @@ def inverse_dynamics(rig: Rig, q: Array, qd: Array, qdd: Array, *, sag: bool = T
 
     `q`, `qd`, `qdd` (n, joints) are the joints' true angles and their rates, in the order of `rig.joints`. At rest
     and level F = (0, 0, -weight). With `sag` an elastic transducer deflects quasi-statically, its angles
-    being K^-1 times the torque, about x, then y, then z; its own rates are left out (valid well below
-    its resonance). Rotors turn with `ratio` times their joint's rate on top of their carrier's rotation.
+    being K^-1 times the torque, about x, then y, then z, and gravity turns in it; the deflection's own rates are
+    left out (valid well below its resonance). Rotors turn with `ratio` times their joint's rate, on top of
+    their carrier's rotation.
     """
-    angles = np.zeros((len(q), 3))
-    wrench = _wrench(rig, kinematics(rig, q, qd, qdd, angles))
+    links = kinematics(rig, q, qd, qdd)
+    wrench = _wrench(rig, links)
     if not sag or rig.transducer.stiffness is None:
         return wrench
-    stiffness = rig.transducer.stiffness.value
-    for _ in range(_SAG_ROUNDS):
-        wrench = _wrench(rig, kinematics(rig, q, qd, qdd, wrench[:, 3:] / stiffness))
-    return wrench
+    return _sagged(wrench, rig, links, rig.transducer.stiffness.value)
 
 
 def static_wrench(rig: Rig, q: Array, *, sag: bool = True) -> Array:
@@ -58,15 +64,14 @@ def regressor(rig: Rig, q: Array, qd: Array, qdd: Array) -> Array:
 
     theta stacks (m, m c, I) of each body, `INERTIAL`: I about the link's origin, in the link's axes.
     """
-    links = kinematics(rig, q, qd, qdd, np.zeros((len(q), 3)))
+    links = kinematics(rig, q, qd, qdd)
     beyond = links_beyond(rig)
     T = links[TRANSDUCER]
     Y = np.zeros((len(q), 6, 10 * len(rig.bodies)))
     for index, body in enumerate(rig.bodies):
         if body.on in beyond:
             force, moment = _link_regressor(links[body.on])
-            lever = (links[body.on].r - T.r)[:, :, None]
-            moment = moment + np.cross(lever, force, axis=1)
+            moment = moment + skew(links[body.on].r - T.r) @ force
             columns = slice(10 * index, 10 * index + 10)
             Y[:, :3, columns] = np.swapaxes(T.R, 1, 2) @ force
             Y[:, 3:, columns] = np.swapaxes(T.R, 1, 2) @ moment
@@ -98,8 +103,8 @@ def links_beyond(rig: Rig) -> frozenset[str]:
     return frozenset(beyond)
 
 
-def kinematics(rig: Rig, q: Array, qd: Array, qdd: Array, deflection: Array) -> dict[str, LinkMotion]:
-    """Motion of every link; `deflection` (n, 3) rad turns T on what carries it."""
+def kinematics(rig: Rig, q: Array, qd: Array, qdd: Array) -> dict[str, LinkMotion]:
+    """Motion of every link, the transducer not deflected."""
     n = len(q)
     upward = np.broadcast_to([0.0, 0.0, float(rig.gravity)], (n, 3))
     still = np.zeros((n, 3))
@@ -107,7 +112,7 @@ def kinematics(rig: Rig, q: Array, qd: Array, qdd: Array, deflection: Array) -> 
 
     def place_transducer(carrier: str) -> None:
         base = links[carrier]
-        R = base.R @ from_tilt(rig.transducer.tilt.value) @ from_xyz(deflection)
+        R = base.R @ from_tilt(rig.transducer.tilt.value)
         links[TRANSDUCER] = LinkMotion(R, base.r, base.omega, base.alpha, base.accel)
 
     if rig.transducer.on == LAB:
@@ -123,7 +128,7 @@ def kinematics(rig: Rig, q: Array, qd: Array, qdd: Array, deflection: Array) -> 
             R=parent.R @ R_J @ about_axis(axis, q[:, index]),
             r=parent.r + d,
             omega=parent.omega + rate,
-            alpha=parent.alpha + e * qdd[:, index, None] + np.cross(parent.omega, rate),
+            alpha=parent.alpha + e * qdd[:, index, None] + cross(parent.omega, rate),
             accel=_accel_at(parent, d),
         )
         if rig.transducer.on == joint.name:
@@ -133,7 +138,7 @@ def kinematics(rig: Rig, q: Array, qd: Array, qdd: Array, deflection: Array) -> 
 
 def _accel_at(link: LinkMotion, d: Array) -> Array:
     """Acceleration of the link's point at `d` (n, 3) from its origin."""
-    accel: Array = link.accel + np.cross(link.alpha, d) + np.cross(link.omega, np.cross(link.omega, d))
+    accel: Array = link.accel + cross(link.alpha, d) + cross(link.omega, cross(link.omega, d))
     return accel
 
 
@@ -148,12 +153,34 @@ def _wrench(rig: Rig, links: dict[str, LinkMotion]) -> Array:
         c = rotate(link.R, body.cog.value)
         F = -float(body.mass) * _accel_at(link, c)
         I_link = link.R @ inertia_matrix(body.inertia.value) @ np.swapaxes(link.R, 1, 2)
-        spin = rotate(I_link, link.alpha) + np.cross(link.omega, rotate(I_link, link.omega))
+        spin = rotate(I_link, link.alpha) + cross(link.omega, rotate(I_link, link.omega))
         force += F
-        moment += np.cross(link.r + c - T.r, F) - spin
+        moment += cross(link.r + c - T.r, F) - spin
     moment += _rotors(rig, links, beyond)
     R_TL = np.swapaxes(T.R, 1, 2)
     return np.concatenate([rotate(R_TL, force), rotate(R_TL, moment)], axis=1)
+
+
+def _sagged(wrench: Array, rig: Rig, links: dict[str, LinkMotion], stiffness: Array) -> Array:
+    """The wrench once T has given way: in T's axes all is as before but the field of gravity, which turned.
+
+    F changes by -m da and M by -(sum m c) x da, da the change of T's apparent acceleration. Exact for a transducer
+    that stands in the laboratory; on a turning joint the carrier's rotation is taken in the old axes.
+    """
+    T, beyond = links[TRANSDUCER], links_beyond(rig)
+    mass, first_moment = 0.0, np.zeros_like(T.r)
+    for body in rig.bodies:
+        if body.on in beyond:
+            link = links[body.on]
+            mass += float(body.mass)
+            first_moment += float(body.mass) * (link.r + rotate(link.R, body.cog.value) - T.r)
+    R_TL = np.swapaxes(T.R, 1, 2)
+    first_moment, accel = rotate(R_TL, first_moment), rotate(R_TL, T.accel)
+    sagged = wrench
+    for _ in range(_SAG_ROUNDS):
+        turned = rotate(np.swapaxes(from_xyz(sagged[:, 3:] / stiffness), 1, 2), accel) - accel
+        sagged = wrench - np.concatenate([mass * turned, cross(first_moment, turned)], axis=1)
+    return sagged
 
 
 def _rotors(rig: Rig, links: dict[str, LinkMotion], beyond: frozenset[str]) -> Array:
@@ -169,7 +196,7 @@ def _rotors(rig: Rig, links: dict[str, LinkMotion], beyond: frozenset[str]) -> A
         acceleration = _along(link.alpha - carrier.alpha, e)
         spin = _along(carrier.omega, e) + ratio * rate
         spin_rate = _along(carrier.alpha, e) + ratio * acceleration
-        moment -= Jr * (spin_rate * e + spin * np.cross(carrier.omega, e))
+        moment -= Jr * (spin_rate * e + spin * cross(carrier.omega, e))
     return moment
 
 
@@ -185,10 +212,10 @@ def _link_regressor(link: LinkMotion) -> tuple[Array, Array]:
     n = len(a)
     force, moment = np.zeros((n, 3, 10)), np.zeros((n, 3, 10))
     for column, unit in enumerate(np.eye(3), start=1):
-        force[:, :, column] = -(np.cross(alpha, unit) + np.cross(w, np.cross(w, unit)))
-        moment[:, :, column] = -np.cross(unit, a)
+        force[:, :, column] = -(cross(alpha, unit) + cross(w, cross(w, unit)))
+        moment[:, :, column] = -cross(unit, a)
     force[:, :, 0] = -a
     for column, unit in enumerate(np.eye(6), start=4):
         element = inertia_matrix(unit)
-        moment[:, :, column] = -(alpha @ element + np.cross(w, w @ element))
+        moment[:, :, column] = -(alpha @ element + cross(w, w @ element))
     return link.R @ force, link.R @ moment

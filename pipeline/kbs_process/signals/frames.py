@@ -44,7 +44,9 @@ def to_rotation_vector(R: Array) -> Array:
     trace = np.trace(R, axis1=-2, axis2=-1)
     K = np.empty((*R.shape[:-2], 4, 4))
     K[..., 0, 0] = 1.0 + trace
-    off = np.stack([R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]], -1)
+    off = np.stack(
+        [R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]], -1
+    )
     K[..., 0, 1:] = K[..., 1:, 0] = off
     K[..., 1:, 1:] = R + np.swapaxes(R, -1, -2) + (1.0 - trace)[..., None, None] * np.eye(3)
     best = np.argmax(np.diagonal(K, axis1=-2, axis2=-1), axis=-1)
@@ -79,3 +81,11 @@ def rotate(R: Array, a: Array) -> Array:
     """R @ a for stacks of matrices (..., 3, 3) and vectors (..., 3)."""
     b: Array = np.einsum("...ij,...j->...i", R, a)
     return b
+
+
+def cross(a: Array, b: Array) -> Array:
+    """a x b over the last axis, broadcasting; several times faster than numpy's general one."""
+    a0, a1, a2 = a[..., 0], a[..., 1], a[..., 2]
+    b0, b1, b2 = b[..., 0], b[..., 1], b[..., 2]
+    product: Array = np.stack([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0], axis=-1)
+    return product

@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from kbs_process.signals.frames import rotate, skew
+from kbs_process.signals.frames import cross, rotate, skew
 from kbs_process.signals.records import Array
 
 
 def transform_wrench(wrench: Array, R_GT: Array, r_GT: Array) -> Array:
     """The same wrench about G's origin in G's axes: F' = R F, M' = R M + r x F'; (..., 6) N, N m."""
     force = rotate(R_GT, wrench[..., :3])
-    moment = rotate(R_GT, wrench[..., 3:]) + np.cross(r_GT, force)
+    moment = rotate(R_GT, wrench[..., 3:]) + cross(r_GT, force)
     return np.concatenate([force, moment], axis=-1)
 
 
@@ -25,7 +25,7 @@ def transform_twist(twist: Array, R_GT: Array, r_GT: Array) -> Array:
     Power is invariant: transform_wrench(w) . transform_twist(v) = w . v.
     """
     omega = rotate(R_GT, twist[..., 3:])
-    velocity = rotate(R_GT, twist[..., :3]) + np.cross(r_GT, omega)
+    velocity = rotate(R_GT, twist[..., :3]) + cross(r_GT, omega)
     return np.concatenate([velocity, omega], axis=-1)
 
 

@@ -1,0 +1,1 @@
+"""Estimation: parameters from data and prior knowledge, with their covariance and named checks."""

@@ -1,0 +1,259 @@
+"""Maximum a posteriori least squares: Levenberg-Marquardt on whitened residuals with Gaussian priors.
+
+theta = argmin |r(theta)|^2 + sum(((theta - theta_0) / sigma_0)^2), r whitened by the caller. The covariance is the
+greater of the model's H^-1 (right where residuals are white with unit variance) and the sandwich H^-1 (S + P) H^-1,
+with S the long-run covariance of the scores, which holds for residuals of any colour.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import lstsq, qr
+
+from kbs_process.errors import FitError
+from kbs_process.estimation.longrun import longrun_covariance
+from kbs_process.signals.records import Array
+
+Residual = Callable[[Array], Array]
+_MAX_ITERATIONS = 60
+_LARGEST_DAMPING = 1e12
+_GAIN = 1e-10  # of the cost: an iteration that gains less ends the search
+_MOVE = 1e-7  # of the parameters' scales, likewise
+_SINGULAR = 1e-11  # of the greatest singular value, columns scaled to unit length
+_WEAK = 0.9  # posterior over prior sigma from which the data say little
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Parameters:
+    """What is fitted: start values that are also the prior's mean, and its sigma (inf: no prior)."""
+
+    names: tuple[str, ...]
+    value: Array  # (p,)
+    sigma: Array  # (p,) > 0
+    lower: Array | None = None  # (p,)
+    upper: Array | None = None  # (p,)
+
+    @property
+    def scale(self) -> Array:
+        """A step of each parameter that matters: its prior sigma, else its size, else 1."""
+        size = np.where(self.value != 0.0, np.abs(self.value), 1.0)
+        scale: Array = np.where(np.isfinite(self.sigma), self.sigma, size)
+        return scale
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """One named question put to a fit, and its answer in words."""
+
+    name: str
+    passed: bool
+    detail: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fit:
+    """Estimates with their covariance; `checks` say what is wrong with them, if anything."""
+
+    names: tuple[str, ...]
+    value: Array  # (p,)
+    sigma: Array  # (p,)
+    covariance: Array  # (p, p)
+    prior_sigma: Array  # (p,)
+    checks: tuple[Check, ...]
+    residual_rms: float  # of the whitened residual: 1 where the weights are right
+    dof: int  # samples less parameters
+    iterations: int
+
+    @property
+    def ok(self) -> bool:
+        return all(check.passed for check in self.checks)
+
+    def __getitem__(self, name: str) -> float:
+        return float(self.value[self.names.index(name)])
+
+
+def fit_map(
+    residual: Residual,
+    parameters: Parameters,
+    *,
+    jacobian: Callable[[Array], Array] | None = None,
+    series: Sequence[tuple[int, int]] | None = None,
+    start: Array | None = None,
+) -> Fit:
+    """Fit `parameters` to a residual (n,) that is measured less modelled over its standard deviation.
+
+    `series` says how the residual is laid out: (samples, channels) of each independent stretch of uniformly
+    sampled data, row-major, in order; without it residuals are taken as white. The search begins at `start`, or
+    at the prior's mean. Raises FitError where data and prior leave a combination of parameters undetermined,
+    and names it.
+    """
+    gradient = jacobian or (lambda theta: difference_jacobian(residual, theta, parameters.scale))
+    begin = parameters.value if start is None else start
+    theta, iterations, converged = _minimise(residual, gradient, parameters, begin)
+    r, J = residual(theta), gradient(theta)
+    precision = parameters.sigma**-2.0
+    H_inverse = _inverse(J, precision, parameters)
+    covariance = H_inverse
+    if series is not None:
+        S = longrun_covariance(r[:, None] * J, series) + np.diag(precision)
+        covariance = _at_least(H_inverse @ S @ H_inverse, H_inverse)
+    sigma = np.sqrt(np.diag(covariance))
+    checks = (
+        Check("converged", converged, f"{iterations} iterations"),
+        _bounds_check(theta, parameters),
+        _identifiable_check(J, sigma, covariance, parameters),
+    )
+    return Fit(
+        names=parameters.names,
+        value=theta,
+        sigma=sigma,
+        covariance=covariance,
+        prior_sigma=parameters.sigma,
+        checks=checks,
+        residual_rms=float(np.sqrt(np.mean(r**2))),
+        dof=len(r) - len(theta),
+        iterations=iterations,
+    )
+
+
+def difference_jacobian(residual: Residual, theta: Array, scale: Array) -> Array:
+    """Central differences with steps of 1e-3 of `scale`: (n, p)."""
+    columns = []
+    for index, size in enumerate(scale):
+        step = np.zeros_like(theta)
+        step[index] = 1e-3 * size
+        columns.append((residual(theta + step) - residual(theta - step)) / (2.0 * step[index]))
+    return np.stack(columns, axis=1)
+
+
+def _minimise(
+    residual: Residual, gradient: Callable[[Array], Array], parameters: Parameters, start: Array
+) -> tuple[Array, int, bool]:
+    root = 1.0 / parameters.sigma
+    low = -np.inf if parameters.lower is None else parameters.lower
+    high = np.inf if parameters.upper is None else parameters.upper
+
+    def augmented(theta: Array) -> Array:
+        return np.concatenate([residual(theta), (theta - parameters.value) * root])
+
+    theta = np.clip(start, low, high)
+    scale = parameters.scale
+    misfit = augmented(theta)
+    cost, damping = _cost(misfit), 0.0
+    for iteration in range(1, _MAX_ITERATIONS + 1):
+        # One QR carries the normal equations of all samples into a triangle of the parameters' size.
+        A = np.column_stack([np.vstack([gradient(theta), np.diag(root)]) * scale, -misfit])
+        triangle = _triangle(A)
+        R, rhs = triangle[:, :-1], triangle[:, -1]
+        if iteration == 1:
+            _refuse_singular(R, parameters.names)
+        while True:
+            damped = np.vstack([R, np.sqrt(damping) * np.diag(np.linalg.norm(R, axis=0))])
+            step = lstsq(damped, np.concatenate([rhs, np.zeros(len(theta))]))[0] * scale
+            candidate = np.clip(theta + step, low, high)
+            candidate_misfit = augmented(candidate)
+            new = _cost(candidate_misfit)
+            if new <= cost or damping > _LARGEST_DAMPING:
+                break
+            damping = max(10.0 * damping, 1e-6)
+        moved = float(np.linalg.norm((candidate - theta) / scale))
+        gained = cost - new
+        if gained > 0.0:
+            theta, cost, misfit = candidate, new, candidate_misfit
+        damping = 0.0 if damping <= 1e-6 else damping / 10.0
+        if gained <= _GAIN * cost or moved < _MOVE:
+            return theta, iteration, True
+    return theta, _MAX_ITERATIONS, False
+
+
+def _cost(r: Array) -> float:
+    cost = float(r @ r)
+    return cost if np.isfinite(cost) else np.inf
+
+
+def _triangle(A: Array) -> Array:
+    """R of A = Q R."""
+    R: Array = qr(A, mode="r", overwrite_a=True, check_finite=False)[0][: A.shape[1]]
+    return R
+
+
+def _inverse(J: Array, precision: Array, parameters: Parameters) -> Array:
+    scale = parameters.scale
+    R = _triangle(np.vstack([J, np.diag(np.sqrt(precision))]) * scale)
+    _refuse_singular(R, parameters.names)
+    _, s, Vt = np.linalg.svd(R)
+    root = Vt.T / s * scale[:, None]
+    inverse: Array = np.asarray(root @ root.T, dtype=np.float64)
+    return inverse
+
+
+def _refuse_singular(R: Array, names: tuple[str, ...]) -> None:
+    length = np.linalg.norm(R, axis=0)
+    dead = [name for name, size in zip(names, length, strict=True) if size == 0.0]
+    if dead:
+        raise FitError(
+            f"the recordings say nothing about {', '.join(dead)}", remedy="give it a prior, or leave it out"
+        )
+    _, s, Vt = np.linalg.svd(R / length)
+    if s[-1] > _SINGULAR * s[0]:
+        return
+    terms = combination(Vt[-1] / length, names)
+    raise FitError(
+        f"these recordings cannot tell these parameters apart: {terms}",
+        remedy="add a recording that moves them differently, give one of them a prior, or leave it out",
+    )
+
+
+def combination(direction: Array, names: tuple[str, ...]) -> str:
+    """The combination of parameters along a direction in words, greatest terms first."""
+    scaled = direction / np.abs(direction).max()
+    order = [index for index in np.argsort(-np.abs(scaled)) if abs(scaled[index]) > 0.05]
+    return " ".join(f"{scaled[index]:+.3g} {names[index]}" for index in order[:6])
+
+
+def _at_least(sandwich: Array, model: Array) -> Array:
+    """`sandwich`, stretched where its variances are below those of `model`: few samples flatter it."""
+    stretch = np.sqrt(np.maximum(1.0, np.diag(model) / np.maximum(np.diag(sandwich), 1e-300)))
+    covariance: Array = sandwich * np.outer(stretch, stretch)
+    return covariance
+
+
+def _bounds_check(theta: Array, parameters: Parameters) -> Check:
+    stuck = [
+        name
+        for name, value, low, high in zip(
+            parameters.names,
+            theta,
+            np.full_like(theta, -np.inf) if parameters.lower is None else parameters.lower,
+            np.full_like(theta, np.inf) if parameters.upper is None else parameters.upper,
+            strict=True,
+        )
+        if value <= low or value >= high
+    ]
+    return Check(
+        "within bounds", not stuck, f"at a bound: {', '.join(stuck)}" if stuck else "none at a bound"
+    )
+
+
+def _identifiable_check(J: Array, sigma: Array, covariance: Array, parameters: Parameters) -> Check:
+    """Which estimates are little more than their prior, and with which other parameter each is confused.
+
+    Information is that of the data alone: a parameter is weak where sigma posterior / sigma prior > 0.9.
+    """
+    correlation = covariance / np.outer(sigma, sigma) - np.eye(len(sigma))
+    informed = np.linalg.norm(J, axis=0)
+    weak = []
+    for index, name in enumerate(parameters.names):
+        prior = parameters.sigma[index]
+        if not np.isfinite(prior) or sigma[index] < _WEAK * prior:
+            continue
+        if informed[index] * prior < 0.5 or len(sigma) == 1:
+            weak.append(f"{name} (no effect on these recordings)")
+        else:
+            partner = int(np.argmax(np.abs(correlation[index])))
+            weak.append(f"{name} (confused with {parameters.names[partner]})")
+    detail = "prior only: " + ", ".join(weak) if weak else "the data inform every parameter"
+    return Check("identifiable", not weak, detail)

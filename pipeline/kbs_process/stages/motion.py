@@ -1,0 +1,201 @@
+"""Joint angles, rates and accelerations from what a rig records: encoder, command, or a measured rate.
+
+A slow joint's encoder repeats one code for many samples: its error is then no noise that a filter averages, and gravity
+turns it into a torque error. The command is smooth but is not where the joint is. The two together,
+q = command + lowpass(encoder - command), keep the command's smoothness above the corner of that low-pass and the
+encoder's truth below; the corner is the one with the least estimated error.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from kbs_process.errors import RecordingError
+from kbs_process.rig.model import Joint, Rig
+from kbs_process.signals.records import Array, Events, Mask, Run, Signal
+from kbs_process.signals.smoothing import kernel_length, smooth
+
+Source = Literal["auto", "encoder", "command+encoder", "rate"]
+_CORNERS = (0.05, 0.1, 0.2, 0.5)  # Hz, of the low-pass on encoder - command
+_PHASES = (0.0, 0.25, 0.5, 0.75)  # of an encoder code, over which its rounding error is averaged
+_OVERSAMPLING = 5  # encoder samples to one of the working rate, where its own rate is not known
+
+
+@dataclass(frozen=True, slots=True)
+class MotionSettings:
+    """`band_Hz`: angles are low-passed there (see `signals.smoothing`) before they are differentiated."""
+
+    band_Hz: float = 2.0
+    source: Source = "auto"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Motion:
+    """Angles of the joints, in the order of the rig's joints, nominal encoder offsets taken off."""
+
+    t0: float  # s
+    dt: float  # s
+    q: Array  # (n, joints) rad
+    qd: Array  # (n, joints) rad/s
+    qdd: Array  # (n, joints) rad/s^2
+    sigma_q: Array  # (n, joints) rad
+    offset: Array  # (joints,) rad, taken off the encoders' readings
+    valid: Mask  # (n,)
+    history: tuple[str, ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.q)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Angle:
+    q: Array  # (n,) not yet low-passed
+    sigma: Array  # (n,)
+    how: str
+
+
+def estimate(run: Run, rig: Rig, settings: MotionSettings = MotionSettings()) -> Motion:
+    """Estimate the motion of every joint of `rig` over the run's time grid.
+
+    Derivatives are exact for band-limited motion up to `band_Hz`; within 2.5 / band_Hz of the ends they rest on a
+    straight continuation. `sigma_q` holds rounding and the part of the real motion that a source misses.
+    Raises RecordingError where a joint has neither angle nor rate.
+    """
+    grid = run.angle or run.rate
+    if grid is None:
+        raise RecordingError(
+            f"recording {run.name} has neither angles nor rates of the joints",
+            remedy="name the encoder's topic in campaign.toml",
+        )
+    angles = [_joint_angle(run, joint, settings) for joint in rig.joints]
+    q = np.stack([angle.q for angle in angles], axis=1)
+    offset = np.array([_offset(joint) for joint in rig.joints])
+    return Motion(
+        t0=grid.t0,
+        dt=grid.dt,
+        q=smooth(q, grid.dt, settings.band_Hz) - offset,
+        qd=smooth(q, grid.dt, settings.band_Hz, derivative=1),
+        qdd=smooth(q, grid.dt, settings.band_Hz, derivative=2),
+        sigma_q=np.stack([angle.sigma for angle in angles], axis=1),
+        offset=offset,
+        valid=grid.valid,
+        history=(
+            *(f"{joint.name}: {angle.how}" for joint, angle in zip(rig.joints, angles, strict=True)),
+            f"angles low-passed at {settings.band_Hz:g} Hz and differentiated",
+        ),
+    )
+
+
+def _offset(joint: Joint) -> float:
+    return 0.0 if joint.encoder is None else float(joint.encoder.offset)
+
+
+def _joint_angle(run: Run, joint: Joint, settings: MotionSettings) -> _Angle:
+    measured = _column(run.angle, joint.name)
+    rate = _column(run.rate, joint.name)
+    source = settings.source
+    if source == "rate" or (source == "auto" and measured is None):
+        if rate is None or run.rate is None:
+            raise RecordingError(f"recording {run.name} has neither angle nor rate of joint '{joint.name}'")
+        return _integrated(rate, run.rate.dt, settings.band_Hz)
+    if measured is None or run.angle is None:
+        raise RecordingError(f"recording {run.name} has no angle of joint '{joint.name}'")
+    commanded = None if run.command is None else _at(run.command, joint.name, run.angle.t)
+    encoder_rate = run.rates.get("angle", _OVERSAMPLING / run.angle.dt)
+    step = 0.0 if joint.encoder is None else float(joint.encoder.step)
+    if source == "encoder" or commanded is None:
+        return _from_encoder(measured, run.angle.dt, step, encoder_rate, settings.band_Hz)
+    return _from_both(measured, commanded, run.angle.dt, step, encoder_rate, settings)
+
+
+def _column(signal: Signal | None, channel: str) -> Array | None:
+    return None if signal is None or channel not in signal.channels else signal.column(channel)
+
+
+def _at(events: Events, channel: str, t: Array) -> Array | None:
+    """The command at the grid's times: linear between cycles, as the motor's field moves; held at the ends."""
+    if channel not in events.channels or len(events.t) < 2:
+        return None
+    at: Array = np.interp(t, events.t, events.values[:, events.channels.index(channel)])
+    return at
+
+
+def _integrated(rate: Array, dt: float, band: float) -> _Angle:
+    """Trapezoidal integral from zero; its error is the random walk of the noise that the band takes off."""
+    q = np.concatenate([[0.0], np.cumsum(0.5 * dt * (rate[1:] + rate[:-1]))])
+    noise = float(np.std(rate - smooth(rate, dt, band)))
+    return _Angle(q, noise * dt * np.sqrt(np.arange(len(q))), "integral of the measured rate")
+
+
+def _from_encoder(measured: Array, dt: float, step: float, encoder_rate: float, band: float) -> _Angle:
+    motion = smooth(measured, dt, band)
+    sigma = rounding_error(motion, dt, step, encoder_rate, band)
+    return _Angle(measured, sigma, f"encoder alone, sigma {_rms(sigma):.2g} rad")
+
+
+def _from_both(
+    measured: Array, commanded: Array, dt: float, step: float, encoder_rate: float, settings: MotionSettings
+) -> _Angle:
+    """Choose the corner with the least of (rounding error below it) + (real deviation lost above it).
+
+    What is lost is the in-band power of encoder - command above the corner, less the rounding error's own there.
+    """
+    band = settings.band_Hz
+    commanded = commanded - _lag(measured, commanded, dt, band) * smooth(commanded, dt, band, derivative=1)
+    motion = commanded + smooth(measured - commanded, dt, band)
+    in_band = rounding_error(motion, dt, step, encoder_rate, band)
+    deviation = smooth(measured - commanded, dt, band)
+    best = _from_encoder(measured, dt, step, encoder_rate, band)
+    least = np.inf if settings.source == "command+encoder" else _rms(best.sigma)
+    for corner in _CORNERS:
+        if corner >= band or kernel_length(corner, dt) > len(measured) // 2:
+            continue
+        slow = smooth(measured - commanded, dt, corner)
+        rounding = rounding_error(motion, dt, step, encoder_rate, corner)
+        lost = _rms(deviation - slow) ** 2 - max(_rms(in_band) ** 2 - _rms(rounding) ** 2, 0.0)
+        sigma = np.sqrt(rounding**2 + max(lost, 0.0))
+        if _rms(sigma) < least:
+            least = _rms(sigma)
+            how = f"command and encoder, joined at {corner:g} Hz, sigma {least:.2g} rad"
+            best = _Angle(commanded + slow, sigma, how)
+    return best
+
+
+def _lag(measured: Array, commanded: Array, dt: float, band: float) -> float:
+    """How much later (s) the joint does what the command says: least squares on the command's rate."""
+    rate = smooth(commanded, dt, band, derivative=1)
+    deviation = commanded - measured
+    rate, deviation = rate - rate.mean(), deviation - deviation.mean()
+    power = float(rate @ rate)
+    return float(rate @ deviation) / power if power > 0.0 else 0.0
+
+
+def rounding_error(motion: Array, dt: float, step: float, encoder_rate: float, band: float) -> Array:
+    """Standard deviation (n,) rad of an encoder's rounding error, below `band` Hz, along a known motion (n,).
+
+    The motion is rounded as the encoder would, at its own rate and at four positions within a code, and
+    filtered; the error's square is averaged over those and over a second. A joint at rest keeps
+    step / sqrt(12); one that crosses codes faster than the band loses most of it.
+    """
+    if step == 0.0:
+        return np.zeros_like(motion)
+    factor = max(1, round(encoder_rate * dt))
+    fine_dt = dt / factor
+    fine = np.interp(np.arange((len(motion) - 1) * factor + 1) / factor, np.arange(len(motion)), motion)
+    power = np.zeros(len(motion))
+    for phase in _PHASES:
+        shifted = fine / step + phase
+        power += smooth(step * (np.round(shifted) - shifted), fine_dt, band)[::factor] ** 2
+    power /= len(_PHASES)
+    window = max(1, min(round(1.0 / dt), len(motion)))
+    kernel = np.ones(window) / window
+    weight = np.convolve(np.ones(len(motion)), kernel, mode="same")
+    sigma: Array = np.sqrt(np.convolve(power, kernel, mode="same") / weight)
+    return sigma
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))
