@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from kbs_process.plant.effect import Port
 from kbs_process.plant.loop import LOOP
-from kbs_process.plant.multibody import joint_offset, multibody_text, unrolled
+from kbs_process.plant.multibody import carrier, joint_offset, multibody_text, unrolled
 from kbs_process.plant.structure import DRIVE, MICROSTEP, RATIO, ROTOR, Structure
 
 ROTOR_STEPS = 2
@@ -68,8 +68,8 @@ def _head(structure: Structure) -> list[str]:
         "import numpy as np",
         "from numba import njit",
         "from kbs_process.plant.kernels import (",
-        "    add3, add6, add_inertia, chain, compiled, cross_force, cross_motion, dot3, dot6, drift,",
-        "    in_plate, inertia, joint_rotation, mean_rounded, momentum, placed, plate_moment, plate_rates,",
+        "    add3, add6, add_inertia, chain, compiled, cross3, cross_force, cross_motion, dot3, dot6,",
+        "    drift, in_plate, inertia, joint_rotation, mean_rounded, momentum, placed, plate_moment, plate_rates,",
         "    relaxation, rotate, rotor_moment, screw, triple,",
         ")",
         *[
@@ -130,8 +130,8 @@ def _rotor(structure: Structure) -> list[str]:
         "):",
         '    """Rotor angle, spin, mean torque on the output and the effects\' states at the end of a step.',
         "",
-        "    `carrier` is the carrier's rate about the rotor's axis at the step's start, `q` the output's",
-        "    angle at its middle, `qd` its rate at the start; `field_0` and `field_1` are in microsteps.",
+        "    `carrier` is the carrier's rate about the rotor's axis, `q` and `qd` the output's angle and rate,",
+        "    all in the middle of the step; `field_0` and `field_1` are in microsteps.",
         '    """',
         f"    h = H / {ROTOR_STEPS}",
         f"    ratio = p[k + {RATIO}]",
@@ -141,19 +141,19 @@ def _rotor(structure: Structure) -> list[str]:
         "    output = 0.0",
         *[f"    {n} = z[{i}]\n    {d} = zd[{i}]" for i, (n, d) in enumerate(zip(names, rates, strict=True))],
         f"    for i in range({ROTOR_STEPS}):",
-        "        since = (i + 0.5) * h",
-        "        angle = q + (since - 0.5 * H) * (qd + 0.5 * H * qdd)",
-        "        rate = qd + since * qdd",
-        "        w = spin - carrier - i * h * carrier_rate",
+        "        off = (i + 0.5) * h - 0.5 * H",
+        "        angle = q + off * qd",
+        "        rate = qd + off * qdd",
+        "        w = spin - carrier - (off - 0.5 * h) * carrier_rate",
         "        mid = theta + 0.5 * h * w",
         "        field = mean_rounded(field_0 + i * slope, field_0 + (i + 1) * slope) / per_rad",
         f"        state = {here}",
         f"        {force} = drive(",
-        f"            field, mid, w, angle, rate, ratio, time + since, state, p, k + {DRIVE}",
+        f"            field, mid, w, angle, rate, ratio, time + off, state, p, k + {DRIVE}",
         "        )",
         # A difference: effects need no derivatives, and the compiler shares what does not depend on w.
         f"        {ahead} = drive(",
-        f"            field, mid, w + 1e-6, angle, rate, ratio, time + since, state, p, k + {DRIVE}",
+        f"            field, mid, w + 1e-6, angle, rate, ratio, time + off, state, p, k + {DRIVE}",
         "        )",
         "        torque = motor - gear / ratio",
         "        damping = (motor_1 - gear_1 / ratio - torque) / 1e-6",
@@ -164,7 +164,7 @@ def _rotor(structure: Structure) -> list[str]:
         # The output feels the gear at the mean rate of the sub-step.
         "        output += gear + joint + (gear_1 + joint_1 - gear - joint) / 1e-6 * 0.5 * (after - w)",
         "        theta = mid + 0.5 * h * after",
-        "        spin = after + carrier + (i + 1) * h * carrier_rate",
+        "        spin = after + carrier + (off + 0.5 * h) * carrier_rate",
         *[f"        {n} += h * {d}" for n, d in zip(names, rates, strict=True)],
         f"    return {', '.join(['theta', 'spin', f'output / {ROTOR_STEPS}', *names, *rates])}",
         "",
@@ -188,25 +188,25 @@ def _step(structure: Structure) -> list[str]:
         '    """Advance the state `x` by H; return the wrench in the middle of the step, force first."""',
         "    half = 0.5 * H",
         f"    rate_0 = {vector('omega')}",
-        f"    rated_0 = {vector('omegad')}",
+        f"    omegad_T = {vector('omegad')}",
         f"    alpha_0 = {vector('alpha')}",
         "    alpha = drift(alpha_0, plate_rates(alpha_0, rate_0), half)",
-        "    omega = drift(rate_0, rated_0, half)",
+        "    omega = omega_T = drift(rate_0, omegad_T, half)",
     ]
     for j in range(n):
         lines += [
-            f"    start_{j} = {at('qd', j)}",
-            f"    q_{j} = {at('q', j)} + half * start_{j}",
-            f"    qd_{j} = start_{j} + half * {at('qdd', j)}",
+            f"    q_{j} = {at('q', j)} + half * {at('qd', j)}",
+            f"    qd_{j} = {at('qd', j)} + half * {at('qdd', j)}",
         ]
     lines.append(f"    {unrolled('a_#, S_#, I_#', n)} = place({unrolled('q_#', n)}, p)")
     for j in range(n):
-        terms, rates = [f"dot3(a_{j}, rate_0)"], [f"dot3(a_{j}, rated_0)"]
-        above = structure.parents[j]
-        while above >= 0:
-            terms.append(f"dot3(a_{j}, a_{above}) * start_{above}")
-            rates.append(f"dot3(a_{j}, a_{above}) * {at('qdd', above)}")
-            above = structure.parents[above]
+        c = carrier(structure, j)
+        if j in structure.parents:
+            lines += [
+                f"    omega_{j} = drift(omega_{c}, a_{j}, qd_{j})",
+                f"    turning = drift(omegad_{c}, a_{j}, {at('qdd', j)})",
+                f"    omegad_{j} = drift(turning, cross3(omega_{c}, a_{j}), qd_{j})",
+            ]
         own = range(j * z, (j + 1) * z)
         results = [
             at("theta", j),
@@ -219,8 +219,8 @@ def _step(structure: Structure) -> list[str]:
         lines += [
             f"    spin_{j} = {at('spin', j)}",
             f"    {', '.join(results)} = turn_rotor(",
-            f"        {at('theta', j)}, spin_{j}, {' + '.join(terms)}, {' + '.join(rates)},",
-            f"        q_{j}, start_{j}, {at('qdd', j)}, field_0[{j}], field_1[{j}], time, H,",
+            f"        {at('theta', j)}, spin_{j}, dot3(a_{j}, omega_{c}), dot3(a_{j}, omegad_{c}),",
+            f"        q_{j}, qd_{j}, {at('qdd', j)}, field_0[{j}], field_1[{j}], time + half, H,",
             f"        {_tuple([at('z', i) for i in own])}, {_tuple([at('zd', i) for i in own])}, p, {k},",
             "    )",
             f"    drag_{j} = p[{k + ROTOR}] * ({at('spin', j)} - spin_{j}) / H",

@@ -40,6 +40,12 @@ def dot3(a: Vector, b: Vector) -> float:
 
 
 @compiled
+def cross3(a: Vector, b: Vector) -> Vector:
+    """a x b"""
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+
+
+@compiled
 def add3(a: Vector, b: Vector) -> Vector:
     """a + b"""
     return (a[0] + b[0], a[1] + b[1], a[2] + b[2])

@@ -38,7 +38,8 @@ def multibody_text(structure: Structure) -> list[str]:
     return [*_place(structure), "", "", *_base(structure), "", "", *_accelerate(structure), "", ""]
 
 
-def _carrier(structure: Structure, joint: int) -> str:
+def carrier(structure: Structure, joint: int) -> str:
+    """Return the suffix of the link that carries a joint's motor."""
     parent = structure.parents[joint]
     return "T" if parent < 0 else str(parent)
 
@@ -102,7 +103,7 @@ def _accelerate(structure: Structure) -> list[str]:
         "    F_T = add6(momentum(I_T, A_T), cross_force(V_T, momentum(I_T, V_T)), 1.0)",
     ]
     for j in range(n):
-        c = _carrier(structure, j)
+        c = carrier(structure, j)
         lines += [
             f"    V_{j} = add6(V_{c}, S_{j}, qd_{j})",
             f"    A_{j} = add6(A_{c}, cross_motion(V_{c}, S_{j}), qd_{j})",
@@ -111,10 +112,10 @@ def _accelerate(structure: Structure) -> list[str]:
     lines += [
         f"    F_{c} = add6(F_{c}, rotor_moment(V_{c}, a_{j}, drag_{j}, momentum_{j}), 1.0)"
         for j in range(n)
-        for c in [_carrier(structure, j)]
+        for c in [carrier(structure, j)]
     ]
     for j in reversed(range(n)):
-        c = _carrier(structure, j)
+        c = carrier(structure, j)
         lines += [
             f"    U_{j} = momentum(I_{j}, S_{j})",
             f"    b_{j} = out_{j} - dot6(S_{j}, F_{j})",
