@@ -28,7 +28,7 @@ _ELECTRICAL = np.pi / 64  # electrical angle of a microstep, rad
 
 
 class DriveNumbers(NamedTuple):
-    """One axis's motor and gearbox, SI; symbols as in docs/plant's drive equations."""
+    """One axis's motor and gearbox, SI, in the symbols of the drive equations."""
 
     Jr: float
     R: float
