@@ -65,7 +65,7 @@ def _visit(node: object, path: str, named: bool, depth: int, found: dict[str, Fi
         return
     elif isinstance(node, list) and all(isinstance(item, int | float) or item is None for item in node):
         found.setdefault(path, Field(path, -1, named))
-    elif isinstance(node, int | float):
+    elif isinstance(node, int | float) or node is None:
         found.setdefault(path, Field(path))
 
 
@@ -112,7 +112,8 @@ class JsonDecoder:
             self._read_lists(messages, decoded, absent)
             values[good], missing[good] = decoded, absent
             present |= ~absent.all(axis=0)
-        return Decoded(stamp, values, good, present, int(missing.any(axis=1).sum()))
+        lacking: Mask = np.logical_or.reduce(missing, axis=1)
+        return Decoded(stamp, values, good, present, lacking)
 
     def _stamps(self, messages: list[Any]) -> Stamps:
         assert self._get_stamp is not None

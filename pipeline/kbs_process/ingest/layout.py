@@ -91,7 +91,7 @@ class Decoded:
     values: Array  # (n, c), NaN where missing
     good: Mask  # (n,)
     present: Mask  # (c,), fields that at least one message has
-    lacking: int  # messages that lack a field
+    lacking: Mask  # (n,), messages that lack a field
 
 
 class LayoutDecoder:
@@ -109,15 +109,18 @@ class LayoutDecoder:
         n = len(at)
         stamp, values = log.copy(), np.empty((n, self._columns))
         good, todo = np.ones(n, dtype=np.bool_), np.ones(n, dtype=np.bool_)
-        present, lacking, left = np.zeros(self._columns, dtype=np.bool_), 0, n
+        present, lacking = np.zeros(self._columns, dtype=np.bool_), np.zeros(n, dtype=np.bool_)
+        left = n
 
         def apply(known: Layout, part: slice) -> int:
-            nonlocal lacking, present
+            nonlocal present
+            before = todo[part].copy() if known.lacks.any() else None
             args = (np.uint64(known.length), known.guards, known.clock, known.cells)
             done = decode(buffer, at[part], size[part], *args, todo[part], stamp[part], values[part])
             if done:
                 present |= ~known.lacks
-                lacking += done if known.lacks.any() else 0
+                if before is not None:
+                    lacking[part] |= before & ~todo[part]
             return done
 
         for known in self._layouts:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import count
 
 from kbs_process.ingest.fields import Elements, Field, Step, find_stamp, sibling
 from kbs_process.ingest.framing import MalformedError
@@ -35,7 +36,7 @@ KINDS = {  # descriptor.proto, FieldDescriptorProto.Type -> kind of cell, wire t
     18: (ZIGZAG, WIRE_VARINT),
 }
 DEPTH = 16  # of messages within messages
-LARGEST_EXTENT = 10_000  # numbers of one message
+LARGEST_EXTENT = 10_000  # numbers and messages of one message
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,9 +132,10 @@ def _add_message(found: Descriptors, prefix: str, data: bytes, depth: int) -> No
 def fields_of(root: str, descriptors: Descriptors) -> tuple[Field, ...]:
     """Return every number of the message, repeated ones as one field each."""
     found: list[Field] = []
+    visits = count()
 
     def visit(name: str, prefix: str, depth: int) -> None:
-        if depth > DEPTH or len(found) > LARGEST_EXTENT:
+        if depth > DEPTH or next(visits) + len(found) > LARGEST_EXTENT:
             raise MalformedError(f"{root} contains itself, or too much")
         members = descriptors.get(name)
         if members is None:
@@ -141,8 +143,8 @@ def fields_of(root: str, descriptors: Descriptors) -> tuple[Field, ...]:
         names = any(m.name == "name" and m.type == STRING and m.repeated for m in members.values())
         for member in members.values():
             if member.type in KINDS:
-                count = -1 if member.repeated else None
-                found.append(Field(prefix + member.name, count, names and member.repeated))
+                size = -1 if member.repeated else None
+                found.append(Field(prefix + member.name, size, names and member.repeated))
             elif member.type == MESSAGE and not member.repeated:
                 visit(member.message, f"{prefix}{member.name}.", depth + 1)
 

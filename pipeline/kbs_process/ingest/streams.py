@@ -35,13 +35,13 @@ class Tally:
     counts: dict[str, int] = field(default_factory=dict)
     spans: dict[str, tuple[int, int]] = field(default_factory=dict)
 
-    def add(self, kind: str, log: Stamps, count: int) -> None:
-        """Add `count` messages that lie somewhere in `log`."""
-        if count:
+    def add(self, kind: str, log: Stamps) -> None:
+        """Add the messages with these log times."""
+        if len(log):
             low, high = int(log.min()), int(log.max())
             first, last = self.spans.get(kind, (low, high))
             self.spans[kind] = (min(first, low), max(last, high))
-            self.counts[kind] = self.counts.get(kind, 0) + count
+            self.counts[kind] = self.counts.get(kind, 0) + len(log)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -110,17 +110,18 @@ class Reading:
         if fresh and good.any():
             payload = next(payloads(segment.buffer, at[good], size[good]))
             _require_names(plan, decoded.present.tolist(), payload, self._where)
-        self._tally.add("undecodable", log, int((~good).sum()))
-        self._tally.add("missing field", log, decoded.lacking)
-        values, stamp = decoded.values, decoded.stamp
+        self._tally.add("missing field", log[decoded.lacking])
+        values, stamp, lacking = decoded.values, decoded.stamp, decoded.lacking
         if not good.all():
-            chosen, values, stamp, log = chosen[good], values[good], stamp[good], log[good]
+            self._tally.add("undecodable", log[~good])
+            chosen, log, lacking = chosen[good], log[good], lacking[good]
+            stamp, values = stamp[good], values[good]
         # A sum is finite only if all of its terms are; the rows are searched only where it is not.
         with np.errstate(all="ignore"):
             finite = np.isfinite(values.sum())
         if not finite:
             bad = ~np.isfinite(values).all(axis=1)
-            self._tally.add("non-finite", log[bad], int(bad.sum()) - decoded.lacking)
+            self._tally.add("non-finite", log[bad & ~lacking])
         return chosen, Block(stamp, log, values)
 
     def _plan(self, number: int, samples: Iterator[bytes]) -> _Plan:
