@@ -107,8 +107,13 @@ def _low_pass_kernel(f1: float, dt: float) -> Array:
 def _known(valid: Mask, f1: float, dt: float) -> Mask:
     """Flag samples in which invalid ones, and those beyond the ends, weigh more than `TOLERANCE`."""
     h = np.abs(_low_pass_kernel(f1, dt))
-    unknown = np.concatenate((np.ones(len(h) // 2), ~valid, np.ones(len(h) // 2)))
-    known: Mask = fftconvolve(unknown, h, mode="valid") <= TOLERANCE
+    beyond = np.cumsum(h)[: len(h) // 2][::-1][: len(valid)]  # weight of what lies before sample 0, 1, ...
+    doubt = np.zeros(len(valid))
+    doubt[: len(beyond)] += beyond
+    doubt[len(valid) - len(beyond) :] += beyond[::-1]
+    if not valid.all():
+        doubt += fftconvolve((~valid).astype(np.float64), h)[len(h) // 2 :][: len(valid)]
+    known: Mask = doubt <= TOLERANCE
     return known
 
 

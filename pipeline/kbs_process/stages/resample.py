@@ -140,10 +140,10 @@ class Extender:
     def _mirror(self, rows: Array) -> Array:
         """Continue rows (count + 1, c), of which the first is the end, outwards: (count, c)."""
         m = np.arange(len(rows), dtype=np.float64)
-        slope, level = np.polynomial.polynomial.polyfit(m, rows, 1)[::-1]
-        line = level + m[:, None] * slope
-        outward = level - m[:, None] * slope
-        continued: Array = (outward + rows - line)[1:]
+        centred = m - m.mean()
+        slope = centred @ rows / (centred @ centred)
+        # level - slope m, the line outwards, plus the mirrored residual, rows - (level + slope m)
+        continued: Array = (rows - 2.0 * m[:, None] * slope)[1:]
         return continued
 
 
@@ -152,34 +152,43 @@ class Decimator:
 
     def __init__(self, design: Design) -> None:
         self._design = design
-        self._held: Array = np.empty((0, 0))  # (c, rows), transposed: the filter runs along contiguous memory
-        self._flags: Array = np.empty(0)
-        self._skip = 0  # rows to drop before the next output's support begins
+        # Transposed, as the filter runs along contiguous memory: the last row is the flag of invented samples.
+        self._x: Array = np.empty((0, 0))
+        self._held = 0
+        self._doubtful = False  # whether any flag is held
         self._rows: list[Array] = []
         self._weights: list[Array] = []
 
     def push(self, rows: Array, invented: Mask | None) -> None:
         """Take rows (n, c) in order; the first output is centred on the H-th of them."""
-        flags = np.zeros(len(rows)) if invented is None else invented.astype(np.float64)
-        x = np.ascontiguousarray(rows.T)
-        if self._held.size:
-            x = np.concatenate((self._held, x), axis=1)
-            flags = np.concatenate((self._flags, flags))
+        end = self._held + len(rows)
+        if end > self._x.shape[1]:
+            held = self._x[:, : self._held]
+            self._x = np.empty((rows.shape[1] + 1, end))
+            if self._held:
+                self._x[:, : self._held] = held
+        x = self._x
+        x[:-1, self._held : end] = rows.T
+        x[-1, self._held : end] = 0.0 if invented is None else invented
+        self._doubtful = self._doubtful or invented is not None
         taps, factor = self._design.taps, self._design.factor
-        count = max((x.shape[1] - len(taps)) // factor + 1, 0)
+        count = max((end - len(taps)) // factor + 1, 0)
         if count:
-            self._rows.append(_every(x, taps, factor, count))
+            self._rows.append(_every(x[:-1], taps, factor, count))
+            doubtful = self._doubtful
             self._weights.append(
-                _every(flags[None, :], np.abs(taps), factor, count)[0] if flags.any() else np.zeros(count)
+                _every(x[-1:], np.abs(taps), factor, count)[0] if doubtful else np.zeros(count)
             )
-        self._held, self._flags = x[:, count * factor :].copy(), flags[count * factor :]
+        self._held = end - count * factor
+        x[:, : self._held] = x[:, count * factor : end].copy()
+        self._doubtful = self._doubtful and bool(x[-1, : self._held].any())
 
     def result(self) -> tuple[Array, Array]:
         """Return kept samples (c, k) and the weight (k,) that invented input has in each."""
         return np.concatenate(self._rows, axis=1), np.concatenate(self._weights)
 
 
-# Slices, because an index that may be negative keeps the compiler from vectorising: a factor of four.
+# Slices below, because an index that may be negative keeps the compiler from vectorising: a factor of four.
 @numba.njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract"})
 def _dot(a: Array, b: Array) -> float:
     total = 0.0
@@ -188,17 +197,34 @@ def _dot(a: Array, b: Array) -> float:
     return total
 
 
-@numba.njit(cache=True, error_model="numpy")
+@numba.njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract"})
 def _every(x: Array, taps: Array, factor: int, count: int) -> Array:
-    """y[c, k] = sum_j taps[j] x[c, k factor + j]."""
+    """y[c, k] = sum_j taps[j] x[c, k factor + j]; four outputs at a time, which share the loads of the taps."""
+    n = len(taps)
     y = np.empty((x.shape[0], count))
     for c in range(x.shape[0]):
-        for k in range(count):
-            y[c, k] = _dot(taps, x[c, k * factor : k * factor + len(taps)])
+        row = x[c]
+        k = 0
+        while k + 4 <= count:
+            i = k * factor
+            x0, x1 = row[i : i + n], row[i + factor : i + factor + n]
+            x2, x3 = row[i + 2 * factor : i + 2 * factor + n], row[i + 3 * factor : i + 3 * factor + n]
+            y0 = y1 = y2 = y3 = 0.0
+            for j in range(n):
+                h = taps[j]
+                y0 += h * x0[j]
+                y1 += h * x1[j]
+                y2 += h * x2[j]
+                y3 += h * x3[j]
+            y[c, k], y[c, k + 1], y[c, k + 2], y[c, k + 3] = y0, y1, y2, y3
+            k += 4
+        while k < count:
+            y[c, k] = _dot(taps, row[k * factor : k * factor + n])
+            k += 1
     return y
 
 
-@numba.njit(cache=True, error_model="numpy")
+@numba.njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract"})
 def _at(x: Array, weight: Array, position: Array, table: Array) -> tuple[Array, Array]:
     """Interpolate x (c, k) and the weights of invented samples at fractional positions (n,): (n, c), (n,)."""
     phases, width = table.shape[0] - 1, table.shape[1]
@@ -216,8 +242,12 @@ def _at(x: Array, weight: Array, position: Array, table: Array) -> tuple[Array, 
             y[n] = x[:, min(max(whole, 0), x.shape[1] - 1)]
             doubt[n] = 1.0
             continue
-        g[:] = (1.0 - share) * table[row] + share * table[row + 1]
-        doubt[n] = _dot(np.abs(g), weight[start : start + width])
+        lower, upper, invented = table[row], table[row + 1], weight[start : start + width]
+        total = 0.0
+        for j in range(width):
+            g[j] = (1.0 - share) * lower[j] + share * upper[j]
+            total += abs(g[j]) * invented[j]
+        doubt[n] = total
         for c in range(x.shape[0]):
             y[n, c] = _dot(g, x[c, start : start + width])
     return y, doubt
