@@ -202,7 +202,8 @@ def predict(campaign: str, recording: str, output: Path | None, quiet: bool) -> 
     """Predict one RECORDING: a name from CAMPAIGN, or any MCAP file with the same topics.
 
     The plant follows what was recorded: field positions, encoders and commands, or, for a campaign that is
-    driven by motion, the measured angles. Writes the prediction as Parquet and as predicted.mcap.
+    driven by motion, the measured angles. The rig is the one of the parameter files, nothing is fitted.
+    Writes the prediction as Parquet and as predicted.mcap.
     """
     from kbs_process.campaign.load import load_campaign
     from kbs_process.campaign.locate import find_campaign, results_folder

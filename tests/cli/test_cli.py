@@ -325,6 +325,43 @@ def test_simulate_an_unknown_trajectory(folder: CampaignFolder, capsys: pytest.C
     assert "did you mean 'EL089P00'?" in capsys.readouterr().err
 
 
+MOTION_DRIVEN = """
+schema = 1
+name = "BENCH"
+title = "Angles alone"
+drive = "motion"
+[bands]
+high_pass_Hz = 0.0
+low_pass_Hz = [2.0]
+working_rate_Hz = 20.0
+[topics]
+wrench = "/transducer/wrench"
+encoder = "/encoder"
+[parameters]
+files = ["parameters/rig.toml"]
+[[recording]]
+file = "recordings/EL089P00_1.mcap"
+trajectory = "EL089P00"
+role = "fit"
+"""
+
+
+def test_predict_from_measured_motion(folder: CampaignFolder, tmp_path: Path) -> None:
+    """Without a drive or a controller, the wrench is that of the bodies in the angles measured."""
+    (folder.path / "campaign.toml").write_text(MOTION_DRIVEN)
+    assert run("predict", str(folder.path), "EL089P00_1", "-o", str(tmp_path / "out")) == 0
+    wrench = pq.read_table(tmp_path / "out" / "wrench.parquet")
+    np.testing.assert_allclose(wrench["Fz"].to_numpy(), -28.0 * 9.80665, rtol=1e-3)
+
+
+def test_there_is_nothing_to_simulate_without_commands(
+    folder: CampaignFolder, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (folder.path / "campaign.toml").write_text(MOTION_DRIVEN)
+    assert run("simulate", str(folder.path)) == 2
+    assert "use 'predict'" in capsys.readouterr().err
+
+
 def test_results_never_go_into_the_campaign(
     folder: CampaignFolder, capsys: pytest.CaptureFixture[str]
 ) -> None:

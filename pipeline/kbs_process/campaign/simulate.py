@@ -25,6 +25,7 @@ def simulate_commands(
     campaign: Campaign, commands: Path, target: Path, *, rate_Hz: float, progress: Progress
 ) -> Path:
     """Simulate the commands of a CSV or Parquet file through the controller; return `target`."""
+    _require_commands(campaign)
     schedule = read_commands(commands, campaign.rig.joint_names)
     schedule = replace(schedule, t=schedule.t - schedule.t[0])
     with progress.task(f"Simulating {commands.name}") as task:
@@ -36,6 +37,7 @@ def simulate_trajectory(
     campaign: Campaign, trajectory: str | None, target: Path, *, rate_Hz: float | None, progress: Progress
 ) -> Path:
     """Simulate the commands recorded in a trajectory's first run (default: the last one listed)."""
+    _require_commands(campaign)
     first = {entry.trajectory: entry for entry in reversed(campaign.recordings)}
     name = trajectory or campaign.recordings[-1].trajectory
     if name not in first:
@@ -87,12 +89,6 @@ def _command_driven(
     duration_s: float,
     update: Callable[[float], None],
 ) -> Iterable[tuple[str, Block]]:
-    if campaign.drive == "motion":
-        raise ConfigError(
-            "its plant is driven by motion: without a recording there is nothing to simulate",
-            where=campaign.name,
-            remedy="use 'predict' with a recording",
-        )
     return predict(
         campaign.rig,
         campaign.effects,
@@ -102,6 +98,15 @@ def _command_driven(
         duration_s=duration_s,
         progress=update,
     )
+
+
+def _require_commands(campaign: Campaign) -> None:
+    if campaign.drive == "motion":
+        raise ConfigError(
+            "this campaign is driven by measured motion: commands move nothing",
+            where=campaign.name,
+            remedy="use 'predict' with a recording",
+        )
 
 
 def _entry(campaign: Campaign, recording: str) -> RecordingEntry:
