@@ -28,7 +28,7 @@ def panels(results: Results, tables: Tables) -> tuple[Panel, ...]:
 def render(results: Results, sections: tuple[Panel, ...], medium: Medium) -> str:
     """Return the page; on paper without scripts and interactive data."""
     styles = _asset("style.css") + (_asset("uPlot.min.css") if medium == "screen" else "")
-    script = f"{_asset('uPlot.iife.min.js')}\n{_asset('plots.js')}" if medium == "screen" else ""
+    script = _script() if medium == "screen" else ""
     environment = Environment(
         loader=PackageLoader("kbs_process.report"),
         autoescape=True,
@@ -46,6 +46,11 @@ def render(results: Results, sections: tuple[Panel, ...], medium: Medium) -> str
         styles=Markup(styles),
         script=Markup(script),
     )
+
+
+def _script() -> str:
+    """Return uPlot with its licence, and what draws with it."""
+    return f"/*\n{_asset('uPlot.LICENSE')}*/\n{_asset('uPlot.iife.min.js')}\n{_asset('plots.js')}"
 
 
 def _numbers(sections: tuple[Panel, ...]) -> dict[int, int]:

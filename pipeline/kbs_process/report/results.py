@@ -356,12 +356,13 @@ def load(folder: Path) -> Results:
 def schema() -> dict[str, Any]:
     """Return the JSON Schema of results.json."""
     (entry,), definitions = msgspec.json.schema_components((Results,), ref_template="#/$defs/{name}")
-    return {
+    whole = {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "Results of a processed campaign",
         **entry,
         "$defs": definitions,
     }
+    return msgspec.json.decode(msgspec.json.encode(whole), type=dict[str, Any])  # as a file holds it
 
 
 if __name__ == "__main__":

@@ -142,7 +142,7 @@
       const axis = { grid: { stroke: "#eceff2", width: 1 }, font: "11px sans-serif", labelFont: "12px sans-serif", labelSize: 20, stroke: "#3a434d" };
       const plot = new uPlot({
         width: box.clientWidth,
-        height: last ? 176 : 146,
+        height: view.channels.length === 1 ? 300 : last ? 176 : 146,
         cursor: { sync: { key, setSeries: false }, drag: { x: true, y: false, dist: 4 }, points: { size: 5 } },
         scales: { x: { time: false }, y: { range: apart ? range(0.8, 0.06) : range(0.06, 0.06) }, r: { range: range(0.06, 2) } },
         series: [

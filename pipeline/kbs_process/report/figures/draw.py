@@ -14,11 +14,11 @@ import matplotlib
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 from PIL import Image
 
 from kbs_process.report.panel import Picture
-from kbs_process.report.text import power
+from kbs_process.report.text import number, power
 
 _COLORS = 48
 WIDTH = 7.1  # in: the text width of an A4 page
@@ -70,12 +70,16 @@ _STYLE: dict[Any, Any] = {
 
 
 def logarithmic(axes: Axes, which: Literal["x", "y"], low: float, high: float) -> None:
-    """Make an axis logarithmic, with a label at every decade, or at 1, 2 and 5 over short ranges."""
+    """Make an axis logarithmic, with a label at every decade, at 1, 2 and 5, or at equal steps over less than one."""
     decades = math.log10(high / low) if high > low > 0.0 else 1.0
     axis: Axis = axes.xaxis if which == "x" else axes.yaxis
     axes.set(**{f"{which}scale": "log", f"{which}lim": (low, high)})
-    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if decades < 2.0 else (1.0,), numticks=8))
-    axis.set_major_formatter(FuncFormatter(lambda value, _: power(value) if value > 0.0 else ""))
+    if decades < 1.0:
+        axis.set_major_locator(MaxNLocator(4))
+        axis.set_major_formatter(FuncFormatter(lambda value, _: number(value, 2)))
+    else:
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if decades < 2.0 else (1.0,), numticks=8))
+        axis.set_major_formatter(FuncFormatter(lambda value, _: power(value)))
     axis.set_minor_formatter(NullFormatter())
 
 

@@ -14,7 +14,7 @@ _PROJECTION = np.array([[-0.55, 1.0, 0.0], [-0.42, 0.0, 1.0]])
 _AXES = (("x", draw.SERIES[5]), ("y", draw.SERIES[2]), ("z", draw.SERIES[0]))
 
 
-def frames(alt: str, *, gravity: bool, spacecraft: bool) -> Picture:
+def frames(alt: str, *, spacecraft: bool) -> Picture:
     """Draw T on the transducer's top plate, positive torques, the weight, and S where there is one."""
     with draw.style():
         figure, axis = draw.canvas(1.9, width=4.6)
@@ -27,11 +27,10 @@ def frames(alt: str, *, gravity: bool, spacecraft: bool) -> Picture:
             line = np.stack([_flat(np.zeros(3)), _flat(origin)])
             axis.plot(line[:, 0], line[:, 1], color=draw.RESIDUAL, linewidth=0.8, linestyle=(0, (3, 2)))
             _triad(axis, origin, 0.7, "S", torques=False)
-        if gravity:
-            start = np.array([0.0, -1.35, 1.0])
-            _arrow(axis, start, np.array([0.0, 0.0, -0.8]), draw.INK)
-            place = _flat(start + np.array([0.0, -0.08, -0.4]))
-            axis.text(place[0], place[1], "g: at rest Fz < 0", ha="right", va="center")
+        start = np.array([0.0, -1.35, 1.0])
+        _arrow(axis, start, np.array([0.0, 0.0, -0.8]), draw.INK)
+        place = _flat(start + np.array([0.0, -0.08, -0.4]))
+        axis.text(place[0], place[1], "g, where z is up:\nat rest Fz < 0", ha="right", va="center")
         axis.margins(0.08)
         return draw.picture(figure, alt)
 

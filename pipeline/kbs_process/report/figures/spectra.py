@@ -25,7 +25,7 @@ def spectra(
     columns = 2 if len(channels) > 1 else 1
     rows = math.ceil(len(channels) / columns)
     with draw.style():
-        figure, axes = draw.ladder(rows, columns, 1.35 if rows > 1 else 2.2, gap=0.12)
+        figure, axes = draw.ladder(rows, columns, 1.14 if rows > 1 else 2.2, gap=0.12)
         # The drawn order runs down the columns: forces left, torques right.
         grid = np.reshape(np.array(axes, dtype=object), (rows, columns)).T.ravel()
         for axis, channel in zip(grid, channels, strict=False):
@@ -93,4 +93,5 @@ def _marks(axis: Axes, resonances: tuple[Resonance, ...], edges: tuple[float, ..
                 va="top",
                 fontsize=5.5,
                 color=draw.LIMIT,
+                bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.4},
             )

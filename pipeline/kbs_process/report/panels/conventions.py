@@ -18,7 +18,7 @@ _CAPTION = Caption(
 )
 _DEFINITIONS = (
     "T: fixed to the transducer's top plate, origin at its reference point; z up where the set-up is level.",
-    "Wrench: force and torque that the unit exerts on the transducer; at rest, Fz is minus the weight.",
+    "Wrench: force and torque that the unit exerts on the transducer; at rest, with z up, Fz is minus the weight.",
     "Torques: Tx = Σ (y Fz − z Fy), and so on: r × F.",
 )
 _SPACECRAFT = (
@@ -30,7 +30,7 @@ def panel(results: Results, tables: Tables) -> Panel:
     """Definitions, the drawing, and the outcome of every self-test."""
     frames_used = {row.frame for row in results.merit} | {row.frame for row in results.requirements}
     spacecraft = "S" in frames_used
-    picture = frames.frames("Frame T with its axes and positive torques", gravity=True, spacecraft=spacecraft)
+    picture = frames.frames("Frame T with its axes and positive torques", spacecraft=spacecraft)
     definitions = (*_DEFINITIONS, _SPACECRAFT) if spacecraft else _DEFINITIONS
     blocks: list[Block] = [
         Text("Definitions:", definitions),
