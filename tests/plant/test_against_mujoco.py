@@ -18,14 +18,14 @@ NOISE = np.array([0.02] * 3 + [0.002] * 3)  # rms a sample at 100 Hz
 CODE = 2.0 * np.pi / 2**14
 
 CASES = {
-    "EL089, open loop": ("EL089P00", 100.0, {}),
-    "EL089, closed loop": ("EL089P00", 85.0, {"loop": "closed"}),
-    "singularity, open loop": ("AESING00", 80.0, {}),
-    "singularity, closed loop": ("AESING00", 80.0, {"loop": "closed", "latency": 2}),
-    "azimuth at 2 deg/s": ("AL012M00", 40.0, {}),
+    "EL089, open loop": ("EL089P00", 90.0, {}),
+    "EL089, closed loop": ("EL089P00", 75.0, {"loop": "closed"}),
+    "singularity, open loop": ("AESING00", 105.0, {}),
+    "singularity, closed loop": ("AESING00", 50.0, {"loop": "closed", "latency": 2}),
+    "azimuth at 2 deg/s": ("AL012M00", 30.0, {}),
     "tilted and misaligned": (
         "AESING00",
-        40.0,
+        20.0,
         {"transducer.tilt": [4e-3, -3e-3], "joint.el.misalignment": [2e-3, 0.0, -3e-3]},
     ),
 }

@@ -98,10 +98,11 @@ def test_energy_lost_is_energy_dissipated() -> None:
 def test_wrench_is_weight_less_rate_of_momentum(elastic: bool) -> None:
     step = 1e-4
     settings: dict[str, Any] = {"amplifier": None, "tilt": (3e-3, -2e-3)}
-    if not elastic:
-        settings["stiffness"] = None
-    of = three_axis(**settings)
     start, rate = np.array([0.3, 0.5, -0.4]), np.radians([2.0, -3.0, 4.0])
+    of = three_axis(**settings)
+    if not elastic:
+        of = two_axis(stiffness=None, misalignment=(0.02, 0.01, -0.03), **settings)
+        start, rate = start[:2], rate[:2]
     made = simulation(of, ramp(start, rate, 1.0), step)
     made.advance(3000, 1)
     states = []
