@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.linalg import solveh_banded
 from scipy.signal import butter, sosfiltfilt
 
 from kbs_process.signals.records import Signal
@@ -63,6 +64,24 @@ def test_on_long_records_it_is_the_plain_zero_phase_filter() -> None:
     ours = high_pass(x, 0.01, DT)
     middle = slice(6000, -6000)  # 300 s
     assert np.abs(ours - plain)[middle].max() < 1e-4 * plain[middle].std()
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 4, 5, 6, 4000])
+def test_the_solution_is_that_of_a_general_banded_solver(n: int) -> None:
+    x = np.random.default_rng(6).normal(size=(n, 3)).cumsum(axis=0)
+    expected = np.zeros_like(x)
+    if n > 2:
+        band = np.zeros((3, n - 2))
+        band[0], band[1, : n - 3], band[2, : max(n - 4, 0)] = (
+            6.0 + (2.0 * np.sin(np.pi * 0.01 * DT)) ** 4,
+            -4.0,
+            1.0,
+        )
+        z = solveh_banded(band[: min(3, n - 2)], np.diff(x, 2, axis=0), lower=True)
+        expected[:-2] += z
+        expected[1:-1] -= 2.0 * z
+        expected[2:] += z
+    np.testing.assert_allclose(high_pass(x, 0.01, DT), expected, atol=1e-6 * np.abs(x).max())
 
 
 def test_lines_are_trend_entirely_and_offsets_cost_no_digits() -> None:
