@@ -9,7 +9,7 @@ import numpy as np
 from kbs_process.errors import RecordingError
 from kbs_process.plant.predict import Schedule, predict
 from kbs_process.rig.model import Rig
-from kbs_process.signals.records import WRENCH_CHANNELS, Array, Events, Run, Signal
+from kbs_process.signals.records import WRENCH_CHANNELS, Array, Events, Run
 from kbs_process.stages.condense import CondenseSettings, condense
 
 
@@ -65,21 +65,6 @@ def predict_run(
     )
     channels = {"wrench": WRENCH_CHANNELS, "angle": rig.joint_names, "field": rig.joint_names}
     return condense(run.name, blocks, channels, settings)
-
-
-def select(signal: Signal, channels: Sequence[str]) -> Signal:
-    """Return the channels asked for, in that order."""
-    columns = [signal.channels.index(channel) for channel in channels]
-    return Signal(
-        t0=signal.t0,
-        dt=signal.dt,
-        values=signal.values[:, columns],
-        channels=tuple(channels),
-        units=tuple(signal.units[column] for column in columns),
-        frame=signal.frame,
-        valid=signal.valid,
-        history=signal.history,
-    )
 
 
 def _columns(events: Events, names: Sequence[str]) -> Array:

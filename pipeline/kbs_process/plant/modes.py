@@ -27,7 +27,7 @@ class Mode:
 def inertia_on_transducer(rig: Rig, q: Array) -> Array:
     """Inertia (3, 3) about T's origin, in T's axes, of everything beyond T at joint angles q (joints,), kg m^2."""
     rest = np.zeros((1, len(q)))
-    links = kinematics(rig, q[None, :], rest, rest, np.zeros((1, 3)))
+    links = kinematics(rig, q[None, :], rest, rest)
     T = links[TRANSDUCER]
     R_TL = T.R[0].T
     total = np.zeros((3, 3))

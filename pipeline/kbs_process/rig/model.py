@@ -32,6 +32,11 @@ class Quantity:
     sigma: Array  # same shape, one standard deviation; 0 is exact by definition
     source: str
 
+    def __post_init__(self) -> None:
+        # Arithmetic on an array without dimensions leaves a scalar, which cannot be indexed by a mask.
+        object.__setattr__(self, "value", np.asarray(self.value, dtype=np.float64))
+        object.__setattr__(self, "sigma", np.asarray(self.sigma, dtype=np.float64))
+
     def __float__(self) -> float:
         return float(self.value)
 

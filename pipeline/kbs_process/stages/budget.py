@@ -6,7 +6,7 @@ Entries are independent causes; the total is the root of their sum of squares (J
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,7 +25,7 @@ class Entry:
     sigma: Array
 
 
-def total(entries: tuple[Entry, ...]) -> Array:
+def total(entries: Sequence[Entry]) -> Array:
     """Root of the sum of squares, (c,)."""
     squares: Array = np.sqrt(np.sum([entry.sigma**2 for entry in entries], axis=0))
     return squares
@@ -43,7 +43,7 @@ def sensor_noise(noise: Array, rate: float, passband: tuple[float, float]) -> En
     return Entry("transducer", "noise of the transducer, white", noise * np.sqrt(2.0 * width / rate))
 
 
-def from_shapes(stage: str, source: str, shapes: list[Signal], band: Filter) -> Entry:
+def from_shapes(stage: str, source: str, shapes: Sequence[Signal], band: Filter) -> Entry:
     """Entry of a stage whose independent one-sigma errors have known time histories `shapes` (at least one)."""
     squares = sum((rms(band(shape)) ** 2 for shape in shapes), np.zeros(len(shapes[0].channels)))
     return Entry(stage, source, np.sqrt(squares))

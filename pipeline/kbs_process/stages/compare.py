@@ -62,7 +62,7 @@ def _merit(channel: str, unit: str, m: Array, p: Array, rate: float, passband: t
         residual_rms=_rms(m - p),
         measured_peak=peak_m,
         predicted_peak=peak_p,
-        correlation=covariance / np.sqrt(variance_m * variance_p) if defined else None,
+        correlation=covariance / float(np.sqrt(variance_m * variance_p)) if defined else None,
         fraction_of_variance=1.0 - float(np.var(m - p)) / variance_m if variance_m > 0 else None,
         spectral_ratio=_spectral_ratio(m, p, rate, passband) if defined else None,
         pessimism=peak_p / peak_m if peak_m > 0 else None,

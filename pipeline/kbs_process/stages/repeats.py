@@ -15,23 +15,28 @@ REFINEMENTS = 12
 
 def motion_of(run: Run) -> Signal | None:
     """Return what tells when a run moved, on the working grid: the command, else the angle, else the rate."""
-    if run.command is not None and run.wrench is not None:
-        grid = run.wrench
-        names = tuple(name for name in run.command.channels if not name.endswith(".rate"))
-        columns = [
-            np.interp(grid.t, run.command.t, run.command.values[:, run.command.channels.index(name)])
-            for name in names
-        ]
-        return Signal(
-            t0=grid.t0,
-            dt=grid.dt,
-            values=np.stack(columns, axis=1),
-            channels=names,
-            units=("rad",) * len(names),
-            frame="joint",
-            valid=np.ones(len(grid), dtype=bool),
-        )
-    return run.angle if run.angle is not None else run.rate
+    return commanded(run) or run.angle or run.rate
+
+
+def commanded(run: Run) -> Signal | None:
+    """Return the commanded angles on the wrench's grid, linear between cycles; None without commands."""
+    if run.command is None or run.wrench is None:
+        return None
+    grid = run.wrench
+    names = tuple(name for name in run.command.channels if not name.endswith(".rate"))
+    columns = [
+        np.interp(grid.t, run.command.t, run.command.values[:, run.command.channels.index(name)])
+        for name in names
+    ]
+    return Signal(
+        t0=grid.t0,
+        dt=grid.dt,
+        values=np.stack(columns, axis=1),
+        channels=names,
+        units=("rad",) * len(names),
+        frame="joint",
+        valid=grid.valid,
+    )
 
 
 def lag(reference: Signal, other: Signal) -> float | None:

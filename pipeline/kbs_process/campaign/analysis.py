@@ -1,0 +1,141 @@
+"""One recording, measured and predicted, in every band and frame."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from kbs_process.campaign.config import Bands, Campaign, RecordingEntry
+from kbs_process.campaign.predicting import predict_run
+from kbs_process.plant.rigid import static_wrench
+from kbs_process.signals.records import WRENCH_CHANNELS, Run, Signal
+from kbs_process.stages import bandpass, gravity
+from kbs_process.stages.bandpass import UNFILTERED, Band
+from kbs_process.stages.condense import CondenseSettings
+from kbs_process.stages.gravity import GravityModel, Static
+from kbs_process.stages.motion import Motion, estimate
+from kbs_process.stages.to_cog import to_spacecraft
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pair:
+    """The same signal measured and predicted; a recording that nobody predicts has the former only."""
+
+    measured: Signal
+    predicted: Signal | None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Analysis:
+    """Everything that is known about one recording once it has been processed."""
+
+    entry: RecordingEntry
+    raw: Signal  # wrench at the working rate, cross-coupling and bias still in
+    run: Run  # decoupled
+    motion: Motion
+    static: Static  # the fitted static wrench along the motion, with its uncertainty
+    residual: Signal  # decoupled less static
+    predicted: Run | None
+    pairs: Mapping[tuple[str, str], Pair]  # by frame and band
+
+
+def bands_of(settings: Bands) -> tuple[Band, ...]:
+    """Return the bands of a campaign, the unfiltered one first."""
+    high_pass = settings.high_pass or None
+    return (UNFILTERED, *(Band(f"lt{low:g}Hz", high_pass, low) for low in settings.low_pass))
+
+
+def passband(band: Band, rate: float) -> tuple[float, float]:
+    """Return a band's limits in Hz; an open one ends at zero or at the working rate's passband."""
+    return band.high_pass_Hz or 0.0, band.low_pass_Hz or 0.4 * rate
+
+
+def analyse(
+    campaign: Campaign,
+    entry: RecordingEntry,
+    raw: Signal,
+    run: Run,
+    motion: Motion,
+    model: GravityModel,
+    update: Callable[[float], None],
+) -> Analysis:
+    """Remove gravity from measurement and prediction alike, cut the bands, move them to the spacecraft."""
+    wrench = _wrench(run)
+    static = gravity.apply(_at_rest(motion), model, entry.name)
+    residual = wrench.derive(wrench.values - static.wrench.values, "fitted static wrench removed")
+    predicted = disturbance = None
+    if entry.role != "calibration":
+        predicted, disturbance = _predict(campaign, run, motion, model, update)
+    return Analysis(
+        entry=entry,
+        raw=raw,
+        run=run,
+        motion=motion,
+        static=static,
+        residual=residual,
+        predicted=predicted,
+        pairs=_pairs(campaign, residual, disturbance),
+    )
+
+
+def _predict(
+    campaign: Campaign, run: Run, motion: Motion, model: GravityModel, update: Callable[[float], None]
+) -> tuple[Run | None, Signal]:
+    """Return the predicted run (of a plant with drives) and its wrench without gravity.
+
+    The plant has the masses and CoGs that the gravity fit found. Its static wrench is taken at its own angles, as the
+    measurement's is. A rig that is driven by its motion has no drives to predict: inertia is all there is.
+    """
+    if campaign.drive == "motion":
+        moving = gravity.apply(motion, model).wrench
+        return None, moving.derive(
+            moving.values - gravity.apply(_at_rest(motion), model).wrench.values, "inertia"
+        )
+    settings = CondenseSettings(working_rate_Hz=campaign.bands.working_rate)
+    predicted = predict_run(model.rig, campaign.effects, run, settings, update)
+    total = _wrench(predicted)
+    angles = estimate(predicted, model.rig)
+    static = static_wrench(model.rig, angles.q)
+    left = total.derive(total.values - static, "static wrench of the plant removed")
+    return predicted, select(left, _wrench(run).channels)
+
+
+def _pairs(campaign: Campaign, residual: Signal, disturbance: Signal | None) -> dict[tuple[str, str], Pair]:
+    spacecraft = campaign.rig.spacecraft
+    pairs = {}
+    for band in bands_of(campaign.bands):
+        measured = bandpass.apply(residual, band)
+        predicted = None if disturbance is None else bandpass.apply(disturbance, band)
+        pairs["T", band.name] = Pair(measured, predicted)
+        if spacecraft is not None and measured.channels == WRENCH_CHANNELS:
+            pairs["S", band.name] = Pair(
+                to_spacecraft(measured, spacecraft),
+                None if predicted is None else to_spacecraft(predicted, spacecraft),
+            )
+    return pairs
+
+
+def _at_rest(motion: Motion) -> Motion:
+    return replace(motion, qd=np.zeros_like(motion.q), qdd=np.zeros_like(motion.q))
+
+
+def select(signal: Signal, channels: Sequence[str]) -> Signal:
+    """Return the channels asked for, in that order."""
+    columns = [signal.channels.index(channel) for channel in channels]
+    return Signal(
+        t0=signal.t0,
+        dt=signal.dt,
+        values=signal.values[:, columns],
+        channels=tuple(channels),
+        units=tuple(signal.units[column] for column in columns),
+        frame=signal.frame,
+        valid=signal.valid,
+        history=signal.history,
+    )
+
+
+def _wrench(run: Run) -> Signal:
+    assert run.wrench is not None  # every campaign names the wrench's topic, and reading demands it
+    return run.wrench

@@ -1,0 +1,57 @@
+"""A methods paragraph for a test report, generated from what was done and with the constants that were used."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from kbs_process.campaign.analysis import Analysis
+from kbs_process.campaign.config import Campaign
+from kbs_process.campaign.findings import Findings
+
+
+def methods(campaign: Campaign, analyses: Sequence[Analysis], findings: Findings) -> str:
+    """Return paragraphs separated by empty lines."""
+    return "\n\n".join(
+        [_reduction(campaign, analyses), _gravity(campaign, analyses), _bands(findings), _plant(campaign)]
+    )
+
+
+def _reduction(campaign: Campaign, analyses: Sequence[Analysis]) -> str:
+    rates = sorted({f"{analysis.run.rates['wrench']:.6g}" for analysis in analyses})
+    return (
+        f"{len(analyses)} recordings of the transducer's wrench at {', '.join(rates)} Hz were brought "
+        f"to one clock each and to {campaign.bands.working_rate:g} Hz by linear-phase Kaiser filters (gain error at "
+        "most 1e-5, aliases at most -120 dB). Cross-coupling was undone by the calibrated matrix: "
+        "w = (I + X)^-1 (raw - bias)."
+    )
+
+
+def _gravity(campaign: Campaign, analyses: Sequence[Analysis]) -> str:
+    used = [analysis.entry.name for analysis in analyses if analysis.entry.role != "held-out"]
+    angles = [line for line in analyses[-1].motion.history if ": " in line]
+    what = "Gravity and inertia were" if campaign.drive == "motion" else "Gravity was"
+    return (
+        f"{what} fitted to {', '.join(used)} by maximum a posteriori least squares over masses, centres of gravity, "
+        "tilt, misalignments and residual cross-coupling, with the one-sigma values of the parameter files as priors "
+        f"and a taring bias for each recording; g = {float(campaign.rig.gravity):g} m/s^2. The static part was subtracted "
+        f"from all recordings, held-out ones included. Angles ({analyses[-1].entry.name}): {'; '.join(angles)}."
+    )
+
+
+def _bands(findings: Findings) -> str:
+    cut = [f"{band.label}: {band.method}" for band in findings.bands if band.low_pass_Hz is not None]
+    return "Measurement and prediction went through the same band filters. " + "; ".join(cut) + "."
+
+
+def _plant(campaign: Campaign) -> str:
+    if campaign.drive == "motion":
+        return (
+            "The prediction is the rigid-body inverse dynamics of the measured motion, with the fitted parameters; "
+            "the rig has no model of a drive."
+        )
+    return (
+        "The prediction is the plant's, driven by the recorded field where there is one, else by the recorded "
+        "commands through the controller, with the masses and centres of gravity that the fit found and the nominal drives of "
+        f"the parameter files. Effects in the plant: {', '.join(campaign.effects)}. Its static wrench was "
+        "removed at its own angles."
+    )

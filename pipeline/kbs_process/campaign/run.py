@@ -1,0 +1,106 @@
+"""The pipeline on one screen: from a campaign's recordings to its results folder."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from kbs_process.campaign.analysis import Analysis, analyse
+from kbs_process.campaign.config import Campaign, RecordingEntry
+from kbs_process.campaign.findings import find
+from kbs_process.campaign.output import write_results
+from kbs_process.campaign.progress import Progress
+from kbs_process.campaign.reading import read_run
+from kbs_process.campaign.store import writing
+from kbs_process.campaign.summary import summarise
+from kbs_process.errors import RecordingError
+from kbs_process.report import build, results
+from kbs_process.signals.records import Run, Signal
+from kbs_process.stages import decouple, gravity, motion
+from kbs_process.stages.decouple import Decoupling
+from kbs_process.stages.gravity import GravityModel, GravitySettings, Sample
+from kbs_process.stages.motion import Motion, MotionSettings
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What the command line tells."""
+
+    verdict_lines: tuple[str, ...]
+    requirement_met: bool | None  # None: there is no requirement, or it is undecided
+    report: Path
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Prepared:
+    """A recording on one clock, decoupled, with its joints' motion."""
+
+    entry: RecordingEntry
+    raw: Signal
+    run: Run
+    motion: Motion
+
+
+def process(campaign: Campaign, target: Path, *, progress: Progress, pdf: bool | None = None) -> Outcome:
+    """Process a campaign and put its results in `target`, in one step, when all is done."""
+    with writing(target) as folder:
+        decoupling = decouple.fit(campaign.rig)
+        prepared = [_prepare(campaign, entry, decoupling, progress) for entry in campaign.recordings]
+        model = _fit_gravity(campaign, prepared, progress)
+        analyses = [_analyse(campaign, one, model, progress) for one in prepared]
+        with progress.task("Comparing, summing up uncertainties"):
+            findings = find(campaign, analyses, model, decoupling)
+            summary = summarise(campaign, analyses, model, decoupling, findings)
+        with progress.task("Writing the report"):
+            write_results(folder, campaign, analyses, summary)
+            page = build.build(folder, pdf)
+    return _outcome(summary, target / page.name)
+
+
+def _prepare(
+    campaign: Campaign, entry: RecordingEntry, decoupling: Decoupling, progress: Progress
+) -> Prepared:
+    with progress.task(f"Reading {entry.name}"):
+        run = read_run(campaign, entry)
+        if run.wrench is None:
+            raise RecordingError("there is no wrench in this recording", where=str(entry.path))
+        settings = MotionSettings(band_Hz=max(campaign.bands.low_pass))
+        return Prepared(
+            entry, run.wrench, decouple.apply(run, decoupling), motion.estimate(run, campaign.rig, settings)
+        )
+
+
+def _fit_gravity(campaign: Campaign, prepared: list[Prepared], progress: Progress) -> GravityModel:
+    """Fit over calibration and fit recordings; held-out ones are not looked at.
+
+    A rig that is driven by its motion has its inertia fitted too, up to the widest band; its commands, if any, drive
+    nothing.
+    """
+    moving = campaign.drive == "motion"
+    settings = (
+        GravitySettings(low_pass_Hz=max(campaign.bands.low_pass), response=True)
+        if moving
+        else GravitySettings()
+    )
+    with progress.task("Fitting gravity and centres of gravity"):
+        samples = [
+            Sample(one.entry.name, one.motion, one.run.wrench, calibration=one.entry.role == "calibration")
+            for one in prepared
+            if one.entry.role != "held-out" and one.run.wrench is not None
+        ]
+        return gravity.fit(samples, campaign.rig, include_inertia=moving, settings=settings)
+
+
+def _analyse(campaign: Campaign, one: Prepared, model: GravityModel, progress: Progress) -> Analysis:
+    with progress.task(f"Analysing {one.entry.name}") as task:
+        return analyse(campaign, one.entry, one.raw, one.run, one.motion, model, task.update)
+
+
+def _outcome(summary: results.Results, report: Path) -> Outcome:
+    """The verdict in words: one line a requirement, then what a reader has to know about it."""
+    lines = [summary.verdict.sentence]
+    serious = sum(notice.severity != "info" for notice in summary.warnings)
+    if serious:
+        lines.append(f"{serious} warning{'s' if serious > 1 else ''}: see the top of the report")
+    met = {"pass": True, "fail": False}.get(summary.verdict.status)
+    return Outcome(tuple(lines), met, report)

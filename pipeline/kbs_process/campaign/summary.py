@@ -1,0 +1,238 @@
+"""results.json: what was found, what a reader must be told, and where every number comes from."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from kbs_process.campaign import provenance
+from kbs_process.campaign.analysis import Analysis
+from kbs_process.campaign.config import Campaign
+from kbs_process.campaign.findings import Findings
+from kbs_process.campaign.methods import methods
+from kbs_process.campaign.notices import notices
+from kbs_process.plant.rigid import static_wrench
+from kbs_process.report import results
+from kbs_process.signals.records import WRENCH_CHANNELS, Signal
+from kbs_process.stages.conventions import SignCheck, check_encoder_sense, check_gravity_sign, check_weight
+from kbs_process.stages.decouple import Decoupling
+from kbs_process.stages.gravity import GravityModel, feasibility
+from kbs_process.stages.repeats import commanded
+from kbs_process.stages.to_cog import ASSUMPTION
+from kbs_process.stages.verdict import COVERAGE
+
+
+def summarise(
+    campaign: Campaign,
+    analyses: Sequence[Analysis],
+    model: GravityModel,
+    decoupling: Decoupling,
+    findings: Findings,
+) -> results.Results:
+    """Return the contents of results.json."""
+    conventions = tuple(_conventions(campaign, analyses))
+    software = provenance.software()
+    return results.Results(
+        campaign=results.CampaignSummary(
+            name=campaign.name,
+            title=campaign.title,
+            article=campaign.article,
+            configuration=campaign.configuration,
+            drive=campaign.drive,
+        ),
+        verdict=_conclusion(findings.requirements),
+        provenance=results.Provenance(
+            version=software["kbs-process"],
+            python=software["python"],
+            libraries=software["libraries"],
+            platform=software["platform"],
+            command=f"kbs-process {campaign.name}",
+            commit=software["commit"] or "",
+            inputs=tuple(results.InputFile(**entry) for entry in provenance.inputs(campaign)),
+        ),
+        requirements=findings.requirements,
+        warnings=tuple(notices(campaign, analyses, model, findings, conventions)),
+        recordings=tuple(_recording(analysis) for analysis in analyses),
+        conventions=conventions,
+        gravity=_gravity(campaign, analyses, model),
+        cross_coupling=_cross_coupling(analyses, decoupling),
+        bands=findings.bands,
+        repeatability=findings.repeatability,
+        merit=findings.merit,
+        resonances=findings.resonances,
+        budget=findings.budget,
+        methods=methods(campaign, analyses, findings),
+        parameters=tuple(_constants(campaign)),
+        notes=(ASSUMPTION,) if campaign.rig.spacecraft is not None else (),
+    )
+
+
+def _conclusion(requirements: Sequence[results.Requirement]) -> results.Conclusion:
+    if not requirements:
+        return results.Conclusion(status="none", sentence="The campaign states no requirement.")
+    worst = max(requirements, key=lambda one: ("pass", "undecided", "fail").index(one.verdict))
+    words = {"pass": "met", "fail": "not met", "undecided": "neither met nor broken within the uncertainty"}
+    value, sigma = worst.value or 0.0, worst.sigma or 0.0
+    sentence = (
+        f"{worst.name}: {words[worst.verdict]}. {worst.statistic.capitalize()} {value:.4f} +- {COVERAGE * sigma:.4f} "
+        f"{worst.unit} (k = {COVERAGE:g}) on {worst.channel} in {worst.recording}, "
+        f"{worst.band_Hz[0] or 0:g} to {worst.band_Hz[1] or 0:g} Hz; limit {worst.limit:g} {worst.unit}."
+    )
+    return results.Conclusion(status=worst.verdict, sentence=sentence)
+
+
+def _recording(analysis: Analysis) -> results.Recording:
+    entry, run = analysis.entry, analysis.run
+    return results.Recording(
+        name=entry.name,
+        file=entry.path.name,
+        trajectory=entry.trajectory,
+        role=entry.role,
+        repeat=entry.repeat,
+        sha256=provenance.sha256(entry.path),
+        duration_s=len(analysis.residual) * analysis.residual.dt,
+        rates=run.rates,
+        losses=tuple(
+            results.LossEntry(
+                kind=loss.kind,
+                where=loss.where,
+                count=loss.count,
+                start_s=loss.start_s,
+                end_s=loss.end_s,
+                detail=loss.detail,
+            )
+            for loss in run.losses
+        ),
+        clocks=tuple(
+            results.Clock(
+                stream=stream,
+                offset_s=clock.offset_s,
+                skew=clock.skew,
+                sigma_s=clock.sigma_offset_s if np.isfinite(clock.sigma_offset_s) else None,
+            )
+            for stream, clock in run.clocks.items()
+        ),
+    )
+
+
+def _conventions(campaign: Campaign, analyses: Sequence[Analysis]) -> Iterable[results.Convention]:
+    checks: list[SignCheck] = [*check_weight(campaign.rig)]
+    for analysis in analyses[:2]:  # the calibration and the first run: signs do not change within a campaign
+        measured = analysis.run.wrench
+        assert measured is not None
+        index = [WRENCH_CHANNELS.index(channel) for channel in measured.channels]
+        nominal = measured.derive(
+            static_wrench(campaign.rig, analysis.motion.q)[:, index], "nominal static wrench"
+        )
+        found = [*check_gravity_sign(measured, nominal, campaign.rig.transducer.noise.value[index])]
+        command, angle = commanded(analysis.run), analysis.run.angle
+        if command is not None and angle is not None:
+            found += check_encoder_sense(angle, command)
+        checks += [
+            SignCheck(f"{check.check}, {analysis.entry.name}", check.expected, check.found, check.ok)
+            for check in found
+        ]
+    for check in checks:
+        yield results.Convention(check=check.check, expected=check.expected, found=check.found, ok=check.ok)
+
+
+def _gravity(campaign: Campaign, analyses: Sequence[Analysis], model: GravityModel) -> results.Gravity:
+    fit = model.fit
+    prior = model.equation.start()
+    quantities = campaign.rig.quantities()
+    parameters = []
+    for index, name in enumerate(model.equation.names):
+        quantity = quantities.get(name.split("[")[0])
+        parameters.append(
+            results.FittedParameter(
+                name=name,
+                unit="" if quantity is None else quantity.unit,
+                prior=float(prior[index]),
+                prior_sigma=float(fit.prior_sigma[index]),
+                value=float(fit.value[index]),
+                sigma=float(fit.sigma[index]),
+            )
+        )
+    return results.Gravity(
+        parameters=tuple(parameters),
+        channels=tuple(_gravity_channel(analyses, index) for index in range(len(model.channels))),
+        checks=tuple(results.Check(name=c.name, ok=c.passed, detail=c.detail) for c in fit.checks),
+        samples=fit.dof + len(fit.value),
+        reduced_chi_square=fit.residual_rms**2,
+        feasible=_feasible(campaign, model),
+    )
+
+
+def _gravity_channel(analyses: Sequence[Analysis], index: int) -> results.GravityChannel:
+    """Over all recordings: the largest static wrench, the rms of what is left, the rms of the model's errors."""
+
+    def over(signals: Iterable[Signal]) -> float:
+        parts = [signal.values[signal.valid, index] for signal in signals]
+        return float(np.sqrt(np.mean(np.concatenate(parts) ** 2)))
+
+    statics = [analysis.static for analysis in analyses]
+    first = statics[0].wrench
+    return results.GravityChannel(
+        channel=first.channels[index],
+        unit=first.units[index],
+        static_peak=max(float(np.max(np.abs(static.wrench.values[:, index]))) for static in statics),
+        residual_rms=over(analysis.residual for analysis in analyses),
+        encoder_sigma=over(static.wrench.derive(static.sigma_encoder, "sigma") for static in statics),
+        model_sigma=over(static.wrench.derive(static.sigma_parameters, "sigma") for static in statics),
+    )
+
+
+def _feasible(campaign: Campaign, model: GravityModel) -> str:
+    """Is gravity compensation by computation feasible? Its error on each torque channel against the tightest limit."""
+    limits = [requirement.limit for requirement in campaign.requirements if requirement.quantity == "torque"]
+    if not limits:
+        return "There is no limit on a torque to measure the compensation's error against."
+    found = feasibility(model, {channel: min(limits) for channel in ("Tx", "Ty", "Tz")})
+    if not found:
+        return "No torque channel is recorded."
+    worst = max(found, key=lambda one: one.ratio)
+    answer = "feasible" if worst.ratio < 1.0 else "feasible only within a band that leaves slow errors out"
+    return (
+        f"Computed compensation is {answer}: its error before filtering is at most {worst.error:.3g} N m rms "
+        f"({worst.channel}), {100 * worst.ratio:.0f} % of the limit of {worst.limit:g} N m."
+    )
+
+
+def _cross_coupling(analyses: Sequence[Analysis], decoupling: Decoupling) -> results.CrossCoupling:
+    channels = decoupling.channels
+    X = np.linalg.inv(decoupling.matrix) - np.eye(len(channels))
+    raw = np.concatenate([analysis.raw.values[analysis.raw.valid] for analysis in analyses])
+    decoupled = (raw - decoupling.bias) @ decoupling.matrix.T
+    removed = raw - decoupling.bias - decoupled
+    share = np.abs(X) * np.std(decoupled, axis=0)
+    row, column = np.unravel_index(int(np.argmax(share / np.std(decoupled, axis=0)[:, None])), share.shape)
+    units = analyses[0].raw.units
+    return results.CrossCoupling(
+        channels=channels,
+        matrix=tuple(tuple(float(x) for x in line) for line in X),
+        sigma=tuple(tuple(float(x) for x in line) for line in decoupling.sigma),
+        largest=(
+            f"Relative to what varies on the channel itself, {channels[column]} leaks most into {channels[row]}: "
+            f"{share[row, column]:.3g} {units[row]} rms."
+        ),
+        contributions=tuple(
+            results.Contribution(channel=channel, unit=units[index], value=float(np.std(removed[:, index])))
+            for index, channel in enumerate(channels)
+        ),
+    )
+
+
+def _constants(campaign: Campaign) -> Iterable[results.Constant]:
+    for entry in provenance.parameters(campaign.rig):
+        yield results.Constant(
+            name=entry["name"],
+            value=_text(entry["value"]),
+            unit=entry["unit"],
+            sigma=_text(entry["sigma"]),
+            source=entry["source"],
+        )
+
+
+def _text(value: float | list[object]) -> float | str:
+    return value if isinstance(value, float) else ", ".join(str(x) for x in np.ravel(np.asarray(value)))

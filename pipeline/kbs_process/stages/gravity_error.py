@@ -1,0 +1,42 @@
+"""What the gravity model's uncertainty becomes in a band: errors with a time history of their own."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kbs_process.signals.records import Array
+from kbs_process.stages.budget import Entry, Filter, from_shapes
+from kbs_process.stages.gravity import GravityModel, Static, derivatives
+from kbs_process.stages.motion import Motion
+
+_POINTS = 1000  # of a recording at which the shapes are computed, linear in between
+_NEGLIGIBLE = 1e-6  # part of the greatest eigenvalue from which a direction is left out
+
+
+def entries(motion: Motion, static: Static, model: GravityModel, band: Filter) -> tuple[Entry, Entry]:
+    """Budget entries of the fitted parameters' covariance and of the angles' error, within a band.
+
+    The static wrench errs by J L z with J its derivatives along the motion, L L^T the parameters' covariance and z
+    independent of unit variance: every column of J L is one error with its own history, and is filtered as the
+    signal is. Constant errors are the taring bias's and vanish in a band without zero frequency. The angles'
+    error is taken as it is within the working band, which bounds it.
+    """
+    shapes = [static.wrench.derive(shape, "error of the gravity model") for shape in _shapes(motion, model)]
+    parameters = from_shapes("gravity", "covariance of the fitted parameters", shapes, band)
+    valid = static.wrench.valid
+    encoder = np.sqrt(np.mean(static.sigma_encoder[valid] ** 2, axis=0))
+    return parameters, Entry("gravity", "angles: encoder rounding through the model", encoder)
+
+
+def _shapes(motion: Motion, model: GravityModel) -> list[Array]:
+    """One-sigma error histories (n, c) of independent directions of the rig's fitted parameters."""
+    at = np.unique(np.linspace(0, len(motion) - 1, min(len(motion), _POINTS)).astype(int))
+    size = model.equation.size
+    J = derivatives(motion, model, at)
+    variance, directions = np.linalg.eigh(model.fit.covariance[:size, :size])
+    t = np.arange(len(motion))
+    return [
+        np.stack([np.interp(t, at, column) for column in (J @ direction * root).T], axis=1)
+        for root, direction in zip(np.sqrt(np.maximum(variance, 0.0)), directions.T, strict=True)
+        if root**2 > _NEGLIGIBLE * variance[-1]
+    ]
