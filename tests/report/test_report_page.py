@@ -233,3 +233,4 @@ def test_a_folder_that_cannot_be_written_is_named(tmp_path: Path) -> None:
     (tmp_path / "index.html").mkdir()
     with pytest.raises(OutputError, match=r"cannot write the report"):
         build(tmp_path, pdf=False)
+    assert not list(tmp_path.glob("*.part"))

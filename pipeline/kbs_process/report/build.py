@@ -21,9 +21,9 @@ def build(results: Path, pdf: bool | None = None) -> Path:
     sections = page.panels(found, Tables(results))
     target = results / "index.html"
     try:
-        target.write_text(page.render(found, sections, "screen"), encoding="utf-8", newline="\n")
+        _replace(target, page.render(found, sections, "screen").encode())
         if pdf or (pdf is None and paper.available()):
-            paper.write(page.render(found, sections, "paper"), results / "report.pdf")
+            _replace(results / "report.pdf", paper.render(page.render(found, sections, "paper")))
     except OSError as error:
         raise OutputError(
             f"cannot write the report: {error.strerror or error}",
@@ -31,3 +31,13 @@ def build(results: Path, pdf: bool | None = None) -> Path:
             remedy="free space on the disk, or check the folder's permissions",
         ) from None
     return target
+
+
+def _replace(target: Path, content: bytes) -> None:
+    """Write beside `target`, then put it in its place: what was there stays whole until then."""
+    aside = target.with_name(f"{target.name}.part")
+    try:
+        aside.write_bytes(content)
+        aside.replace(target)
+    finally:
+        aside.unlink(missing_ok=True)

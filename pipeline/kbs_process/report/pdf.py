@@ -6,7 +6,6 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
-from pathlib import Path
 
 from kbs_process.errors import OutputError
 
@@ -19,14 +18,15 @@ def available() -> bool:
     return find_spec("weasyprint") is not None
 
 
-def write(html: str, target: Path) -> None:
-    """Write `html` as PDF; the same page gives the same bytes."""
+def render(html: str) -> bytes:
+    """Return `html` as PDF; the same page gives the same bytes."""
     try:
         import weasyprint  # an extra, and slow to import
     except (ImportError, OSError) as error:  # OSError: its shared libraries are missing
-        raise OutputError(f"no PDF without weasyprint: {error}", where=str(target), remedy=_REMEDY) from None
+        raise OutputError(f"no PDF without weasyprint: {error}", remedy=_REMEDY) from None
     with _fixed_date():
-        target.write_bytes(weasyprint.HTML(string=html).write_pdf(presentational_hints=True))
+        content: bytes = weasyprint.HTML(string=html).write_pdf(presentational_hints=True)
+    return content
 
 
 @contextmanager

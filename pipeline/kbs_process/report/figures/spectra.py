@@ -41,7 +41,7 @@ def spectra(
             if bottom >= column * rows:
                 grid[bottom].set_xlabel("frequency / Hz")
         grid[0].legend(loc="lower left", fontsize=6.5)
-        return draw.picture(figure, alt, title)
+        return draw.picture(figure, alt, title, "png")
 
 
 def _curves(axis: Axes, table: Table, channel: str) -> None:
