@@ -128,7 +128,8 @@ def align(streams: dict[str, ClockData], reference: str) -> dict[str, Clock]:
     """Map every stream's clock to the reference's: t = 0 at the reference's first sample.
 
     A clock that agrees with one already placed, within three standard uncertainties at both of its ends, is
-    taken to be that clock: streams of one computer keep their relation exactly.
+    taken to be that clock: streams of one computer keep their relation exactly. The uncertainty stated remains
+    that of the comparison, which is all that shows that it is one clock.
     """
     base = streams[reference]
     clocks = {
@@ -168,8 +169,8 @@ def _place(data: ClockData, streams: dict[str, ClockData], clocks: dict[str, Clo
         shared = Clock(
             clock.offset_s + (1.0 + clock.skew) * lead,
             clock.skew,
-            clock.sigma_offset_s,
-            clock.sigma_skew,
+            fitted.sigma_offset_s,
+            fitted.sigma_skew,
             data.line.latency,
             f"same as {key}",
         )

@@ -36,12 +36,13 @@ class Grid:
 def nominal_grid(stamp: Stamps) -> Grid:
     """Find the grid of increasing stamps (n >= 2).
 
-    The median step tells how many periods each step is; a line through the stamps over those counts then
-    averages jitter and rounding: on 8192 stamps rounded to 1 ns the period is good to 1e-9 of itself and
-    better, so the grid stays on the samples of a steady clock for days.
+    The median step tells which steps are of one period, their mean how many periods the others are; a line
+    through the stamps over those counts then averages jitter and rounding. On 8192 stamps rounded to 1 ns the
+    period is good to 1e-9 of itself and better, so the grid stays on the samples of a steady clock for days.
     """
     step = np.diff(stamp)
-    count = np.maximum(np.rint(step / np.median(step)), 1.0)
+    one = step[np.abs(step / np.median(step) - 1.0) <= 0.5]
+    count = np.maximum(np.rint(step / one.mean()), 1.0)
     index = np.concatenate(([0.0], np.cumsum(count)))
     x = index - index.mean()
     y = (stamp - stamp[0]).astype(np.float64)

@@ -184,8 +184,10 @@ class Decimator:
         self._doubtful = self._doubtful and bool(x[-1, : self._held].any())
 
     def result(self) -> tuple[Array, Array]:
-        """Return kept samples (c, k) and the weight (k,) that invented input has in each."""
-        return np.concatenate(self._rows, axis=1), np.concatenate(self._weights)
+        """Give away kept samples (c, k) and the weight (k,) that invented input has in each."""
+        rows, self._rows = np.concatenate(self._rows, axis=1), []
+        weights, self._weights = np.concatenate(self._weights), []
+        return rows, weights
 
 
 # Slices below, because an index that may be negative keeps the compiler from vectorising: a factor of four.
