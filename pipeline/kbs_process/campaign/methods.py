@@ -33,8 +33,8 @@ def _gravity(campaign: Campaign, analyses: Sequence[Analysis]) -> str:
     return (
         f"{what} fitted to {', '.join(used)} by maximum a posteriori least squares over masses, centres of gravity, "
         "tilt, misalignments and residual cross-coupling, with the one-sigma values of the parameter files as priors "
-        f"and a taring bias for each recording; g = {float(campaign.rig.gravity):g} m/s^2. The static part was subtracted "
-        f"from all recordings, held-out ones included. Angles ({analyses[-1].entry.name}): {'; '.join(angles)}."
+        f"and a taring bias for each recording; g = {float(campaign.rig.gravity):g} m/s^2. The static part was "
+        f"subtracted from all recordings, held-out ones included. Angles: {'; '.join(angles)}."
     )
 
 
@@ -51,7 +51,7 @@ def _plant(campaign: Campaign) -> str:
         )
     return (
         "The prediction is the plant's, driven by the recorded field where there is one, else by the recorded "
-        "commands through the controller, with the masses and centres of gravity that the fit found and the nominal drives of "
-        f"the parameter files. Effects in the plant: {', '.join(campaign.effects)}. Its static wrench was "
+        "commands through the controller, with the masses and centres of gravity that the fit found and the nominal "
+        f"drives of the parameter files. Effects in the plant: {', '.join(campaign.effects)}. Its static wrench was "
         "removed at its own angles."
     )
