@@ -24,6 +24,7 @@ from kbs_process.signals.records import Loss
 
 WINDOW = 1 << 20  # bytes read at a time: they stay in the processor's cache until used
 CANDIDATE = re.compile(rb"(?=([\x05\x06]).{5}\x00\x00\x00)", re.DOTALL)  # a chunk or message below 2^40 bytes
+MOST_ENTRIES = 1 << 17  # schemas and channels that one chunk may hold: all numbers there are
 OPCODE, CHANNEL, LOG, AT, SIZE = range(5)  # rows of the table that `walk` returns
 
 
@@ -67,7 +68,7 @@ class Container:
         with self.path.open("rb", buffering=0) as file:
             self._seek(file, len(mcap.MAGIC))
             while (stop := self._fill(file)) > 0:
-                end, table = self._walk(self._buffer, stop)
+                end, table = self._walk(self._buffer, stop, chunk=False)
                 ends = np.flatnonzero((table[OPCODE] == mcap.DATA_END_OP) & (table[SIZE] == 4))
                 yield from self._window(table[:, : ends[0]] if len(ends) else table)
                 if len(ends):
@@ -80,9 +81,9 @@ class Container:
         self._truncated(self._at, b"")
 
     @staticmethod
-    def _walk(buffer: Bytes, stop: int) -> tuple[int, Words]:
+    def _walk(buffer: Bytes, stop: int, *, chunk: bool) -> tuple[int, Words]:
         """Return where the records in buffer[:stop] end, and their table."""
-        table = walk(buffer, np.uint64(0), np.uint64(stop))
+        table = walk(buffer, np.uint64(stop), chunk)
         return int(table[AT, -1]), table[:, :-1]
 
     # The window over the file
@@ -217,10 +218,13 @@ class Container:
         if head.crc and crc32(memoryview(buffer)[: head.size]) != head.crc:  # type: ignore[arg-type]
             self.lose("crc", "chunk with a wrong CRC", **span)
             return
-        end, table = self._walk(buffer, head.size)
+        end, table = self._walk(buffer, head.size, chunk=True)
         if end != head.size:
             self.lose("undecodable", f"chunk: its last {head.size - end} bytes are no records", **span)
         others = np.flatnonzero(table[OPCODE] != mcap.MESSAGE_OP)
+        if len(others) > MOST_ENTRIES:
+            self.lose("undecodable", f"chunk: {len(others)} schemas and channels", **span)
+            return
         for i in others:
             try:
                 self.dictionary.add(int(table[OPCODE, i]), bytes(self._content(buffer, table[:, i])))

@@ -18,7 +18,8 @@ Words = NDArray[np.uint64]
 
 RECORD_HEAD = 9  # opcode, length
 MESSAGE_HEAD = 22  # channel, sequence, log time, publish time
-MESSAGE = 5
+SCHEMA, MESSAGE = 3, 5  # with channels between them, all that a chunk may hold
+SHORTEST = 14  # content of a schema record without a single letter
 
 # Forms of a cell (how it is written) and kinds (what it means)
 LITTLE, BIG, VARINT, ZERO, MISSING = range(5)
@@ -56,25 +57,28 @@ def _word(buffer: Bytes, at: np.uint64) -> np.uint64:
     return word
 
 
-@njit(TABLE(BUFFER, types.uint64, types.uint64), cache=True)
-def walk(buffer: Bytes, start: np.uint64, stop: np.uint64) -> Words:
-    """Walk the records in buffer[start:stop]; return a column (opcode, channel, log time, at, size) for each.
+@njit(TABLE(BUFFER, types.uint64, types.boolean), cache=True)
+def walk(buffer: Bytes, stop: np.uint64, chunk: bool) -> Words:
+    """Walk the records in buffer[:stop]; return a column (opcode, channel, log time, at, size) for each.
 
     `at` and `size` are those of a message's payload, or of any other record's whole content. The last column
-    has opcode 0 and, in `at`, where the walk ended: `stop`, or the first record that does not fit.
-    Two passes, because a list of unknown length costs more than walking twice. Work: O(stop - start).
+    has opcode 0 and, in `at`, where the walk ended: `stop`, or the first record that does not fit or,
+    in a chunk, is no schema, channel or message.
+    Two passes, because a list of unknown length costs more than walking twice. Work: O(stop).
     """
     count = 0
-    at = start
+    at = U(0)
     while at + U(RECORD_HEAD) <= stop:
         length = _word(buffer, at + U(1))
         if length > stop - at - U(RECORD_HEAD) or (buffer[at] == MESSAGE and length < U(MESSAGE_HEAD)):
+            break
+        if chunk and not (SCHEMA <= buffer[at] <= MESSAGE and length >= U(SHORTEST)):
             break
         at += U(RECORD_HEAD) + length
         count += 1
     table = np.zeros((5, count + 1), dtype=np.uint64)
     table[3, count] = at
-    at = start
+    at = U(0)
     for i in range(count):
         length = _word(buffer, at + U(1))
         table[0, i] = buffer[at]
