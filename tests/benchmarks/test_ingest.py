@@ -18,12 +18,12 @@ import msgspec
 import numpy as np
 import pytest
 import zstandard
-from ingest.mcap_files import rewrite
 from mcap.reader import make_reader
 from mcap.writer import CompressionType
 from mcap_ros2.decoder import DecoderFactory
 from pytest_benchmark.fixture import BenchmarkFixture
 
+from ingest.mcap_files import rewrite
 from kbs_process.ingest import OutStream, Stream, open_recording, write_mcap
 from kbs_process.ingest.encoding import Encoding
 
@@ -141,6 +141,7 @@ def test_reading_costs_little_more_than_decompressing(
     assert read_all(path) == 2 * MESSAGES
     base = best(lambda: lowest(path), rounds)
     benchmark.pedantic(read_all, (path,), rounds=rounds)
+    base = min(base, best(lambda: lowest(path), rounds))  # before and after, as other work comes and goes
     ratio = benchmark.stats.stats.min / base
     benchmark.extra_info["ratio"] = ratio
     print(
@@ -163,7 +164,8 @@ def test_peer(benchmark: BenchmarkFixture, files: dict[str, Path], tmp_path: Pat
     seconds = benchmark.stats.stats.min * 2 * MESSAGES / PEER_MESSAGES
     base, own = best(lambda: floor(files["ros2"])), best(lambda: read_all(files["ros2"]))
     print(
-        f"\npeer: {seconds / base:.0f} times the floor, extrapolated from {PEER_MESSAGES} messages; here {own / base:.2f}"
+        f"\npeer: {seconds / base:.0f} times the floor, extrapolated from {PEER_MESSAGES} messages; "
+        f"here {own / base:.2f}"
     )
     assert own < seconds
 
