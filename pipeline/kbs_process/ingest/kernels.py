@@ -158,9 +158,12 @@ def decode(
         if not todo[i] or size[i] != length:
             continue
         fits = True
+        inside = at[i] + length + U(8) <= U(len(buffer))  # no word of a guard reaches beyond the buffer
         for g in range(len(guards)):
-            if _word(buffer, at[i] + guards[g, 0]) & guards[g, 1] != guards[g, 2]:
-                fits = False
+            place = at[i] + guards[g, 0]
+            word = _inner_word(buffer, place) if inside else _word(buffer, place)
+            fits = word & guards[g, 1] == guards[g, 2]
+            if not fits:
                 break
         if not fits:
             continue
