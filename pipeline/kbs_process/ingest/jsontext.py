@@ -14,7 +14,7 @@ from typing import Annotated, Any
 import msgspec
 import numpy as np
 
-from kbs_process.ingest.fields import Elements, Field, Step, find_stamp, sibling
+from kbs_process.ingest.fields import Elements, Field, Key, Step, find_stamp, sibling
 from kbs_process.ingest.kernels import Bytes, Words
 from kbs_process.ingest.layout import Decoded
 from kbs_process.signals.records import Array, Mask, Stamps
@@ -134,27 +134,38 @@ class JsonDecoder:
             absent[:, self._scalars] = gone.reshape(table.shape)[:, :width]
 
     def _read_lists(self, messages: list[Any], values: Array, absent: Mask) -> None:
-        for column in self._lists:
-            step = self._steps[column]
-            get = self._get_list[step.path]
-            if isinstance(step.key, int):
-                picks = [_pick(get(message), step.key) for message in messages]
-            else:
-                get_names = self._get_list[sibling(step.path)]
-                picks = [_pick_named(get(message), get_names(message), step.key) for message in messages]
-            values[:, column] = np.array(picks, dtype=np.float64)
-            absent[:, column] = [pick is None for pick in picks]
+        for path in dict.fromkeys(self._steps[column].path for column in self._lists):
+            columns = [column for column in self._lists if self._steps[column].path == path]
+            rows = list(map(self._get_list[path], messages))
+            get_names = self._get_list.get(sibling(path))
+            names = [()] * len(rows) if get_names is None else list(map(get_names, messages))
+            flat = list(chain.from_iterable(rows))
+            width = len(rows[0])
+            if None not in flat and set(map(len, rows)) == {width} and names.count(names[0]) == len(names):
+                # The usual case: all messages are alike, and one look at the first tells where everything is.
+                table = np.array(flat, dtype=np.float64).reshape(len(rows), width)
+                for column in columns:
+                    place = _place(self._steps[column].key, names[0])
+                    if place is not None and place < width:
+                        values[:, column] = table[:, place]
+                    else:
+                        absent[:, column] = True
+                continue
+            for column in columns:
+                key = self._steps[column].key
+                picks = [_pick(row, _place(key, name)) for row, name in zip(rows, names, strict=True)]
+                values[:, column] = np.array(picks, dtype=np.float64)
+                absent[:, column] = [pick is None for pick in picks]
 
 
-def _pick(items: list[float | None], index: int) -> float | None:
-    return items[index] if index < len(items) else None
+def _place(key: Key | None, names: Sequence[str]) -> int | None:
+    if isinstance(key, str):
+        return names.index(key) if key in names else None
+    return key
 
 
-def _pick_named(items: list[float | None], names: list[str], name: str | None) -> float | None:
-    try:
-        return items[names.index(name)]  # type: ignore[arg-type]
-    except (ValueError, IndexError):
-        return None
+def _pick(row: list[float | None], place: int | None) -> float | None:
+    return None if place is None or place >= len(row) else row[place]
 
 
 def _struct(name: str, types: dict[str, Any]) -> Any:
