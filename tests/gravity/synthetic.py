@@ -22,12 +22,12 @@ def perturbed(rig, rng, *, names=(".mass", ".cog", ".tilt", ".misalignment", ".o
     return substitute(rig, values)
 
 
-def staircase(seconds, stops, rng):
-    """Pseudo-static angle: slow smooth moves between stops, at FINE Hz, with time."""
+def staircase(seconds, stops):
+    """Pseudo-static angle: slow smooth moves between stops, at FINE Hz."""
     t = np.arange(int(seconds * FINE)) / FINE
     knots = np.linspace(0, seconds, 2 * len(stops))
     levels = np.repeat(stops, 2)
-    return t, smooth(np.interp(t, knots, levels), 1 / FINE, 0.3)
+    return smooth(np.interp(t, knots, levels), 1 / FINE, 0.3)
 
 
 def record(rig, name, q_fine, rng, *, noise=None, bias=None, deviation=0.0):

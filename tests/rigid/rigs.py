@@ -25,12 +25,24 @@ def body(name, on, mass, cog, inertia, s_mass=0.05, s_cog=0.003, s_inertia=0.0):
 
 
 def joint(
-    name, parent, axis, origin=(0, 0, 0), mis=(0, 0, 0), *, s_mis=0.0, step=None, rotor=None, s_origin=0.0
+    name,
+    parent,
+    axis,
+    origin=(0, 0, 0),
+    mis=(0, 0, 0),
+    *,
+    s_mis=0.0,
+    step=None,
+    rotor=None,
+    s_origin=0.0,
+    s_offset=2e-4,
 ):
     at = f"joint.{name}"
     encoder = None
     if step is not None:
-        encoder = Encoder(quantity(f"{at}.encoder.step", step), quantity(f"{at}.encoder.offset", 0.0, 2e-4))
+        encoder = Encoder(
+            quantity(f"{at}.encoder.step", step), quantity(f"{at}.encoder.offset", 0.0, s_offset)
+        )
     drive = None
     if rotor is not None:
         drive = Drive(

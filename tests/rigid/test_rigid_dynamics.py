@@ -5,11 +5,11 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 import pytest
-from rigs import pointing_rig, smooth_motion, wheel_rig
 
 from kbs_process.plant import rigid
 from kbs_process.rig.model import TRANSDUCER, substitute
 from kbs_process.signals.frames import from_rotation_vector, from_tilt, from_xyz, rotate
+from rigid.rigs import pointing_rig, smooth_motion, wheel_rig
 
 G = 9.80665
 

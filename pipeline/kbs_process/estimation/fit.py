@@ -24,6 +24,8 @@ _GAIN = 1e-10  # of the cost: an iteration that gains less ends the search
 _MOVE = 1e-7  # of the parameters' scales, likewise
 _SINGULAR = 1e-11  # of the greatest singular value, columns scaled to unit length
 _WEAK = 0.9  # posterior over prior sigma from which the data say little
+_CONFUSED = 0.98  # correlation
+_SEEN = 0.5  # prior sigmas over noise: what a parameter alone would show in the data
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -176,8 +178,8 @@ def _cost(r: Array) -> float:
 
 def _triangle(A: Array) -> Array:
     """R of A = Q R."""
-    R: Array = qr(A, mode="r", overwrite_a=True, check_finite=False)[0][: A.shape[1]]
-    return R
+    R = qr(A, mode="r", overwrite_a=True, check_finite=False)[0]
+    return np.asarray(R[: A.shape[1]], dtype=np.float64)
 
 
 def _inverse(J: Array, precision: Array, parameters: Parameters) -> Array:
@@ -239,21 +241,26 @@ def _bounds_check(theta: Array, parameters: Parameters) -> Check:
 
 
 def _identifiable_check(J: Array, sigma: Array, covariance: Array, parameters: Parameters) -> Check:
-    """Which estimates are little more than their prior, and with which other parameter each is confused.
+    """Which estimates are little more than their prior, and which pairs only their combination is known of.
 
-    Information is that of the data alone: a parameter is weak where sigma posterior / sigma prior > 0.9.
+    Prior only: sigma posterior / sigma prior > 0.9. Confused: |correlation| > 0.98 with the named partner.
     """
     correlation = covariance / np.outer(sigma, sigma) - np.eye(len(sigma))
-    informed = np.linalg.norm(J, axis=0)
-    weak = []
+    partner = np.argmax(np.abs(correlation), axis=1)
+    informed = np.linalg.norm(J, axis=0) * parameters.sigma
+    prior_only, confused = [], []
     for index, name in enumerate(parameters.names):
-        prior = parameters.sigma[index]
-        if not np.isfinite(prior) or sigma[index] < _WEAK * prior:
-            continue
-        if informed[index] * prior < 0.5 or len(sigma) == 1:
-            weak.append(f"{name} (no effect on these recordings)")
-        else:
-            partner = int(np.argmax(np.abs(correlation[index])))
-            weak.append(f"{name} (confused with {parameters.names[partner]})")
-    detail = "prior only: " + ", ".join(weak) if weak else "the data inform every parameter"
-    return Check("identifiable", not weak, detail)
+        other = parameters.names[partner[index]]
+        if np.abs(correlation[index, partner[index]]) > _CONFUSED:
+            confused.append(f"{name} with {other}")
+        elif np.isfinite(parameters.sigma[index]) and sigma[index] > _WEAK * parameters.sigma[index]:
+            seen = informed[index] > _SEEN
+            prior_only.append(
+                f"{name} (hidden by {other})" if seen else f"{name} (no effect on these recordings)"
+            )
+    parts = []
+    if prior_only:
+        parts.append("prior only: " + ", ".join(prior_only))
+    if confused:
+        parts.append("confused: " + ", ".join(confused))
+    return Check("identifiable", not parts, "; ".join(parts) or "the data inform every parameter")

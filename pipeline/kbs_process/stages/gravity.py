@@ -21,7 +21,8 @@ from kbs_process.estimation.fit import Fit, Parameters, combination, fit_map
 from kbs_process.estimation.longrun import variance_inflation
 from kbs_process.rig.model import Rig
 from kbs_process.signals.records import WRENCH_CHANNELS, WRENCH_UNITS, Array, Signal
-from kbs_process.stages.gravity_equation import Equation, Prepared, prepare
+from kbs_process.stages.gravity_equation import Equation, Prepared, at_rest, prepare
+from kbs_process.stages.gravity_parameters import Index
 from kbs_process.stages.motion import Motion
 
 _ROUNDS = 3  # of weights
@@ -100,15 +101,17 @@ def fit(
 ) -> GravityModel:
     """Fit the model to all samples, calibrations first.
 
-    Inertial forces are always in the equation; with `include_inertia` their parameters are free and `apply` removes
-    them, without it they stay as the rig says and `apply` removes gravity alone. Raises FitError where nothing
-    moves, or where the data say nothing that the priors did not.
+    With `include_inertia` inertial forces are in the equation, their parameters are free, and `apply` removes them.
+    Without it they are taken off the data as the rig's own numbers say, and `apply` removes gravity alone.
+    Raises FitError where nothing moves, or where the data say nothing that the priors did not.
     """
     _refuse_no_motion(samples, rig)
     prepared = [
         prepare(s.name, s.motion, s.wrench, settings.low_pass_Hz, with_neighbours=settings.response)
         for s in samples
     ]
+    if not include_inertia:
+        prepared = [at_rest(p, rig) for p in prepared]
     first = [p for p, s in zip(prepared, samples, strict=True) if s.calibration] or prepared
     equation = Equation.of(
         rig,
@@ -192,7 +195,7 @@ def apply(motion: Motion, model: GravityModel, recording: str | None = None) -> 
     )
 
 
-def derivatives(motion: Motion, model: GravityModel, at: Array) -> Array:
+def derivatives(motion: Motion, model: GravityModel, at: Index) -> Array:
     """Derivatives (m, c, p) of the modelled wrench by the rig's fitted parameters, at samples `at` (m,)."""
     equation = model.equation
     theta = model.fit.value[: equation.size]

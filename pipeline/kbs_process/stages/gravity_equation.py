@@ -72,18 +72,41 @@ def prepare(name: str, motion: Motion, wrench: Signal, low_pass: float, *, with_
             f"{name}: too short or too damaged for a gravity fit below {low_pass:g} Hz",
             remedy=f"give it {4 * edge * motion.dt:.0f} s at least, or raise the fit's low-pass",
         )
+    motion = replace(
+        motion,
+        q=smooth(motion.q, motion.dt, low_pass),
+        qd=smooth(motion.qd, motion.dt, low_pass),
+        qdd=smooth(motion.qdd, motion.dt, low_pass),
+    )
     smoothed = Prepared(
         name=name,
         dt=motion.dt,
-        q=smooth(motion.q, motion.dt, low_pass) + motion.offset,
-        qd=smooth(motion.qd, motion.dt, low_pass),
-        qdd=smooth(motion.qdd, motion.dt, low_pass),
+        q=motion.q + motion.offset,
+        qd=motion.qd,
+        qdd=motion.qdd,
         before=Prepared.neighbour(motion, -1) if with_neighbours else None,
         after=Prepared.neighbour(motion, 1) if with_neighbours else None,
         sigma_q=motion.sigma_q,
         wrench=smooth(wrench.values, wrench.dt, low_pass),
     )
     return smoothed.rows(at)
+
+
+def at_rest(p: Prepared, rig: Rig) -> Prepared:
+    """The instants as if the joints stood still: the rig's nominal inertial forces taken off the wrench.
+
+    Differentiated encoder noise is in these forces. Were their parameters fitted to them, it would pull the
+    estimates towards zero (errors in variables); taken off once, it is but noise.
+    """
+    q, rest = p.q - encoder_offsets(rig), np.zeros_like(p.q)
+    inertial = inverse_dynamics(rig, q, p.qd, p.qdd) - inverse_dynamics(rig, q, rest, rest)
+    index = [WRENCH_CHANNELS.index(channel) for channel in rig.transducer.channels]
+    return replace(p, qd=rest, qdd=rest, before=None, after=None, wrench=p.wrench - inertial[:, index])
+
+
+def encoder_offsets(rig: Rig) -> Array:
+    """(joints,) rad; zero for a joint without an encoder."""
+    return np.array([0.0 if j.encoder is None else float(j.encoder.offset) for j in rig.joints])
 
 
 def _away_from_invalid(valid: Mask, edge: int) -> Mask:
@@ -217,7 +240,7 @@ class Equation:
     def _wrenches(self, theta: Array, p: Prepared) -> tuple[Array, ...]:
         """W at the instants and, where known, one sample before and after."""
         rig = self.elements.rig_at(theta[: len(self.elements.names)])
-        offset = np.array([0.0 if j.encoder is None else float(j.encoder.offset) for j in rig.joints])
+        offset = encoder_offsets(rig)
         moments = [(p.q, p.qd, p.qdd)] + [angles for angles in (p.before, p.after) if angles is not None]
         return tuple(inverse_dynamics(rig, q - offset, qd, qdd) for q, qd, qdd in moments)
 

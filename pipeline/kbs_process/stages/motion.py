@@ -60,7 +60,7 @@ class _Angle:
 def estimate(run: Run, rig: Rig, settings: MotionSettings = MotionSettings()) -> Motion:
     """Estimate the motion of every joint of `rig` over the run's time grid.
 
-    Derivatives are exact for band-limited motion up to `band_Hz`; within 2.5 / band_Hz of the ends they rest on a
+    Derivatives are exact for band-limited motion up to `band_Hz`; within 1 / band_Hz of the ends they rest on a
     straight continuation. `sigma_q` holds rounding and the part of the real motion that a source misses.
     Raises RecordingError where a joint has neither angle nor rate.
     """
