@@ -1,4 +1,4 @@
-"""Repeats are found and brought to one axis; what is no repeat is not taken for one."""
+"""The lag of a repeat is found; what is no repeat is not taken for one."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from kbs_process.signals.records import Signal
-from kbs_process.stages.repeats import lag, shifted
+from kbs_process.stages.repeats import lag
 
 DT = 0.05
 
@@ -40,16 +40,3 @@ def test_another_trajectory_is_no_repeat():
     other = 1.2 + 0.3 * np.sin(2 * np.pi * T / 45.0)
     assert lag(signal(motion(T, 50.0)), signal(other)) is None
     assert lag(signal(np.full_like(T, 0.5)), signal(motion(T, 50.0))) is None
-
-
-def test_shifting_undoes_a_delay():
-    rng = np.random.default_rng(5)
-    tones = [(f, rng.uniform(0, 6.28)) for f in np.linspace(0.05, 1.0, 12)]
-
-    def wave(t: np.ndarray) -> np.ndarray:
-        return sum(np.sin(2 * np.pi * f * t + p) for f, p in tones)
-
-    moved = shifted(signal(wave(T - 1.2345)), 1.2345, signal(wave(T)))
-    error = moved.values[moved.valid, 0] - wave(T)[moved.valid]
-    assert np.sqrt(np.mean(error**2)) < 1e-4 * np.std(wave(T))
-    assert not moved.valid[-20:].any()  # nothing was recorded there

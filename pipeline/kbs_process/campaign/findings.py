@@ -48,7 +48,7 @@ def find(
     found = tuple(budgets(campaign, runs, model, decoupling, statements, repeated, resonances))
     return Findings(
         repeatability=repeated,
-        merit=tuple(_merits(campaign, runs, bands)),
+        merit=tuple(_merits(campaign, runs, bands, found)),
         budget=found,
         requirements=tuple(
             judged(campaign, requirement, runs, found) for requirement in campaign.requirements
@@ -88,14 +88,8 @@ def _repeatability(runs: Sequence[Analysis], bands: Sequence[Band]) -> Iterable[
         if len(lags) < 2:
             continue
         for frame, band in group[0].pairs:
-            reference = group[0].pairs[frame, band].measured
-            aligned = [
-                reference
-                if index == 0
-                else repeats.shifted(group[index].pairs[frame, band].measured, late, reference)
-                for index, late in lags.items()
-            ]
-            found = repeatability.fit(aligned)
+            signals = [group[index].pairs[frame, band].measured for index in lags]
+            found = repeatability.fit(repeatability.on_common_axis(signals, list(lags.values())))
             for index, channel in enumerate(found.channels):
                 yield results.Repeatability(
                     trajectory=trajectory,
@@ -122,8 +116,11 @@ def _lags(group: Sequence[Analysis]) -> dict[int, float]:
     return lags
 
 
-def _merits(campaign: Campaign, runs: Sequence[Analysis], bands: Sequence[Band]) -> Iterable[results.Merit]:
+def _merits(
+    campaign: Campaign, runs: Sequence[Analysis], bands: Sequence[Band], budget: Sequence[results.Budget]
+) -> Iterable[results.Merit]:
     by_name = {band.name: band for band in bands}
+    sigma = {(entry.frame, entry.band, entry.channel): entry.total for entry in budget}
     for analysis in runs:
         for (frame, name), pair in analysis.pairs.items():
             if pair.predicted is None:
@@ -146,6 +143,7 @@ def _merits(campaign: Campaign, runs: Sequence[Analysis], bands: Sequence[Band])
                     fraction_of_variance=merit.fraction_of_variance,
                     spectral_ratio=merit.spectral_ratio,
                     pessimism=merit.pessimism,
+                    sigma=sigma.get((_frame(frame), name, merit.channel)),
                 )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterable, Sequence
 
 from kbs_process.campaign.analysis import Analysis
@@ -9,6 +10,7 @@ from kbs_process.campaign.config import Campaign
 from kbs_process.campaign.findings import Findings
 from kbs_process.report import results
 from kbs_process.stages.gravity import GravityModel
+from kbs_process.stages.verdict import COVERAGE
 
 # A resonance below this many times a band's edge is next to it: the band then holds part of the resonance's flank.
 NEXT_TO = 4.0
@@ -16,6 +18,9 @@ NEXT_TO = 4.0
 WEAK = 0.5
 # Repeats with less signal than this many times their noise are dominated by noise.
 NOISY = 1.0
+# Characters of a check's detail that a notice quotes.
+LONG = 160
+QUANTITY = {"torque": "T", "force": "F"}  # first letter of its channels
 
 
 def notices(
@@ -62,29 +67,38 @@ def _losses(analyses: Sequence[Analysis]) -> Iterable[results.Notice]:
 def _fit(model: GravityModel) -> Iterable[results.Notice]:
     for check in model.fit.checks:
         if not check.passed:
-            yield results.Notice(severity="info", what=f"gravity fit, {check.name}: {check.detail}")
+            detail = check.detail if len(check.detail) < LONG else f"{check.detail[:LONG]} ..."
+            yield results.Notice(
+                severity="info",
+                what=f"gravity fit, {check.name}: {detail}",
+                remedy="see the gravity fit's table",
+            )
 
 
 def _repeats(campaign: Campaign, findings: Findings) -> Iterable[results.Notice]:
+    """One notice a trajectory, band and frame whose channels differ from run to run by more than they share."""
     if not findings.repeatability:
         yield results.Notice(
             severity="warning" if campaign.requirements else "info",
             what="no trajectory was repeated: the budget holds no repeatability",
             remedy="run every trajectory two or three times",
         )
-    wanted = {(one.frame, one.band, one.quantity[0].upper()) for one in findings.requirements}
+    judged = {(one.frame, one.band, QUANTITY[one.quantity]) for one in findings.requirements}
+    noisy: dict[str, list[results.Repeatability]] = defaultdict(list)
     for entry in findings.repeatability:
-        if (
-            (entry.frame, entry.band, entry.channel[0]) in wanted
-            and entry.ratio is not None
-            and entry.ratio < NOISY
-        ):
-            yield results.Notice(
-                severity="warning",
-                what=f"{entry.channel} does not repeat: noise {entry.noise_rms:.3g} {entry.unit} rms "
-                f"against a signal of {entry.signal_rms:.3g}",
-                where=f"{entry.trajectory}, {entry.band}, frame {entry.frame}",
-            )
+        key = (entry.frame, entry.band, entry.channel[0])
+        if key in judged and entry.ratio is not None and entry.ratio < NOISY:
+            noisy[f"{entry.trajectory}, {entry.band}, frame {entry.frame}"].append(entry)
+    for where, entries in noisy.items():
+        each = ", ".join(
+            f"{e.channel} {e.noise_rms:.2g} against {e.signal_rms:.2g} {e.unit}" for e in entries
+        )
+        yield results.Notice(
+            severity="warning",
+            what=f"noise is larger than what the repeats have in common (rms): {each}",
+            where=where,
+            remedy="the verdict bounds the disturbance rather than measures it: quieten the transducer, or repeat more",
+        )
 
 
 def _resonance(findings: Findings) -> Iterable[results.Notice]:
@@ -103,19 +117,32 @@ def _resonance(findings: Findings) -> Iterable[results.Notice]:
 
 
 def _predictions(findings: Findings) -> Iterable[results.Notice]:
-    judged = {(one.frame, one.band): one for one in findings.requirements}
-    for merit in findings.merit:
-        requirement = judged.get((merit.frame, merit.band))
-        if requirement is None or merit.channel[0] != ("T" if requirement.quantity == "torque" else "F"):
-            continue
-        if merit.fraction_of_variance is not None and merit.fraction_of_variance < WEAK:
+    """Where the prediction can be tested in a requirement's band, and fails; and where it cannot be tested."""
+    judged = {(one.frame, one.band, QUANTITY[one.quantity]) for one in findings.requirements}
+    of_judged = [merit for merit in findings.merit if (merit.frame, merit.band, merit.channel[0]) in judged]
+    noise = [merit for merit in of_judged if at_the_noise(merit)]
+    if noise:
+        channels = ", ".join(sorted({merit.channel for merit in noise}))
+        yield results.Notice(
+            severity="info",
+            what=f"{channels} in the requirement's band lie within twice their own uncertainty: "
+            "the prediction cannot be tested there",
+            remedy="look at wider bands and at the transducer (frame T) for the correlation",
+        )
+    for merit in of_judged:
+        explained = merit.fraction_of_variance
+        if not at_the_noise(merit) and explained is not None and explained < WEAK:
             yield results.Notice(
-                severity="info",
-                what=f"the prediction explains {100 * merit.fraction_of_variance:.0f} % of the variance of "
-                f"{merit.channel} in the requirement's band",
-                where=f"{merit.recording}, frame {merit.frame}",
-                remedy="see figures of merit: phases of cogging and friction are unknown before identification",
+                severity="warning",
+                what=f"the prediction explains {100 * explained:.0f} % of the variance of {merit.channel}",
+                where=f"{merit.recording}, {merit.band}, frame {merit.frame}",
+                remedy="see figures of merit; phases of cogging and friction are unknown before identification",
             )
+
+
+def at_the_noise(merit: results.Merit) -> bool:
+    """Is a measured channel within twice its own uncertainty?"""
+    return merit.sigma is not None and (merit.measured_rms or 0.0) < COVERAGE * merit.sigma
 
 
 def _edges(findings: Findings) -> Iterable[results.Notice]:

@@ -15,7 +15,7 @@ from scipy.interpolate import CubicSpline
 from scipy.stats import chi2
 
 from kbs_process.errors import RecordingError
-from kbs_process.signals.records import Array, Events, Signal
+from kbs_process.signals.records import Array, Signal
 
 CONFIDENCE = 0.95
 
@@ -34,16 +34,6 @@ class Repeatability:
     ratio: Array  # signal / noise; infinite without noise
     repeats: int
     samples: int  # of each repeat, valid in all of them
-
-
-def departure(events: Events) -> float:
-    """Time of the last command before the commanded position or rate first changes, s.
-
-    The recorder is started by hand, the trajectory by the electronics: repeats are to be laid on each other by
-    this time, good to the resolution of the command's stamps.
-    """
-    moved = np.flatnonzero(np.any(events.values != events.values[0], axis=1))
-    return float(events.t[max(int(moved[0]) - 1, 0)]) if len(moved) else float(events.t[0])
 
 
 def on_common_axis(runs: Sequence[Signal], starts: Sequence[float]) -> list[Signal]:

@@ -1,9 +1,8 @@
-"""Repeats of a trajectory brought to one time axis: a recorder may be started at any moment before the motion."""
+"""By how much one repeat of a trajectory is later than another: recorders are started by hand."""
 
 from __future__ import annotations
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 from scipy.signal import fftconvolve
 
 from kbs_process.signals.records import Array, Run, Signal
@@ -66,27 +65,6 @@ def lag(reference: Signal, other: Signal) -> float | None:
         if abs(step) < 1e-9:
             break
     return shift if residual < SAME_MOTION * spread else None
-
-
-def shifted(signal: Signal, by: float, like: Signal) -> Signal:
-    """Return `signal` earlier by `by` s, on the grid of `like`; samples outside it are flagged.
-
-    Cubic splines: the gain errs by (2 pi f dt)^4 / 720 at most, 3e-4 at 2 Hz and 20 Hz sampling.
-    """
-    t = like.t + by
-    inside = (t >= signal.t[0]) & (t <= signal.t[-1])
-    values = CubicSpline(signal.t, signal.values, axis=0)(np.clip(t, signal.t[0], signal.t[-1]))
-    valid = inside & (np.interp(t, signal.t, signal.valid.astype(float)) > 1.0 - 1e-9)
-    return Signal(
-        t0=like.t0,
-        dt=like.dt,
-        values=values,
-        channels=signal.channels,
-        units=signal.units,
-        frame=signal.frame,
-        valid=valid,
-        history=(*signal.history, f"shifted by {-by:+.6f} s to the first repeat"),
-    )
 
 
 def _overlap(reference: Signal, other: Signal, shift: float) -> tuple[Array, Array, Array, Array]:
