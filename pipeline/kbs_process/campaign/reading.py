@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from kbs_process.campaign.config import Campaign, RecordingEntry
 from kbs_process.ingest import Stream, open_recording
-from kbs_process.signals.records import Block, Run
+from kbs_process.signals.records import Block, Loss, Run
 from kbs_process.stages.condense import CondenseSettings, condense
 
 # A recorder need not have these; everything else that the campaign names has to be there.
@@ -30,7 +30,17 @@ def read_run(campaign: Campaign, entry: RecordingEntry) -> Run:
         {topic.key: topic.channels for topic in topics},
         CondenseSettings(working_rate_Hz=campaign.bands.working_rate),
     )
-    return replace(run, losses=(*source.losses, *run.losses))
+    late = ((source.start_ns or run.log_epoch_ns) - run.log_epoch_ns) * 1e-9
+    return replace(run, losses=(*(_later(loss, late) for loss in source.losses), *run.losses))
+
+
+def _later(loss: Loss, by: float) -> Loss:
+    """A loss of the file, located from its first message, on the run's time axis."""
+    return replace(
+        loss,
+        start_s=None if loss.start_s is None else loss.start_s + by,
+        end_s=None if loss.end_s is None else loss.end_s + by,
+    )
 
 
 def _within(

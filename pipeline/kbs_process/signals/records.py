@@ -154,6 +154,7 @@ class Run:
     spectrum: Spectrum | None  # of the wrench
     envelope: Envelope | None  # of the wrench
     epoch_ns: int  # sensor clock at the recording's time zero
+    log_epoch_ns: int = 0  # recorder clock at the recording's time zero
     rates: dict[str, float] = dataclasses.field(default_factory=dict)  # Hz, measured, by stream
     losses: tuple[Loss, ...] = ()
     clocks: dict[str, Clock] = dataclasses.field(default_factory=dict)  # by stream

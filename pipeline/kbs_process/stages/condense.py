@@ -109,6 +109,7 @@ def condense(
         spectrum=wrench.welch.result() if wrench and wrench.welch else None,
         envelope=_envelope(wrench) if wrench else None,
         epoch_ns=present[reference].first_stamp,
+        log_epoch_ns=present[reference].clock().first_log,
         rates={key: line.grid.rate for key, line in present.items() if line.grid is not None},
         losses=(*_losses(present, clocks), *(_missing(s.line) for s in slow.values() if not s.line.samples)),
         clocks=clocks,
