@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import lstsq, qr
+from scipy.linalg import lstsq
 
 from kbs_process.errors import FitError
 from kbs_process.estimation.longrun import longrun_covariance
@@ -178,8 +178,7 @@ def _cost(r: Array) -> float:
 
 def _triangle(A: Array) -> Array:
     """R of A = Q R."""
-    R = qr(A, mode="r", overwrite_a=True, check_finite=False)[0]
-    return np.asarray(R[: A.shape[1]], dtype=np.float64)
+    return np.asarray(np.linalg.qr(A, mode="r"), dtype=np.float64)
 
 
 def _inverse(J: Array, precision: Array, parameters: Parameters) -> Array:
