@@ -11,6 +11,7 @@ from plant_rigs import NOMINAL, body, joint, one_axis, rig, three_axis, two_axis
 from scipy.linalg import eigh
 
 from kbs_process.plant.effects import select
+from kbs_process.plant.modes import modes as modes_on_transducer
 from kbs_process.plant.predict import predict
 from kbs_process.plant.schedule import Schedule
 from kbs_process.plant.simulation import Simulation
@@ -264,3 +265,7 @@ def test_base_resonance_is_the_eigenvalue() -> None:
     print(f"first resonance {frequency:.4f} Hz, eigenvalue {expected:.4f} Hz")
     assert 1.0 < expected < 20.0
     assert frequency == pytest.approx(expected, rel=1e-3)
+    # The modes that reports name come from Jacobians of the bodies, not from these energies.
+    named = modes_on_transducer(of, select(NOMINAL), position)
+    assert named[0].frequency == pytest.approx(expected, rel=1e-4)
+    assert [mode.axis for mode in named[:3]] == ["y", "x", "z"]

@@ -13,7 +13,8 @@ from kbs_process.campaign.analysis import Analysis, bands_of, passband
 from kbs_process.campaign.config import Campaign
 from kbs_process.campaign.judging import judged
 from kbs_process.campaign.uncertainty import budgets
-from kbs_process.plant.modes import rocking_modes
+from kbs_process.plant.effects import select
+from kbs_process.plant.modes import modes
 from kbs_process.report import results
 from kbs_process.stages import repeatability, repeats
 from kbs_process.stages.bandpass import Band, BandStatement, statement
@@ -150,18 +151,20 @@ def _merits(
 def _resonances(
     campaign: Campaign, runs: Sequence[Analysis], model: GravityModel
 ) -> tuple[results.Resonance, ...]:
-    """Rocking modes at the first and the last pose of the first run: they move with the joints."""
-    if not runs or campaign.rig.transducer.on != "lab":
+    """Modes on the transducer at the first and the last pose of the first run: they move with the joints."""
+    if not runs:
         return ()
-    q = runs[0].motion.q
+    q, nyquist = runs[0].motion.q, 0.5 * runs[0].run.rates["wrench"]
     found = []
     for where, pose in (("first pose", q[0]), ("last pose", q[-1])):
         angles = ", ".join(
             f"{name} {np.degrees(angle):.1f} deg"
             for name, angle in zip(campaign.rig.joint_names, pose, strict=True)
         )
-        for mode in rocking_modes(model.rig, pose):
-            source = f"rocking about {mode.axis}, drives locked, {where} ({angles})"
+        for mode in modes(model.rig, select(campaign.effects), pose):
+            if mode.frequency > nyquist:
+                continue
+            source = f"turning about {mode.axis}, {where} ({angles})"
             found.append(
                 results.Resonance(
                     axis=mode.axis, frequency_Hz=mode.frequency, sigma_Hz=mode.sigma, source=source
