@@ -203,6 +203,12 @@ def derivatives(motion: Motion, model: GravityModel, at: Index) -> Array:
     return J.reshape(len(at), len(equation.channels), equation.size)
 
 
+def angle_slopes(motion: Motion, model: GravityModel, at: Index) -> Array:
+    """Derivatives (m, c, joints) of the modelled wrench by the joints' angles, at samples `at` (m,)."""
+    equation = model.equation
+    return equation.angle_slopes(model.fit.value[: equation.size], _from_motion(motion, equation).rows(at))
+
+
 def feasibility(model: GravityModel, limits: Mapping[str, float]) -> tuple[Feasibility, ...]:
     """Error of the computed compensation for each channel with a limit: worst recording, residual and encoder."""
     statements = []

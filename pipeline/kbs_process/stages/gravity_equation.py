@@ -219,17 +219,20 @@ class Equation:
             J[:, :, -2], J[:, :, -1] = first @ mixing, second @ mixing
         return J.reshape(n * c, self.size)
 
-    def encoder_error(self, theta: Array, p: Prepared) -> Array:
-        """|dW/dq| sigma_q (n, c), joints independent, N and N m."""
-        variance = np.zeros((len(p.q), len(self.channels)))
+    def angle_slopes(self, theta: Array, p: Prepared) -> Array:
+        """dW/dq (n, c, joints), N/rad and N m/rad: what an error of an angle does."""
         alone = replace(p, before=None, after=None)
-        for joint in range(p.q.shape[1]):
-            step = np.zeros(p.q.shape[1])
-            step[joint] = _ANGLE_STEP
+        slopes = []
+        for step in _ANGLE_STEP * np.eye(p.q.shape[1]):
             ahead = self.predict(theta, replace(alone, q=p.q + step))
             behind = self.predict(theta, replace(alone, q=p.q - step))
-            variance += ((ahead - behind) / (2 * _ANGLE_STEP) * p.sigma_q[:, joint, None]) ** 2
-        return np.sqrt(variance)
+            slopes.append((ahead - behind) / (2 * _ANGLE_STEP))
+        return np.stack(slopes, axis=2)
+
+    def encoder_error(self, theta: Array, p: Prepared) -> Array:
+        """|dW/dq| sigma_q (n, c), joints independent, N and N m."""
+        error: Array = np.sqrt(np.sum((self.angle_slopes(theta, p) * p.sigma_q[:, None, :]) ** 2, axis=2))
+        return error
 
     def _coupling(self, theta: Array) -> Array:
         dX = np.zeros((6, 6))

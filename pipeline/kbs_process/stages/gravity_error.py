@@ -6,7 +6,8 @@ import numpy as np
 
 from kbs_process.signals.records import Array
 from kbs_process.stages.budget import Entry, Filter, from_shapes
-from kbs_process.stages.gravity import GravityModel, Static, derivatives
+from kbs_process.stages.gravity import GravityModel, Static, angle_slopes, derivatives
+from kbs_process.stages.gravity_parameters import Index
 from kbs_process.stages.motion import Motion
 
 _POINTS = 1000  # of a recording at which the shapes are computed, linear in between
@@ -18,19 +19,43 @@ def entries(motion: Motion, static: Static, model: GravityModel, band: Filter) -
 
     The static wrench errs by J L z with J its derivatives along the motion, L L^T the parameters' covariance and z
     independent of unit variance: every column of J L is one error with its own history, and is filtered as the
-    signal is. Constant errors are the taring bias's and vanish in a band without zero frequency. The angles'
-    error is taken as it is within the working band, which bounds it.
+    signal is. Constant errors are the taring bias's and vanish in a band without zero frequency. The angles' error
+    goes the same way, (dW/dq) times the histories of the encoders' rounding; what the angles' source misses of the
+    real motion counts in full, wherever in the band it lies.
     """
     shapes = [static.wrench.derive(shape, "error of the gravity model") for shape in _shapes(motion, model)]
     parameters = from_shapes("gravity", "covariance of the fitted parameters", shapes, band)
-    valid = static.wrench.valid
-    encoder = np.sqrt(np.mean(static.sigma_encoder[valid] ** 2, axis=0))
-    return parameters, Entry("gravity", "angles: encoder rounding through the model", encoder)
+    slope = _slope(motion, model)
+    rounding = [
+        static.wrench.derive(
+            slope[:, :, joint] * history[:, None] / np.sqrt(len(motion.rounding)), "rounding"
+        )
+        for phase in motion.rounding
+        for joint, history in enumerate(phase.T)
+    ]
+    rounded = from_shapes("gravity", "", rounding, band).sigma
+    missed = np.sqrt(np.mean((slope * motion.missed) ** 2, axis=0).sum(axis=1))
+    return parameters, Entry(
+        "gravity", "angles: encoder rounding and missed motion", np.hypot(rounded, missed)
+    )
+
+
+def _slope(motion: Motion, model: GravityModel) -> Array:
+    """dW/dq (n, c, joints) along the motion."""
+    at = _sparse(motion)
+    sparse = angle_slopes(motion, model, at)
+    t = np.arange(len(motion))
+    columns = [np.interp(t, at, column) for column in sparse.reshape(len(at), -1).T]
+    return np.stack(columns, axis=1).reshape(len(motion), *sparse.shape[1:])
+
+
+def _sparse(motion: Motion) -> Index:
+    return np.unique(np.linspace(0, len(motion) - 1, min(len(motion), _POINTS)).astype(np.int64))
 
 
 def _shapes(motion: Motion, model: GravityModel) -> list[Array]:
     """One-sigma error histories (n, c) of independent directions of the rig's fitted parameters."""
-    at = np.unique(np.linspace(0, len(motion) - 1, min(len(motion), _POINTS)).astype(int))
+    at = _sparse(motion)
     size = model.equation.size
     J = derivatives(motion, model, at)
     variance, directions = np.linalg.eigh(model.fit.covariance[:size, :size])

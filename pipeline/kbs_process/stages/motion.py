@@ -41,7 +41,11 @@ class Motion:
     q: Array  # (n, joints) rad
     qd: Array  # (n, joints) rad/s
     qdd: Array  # (n, joints) rad/s^2
-    sigma_q: Array  # (n, joints) rad
+    sigma_q: Array  # (n, joints) rad, of both causes below
+    rounding: (
+        Array  # (phases, n, joints) rad, how encoder rounding may have erred, for positions within a code
+    )
+    missed: Array  # (joints,) rad rms, real motion that the source does not show
     offset: Array  # (joints,) rad, taken off the encoders' readings
     valid: Mask  # (n,)
     history: tuple[str, ...] = ()
@@ -53,6 +57,8 @@ class Motion:
 @dataclass(frozen=True, slots=True, eq=False)
 class _Angle:
     q: Array  # (n,) not yet low-passed
+    rounding: Array  # (phases, n)
+    missed: float
     sigma: Array  # (n,)
     how: str
 
@@ -80,6 +86,8 @@ def estimate(run: Run, rig: Rig, settings: MotionSettings = MotionSettings()) ->
         qd=smooth(q, grid.dt, settings.band_Hz, derivative=1),
         qdd=smooth(q, grid.dt, settings.band_Hz, derivative=2),
         sigma_q=np.stack([angle.sigma for angle in angles], axis=1),
+        rounding=np.stack([angle.rounding for angle in angles], axis=2),
+        missed=np.array([angle.missed for angle in angles]),
         offset=offset,
         valid=grid.valid,
         history=(
@@ -127,13 +135,15 @@ def _integrated(rate: Array, dt: float, band: float) -> _Angle:
     """Trapezoidal integral from zero; its error is the random walk of the noise that the band takes off."""
     q = np.concatenate([[0.0], np.cumsum(0.5 * dt * (rate[1:] + rate[:-1]))])
     noise = float(np.std(rate - smooth(rate, dt, band)))
-    return _Angle(q, noise * dt * np.sqrt(np.arange(len(q))), "integral of the measured rate")
+    sigma = noise * dt * np.sqrt(np.arange(len(q)))
+    return _Angle(q, np.zeros((len(_PHASES), len(q))), _rms(sigma), sigma, "integral of the measured rate")
 
 
 def _from_encoder(measured: Array, dt: float, step: float, encoder_rate: float, band: float) -> _Angle:
     motion = smooth(measured, dt, band)
-    sigma = rounding_error(motion, dt, step, encoder_rate, band)
-    return _Angle(measured, sigma, f"encoder alone, sigma {_rms(sigma):.2g} rad")
+    rounding = rounding_histories(motion, dt, step, encoder_rate, band)
+    sigma = rounding_error(rounding, dt)
+    return _Angle(measured, rounding, 0.0, sigma, f"encoder alone, sigma {_rms(sigma):.2g} rad")
 
 
 def _from_both(
@@ -146,7 +156,7 @@ def _from_both(
     band = settings.band_Hz
     commanded = commanded - _lag(measured, commanded, dt, band) * smooth(commanded, dt, band, derivative=1)
     motion = commanded + smooth(measured - commanded, dt, band)
-    in_band = rounding_error(motion, dt, step, encoder_rate, band)
+    in_band = rounding_error(rounding_histories(motion, dt, step, encoder_rate, band), dt)
     deviation = smooth(measured - commanded, dt, band)
     best = _from_encoder(measured, dt, step, encoder_rate, band)
     least = np.inf if settings.source == "command+encoder" else _rms(best.sigma)
@@ -154,13 +164,14 @@ def _from_both(
         if corner >= band or kernel_length(corner, dt) > len(measured) // 2:
             continue
         slow = smooth(measured - commanded, dt, corner)
-        rounding = rounding_error(motion, dt, step, encoder_rate, corner)
-        lost = _rms(deviation - slow) ** 2 - max(_rms(in_band) ** 2 - _rms(rounding) ** 2, 0.0)
-        sigma = np.sqrt(rounding**2 + max(lost, 0.0))
+        rounding = rounding_histories(motion, dt, step, encoder_rate, corner)
+        known = rounding_error(rounding, dt)
+        missed = _rms(deviation - slow) ** 2 - max(_rms(in_band) ** 2 - _rms(known) ** 2, 0.0)
+        sigma = np.sqrt(known**2 + max(missed, 0.0))
         if _rms(sigma) < least:
             least = _rms(sigma)
             how = f"command and encoder, joined at {corner:g} Hz, sigma {least:.2g} rad"
-            best = _Angle(commanded + slow, sigma, how)
+            best = _Angle(commanded + slow, rounding, float(np.sqrt(max(missed, 0.0))), sigma, how)
     return best
 
 
@@ -173,26 +184,30 @@ def _lag(measured: Array, commanded: Array, dt: float, band: float) -> float:
     return float(rate @ deviation) / power if power > 0.0 else 0.0
 
 
-def rounding_error(motion: Array, dt: float, step: float, encoder_rate: float, band: float) -> Array:
-    """Standard deviation (n,) rad of an encoder's rounding error, below `band` Hz, along a known motion (n,).
+def rounding_histories(motion: Array, dt: float, step: float, encoder_rate: float, band: float) -> Array:
+    """How an encoder's rounding errs below `band` Hz along a known motion (n,): (phases, n) rad.
 
     The motion is rounded as the encoder would, at its own rate and at four positions within a code, and
-    filtered; the error's square is averaged over those and over a second. A joint at rest keeps
-    step / sqrt(12); one that crosses codes faster than the band loses most of it.
+    filtered: which of them is the true one nobody knows.
     """
     if step == 0.0:
-        return np.zeros_like(motion)
+        return np.zeros((len(_PHASES), len(motion)))
     factor = max(1, round(encoder_rate * dt))
-    fine_dt = dt / factor
     fine = np.interp(np.arange((len(motion) - 1) * factor + 1) / factor, np.arange(len(motion)), motion)
-    power = np.zeros(len(motion))
-    for phase in _PHASES:
-        shifted = fine / step + phase
-        power += smooth(step * (np.round(shifted) - shifted), fine_dt, band)[::factor] ** 2
-    power /= len(_PHASES)
-    window = max(1, min(round(1.0 / dt), len(motion)))
+    codes = fine / step + np.array(_PHASES)[:, None]
+    histories: Array = smooth((step * (np.round(codes) - codes)).T, dt / factor, band)[::factor].T
+    return histories
+
+
+def rounding_error(histories: Array, dt: float) -> Array:
+    """Standard deviation (n,) rad of the rounding error: its square averaged over phases and over a second.
+
+    A joint at rest keeps step / sqrt(12); one that crosses codes faster than the band loses most of it.
+    """
+    power = np.mean(histories**2, axis=0)
+    window = max(1, min(round(1.0 / dt), len(power)))
     kernel = np.ones(window) / window
-    weight = np.convolve(np.ones(len(motion)), kernel, mode="same")
+    weight = np.convolve(np.ones(len(power)), kernel, mode="same")
     sigma: Array = np.sqrt(np.convolve(power, kernel, mode="same") / weight)
     return sigma
 
