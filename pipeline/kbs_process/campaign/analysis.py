@@ -64,7 +64,10 @@ def analyse(
     """Remove gravity from measurement and prediction alike, cut the bands, move them to the spacecraft."""
     wrench = _wrench(run)
     static = gravity.apply(_at_rest(motion), model, entry.name)
-    residual = wrench.derive(wrench.values - static.wrench.values, "fitted static wrench removed")
+    residual = wrench.derive(
+        model.without_coupling(wrench.values - static.wrench.values),
+        "fitted static wrench and the fitted rest of the cross-coupling removed",
+    )
     predicted = disturbance = None
     if entry.role != "calibration":
         predicted, disturbance = _predict(campaign, run, motion, model, update)

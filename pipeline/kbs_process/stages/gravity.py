@@ -67,6 +67,13 @@ class GravityModel:
     def channels(self) -> tuple[str, ...]:
         return self.equation.channels
 
+    def without_coupling(self, residual: Array) -> Array:
+        """Undo the fitted rest of the cross-coupling on a residual (n, c): (I + dX)^-1."""
+        index = self.equation.index
+        dX = self.equation.coupling(self.fit.value[: self.equation.size])[np.ix_(index, index)]
+        undone = np.linalg.solve(np.eye(len(index)) + dX, residual.T).T
+        return np.ascontiguousarray(undone, dtype=np.float64)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Static:
@@ -282,8 +289,12 @@ def _fit_once(equation: Equation, prepared: Sequence[Prepared], sigmas: Sequence
 
 
 def _first_sigma(p: Prepared, rig: Rig) -> Array:
-    """Before there is a residual: a hundredth of the range that the channel shows."""
-    sigma: Array = np.maximum(0.01 * np.ptp(p.wrench, axis=0), _least_sigma(p, rig))
+    """Before there is a residual: a hundredth of the range that the channel shows, the sensor's noise at least.
+
+    Channels that hold nothing but noise would bend all parameters to it otherwise, far from where the equation is
+    nearly linear.
+    """
+    sigma: Array = np.maximum(0.01 * np.ptp(p.wrench, axis=0), 10.0 * _least_sigma(p, rig))
     return sigma
 
 

@@ -188,7 +188,7 @@ class Equation:
         if len(self.rows) == 0:
             return rig
         X = rig.transducer.cross_coupling
-        total = (np.eye(6) + X.value) @ (np.eye(6) + self._coupling(theta)) - np.eye(6)
+        total = (np.eye(6) + X.value) @ (np.eye(6) + self.coupling(theta)) - np.eye(6)
         spread = X.sigma.copy()
         if sigma is not None:
             spread[self.rows, self.columns] = sigma[count : count + len(self.rows)]
@@ -197,7 +197,7 @@ class Equation:
     def predict(self, theta: Array, p: Prepared) -> Array:
         """(n, c) N and N m."""
         total = self._responded(theta, self._wrenches(theta, p), p.dt)
-        values: Array = (total @ (np.eye(6) + self._coupling(theta)).T)[:, self.index]
+        values: Array = (total @ (np.eye(6) + self.coupling(theta)).T)[:, self.index]
         return values
 
     def jacobian(self, theta: Array, p: Prepared) -> Array:
@@ -206,7 +206,7 @@ class Equation:
         J = np.zeros((n, c, self.size))
         wrenches = self._wrenches(theta, p)
         W = self._responded(theta, wrenches, p.dt)
-        mixing = (np.eye(6) + self._coupling(theta)).T[:, self.index]
+        mixing = (np.eye(6) + self.coupling(theta)).T[:, self.index]
         base = W @ mixing
         for column, scale in enumerate(self.elements.sigma):
             moved = theta.copy()
@@ -234,7 +234,8 @@ class Equation:
         error: Array = np.sqrt(np.sum((self.angle_slopes(theta, p) * p.sigma_q[:, None, :]) ** 2, axis=2))
         return error
 
-    def _coupling(self, theta: Array) -> Array:
+    def coupling(self, theta: Array) -> Array:
+        """What the calibration left of the cross-coupling, (6, 6)."""
         dX = np.zeros((6, 6))
         start = len(self.elements.names)
         dX[self.rows, self.columns] = theta[start : start + len(self.rows)]
