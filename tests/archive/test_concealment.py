@@ -1,0 +1,72 @@
+"""What processes a campaign cannot know how it was made: neither by its code nor by the files that it opens."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PACKAGE = ROOT / "pipeline" / "kbs_process"
+# What computes. The command line and the importers name campaigns in their examples.
+COMPUTING = ("stages", "plant", "estimation", "ingest", "rig", "signals", "campaign", "report")
+
+# Opens every file through the audit hook, and prints those below the checkout.
+WATCHED = """
+import sys
+from pathlib import Path
+root, campaign, target = map(Path, sys.argv[1:])
+opened = set()
+sys.addaudithook(lambda event, args: opened.add(args[0]) if event in ("open", "os.listdir", "os.scandir") else None)
+from kbs_process.campaign import run
+from kbs_process.campaign.load import load_campaign
+from kbs_process.campaign.progress import SilentProgress
+run.build.build = lambda folder, pdf: folder / "index.html"
+run.process(load_campaign(campaign), target, progress=SilentProgress(), pdf=False)
+for path in sorted({str(path) for path in opened if isinstance(path, (str, bytes, Path))}):
+    print(path)
+"""
+
+
+def strings(source: Path) -> set[str]:
+    """String constants of a module, its docstrings aside."""
+    tree = ast.parse(source.read_text())
+    documented = [
+        node for node in ast.walk(tree) if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef))
+    ]
+    docstrings = {
+        id(node.body[0].value) for node in documented if node.body and isinstance(node.body[0], ast.Expr)
+    }
+    return {
+        node.value
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in docstrings
+    }
+
+
+@pytest.mark.parametrize("folder", COMPUTING)
+def test_code_names_neither_campaigns_nor_truth(folder: str):
+    campaigns = {path.name for path in (ROOT / "campaigns").iterdir() if path.is_dir()}
+    secrets = campaigns | {"truth", "tests/", "seed"}
+    modules = [path for path in (PACKAGE / folder).rglob("*.py") if "importers" not in path.parts]
+    assert modules
+    for module in modules:
+        found = {text for text in strings(module) if any(secret in text for secret in secrets)}
+        assert not found, f"{module.relative_to(ROOT)}: {found}"
+
+
+def test_processing_opens_nothing_but_the_campaign(tmp_path: Path):
+    campaign = ROOT / "campaigns" / "ALSTPP00"
+    done = subprocess.run(
+        [sys.executable, "-c", WATCHED, str(ROOT), str(campaign), str(tmp_path / "out")],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    opened = [Path(line) for line in done.stdout.splitlines()]
+    below = [path for path in opened if path.is_relative_to(ROOT)]
+    allowed = (campaign, ROOT / "pipeline", ROOT / "schemas", ROOT / ".venv", ROOT / ".git")
+    strays = [path for path in below if not any(path.is_relative_to(place) for place in allowed)]
+    assert campaign / "campaign.toml" in below
+    assert not strays
