@@ -468,7 +468,10 @@ def _spectrum(
 
 def _table(path: Path, recording: str, frame: str, columns: dict[str, np.ndarray]) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
-    units = {name: UNITS.get(name.partition(".")[0], "") for name in columns} | {"t": "s", "f": "Hz"}
+    units = {name: UNITS.get(name.partition(".")[0], "") for name in columns}
+    if "f" in columns:
+        units = {name: f"({unit})^2/Hz" for name, unit in units.items()}
+    units |= {"t": "s", "f": "Hz"}
     about = {"recording": recording, "frame": frame, "units": units, "history": ["synthetic"]}
     table = pa.table({name: pa.array(values) for name, values in columns.items()})
     pq.write_table(table.replace_schema_metadata({b"kbs": json.dumps(about).encode()}), path)

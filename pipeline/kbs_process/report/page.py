@@ -5,6 +5,8 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
+import re
+import textwrap
 from importlib import resources
 from typing import Literal
 
@@ -18,6 +20,8 @@ from kbs_process.report.results import Results
 from kbs_process.report.tables import Tables
 
 Medium = Literal["screen", "paper"]
+_PIECE = 32  # characters of a long word between two places where a line may end
+_LONG_WORD = re.compile(r"\S{65,}")  # a checksum stays whole, to be copied
 
 
 def panels(results: Results, tables: Tables) -> tuple[Panel, ...]:
@@ -36,7 +40,7 @@ def render(results: Results, sections: tuple[Panel, ...], medium: Medium) -> str
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters.update(embedded=_embedded, identity=id)
+    environment.filters.update(embedded=_embedded, identity=id, divisible=_divisible)
     return environment.get_template("page.html.j2").render(
         results=results,
         panels=sections,
@@ -88,6 +92,13 @@ def _embedded(value: object) -> Markup:
     """Return a value as JSON that cannot end the script element it stands in."""
     text = json.dumps(msgspec.to_builtins(value), separators=(",", ":"), ensure_ascii=True)
     return Markup(text.replace("<", "\\u003c"))
+
+
+def _divisible(text: str, medium: Medium) -> str:
+    """Return `text` such that it can be broken into lines on paper, even if it is one long word."""
+    if medium == "screen":  # a browser breaks words by itself
+        return text
+    return _LONG_WORD.sub(lambda word: "\u200b".join(textwrap.wrap(word[0], _PIECE)), text)
 
 
 def _asset(name: str) -> str:

@@ -34,12 +34,15 @@ class Picture:
 
 @dataclass(frozen=True, slots=True)
 class Channel:
-    """Curves of one channel for the interactive plots, each packed by `series.pack`."""
+    """Curves of one channel for the interactive plots, each packed by `series.pack`.
+
+    The computed curve is None where the page works it out: measured less residual.
+    """
 
     name: str
     unit: str
     limit: float | None
-    curves: tuple[dict[str, object], ...]
+    curves: tuple[dict[str, object] | None, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +66,7 @@ class Live:
     names: tuple[str, ...]  # of a channel's curves, in their order
     views: tuple[View, ...]
     two_scales: bool  # the residual has an axis of its own
+    shortcuts: tuple[tuple[str, str], ...] = ()  # name and choice of the views most asked for
 
 
 @dataclass(frozen=True, slots=True)

@@ -240,6 +240,13 @@ class Merit(Record, frozen=True, kw_only=True):
     pessimism: float | None  # predicted over measured peak
     sigma: float | None = None  # of the measured channel in this band
 
+    @property
+    def at_the_noise(self) -> bool:
+        """Whether there is too little signal for these figures to say anything of the prediction."""
+        return (
+            self.sigma is not None and self.measured_rms is not None and self.measured_rms < 2.0 * self.sigma
+        )
+
 
 class Resonance(Record, frozen=True, kw_only=True):
     """A resonance of the article on the transducer."""

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import math
+from collections.abc import Sequence
 
 MISSING = "–"
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -78,6 +80,19 @@ def power(value: float) -> str:
     if -3 <= exponent < 4:
         return number(value, 1)
     return f"{'' if mantissa == 1 else f'{mantissa}·'}10{_raised(exponent)}"
+
+
+def steps(values: Sequence[float]) -> list[str]:
+    """Return labels for ticks at equal steps, all with the decimals that tell them apart: 0.00, 0.25, 2·10⁻⁶."""
+    largest = max((abs(value) for value in values), default=0.0)
+    if largest == 0.0:
+        return ["0"] * len(values)
+    exponent = 0 if _readable(_exponent(largest)) else _exponent(largest)
+    scaled = [value / 10.0**exponent for value in values]
+    step = min((abs(b - a) for a, b in itertools.pairwise(scaled)), default=abs(scaled[0]))
+    decimals = next((n for n in range(12) if abs(round(step, n) - step) < 1e-3 * step), 12)
+    suffix = f"·10{_raised(exponent)}" if exponent else ""
+    return [_sign(f"{value + 0.0:.{decimals}f}") + (suffix if value else "") for value in scaled]
 
 
 def _exponent(value: float) -> int:

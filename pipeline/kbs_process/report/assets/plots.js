@@ -21,6 +21,13 @@
     });
   };
 
+  const curvesOf = (channel) => {
+    const found = channel.curves.map((packed) => packed && unpack(packed));
+    // A computed curve is left out where it is what was measured less the residual.
+    const computed = (v, i) => (v === null || found[2][i] === null ? null : v - found[2][i]);
+    return found.map((curve) => curve || found[0].map(computed));
+  };
+
   const shown = (value) => (value === null || value === undefined ? "–" : value.toPrecision(4).replace("-", "−"));
   const tidy = (unit) => unit.replace("^2", "²").replaceAll(" ", "\u00a0");
 
@@ -41,7 +48,7 @@
   };
 
   function figure(root) {
-    const { key, names, views, two_scales: twoScales } = JSON.parse(document.getElementById(`live-${root.dataset.key}`).textContent);
+    const { key, names, views, two_scales: twoScales, shortcuts } = JSON.parse(document.getElementById(`live-${root.dataset.key}`).textContent);
     const box = root.querySelector(".plots");
     const reading = root.querySelector(".reading");
     const unique = (field) => [...new Set(views.map((view) => view[field]))];
@@ -128,7 +135,8 @@
 
     const make = (channel, t, last) => {
       const order = LOWEST_FIRST.filter((i) => i < channel.curves.length);
-      const curves = order.map((i) => unpack(channel.curves[i]));
+      const all = curvesOf(channel);
+      const curves = order.map((i) => all[i]);
       const apart = twoScales && channel.curves.length === 3;
       const peak = Math.max(...curves.map((curve) => curve.reduce((most, v) => Math.max(most, Math.abs(v)), 0)));
       const highest = curves.at(-1).reduce((most, v) => Math.max(most, v), 0); // of the residual
@@ -190,7 +198,16 @@
     const notes = element("span", "", "hint");
     all.type = "button";
     all.addEventListener("click", () => plots.length && zoom(plots[0].data[0][0], plots[0].data[0].at(-1)));
-    root.querySelector(".choices").append(recordings.frame, choices.frame, all, notes);
+    const jumps = shortcuts.map(([name, choice]) => {
+      const jump = element("button", name);
+      jump.type = "button";
+      jump.addEventListener("click", () => {
+        choices.select.value = choice;
+        show();
+      });
+      return jump;
+    });
+    root.querySelector(".choices").append(recordings.frame, choices.frame, all, ...jumps, notes);
     root.hidden = false;
     root.parentElement.classList.add("live-on");
     show();

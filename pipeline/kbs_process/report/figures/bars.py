@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -11,6 +12,8 @@ from kbs_process.report.figures import draw
 from kbs_process.report.panel import Picture
 from kbs_process.report.results import Budget, FittedParameter, Repeatability, Requirement
 from kbs_process.report.text import label, number, unit
+
+_ROWS = 24  # of parameters in one column
 
 
 def against_limit(requirement: Requirement, alt: str) -> Picture:
@@ -97,35 +100,44 @@ def variance_shares(budgets: Sequence[Budget], alt: str) -> Picture:
 
 
 def shifts(parameters: Sequence[FittedParameter], alt: str) -> Picture:
-    """Draw how far each fitted parameter moved from its prior, in the prior's sigma."""
+    """Draw how far each fitted parameter moved from its prior, in the prior's sigma; many in two columns."""
     moved = [entry for entry in parameters if entry.prior is not None and entry.prior_sigma]
+    columns = 1 if len(moved) <= _ROWS else 2
+    rows = math.ceil(len(moved) / columns)
+    prior = np.array([entry.prior for entry in moved], dtype=float)
+    width = np.array([entry.prior_sigma for entry in moved], dtype=float)
+    pull = (np.array([entry.value for entry in moved]) - prior) / width
+    error = np.array([entry.sigma for entry in moved]) / width
+    reach = max(3.0, 1.15 * float(np.max(np.abs(pull), initial=0.0)))
     with draw.style():
-        figure, axis = draw.canvas(0.7 + 0.2 * len(moved))
-        place = np.arange(len(moved), dtype=float)
-        prior = np.array([entry.prior for entry in moved], dtype=float)
-        width = np.array([entry.prior_sigma for entry in moved], dtype=float)
-        pull = (np.array([entry.value for entry in moved]) - prior) / width
-        axis.axvspan(-2.0, 2.0, color=draw.SHADE, linewidth=0, label="prior, ± 2 σ")
-        axis.errorbar(
-            pull,
-            place,
-            xerr=np.array([entry.sigma for entry in moved]) / width,
-            fmt="o",
-            markersize=3.5,
-            color=draw.MEASURED,
-            elinewidth=1.0,
-            capsize=2,
-            label="fitted, ± 1 σ",
+        figure = Figure(
+            figsize=(draw.WIDTH, 0.7 + (0.2 if columns == 1 else 0.155) * rows), layout="constrained"
         )
-        axis.axvline(0.0, color=draw.RESIDUAL, linewidth=0.7)
-        axis.set_yticks(place, [label(entry.name) for entry in moved])
-        axis.set_ylim(len(moved) - 0.5, -0.5)
-        reach = max(3.0, 1.15 * float(np.max(np.abs(pull), initial=0.0)))
-        axis.set_xlim(-reach, reach)
-        axis.grid(visible=False, axis="y")
-        axis.set_xlabel("(fitted − prior) / prior's σ")
-        _legend_above(figure)
-        return draw.picture(figure, alt)
+        axes = figure.subplots(1, columns, squeeze=False)[0]
+        for column, axis in enumerate(axes):
+            shown = slice(column * rows, min((column + 1) * rows, len(moved)))
+            place = np.arange(shown.stop - shown.start, dtype=float)
+            axis.axvspan(-2.0, 2.0, color=draw.SHADE, linewidth=0, label="prior, ± 2 σ")
+            axis.errorbar(
+                pull[shown],
+                place,
+                xerr=error[shown],
+                fmt="o",
+                markersize=3.5,
+                color=draw.MEASURED,
+                elinewidth=1.0,
+                capsize=2,
+                label="fitted, ± 1 σ",
+            )
+            axis.axvline(0.0, color=draw.RESIDUAL, linewidth=0.7)
+            axis.set_yticks(place, [label(entry.name) for entry in moved[shown]])
+            axis.set_ylim(rows - 0.5, -0.5)
+            axis.set_xlim(-reach, reach)
+            axis.grid(visible=False, axis="y")
+            axis.set_xlabel("(fitted − prior) / prior's σ")
+        handles, names = axes[0].get_legend_handles_labels()
+        figure.legend(handles, names, loc="outside upper left", ncols=4, fontsize=7)
+        return draw.picture(figure, alt, form="svg" if columns == 1 else "png")
 
 
 def _legend_above(figure: Figure) -> None:

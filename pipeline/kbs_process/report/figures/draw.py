@@ -11,8 +11,11 @@ from contextlib import contextmanager
 from typing import Any, Literal
 
 import matplotlib
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 from PIL import Image
@@ -20,7 +23,7 @@ from PIL import Image
 from kbs_process.report.panel import Picture
 from kbs_process.report.text import number, power
 
-_COLORS = 48
+_DPI = 150
 WIDTH = 7.1  # in: the text width of an A4 page
 INK = "#20262e"
 MEASURED = "#1f4e79"
@@ -28,6 +31,9 @@ PREDICTED = "#f0a94a"
 RESIDUAL = "#7c8591"
 LIMIT = "#b3261e"
 SHADE = "#e6e9ed"
+GRID = "#eceff2"
+AXIS = "#8a929c"
+TICK = "#59626d"
 SERIES = ("#1f4e79", "#d97706", "#4c956c", "#8e5ea2", "#7c8591", "#c1666b", "#2a9d8f", "#b08968")
 
 # The computed curve is broad and pale under the measured one, so that both show where they agree.
@@ -43,7 +49,7 @@ _STYLE: dict[Any, Any] = {
     "font.size": 7.5,
     "text.parse_math": False,
     "text.color": INK,
-    "axes.edgecolor": "#8a929c",
+    "axes.edgecolor": AXIS,
     "axes.labelcolor": INK,
     "axes.linewidth": 0.6,
     "axes.spines.top": False,
@@ -53,11 +59,11 @@ _STYLE: dict[Any, Any] = {
     "axes.titleweight": "bold",
     "axes.grid": True,
     "axes.axisbelow": True,
-    "grid.color": "#eceff2",
+    "grid.color": GRID,
     "grid.linewidth": 0.6,
     "lines.linewidth": 0.8,
-    "xtick.color": "#59626d",
-    "ytick.color": "#59626d",
+    "xtick.color": TICK,
+    "ytick.color": TICK,
     "xtick.major.width": 0.6,
     "ytick.major.width": 0.6,
     "legend.frameon": False,
@@ -99,28 +105,6 @@ def canvas(height: float, *, width: float = WIDTH) -> tuple[Figure, Axes]:
     return figure, figure.subplots()
 
 
-def ladder(rows: int, columns: int, row_height: float, *, gap: float) -> tuple[Figure, list[Axes]]:
-    """Return a figure of many axes, row by row, with fixed margins (in): much faster than fitted ones."""
-    left, right, top, bottom, between = 0.68, 0.06, 0.22, 0.42, 0.62
-    height = rows * row_height + (rows - 1) * gap + top + bottom
-    figure = Figure(figsize=(WIDTH, height))
-    axes_width = (WIDTH - left - right - (columns - 1) * between) / columns
-    grid = figure.subplots(
-        rows,
-        columns,
-        squeeze=False,
-        gridspec_kw={
-            "left": left / WIDTH,
-            "right": 1.0 - right / WIDTH,
-            "top": 1.0 - top / height,
-            "bottom": bottom / height,
-            "wspace": between / axes_width,
-            "hspace": gap / row_height,
-        },
-    )
-    return figure, [axes for row in grid for axes in row]
-
-
 def picture(figure: Figure, alt: str, title: str = "", form: Literal["svg", "png"] = "svg") -> Picture:
     """Return the figure as a data URI: SVG, or PNG where its curves are dense."""
     content = io.BytesIO()
@@ -128,10 +112,30 @@ def picture(figure: Figure, alt: str, title: str = "", form: Literal["svg", "png
         nothing = dict.fromkeys(("Date", "Creator", "Format", "Type"))
         figure.savefig(content, format="svg", metadata=nothing)
     else:
-        drawn = io.BytesIO()
-        figure.savefig(drawn, format="png", dpi=150, pil_kwargs={"compress_level": 0})
-        # A palette makes the page half as large, and so few hues need no more.
-        Image.open(drawn).convert("RGB").quantize(_COLORS).save(content, "PNG")
+        figure.dpi = _DPI
+        canvas: Any = FigureCanvasAgg(figure)  # whose methods have no types
+        canvas.draw()
+        # Sixteen hues, four bits each, make the page half as large as all of them, and show the same.
+        drawn = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
+        drawn.quantize(palette=_palette(), dither=Image.Dither.NONE).save(content, "PNG", bits=4)
     kind = "image/svg+xml" if form == "svg" else "image/png"
     uri = f"data:{kind};base64,{base64.b64encode(content.getvalue()).decode('ascii')}"
     return Picture(uri, alt, title, round(100.0 * figure.get_figwidth() / WIDTH))
+
+
+def _palette() -> Image.Image:
+    """The colours of the curves, and those between them and the paper that smooth edges need."""
+
+    def mixed(color: str, share: float, ground: str = "white") -> list[int]:
+        over, under = np.array(to_rgb(color)), np.array(to_rgb(ground))
+        return [round(255 * part) for part in share * over + (1.0 - share) * under]
+
+    shares = {
+        INK: (1.0, 0.75), MEASURED: (1.0, 0.75, 0.5, 0.25), PREDICTED: (1.0, 0.6, 0.3),
+        RESIDUAL: (1.0, 0.5), LIMIT: (1.0, 0.5), SHADE: (1.0,), "white": (1.0,),
+    }  # fmt: skip
+    colors = [mixed(color, share) for color, parts in shares.items() for share in parts]
+    colors.append(mixed(MEASURED, 0.5, PREDICTED))
+    palette = Image.new("P", (1, 1))
+    palette.putpalette([part for color in colors for part in color])
+    return palette

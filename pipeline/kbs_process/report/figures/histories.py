@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from matplotlib.axes import Axes
 
 from kbs_process.report import series
 from kbs_process.report.figures import draw
+from kbs_process.report.figures.sheet import Panel, Sheet
 from kbs_process.report.panel import Picture
 from kbs_process.report.text import unit
-from kbs_process.signals.records import Array
+from kbs_process.signals.records import Array, Mask
 
-_POINTS = 2400  # two for each pixel of the widest axes
+_POINTS = 1800  # at least two for each pixel of the widest panel
 
 
 def strips(
@@ -24,36 +24,37 @@ def strips(
     alt: str,
     title: str,
 ) -> Picture:
-    """Draw one row a channel; on `same_scale` the residual shares its row's axis."""
+    """Draw one row a channel; on `same_scale` the residual shares its row's scale."""
     paired = any(row.residual is not None for row in rows)
-    columns = 2 if paired else 1
+    time = (float(t[0]), float(t[-1]))
+    counts = _outside(t, shaded)
     with draw.style():
-        figure, axes = draw.ladder(len(rows), columns, 0.98 if len(rows) > 1 else 1.9, gap=0.12)
+        sheet = Sheet(len(rows), 2 if paired else 1, 0.98 if len(rows) > 1 else 1.9, gap=0.12)
         for index, row in enumerate(rows):
-            left = axes[index * columns]
-            _curve(left, t, row.measured, "measured")
-            if row.computed is not None:
-                _curve(left, t, row.computed, computed_name)
-            _limit(left, row)
-            left.set_ylabel(f"{row.channel} / {unit(row.unit)}")
-            if paired and row.residual is not None:
-                right = axes[index * columns + 1]
-                _curve(right, t, row.residual, "residual")
-                if same_scale:
-                    right.set_ylim(left.get_ylim())
-        for axis in axes:
-            for start, end in shaded:
-                axis.axvspan(start, end, color=draw.SHADE, linewidth=0, zorder=0)
-            axis.set_xlim(float(t[0]), float(t[-1]))
-            axis.locator_params(axis="y", nbins=4)
-        for axis in axes[:columns]:
-            axis.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, borderaxespad=0.1)
-        for axis in axes[:-columns]:
-            axis.tick_params(labelbottom=False)
-        for axis in axes[-columns:]:
-            axis.set_xlabel("time / s")
-        figure.align_ylabels()
-        return draw.picture(figure, alt, title, "png")
+            limits = _limits(row)
+            shown = {"measured": row.measured, computed_name: row.computed}
+            together = _range(
+                *(curve[counts] for curve in shown.values() if curve is not None), np.array(limits)
+            )
+            panels = [sheet.panel(index, 0, time, together)]
+            _curves(panels[0], t, shown)
+            panels[0].across(limits, colors=draw.LIMIT, linewidths=0.8, linestyles=[(0, (4, 2))], zorder=2.5)
+            if row.residual is not None:
+                panels.append(
+                    sheet.panel(index, 1, time, together if same_scale else _range(row.residual[counts]))
+                )
+                _curves(panels[1], t, {"residual": row.residual})
+            for place, panel in enumerate(panels):
+                panel.shade(shaded)
+                panel.frame(
+                    "" if place else f"{row.channel} / {unit(row.unit)}",
+                    below="time / s" if index == len(rows) - 1 else None,
+                )
+        computed = any(row.computed is not None for row in rows)
+        sheet.key(0, ("measured", computed_name) if computed else ("measured",))
+        if paired:
+            sheet.key(1, ("residual",))
+        return draw.picture(sheet.figure, alt, title, "png")
 
 
 def shows_limit(peak: float, limit: float) -> bool:
@@ -61,15 +62,36 @@ def shows_limit(peak: float, limit: float) -> bool:
     return peak > 0.25 * limit
 
 
-def _curve(axis: Axes, t: Array, values: Array, name: str) -> None:
-    size = series.stride(len(values), _POINTS)
+def _curves(panel: Panel, t: Array, curves: dict[str, Array | None]) -> None:
+    size = series.stride(len(t), _POINTS)
     first, step = series.times(t, size)
-    points = series.envelope(values, size)
-    axis.plot(first + step * np.arange(len(points)), points, label=name, **draw.LINES[name])
+    for name, values in curves.items():
+        if values is not None:
+            points = series.envelope(values, size)
+            panel.curve(first + step * np.arange(len(points), dtype=np.float64), points, draw.LINES[name])
 
 
-def _limit(axis: Axes, row: series.Trace) -> None:
+def _outside(t: Array, stretches: tuple[tuple[float, float], ...]) -> Mask:
+    """Return which times lie in none of the stretches, or all of them where none would be left."""
+    outside = np.ones(len(t), dtype=np.bool_)
+    for start, end in stretches:
+        outside &= (t < start) | (t > end)
+    return outside if outside.any() else ~outside
+
+
+def _range(*curves: Array) -> tuple[float, float]:
+    """Return limits that leave a little room about all finite values."""
+    low, high = 0.0, 0.0
+    found = [curve[np.isfinite(curve)] for curve in curves]
+    if any(values.size for values in found):
+        low = min(float(values.min()) for values in found if values.size)
+        high = max(float(values.max()) for values in found if values.size)
+    room = 0.05 * (high - low) or 0.05 * abs(high) or 1.0
+    return low - room, high + room
+
+
+def _limits(row: series.Trace) -> tuple[float, ...]:
+    """Return the levels of the limit, if it is to be drawn."""
     if row.limit is None or not shows_limit(float(np.nanmax(np.abs(row.measured), initial=0.0)), row.limit):
-        return
-    for sign in (-1.0, 1.0):
-        axis.axhline(sign * row.limit, color=draw.LIMIT, linewidth=0.8, linestyle=(0, (4, 2)))
+        return ()
+    return -row.limit, row.limit

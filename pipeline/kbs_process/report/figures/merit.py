@@ -16,7 +16,7 @@ _MARKS = ("o", "s", "^", "D", "v", "P", "X", "*")
 
 
 def peaks(rows: Sequence[Merit], alt: str) -> Picture:
-    """Draw one mark a recording and channel, axes for each unit."""
+    """Draw one mark a recording and channel, hollow where it is at the noise, axes for each unit."""
     units = list(dict.fromkeys(row.unit for row in rows))
     channels = list(dict.fromkeys(row.channel for row in rows))
     with draw.style():
@@ -33,17 +33,20 @@ def peaks(rows: Sequence[Merit], alt: str) -> Picture:
             axis.plot([low, high], [low, high], color=draw.RESIDUAL, linewidth=0.8)
             axis.text(0.03, 0.96, "pessimistic", transform=axis.transAxes, va="top", color="#8a6d3b")
             axis.text(0.97, 0.04, "optimistic", transform=axis.transAxes, ha="right", color=draw.LIMIT)
-            for channel in dict.fromkeys(row.channel for row in shown):
-                mine = np.array([row.channel == channel for row in shown])
+            for channel, noise in dict.fromkeys((row.channel, row.at_the_noise) for row in shown):
+                mine = np.array([(row.channel, row.at_the_noise) == (channel, noise) for row in shown])
                 index = channels.index(channel)
+                color = draw.SERIES[index % len(draw.SERIES)]
                 axis.plot(
                     measured[mine],
                     predicted[mine],
                     linestyle="none",
                     marker=_MARKS[index % len(_MARKS)],
                     markersize=4.5,
-                    color=draw.SERIES[index % len(draw.SERIES)],
-                    label=label(channel),
+                    markerfacecolor="white" if noise else color,
+                    markeredgecolor=draw.RESIDUAL if noise else color,
+                    markeredgewidth=0.7,
+                    label=f"{label(channel)}, at the noise" if noise else label(channel),
                 )
             draw.logarithmic(axis, "x", low, high)
             draw.logarithmic(axis, "y", low, high)

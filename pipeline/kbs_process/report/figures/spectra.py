@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from matplotlib.axes import Axes
 
 from kbs_process.report.figures import draw
+from kbs_process.report.figures.sheet import Panel, Sheet
 from kbs_process.report.panel import Picture
 from kbs_process.report.results import Resonance
 from kbs_process.report.tables import Table
@@ -20,48 +20,49 @@ _BINS = 500
 def spectra(
     table: Table, resonances: tuple[Resonance, ...], edges: tuple[float, ...], *, alt: str, title: str
 ) -> Picture:
-    """Draw measured and predicted density of every channel on logarithmic axes."""
+    """Draw measured and predicted density of every channel on logarithmic scales, down the columns."""
     channels = table.channels
     columns = 2 if len(channels) > 1 else 1
     rows = math.ceil(len(channels) / columns)
     with draw.style():
-        figure, axes = draw.ladder(rows, columns, 1.14 if rows > 1 else 2.2, gap=0.12)
-        # The drawn order runs down the columns: forces left, torques right.
-        grid = np.reshape(np.array(axes, dtype=object), (rows, columns)).T.ravel()
-        for axis, channel in zip(grid, channels, strict=False):
-            _curves(axis, table, channel)
-            _marks(axis, resonances, edges, named=axis is grid[0])
-            axis.set_ylabel(f"{channel} / ({unit(table.unit(channel))})²/Hz")
-        for axis in grid[len(channels) :]:
-            axis.remove()
-        for column in range(columns):
-            bottom = min((column + 1) * rows, len(channels)) - 1
-            for axis in grid[column * rows : bottom]:
-                axis.tick_params(labelbottom=False)
-            if bottom >= column * rows:
-                grid[bottom].set_xlabel("frequency / Hz")
-        grid[0].legend(loc="lower left", fontsize=6.5)
-        return draw.picture(figure, alt, title, "png")
+        sheet = Sheet(rows, columns, 1.14 if rows > 1 else 2.2, gap=0.12)
+        names: set[str] = set()
+        for index, channel in enumerate(channels):
+            column, row = divmod(index, rows)
+            curves = _curves(table, channel)
+            frequencies, densities = (
+                _range(*(f for f, _ in curves.values())),
+                _range(*(density for _, density in curves.values())),
+            )
+            panel = sheet.panel(
+                row, column, frequencies, (0.5 * densities[0], 2.0 * densities[1]), logarithmic=True
+            )
+            for name, (frequency, density) in curves.items():
+                panel.curve(frequency, density, draw.LINES[name])
+            _marks(panel, resonances, edges, named=index == 0)
+            lowest = row == rows - 1 or index == len(channels) - 1
+            panel.frame(
+                f"{channel} / {unit(table.unit(channel))}", below="frequency / Hz" if lowest else None
+            )
+            names |= curves.keys()
+        sheet.key(0, sorted(names))
+        return draw.picture(sheet.figure, alt, title, "png")
 
 
-def _curves(axis: Axes, table: Table, channel: str) -> None:
-    """Draw the channel's densities; noughts, which a logarithmic axis cannot show, are left out."""
-    f = table.columns["f"]
-    shown = [
-        (kind, *_thinned(f, table.columns[f"{channel}.{kind}"]))
-        for kind in ("predicted", "measured")
+def _curves(table: Table, channel: str) -> dict[str, tuple[Array, Array]]:
+    """Return the channel's densities."""
+    return {
+        kind: _thinned(table.columns["f"], table.columns[f"{channel}.{kind}"])
+        for kind in ("measured", "predicted")
         if f"{channel}.{kind}" in table.columns
-    ]
-    for kind, frequency, density in shown:
-        axis.plot(frequency, density, label=kind, **draw.LINES[kind])
-    densities = np.concatenate([density for _, _, density in shown])
-    if densities.size:
-        draw.logarithmic(axis, "x", float(f[f > 0].min()), float(f.max()))
-        draw.logarithmic(axis, "y", 0.5 * float(densities.min()), 2.0 * float(densities.max()))
+    }
 
 
 def _thinned(f: Array, density: Array) -> tuple[Array, Array]:
-    """Keep the greatest density of each of many equal steps of log frequency, so that no line is lost."""
+    """Keep the greatest density of each of many equal steps of log frequency, so that no line is lost.
+
+    Noughts, which a logarithmic scale cannot show, are left out.
+    """
     usable = (f > 0) & (density > 0)
     f, density = f[usable], density[usable]
     if len(f) <= _BINS:
@@ -73,25 +74,31 @@ def _thinned(f: Array, density: Array) -> tuple[Array, Array]:
     return f[keep], density[keep]
 
 
-def _marks(axis: Axes, resonances: tuple[Resonance, ...], edges: tuple[float, ...], *, named: bool) -> None:
-    for edge in edges:
-        axis.axvline(edge, color=draw.INK, linewidth=0.7, linestyle=(0, (1, 1.5)), zorder=1)
+def _range(*values: Array) -> tuple[float, float]:
+    """Return the least and the greatest of all positive values; a decade where there are none."""
+    found = np.concatenate(values)
+    return (float(found.min()), float(found.max())) if found.size else (0.1, 1.0)
+
+
+def _marks(panel: Panel, resonances: tuple[Resonance, ...], edges: tuple[float, ...], *, named: bool) -> None:
+    """Draw band edges and resonances within the panel's range, these with their names in the first panel."""
+    shown = [edge for edge in edges if panel.x.low <= edge <= panel.x.high]
+    panel.upright(shown, colors=draw.INK, linewidths=0.7, linestyles=[(0, (1, 1.5))], zorder=1)
     ordered = sorted(resonances, key=lambda resonance: resonance.frequency_Hz)
-    for index, resonance in enumerate(ordered):
-        axis.axvline(resonance.frequency_Hz, color=draw.LIMIT, linewidth=0.7, linestyle=(0, (4, 2)), zorder=1)
-        if named:
-            # Neighbours stand on opposite sides of their lines, as the first two are often close.
-            side = -1 if index % 2 == 0 else 1
-            axis.annotate(
-                f"{label(resonance.axis, 12)} {number(resonance.frequency_Hz)} Hz",
-                (resonance.frequency_Hz, 1.0),
-                xycoords=("data", "axes fraction"),
-                xytext=(1.5 * side, -1),
-                textcoords="offset points",
-                rotation=90,
-                ha="right" if side < 0 else "left",
-                va="top",
-                fontsize=5.5,
-                color=draw.LIMIT,
-                bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.4},
-            )
+    ordered = [found for found in ordered if panel.x.low <= found.frequency_Hz <= panel.x.high]
+    frequencies = [resonance.frequency_Hz for resonance in ordered]
+    panel.upright(frequencies, colors=draw.LIMIT, linewidths=0.7, linestyles=[(0, (4, 2))], zorder=1)
+    for index, resonance in enumerate(ordered if named else ()):
+        # Neighbours stand on opposite sides of their lines, as the first two are often close.
+        side = -1 if index % 2 == 0 else 1
+        panel.sheet.axes.text(
+            float(panel.x.place(resonance.frequency_Hz)) + 0.02 * side,
+            panel.y.end - 0.015,
+            f"{label(resonance.axis, 12)} {number(resonance.frequency_Hz)} Hz",
+            rotation=90,
+            ha="right" if side < 0 else "left",
+            va="top",
+            fontsize=5.5,
+            color=draw.LIMIT,
+            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.4},
+        )

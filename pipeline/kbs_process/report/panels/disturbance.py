@@ -34,25 +34,41 @@ _CAPTION = Caption(
     "trajectory (speed, tooth passing, resonance) the difference sits, and at the spectra.",
 )
 
+Entry = tuple[str, str, Frame, Table]  # recording, band, frame, table
+
 
 def panel(results: Results, tables: Tables) -> Panel:
-    """Interactive view of every recording, band and frame; the requirement's band on plates for paper."""
+    """Interactive view of every recording, band and frame; on paper what is required, and the bursts."""
     question = "Does the predicted disturbance look like the measured one, and is it the larger of the two?"
     found = list(_found(results, tables))
     if not found:
         return Panel("disturbance", "Disturbance", question, (Text("No band table to show."),))
     scenes = [_scene(results, *entry) for entry in found]
-    band = main_band(results)
-    plates = [entry for entry in found if entry[1] == band]
-    main = main_frame(results)
-    chosen = [entry for entry in plates if entry[2] == main][:PLATES]
-    others = [entry for entry in plates if entry[2] != main][:PLATES]
+    main = (main_band(results), main_frame(results))
+    bursts = (_whole_band(results), "T")
     live = views(scenes)
+    shown = {view.choice for view in live}
+    shortcuts = {
+        "Requirement" if results.requirements else "Narrowest band": main,
+        "Bursts (unfiltered)": bursts,
+    }
     figure = Figure(
-        f"Disturbance, measured and predicted ({band_label(results, band)} on paper)",
-        tuple(_plate(results, *entry) for entry in (*chosen, *others)),
+        "Disturbance, measured and predicted",
+        tuple(
+            _plate(results, *entry) for key in dict.fromkeys((main, bursts)) for entry in _plates(found, key)
+        ),
         _CAPTION,
-        Live("disturbance", ("measured", "predicted", "residual"), live, two_scales=False),
+        Live(
+            "disturbance",
+            ("measured", "predicted", "residual"),
+            live,
+            two_scales=False,
+            shortcuts=tuple(
+                (name, _choice(results, *key))
+                for name, key in shortcuts.items()
+                if _choice(results, *key) in shown
+            ),
+        ),
     )
     blocks: list[Block] = [figure]
     if len(live) < len(scenes):
@@ -61,16 +77,35 @@ def panel(results: Results, tables: Tables) -> Panel:
     return Panel("disturbance", "Disturbance", question, tuple(blocks))
 
 
-def _found(results: Results, tables: Tables) -> Iterator[tuple[str, str, Frame, Table]]:
-    """Every table there is, in the order of interest: band, frame, recording."""
+def _found(results: Results, tables: Tables) -> Iterator[Entry]:
+    """Every table with something to compare, in the order of interest: band, frame, recording.
+
+    Calibration recordings serve the fit; they are shown with the static wrench.
+    """
     main = main_frame(results)
+    compared = [recording for recording in by_role(results.recordings) if recording.role != "calibration"]
     frames: tuple[Frame, Frame] = ("S", "T") if main == "S" else ("T", "S")
     for band in band_names(results):
         for frame in frames:
-            for recording in by_role(results.recordings):
+            for recording in compared:
                 table = tables.band(recording.name, band, frame)
                 if table is not None and table.channels:
                     yield recording.name, band, frame, table
+
+
+def _plates(found: list[Entry], key: tuple[str, str]) -> list[Entry]:
+    """Return the first entries in a band and frame."""
+    return [entry for entry in found if entry[1:3] == key][:PLATES]
+
+
+def _whole_band(results: Results) -> str:
+    """Return the band that nothing was cut from, or else the main one."""
+    uncut = (band.name for band in results.bands if band.low_pass_Hz is None)
+    return next(uncut, main_band(results))
+
+
+def _choice(results: Results, band: str, frame: str) -> str:
+    return f"{band_label(results, band)}, {frame_label(frame)}"
 
 
 def _traces(results: Results, band: str, frame: Frame, table: Table) -> tuple[series.Trace, ...]:
@@ -86,12 +121,12 @@ def _traces(results: Results, band: str, frame: Frame, table: Table) -> tuple[se
 
 
 def _scene(results: Results, name: str, band: str, frame: Frame, table: Table) -> Scene:
-    choice = f"{band_label(results, band)}, {frame_label(frame)}"
-    return Scene(name, choice, table.columns["t"], table.valid, _traces(results, band, frame, table))
+    traces = _traces(results, band, frame, table)
+    return Scene(name, _choice(results, band, frame), table.columns["t"], table.valid, traces)
 
 
 def _plate(results: Results, name: str, band: str, frame: Frame, table: Table) -> Picture:
-    title = f"{name}, {band_label(results, band)}, {frame_label(frame)}"
+    title = f"{name}, {_choice(results, band, frame)}"
     return histories.strips(
         table.columns["t"],
         _traces(results, band, frame, table),

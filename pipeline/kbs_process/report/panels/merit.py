@@ -21,17 +21,19 @@ from kbs_process.report.text import measure, number, percent, unit
 
 _CAPTION = Caption(
     shown="Predicted against measured peak, one mark a recording and channel. On the line they are "
-    "equal; above it the prediction is the larger, hence pessimistic.",
+    "equal; above it the prediction is the larger, hence pessimistic. Hollow: at the noise, as the measured rms is "
+    "less than twice its uncertainty.",
     good="Marks on the line or a little above it; repeats of a trajectory close together.",
     bad="Marks below the line: the prediction promises less disturbance than there is. Marks far above "
     "it: the margin is spent on the model.",
-    do="For a mark below the line, see that channel's time history. Where the measured peak is no more "
-    "than a few of its sigma, the mark is noise: judge by repeatability instead.",
+    do="For a mark below the line, see that channel's time history. A hollow mark says nothing of the "
+    "prediction: record more repeats, or look at the unfiltered disturbance, where the signal is larger.",
 )
 _NOTE = (
     "FVE: fraction of the measured variance that the prediction explains; 100 % is perfect, 0 no better "
     "than no prediction, negative worse. Spectral ratio: predicted over measured power within the band. "
-    "Pessimism: predicted over measured peak."
+    "Pessimism: predicted over measured peak. At the noise: the measured rms is less than twice its uncertainty, "
+    "so that the figures in grey describe the noise and not the prediction."
 )
 _HEAD = (
     "Recording",
@@ -46,6 +48,7 @@ _HEAD = (
     "FVE",
     "Spectral ratio",
     "Pessimism",
+    "",
 )
 
 
@@ -79,7 +82,7 @@ def _rank(results: Results, row: Merit, main: tuple[str, str]) -> tuple[bool, in
 
 def _table(results: Results, band: str, frame: str, rows: tuple[Merit, ...]) -> Grid:
     title = f"Figures of merit, {band_label(results, band)}, {frame_label(frame)}"
-    return Grid(title, _HEAD, _rows(rows), "kkkrrrrrrrrr", _NOTE)
+    return Grid(title, _HEAD, _rows(rows), "kkkrrrrrrrrrk", _NOTE)
 
 
 def _rows(rows: tuple[Merit, ...]) -> tuple[tuple[str | Cell, ...], ...]:
@@ -92,9 +95,13 @@ def _rows(rows: tuple[Merit, ...]) -> tuple[tuple[str | Cell, ...], ...]:
 
 
 def _figures(row: Merit) -> tuple[str | Cell, ...]:
-    explained = percent(row.fraction_of_variance, 2)
+    noise = row.at_the_noise
     poor = row.fraction_of_variance is not None and row.fraction_of_variance < 0.0
     optimistic = row.pessimism is not None and row.pessimism < 1.0
+
+    def judged(text: str, *, doubtful: bool = False) -> Cell:
+        return Cell(text, "muted" if noise else "undecided" if doubtful else "")
+
     return (
         f"{row.channel} / {unit(row.unit)}",
         measure(row.measured_rms, row.sigma, 3),
@@ -102,8 +109,9 @@ def _figures(row: Merit) -> tuple[str | Cell, ...]:
         number(row.residual_rms),
         number(row.measured_peak),
         number(row.predicted_peak),
-        number(row.correlation, 2),
-        Cell(explained, "undecided" if poor else ""),
-        number(row.spectral_ratio, 2),
-        Cell(number(row.pessimism, 2), "undecided" if optimistic else ""),
+        judged(number(row.correlation, 2)),
+        judged(percent(row.fraction_of_variance, 2), doubtful=poor),
+        judged(number(row.spectral_ratio, 2)),
+        judged(number(row.pessimism, 2), doubtful=optimistic),
+        Cell("at the noise" if noise else "", "muted"),
     )

@@ -22,6 +22,6 @@ def panel(results: Results, tables: Tables) -> Panel:
     blocks: list[Block] = [
         Text(f"Made by: {made.command}"),
         Grid("Software", ("Component", "Version"), software, "ll"),
-        Grid("Inputs", ("File", "SHA-256"), tuple(inputs.items()), "ll"),
+        Grid("Inputs", ("File", "SHA-256"), tuple(inputs.items()), "lk"),
     ]
     return Panel("provenance", "Provenance", "What made these results, and from what?", tuple(blocks))

@@ -11,7 +11,7 @@ from kbs_process.report import series
 from kbs_process.report.panel import Channel, View
 from kbs_process.signals.records import Array, Mask
 
-BUDGET = 800_000  # points of all curves of one figure: 2.1 MB of page
+BUDGET = 800_000  # points of all curves of one figure: at most 2.1 MB of page
 FEWEST = 600  # points a curve, below which it says too little
 
 
@@ -61,10 +61,18 @@ def _view(scene: Scene, points: int) -> View:
             trace.channel,
             trace.unit,
             trace.limit,
-            tuple(series.pack(series.envelope(curve, size)) for curve in trace.curves),
+            _packed(trace, size),
         )
         for trace in scene.traces
     )
     bin_s = 2.0 * step if size > 1 else None
     shaded = series.stretches(scene.t, np.logical_not(scene.valid))
     return View(scene.recording, scene.choice, t0, step, bin_s, shaded, channels)
+
+
+def _packed(trace: series.Trace, size: int) -> tuple[dict[str, object] | None, ...]:
+    """Pack the curves; of three that are whole the middle one is left to be worked out by the page."""
+    derived = trace.computed if size == 1 and len(trace.curves) == 3 else None
+    return tuple(
+        None if curve is derived else series.pack(series.envelope(curve, size)) for curve in trace.curves
+    )
