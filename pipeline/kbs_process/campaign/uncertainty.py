@@ -71,7 +71,9 @@ def _entries(
     index = [WRENCH_CHANNELS.index(channel) for channel in measured.channels]
     assert analysis.run.wrench is not None
     sensor = budget.sensor_noise(
-        campaign.rig.transducer.noise.value[index], analysis.run.rates["wrench"], limits
+        campaign.rig.transducer.noise.value[index],
+        analysis.run.rates["wrench"],
+        bandpass.noise_bandwidth(band, measured.dt),
     )
     entries = [
         sensor,

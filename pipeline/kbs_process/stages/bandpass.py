@@ -62,6 +62,12 @@ def gain(band: Band, f: Array, dt: float) -> Array:
     return g
 
 
+def noise_bandwidth(band: Band, dt: float) -> float:
+    """Width of the rectangle, Hz, that passes as much white noise as the band does: the integral of gain^2."""
+    f = np.linspace(0.0, 0.5 / dt, 20001)[1:-1]
+    return float(np.trapezoid(gain(band, f, dt) ** 2, f))
+
+
 def apply(signal: Signal, band: Band) -> Signal:
     """Return the signal's part in the band; samples that lean on unknown ones by more than 0.1 % are flagged.
 

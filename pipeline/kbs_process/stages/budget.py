@@ -37,10 +37,9 @@ def rms(signal: Signal) -> Array:
     return values
 
 
-def sensor_noise(noise: Array, rate: float, passband: tuple[float, float]) -> Entry:
-    """White noise of rms `noise` (c,) a sample at `rate` Hz, within `passband` Hz: noise sqrt(2 (f2 - f1) / rate)."""
-    width = min(passband[1], rate / 2) - passband[0]
-    return Entry("transducer", "noise of the transducer, white", noise * np.sqrt(2.0 * width / rate))
+def sensor_noise(noise: Array, rate: float, bandwidth: float) -> Entry:
+    """White noise of rms `noise` (c,) a sample at `rate` Hz, in a band `bandwidth` Hz wide: noise sqrt(2 B / rate)."""
+    return Entry("transducer", "noise of the transducer, white", noise * np.sqrt(2.0 * bandwidth / rate))
 
 
 def from_shapes(stage: str, source: str, shapes: Sequence[Signal], band: Filter) -> Entry:
