@@ -59,7 +59,9 @@ def test_code_names_neither_campaigns_nor_truth(folder: str):
 def test_processing_opens_nothing_but_the_campaign(tmp_path: Path):
     campaign = ROOT / "campaigns" / "ALSTPP00"
     done = subprocess.run(
-        [sys.executable, "-c", WATCHED, str(ROOT), str(campaign), str(tmp_path / "out")],
+        # Isolated: where it is started from is no place to look for modules.
+        [sys.executable, "-P", "-c", WATCHED, str(ROOT), str(campaign), str(tmp_path / "out")],
+        cwd=tmp_path,
         capture_output=True,
         text=True,
         check=True,
