@@ -7,25 +7,40 @@ import math
 from pathlib import Path
 
 import jsonschema
+import msgspec
 import pytest
 
 from kbs_process.errors import OutputError
 from kbs_process.report import results as r
+from kbs_process.report.build import build
+from kbs_process.report.documents import DOCUMENTS
+from kbs_process.report.records.common import decode, load, schema_of
 from report import sample
 
-SCHEMA = Path(__file__).parents[2] / "schemas" / "results.schema.json"
+SCHEMAS = Path(__file__).parents[2] / "schemas"
+SCHEMA = SCHEMAS / "results.schema.json"
 
 
-def test_the_committed_schema_is_the_one_of_the_records() -> None:
-    assert json.loads(SCHEMA.read_text()) == r.schema()
+@pytest.mark.parametrize("kind", DOCUMENTS)
+def test_the_committed_schema_is_the_one_of_the_records(kind: str) -> None:
+    document = DOCUMENTS[kind]
+    path = SCHEMA if kind == "correlation" else SCHEMAS / f"{kind}.schema.json"
+    assert json.loads(path.read_text()) == schema_of(document.record, document.title)
+
+
+@pytest.mark.parametrize("kind", DOCUMENTS)
+def test_results_say_of_what_kind_they_are(kind: str) -> None:
+    assert {field.name: field.default for field in msgspec.structs.fields(DOCUMENTS[kind].record)}[
+        "kind"
+    ] == kind
 
 
 def test_the_sample_satisfies_the_schema_and_survives_a_round_trip() -> None:
     results = sample.command_results()
     content = r.encode(results)
     jsonschema.Draft202012Validator(json.loads(SCHEMA.read_text())).validate(json.loads(content))
-    assert r.decode(content) == results
-    assert r.encode(r.decode(content)) == content
+    assert decode(content, r.Results) == results
+    assert r.encode(decode(content, r.Results)) == content
 
 
 def test_numbers_that_could_not_be_determined_become_null() -> None:
@@ -36,7 +51,7 @@ def test_numbers_that_could_not_be_determined_become_null() -> None:
         provenance=sample.PROVENANCE,
         resonances=(resonance,),
     )
-    assert r.decode(r.encode(minimal)).resonances[0].sigma_Hz is None
+    assert decode(r.encode(minimal), r.Results).resonances[0].sigma_Hz is None
 
 
 @pytest.mark.parametrize(
@@ -53,7 +68,7 @@ def test_a_wrong_field_is_named(change, said, tmp_path) -> None:
     change(content)
     (tmp_path / "results.json").write_text(json.dumps(content))
     with pytest.raises(OutputError) as caught:
-        r.load(tmp_path)
+        load(tmp_path, r.Results)
     assert said in str(caught.value)
     assert str(tmp_path) in str(caught.value)
     assert caught.value.remedy
@@ -63,9 +78,18 @@ def test_a_wrong_field_is_named(change, said, tmp_path) -> None:
 def test_what_is_no_json_is_refused(content, tmp_path) -> None:
     (tmp_path / "results.json").write_bytes(content)
     with pytest.raises(OutputError, match="not a results file"):
-        r.load(tmp_path)
+        load(tmp_path, r.Results)
 
 
 def test_an_empty_folder_is_refused_with_a_remedy(tmp_path) -> None:
     with pytest.raises(OutputError, match="no results here"):
-        r.load(tmp_path)
+        load(tmp_path, r.Results)
+
+
+def test_an_unknown_kind_of_report_is_refused_with_a_remedy(tmp_path) -> None:
+    content = json.loads(r.encode(sample.command_results()))
+    content["kind"] = "correlatoin"
+    (tmp_path / "results.json").write_text(json.dumps(content))
+    with pytest.raises(OutputError, match="no report of kind 'correlatoin'") as caught:
+        build(tmp_path)
+    assert "correlation" in caught.value.remedy

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from kbs_process.errors import OutputError
+from kbs_process.errors import OutputError, did_you_mean
 from kbs_process.report import pdf as paper
-from kbs_process.report.results import load
-from kbs_process.report.tables import Tables
+from kbs_process.report.records.common import FILE, kind_of
 
 
 def build(results: Path, pdf: bool | None = None) -> Path:
@@ -15,15 +14,22 @@ def build(results: Path, pdf: bool | None = None) -> Path:
 
     `pdf`: True demands the PDF, False leaves it out, None makes it where weasyprint is installed.
     """
-    found = load(results)
+    kind = kind_of(results)
     from kbs_process.report import page  # draws: matplotlib costs most of a second to import
+    from kbs_process.report.documents import DOCUMENTS
 
-    sections = page.panels(found, Tables(results))
+    if kind not in DOCUMENTS:
+        raise OutputError(
+            f"there is no report of kind '{kind}'",
+            where=str(results / FILE),
+            remedy=did_you_mean(kind, DOCUMENTS),
+        )
+    head, sections = DOCUMENTS[kind].read(results)
     target = results / "index.html"
     try:
-        _replace(target, page.render(found, sections, "screen").encode())
+        _replace(target, page.render(head, sections, "screen").encode())
         if pdf or (pdf is None and paper.available()):
-            _replace(results / "report.pdf", paper.render(page.render(found, sections, "paper")))
+            _replace(results / "report.pdf", paper.render(page.render(head, sections, "paper")))
     except OSError as error:
         raise OutputError(
             f"cannot write the report: {error.strerror or error}",

@@ -14,22 +14,14 @@ import msgspec
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from kbs_process.report.panel import Block, Fold, Panel
-from kbs_process.report.panels.catalogue import PANELS
-from kbs_process.report.results import Results
-from kbs_process.report.tables import Tables
+from kbs_process.report.panel import Block, Fold, Head, Panel
 
 Medium = Literal["screen", "paper"]
 _PIECE = 32  # characters of a long word between two places where a line may end
 _LONG_WORD = re.compile(r"\S{65,}")  # a checksum stays whole, to be copied
 
 
-def panels(results: Results, tables: Tables) -> tuple[Panel, ...]:
-    """Return all sections of the report."""
-    return tuple(make(results, tables) for make in PANELS)
-
-
-def render(results: Results, sections: tuple[Panel, ...], medium: Medium) -> str:
+def render(head: Head, sections: tuple[Panel, ...], medium: Medium) -> str:
     """Return the page; on paper without scripts and interactive data."""
     styles = _asset("style.css") + (_asset("uPlot.min.css") if medium == "screen" else "")
     script = _script() if medium == "screen" else ""
@@ -42,7 +34,7 @@ def render(results: Results, sections: tuple[Panel, ...], medium: Medium) -> str
     )
     environment.filters.update(embedded=_embedded, identity=id, divisible=_divisible)
     return environment.get_template("page.html.j2").render(
-        results=results,
+        head=head,
         panels=sections,
         medium=medium,
         numbers=_numbers(sections),

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
-from kbs_process.report.results import Results
-from kbs_process.report.tables import Tables
+from kbs_process.report.records.common import Conclusion
 
 Tone = Literal["", "pass", "fail", "undecided", "muted"]
 
@@ -140,4 +138,13 @@ class Panel:
     blocks: tuple[Block, ...]
 
 
-PanelMaker = Callable[[Results, Tables], Panel]
+@dataclass(frozen=True, slots=True)
+class Head:
+    """What stands above all sections."""
+
+    kicker: str  # what kind of report this is
+    name: str
+    title: str
+    about: str
+    conclusion: Conclusion
+    version: str  # of what made the results

@@ -1,33 +1,30 @@
-"""What a processed campaign has to say: the contents of results.json, typed.
+"""What a processed campaign has to say: the contents of its results.json, typed.
 
 These records are the contract between the pipeline, which fills them, and the report, which shows
-them; schemas/results.schema.json is generated from them (`python -m kbs_process.report.results`).
-Units are SI and part of a field's name, or stand beside the value in `unit`. A number that could not
-be determined is None (null), never NaN. Every `sigma` is one standard deviation.
+them; schemas/results.schema.json is generated from them (`python -m kbs_process.report.documents correlation`).
 """
 
 from __future__ import annotations
 
-import json
-from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import msgspec
 
-from kbs_process.errors import OutputError
+from kbs_process.report.records.common import Check as Check
+from kbs_process.report.records.common import Conclusion as Conclusion
+from kbs_process.report.records.common import Constant as Constant
+from kbs_process.report.records.common import InputFile as InputFile
+from kbs_process.report.records.common import Notice as Notice
+from kbs_process.report.records.common import Provenance as Provenance
+from kbs_process.report.records.common import Record as Record
+from kbs_process.report.records.common import encode as encode
 
 SCHEMA_VERSION: Literal[1] = 1
 
 Verdict = Literal["pass", "fail", "undecided"]
-Status = Literal["pass", "fail", "undecided", "none"]
 Frame = Literal["T", "S"]
 Role = Literal["calibration", "fit", "held-out"]
-Severity = Literal["info", "warning", "error"]
 Statistic = Literal["peak", "rms"]
-
-
-class Record(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """An immutable entry of results.json; an unknown key is an error."""
 
 
 class CampaignSummary(Record, frozen=True, kw_only=True):
@@ -38,13 +35,6 @@ class CampaignSummary(Record, frozen=True, kw_only=True):
     article: str
     configuration: str
     drive: Literal["command", "motion"]  # what drives the plant: the commands, or the measured angles
-
-
-class Conclusion(Record, frozen=True, kw_only=True):
-    """The campaign's verdict ("none": it has no requirement), in a word and in a sentence."""
-
-    status: Status
-    sentence: str
 
 
 class ChannelResult(Record, frozen=True, kw_only=True):
@@ -82,15 +72,6 @@ class Requirement(Record, frozen=True, kw_only=True):
     source: str = ""
 
 
-class Notice(Record, frozen=True, kw_only=True):
-    """Something that a reader of the verdict must know, and what can be done about it."""
-
-    severity: Severity
-    what: str
-    where: str = ""
-    remedy: str = ""
-
-
 class LossEntry(Record, frozen=True, kw_only=True):
     """Samples or messages that a recording lacks, holds twice, or holds damaged."""
 
@@ -121,7 +102,7 @@ class Recording(Record, frozen=True, kw_only=True):
     repeat: int
     sha256: str
     duration_s: float
-    rates: dict[str, float] = {}  # Hz, by stream
+    rates: dict[str, float] = msgspec.field(default_factory=dict)  # Hz, by stream
     losses: tuple[LossEntry, ...] = ()
     clocks: tuple[Clock, ...] = ()
 
@@ -144,14 +125,6 @@ class FittedParameter(Record, frozen=True, kw_only=True):
     prior_sigma: float | None
     value: float
     sigma: float
-
-
-class Check(Record, frozen=True, kw_only=True):
-    """A named check on a fit."""
-
-    name: str
-    ok: bool
-    detail: str = ""
 
 
 class GravityChannel(Record, frozen=True, kw_only=True):
@@ -276,41 +249,13 @@ class Budget(Record, frozen=True, kw_only=True):
     total: float
 
 
-class Constant(Record, frozen=True, kw_only=True):
-    """A constant that the processing used; arrays are printed as text."""
-
-    name: str
-    value: float | str
-    unit: str
-    sigma: float | str | None
-    source: str
-
-
-class InputFile(Record, frozen=True, kw_only=True):
-    """A file that the results depend on."""
-
-    file: str
-    sha256: str
-
-
-class Provenance(Record, frozen=True, kw_only=True):
-    """What made these results."""
-
-    version: str
-    python: str
-    libraries: dict[str, str]
-    platform: str
-    command: str
-    commit: str = ""
-    inputs: tuple[InputFile, ...] = ()
-
-
 class Results(Record, frozen=True, kw_only=True):
     """results.json."""
 
     campaign: CampaignSummary
     verdict: Conclusion
     provenance: Provenance
+    kind: Literal["correlation"] = "correlation"
     schema: Literal[1] = SCHEMA_VERSION
     requirements: tuple[Requirement, ...] = ()
     warnings: tuple[Notice, ...] = ()
@@ -326,51 +271,3 @@ class Results(Record, frozen=True, kw_only=True):
     methods: str = ""  # paragraphs, separated by empty lines
     parameters: tuple[Constant, ...] = ()
     notes: tuple[str, ...] = ()  # assumptions to be said aloud: how torques were moved to S, for one
-
-
-def encode(results: Results) -> bytes:
-    """Return results.json: indented, the same bytes for the same results; NaN and infinities become null."""
-    compact = msgspec.json.encode(results, order="deterministic")
-    return msgspec.json.format(compact, indent=2) + b"\n"
-
-
-def decode(content: bytes, where: str = "results.json") -> Results:
-    """Return the results in `content`, or say which field is wrong."""
-    try:
-        return msgspec.json.decode(content, type=Results)
-    except (msgspec.ValidationError, msgspec.DecodeError) as error:
-        raise OutputError(
-            f"not a results file of this version: {error}",
-            where=where,
-            remedy="process the campaign again: kbs-process CAMPAIGN",
-        ) from None
-
-
-def load(folder: Path) -> Results:
-    """Return the results of a results folder."""
-    path = folder / "results.json"
-    try:
-        content = path.read_bytes()
-    except FileNotFoundError:
-        raise OutputError(
-            "no results here",
-            where=str(path),
-            remedy="give a results folder (reports/NAME), or process the campaign first",
-        ) from None
-    return decode(content, str(path))
-
-
-def schema() -> dict[str, Any]:
-    """Return the JSON Schema of results.json."""
-    (entry,), definitions = msgspec.json.schema_components((Results,), ref_template="#/$defs/{name}")
-    whole = {
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "title": "Results of a processed campaign",
-        **entry,
-        "$defs": definitions,
-    }
-    return msgspec.json.decode(msgspec.json.encode(whole), type=dict[str, Any])  # as a file holds it
-
-
-if __name__ == "__main__":
-    print(json.dumps(schema(), indent=2))

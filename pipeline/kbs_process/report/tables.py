@@ -55,17 +55,18 @@ class Tables:
 
     def gravity(self, recording: str) -> Table | None:
         """Measured wrench, static model and residual of a recording."""
-        return self._read("gravity", recording)
+        return self.read("gravity", recording)
 
     def band(self, recording: str, band: str, frame: str) -> Table | None:
         """Measured and predicted wrench of a recording in one band, in frame T or S."""
-        return self._read("spacecraft" if frame == "S" else "bands", f"{recording}.{band}")
+        return self.read("spacecraft" if frame == "S" else "bands", f"{recording}.{band}")
 
     def spectrum(self, recording: str) -> Table | None:
         """Power spectral densities of a recording."""
-        return self._read("spectrum", recording)
+        return self.read("spectrum", recording)
 
-    def _read(self, kind: str, stem: str) -> Table | None:
+    def read(self, kind: str, stem: str) -> Table | None:
+        """Table `tables/KIND/STEM.parquet`."""
         directory = self.folder / "tables" / kind
         name = f"{stem}.parquet"
         # Looked up among the files that are there, so that no name can lead out of the folder.

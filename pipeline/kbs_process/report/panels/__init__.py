@@ -1,1 +1,1 @@
-"""The report's sections, one module each; `catalogue.PANELS` is their order."""
+"""The sections of reports, one module each; `documents` puts them in order."""

@@ -1,0 +1,12 @@
+"""All kinds of reports, by the `kind` in results.json."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from kbs_process.report.document import Document
+from kbs_process.report.documents import correlation
+
+DOCUMENTS: dict[str, Document[Any]] = {
+    "correlation": correlation.DOCUMENT,
+}

@@ -1,0 +1,1 @@
+"""The contents of results.json, typed: what all kinds share, and one module a kind."""

@@ -1,0 +1,137 @@
+"""What every results.json has: its records' base, verdict, notices and provenance, and how it is stored.
+
+Units are SI and part of a field's name, or stand beside the value in `unit`. A number that could not
+be determined is None (null), never NaN. Every `sigma` is one standard deviation.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Literal, TypeVar
+
+import msgspec
+
+from kbs_process.errors import OutputError
+
+FILE = "results.json"
+
+Status = Literal["pass", "fail", "undecided", "none"]
+Severity = Literal["info", "warning", "error"]
+
+
+class Record(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """An immutable entry of results.json; an unknown key is an error."""
+
+
+class Conclusion(Record, frozen=True, kw_only=True):
+    """The campaign's verdict ("none": it has no requirement), in a word and in a sentence."""
+
+    status: Status
+    sentence: str
+
+
+class Notice(Record, frozen=True, kw_only=True):
+    """Something that a reader of the verdict must know, and what can be done about it."""
+
+    severity: Severity
+    what: str
+    where: str = ""
+    remedy: str = ""
+
+
+class Check(Record, frozen=True, kw_only=True):
+    """A named check on a fit."""
+
+    name: str
+    ok: bool
+    detail: str = ""
+
+
+class Constant(Record, frozen=True, kw_only=True):
+    """A constant that the processing used; arrays are printed as text."""
+
+    name: str
+    value: float | str
+    unit: str
+    sigma: float | str | None
+    source: str
+
+
+class InputFile(Record, frozen=True, kw_only=True):
+    """A file that the results depend on."""
+
+    file: str
+    sha256: str
+
+
+class Provenance(Record, frozen=True, kw_only=True):
+    """What made these results."""
+
+    version: str
+    python: str
+    libraries: dict[str, str]
+    platform: str
+    command: str
+    commit: str = ""
+    inputs: tuple[InputFile, ...] = ()
+
+
+class _Kind(msgspec.Struct, frozen=True):
+    """The one key that says how to read the others."""
+
+    kind: str = "correlation"
+
+
+R = TypeVar("R", bound=msgspec.Struct)
+
+
+def encode(results: Record) -> bytes:
+    """Return results.json: indented, the same bytes for the same results; NaN and infinities become null."""
+    compact = msgspec.json.encode(results, order="deterministic")
+    return msgspec.json.format(compact, indent=2) + b"\n"
+
+
+def decode(content: bytes, record: type[R], where: str = FILE) -> R:
+    """Return the results in `content`, or say which field is wrong."""
+    try:
+        return msgspec.json.decode(content, type=record)
+    except (msgspec.ValidationError, msgspec.DecodeError) as error:
+        raise OutputError(
+            f"not a results file of this version: {error}",
+            where=where,
+            remedy="process the campaign again: kbs-process CAMPAIGN",
+        ) from None
+
+
+def load(folder: Path, record: type[R]) -> R:
+    """Return the results of a results folder."""
+    return decode(_content(folder), record, str(folder / FILE))
+
+
+def kind_of(folder: Path) -> str:
+    """Return what kind of results a folder holds."""
+    return decode(_content(folder), _Kind, str(folder / FILE)).kind
+
+
+def schema_of(record: type[Record], title: str) -> dict[str, Any]:
+    """Return the JSON Schema of a kind of results.json."""
+    (entry,), definitions = msgspec.json.schema_components((record,), ref_template="#/$defs/{name}")
+    whole = {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": title,
+        **entry,
+        "$defs": definitions,
+    }
+    return msgspec.json.decode(msgspec.json.encode(whole), type=dict[str, Any])  # as a file holds it
+
+
+def _content(folder: Path) -> bytes:
+    path = folder / FILE
+    try:
+        return path.read_bytes()
+    except FileNotFoundError:
+        raise OutputError(
+            "no results here",
+            where=str(path),
+            remedy="give a results folder (reports/NAME), or process the campaign first",
+        ) from None
