@@ -29,8 +29,9 @@ _RUN_NS = 1_800_000_000_000  # half an hour from run to run
 def make(campaign: Campaign, index: int, commands: Commands | None = None) -> Recording:
     """Simulate and record one run; `commands` other than its trajectory's make a shorter one."""
     run = campaign.runs[index]
+    hardware = campaign.hardware()
     recording = record(
-        campaign.hardware().with_values({"bungee": run.bungee}),
+        hardware.with_values({"bungee": run.bungee, "loop": run.loop or hardware.loop}),
         TRAJECTORIES[run.trajectory]() if commands is None else commands,
         seed=1000 * campaign.seed + index,
         epoch_ns=_FIRST_DAY_NS + campaign.day * _DAY_NS + index * _RUN_NS,

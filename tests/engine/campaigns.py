@@ -28,6 +28,7 @@ class Run:
     form: Format = SMALL
     gaps: tuple[tuple[str, float, float], ...] = ()  # stream, start and end (s after its first message)
     bungee: Bungee | None = None
+    loop: str | None = None  # "open" or "closed"; None: as the campaign's controller
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,6 +141,17 @@ _ALL = (
                 bungee=ABOVE_ANTENNA,
                 form=Format(encoding="json", message_index=False),
             ),
+        ),
+    ),
+    Campaign(
+        "DUMMY1",
+        seed=108,
+        day=8,
+        runs=(
+            Run("SWPAZ000_1.mcap", "SWPAZ000", encoder_hz=20.0, loop="open"),
+            Run("SWPEL000_1.mcap", "SWPEL000", encoder_hz=20.0, loop="closed"),
+            Run("TRKL0000_1.mcap", "TRKL0000", encoder_hz=20.0, loop="open"),
+            Run("TRKL0000_2.mcap", "TRKL0000", encoder_hz=20.0, loop="closed"),
         ),
     ),
 )

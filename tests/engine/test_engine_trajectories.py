@@ -7,7 +7,8 @@ import pytest
 
 from engine import TRAJECTORIES
 
-QUICK = {"AZPS_ATA": 0.15, "AL012M00": 0.25, "ALSTPP00": 0.25}  # deg/s^2, out of the flight's envelope
+# deg/s^2, out of the flight's envelope
+QUICK = {"AZPS_ATA": 0.15, "AL012M00": 0.25, "ALSTPP00": 0.25, "SWPAZ000": 0.03, "SWPEL000": 0.03}
 
 
 @pytest.mark.parametrize("name", TRAJECTORIES)

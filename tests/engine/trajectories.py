@@ -1,4 +1,4 @@
-"""The paper's test trajectories (table 2) as commands: desired position and rate, one a real-time cycle.
+"""The paper's test trajectories (table 2) and sweeps of configuration 1: desired angle and rate, one a real-time cycle.
 
 Each axis follows a list of stretches of constant acceleration, so that positions and rates are
 exact and limits can be read off. Numbers in this file are in degrees; commands are in radians.
@@ -204,6 +204,35 @@ def alstpp00() -> Commands:
     return commands(az.stopped(81.0, _BUNGEE_ACCELERATION), el, 105.0)
 
 
+def _sweep(start: float, peak: float) -> Axis:
+    """Rates 0 to `peak`, through zero to -`peak`, back to 0, in 120 s: every order of the motor, both ways."""
+    acceleration = abs(peak) / 30.0
+    return (
+        Axis(start)
+        .rest(3.0)
+        .accelerate(peak, acceleration)
+        .accelerate(-peak, acceleration)
+        .accelerate(0.0, acceleration)
+    )
+
+
+def swpaz000() -> Commands:
+    """Rate sweeps of both axes, azimuth to 0.9 deg/s, elevation 31 to 40 deg; beyond the flight's accelerations."""
+    return commands(_sweep(-10.0, 0.9), _sweep(40.0, -0.6), 125.0)
+
+
+def swpel000() -> Commands:
+    """Rate sweeps of both axes, elevation to 0.9 deg/s between 60 and 73.5 deg."""
+    return commands(_sweep(10.0, -0.6), _sweep(60.0, 0.9), 125.0)
+
+
+def trkl0000() -> Commands:
+    """Slow tracking with a reversal of each axis, at the accelerations of normal operation."""
+    az = Axis(20.0).rest(3.0).accelerate(0.12).rest(20.0).accelerate(-0.3).rest(20.0).accelerate(0.0)
+    el = Axis(45.0).rest(5.0).accelerate(0.35).rest(15.0).accelerate(-0.1).rest(15.0).accelerate(0.0)
+    return commands(az, el, 110.0)
+
+
 TRAJECTORIES: dict[str, Callable[[], Commands]] = {
     "AZPS_ATA": azps_ata,
     "AESING00": aesing00,
@@ -213,4 +242,7 @@ TRAJECTORIES: dict[str, Callable[[], Commands]] = {
     "ACQ600": acq600,
     "AL012M00": al012m00,
     "ALSTPP00": alstpp00,
+    "SWPAZ000": swpaz000,
+    "SWPEL000": swpel000,
+    "TRKL0000": trkl0000,
 }
