@@ -78,7 +78,7 @@ def turn(joint: Joint) -> tuple[Array, Array]:
     Rodrigues' formula behind the misalignment: R(q) = exp(mis) (a a^T + (1 - a a^T) cos q + [a]x sin q).
     """
     a = np.asarray(joint.axis, dtype=float)
-    R = Rotation.from_rotvec(joint.misalignment.value).as_matrix()
+    R = Rotation.from_rotvec(joint.misalignment.value.copy()).as_matrix()  # scipy refuses read-only arrays
     along = np.outer(a, a)
     skew = np.cross(np.eye(3), a)
     return R @ a, np.stack([R @ along, R @ (np.eye(3) - along), R @ skew])
