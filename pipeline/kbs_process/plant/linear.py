@@ -1,0 +1,181 @@
+"""The plant linearised about rest at a pose: M x'' + C x' + K x = B u, and what it does to the wrench.
+
+The c coordinates x are the plate's angles about T's x, y and z (none on a rigid transducer), then the angles of
+the n driven joints, then their rotors' angles over the gear ratio. The n inputs u are the motors' fields over the
+gear ratio. So everything is in rad, of the plate or of the output.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from kbs_process.plant.effect import SIGNALS, Effect, Port
+from kbs_process.plant.rigid import LinkMotion, inertia_matrix, kinematics, links_beyond
+from kbs_process.rig.model import LAB, TRANSDUCER, Drive, Joint, Rig
+from kbs_process.signals.frames import from_rotation_vector, rotate
+from kbs_process.signals.records import Array
+
+_STEP = 1e-6  # rad and rad/s, of central differences
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Linear:
+    """Matrices of the linearised plant; the first `plate` coordinates turn the transducer's plate."""
+
+    plate: int  # 3, or 0 on a rigid transducer
+    joints: tuple[str, ...]  # the driven ones
+    M: Array  # (c, c) kg m^2
+    C: Array  # (c, c) N m s/rad
+    K: Array  # (c, c) N m/rad, gravity's included
+    B: Array  # (c, n) N m/rad
+    momentum: Array  # (6, c) linear, and angular momentum about T's origin, in T, for unit rates
+    gravity: Array  # (6, c) change of the weight's wrench in the plate's own axes, for unit angles
+
+    def output(self, joint: str) -> int:
+        """Return the coordinate of a driven joint's angle."""
+        return self.plate + self.joints.index(joint)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Freedom:
+    """A rotation: about `axis` through `point`, both in the laboratory, of the links it carries."""
+
+    axis: Array  # (3,)
+    point: Array  # (3,) m
+    carries: frozenset[str]
+
+
+def linearise(rig: Rig, effects: Sequence[Effect], q: Array) -> Linear:
+    r"""Linearise at joint angles q (joints,), rad, at rest.
+
+    Equation: with a_i the axis of freedom i through p_i, c_b the CoG of a body b that it carries, and
+        $v_{bi} = a_i \times (c_b - p_i)$:
+        $M_{ij} = \sum_b m_b v_{bi} \cdot v_{bj} + a_i \cdot I_b a_j$, each rotor adds
+        $J_r t_i t_j$, t being its absolute turns, and gravity adds $-m_b g \cdot (a_i \times v_{bj})$ to $K_{ij}$ for i
+        inboard of j, the Hessian of its potential.
+    Units: kg, m, rad, s.
+    Validity: small motions about rest. Slopes are those of the drives' equations at rest without load: at a fifth of
+        Tmax a motor's is 2 % less, in series with a gear that is 35 times as soft. Coulomb friction has no slope and
+        is left out, effects' own states are held, and the pose is the one without sag.
+    Source: R. Featherstone, Rigid Body Dynamics Algorithms (2008), chapters 3 and 6.
+    """
+    pose = np.asarray(q, dtype=float)[None, :]
+    links = kinematics(rig, pose, np.zeros_like(pose), np.zeros_like(pose))
+    driven = tuple(joint for joint in rig.joints if joint.drive is not None)
+    freedoms = _freedoms(rig, links, driven)
+    n, turning = len(driven), len(freedoms)
+    plate, size = turning - n, turning + n
+    M, C, K = (np.zeros((size, size)) for _ in range(3))
+    B, momentum, gravity = np.zeros((size, n)), np.zeros((6, size)), np.zeros((6, size))
+    _add_bodies(rig, links, freedoms, M, K, momentum, gravity)
+    if plate:
+        assert rig.transducer.stiffness is not None
+        K[:3, :3] += np.diag(rig.transducer.stiffness.value)
+        if rig.transducer.damping is not None:
+            C[:3, :3] += np.diag(rig.transducer.damping.value)
+    R_TL = links[TRANSDUCER].R[0].T
+    for index, joint in enumerate(driven):
+        assert joint.drive is not None
+        out, rotor = plate + index, turning + index
+        axis = freedoms[out].axis
+        turns = np.zeros(size)
+        turns[:turning] = [f.axis @ axis * (joint.parent in f.carries) for f in freedoms]
+        turns[rotor] = float(joint.drive.ratio)
+        M += float(joint.drive.rotor_inertia) * np.outer(turns, turns)
+        momentum[3:] += float(joint.drive.rotor_inertia) * np.outer(R_TL @ axis, turns)
+        pair = np.ix_([out, rotor], [out, rotor])
+        stiffness, damping, B[[out, rotor], index] = drive_slopes(joint.drive, effects)
+        K[pair] += stiffness
+        C[pair] += damping
+    return Linear(plate, tuple(joint.name for joint in driven), M, C, K, B, momentum, gravity)
+
+
+def drive_slopes(drive: Drive, effects: Sequence[Effect]) -> tuple[Array, Array, Array]:
+    """Return stiffness (2, 2), damping (2, 2) and the field's action (2,) on output and rotor, at rest.
+
+    Rotor and field count as angles at the output, their torques `ratio` times those at the motor: N m/rad, N m s/rad.
+    """
+    ratio = float(drive.ratio)
+    parameters = {name: float(quantity) for name, quantity in drive.parameters.items()}
+
+    def torques(**signals: float) -> Array:
+        known = dict.fromkeys(SIGNALS, 0.0) | {"ratio": ratio} | parameters | signals
+        totals = dict.fromkeys(Port, 0.0)
+        for effect in effects:
+            if effect.port is not Port.MOTOR_FRICTION:
+                known |= {state.name: state.initial for state in effect.states}
+                value = effect.equation(*(known[name] for name in effect.arguments))
+                totals[effect.port] += value[0] if effect.states else value
+        gear = totals[Port.TRANSMISSION]
+        return np.array([gear + totals[Port.JOINT_TORQUE], ratio * totals[Port.MOTOR_TORQUE] - gear])
+
+    def slope(signal: str, scale: float) -> Array:
+        return scale * (torques(**{signal: _STEP}) - torques(**{signal: -_STEP})) / (2.0 * _STEP)
+
+    stiffness = -np.stack([slope("joint_angle", 1.0), slope("rotor_angle", ratio)], axis=1)
+    damping = -np.stack([slope("joint_rate", 1.0), slope("rotor_rate", ratio)], axis=1)
+    return stiffness, damping, slope("field", ratio)
+
+
+def _freedoms(rig: Rig, links: dict[str, LinkMotion], driven: Sequence[Joint]) -> list[_Freedom]:
+    """The plate's axes where it is elastic, then the driven joints', from the laboratory outwards."""
+    T = links[TRANSDUCER]
+    freedoms = []
+    if rig.transducer.stiffness is not None and rig.transducer.on == LAB:
+        freedoms = [_Freedom(axis, T.r[0], links_beyond(rig)) for axis in T.R[0].T]
+    for joint in driven:
+        turned = from_rotation_vector(joint.misalignment.value) @ np.asarray(joint.axis)
+        axis = rotate(links[joint.parent].R, turned)[0]
+        freedoms.append(_Freedom(axis, links[joint.name].r[0], _outwards(rig, joint.name)))
+    return freedoms
+
+
+def _add_bodies(
+    rig: Rig,
+    links: dict[str, LinkMotion],
+    freedoms: Sequence[_Freedom],
+    M: Array,
+    K: Array,
+    momentum: Array,
+    gravity: Array,
+) -> None:
+    """Add what mass, inertia and weight of the bodies beyond T contribute, to the freedoms' rows and columns."""
+    T, beyond = links[TRANSDUCER], links_beyond(rig)
+    R_TL, down = T.R[0].T, np.array([0.0, 0.0, -float(rig.gravity)])
+    count = len(freedoms)
+    turning = slice(0, count)
+    for body in rig.bodies:
+        if body.on not in beyond:
+            continue
+        link, mass = links[body.on], float(body.mass)
+        centre = (link.r + rotate(link.R, body.cog.value))[0]
+        spin = np.stack([f.axis * (body.on in f.carries) for f in freedoms], axis=1)
+        arm = np.stack([np.cross(f.axis, centre - f.point) * (body.on in f.carries) for f in freedoms], 1)
+        tensor = link.R[0] @ inertia_matrix(body.inertia.value) @ link.R[0].T
+        M[turning, turning] += mass * arm.T @ arm + spin.T @ tensor @ spin
+        lever = centre - T.r[0]
+        momentum[:3, turning] += R_TL @ (mass * arm)
+        momentum[3:, turning] += R_TL @ (mass * np.cross(lever, arm, axisb=0).T + tensor @ spin)
+        for j in range(count):
+            for i in range(j + 1):
+                second = -mass * down @ np.cross(spin[:, i], arm[:, j])
+                K[i, j] += second
+                K[j, i] += second * (i != j)
+            # Seen from the plate, its own turn tilts gravity, and a joint's turn moves the CoG.
+            on_plate = TRANSDUCER in freedoms[j].carries
+            tilted = -np.cross(freedoms[j].axis, down) if on_plate else np.zeros(3)
+            moved = np.zeros(3) if on_plate else arm[:, j]
+            gravity[:3, j] += R_TL @ (mass * tilted)
+            gravity[3:, j] += R_TL @ (mass * (np.cross(lever, tilted) + np.cross(moved, down)))
+
+
+def _outwards(rig: Rig, name: str) -> frozenset[str]:
+    """A joint's link and those that hang on it."""
+    carried = {name}
+    for joint in rig.joints:
+        if joint.parent in carried:
+            carried.add(joint.name)
+    return frozenset(carried)
