@@ -39,6 +39,10 @@ class SimulationError(KbsError):
     """The plant's solution is not finite, or its parameters make no sense."""
 
 
+class MissionError(KbsError):
+    """A mission's orbit, relay satellites and limits allow no trajectory."""
+
+
 class OutputError(KbsError):
     """Results cannot be written; what was there before is untouched."""
 
