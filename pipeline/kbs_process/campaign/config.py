@@ -95,6 +95,8 @@ class Campaign:
     recordings: tuple[RecordingEntry, ...]
     rig: Rig
     inputs: tuple[Path, ...]  # files of the description: campaign.toml, parameter files, CSV matrices
+    mission: Path | None = None  # orbit, relay satellites and limits of a reference day
+    modal: Path | None = None  # modes of the article on its transducer; None: derived from the plant
 
     def recording(self, name: str) -> RecordingEntry:
         """Return the recording of that name."""

@@ -134,6 +134,22 @@ def merge(documents: Sequence[Document], problems: Problems) -> Merged:
     return Merged(tree, tuple(documents))
 
 
+def substituted(tables: Merged, documents: Sequence[Document]) -> Merged:
+    """Return `tables` with every value that `documents` give in place of its own; the last one counts."""
+    tree = _copied(tables.tree)
+    for document in documents:
+        _replace_into(tree, document.tree)
+    return Merged(tree, (*reversed(documents), *tables.documents))
+
+
+def _replace_into(tree: Tree, other: Mapping[str, Any]) -> None:
+    for name, value in other.items():
+        if name in tree and _is_table(tree[name]) and _is_table(value):
+            _replace_into(tree[name], value)
+        else:
+            tree[name] = _copied(value)
+
+
 def _is_table(value: object) -> bool:
     """Say whether a value is a table whose keys may be spread over files; a quantity is not."""
     return isinstance(value, dict) and "value" not in value

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 
 from kbs_process.campaign.checks import check_campaign
 from kbs_process.campaign.config import Bands, Campaign, RecordingEntry, Requirement, Topic, Topics
-from kbs_process.campaign.documents import Document, Merged, Tree, check_finite, merge, read
+from kbs_process.campaign.documents import Document, Merged, Tree, check_finite, merge, read, substituted
 from kbs_process.campaign.problems import Problems
 from kbs_process.campaign.rig_builder import RigBuilder
 from kbs_process.campaign.schema import violations
@@ -18,11 +19,12 @@ from kbs_process.rig.model import Rig
 CAMPAIGN_FILE = "campaign.toml"
 
 
-def load_campaign(folder: Path, *, checksums: bool = True) -> Campaign:
+def load_campaign(folder: Path, *, checksums: bool = True, flight: bool = False) -> Campaign:
     """Read and check the campaign in `folder`.
 
     Raises ConfigError with the file, the key and the remedy of up to five faults. `checksums` says
-    whether recordings are read through to compare the SHA-256 that the campaign states.
+    whether recordings are read through to compare the SHA-256 that the campaign states; with `flight`, the
+    parameters of the flight model take the place of those of the test.
     """
     folder = folder.absolute()
     problems = Problems(subject=str(folder))
@@ -36,11 +38,15 @@ def load_campaign(folder: Path, *, checksums: bool = True) -> Campaign:
     problems.raise_any()
 
     tables = _read_parameters(folder, document.tree["parameters"]["files"], problems)
+    if flight:
+        tables = _substitute_flight(folder, document, tables, problems)
     units = {parameter.name: parameter.unit for effect in CATALOGUE for parameter in effect.parameters}
     rig = RigBuilder(tables, folder, units, problems).build()
     problems.raise_any()
 
     campaign = _campaign(folder, document, tables, rig, problems)
+    if flight:
+        campaign = replace(campaign, article=document.tree["flight"].get("article", campaign.article))
     check_campaign(campaign, document, tables, problems, checksums=checksums)
     problems.raise_any()
     return campaign
@@ -53,17 +59,33 @@ def _check_schema(document: Document, schema: str, problems: Problems) -> None:
 
 def _read_parameters(folder: Path, files: Iterable[str], problems: Problems) -> Merged:
     """Read all parameter files as one tree, each checked alone and then all together."""
-    remedy = f"correct [parameters] files in {CAMPAIGN_FILE}, or add the file"
-    documents = [read(folder / name, role="the parameter file", remedy=remedy) for name in files]
-    for document in documents:
-        check_finite(document, problems)
-        _check_schema(document, "parameters", problems)
-    tables = merge(documents, problems)
+    tables = merge(_read_each(folder, files, "[parameters] files", problems), problems)
     if not problems.found:
         for violation in violations(tables.tree, "parameters", "complete"):
             problems.add(tables.place(violation.key), violation.what, violation.remedy)
     problems.raise_any()
     return tables
+
+
+def _substitute_flight(folder: Path, document: Document, tables: Merged, problems: Problems) -> Merged:
+    """Put what [flight] says of the flight model in the place of what was tested."""
+    if "flight" not in document.tree:
+        remedy = 'add [flight] with substitute = ["parameters/flight.toml"], or an empty list to fly what was tested'
+        problems.add(document.place(("flight",)), "is missing: nothing is said of the flight model", remedy)
+        problems.raise_any()
+    files = document.tree["flight"]["substitute"]
+    other = substituted(tables, _read_each(folder, files, "[flight] substitute", problems))
+    problems.raise_any()
+    return other
+
+
+def _read_each(folder: Path, files: Iterable[str], key: str, problems: Problems) -> list[Document]:
+    remedy = f"correct {key} in {CAMPAIGN_FILE}, or add the file"
+    documents = [read(folder / name, role="the parameter file", remedy=remedy) for name in files]
+    for document in documents:
+        check_finite(document, problems)
+        _check_schema(document, "parameters", problems)
+    return documents
 
 
 def _campaign(folder: Path, document: Document, tables: Merged, rig: Rig, problems: Problems) -> Campaign:
@@ -89,9 +111,11 @@ def _campaign(folder: Path, document: Document, tables: Merged, rig: Rig, proble
         ),
         topics=_topics(tree["topics"], rig),
         effects=tuple(effect.name for effect in CATALOGUE if effect.name in effects),
-        recordings=tuple(_recording(folder, table) for table in tree["recording"]),
+        recordings=tuple(_recording(folder, table) for table in tree.get("recording", [])),
         rig=rig,
         inputs=(document.path, *(entry.path for entry in tables.documents), *_matrices(folder, tables.tree)),
+        mission=folder / tree["mission"]["file"] if "mission" in tree else None,
+        modal=folder / tree["model"]["modal"] if "modal" in tree.get("model", {}) else None,
     )
 
 

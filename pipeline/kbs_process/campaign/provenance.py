@@ -5,14 +5,18 @@ from __future__ import annotations
 import hashlib
 import platform
 import subprocess
+from collections.abc import Iterable, Sequence
 from functools import lru_cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 import kbs_process
 from kbs_process.campaign.config import Campaign
 from kbs_process.errors import RecordingError
+from kbs_process.report.records.common import Constant, InputFile, Provenance
 from kbs_process.rig.model import Quantity, Rig
 
 # Libraries that compute, read or write; a report names their versions.
@@ -56,6 +60,34 @@ def software() -> dict[str, Any]:
         "platform": f"{platform.system()} {platform.machine()}",
         "libraries": {name: _version(name) for name in LIBRARIES},
     }
+
+
+def made(command: str, campaign: Campaign, others: Sequence[Path] = ()) -> Provenance:
+    """Return what made results: `command`, the software, the campaign's files, and `others` that were read."""
+    about = software()
+    files = {entry["file"]: entry["sha256"] for entry in inputs(campaign)}
+    files |= {_relative(path, campaign.folder): sha256(path) for path in others}
+    return Provenance(
+        version=about["kbs-process"],
+        python=about["python"],
+        libraries=about["libraries"],
+        platform=about["platform"],
+        command=command,
+        commit=about["commit"] or "",
+        inputs=tuple(InputFile(file=file, sha256=digest) for file, digest in files.items()),
+    )
+
+
+def constants(rig: Rig) -> Iterable[Constant]:
+    """Yield every quantity of the rig as a report prints it."""
+    for quantity in _sorted(rig):
+        yield Constant(
+            name=quantity.name,
+            value=_text(quantity.value.tolist()),
+            unit=quantity.unit,
+            sigma=_text(quantity.sigma.tolist()),
+            source=quantity.source,
+        )
 
 
 def inputs(campaign: Campaign) -> list[dict[str, str]]:
@@ -118,3 +150,7 @@ def _commit(package: Path) -> str | None:
     except (OSError, subprocess.SubprocessError):
         return None
     return head.stdout.strip() + ("+" if changed.stdout.strip() else "")
+
+
+def _text(value: float | list[object]) -> float | str:
+    return value if isinstance(value, float) else ", ".join(str(x) for x in np.ravel(np.asarray(value)))

@@ -92,9 +92,22 @@ class TableWriter:
         frame: str,
         history: Sequence[str],
     ) -> None:
-        about = {"recording": self.recording, "frame": frame, "units": units, "history": list(history)}
-        table = pa.table({name: pa.array(values) for name, values in columns.items()})
-        table = table.replace_schema_metadata({"kbs": json.dumps(about, sort_keys=True)})
-        directory = self.folder / "tables" / kind
-        directory.mkdir(parents=True, exist_ok=True)
-        pq.write_table(table, directory / f"{stem}.parquet", compression="zstd")
+        path = self.folder / "tables" / kind / f"{stem}.parquet"
+        write_table(path, columns, units, frame=frame, history=history, recording=self.recording)
+
+
+def write_table(
+    path: Path,
+    columns: Mapping[str, Array | Mask],
+    units: Mapping[str, str],
+    *,
+    frame: str = "",
+    history: Sequence[str] = (),
+    recording: str = "",
+) -> None:
+    """Write one table, and what its columns are into the file's metadata; folders are made."""
+    about = {"recording": recording, "frame": frame, "units": units, "history": list(history)}
+    table = pa.table({name: pa.array(values) for name, values in columns.items()})
+    table = table.replace_schema_metadata({"kbs": json.dumps(about, sort_keys=True)})
+    path.parent.mkdir(parents=True, exist_ok=True)
+    pq.write_table(table, path, compression="zstd")

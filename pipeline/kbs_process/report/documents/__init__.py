@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from kbs_process.report.document import Document
-from kbs_process.report.documents import correlation
+from kbs_process.report.documents import correlation, flight
 
 DOCUMENTS: dict[str, Document[Any]] = {
     "correlation": correlation.DOCUMENT,
+    "flight": flight.DOCUMENT,
 }

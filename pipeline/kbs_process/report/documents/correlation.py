@@ -18,6 +18,7 @@ from kbs_process.report.panels import (
     repeatability,
     spectra,
     static,
+    transducer,
 )
 from kbs_process.report.results import Results
 
@@ -48,6 +49,7 @@ DOCUMENT = Document(
         disturbance.panel,
         merit.panel,
         spectra.panel,
+        transducer.panel,
         static.panel,
         gravity.panel,
         coupling.panel,

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from kbs_process.report.panel import Block, Fold, Grid, Panel, Text
 from kbs_process.report.panels.choose import band_range
+from kbs_process.report.records.common import Constant
 from kbs_process.report.results import Results
 from kbs_process.report.tables import Tables
 from kbs_process.report.text import MISSING, count, measure, number, percent, unit
@@ -16,8 +19,7 @@ def panel(results: Results, tables: Tables) -> Panel:
     if results.bands:
         blocks.append(_bands(results))
     if results.parameters:
-        title = f"Constants ({count(len(results.parameters), 'parameter')})"
-        blocks.append(Fold(title, (_constants(results),)))
+        blocks.append(constants(results.parameters))
     return Panel("methods", "Methods", "How were these figures obtained?", tuple(blocks))
 
 
@@ -36,12 +38,13 @@ def _bands(results: Results) -> Grid:
     return Grid("Bands", ("Band", "Range", "Method", "Edge", "Edge error"), rows, "lllrr", note)
 
 
-def _constants(results: Results) -> Grid:
+def constants(entries: Sequence[Constant]) -> Fold:
+    """Return a table of constants that a reader opens on demand."""
     rows = tuple(
-        (entry.name, *_value(entry.value, entry.sigma), unit(entry.unit), entry.source)
-        for entry in results.parameters
+        (entry.name, *_value(entry.value, entry.sigma), unit(entry.unit), entry.source) for entry in entries
     )
-    return Grid("Constants used", ("Name", "Value", "Unit", "Source"), rows, "lrll")
+    grid = Grid("Constants used", ("Name", "Value", "Unit", "Source"), rows, "lrll")
+    return Fold(f"Constants ({count(len(rows), 'parameter')})", (grid,))
 
 
 def _value(value: float | str, sigma: float | str | None) -> tuple[str]:

@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from kbs_process.report.panel import Block, Grid, Panel, Text
+from kbs_process.report.records.common import Provenance
 from kbs_process.report.results import Results
 from kbs_process.report.tables import Tables
 
 
 def panel(results: Results, tables: Tables) -> Panel:
     """The command, the software, and the checksum of every input."""
-    made = results.provenance
+    return of(results.provenance, {entry.file: entry.sha256 for entry in results.recordings})
+
+
+def of(made: Provenance, recorded: Mapping[str, str] | None = None) -> Panel:
+    """Return the section for any kind of results; `recorded` gives checksums of recordings by file."""
     software = (
         ("kbs-process", made.version),
         *((("commit", made.commit),) if made.commit else ()),
@@ -17,8 +24,7 @@ def panel(results: Results, tables: Tables) -> Panel:
         ("platform", made.platform),
         *made.libraries.items(),
     )
-    recorded = {entry.file: entry.sha256 for entry in results.recordings}
-    inputs = recorded | {entry.file: entry.sha256 for entry in made.inputs}
+    inputs = dict(recorded or {}) | {entry.file: entry.sha256 for entry in made.inputs}
     blocks: list[Block] = [
         Text(f"Made by: {made.command}"),
         Grid("Software", ("Component", "Version"), software, "ll"),
