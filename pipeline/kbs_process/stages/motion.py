@@ -4,6 +4,9 @@ A slow joint's encoder repeats one code for many samples: its error is then no n
 turns it into a torque error. The command is smooth but is not where the joint is. The two together,
 q = command + lowpass(encoder - command), keep the command's smoothness above the corner of that low-pass and the
 encoder's truth below; the corner is the one with the least estimated error.
+
+The wrench passes an amplifier that delays it and the encoders do not. At 2 deg/s, 10 ms turn 10 N m of gravity into an
+error of 3 mN m that changes its sign with the rate's. So angles are given as the delayed wrench shows them.
 """
 
 from __future__ import annotations
@@ -12,6 +15,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from kbs_process.errors import RecordingError
 from kbs_process.rig.model import Joint, Rig
@@ -34,7 +38,10 @@ class MotionSettings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
-    """Angles of the joints, in the order of the rig's joints, nominal encoder offsets taken off."""
+    """Angles of the joints, in the order of the rig's joints, nominal encoder offsets taken off.
+
+    They are as late as the transducer's amplifier makes the wrench.
+    """
 
     t0: float  # s
     dt: float  # s
@@ -79,12 +86,16 @@ def estimate(run: Run, rig: Rig, settings: MotionSettings = MotionSettings()) ->
     angles = [_joint_angle(run, joint, settings) for joint in rig.joints]
     q = np.stack([angle.q for angle in angles], axis=1)
     offset = np.array([_offset(joint) for joint in rig.joints])
+    delay = 0.0 if rig.transducer.amplifier is None else rig.transducer.amplifier.delay
+    moved, rate, acceleration = (
+        _later(smooth(q, grid.dt, settings.band_Hz, derivative=order), grid.dt, delay) for order in (0, 1, 2)
+    )
     return Motion(
         t0=grid.t0,
         dt=grid.dt,
-        q=smooth(q, grid.dt, settings.band_Hz) - offset,
-        qd=smooth(q, grid.dt, settings.band_Hz, derivative=1),
-        qdd=smooth(q, grid.dt, settings.band_Hz, derivative=2),
+        q=moved - offset,
+        qd=rate,
+        qdd=acceleration,
         sigma_q=np.stack([angle.sigma for angle in angles], axis=1),
         rounding=np.stack([angle.rounding for angle in angles], axis=2),
         missed=np.array([angle.missed for angle in angles]),
@@ -93,8 +104,22 @@ def estimate(run: Run, rig: Rig, settings: MotionSettings = MotionSettings()) ->
         history=(
             *(f"{joint.name}: {angle.how}" for joint, angle in zip(rig.joints, angles, strict=True)),
             f"angles low-passed at {settings.band_Hz:g} Hz and differentiated",
+            *(
+                [f"angles delayed by {1e3 * delay:.1f} ms, as the amplifier delays the wrench"]
+                if delay
+                else []
+            ),
         ),
     )
+
+
+def _later(values: Array, dt: float, delay: float) -> Array:
+    """Delay channels (n, c) that are low-passed well below the sampling rate; the first value is held."""
+    if delay == 0.0 or len(values) < 2:
+        return values
+    t = dt * np.arange(len(values))
+    delayed: Array = CubicSpline(t, values)(np.maximum(t - delay, 0.0))
+    return delayed
 
 
 def _offset(joint: Joint) -> float:
