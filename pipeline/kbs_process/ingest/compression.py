@@ -16,10 +16,9 @@ ALLOWANCE = 1 << 16  # bytes that any chunk may declare
 
 
 class Decompressor:
-    """Decompresses chunks; the result of one holds until the next."""
+    """Decompresses chunks."""
 
     def __init__(self) -> None:
-        self._buffer = np.zeros(0, dtype=np.uint8)
         self._zstd = zstandard.ZstdDecompressor(max_window_size=LARGEST)
 
     def __call__(self, compression: str, compressed: memoryview, declared: int) -> Bytes:
@@ -30,7 +29,7 @@ class Decompressor:
         if declared > LARGEST or declared > ALLOWANCE + RATIO * len(compressed):
             raise MalformedError(f"{len(compressed)} bytes that declare {declared}")
         if compression == "":
-            result = np.frombuffer(compressed, dtype=np.uint8)
+            result = np.frombuffer(bytes(compressed), dtype=np.uint8)
         elif not declared and not compressed:
             result = np.zeros(0, dtype=np.uint8)
         elif compression == "zstd":
@@ -44,9 +43,8 @@ class Decompressor:
         return result
 
     def _decompress_zstd(self, compressed: memoryview, declared: int) -> Bytes:
-        if len(self._buffer) < declared:
-            self._buffer = np.zeros(declared + declared // 4, dtype=np.uint8)
-        target = memoryview(self._buffer)[:declared]  # type: ignore[arg-type]
+        buffer = np.empty(declared, dtype=np.uint8)
+        target = memoryview(buffer)  # type: ignore[arg-type]
         size = 0
         try:
             with self._zstd.stream_reader(compressed, read_across_frames=True) as reader:
@@ -57,7 +55,7 @@ class Decompressor:
             raise MalformedError(str(error)) from error
         if more:
             raise MalformedError(f"more than the {declared} bytes declared")
-        return self._buffer[:size]
+        return buffer[:size]
 
 
 def _decompress_lz4(compressed: memoryview, declared: int) -> Bytes:

@@ -8,7 +8,7 @@ resumes at the next chunk (or message outside a chunk) that is consistent in its
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
@@ -30,10 +30,11 @@ OPCODE, CHANNEL, LOG, AT, SIZE = range(5)  # rows of the table that `walk` retur
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Segment:
-    """Messages in one buffer, which holds until the next segment is asked for."""
+    """Messages in one buffer, which is theirs alone, and what the file has described up to there."""
 
     buffer: Bytes
     table: Words  # (5, n): OPCODE, CHANNEL, LOG, AT, SIZE
+    dictionary: mcap.Dictionary
 
 
 class Container:
@@ -43,6 +44,7 @@ class Container:
         self.path = path
         self.size = path.stat().st_size
         self.dictionary = dictionary
+        self._known = dictionary.copy()  # as the segments have it: they may be in use while reading goes on
         self.losses: list[Loss] = []
         self.origin = origin  # log time of the recording's first message, ns: zero of the losses' times
         self._last: int | None = None
@@ -63,7 +65,7 @@ class Container:
         """Return a log time in s since the recording's first message."""
         return None if log is None or self.origin is None else (log - self.origin) / 1e9
 
-    def segments(self) -> Iterator[Segment]:
+    def segments(self) -> Generator[Segment]:
         """Yield the messages of the file, in its order."""
         with self.path.open("rb", buffering=0) as file:
             self._seek(file, len(mcap.MAGIC))
@@ -168,13 +170,15 @@ class Container:
         messages = table[OPCODE] == mcap.MESSAGE_OP
         if messages.any():
             self._loose = True
-            yield self._segment(self._buffer, table[:, messages])
+            yield self._segment(self._buffer.copy(), table[:, messages])
 
     def _segment(self, buffer: Bytes, table: Words) -> Segment:
         if self.origin is None:
             self.origin = int(table[LOG, 0])
         self._last = int(table[LOG, -1])
-        return Segment(buffer, table)
+        if self.dictionary.size > self._known.size:
+            self._known = self.dictionary.copy()
+        return Segment(buffer, table, self._known)
 
     @staticmethod
     def _content(buffer: Bytes, column: Words) -> memoryview:

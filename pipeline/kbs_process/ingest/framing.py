@@ -63,6 +63,15 @@ class Dictionary:
             number, channel = parse_channel(content)
             self.conflicts += self.channels.setdefault(number, channel) != channel
 
+    @property
+    def size(self) -> int:
+        """How many entries there are: one that has not grown is the same, as the first of a number holds."""
+        return len(self.schemas) + len(self.channels)
+
+    def copy(self) -> Dictionary:
+        """Return the dictionary as it is now."""
+        return Dictionary(dict(self.schemas), dict(self.channels), self.conflicts)
+
     def schema_of(self, channel: Channel) -> Schema:
         """Return the channel's schema; one without a name where the file gives none."""
         return self.schemas.get(channel.schema, Schema("", "", b""))

@@ -7,8 +7,15 @@ cells inside the messages.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from sys import byteorder
+from typing import Any
+
 import numpy as np
+from llvmlite import ir  # type: ignore[import-untyped]
 from numba import njit, types
+from numba.extending import intrinsic
+from numba.np.arrayobj import make_array
 from numpy.typing import NDArray
 
 from kbs_process.signals.records import Array, Mask, Stamps
@@ -29,35 +36,32 @@ U = np.uint64
 BUFFER = types.Array(types.uint8, 1, "C", readonly=True)
 WORDS = types.Array(types.uint64, 1, "C")
 TABLE = types.Array(types.uint64, 2, "C")
+TABLE_ANY = types.Array(types.uint64, 2, "A")
 
 
-@njit(inline="always")
-def _inner_word(buffer: Bytes, at: np.uint64) -> np.uint64:
+def _unaligned_load(context: Any, buffer: Any, at: Any) -> Any:
     """Return the little-endian 64-bit word at byte `at`; all of it must lie inside the buffer."""
-    return (
-        U(buffer[at])
-        | (U(buffer[at + U(1)]) << U(8))
-        | (U(buffer[at + U(2)]) << U(16))
-        | (U(buffer[at + U(3)]) << U(24))
-        | (U(buffer[at + U(4)]) << U(32))
-        | (U(buffer[at + U(5)]) << U(40))
-        | (U(buffer[at + U(6)]) << U(48))
-        | (U(buffer[at + U(7)]) << U(56))
-    )
+
+    def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        data = make_array(signature.args[0])(context, builder, arguments[0]).data  # type: ignore[no-untyped-call]
+        place = builder.bitcast(builder.gep(data, [arguments[1]]), ir.IntType(64).as_pointer())
+        word = builder.load(place, align=1)
+        return word if byteorder == "little" else builder.bswap(word)
+
+    return types.uint64(buffer, at), code
+
+
+_inner_word: Callable[[Bytes, np.uint64], np.uint64] = intrinsic(_unaligned_load)  # type: ignore[assignment]
 
 
 @njit(inline="always")
 def _word(buffer: Bytes, at: np.uint64) -> np.uint64:
-    """Return the little-endian 64-bit word at byte `at`, zeros beyond the buffer's end."""
-    if at + U(8) <= U(len(buffer)):
-        return _inner_word(buffer, at)
-    word = U(0)
-    for k in range(U(len(buffer)) - at if at < U(len(buffer)) else U(0)):
-        word |= U(buffer[at + U(k)]) << U(8 * k)
-    return word
+    """Return the little-endian 64-bit word at byte `at`, zeros beyond the end of a buffer of eight bytes or more."""
+    start = min(at, U(len(buffer)) - U(8))
+    return _inner_word(buffer, start) >> (U(8) * (at - start))
 
 
-@njit(TABLE(BUFFER, types.uint64, types.boolean), cache=True)
+@njit(TABLE(BUFFER, types.uint64, types.boolean), cache=True, nogil=True)
 def walk(buffer: Bytes, stop: np.uint64, chunk: bool) -> Words:
     """Walk the records in buffer[:stop]; return a column (opcode, channel, log time, at, size) for each.
 
@@ -95,17 +99,44 @@ def walk(buffer: Bytes, stop: np.uint64, chunk: bool) -> Words:
 
 
 @njit(inline="always")
+def _swapped(word: np.uint64) -> np.uint64:
+    """Return the word with its bytes in reverse order."""
+    word = (word & U(0x00FF00FF00FF00FF)) << U(8) | (word >> U(8)) & U(0x00FF00FF00FF00FF)
+    word = (word & U(0x0000FFFF0000FFFF)) << U(16) | (word >> U(16)) & U(0x0000FFFF0000FFFF)
+    return word << U(32) | word >> U(32)
+
+
+@njit(TABLE(TABLE_ANY, types.uint64), cache=True, nogil=True)
+def select(table: Words, channel: np.uint64) -> Words:
+    """Return (4, n): the place in `table` of each of the channel's messages, its log time, at and size."""
+    count = 0
+    for i in range(table.shape[1]):
+        count += table[1, i] == channel
+    chosen = np.empty((4, count), dtype=np.uint64)
+    k = 0
+    for i in range(table.shape[1]):
+        if table[1, i] == channel:
+            chosen[0, k] = i
+            for row in range(3):
+                chosen[1 + row, k] = table[2 + row, i]
+            k += 1
+    return chosen
+
+
+@njit(inline="always")
 def _load(buffer: Bytes, place: np.uint64, size: np.uint64, form: np.uint64) -> np.uint64:
     """Return the bits of a cell of `size` bytes."""
     if form == LITTLE:
         return _word(buffer, place) & (~U(0) >> (U(64) - U(8) * size))
-    bits = U(0)
-    for k in range(size):
-        byte = U(buffer[place + U(k)])
-        if form == BIG:
-            bits = (bits << U(8)) | byte
-        else:
-            bits |= (byte & U(0x7F)) << (U(7) * U(k))
+    if form == BIG:
+        return _swapped(_word(buffer, place)) >> (U(64) - U(8) * size)
+    bits = _word(buffer, place) & (~U(0) >> (U(64) - U(8) * min(size, U(8))))
+    # Seven bits of each byte, put side by side in pairs, fours and eights.
+    bits = (bits & U(0x007F007F007F007F)) | (bits & U(0x7F007F007F007F00)) >> U(1)
+    bits = (bits & U(0x00003FFF00003FFF)) | (bits & U(0x3FFF00003FFF0000)) >> U(2)
+    bits = (bits & U(0x000000000FFFFFFF)) | (bits & U(0x0FFFFFFF00000000)) >> U(4)
+    for k in range(U(8), size):
+        bits |= (U(buffer[place + k]) & U(0x7F)) << (U(7) * k)
     return bits
 
 
@@ -130,6 +161,7 @@ def _signed(bits: np.uint64, size: np.uint64, form: np.uint64) -> np.int64:
         types.Array(types.float64, 2, "C"),
     ),
     cache=True,
+    nogil=True,
 )
 def decode(
     buffer: Bytes,
@@ -158,11 +190,8 @@ def decode(
         if not todo[i] or size[i] != length:
             continue
         fits = True
-        inside = at[i] + length + U(8) <= U(len(buffer))  # no word of a guard reaches beyond the buffer
         for g in range(len(guards)):
-            place = at[i] + guards[g, 0]
-            word = _inner_word(buffer, place) if inside else _word(buffer, place)
-            fits = word & guards[g, 1] == guards[g, 2]
+            fits = _word(buffer, at[i] + guards[g, 0]) & guards[g, 1] == guards[g, 2]
             if not fits:
                 break
         if not fits:

@@ -95,7 +95,7 @@ class Decoded:
 
 
 class LayoutDecoder:
-    """Decodes a stream by the layouts met so far, the latest first.
+    """Decodes a stream by the layouts met so far, the commonest first.
 
     `trace` returns the layout of one message, and raises `MalformedError` where that contradicts its schema.
     """
@@ -123,10 +123,15 @@ class LayoutDecoder:
                     lacking[part] |= before & ~todo[part]
             return done
 
+        counts: list[int] = []
         for known in self._layouts:
-            left -= apply(known, slice(None))
-            if not left:
-                return Decoded(stamp, values, good, present, lacking)
+            counts.append(apply(known, slice(None)) if left else 0)
+            left -= counts[-1]
+        # The commonest first: most segments then need no more than that one.
+        order = sorted(range(len(counts)), key=counts.__getitem__, reverse=True)
+        self._layouts = [self._layouts[i] for i in order]
+        if not left:
+            return Decoded(stamp, values, good, present, lacking)
         fresh = 0
         for first in np.flatnonzero(todo).tolist():
             if not todo[first]:

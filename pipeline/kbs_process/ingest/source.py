@@ -12,6 +12,7 @@ import numpy as np
 
 from kbs_process.errors import RecordingError, did_you_mean
 from kbs_process.ingest import framing as mcap
+from kbs_process.ingest.ahead import ahead
 from kbs_process.ingest.container import AT, CHANNEL, SIZE, Container, Segment
 from kbs_process.ingest.streams import SAMPLES, Reading, Sample, Stream, payloads, type_of
 from kbs_process.signals.records import Block, Loss, Stamps
@@ -104,7 +105,7 @@ class Source:
         if self._indexed:
             self._require_topics(streams, container.dictionary)
         readings = [Reading(stream, container) for stream in streams]
-        for segment in container.segments():
+        for segment in ahead(container.segments()):
             counter.add(segment)
             for reading in readings:
                 block = reading.block(segment)
@@ -121,7 +122,7 @@ class Source:
         wanted = {topic.topic for topic in self.topics if topic.count != 0}
         container = self._container()
         for segment in container.segments():
-            channels = container.dictionary.channels
+            channels = segment.dictionary.channels
             numbers, firsts = np.unique(segment.table[CHANNEL], return_index=True)
             for number, first in zip(numbers.tolist(), firsts.tolist(), strict=True):
                 if number in channels and channels[number].topic not in found:
@@ -131,7 +132,7 @@ class Source:
                     texts = list(islice(payloads(segment.buffer, table[AT], table[SIZE]), SAMPLES))
                     try:
                         found[topic] = Sample(
-                            type_of(container.dictionary, number, iter(texts), topic), texts[0]
+                            type_of(segment.dictionary, number, iter(texts), topic), texts[0]
                         )
                     except RecordingError as error:
                         found[topic] = error.what

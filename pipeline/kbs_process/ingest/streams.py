@@ -9,10 +9,10 @@ from itertools import islice
 import numpy as np
 
 from kbs_process.errors import RecordingError, did_you_mean
-from kbs_process.ingest.container import AT, CHANNEL, LOG, SIZE, Container, Segment
+from kbs_process.ingest.container import Container, Segment
 from kbs_process.ingest.fields import Step, resolve
 from kbs_process.ingest.framing import Dictionary
-from kbs_process.ingest.kernels import Bytes, Words
+from kbs_process.ingest.kernels import Bytes, Words, select
 from kbs_process.ingest.messages import Decoder, MessageType, message_type
 from kbs_process.signals.records import Block, Loss, Stamps
 
@@ -73,11 +73,11 @@ class Reading:
 
     def block(self, segment: Segment) -> Block | None:
         """Return the stream's messages in the segment, in their order; None where there is none."""
-        channels = self._container.dictionary.channels
+        channels = segment.dictionary.channels
         parts = []
         for number in [n for n, channel in channels.items() if channel.topic == self.stream.topic]:
-            chosen = np.flatnonzero(segment.table[CHANNEL] == np.uint64(number))
-            if len(chosen):
+            chosen = select(segment.table, np.uint64(number))
+            if chosen.shape[1]:
                 parts.append(self._decode(number, segment, chosen))
         if len(parts) < 2:
             return parts[0][1] if parts else None
@@ -96,14 +96,14 @@ class Reading:
             first, last = self._tally.spans[kind]
             yield Loss(kind, self._where, count, seconds(first), seconds(last))
 
-    def _decode(self, number: int, segment: Segment, chosen: Stamps) -> tuple[Stamps, Block]:
-        at, size = segment.table[AT][chosen], segment.table[SIZE][chosen]
-        log = segment.table[LOG][chosen].view(np.int64)
+    def _decode(self, number: int, segment: Segment, chosen: Words) -> tuple[Stamps, Block]:
+        places, log = chosen[0].view(np.int64), chosen[1].view(np.int64)
+        at, size = chosen[2], chosen[3]
         if not self.stream.fields:  # messages of any type can be counted
-            return chosen, Block(log, log, np.empty((len(log), 0)))
+            return places, Block(log, log, np.empty((len(log), 0)))
         fresh = number not in self._plans
         if fresh:
-            self._plans[number] = self._plan(number, payloads(segment.buffer, at, size))
+            self._plans[number] = self._plan(number, segment.dictionary, payloads(segment.buffer, at, size))
         plan = self._plans[number]
         decoded = plan.decode(segment.buffer, at, size, log)
         good = decoded.good
@@ -114,7 +114,7 @@ class Reading:
         values, stamp, lacking = decoded.values, decoded.stamp, decoded.lacking
         if not good.all():
             self._tally.add("undecodable", log[~good])
-            chosen, log, lacking = chosen[good], log[good], lacking[good]
+            places, log, lacking = places[good], log[good], lacking[good]
             stamp, values = stamp[good], values[good]
         # A sum is finite only if all of its terms are; the rows are searched only where it is not.
         with np.errstate(all="ignore"):
@@ -122,11 +122,11 @@ class Reading:
         if not finite:
             bad = ~np.isfinite(values).all(axis=1)
             self._tally.add("non-finite", log[bad & ~lacking])
-        return chosen, Block(stamp, log, values)
+        return places, Block(stamp, log, values)
 
-    def _plan(self, number: int, samples: Iterator[bytes]) -> _Plan:
-        kind = type_of(self._container.dictionary, number, samples, self._where)
-        name = self._container.dictionary.schema_of(self._container.dictionary.channels[number]).name
+    def _plan(self, number: int, dictionary: Dictionary, samples: Iterator[bytes]) -> _Plan:
+        kind = type_of(dictionary, number, samples, self._where)
+        name = dictionary.schema_of(dictionary.channels[number]).name
         steps = resolve(self.stream.fields, kind.fields, f"{self._where} ({name})" if name else self._where)
         return _Plan(kind, steps, kind.decoder(steps))
 
