@@ -21,9 +21,9 @@ from engine.trajectories import TRAJECTORIES, Commands
 
 TRUTH_FOLDER = Path(__file__).resolve().parents[1] / "archive" / "truth"
 
-_DAY_NS = 86_400_000_000_000
-_FIRST_DAY_NS = 803_206_800_000_000_000  # 1995-06-15 09:00 UTC
-_RUN_NS = 1_800_000_000_000  # half an hour from run to run
+DAY_NS = 86_400_000_000_000
+FIRST_DAY_NS = 803_206_800_000_000_000  # 1995-06-15 09:00 UTC
+RUN_NS = 1_800_000_000_000  # half an hour from run to run
 
 
 def make(campaign: Campaign, index: int, commands: Commands | None = None) -> Recording:
@@ -34,7 +34,7 @@ def make(campaign: Campaign, index: int, commands: Commands | None = None) -> Re
         hardware.with_values({"bungee": run.bungee, "loop": run.loop or hardware.loop}),
         TRAJECTORIES[run.trajectory]() if commands is None else commands,
         seed=1000 * campaign.seed + index,
-        epoch_ns=_FIRST_DAY_NS + campaign.day * _DAY_NS + index * _RUN_NS,
+        epoch_ns=FIRST_DAY_NS + campaign.day * DAY_NS + index * RUN_NS,
         wrench_hz=run.wrench_hz,
         encoder_hz=run.encoder_hz,
     )
