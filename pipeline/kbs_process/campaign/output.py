@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+import msgspec
 import numpy as np
 
 from kbs_process.campaign.analysis import Analysis
 from kbs_process.campaign.config import Campaign
-from kbs_process.campaign.tables import TableWriter
+from kbs_process.campaign.tables import TableWriter, write_table
+from kbs_process.campaign.transducer import Study
 from kbs_process.ingest import OutStream, write_mcap
 from kbs_process.report import results
 from kbs_process.signals.records import WRENCH_CHANNELS, Signal
@@ -17,13 +19,28 @@ from kbs_process.stages.repeats import commanded
 
 
 def write_results(
-    folder: Path, campaign: Campaign, analyses: Sequence[Analysis], summary: results.Results
+    folder: Path,
+    campaign: Campaign,
+    analyses: Sequence[Analysis],
+    summary: results.Results,
+    on_transducer: Study | None,
 ) -> None:
     """Write results.json, the tables of every stage, and the processed signals as MCAP."""
     for analysis in analyses:
         _tables(TableWriter(folder, analysis.entry.name), analysis)
         _recording(folder / "processed", analysis)
+    if on_transducer is not None:
+        _curves(folder / "tables" / "transducer", on_transducer)
+        summary = msgspec.structs.replace(summary, transducer=on_transducer.findings)
     (folder / "results.json").write_bytes(results.encode(summary))
+
+
+def _curves(folder: Path, found: Study) -> None:
+    name = found.findings.recording
+    for kind, columns, unit in (("gain", found.gains, "1"), ("spectrum", found.spectra, "(N m)^2/Hz")):
+        if columns:
+            units = {column: "Hz" if column == "f" else unit for column in columns}
+            write_table(folder / f"{name}.{kind}.parquet", columns, units, frame="T", recording=name)
 
 
 def _tables(writer: TableWriter, analysis: Analysis) -> None:

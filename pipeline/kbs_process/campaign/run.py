@@ -13,6 +13,7 @@ from kbs_process.campaign.progress import Progress
 from kbs_process.campaign.reading import read_run
 from kbs_process.campaign.store import writing
 from kbs_process.campaign.summary import summarise
+from kbs_process.campaign.transducer import study
 from kbs_process.errors import RecordingError
 from kbs_process.report import build, results
 from kbs_process.signals.records import Run, Signal
@@ -51,8 +52,10 @@ def process(campaign: Campaign, target: Path, *, progress: Progress, pdf: bool |
         with progress.task("Comparing, summing up uncertainties"):
             findings = find(campaign, analyses, model, decoupling)
             summary = summarise(campaign, analyses, model, decoupling, findings)
+        with progress.task("Following the transducer's resonance") as task:
+            on_transducer = study(campaign, analyses, model.rig, task.update)
         with progress.task("Writing the report"):
-            write_results(folder, campaign, analyses, summary)
+            write_results(folder, campaign, analyses, summary, on_transducer)
             page = build.build(folder, pdf)
     return _outcome(summary, target / page.name)
 

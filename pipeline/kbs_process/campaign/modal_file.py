@@ -1,0 +1,110 @@
+"""Modal models as files: TOML, one table a pose and one a mode (schemas/modal.schema.json)."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from pathlib import Path
+
+import numpy as np
+
+from kbs_process.campaign.documents import Document, Tree, check_finite, read
+from kbs_process.campaign.problems import Problems
+from kbs_process.campaign.schema import violations
+from kbs_process.campaign.units import factor
+from kbs_process.errors import did_you_mean
+from kbs_process.plant.modal import ModalModel, ModalTable, tracked
+from kbs_process.signals.records import Array
+
+SIX = ("shape", "participation", "gravity")
+
+
+def read_modal(path: Path, joints: Collection[str]) -> ModalTable:
+    """Read a modal file for a rig with `joints`; poses come out in the order of their angles.
+
+    Raises ConfigError with the file, the key and the remedy.
+    """
+    problems = Problems(subject=str(path))
+    document = read(
+        path, role="the modal file", remedy="correct [model] modal in campaign.toml, or add the file"
+    )
+    check_finite(document, problems)
+    for violation in violations(document.tree, "modal"):
+        problems.add(document.place(violation.key), violation.what, violation.remedy)
+    problems.raise_any()
+    tree = document.tree
+    if tree["joint"] not in joints:
+        problems.add(
+            document.place(("joint",)),
+            f"there is no joint '{tree['joint']}'",
+            did_you_mean(tree["joint"], joints),
+        )
+    _check_poses(document, problems)
+    problems.raise_any()
+    models = sorted((_model(pose) for pose in tree["pose"]), key=lambda model: model.angle)
+    return ModalTable(tree["joint"], tracked(models), tree["source"])
+
+
+def _check_poses(document: Document, problems: Problems) -> None:
+    poses = document.tree["pose"]
+    count = len(poses[0]["mode"])
+    angles: set[float] = set()
+    for index, pose in enumerate(poses):
+        if len(pose["mode"]) != count:
+            problems.add(
+                document.place(("pose", index, "mode")),
+                f"has {len(pose['mode'])} modes, the first pose {count}",
+                "give the same modes at every pose: they are followed from one to the next",
+            )
+        angle = _angle(pose)
+        if angle in angles:
+            problems.add(
+                document.place(("pose", index, "angle")), "is given twice", "delete one of the two poses"
+            )
+        angles.add(angle)
+
+
+def _angle(pose: Tree) -> float:
+    return float(pose["angle"]["value"]) * factor(pose["angle"]["unit"], "rad")
+
+
+def _model(pose: Tree) -> ModalModel:
+    def column(name: str) -> Array:
+        return np.array([float(mode.get(name, 0.0)) for mode in pose["mode"]])
+
+    def six(name: str) -> Array:
+        return np.array([mode.get(name, [0.0] * 6) for mode in pose["mode"]], dtype=float).T
+
+    return ModalModel(
+        angle=_angle(pose),
+        frequency=column("frequency_Hz"),
+        frequency_sigma=column("frequency_sigma_Hz"),
+        damping=column("damping"),
+        damping_sigma=column("damping_sigma"),
+        **{name: six(name) for name in SIX},
+    )
+
+
+def modal_text(table: ModalTable) -> str:
+    """Return a modal file that `read_modal` reads back to the last bit."""
+    lines = [
+        "#:schema modal.schema.json",
+        "# Modes of the article on its transducer, of unit modal mass. shape: motion of the interface (3 x kg^-1/2,",
+        "# 3 x rad kg^-1/2 m^-1); participation: momentum about T's origin for unit modal velocity (3 x kg^1/2,",
+        "# 3 x kg^1/2 m), its squares the effective masses; gravity: change of the weight's wrench. Axes of T.",
+        "schema = 1",
+        f'joint = "{table.joint}"',
+        f'source = "{table.source}"',
+    ]
+    for model in table.models:
+        lines += ["", "[[pose]]", f'angle = {{ value = {model.angle!r}, unit = "rad" }}']
+        for k in range(len(model.frequency)):
+            lines += [
+                "",
+                "[[pose.mode]]",
+                f"frequency_Hz = {float(model.frequency[k])!r}",
+                f"frequency_sigma_Hz = {float(model.frequency_sigma[k])!r}",
+                f"damping = {float(model.damping[k])!r}",
+                f"damping_sigma = {float(model.damping_sigma[k])!r}",
+                *(f"{name} = {[float(value) for value in getattr(model, name)[:, k]]}" for name in SIX),
+            ]
+    return "\n".join(lines) + "\n"
