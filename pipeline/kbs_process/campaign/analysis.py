@@ -14,7 +14,8 @@ from kbs_process.signals.records import WRENCH_CHANNELS, Run, Signal
 from kbs_process.stages import bandpass, gravity
 from kbs_process.stages.bandpass import UNFILTERED, Band
 from kbs_process.stages.condense import CondenseSettings
-from kbs_process.stages.gravity import GravityModel, Static
+from kbs_process.stages.gravity import GravityModel, Sample, Static
+from kbs_process.stages.gravity_quality import Misfit, misfits
 from kbs_process.stages.motion import Motion, estimate
 from kbs_process.stages.to_cog import to_spacecraft
 
@@ -36,6 +37,7 @@ class Analysis:
     run: Run  # decoupled
     motion: Motion
     static: Static  # the fitted static wrench along the motion, with its uncertainty
+    misfits: tuple[Misfit, ...]  # of the static wrench, channel by channel
     residual: Signal  # decoupled less static
     predicted: Run | None
     pairs: Mapping[tuple[str, str], Pair]  # by frame and band
@@ -63,7 +65,9 @@ def analyse(
 ) -> Analysis:
     """Remove gravity from measurement and prediction alike, cut the bands, move them to the spacecraft."""
     wrench = _wrench(run)
-    static = gravity.apply(_at_rest(motion), model, entry.name)
+    sample = Sample(entry.name, motion, wrench)
+    taring = gravity.tare(sample, model)
+    static = gravity.apply(_at_rest(motion), model, taring)
     residual = wrench.derive(
         model.without_coupling(wrench.values - static.wrench.values),
         "fitted static wrench and the fitted rest of the cross-coupling removed",
@@ -77,6 +81,7 @@ def analyse(
         run=run,
         motion=motion,
         static=static,
+        misfits=misfits(sample, model, taring),
         residual=residual,
         predicted=predicted,
         pairs=_pairs(campaign, residual, disturbance),
@@ -93,9 +98,9 @@ def _predict(
     """
     if campaign.drive == "motion":
         moving = gravity.apply(motion, model).wrench
-        return None, moving.derive(
-            moving.values - gravity.apply(_at_rest(motion), model).wrench.values, "inertia"
-        )
+        inertia = moving.values - gravity.apply(_at_rest(motion), model).wrench.values
+        # The measurement's residual had the fitted rest of the cross-coupling undone as well.
+        return None, moving.derive(model.without_coupling(inertia), "inertia")
     settings = CondenseSettings(working_rate_Hz=campaign.bands.working_rate)
     predicted = predict_run(model.rig, campaign.effects, run, settings, update)
     total = _wrench(predicted)

@@ -34,7 +34,9 @@ def _gravity(campaign: Campaign, analyses: Sequence[Analysis]) -> str:
         f"{what} fitted to {', '.join(used)} by maximum a posteriori least squares over masses, centres of gravity, "
         "tilt, misalignments and residual cross-coupling, with the one-sigma values of the parameter files as priors "
         f"and a taring bias for each recording; g = {float(campaign.rig.gravity):g} m/s^2. The static part was "
-        f"subtracted from all recordings, held-out ones included. Angles: {'; '.join(angles)}."
+        "subtracted from all recordings. Held-out ones were not fitted; of each one constant a channel was estimated "
+        "(location under Student's t with 4 degrees of freedom about the spread of the fitted residuals) and "
+        f"subtracted as well. Angles: {'; '.join(angles)}."
     )
 
 

@@ -10,6 +10,7 @@ from kbs_process.campaign.config import Campaign
 from kbs_process.campaign.findings import Findings
 from kbs_process.report import results
 from kbs_process.stages.gravity import GravityModel
+from kbs_process.stages.gravity_quality import Misfit
 from kbs_process.stages.verdict import COVERAGE
 
 # A resonance below this many times a band's edge is next to it: the band then holds part of the resonance's flank.
@@ -33,7 +34,9 @@ def notices(
     """Yield everything worth a notice, worst first."""
     yield from _conventions(conventions)
     yield from _losses(analyses)
+    yield from _static_load(campaign, analyses, model)
     yield from _fit(model)
+    yield from _taring(analyses)
     yield from _repeats(campaign, findings)
     yield from _resonance(findings)
     yield from _predictions(findings)
@@ -73,6 +76,41 @@ def _fit(model: GravityModel) -> Iterable[results.Notice]:
                 what=f"gravity fit, {check.name}: {detail}",
                 remedy="see the gravity fit's table",
             )
+
+
+def _static_load(
+    campaign: Campaign, analyses: Sequence[Analysis], model: GravityModel
+) -> Iterable[results.Notice]:
+    """A recording whose slow part the model leaves: what is judged or compared is then that load."""
+    matter = "the verdict is" if campaign.requirements else "the figures of merit are"
+    for analysis in analyses:
+        large = [misfit for misfit in analysis.misfits if not misfit.ok]
+        if large:
+            worst = max(misfit.ratio for misfit in large)
+            yield results.Notice(
+                severity="warning",
+                what=f"an unmodelled static load: below {model.settings.low_pass_Hz:.2g} Hz gravity leaves up to "
+                f"{worst:.0f} times what its uncertainty explains (rms: {', '.join(map(_left, large))}); {matter} "
+                "about that load rather than the article's own disturbance",
+                where=analysis.entry.name,
+                remedy="look for what pulls on the article and is in no parameter file (a bungee, a cable, a stop, a "
+                "hand): take it off, or judge a recording without it",
+            )
+
+
+def _left(misfit: Misfit) -> str:
+    return f"{misfit.channel} {misfit.left:.2g} against {misfit.explained:.2g} {misfit.unit}"
+
+
+def _taring(analyses: Sequence[Analysis]) -> Iterable[results.Notice]:
+    alone = [analysis.entry.name for analysis in analyses if not analysis.static.taring.fitted]
+    if alone:
+        yield results.Notice(
+            severity="info",
+            what=f"not in the gravity fit, so tared by themselves: {', '.join(alone)}. One constant a channel was "
+            "estimated from each, and nothing else",
+            remedy="constants and their uncertainty are in the gravity fit's table",
+        )
 
 
 def _repeats(campaign: Campaign, findings: Findings) -> Iterable[results.Notice]:

@@ -11,6 +11,7 @@ from kbs_process.campaign.findings import find
 from kbs_process.campaign.output import write_results
 from kbs_process.campaign.progress import Progress
 from kbs_process.campaign.reading import read_run
+from kbs_process.campaign.settings import gravity_settings, motion_settings
 from kbs_process.campaign.store import writing
 from kbs_process.campaign.summary import summarise
 from kbs_process.campaign.transducer import study
@@ -19,8 +20,8 @@ from kbs_process.report import build, results
 from kbs_process.signals.records import Run, Signal
 from kbs_process.stages import decouple, gravity, motion
 from kbs_process.stages.decouple import Decoupling
-from kbs_process.stages.gravity import GravityModel, GravitySettings, Sample
-from kbs_process.stages.motion import Motion, MotionSettings
+from kbs_process.stages.gravity import GravityModel, Sample
+from kbs_process.stages.motion import Motion
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,31 +68,31 @@ def _prepare(
         run = read_run(campaign, entry)
         if run.wrench is None:
             raise RecordingError("there is no wrench in this recording", where=str(entry.path))
-        settings = MotionSettings(band_Hz=max(campaign.bands.low_pass))
         return Prepared(
-            entry, run.wrench, decouple.apply(run, decoupling), motion.estimate(run, campaign.rig, settings)
+            entry,
+            run.wrench,
+            decouple.apply(run, decoupling),
+            motion.estimate(run, campaign.rig, motion_settings(campaign)),
         )
 
 
 def _fit_gravity(campaign: Campaign, prepared: list[Prepared], progress: Progress) -> GravityModel:
     """Fit over calibration and fit recordings; held-out ones are not looked at.
 
-    A rig that is driven by its motion has its inertia fitted too, up to the widest band; its commands, if any, drive
-    nothing.
+    A rig that is driven by its motion has its inertia fitted too; its commands, if any, drive nothing.
     """
-    moving = campaign.drive == "motion"
-    settings = (
-        GravitySettings(low_pass_Hz=max(campaign.bands.low_pass), response=True)
-        if moving
-        else GravitySettings()
-    )
     with progress.task("Fitting gravity and centres of gravity"):
         samples = [
             Sample(one.entry.name, one.motion, one.run.wrench, calibration=one.entry.role == "calibration")
             for one in prepared
             if one.entry.role != "held-out" and one.run.wrench is not None
         ]
-        return gravity.fit(samples, campaign.rig, include_inertia=moving, settings=settings)
+        return gravity.fit(
+            samples,
+            campaign.rig,
+            include_inertia=campaign.drive == "motion",
+            settings=gravity_settings(campaign),
+        )
 
 
 def _analyse(campaign: Campaign, one: Prepared, model: GravityModel, progress: Progress) -> Analysis:

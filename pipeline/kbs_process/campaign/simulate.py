@@ -14,11 +14,12 @@ from kbs_process.campaign.predicting import schedule_of
 from kbs_process.campaign.prediction_files import write_prediction
 from kbs_process.campaign.progress import Progress
 from kbs_process.campaign.reading import read_run
+from kbs_process.campaign.settings import motion_settings
 from kbs_process.errors import ConfigError, did_you_mean
 from kbs_process.plant.predict import Schedule, predict
 from kbs_process.plant.rigid import inverse_dynamics
 from kbs_process.signals.records import Block, Run
-from kbs_process.stages.motion import MotionSettings, estimate
+from kbs_process.stages.motion import estimate
 
 
 def simulate_commands(
@@ -74,7 +75,7 @@ def predict_recording(campaign: Campaign, recording: str, target: Path, *, progr
 
 def _motion_driven(campaign: Campaign, run: Run) -> Iterable[tuple[str, Block]]:
     """Yield the rigid-body wrench of the measured motion, at the working rate."""
-    motion = estimate(run, campaign.rig, MotionSettings(band_Hz=campaign.bands.low_pass[-1]))
+    motion = estimate(run, campaign.rig, motion_settings(campaign))
     stamp = np.rint((motion.t0 + motion.dt * np.arange(len(motion))) * 1e9).astype(np.int64)
     wrench = inverse_dynamics(campaign.rig, motion.q, motion.qd, motion.qdd)
     yield "wrench", Block(stamp, stamp, wrench)

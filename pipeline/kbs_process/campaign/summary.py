@@ -17,7 +17,8 @@ from kbs_process.report import results
 from kbs_process.signals.records import WRENCH_CHANNELS, Signal
 from kbs_process.stages.conventions import SignCheck, check_encoder_sense, check_gravity_sign, check_weight
 from kbs_process.stages.decouple import Decoupling
-from kbs_process.stages.gravity import GravityModel, feasibility
+from kbs_process.stages.gravity import GravityModel, taring_error
+from kbs_process.stages.gravity_quality import feasibility
 from kbs_process.stages.repeats import commanded
 from kbs_process.stages.to_cog import ASSUMPTION
 from kbs_process.stages.verdict import COVERAGE
@@ -161,7 +162,28 @@ def _gravity(campaign: Campaign, analyses: Sequence[Analysis], model: GravityMod
         samples=fit.dof + len(fit.value),
         reduced_chi_square=fit.residual_rms**2,
         feasible=_feasible(campaign, model),
+        recordings=tuple(_static_recording(analysis, model) for analysis in analyses),
+        low_pass_Hz=model.settings.low_pass_Hz,
     )
+
+
+def _static_recording(analysis: Analysis, model: GravityModel) -> results.StaticRecording:
+    taring = analysis.static.taring
+    channels = tuple(
+        results.StaticChannel(
+            channel=misfit.channel,
+            unit=misfit.unit,
+            constant=float(constant),
+            sigma=float(sigma),
+            left=misfit.left,
+            explained=misfit.explained,
+            ok=misfit.ok,
+        )
+        for misfit, constant, sigma in zip(
+            analysis.misfits, taring.bias, taring_error(model, taring), strict=True
+        )
+    )
+    return results.StaticRecording(recording=analysis.entry.name, fitted=taring.fitted, channels=channels)
 
 
 def _gravity_channel(analyses: Sequence[Analysis], index: int) -> results.GravityChannel:

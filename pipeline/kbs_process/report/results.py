@@ -139,6 +139,26 @@ class GravityChannel(Record, frozen=True, kw_only=True):
     model_sigma: float | None = None  # of the static wrench, from the fitted parameters' covariance
 
 
+class StaticChannel(Record, frozen=True, kw_only=True):
+    """A channel of one recording: its taring, and what the model leaves next to what its uncertainty explains."""
+
+    channel: str
+    unit: str
+    constant: float
+    sigma: float
+    left: float  # rms below the fit's low-pass
+    explained: float
+    ok: bool
+
+
+class StaticRecording(Record, frozen=True, kw_only=True):
+    """How one recording was tared, and how well the gravity model describes it."""
+
+    recording: str
+    fitted: bool  # the constants are the fit's; else they were estimated with the model held
+    channels: tuple[StaticChannel, ...]
+
+
 class Gravity(Record, frozen=True, kw_only=True):
     """The gravity (and where identified, inertia) fit."""
 
@@ -148,6 +168,8 @@ class Gravity(Record, frozen=True, kw_only=True):
     samples: int = 0
     reduced_chi_square: float | None = None
     feasible: str = ""  # a sentence: is computed gravity compensation feasible?
+    recordings: tuple[StaticRecording, ...] = ()
+    low_pass_Hz: float | None = None  # below which the model was fitted
 
 
 class Contribution(Record, frozen=True, kw_only=True):

@@ -11,18 +11,25 @@ counts for what it is worth.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from kbs_process.errors import FitError
-from kbs_process.estimation.fit import Fit, Parameters, combination, fit_map
-from kbs_process.estimation.longrun import variance_inflation
+from kbs_process.estimation.fit import Fit
 from kbs_process.rig.model import Rig
-from kbs_process.signals.records import WRENCH_CHANNELS, WRENCH_UNITS, Array, Signal
+from kbs_process.signals.records import WRENCH_UNITS, Array, Signal
 from kbs_process.stages.gravity_equation import Equation, Prepared, at_rest, prepare
 from kbs_process.stages.gravity_parameters import Index
+from kbs_process.stages.gravity_solve import (
+    first_sigma,
+    least_sigma,
+    refuse_uninformed,
+    residual_sigma,
+    solve,
+)
+from kbs_process.stages.gravity_taring import Taring, estimate, of_fit
 from kbs_process.stages.motion import Motion
 
 _ROUNDS = 3  # of weights
@@ -43,9 +50,14 @@ class Sample:
 
 @dataclass(frozen=True, slots=True)
 class GravitySettings:
-    """`response` adds a delay and the rig's own resonance, seen from below, to a motion-driven rig."""
+    """`response` adds a delay and the rig's own resonance, seen from below, to a motion-driven rig.
+
+    Recordings that are not fitted are tared below `taring_Hz`: a load that comes and goes, such as pushes of a hand,
+    has to do so within that band to be told from a bias.
+    """
 
     low_pass_Hz: float = 1.0
+    taring_Hz: float = 2.0
     cross_coupling: bool = True
     response: bool = False
     delay_sigma: float = 0.02  # s
@@ -59,13 +71,26 @@ class GravityModel:
     rig: Rig
     fit: Fit
     equation: Equation
-    bias: dict[str, Array]  # (c,) of each recording, N and N m
+    settings: GravitySettings
+    taring: dict[str, Taring]  # of each fitted recording
+    reference: tuple[str, ...]  # recordings fitted first: the calibrations, or all where there is none
     residual_rms: dict[str, Array]  # (c,) of each recording, low-passed
+    taring_spread: Array  # (c,) rms of what the model leaves of them below `taring_Hz`, N and N m
     encoder_error: dict[str, Array]  # (c,) rms of (dW/dq sigma_q) over each recording
 
     @property
     def channels(self) -> tuple[str, ...]:
         return self.equation.channels
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        return tuple(WRENCH_UNITS[index] for index in self.equation.index)
+
+    @property
+    def unexplained(self) -> Array:
+        """What the model leaves (c,) of the recordings fitted first, below the fit's low-pass, rms, N and N m."""
+        mean: Array = np.sqrt(np.mean([self.residual_rms[name] ** 2 for name in self.reference], axis=0))
+        return mean
 
     def without_coupling(self, residual: Array) -> Array:
         """Undo the fitted rest of the cross-coupling on a residual (n, c): (I + dX)^-1."""
@@ -82,21 +107,12 @@ class Static:
     wrench: Signal
     sigma_parameters: Array
     sigma_encoder: Array
+    taring: Taring
 
     @property
     def sigma(self) -> Array:
         total: Array = np.hypot(self.sigma_parameters, self.sigma_encoder)
         return total
-
-
-@dataclass(frozen=True, slots=True)
-class Feasibility:
-    """Whether a channel's gravity can be computed well enough: its error next to what is sought."""
-
-    channel: str
-    error: float  # rms of the residual and of the encoder's error, N or N m
-    limit: float
-    ratio: float
 
 
 def fit(
@@ -113,13 +129,6 @@ def fit(
     Raises FitError where nothing moves, or where the data say nothing that the priors did not.
     """
     _refuse_no_motion(samples, rig)
-    prepared = [
-        prepare(s.name, s.motion, s.wrench, settings.low_pass_Hz, with_neighbours=settings.response)
-        for s in samples
-    ]
-    if not include_inertia:
-        prepared = [at_rest(p, rig) for p in prepared]
-    first = [p for p, s in zip(prepared, samples, strict=True) if s.calibration] or prepared
     equation = Equation.of(
         rig,
         include_inertia=include_inertia,
@@ -128,78 +137,126 @@ def fit(
         if settings.response
         else None,
     )
+    data = [prepared(sample, equation, settings, settings.low_pass_Hz) for sample in samples]
+    first = [p for p, s in zip(data, samples, strict=True) if s.calibration] or data
     theta = equation.start()
-    sigmas = [_first_sigma(p, rig) for p in first]
-    for used in [first] + [prepared] * _ROUNDS:
+    sigmas = [first_sigma(p, rig) for p in first]
+    for used in [first] + [data] * _ROUNDS:
         if len(sigmas) != len(used):
-            sigmas = [_sigma(equation, theta, p, rig) for p in used]
-        result = _fit_once(equation, used, sigmas, theta)
+            sigmas = [residual_sigma(equation, theta, p, rig) for p in used]
+        weighed = sigmas
+        result = solve(equation, used, sigmas, theta)
         theta = result.value[: equation.size]
-        sigmas = [_sigma(equation, theta, p, rig) for p in used]
-    _refuse_uninformed(equation, prepared, sigmas, theta)
-    biases = result.value[equation.size :].reshape(len(prepared), -1)
+        sigmas = [residual_sigma(equation, theta, p, rig) for p in used]
+    refuse_uninformed(equation, data, sigmas, theta)
+    biases = result.value[equation.size :].reshape(len(data), -1)
+    taring = {
+        p.name: of_fit(equation, theta, p, bias, sigma)
+        for p, bias, sigma in zip(data, biases, weighed, strict=True)
+    }
     return GravityModel(
         rig=equation.rig_at(theta, result.sigma[: equation.size]),
         fit=result,
         equation=equation,
-        bias={p.name: bias for p, bias in zip(prepared, biases, strict=True)},
+        settings=settings,
+        taring=taring,
+        reference=tuple(p.name for p in first),
         residual_rms={
             p.name: np.sqrt(np.mean((p.wrench - equation.predict(theta, p) - bias) ** 2, axis=0))
-            for p, bias in zip(prepared, biases, strict=True)
+            for p, bias in zip(data, biases, strict=True)
         },
-        encoder_error={
-            p.name: np.sqrt(np.mean(equation.encoder_error(theta, p) ** 2, axis=0)) for p in prepared
-        },
+        taring_spread=_spread(samples, equation, settings, theta, list(biases)),
+        encoder_error={p.name: np.sqrt(np.mean(equation.encoder_error(theta, p) ** 2, axis=0)) for p in data},
     )
 
 
-def apply(motion: Motion, model: GravityModel, recording: str | None = None) -> Static:
-    """The wrench to be subtracted from a decoupled recording, its taring bias included.
+def _spread(
+    samples: Sequence[Sample],
+    equation: Equation,
+    settings: GravitySettings,
+    theta: Array,
+    biases: Sequence[Array],
+) -> Array:
+    """Rms (c,) of what the model leaves of all samples below `taring_Hz`, each weighing the same."""
+    powers = []
+    for sample, bias in zip(samples, biases, strict=True):
+        p = prepared(sample, equation, settings, settings.taring_Hz)
+        powers.append(np.mean((p.wrench - equation.predict(theta, p) - bias) ** 2, axis=0))
+    spread: Array = np.sqrt(np.mean(powers, axis=0))
+    return spread
 
-    A recording that was not fitted gets the mean of the fitted biases and, in its sigma, the prior's spread of a
-    taring bias. Errors are first order in the parameters' covariance and in `motion.sigma_q`.
+
+def prepared(sample: Sample, equation: Equation, settings: GravitySettings, low_pass_Hz: float) -> Prepared:
+    """The instants of a recording that the equation is compared with; see `at_rest` for a model without inertia."""
+    data = prepare(sample.name, sample.motion, sample.wrench, low_pass_Hz, with_neighbours=settings.response)
+    return data if equation.include_inertia else at_rest(data, equation.elements.rig)
+
+
+def tare(sample: Sample, model: GravityModel) -> Taring:
+    """The recording's constant: the fit's own where it was fitted, else estimated with the model held."""
+    if sample.name in model.taring:
+        return model.taring[sample.name]
+    equation = model.equation
+    data = prepared(sample, equation, model.settings, model.settings.taring_Hz)
+    spread = np.maximum(model.taring_spread, least_sigma(data, model.rig))
+    return estimate(equation, model.fit.value[: equation.size], data, spread)
+
+
+def apply(motion: Motion, model: GravityModel, taring: Taring | None = None) -> Static:
+    """The wrench to be subtracted from a decoupled recording, its taring included where given.
+
+    Errors are first order in the parameters' covariance, with the taring's share in it, and in `motion.sigma_q`.
     """
     equation, c = model.equation, len(model.channels)
     theta = model.fit.value[: equation.size]
-    known = recording in model.bias
-    bias = model.bias[recording] if recording in model.bias else np.mean(list(model.bias.values()), axis=0)
-    prepared = _from_motion(motion, equation)
+    taring = taring or Taring.none(c, equation.size)
+    whole = _from_motion(motion, equation)
     values = np.empty((len(motion), c))
     for start in range(0, len(motion), _CHUNK):
         rows = slice(start, min(start + _CHUNK, len(motion)))
-        values[rows] = equation.predict(theta, prepared.rows(rows)) + bias
+        values[rows] = equation.predict(theta, whole.rows(rows)) + taring.bias
     count = min(len(motion), _ERROR_POINTS)
     at = np.arange(count, dtype=np.intp) * (len(motion) - 1) // max(count - 1, 1)
-    sparse = prepared.rows(at)
-    J = equation.jacobian(theta, sparse).reshape(len(at), c, equation.size)
-    columns = list(range(equation.size))
-    spread = np.zeros(c)
-    if known:
-        position = equation.size + c * list(model.bias).index(str(recording))
-        columns += range(position, position + c)
-        J = np.concatenate([J, np.broadcast_to(np.eye(c), (len(at), c, c))], axis=2)
-    else:
-        spread = equation.bias_sigma
-    C = model.fit.covariance[np.ix_(columns, columns)]
-    parameters = np.sqrt(np.einsum("nci,ij,ncj->nc", J, C, J) + spread**2)
+    sparse = whole.rows(at)
+    parameters = error_of(model, sparse, taring)
     encoder = equation.encoder_error(theta, sparse)
     t = np.arange(len(motion))
-    inertia = "rigid-body wrench" if equation.include_inertia else "static wrench"
+    kind = "rigid-body wrench" if equation.include_inertia else "static wrench"
     wrench = Signal(
         t0=motion.t0,
         dt=motion.dt,
         values=values,
         channels=model.channels,
-        units=tuple(WRENCH_UNITS[WRENCH_CHANNELS.index(channel)] for channel in model.channels),
+        units=model.units,
         frame="T",
         valid=motion.valid,
-        history=(*motion.history, f"{inertia} of the fitted gravity model"),
+        history=(*motion.history, f"{kind} of the fitted gravity model"),
     )
     return Static(
         wrench,
         np.stack([np.interp(t, at, column) for column in parameters.T], axis=1),
         np.stack([np.interp(t, at, column) for column in encoder.T], axis=1),
+        taring,
     )
+
+
+def error_of(model: GravityModel, data: Prepared, taring: Taring) -> Array:
+    """Standard deviation (n, c) of the modelled wrench, the recording's constant included, at its instants."""
+    equation = model.equation
+    theta = model.fit.value[: equation.size]
+    J = equation.jacobian(theta, data).reshape(len(data.q), len(equation.channels), equation.size)
+    J = J + taring.slope
+    C = model.fit.covariance[: equation.size, : equation.size]
+    error: Array = np.sqrt(np.maximum(np.einsum("nci,ij,ncj->nc", J, C, J), 0.0) + taring.noise**2)
+    return error
+
+
+def taring_error(model: GravityModel, taring: Taring) -> Array:
+    """Standard deviation (c,) of a recording's constant, N and N m."""
+    size = model.equation.size
+    variance = np.einsum("ci,ij,cj->c", taring.slope, model.fit.covariance[:size, :size], taring.slope)
+    error: Array = np.sqrt(np.maximum(variance, 0.0) + taring.noise**2)
+    return error
 
 
 def derivatives(motion: Motion, model: GravityModel, at: Index) -> Array:
@@ -214,19 +271,6 @@ def angle_slopes(motion: Motion, model: GravityModel, at: Index) -> Array:
     """Derivatives (m, c, joints) of the modelled wrench by the joints' angles, at samples `at` (m,)."""
     equation = model.equation
     return equation.angle_slopes(model.fit.value[: equation.size], _from_motion(motion, equation).rows(at))
-
-
-def feasibility(model: GravityModel, limits: Mapping[str, float]) -> tuple[Feasibility, ...]:
-    """Error of the computed compensation for each channel with a limit: worst recording, residual and encoder."""
-    statements = []
-    for index, channel in enumerate(model.channels):
-        if channel in limits:
-            error = max(
-                float(np.hypot(model.residual_rms[name][index], model.encoder_error[name][index]))
-                for name in model.bias
-            )
-            statements.append(Feasibility(channel, error, limits[channel], error / limits[channel]))
-    return tuple(statements)
 
 
 def _from_motion(motion: Motion, equation: Equation) -> Prepared:
@@ -246,75 +290,6 @@ def _from_motion(motion: Motion, equation: Equation) -> Prepared:
     )
 
 
-def _fit_once(equation: Equation, prepared: Sequence[Prepared], sigmas: Sequence[Array], theta: Array) -> Fit:
-    c, k = len(equation.channels), len(prepared)
-
-    def residual(full: Array) -> Array:
-        biases = full[equation.size :].reshape(k, c)
-        parts = [
-            (equation.predict(full[: equation.size], p) + bias - p.wrench) / sigma
-            for p, bias, sigma in zip(prepared, biases, sigmas, strict=True)
-        ]
-        return np.concatenate([part.ravel() for part in parts])
-
-    def jacobian(full: Array) -> Array:
-        blocks = []
-        for index, (p, sigma) in enumerate(zip(prepared, sigmas, strict=True)):
-            block = np.zeros((len(p.q), c, len(full)))
-            block[:, :, : equation.size] = equation.jacobian(full[: equation.size], p).reshape(
-                len(p.q), c, -1
-            )
-            at = equation.size + c * index
-            block[:, :, at : at + c] = np.eye(c)
-            blocks.append((block / sigma[:, None]).reshape(len(p.q) * c, -1))
-        return np.concatenate(blocks)
-
-    bias_names = tuple(f"bias[{p.name}].{channel}" for p in prepared for channel in equation.channels)
-    prior = equation.start()
-    zero = np.zeros(k * c)
-    parameters = Parameters(
-        names=equation.names + bias_names,
-        value=np.concatenate([prior, zero]),
-        sigma=np.concatenate([equation.sigma(), np.tile(equation.bias_sigma, k)]),
-        lower=np.concatenate([equation.lower(), np.full(k * c, -np.inf)]),
-    )
-    first_bias = [np.mean(p.wrench - equation.predict(theta, p), axis=0) for p in prepared]
-    return fit_map(
-        residual,
-        parameters,
-        jacobian=jacobian,
-        series=[(len(p.q), c) for p in prepared],
-        start=np.concatenate([theta, *first_bias]),
-    )
-
-
-def _first_sigma(p: Prepared, rig: Rig) -> Array:
-    """Before there is a residual: a hundredth of the range that the channel shows, the sensor's noise at least.
-
-    Channels that hold nothing but noise would bend all parameters to it otherwise, far from where the equation is
-    nearly linear.
-    """
-    sigma: Array = np.maximum(0.01 * np.ptp(p.wrench, axis=0), 10.0 * _least_sigma(p, rig))
-    return sigma
-
-
-def _sigma(equation: Equation, theta: Array, p: Prepared, rig: Rig) -> Array:
-    """Standard deviation (c,) of white noise that would leave the parameters as uncertain as this residual."""
-    residual = p.wrench - equation.predict(theta, p)
-    residual = residual - residual.mean(axis=0)
-    coloured = np.sqrt(np.mean(residual**2, axis=0) * variance_inflation(residual))
-    sigma: Array = np.maximum(coloured, _least_sigma(p, rig))
-    return sigma
-
-
-def _least_sigma(p: Prepared, rig: Rig) -> Array:
-    index = [WRENCH_CHANNELS.index(channel) for channel in rig.transducer.channels]
-    floor: Array = np.maximum(
-        0.1 * rig.transducer.noise.value[index], 1e-9 * (1.0 + np.ptp(p.wrench, axis=0))
-    )
-    return floor
-
-
 def _refuse_no_motion(samples: Sequence[Sample], rig: Rig) -> None:
     if not samples:
         raise FitError(
@@ -331,21 +306,3 @@ def _refuse_no_motion(samples: Sequence[Sample], rig: Rig) -> None:
         "cannot be told apart from the transducer's bias",
         remedy="add a recording that turns the joints, such as a pseudo-static calibration",
     )
-
-
-def _refuse_uninformed(
-    equation: Equation, prepared: Sequence[Prepared], sigmas: Sequence[Array], theta: Array
-) -> None:
-    """Refuse data whose strongest message about the rig, bias aside, is weaker than the prior."""
-    blocks = []
-    for p, sigma in zip(prepared, sigmas, strict=True):
-        J = equation.jacobian(theta, p).reshape(len(p.q), len(equation.channels), -1)
-        blocks.append(((J - J.mean(axis=0)) / sigma[:, None]).reshape(-1, equation.size))
-    _, s, Vt = np.linalg.svd(np.concatenate(blocks) * equation.sigma(), full_matrices=False)
-    if s[0] < 1.0:
-        direction = combination(Vt[0], equation.names)
-        raise FitError(
-            "the recordings say less about the rig than its parameter files do; the best that they hold, "
-            f"{direction} (in prior sigmas), cannot be told apart from the transducer's bias",
-            remedy="add a recording that turns the joints further",
-        )

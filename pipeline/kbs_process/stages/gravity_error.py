@@ -8,23 +8,35 @@ from kbs_process.signals.records import Array
 from kbs_process.stages.budget import Entry, Filter, from_shapes
 from kbs_process.stages.gravity import GravityModel, Static, angle_slopes, derivatives
 from kbs_process.stages.gravity_parameters import Index
+from kbs_process.stages.gravity_taring import Taring
 from kbs_process.stages.motion import Motion
 
 _POINTS = 1000  # of a recording at which the shapes are computed, linear in between
 _NEGLIGIBLE = 1e-6  # part of the greatest eigenvalue from which a direction is left out
 
 
-def entries(motion: Motion, static: Static, model: GravityModel, band: Filter) -> tuple[Entry, Entry]:
+def entries(motion: Motion, static: Static, model: GravityModel, band: Filter) -> tuple[Entry, Entry, Entry]:
     """Budget entries of the fitted parameters' covariance and of the angles' error, within a band.
 
     The static wrench errs by J L z with J its derivatives along the motion, L L^T the parameters' covariance and z
     independent of unit variance: every column of J L is one error with its own history, and is filtered as the
-    signal is. Constant errors are the taring bias's and vanish in a band without zero frequency. The angles' error
-    goes the same way, (dW/dq) times the histories of the encoders' rounding; what the angles' source misses of the
-    real motion counts in full, wherever in the band it lies.
+    signal is. The recording's own constant takes up the mean of these errors (`Taring.slope`); what its noise leaves
+    is constant, and vanishes in a band without zero frequency. The angles' error goes the same way, (dW/dq) times the
+    histories of the encoders' rounding; what the angles' source misses of the real motion counts in full, wherever in
+    the band it lies.
     """
-    shapes = [static.wrench.derive(shape, "error of the gravity model") for shape in _shapes(motion, model)]
+    shapes = [
+        static.wrench.derive(shape, "error of the gravity model")
+        for shape in _shapes(motion, model, static.taring)
+    ]
     parameters = from_shapes("gravity", "covariance of the fitted parameters", shapes, band)
+    constant = np.broadcast_to(static.taring.noise, static.wrench.values.shape)
+    tared = from_shapes(
+        "gravity",
+        "taring: a constant to each recording",
+        [static.wrench.derive(constant.copy(), "error of the taring")],
+        band,
+    )
     slope = _slope(motion, model)
     rounding = [
         static.wrench.derive(
@@ -35,9 +47,8 @@ def entries(motion: Motion, static: Static, model: GravityModel, band: Filter) -
     ]
     rounded = from_shapes("gravity", "", rounding, band).sigma
     missed = np.sqrt(np.mean((slope * motion.missed) ** 2, axis=0).sum(axis=1))
-    return parameters, Entry(
-        "gravity", "angles: encoder rounding and missed motion", np.hypot(rounded, missed)
-    )
+    angles = Entry("gravity", "angles: encoder rounding and missed motion", np.hypot(rounded, missed))
+    return parameters, tared, angles
 
 
 def _slope(motion: Motion, model: GravityModel) -> Array:
@@ -53,11 +64,11 @@ def _sparse(motion: Motion) -> Index:
     return np.unique(np.linspace(0, len(motion) - 1, min(len(motion), _POINTS)).astype(np.int64))
 
 
-def _shapes(motion: Motion, model: GravityModel) -> list[Array]:
+def _shapes(motion: Motion, model: GravityModel, taring: Taring) -> list[Array]:
     """One-sigma error histories (n, c) of independent directions of the rig's fitted parameters."""
     at = _sparse(motion)
     size = model.equation.size
-    J = derivatives(motion, model, at)
+    J = derivatives(motion, model, at) + taring.slope
     variance, directions = np.linalg.eigh(model.fit.covariance[:size, :size])
     t = np.arange(len(motion))
     return [

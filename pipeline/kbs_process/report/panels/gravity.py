@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from kbs_process.report.figures import bars
 from kbs_process.report.panel import Block, Caption, Cell, Figure, Grid, Panel, Text
-from kbs_process.report.results import Gravity, Results
+from kbs_process.report.results import Gravity, Results, StaticChannel
 from kbs_process.report.tables import Tables
 from kbs_process.report.text import count, measure, number, unit
 
@@ -36,6 +36,8 @@ def panel(results: Results, tables: Tables) -> Panel:
         picture = bars.shifts(gravity.parameters, alt)
         blocks.append(Figure("Fitted parameters against their priors", (picture,), _CAPTION))
     blocks.append(_channels(gravity))
+    if gravity.recordings:
+        blocks.extend((_taring(gravity), _left(gravity)))
     if gravity.checks:
         rows = tuple(
             (entry.name, Cell("ok" if entry.ok else "not met", "pass" if entry.ok else "fail"), entry.detail)
@@ -78,3 +80,41 @@ def _channels(gravity: Gravity) -> Grid:
     head = ("Channel", "Static peak", "Residual rms", "σ from angles", "σ from the fit", "Unit")
     note = "σ from angles: encoder noise and quantisation times the static wrench's slope over the angle."
     return Grid("Static wrench and what is left of it", head, rows, "lrrrrl", note)
+
+
+def _taring(gravity: Gravity) -> Grid:
+    rows = tuple(
+        (
+            entry.recording,
+            "the fit" if entry.fitted else "itself",
+            *(measure(channel.constant, channel.sigma) for channel in entry.channels),
+        )
+        for entry in gravity.recordings
+    )
+    head = ("Recording", "Tared by", *map(_named, gravity.recordings[0].channels))
+    note = (
+        "The constant that the transducer added to each recording, taken away with the static wrench. A recording that "
+        "was not fitted is tared by itself: these constants are all that was estimated from it."
+    )
+    return Grid("Taring", head, rows, "kk" + "r" * len(gravity.recordings[0].channels), note)
+
+
+def _left(gravity: Gravity) -> Grid:
+    rows = tuple((entry.recording, *map(_ratio, entry.channels)) for entry in gravity.recordings)
+    head = ("Recording", *map(_named, gravity.recordings[0].channels))
+    below = "" if gravity.low_pass_Hz is None else f" below {number(gravity.low_pass_Hz, 2)} Hz"
+    note = (
+        "Rms of what the model leaves, over what the model's and the angles' uncertainty and the fitted pseudo-static "
+        "recordings' own residual explain. Marked: a load that no parameter file describes."
+    )
+    title = f"What is left of each recording{below}, over what may be left"
+    return Grid(title, head, rows, "k" + "r" * len(gravity.recordings[0].channels), note)
+
+
+def _ratio(channel: StaticChannel) -> str | Cell:
+    text = f"{number(channel.left, 2)} / {number(channel.explained, 2)}"
+    return text if channel.ok else Cell(text, "undecided")
+
+
+def _named(channel: StaticChannel) -> str:
+    return f"{channel.channel} / {unit(channel.unit)}"

@@ -1,0 +1,34 @@
+"""A bungee that no parameter file describes, in an archived campaign: told at the top of the report, by its factor."""
+
+from __future__ import annotations
+
+import shutil
+
+from engine.campaigns import CAMPAIGNS_FOLDER
+from kbs_process.campaign import run
+from kbs_process.campaign.load import load_campaign
+from kbs_process.campaign.progress import SilentProgress
+from real.campaigns import Processed
+
+
+def _warnings(name, folder, monkeypatch):
+    monkeypatch.setattr(run.build, "build", lambda results, pdf: results / "index.html")  # pages take longest
+    run.process(load_campaign(CAMPAIGNS_FOLDER / name), folder / name, progress=SilentProgress(), pdf=False)
+    found = Processed(CAMPAIGNS_FOLDER / name, folder / name).results.warnings
+    shutil.rmtree(folder / name)
+    return [notice for notice in found if "unmodelled static load" in notice.what]
+
+
+def test_recordings_with_a_bungee_are_named_with_channels_and_a_remedy(tmp_path, monkeypatch):
+    told = _warnings("AL012M00", tmp_path, monkeypatch)
+    assert [notice.where for notice in told] == ["AL012M00_1", "AL012M00_2"]
+    assert {notice.severity for notice in told} == {"warning"}
+    for notice in told:
+        assert "Tx" in notice.what
+        assert "Ty" in notice.what
+        assert "the verdict is about that load" in notice.what
+        assert "bungee" in notice.remedy
+
+
+def test_recordings_that_gravity_describes_are_not(tmp_path, monkeypatch):
+    assert _warnings("EL089", tmp_path, monkeypatch) == []
