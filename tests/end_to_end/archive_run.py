@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import json
 import os
 import subprocess
@@ -21,10 +20,8 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from engine.campaigns import CAMPAIGNS_FOLDER
-from kbs_process.ingest import Stream, open_recording
 
 Array = NDArray[np.float64]
-WRENCH = tuple(f"wrench.{part}.{axis}" for part in ("force", "torque") for axis in "xyz")
 TESTS = Path(__file__).resolve().parents[1]
 
 
@@ -45,39 +42,18 @@ class Processed:
         table = pq.read_table(self.folder / "tables" / f"{name}.parquet")
         return {column: table[column].to_numpy() for column in table.column_names}
 
-    def wrench(self, recording: str, topic: str) -> tuple[NDArray[np.int64], Array]:
-        """Stamps (n,) in ns and wrench (n, 6) of a topic of the processed recording."""
-        source = open_recording(self.folder / "processed" / f"{recording}.mcap")
-        blocks = [block for _, block in source.read([Stream("wrench", topic, WRENCH)])]
-        return (
-            np.concatenate([block.stamp for block in blocks]),
-            np.concatenate([block.values for block in blocks]),
-        )
 
-
-def processed(name: str, root: Path, *, page: bool = False) -> Processed:
-    """Process an archived campaign into `root`/NAME, unless that was done before, here or by another worker."""
+def processed(name: str, root: Path) -> Processed:
+    """Process an archived campaign into `root`/NAME, unless that was done before; warnings are errors."""
     target = root / name
-    with (root / f"{name}.lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        if not (target / "results.json").exists():
-            run_alone(target, name, page=page)
+    if not (target / "results.json").exists():
+        subprocess.run(
+            [sys.executable, "-W", "error", "-m", "end_to_end.archive_run", f"{target}", name],
+            cwd=TESTS,
+            env=os.environ | {"OPENBLAS_NUM_THREADS": "1"},
+            check=True,
+        )
     return Processed(name, target)
-
-
-def run_alone(target: Path, name: str, *, page: bool, **environment: str) -> None:
-    """Process a campaign in another process, as the command line does, warnings being errors."""
-    words = (
-        ["kbs_process.cli", f"{CAMPAIGNS_FOLDER / name}", "--output", f"{target}", "--no-pdf", "--quiet"]
-        if page
-        else ["end_to_end.archive_run", f"{target}", name]
-    )
-    subprocess.run(
-        [sys.executable, "-W", "error", "-m", *words],
-        cwd=TESTS,
-        env=os.environ | {"OPENBLAS_NUM_THREADS": "1"} | environment,
-        check=True,
-    )
 
 
 def main() -> None:

@@ -1,4 +1,4 @@
-"""Fitted gravity parameters of archived campaigns against what was drawn for them: are the stated sigmas honest?
+"""Archived campaigns against what was drawn for them: are the stated sigmas, and the budget, honest?
 
 pytest tests/end_to_end -s        # prints the figures
 """
@@ -14,6 +14,9 @@ import pytest
 from end_to_end.archive_run import processed
 from end_to_end.truth import Truth
 from engine.hardware import Array
+from kbs_process.signals.records import WRENCH_CHANNELS, WRENCH_UNITS, Signal
+from kbs_process.stages import bandpass
+from kbs_process.stages.bandpass import Band
 
 # Elevation alone, azimuth alone, both, a stop, and a hand-over. A cord that no model contains hangs in the others.
 NAMES = ("EL089", "AZPS_ATA", "AESTPP00", "ACQ600")
@@ -35,8 +38,12 @@ class Fitted:
 
 
 @pytest.fixture(scope="module")
-def fitted(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Fitted]:
-    root = tmp_path_factory.mktemp("archive")
+def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("archive")
+
+
+@pytest.fixture(scope="module")
+def fitted(root: Path) -> dict[str, Fitted]:
     return {name: _fitted(name, root) for name in NAMES}
 
 
@@ -79,6 +86,29 @@ def test_centre_of_gravity_of_the_antenna(fitted: dict[str, Fitted]) -> None:
         )
         assert abs(one.z[at]) < 3
         assert one.sigma[at] < 0.6 * one.prior_sigma[at]
+
+
+@pytest.mark.parametrize(("name", "edge"), [("lt1Hz", 1.0), ("lt2Hz", 2.0)])
+def test_error_in_the_band_is_what_the_budget_states(root: Path, name: str, edge: float) -> None:
+    """Measured disturbance less the true one, channel by channel, over the report's total."""
+    campaign = processed("EL089", root)
+    run = list(Truth("EL089").runs())[1]
+    table = campaign.table(f"bands/{run.recording}.{name}")
+    t = table["t"]
+    dt = (t[-1] - t[0]) / (len(t) - 1)
+    everywhere = np.ones(len(t), dtype=bool)
+    true = Signal(t[0], dt, run.disturbance(t), WRENCH_CHANNELS, WRENCH_UNITS, "T", everywhere)
+    cut = bandpass.apply(true, Band(name, 0.01, edge))
+    valid = table["valid"] & cut.valid
+    stated = {
+        b["channel"]: b["total"] for b in campaign.results["budget"] if (b["frame"], b["band"]) == ("T", name)
+    }
+    for index, channel in enumerate(WRENCH_CHANNELS):
+        error = _rms(table[f"{channel}.measured"][valid] - cut.values[valid, index])
+        print(
+            f"{name} {channel}: error {error:.2e}, budget {stated[channel]:.2e}, {error / stated[channel]:.2f}"
+        )
+        assert 0.7 < error / stated[channel] < 1.4
 
 
 def _rms(values: Array) -> float:

@@ -10,15 +10,13 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.signal import firwin, oaconvolve
 
-from engine.archive import DAY_NS, FIRST_DAY_NS, RUN_NS, TRUTH_FOLDER
+from engine.archive import TRUTH_FOLDER
 from engine.campaigns import CAMPAIGNS, Run
 from engine.hardware import Array, Hardware
 from engine.rigid import AZ, EL, build
-from engine.sensors import DRIFT_TIME
 from engine.simulation import TIME_STEP, amplify, at, equilibrium, integrate
 from engine.trajectories import TRAJECTORIES, Commands
 
@@ -90,24 +88,6 @@ class TrueRun:
     def commands(self) -> Commands:
         """Its commands."""
         return TRAJECTORIES[self.run.trajectory]()
-
-    def seconds(self, stamp: NDArray[np.int64]) -> Array:
-        """Time of the run at stamps of its recorders (ns), whose clocks are right within milliseconds."""
-        epoch = FIRST_DAY_NS + CAMPAIGNS[self.truth.name].day * DAY_NS + self.index * RUN_NS
-        return (stamp - epoch) * 1e-9
-
-    def static_recorded(self, t: Array) -> Array:
-        """Static wrench at the commanded angles, as the calibrated transducer would have told it, (n, 6).
-
-        Cross-coupling beyond the calibrated, bias beyond the nominal, and drift are in it.
-        """
-        angles = at(self.commands.t, self.commands.position, t)
-        true = np.array([self.static(angle)[1] for angle in angles])
-        entry = self.truth.document["recordings"][self.index]
-        drift = np.array(entry["drift"]) * (1 - np.exp(-t / DRIFT_TIME))[:, None]
-        offset = self.hardware["transducer.bias"] - self.truth.nominal["transducer.bias"] + drift
-        calibrated = np.eye(6) + self.truth.nominal["transducer.cross_coupling"]
-        return true @ (np.eye(6) + self.truth.coupling).T + np.linalg.solve(calibrated, offset.T).T
 
     def static(self, commanded: Array) -> tuple[Array, Array]:
         """Joint angles (2,) and wrench (6,) at rest where the drives hold the `commanded` angles."""
