@@ -18,7 +18,8 @@ from kbs_process.signals.records import WRENCH_CHANNELS, WRENCH_UNITS, Signal
 from kbs_process.stages import bandpass
 from kbs_process.stages.bandpass import Band
 
-# Elevation alone, azimuth alone, both, a stop, and a hand-over. A cord that no model contains hangs in the others.
+# Four of eight, for time. AESING00 and ELSTPP00 are left out; in AL012M00 and ALSTPP00 hangs a cord that no model
+# contains.
 NAMES = ("EL089", "AZPS_ATA", "AESTPP00", "ACQ600")
 INFORMED = 1.5  # prior sigma over sigma, from which the recordings have a say
 
