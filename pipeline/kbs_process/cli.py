@@ -217,7 +217,9 @@ def predict(campaign: str, recording: str, output: Path | None, quiet: bool) -> 
 
 
 @cli.command(
-    epilog=examples("flight campaign/EL089", "flight campaign/EL089 --command slew.csv --samples 500 --seed 3")
+    epilog=examples(
+        "flight campaign/EL089", "flight campaign/EL089 --command slew.csv --samples 500 --seed 3"
+    )
 )
 @campaign_argument
 @click.option("--trajectory", metavar="NAME", help="Commands of the first recording of this trajectory.")
@@ -259,6 +261,37 @@ def flight(
     for line in outcome.verdict_lines:
         click.echo(line)
     click.echo(f"Report: {outcome.report}")
+
+
+@cli.command(
+    "reference-day",
+    epilog=examples("reference-day", "reference-day campaign/REFDAY --output /data/day --check"),
+)
+@click.argument("campaign", default="campaign/REFDAY")
+@output_option
+@pdf_option
+@click.option("--check", is_flag=True, help="Exit with 1 when a requirement is not met.")
+@quiet_option
+def reference_day(campaign: str, output: Path | None, pdf: bool | None, check: bool, quiet: bool) -> None:
+    """Simulate the reference day of CAMPAIGN [default: campaign/REFDAY] in flight.
+
+    Plans the antenna's trajectory from the orbit and the relay satellites of the campaign's mission file, flies it
+    through controller and plant, and judges pointing and disturbance torque in each section of the day.
+    """
+    from kbs_process.campaign.load import load_campaign
+    from kbs_process.campaign.locate import find_campaign, results_folder
+
+    folder = find_campaign(campaign)
+    target = results_folder(folder, output, suffix="-reference-day")
+    loaded = load_campaign(folder)
+    from kbs_process.campaign.reference_day import simulate_day
+
+    outcome = simulate_day(loaded, target, progress=_progress(quiet), pdf=pdf)
+    for line in outcome.verdict_lines:
+        click.echo(line)
+    click.echo(f"Report: {outcome.report}")
+    if check and outcome.requirement_met is False:
+        sys.exit(NOT_MET)
 
 
 @cli.command(epilog=examples("report reports/EL089", "report reports/EL089 --no-pdf"))

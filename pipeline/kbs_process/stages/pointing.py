@@ -6,7 +6,7 @@ requirement that they are held against:
 - bias: the mean;
 - random: twice the standard deviation about the bias;
 - percentile: the value that 95 % of |error| stay below, bias included;
-- orbit: how far the slow part, a moving mean, departs from its own mean within any one orbit (peak).
+- orbit: half the range of the slow part, a moving mean, within any one orbit (peak).
 """
 
 from __future__ import annotations
@@ -38,6 +38,7 @@ class PointingStatistics:
     percentile: float  # of |error|
     percentile_sigma: float
     orbit: float  # peak
+    orbit_sigma: float  # of the moving mean, from the random error: as much of `orbit` may be noise
     greatest: float  # |error|
 
 
@@ -135,6 +136,7 @@ def _one(axis: str, e: Array, dt: float, period: float, smoothing: float) -> Poi
         percentile=percentile,
         percentile_sigma=float(sigma[2]),
         orbit=orbit_variation(e, dt, smoothing, period),
+        orbit_sigma=float(sigma[0]) * max(1.0, len(e) * dt / smoothing) ** 0.5,
         greatest=float(magnitude.max()),
     )
 

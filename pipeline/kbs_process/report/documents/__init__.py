@@ -5,9 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 from kbs_process.report.document import Document
-from kbs_process.report.documents import correlation, flight
+from kbs_process.report.documents import correlation, flight, reference_day
 
 DOCUMENTS: dict[str, Document[Any]] = {
     "correlation": correlation.DOCUMENT,
     "flight": flight.DOCUMENT,
+    "reference-day": reference_day.DOCUMENT,
 }

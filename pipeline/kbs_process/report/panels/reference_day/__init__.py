@@ -1,0 +1,1 @@
+"""The sections of a reference day's report."""
