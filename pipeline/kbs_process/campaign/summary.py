@@ -18,10 +18,13 @@ from kbs_process.signals.records import WRENCH_CHANNELS, Signal
 from kbs_process.stages.conventions import SignCheck, check_encoder_sense, check_gravity_sign, check_weight
 from kbs_process.stages.decouple import Decoupling
 from kbs_process.stages.gravity import GravityModel, taring_error
+from kbs_process.stages.gravity_equation import RESPONSE
 from kbs_process.stages.gravity_quality import feasibility
 from kbs_process.stages.repeats import commanded
 from kbs_process.stages.to_cog import ASSUMPTION
 from kbs_process.stages.verdict import COVERAGE
+
+RESPONSE_UNITS = dict(zip(RESPONSE, ("s", "s^2"), strict=True))
 
 
 def summarise(
@@ -148,7 +151,7 @@ def _gravity(campaign: Campaign, analyses: Sequence[Analysis], model: GravityMod
         parameters.append(
             results.FittedParameter(
                 name=name,
-                unit="" if quantity is None else quantity.unit,
+                unit=RESPONSE_UNITS.get(name, "") if quantity is None else quantity.unit,
                 prior=float(prior[index]),
                 prior_sigma=float(fit.prior_sigma[index]),
                 value=float(fit.value[index]),
@@ -230,14 +233,15 @@ def _cross_coupling(analyses: Sequence[Analysis], decoupling: Decoupling) -> res
     share = np.abs(X) * np.std(decoupled, axis=0)
     row, column = np.unravel_index(int(np.argmax(share / np.std(decoupled, axis=0)[:, None])), share.shape)
     units = analyses[0].raw.units
+    largest = (
+        f"Relative to what varies on the channel itself, {channels[column]} leaks most into {channels[row]}: "
+        f"{share[row, column]:.3g} {units[row]} rms."
+    )
     return results.CrossCoupling(
         channels=channels,
         matrix=tuple(tuple(float(x) for x in line) for line in X),
         sigma=tuple(tuple(float(x) for x in line) for line in decoupling.sigma),
-        largest=(
-            f"Relative to what varies on the channel itself, {channels[column]} leaks most into {channels[row]}: "
-            f"{share[row, column]:.3g} {units[row]} rms."
-        ),
+        largest=largest if np.any(X) else "The parameter files state no cross-coupling: none was undone.",
         contributions=tuple(
             results.Contribution(channel=channel, unit=units[index], value=float(np.std(removed[:, index])))
             for index, channel in enumerate(channels)
