@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
@@ -15,10 +16,11 @@ from kbs_process.campaign.config import Campaign
 from kbs_process.campaign.documents import shown
 from kbs_process.campaign.store import writing
 from kbs_process.ingest.encoding import OutStream
-from kbs_process.ingest.writer import write_mcap
+from kbs_process.ingest.writer import write_pieces
 from kbs_process.signals.records import WRENCH_CHANNELS, WRENCH_UNITS, Block
 
 MARKER = "provenance.json"  # what makes a folder one of ours
+ROWS = 1 << 16  # of a row group
 HISTORY = "true wrench behind the amplifier, without cross-coupling, bias, noise and resolution"
 
 
@@ -37,11 +39,18 @@ def write_prediction(
     `kind` is "simulated" or "predicted", `name` says what of; `epoch_ns` is the sensor clock at time zero.
     """
     with writing(target, marker=MARKER) as folder:
-        whole = _gather(streams)
-        for key, block in whole.items():
-            _write_table(folder / f"{key}.parquet", campaign, key, block, name)
-        outputs = [_out_stream(campaign, key, block, epoch_ns) for key, block in whole.items()]
-        write_mcap(folder / f"{kind}.mcap", outputs)
+        tables: dict[str, _Table] = {}
+        with ExitStack() as open_tables:
+
+            def pieces() -> Iterator[OutStream]:
+                for key, block in streams:
+                    if key not in tables:
+                        table = _Table(folder / f"{key}.parquet", campaign, key, name)
+                        tables[key] = open_tables.enter_context(table)
+                    tables[key].add(block)
+                    yield _out_stream(campaign, key, block, epoch_ns)
+
+            write_pieces(folder / f"{kind}.mcap", pieces())
         about = {
             "campaign": campaign.name,
             kind: name,
@@ -57,34 +66,43 @@ def write_prediction(
     return target
 
 
-def _gather(streams: Iterable[tuple[str, Block]]) -> dict[str, Block]:
-    blocks: dict[str, list[Block]] = {}
-    for key, block in streams:
-        blocks.setdefault(key, []).append(block)
-    return {
-        key: Block(
-            np.concatenate([block.stamp for block in parts]),
-            np.concatenate([block.log for block in parts]),
-            np.concatenate([block.values for block in parts]),
-        )
-        for key, parts in sorted(blocks.items())
-    }
+class _Table:
+    """A Parquet table of one stream, written as the blocks come, in row groups of `ROWS` or more."""
 
+    def __init__(self, path: Path, campaign: Campaign, key: str, name: str) -> None:
+        channels = WRENCH_CHANNELS if key == "wrench" else campaign.rig.joint_names
+        units = WRENCH_UNITS if key == "wrench" else ("rad",) * len(channels)
+        about = {
+            "recording": name,
+            "frame": "T" if key == "wrench" else "joint",
+            "units": {"t": "s"} | dict(zip(channels, units, strict=True)),
+            "history": [HISTORY] if key == "wrench" else [],
+        }
+        metadata = {"kbs": json.dumps(about, sort_keys=True)}
+        self._schema = pa.schema([(column, pa.float64()) for column in ("t", *channels)], metadata=metadata)
+        self._writer = pq.ParquetWriter(path, self._schema, compression="zstd")
+        self._blocks: list[Block] = []
 
-def _write_table(path: Path, campaign: Campaign, key: str, block: Block, name: str) -> None:
-    channels = WRENCH_CHANNELS if key == "wrench" else campaign.rig.joint_names
-    units = WRENCH_UNITS if key == "wrench" else ("rad",) * len(channels)
-    columns = {"t": block.stamp * 1e-9}
-    columns |= {channel: block.values[:, index] for index, channel in enumerate(channels)}
-    about = {
-        "recording": name,
-        "frame": "T" if key == "wrench" else "joint",
-        "units": {"t": "s"} | dict(zip(channels, units, strict=True)),
-        "history": [HISTORY] if key == "wrench" else [],
-    }
-    table = pa.table({column: pa.array(values) for column, values in columns.items()})
-    table = table.replace_schema_metadata({"kbs": json.dumps(about, sort_keys=True)})
-    pq.write_table(table, path, compression="zstd")
+    def __enter__(self) -> _Table:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._flush()
+        self._writer.close()
+
+    def add(self, block: Block) -> None:
+        """Append a block."""
+        self._blocks.append(block)
+        if sum(map(len, self._blocks)) >= ROWS:
+            self._flush()
+
+    def _flush(self) -> None:
+        if self._blocks:
+            t = np.concatenate([block.stamp for block in self._blocks]) * 1e-9
+            values = np.concatenate([block.values for block in self._blocks])
+            columns = [pa.array(t), *(pa.array(column) for column in values.T)]
+            self._writer.write_table(pa.Table.from_arrays(columns, schema=self._schema))
+            self._blocks = []
 
 
 def _out_stream(campaign: Campaign, key: str, block: Block, epoch_ns: int) -> OutStream:

@@ -26,7 +26,7 @@ from kbs_process.campaign.progress import Progress, SilentProgress
 from kbs_process.campaign.provenance import sha256
 from kbs_process.campaign.store import writing
 from kbs_process.errors import OutputError, RecordingError, did_you_mean
-from kbs_process.ingest import OutStream, write_mcap
+from kbs_process.ingest import OutStream, write_pieces
 from kbs_process.signals.records import Array, Block
 
 LATEST_NS = (1 << 31) * 1_000_000_000  # the seconds of a ROS 2 time stamp are a signed 32-bit number
@@ -109,12 +109,12 @@ def _convert_part(
     """Write one recording; return what was found wrong with its source."""
     table = open_table(path, mapping.format, mapping.text)
     findings = Findings()
-    blocks = read_part(table, mapping, part, findings)
     topics = {"encoder" if topic.key == "angle" else topic.key: topic for topic in campaign.topics.present()}
-    streams = [
-        _out_stream(stream, blocks[stream.key], topics[stream.key], path) for stream in mapping.streams
-    ]
-    write_mcap(folder / recording_file(part.stem), streams)
+    pieces = (
+        _out_stream(stream, block, topics[stream.key], path)
+        for stream, block in read_part(table, mapping, part, findings)
+    )
+    write_pieces(folder / recording_file(part.stem), pieces)
     return findings.lines()
 
 
@@ -123,7 +123,7 @@ def _out_stream(stream: StreamMap, block: Block, topic: Topic, path: Path) -> Ou
 
     The file has one clock: recorder's and sensor's are the same.
     """
-    if int(block.stamp.min()) < 0 or int(block.stamp.max()) >= LATEST_NS:
+    if len(block) and (int(block.stamp.min()) < 0 or int(block.stamp.max()) >= LATEST_NS):
         raise RecordingError(
             f"times of '{stream.key}' reach from {block.stamp.min() / 1e9:g} s to {block.stamp.max() / 1e9:g} s "
             "after 1970, where recordings hold 0 to 2147483648 s",

@@ -15,6 +15,7 @@ from kbs_process.campaign.importers.tables import Cells, Table, find_column
 from kbs_process.errors import RecordingError
 from kbs_process.signals.records import Array, Block, Mask, Stamps
 
+_NO_STAMPS = np.empty(0, dtype=np.int64)
 Piece = dict[str, Block]  # by stream key; the streams of one pass over the file
 
 
@@ -42,9 +43,18 @@ class Findings:
         return tuple(f"{count} {what}" for what, count in self.counts.most_common() if count)
 
 
-def read_part(table: Table, mapping: Mapping, part: Part, findings: Findings) -> dict[str, Block]:
-    """Return the streams of one recording, by their key in campaign.toml's [topics]."""
-    passes = [_pieces(table, mapping, streams, findings) for streams in _passes(mapping.streams)]
+def read_part(
+    table: Table, mapping: Mapping, part: Part, findings: Findings
+) -> Iterator[tuple[StreamMap, Block]]:
+    """Yield the streams of one recording a piece at a time, those of several passes side by side in time.
+
+    The first piece of each stream is empty: so all are known before the first sample. Raises RecordingError,
+    at the end, for a stream without a sample.
+    """
+    streams = {stream.key: stream for stream in mapping.streams}
+    for stream in mapping.streams:
+        yield stream, Block(_NO_STAMPS, _NO_STAMPS, np.empty((0, len(stream.channels))))
+    passes = [_pieces(table, mapping, shared, findings) for shared in _passes(mapping.streams)]
     start, end = -(1 << 63), (1 << 63) - 1
     if part.start_s > 0.0 or np.isfinite(part.end_s):
         heads = [next(pieces, {}) for pieces in passes]
@@ -54,21 +64,34 @@ def read_part(table: Table, mapping: Mapping, part: Part, findings: Findings) ->
         start = first + round(part.start_s * 1e9)
         end = first + round(part.end_s * 1e9) if np.isfinite(part.end_s) else end
 
-    collected: dict[str, list[Block]] = {stream.key: [] for stream in mapping.streams}
-    for piece in chain.from_iterable(passes):
+    empty = set(streams)
+    for piece in _side_by_side(passes):
         for key, block in piece.items():
             inside = _select(block, (block.stamp >= start) & (block.stamp < end))
             findings.check(key, inside)
-            collected[key].append(inside)
-    blocks = {key: _joined(parts) for key, parts in collected.items() if parts}
-    for key in collected:
-        if key not in blocks or not len(blocks[key]):
+            if len(inside):
+                empty.discard(key)
+                yield streams[key], inside
+    for key in streams:
+        if key in empty:
             raise RecordingError(
                 f"no sample of '{key}' for recording '{part.stem}'",
                 where=str(table.path),
                 remedy="check start_s and end_s (s from the file's first sample), and that the file is whole",
             )
-    return blocks
+
+
+def _side_by_side(passes: Sequence[Iterator[Piece]]) -> Iterator[Piece]:
+    """Yield the pieces of all passes, the next from the one that is furthest behind in time."""
+    reached = dict.fromkeys(range(len(passes)), -(1 << 63))
+    while reached:
+        behind = min(reached, key=reached.__getitem__)
+        piece = next(passes[behind], None)
+        if piece is None:
+            del reached[behind]
+            continue
+        yield piece
+        reached[behind] = max([reached[behind], *(int(b.stamp[-1]) for b in piece.values() if len(b))])
 
 
 def _passes(streams: Sequence[StreamMap]) -> list[list[StreamMap]]:
@@ -182,8 +205,3 @@ def _select(block: Block, mask: Mask) -> Block:
     if mask.all():
         return block
     return Block(block.stamp[mask], block.log[mask], block.values[mask])
-
-
-def _joined(blocks: Sequence[Block]) -> Block:
-    stamp = np.concatenate([block.stamp for block in blocks])
-    return Block(stamp, stamp, np.concatenate([block.values for block in blocks]))
