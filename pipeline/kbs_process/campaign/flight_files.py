@@ -126,8 +126,8 @@ def _conclusion(requirements: Sequence[records.FlightRequirement]) -> Conclusion
     sentence = (
         f"{worst.name}: a flight unit meets it with a probability of {100 * worst.meets.value:.1f} % "
         f"({100 * worst.meets.low:.1f} to {100 * worst.meets.high:.1f} %). {worst.statistic.capitalize()} "
-        f"{worst.worst.nominal:.4f} {worst.unit} nominally, {worst.worst.q05:.4f} to {worst.worst.q95:.4f} {worst.unit} "
-        f"in 90 % of the units; limit {worst.limit:g} {worst.unit}."
+        f"{worst.worst.nominal:.4f} {worst.unit} nominally, {worst.worst.q05:.4f} to {worst.worst.q95:.4f} "
+        f"{worst.unit} in 90 % of the units; limit {worst.limit:g} {worst.unit}."
     )
     return Conclusion(status=status, sentence=sentence)
 
@@ -157,7 +157,7 @@ def _warnings(flight: Flight) -> Iterable[Notice]:
     if flight.failed:
         yield Notice(
             severity="warning",
-            what=f"{flight.failed} of {flight.failed + len(flight.units)} units could not be simulated, and are left out",
+            what=f"{flight.failed} of {flight.failed + len(flight.units)} units could not be simulated: left out",
             remedy="look for parameters whose sigma reaches values that no unit has",
         )
     if upper_bound(np.zeros(len(flight.units)), CONTENT, CONFIDENCE) is None:
@@ -193,6 +193,6 @@ def _histories(folder: Path, flight: Flight, index: int, judged: Judged) -> None
             f"{channel}.q95": high[:, column],
         }
     unit = judged.requirement.unit
-    units = {name: unit for name in columns} | {"t": "s"}
+    units = dict.fromkeys(columns, unit) | {"t": "s"}
     path = folder / "tables" / "flight" / f"requirement_{index}.parquet"
     write_table(path, columns, units, frame=judged.requirement.frame)

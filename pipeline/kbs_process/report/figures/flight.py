@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from kbs_process.report.figures import draw
 from kbs_process.report.panel import Picture
@@ -49,8 +50,7 @@ def histories(requirement: FlightRequirement, table: Table) -> Picture:
     t = table.columns["t"]
     rows = requirement.channels
     with draw.style():
-        figure, first = draw.canvas(0.5 + 1.15 * len(rows))
-        figure.clear()
+        figure = Figure(figsize=(draw.WIDTH, 0.5 + 1.15 * len(rows)), layout="constrained")
         axes = np.atleast_1d(figure.subplots(len(rows), 1, sharex=True))
         for axis, row in zip(axes, rows, strict=True):
             low, high, q05, q95 = (

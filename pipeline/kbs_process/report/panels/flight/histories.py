@@ -15,7 +15,8 @@ _CAPTION = Caption(
     good="Bursts at the same times in all units, and all within the limits.",
     bad="A pale band much wider than the nominal unit's: where the burst falls depends on the unit, and one "
     "prediction says little.",
-    do="If bursts come where a tooth-passing or cogging line crosses a resonance, choose rates that do not dwell there.",
+    do="If bursts come where a tooth-passing or cogging line crosses a resonance, choose rates that do not dwell "
+    "there.",
 )
 
 
