@@ -1,7 +1,9 @@
 """Speed and memory of the reader on two million messages, beside the floor and the peer.
 
 The floor is the time merely to read and decompress every chunk (for JSON: and to decode every payload, untyped,
-with msgspec), by the same libraries, without CRC. Run with
+with msgspec), by the same libraries, on one thread, without CRC. The reader reads, checks and decompresses on a
+second thread: where a second processor is free, it gains by that, and its ratio of times says so. The ratio of
+processor times of all threads, printed beside it, is what it would take on one. Run with
 `pytest tests/benchmarks/test_ingest.py --benchmark-only -s`.
 """
 
@@ -95,13 +97,13 @@ def json_floor(path: Path) -> None:
             at += 9 + length
 
 
-def best(run: Callable[[], object], rounds: int = 5) -> float:
+def best(run: Callable[[], object], rounds: int = 5, clock: Callable[[], float] = time.perf_counter) -> float:
     """Return the shortest of several times, s: the one least disturbed by other work."""
     times = []
     for _ in range(rounds):
-        start = time.perf_counter()
+        start = clock()
         run()
-        times.append(time.perf_counter() - start)
+        times.append(clock() - start)
     return min(times)
 
 
@@ -143,9 +145,12 @@ def test_reading_costs_little_more_than_decompressing(
     benchmark.pedantic(read_all, (path,), rounds=rounds)
     base = min(base, best(lambda: lowest(path), rounds))  # before and after, as other work comes and goes
     ratio = benchmark.stats.stats.min / base
-    benchmark.extra_info["ratio"] = ratio
+    work = best(lambda: read_all(path), rounds, time.process_time)
+    work /= best(lambda: lowest(path), rounds, time.process_time)
+    benchmark.extra_info |= {"ratio": ratio, "processor time": work}
     print(
-        f"\n{name}: {ratio:.2f} times the floor of {base:.3f} s ({path.stat().st_size / 1e6:.0f} MB), limit {limit}"
+        f"\n{name}: {ratio:.2f} times the floor of {base:.3f} s ({path.stat().st_size / 1e6:.0f} MB), limit {limit}; "
+        f"{work:.2f} times its processor time"
     )
     assert ratio <= limit
 
