@@ -283,7 +283,7 @@ def reference_day(campaign: str, output: Path | None, pdf: bool | None, check: b
 
     folder = find_campaign(campaign)
     target = results_folder(folder, output, suffix="-reference-day")
-    loaded = load_campaign(folder)
+    loaded = load_campaign(folder, recordings=False)
     from kbs_process.campaign.reference_day import simulate_day
 
     outcome = simulate_day(loaded, target, progress=_progress(quiet), pdf=pdf)
@@ -291,6 +291,65 @@ def reference_day(campaign: str, output: Path | None, pdf: bool | None, check: b
         click.echo(line)
     click.echo(f"Report: {outcome.report}")
     if check and outcome.requirement_met is False:
+        sys.exit(NOT_MET)
+
+
+@cli.command(
+    epilog=examples(
+        "stability campaign/EL089", "stability campaign/EL089 --joint el --from 0 --to 87 --points 30"
+    )
+)
+@campaign_argument
+@click.option("--joint", metavar="NAME", help="Joint to sweep [default: the last one].")
+@click.option(
+    "--from", "low", type=float, default=-30.0, show_default=True, metavar="DEG", help="Its first angle."
+)
+@click.option(
+    "--to", "high", type=float, default=90.0, show_default=True, metavar="DEG", help="Its last angle."
+)
+@click.option("--points", type=click.IntRange(2), default=25, show_default=True, help="Poses.")
+@output_option
+@pdf_option
+@click.option("--check", is_flag=True, help="Exit with 1 when the margins are not kept.")
+@quiet_option
+def stability(
+    campaign: str,
+    joint: str | None,
+    low: float,
+    high: float,
+    points: int,
+    output: Path | None,
+    pdf: bool | None,
+    check: bool,
+    quiet: bool,
+) -> None:
+    """Analyse the stability of CAMPAIGN's pointing loop over a joint's range.
+
+    Margins, poles and sensitivity of the linearised, exactly discretised loop on the elastic transducer, and the gains at
+    which simulations of the whole plant begin to oscillate.
+    """
+    from kbs_process.campaign.load import load_campaign
+    from kbs_process.campaign.locate import find_campaign, results_folder
+
+    folder = find_campaign(campaign)
+    target = results_folder(folder, output, suffix="-stability")
+    loaded = load_campaign(folder, checksums=False)
+    from kbs_process.campaign.stability import analyse_stability
+
+    outcome = analyse_stability(
+        loaded,
+        target,
+        joint=joint,
+        low_deg=low,
+        high_deg=high,
+        points=points,
+        progress=_progress(quiet),
+        pdf=pdf,
+    )
+    for line in outcome.verdict_lines:
+        click.echo(line)
+    click.echo(f"Report: {outcome.report}")
+    if check and not outcome.requirement_met:
         sys.exit(NOT_MET)
 
 
@@ -353,8 +412,9 @@ def _progress(quiet: bool) -> Progress:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line and exit."""
-    # One thread: sums in one order give the same bits on every machine, and small matrices are no faster with two.
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    # One thread, whatever the user's shell says: sums in one order give the same bits, and small matrices are no faster
+    # with two.
+    os.environ["OPENBLAS_NUM_THREADS"] = "1"
     words = list(sys.argv[1:] if arguments is None else arguments)
     debug = "--debug" in words
     try:

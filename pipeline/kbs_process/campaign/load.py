@@ -19,12 +19,14 @@ from kbs_process.rig.model import Rig
 CAMPAIGN_FILE = "campaign.toml"
 
 
-def load_campaign(folder: Path, *, checksums: bool = True, flight: bool = False) -> Campaign:
+def load_campaign(
+    folder: Path, *, checksums: bool = True, flight: bool = False, recordings: bool = True
+) -> Campaign:
     """Read and check the campaign in `folder`.
 
     Raises ConfigError with the file, the key and the remedy of up to five faults. `checksums` says
     whether recordings are read through to compare the SHA-256 that the campaign states; with `flight`, the
-    parameters of the flight model take the place of those of the test.
+    parameters of the flight model take the place of those of the test. Without `recordings` there need be none.
     """
     folder = folder.absolute()
     problems = Problems(subject=str(folder))
@@ -47,6 +49,9 @@ def load_campaign(folder: Path, *, checksums: bool = True, flight: bool = False)
     campaign = _campaign(folder, document, tables, rig, problems)
     if flight:
         campaign = replace(campaign, article=document.tree["flight"].get("article", campaign.article))
+    if recordings and not campaign.recordings:
+        remedy = "add [[recording]], or simulate the campaign's mission: kbs-process reference-day"
+        problems.add(document.place(("recording",)), "is missing: there is nothing to read", remedy)
     check_campaign(campaign, document, tables, problems, checksums=checksums)
     problems.raise_any()
     return campaign

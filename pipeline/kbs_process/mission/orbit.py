@@ -10,7 +10,7 @@ from kbs_process.mission.model import Orbit, Relay
 from kbs_process.signals.records import Array
 
 EARTH_RADIUS = 6378135.0  # m, equatorial, WGS 72 as in SGP4
-EARTH_RATE = 7.292115146706979e-5  # rad/s, of the Earth against the mean equinox (IAU 1982)
+EARTH_RATE = 1.00273790935 * 2.0 * np.pi / 86400.0  # rad/s, against the mean equinox (IAU 1982)
 EARTH_MU = 3.986008e14  # m^3/s^2, WGS 72
 GEOSTATIONARY_RADIUS = (EARTH_MU / EARTH_RATE**2) ** (1.0 / 3.0)  # m; the Earth's oblateness adds 0.5 km
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from kbs_process.mission.model import Mission
 from kbs_process.mission.passes import Track, followed, rendezvous, runs, within
-from kbs_process.signals.records import Array
+from kbs_process.signals.records import Array, Mask
 
 STEP = 0.5  # s by which a bridge is tried longer at either end
 LONGEST = 600.0  # s at either end
@@ -21,13 +21,26 @@ def bridged(track: Track, mission: Mission) -> Track:
     """
     q, usable, on_bridge = track.q.copy(), track.usable.copy(), track.bridged.copy()
     possible = followed(track.rate, track.acceleration, mission.limits)
-    for first, last in runs(track.in_view & ~possible):
+    for first, last in _crossings(track.in_view & ~possible, round(LONGEST / mission.cycle)):
         found = _shortest(track, first, last, mission)
         if found is not None:
             start, path = found
             end = start + len(path)
             q[start:end], usable[start:end], on_bridge[start:end] = path, True, True
     return replace(track, q=q, usable=usable, bridged=on_bridge)
+
+
+def _crossings(impossible: Mask, apart: int) -> list[tuple[int, int]]:
+    """Runs of cycles that cannot be followed; those less than `apart` cycles from each other are one crossing.
+
+    Azimuth accelerates before the zenith and brakes behind it, and may be possible to follow in between.
+    """
+    merged: list[tuple[int, int]] = []
+    for first, last in runs(impossible):
+        if merged and first - merged[-1][1] < apart:
+            first = merged.pop()[0]
+        merged.append((first, last))
+    return merged
 
 
 def _shortest(track: Track, first: int, last: int, mission: Mission) -> tuple[int, Array] | None:
