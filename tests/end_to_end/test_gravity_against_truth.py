@@ -5,13 +5,13 @@ pytest tests/end_to_end -s        # prints the figures
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from end_to_end.archive_run import processed
+from end_to_end.archive_run import Processed
 from end_to_end.truth import Truth
 from engine.hardware import Array
 from kbs_process.signals.records import WRENCH_CHANNELS, WRENCH_UNITS, Signal
@@ -39,18 +39,13 @@ class Fitted:
 
 
 @pytest.fixture(scope="module")
-def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("archive")
+def fitted(archived: Callable[[str], Processed]) -> dict[str, Fitted]:
+    return {name: _fitted(archived(name)) for name in NAMES}
 
 
-@pytest.fixture(scope="module")
-def fitted(root: Path) -> dict[str, Fitted]:
-    return {name: _fitted(name, root) for name in NAMES}
-
-
-def _fitted(name: str, root: Path) -> Fitted:
-    parameters = processed(name, root).results["gravity"]["parameters"]
-    truth = Truth(name)
+def _fitted(campaign: Processed) -> Fitted:
+    parameters = campaign.results["gravity"]["parameters"]
+    truth = Truth(campaign.name)
     return Fitted(
         names=tuple(p["name"] for p in parameters),
         error=np.array([p["value"] - truth.parameter(p["name"]) for p in parameters]),
@@ -90,9 +85,11 @@ def test_centre_of_gravity_of_the_antenna(fitted: dict[str, Fitted]) -> None:
 
 
 @pytest.mark.parametrize(("name", "edge"), [("lt1Hz", 1.0), ("lt2Hz", 2.0)])
-def test_error_in_the_band_is_what_the_budget_states(root: Path, name: str, edge: float) -> None:
+def test_error_in_the_band_is_what_the_budget_states(
+    archived: Callable[[str], Processed], name: str, edge: float
+) -> None:
     """Measured disturbance less the true one, channel by channel, over the report's total."""
-    campaign = processed("EL089", root)
+    campaign = archived("EL089")
     run = list(Truth("EL089").runs())[1]
     table = campaign.table(f"bands/{run.recording}.{name}")
     t = table["t"]
