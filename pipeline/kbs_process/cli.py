@@ -325,8 +325,8 @@ def stability(
 ) -> None:
     """Analyse the stability of CAMPAIGN's pointing loop over a joint's range.
 
-    Margins, poles and sensitivity of the linearised, exactly discretised loop on the elastic transducer, and the gains at
-    which simulations of the whole plant begin to oscillate.
+    Margins, poles and sensitivity of the linearised, exactly discretised loop on the elastic transducer, and the gains
+    at which simulations of the whole plant begin to oscillate.
     """
     from kbs_process.campaign.load import load_campaign
     from kbs_process.campaign.locate import find_campaign, results_folder

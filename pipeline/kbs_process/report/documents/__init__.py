@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 from kbs_process.report.document import Document
-from kbs_process.report.documents import correlation, flight, reference_day
+from kbs_process.report.documents import correlation, flight, reference_day, stability
 
 DOCUMENTS: dict[str, Document[Any]] = {
     "correlation": correlation.DOCUMENT,
     "flight": flight.DOCUMENT,
     "reference-day": reference_day.DOCUMENT,
+    "stability": stability.DOCUMENT,
 }

@@ -16,7 +16,9 @@ from kbs_process.report.tables import Tables
 from kbs_process.report.text import measure, number, percent, unit
 from kbs_process.signals.records import Array
 
-QUESTION = "How much of a band's torque does the transducer's resonance make, and do both ways to compute it agree?"
+QUESTION = (
+    "How much of a band's torque does the transducer's resonance make, and do both ways to compute it agree?"
+)
 _GAINS = Caption(
     shown="Torque that the transducer reads over the torque that the article would exert on a rigid base, over "
     "frequency, at the first, middle and last pose; dotted: the bands' upper edges; coloured: the same behind each "
