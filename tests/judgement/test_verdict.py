@@ -1,10 +1,13 @@
 """A verdict is decided only where the expanded uncertainty leaves no doubt."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from kbs_process.signals.records import Signal
-from kbs_process.stages.verdict import extremes, judge
+from kbs_process.stages.bandpass import Band, apply, crossing_rate
+from kbs_process.stages.verdict import extremes, judge, peak_coverage
 
 
 @pytest.mark.parametrize(
@@ -36,3 +39,37 @@ def test_the_worst_recording_decides_and_invalid_samples_do_not_count():
     (rms,) = extremes([("a", a)], ("Tx",), "rms")
     assert rms.value == pytest.approx(np.sqrt((1 + 9) / 2))
     assert rms.time_s is None
+
+
+def test_noise_alone_breaks_no_limit_by_its_peak():
+    # The peak of ten minutes of noise is some 3.5 sigma: two sigma less would still be above a limit of one.
+    band, dt, sigma = Band("lt1Hz", 0.01, 1.0), 0.05, 1e-3
+    rng = np.random.default_rng(7)
+    below = peak_coverage(crossing_rate(band, dt) * 600.0)
+    failed = by_two_sigma = above = 0
+    for _ in range(40):
+        x = run(rng.normal(size=(12_000, 2)), np.ones(12_000, dtype=bool))
+        noise = apply(replace(x, dt=dt), band)
+        noise = noise.derive(noise.values * sigma / noise.values[noise.valid].std(axis=0), "scaled")
+        for found in extremes([("noise", noise)], ("Tx", "Ty"), "peak"):
+            failed += judge(found.value, sigma, sigma, below) == "fail"
+            by_two_sigma += judge(found.value, sigma, sigma) == "fail"
+            above += found.value > 3.3 * sigma
+    assert failed <= 5  # of 80, each with a probability of 2.3 %
+    assert by_two_sigma > 60
+    assert above > 40
+
+
+def test_how_often_noise_in_a_band_crosses_zero():
+    band, dt, n = Band("lt2Hz", 0.01, 2.0), 0.05, 200_000
+    x = apply(
+        replace(run(np.random.default_rng(8).normal(size=(n, 2)), np.ones(n, dtype=bool)), dt=dt), band
+    ).column("Tx")
+    up = np.count_nonzero((x[:-1] < 0.0) & (x[1:] >= 0.0)) / (n * dt)
+    assert crossing_rate(band, dt) == pytest.approx(up, rel=0.02)
+
+
+def test_a_peak_well_above_the_noise_still_fails():
+    assert judge(0.1, 0.005, 0.06, peak_coverage(700.0)) == "fail"
+    assert judge(0.075, 0.005, 0.06, peak_coverage(700.0)) == "undecided"
+    assert peak_coverage(0.0) >= 2.0

@@ -10,8 +10,9 @@ from kbs_process.campaign.analysis import Analysis, bands_of
 from kbs_process.campaign.config import Campaign, Requirement
 from kbs_process.errors import ConfigError
 from kbs_process.report import results
-from kbs_process.stages.bandpass import Band
-from kbs_process.stages.verdict import COVERAGE, Judgement, extremes, judge
+from kbs_process.signals.records import Signal
+from kbs_process.stages.bandpass import Band, crossing_rate
+from kbs_process.stages.verdict import COVERAGE, Judgement, extremes, judge, peak_coverage
 
 SEVERITY: dict[Judgement, int] = {"pass": 0, "undecided": 1, "fail": 2}
 
@@ -49,8 +50,9 @@ def judged(
         )
     }
     worst = max(measured, key=lambda extreme: extreme.value + COVERAGE * sigmas[extreme.channel])
+    below = coverage_below(requirement.statistic, [pair.measured for _, pair in pairs], band)
     verdict = max(
-        (judge(extreme.value, sigmas[extreme.channel], requirement.limit) for extreme in measured),
+        (judge(extreme.value, sigmas[extreme.channel], requirement.limit, below) for extreme in measured),
         key=SEVERITY.__getitem__,
     )
     return results.Requirement(
@@ -83,6 +85,14 @@ def judged(
         ),
         source=requirement.source,
     )
+
+
+def coverage_below(statistic: str, measured: Sequence[Signal], band: Band) -> float:
+    """Return how many sigmas the true statistic may lie below that of all these signals."""
+    if statistic != "peak":
+        return COVERAGE
+    seconds = sum(float(np.count_nonzero(signal.valid)) * signal.dt for signal in measured)
+    return peak_coverage(crossing_rate(band, measured[0].dt) * seconds)
 
 
 def band_of(requirement: Requirement, bands: Iterable[Band]) -> Band:

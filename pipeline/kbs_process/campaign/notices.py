@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
 
-from kbs_process.campaign.analysis import Analysis
+from kbs_process.campaign.analysis import Analysis, bands_of
 from kbs_process.campaign.config import Campaign
 from kbs_process.campaign.findings import Findings
+from kbs_process.campaign.judging import band_of, coverage_below
 from kbs_process.report import results
+from kbs_process.signals.records import Loss
 from kbs_process.stages.gravity import GravityModel
 from kbs_process.stages.gravity_quality import Misfit
 from kbs_process.stages.verdict import COVERAGE
@@ -37,6 +39,7 @@ def notices(
     yield from _static_load(campaign, analyses, model)
     yield from _fit(model)
     yield from _taring(analyses)
+    yield from _peaks(campaign, analyses, findings)
     yield from _repeats(campaign, findings)
     yield from _resonance(findings)
     yield from _predictions(findings)
@@ -54,17 +57,31 @@ def _conventions(conventions: Sequence[results.Convention]) -> Iterable[results.
 
 
 def _losses(analyses: Sequence[Analysis]) -> Iterable[results.Notice]:
+    """One notice a recording: of each kind how much, and between which times."""
     for analysis in analyses:
-        if analysis.run.losses:
-            kinds: dict[str, int] = {}
-            for loss in analysis.run.losses:
-                kinds[loss.kind] = kinds.get(loss.kind, 0) + max(loss.count, 1)
+        kinds: dict[str, list[Loss]] = defaultdict(list)
+        for loss in analysis.run.losses:
+            kinds[loss.kind].append(loss)
+        if kinds:
             yield results.Notice(
                 severity="warning",
-                what="; ".join(f"{kind}: {count}" for kind, count in kinds.items()),
+                what="; ".join(f"{kind}: {_extent(losses)}" for kind, losses in kinds.items()),
                 where=analysis.entry.name,
                 remedy=f"kbs-process inspect recordings/{analysis.entry.path.name} lists each with its time",
             )
+
+
+def _extent(losses: Sequence[Loss]) -> str:
+    """How many, and from when to when: "3, between 12.0 s and 14.2 s"."""
+    count = str(sum(max(loss.count, 1) for loss in losses))
+    starts = [loss.start_s for loss in losses if loss.start_s is not None]
+    ends = [loss.end_s for loss in losses if loss.end_s is not None]
+    if not starts:
+        return count
+    first, last = min(starts), max([*ends, *starts])
+    return (
+        f"{count}, between {first:.1f} s and {last:.1f} s" if last > first else f"{count}, at {first:.1f} s"
+    )
 
 
 def _fit(model: GravityModel) -> Iterable[results.Notice]:
@@ -111,6 +128,28 @@ def _taring(analyses: Sequence[Analysis]) -> Iterable[results.Notice]:
             "estimated from each, and nothing else",
             remedy="constants and their uncertainty are in the gravity fit's table",
         )
+
+
+def _peaks(campaign: Campaign, analyses: Sequence[Analysis], findings: Findings) -> Iterable[results.Notice]:
+    """Peaks that noise alone may make: the largest of many samples exceeds the true one, never falls short of it."""
+    for requirement in findings.requirements:
+        band = band_of(
+            campaign.requirements[findings.requirements.index(requirement)], bands_of(campaign.bands)
+        )
+        key = (requirement.frame, band.name)
+        signals = [one.pairs[key].measured for one in analyses if one.entry.role != "calibration"]
+        below = coverage_below(requirement.statistic, signals, band)
+        noise = [c for c in requirement.channels if (c.value or 0.0) < below * (c.sigma or 0.0)]
+        if requirement.statistic == "peak" and noise:
+            each = ", ".join(f"{c.channel} {c.value:.2g} of {below * (c.sigma or 0.0):.2g}" for c in noise)
+            yield results.Notice(
+                severity="info",
+                what=f"these peaks are no larger than noise alone may make them in all recordings together, "
+                f"{below:.1f} sigma: {each} {requirement.unit}. The article's own may be anything from zero to the "
+                f"measured value and {COVERAGE:g} sigma",
+                where=requirement.name,
+                remedy="the value is an upper bound; a quieter transducer, or a narrower band, would lower it",
+            )
 
 
 def _repeats(campaign: Campaign, findings: Findings) -> Iterable[results.Notice]:

@@ -68,6 +68,13 @@ def noise_bandwidth(band: Band, dt: float) -> float:
     return float(np.trapezoid(gain(band, f, dt) ** 2, f))
 
 
+def crossing_rate(band: Band, dt: float) -> float:
+    """How often a second white noise in the band crosses zero upwards: the rms frequency of its power (Rice)."""
+    f = np.linspace(0.0, 0.5 / dt, 20001)[1:-1]
+    power = gain(band, f, dt) ** 2
+    return float(np.sqrt(np.trapezoid(f**2 * power, f) / np.trapezoid(power, f)))
+
+
 def apply(signal: Signal, band: Band) -> Signal:
     """Return the signal's part in the band; samples that lean on unknown ones by more than 0.1 % are flagged.
 
