@@ -54,6 +54,10 @@ def load_campaign(
         problems.add(document.place(("recording",)), "is missing: there is nothing to read", remedy)
     check_campaign(campaign, document, tables, problems, checksums=checksums)
     problems.raise_any()
+    if campaign.modal is not None:
+        from kbs_process.campaign.modal_file import read_modal  # few campaigns have one, and it takes its time
+
+        read_modal(campaign.modal, rig.joint_names)
     return campaign
 
 
@@ -96,6 +100,7 @@ def _read_each(folder: Path, files: Iterable[str], key: str, problems: Problems)
 def _campaign(folder: Path, document: Document, tables: Merged, rig: Rig, problems: Problems) -> Campaign:
     tree = document.tree
     effects = tree.get("model", {}).get("effects", [])
+    modal = folder / tree["model"]["modal"] if "modal" in tree.get("model", {}) else None
     requirements = (
         _requirement(index, table, document, problems)
         for index, table in enumerate(tree.get("requirement", []))
@@ -118,9 +123,14 @@ def _campaign(folder: Path, document: Document, tables: Merged, rig: Rig, proble
         effects=tuple(effect.name for effect in CATALOGUE if effect.name in effects),
         recordings=tuple(_recording(folder, table) for table in tree.get("recording", [])),
         rig=rig,
-        inputs=(document.path, *(entry.path for entry in tables.documents), *_matrices(folder, tables.tree)),
+        inputs=(
+            document.path,
+            *(entry.path for entry in tables.documents),
+            *_matrices(folder, tables.tree),
+            *(() if modal is None else (modal,)),
+        ),
         mission=folder / tree["mission"]["file"] if "mission" in tree else None,
-        modal=folder / tree["model"]["modal"] if "modal" in tree.get("model", {}) else None,
+        modal=modal,
     )
 
 
