@@ -55,7 +55,8 @@ def load_campaign(
     check_campaign(campaign, document, tables, problems, checksums=checksums)
     problems.raise_any()
     if campaign.modal is not None:
-        from kbs_process.campaign.modal_file import read_modal  # few campaigns have one, and it takes its time
+        # Few campaigns have one, and what reads it takes its time to import.
+        from kbs_process.campaign.modal_file import read_modal
 
         read_modal(campaign.modal, rig.joint_names)
     return campaign
