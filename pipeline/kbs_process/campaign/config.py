@@ -37,7 +37,7 @@ class Bands:
 class Topic:
     """Where a stream of the pipeline is in a recording."""
 
-    key: str  # the stream: "wrench", "angle", "rate", "command", "field" or "temperature"
+    key: str  # the stream: "wrench", "angle", "rate", "command", "field", "temperature" or "pointing"
     topic: str
     fields: tuple[str, ...]  # place of each channel in a message: "wrench.force.x", "position[az]"
     channels: tuple[str, ...]  # names of the channels: "Fx"; "az"; "az.rate"
@@ -53,10 +53,19 @@ class Topics:
     command: Topic | None
     field: Topic | None
     temperature: Topic | None
+    pointing: Topic | None  # angles by an external instrument
 
     def present(self) -> tuple[Topic, ...]:
         """Return the streams that the campaign names, wrench first."""
-        streams = (self.wrench, self.angle, self.rate, self.command, self.field, self.temperature)
+        streams = (
+            self.wrench,
+            self.angle,
+            self.rate,
+            self.command,
+            self.field,
+            self.temperature,
+            self.pointing,
+        )
         return tuple(stream for stream in streams if stream is not None)
 
     def channels(self) -> Mapping[str, tuple[str, ...]]:

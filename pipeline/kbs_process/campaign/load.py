@@ -183,6 +183,7 @@ def _topics(tree: Tree, rig: Rig) -> Topics:
         ),
         field=topic("field", "field", position, joints),
         temperature=topic("temperature", "temperature", ("temperature",), ("temperature",)),
+        pointing=topic("pointing", "pointing", position, joints),
     )
 
 

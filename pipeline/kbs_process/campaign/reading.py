@@ -11,7 +11,7 @@ from kbs_process.signals.records import Block, Loss, Run
 from kbs_process.stages.condense import CondenseSettings, condense
 
 # A recorder need not have these; everything else that the campaign names has to be there.
-OPTIONAL_STREAMS = frozenset({"field", "temperature"})
+OPTIONAL_STREAMS = frozenset({"field", "temperature", "pointing"})
 
 
 def read_run(campaign: Campaign, entry: RecordingEntry) -> Run:

@@ -10,6 +10,7 @@ import numpy as np
 from kbs_process.campaign import provenance
 from kbs_process.campaign.config import Campaign
 from kbs_process.campaign.mission import Day
+from kbs_process.campaign.pointing import estimate
 from kbs_process.campaign.reference_discussion import discussion
 from kbs_process.campaign.reference_sections import TORQUES, Assessed, Section, Verdict
 from kbs_process.campaign.tables import write_table
@@ -18,7 +19,6 @@ from kbs_process.mission.planner import Plan
 from kbs_process.report.records import reference_day as records
 from kbs_process.report.records.common import Conclusion, Constant, encode
 from kbs_process.signals.records import Array, Mask, Signal
-from kbs_process.stages.pointing import PointingStatistics
 from kbs_process.stages.to_cog import ASSUMPTION
 from kbs_process.stages.verdict import COVERAGE, judge
 
@@ -98,7 +98,7 @@ def write_results(
         ),
         sections=tuple(_section(section) for section in found.sections),
         requirements=judged,
-        boresight=tuple(_estimate(one) for one in found.whole),
+        boresight=tuple(estimate(one) for one in found.whole),
         discussion=discussion(campaign, found.sections),
         parameters=(*_constants(day), *provenance.constants(campaign.rig)),
         notes=NOTES,
@@ -117,8 +117,8 @@ def _section(section: Section) -> records.Section:
         ends_with=section.entry.until,
         modes=section.modes,
         greatest_rate=section.greatest_rate,
-        azimuth=_estimate(azimuth),
-        elevation=_estimate(elevation),
+        azimuth=estimate(azimuth),
+        elevation=estimate(elevation),
         torques=tuple(
             records.Torque(
                 band=one.band.name, label=one.label, value=one.value, axis=one.axis, time_s=one.time
@@ -135,20 +135,6 @@ def _section(section: Section) -> records.Section:
             comment=published.comment,
             end_s=section.entry.near,
         ),
-    )
-
-
-def _estimate(one: PointingStatistics) -> records.PointingEstimate:
-    return records.PointingEstimate(
-        axis=one.axis,
-        bias=one.bias,
-        bias_sigma=one.bias_sigma,
-        random=one.random,
-        random_sigma=one.random_sigma,
-        percentile=one.percentile,
-        percentile_sigma=one.percentile_sigma,
-        orbit=one.orbit,
-        greatest=one.greatest,
     )
 
 

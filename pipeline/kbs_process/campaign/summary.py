@@ -12,6 +12,7 @@ from kbs_process.campaign.config import Campaign
 from kbs_process.campaign.findings import Findings
 from kbs_process.campaign.methods import methods
 from kbs_process.campaign.notices import notices
+from kbs_process.campaign.pointing import recorded_pointing
 from kbs_process.plant.rigid import static_wrench
 from kbs_process.report import results
 from kbs_process.signals.records import WRENCH_CHANNELS, Signal
@@ -36,7 +37,6 @@ def summarise(
 ) -> results.Results:
     """Return the contents of results.json."""
     conventions = tuple(_conventions(campaign, analyses))
-    software = provenance.software()
     return results.Results(
         campaign=results.CampaignSummary(
             name=campaign.name,
@@ -46,15 +46,7 @@ def summarise(
             drive=campaign.drive,
         ),
         verdict=_conclusion(findings.requirements),
-        provenance=results.Provenance(
-            version=software["kbs-process"],
-            python=software["python"],
-            libraries=software["libraries"],
-            platform=software["platform"],
-            command=f"kbs-process {campaign.name}",
-            commit=software["commit"] or "",
-            inputs=tuple(results.InputFile(**entry) for entry in provenance.inputs(campaign)),
-        ),
+        provenance=provenance.made(f"kbs-process {campaign.name}", campaign),
         requirements=findings.requirements,
         warnings=tuple(notices(campaign, analyses, model, findings, conventions)),
         recordings=tuple(_recording(analysis) for analysis in analyses),
@@ -66,8 +58,9 @@ def summarise(
         merit=findings.merit,
         resonances=findings.resonances,
         budget=findings.budget,
+        pointing=tuple(recorded_pointing(analyses)),
         methods=methods(campaign, analyses, findings),
-        parameters=tuple(_constants(campaign)),
+        parameters=tuple(provenance.constants(campaign.rig)),
         notes=(ASSUMPTION,) if campaign.rig.spacecraft is not None else (),
     )
 
@@ -247,18 +240,3 @@ def _cross_coupling(analyses: Sequence[Analysis], decoupling: Decoupling) -> res
             for index, channel in enumerate(channels)
         ),
     )
-
-
-def _constants(campaign: Campaign) -> Iterable[results.Constant]:
-    for entry in provenance.parameters(campaign.rig):
-        yield results.Constant(
-            name=entry["name"],
-            value=_text(entry["value"]),
-            unit=entry["unit"],
-            sigma=_text(entry["sigma"]),
-            source=entry["source"],
-        )
-
-
-def _text(value: float | list[object]) -> float | str:
-    return value if isinstance(value, float) else ", ".join(str(x) for x in np.ravel(np.asarray(value)))

@@ -18,6 +18,7 @@ from kbs_process.report.records.common import Notice as Notice
 from kbs_process.report.records.common import Provenance as Provenance
 from kbs_process.report.records.common import Record as Record
 from kbs_process.report.records.common import encode as encode
+from kbs_process.report.records.pointing import RecordedPointing
 from kbs_process.report.records.transducer import OnTransducer
 
 SCHEMA_VERSION: Literal[1] = 1
@@ -292,6 +293,7 @@ class Results(Record, frozen=True, kw_only=True):
     resonances: tuple[Resonance, ...] = ()
     transducer: OnTransducer | None = None
     budget: tuple[Budget, ...] = ()
+    pointing: tuple[RecordedPointing, ...] = ()
     methods: str = ""  # paragraphs, separated by empty lines
     parameters: tuple[Constant, ...] = ()
     notes: tuple[str, ...] = ()  # assumptions to be said aloud: how torques were moved to S, for one

@@ -158,6 +158,7 @@ class Run:
     rates: dict[str, float] = dataclasses.field(default_factory=dict)  # Hz, measured, by stream
     losses: tuple[Loss, ...] = ()
     clocks: dict[str, Clock] = dataclasses.field(default_factory=dict)  # by stream
+    pointing: Signal | None = None  # angle of each joint by an external instrument, rad
 
     def with_wrench(self, wrench: Signal) -> Run:
         """Return the same run with another wrench."""

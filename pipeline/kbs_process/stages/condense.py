@@ -32,7 +32,7 @@ from kbs_process.stages.stream import Collected, Timeline, Uniform
 
 Progress = Callable[[str, int], None]  # stream, samples just taken
 
-SAMPLED = ("wrench", "angle", "rate")  # brought to the working rate; the first one present is the reference
+SAMPLED = ("wrench", "angle", "rate", "pointing")  # brought to the working rate; the first one present is the reference
 SLOW = ("command", "field", "temperature")  # kept sample by sample: one a control cycle, or slower
 DOUBT = 1e-3  # largest weight of invented samples in a valid one
 
@@ -113,6 +113,7 @@ def condense(
         rates={key: line.grid.rate for key, line in present.items() if line.grid is not None},
         losses=(*_losses(present, clocks), *(_missing(s.line) for s in slow.values() if not s.line.samples)),
         clocks=clocks,
+        pointing=signals.get("pointing"),
     )
 
 
@@ -147,7 +148,7 @@ def _stream(name: str, key: str, columns: tuple[str, ...], settings: CondenseSet
         where,
         columns,
         settings.working_rate_Hz,
-        unwrap=angle,
+        unwrap=key != "rate",
         keep_below=settings.encoder_limit_Hz if angle else 0.0,
     )
 
@@ -187,7 +188,7 @@ def _signal(key: str, kept: Kept, columns: tuple[str, ...], clock: Clock, dt: fl
 def _meaning(key: str, columns: tuple[str, ...]) -> tuple[tuple[str, ...], str]:
     if key == "wrench":
         return tuple(WRENCH_UNITS[WRENCH_CHANNELS.index(channel)] for channel in columns), "T"
-    return ("rad" if key == "angle" else "rad/s",) * len(columns), "joint"
+    return ("rad/s" if key == "rate" else "rad",) * len(columns), "joint"
 
 
 def _story(kept: Kept, clock: Clock, dt: float) -> str:

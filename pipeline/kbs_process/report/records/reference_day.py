@@ -5,20 +5,7 @@ from __future__ import annotations
 from typing import Literal
 
 from kbs_process.report.records.common import Conclusion, Constant, Notice, Provenance, Record, Status
-
-
-class PointingEstimate(Record, frozen=True, kw_only=True):
-    """Pointing error of one axis over a stretch of time; a sigma is that of the estimate before it."""
-
-    axis: str
-    bias: float
-    bias_sigma: float
-    random: float  # 2 sigma about the bias
-    random_sigma: float
-    percentile: float  # 95 % of the magnitude
-    percentile_sigma: float
-    orbit: float  # slow part: half its range within any one orbit
-    greatest: float
+from kbs_process.report.records.pointing import PointingEstimate
 
 
 class PublishedSection(Record, frozen=True, kw_only=True):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from kbs_process.report.figures import pointing
 from kbs_process.report.figures import reference_day as figures
 from kbs_process.report.panel import Block, Caption, Figure, Fold, Panel, Picture
 from kbs_process.report.records.reference_day import ReferenceDayResults, Section
@@ -52,5 +53,5 @@ def _densities(table: Table, section: Section) -> tuple[Picture, ...]:
     inside = np.logical_and(table.valid, (t >= section.start_s) & (t < section.end_s))
     found = (("azimuth", "az", section.azimuth), ("elevation", "el", section.elevation))
     return (
-        figures.distributions([(name, table.columns[column][inside], one) for name, column, one in found]),
+        pointing.distributions([(name, table.columns[column][inside], one) for name, column, one in found]),
     )

@@ -6,7 +6,8 @@ import numpy as np
 
 from kbs_process.report.figures import reference_day as figures
 from kbs_process.report.panel import Block, Caption, Figure, Grid, Panel, Text
-from kbs_process.report.records.reference_day import PointingEstimate, ReferenceDayResults, Section
+from kbs_process.report.records.pointing import PointingEstimate
+from kbs_process.report.records.reference_day import ReferenceDayResults, Section
 from kbs_process.report.tables import Tables
 from kbs_process.report.text import MISSING, measure, number
 
