@@ -193,10 +193,14 @@ def _sensitivities(
     """Move every uncertain number of the rig by a sigma; those of a quantity add in squares."""
     rig = campaign.rig
 
-    def factor(other: Rig) -> float:
-        return stability.critical(_system(campaign, other, joint, angle), controller).factor
+    nominal = stability.critical(_system(campaign, rig, joint, angle), controller).factor
+    if not np.isfinite(nominal):
+        return ()
 
-    nominal, found = factor(rig), []
+    def factor(other: Rig) -> float:
+        return stability.critical_near(_system(campaign, other, joint, angle), controller, nominal)
+
+    found = []
     for name, quantity in rig.quantities().items():
         if name.split(".")[0] not in ("body", "joint", "transducer") or not np.any(quantity.sigma > 0.0):
             continue

@@ -22,6 +22,7 @@ from kbs_process.signals.grid import overlap
 from kbs_process.signals.records import WRENCH_CHANNELS, WRENCH_UNITS, Array, Run, Signal
 from kbs_process.stages import bandpass
 from kbs_process.stages.bandpass import UNFILTERED
+from kbs_process.stages.budget import sensor_noise
 from kbs_process.stages.condense import CondenseSettings
 from kbs_process.stages.motion import estimate
 from kbs_process.stages.resonance import Transmitted, amplification, filter_errors, transmit
@@ -170,6 +171,10 @@ def _agreement(campaign: Campaign, analysis: Analysis, found: Transmitted) -> It
         modal, rigid = bandpass.apply(found.read, band), bandpass.apply(found.rigid, band)
         coupled, modal, rigid = overlap(coupled, modal, rigid)
         valid = coupled.valid & modal.valid
+        bandwidth = bandpass.noise_bandwidth(band, coupled.dt)
+        noise = sensor_noise(
+            campaign.rig.transducer.noise.value, analysis.run.rates["wrench"], bandwidth
+        ).sigma
         for channel, unit in zip(coupled.channels, coupled.units, strict=True):
             one, other = coupled.column(channel)[valid], modal.column(channel)[valid]
             yield BothWays(
@@ -180,6 +185,7 @@ def _agreement(campaign: Campaign, analysis: Analysis, found: Transmitted) -> It
                 modal_rms=_rms(other),
                 rigid_rms=_rms(rigid.column(channel)[valid]),
                 difference_rms=_rms(one - other),
+                noise_rms=float(noise[WRENCH_CHANNELS.index(channel)]),
             )
 
 

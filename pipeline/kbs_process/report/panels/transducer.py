@@ -162,7 +162,16 @@ def _error_table(results: Results, found: OnTransducer, frame: str) -> Grid:
 
 
 def _agreement_table(results: Results, found: OnTransducer) -> Grid:
-    head = ("Band", "Channel", "Coupled rms", "Modal rms", "Rigid rms", "Coupled less modal", "Relative")
+    head = (
+        "Band",
+        "Channel",
+        "Coupled rms",
+        "Modal rms",
+        "Rigid rms",
+        "Coupled less modal",
+        "of the coupled",
+        "of the noise",
+    )
     rows = tuple(
         (
             band_label(results, e.band),
@@ -172,10 +181,12 @@ def _agreement_table(results: Results, found: OnTransducer) -> Grid:
             number(e.rigid_rms),
             number(e.difference_rms),
             percent(e.difference_rms / e.coupled_rms if e.coupled_rms > 0.0 else None, 2),
+            percent(e.difference_rms / e.noise_rms if e.noise_rms > 0.0 else None, 2),
         )
         for e in found.agreement
     )
-    return Grid(f"Both ways, {frame_label('T')}", head, rows, "kkrrrrr", f"Modes: {found.source}.")
+    note = f"Modes: {found.source}. Noise: the sensor's, in the band; a difference far below it cannot be measured."
+    return Grid(f"Both ways, {frame_label('T')}", head, rows, "kkrrrrrr", note)
 
 
 def _mode_table(found: OnTransducer) -> Grid:

@@ -56,6 +56,7 @@ class BothWays(Record, frozen=True, kw_only=True):
     modal_rms: float
     rigid_rms: float
     difference_rms: float  # coupled less modal
+    noise_rms: float  # of the sensor in this band
 
 
 class OnTransducer(Record, frozen=True, kw_only=True):
