@@ -137,7 +137,7 @@ def radius(loop: Loop) -> float:
 
 
 def critical_near(system: Linear, controller: Controller, factor: float) -> float:
-    """Return the critical factor of a system little different from one that has `factor`: as `critical`, but quicker."""
+    """Return the critical factor of a system little different from one that has `factor`, faster than `critical`."""
 
     def excess(logarithm: float) -> float:
         tried = float(np.exp(logarithm))
