@@ -33,7 +33,15 @@ FAULTS = {
     ),
     "band beyond the bands": (CAMPAIGN, "band_Hz = [0.01, 1.0]", "band_Hz = [0.01, 5.0]", ["beyond", "0.01 to 2 Hz"]),
     "empty band": (CAMPAIGN, "band_Hz = [0.01, 1.0]", "band_Hz = [1.0, 0.01]", ["is empty"]),
-    "rate too low": (CAMPAIGN, "working_rate_Hz = 20.0", "working_rate_Hz = 3.0", ["half the working rate"]),
+    "lower edge that no band has": (
+        CAMPAIGN,
+        "band_Hz = [0.01, 1.0]",
+        "band_Hz = [0.5, 1.0]",
+        ["requirement[1].band_Hz", "[0.5, 1] is not cut", "0.01 to 1 Hz and 0.01 to 2 Hz"],
+    ),
+    "upper edge that no band has": (CAMPAIGN, "band_Hz = [0.01, 1.0]", "band_Hz = [0.01, 1.5]", ["is not cut"]),
+    "rate too low": (CAMPAIGN, "working_rate_Hz = 20.0", "working_rate_Hz = 3.0", ["2 Hz is above 1.2 Hz"]),
+    "band in the flank of the decimation": (CAMPAIGN, "[1.0, 2.0]", "[1.0, 9.5]", ["9.5 Hz is above 8 Hz"]),
     "repeat twice": (CAMPAIGN, "repeat = 3", "repeat = 2", ["run 2 of EL089P00 is 'EL089P00_2' already"]),
     "recording twice": (CAMPAIGN, "EL089P00_3.mcap", "EL089P00_2.mcap", ["called 'EL089P00_2' too"]),
     "missing recording": (

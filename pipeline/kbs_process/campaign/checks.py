@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import isclose
 from pathlib import Path
 
 from kbs_process.campaign.config import Campaign, RecordingEntry
@@ -11,6 +12,8 @@ from kbs_process.campaign.provenance import sha256
 from kbs_process.errors import did_you_mean
 from kbs_process.plant.effects import CATALOGUE
 from kbs_process.rig.model import Joint
+
+_KEPT = 0.4  # of the working rate: decimation changes nothing below (stages.resample)
 
 
 def check_campaign(
@@ -97,10 +100,9 @@ def _check_bands(campaign: Campaign, document: Document, problems: Problems) -> 
     if bands.low_pass[0] <= bands.high_pass:
         what = f"{bands.low_pass[0]:g} Hz is not above the high-pass, {bands.high_pass:g} Hz"
         problems.add(place, what, "give greater edges, or lower high_pass_Hz")
-    if bands.low_pass[-1] >= bands.working_rate / 2.0:
-        what = (
-            f"{bands.low_pass[-1]:g} Hz is not below half the working rate, {bands.working_rate / 2.0:g} Hz"
-        )
+    if bands.low_pass[-1] > _KEPT * bands.working_rate:
+        kept = f"{_KEPT * bands.working_rate:g} Hz"
+        what = f"{bands.low_pass[-1]:g} Hz is above {kept}, up to which the working rate keeps everything"
         problems.add(place, what, "raise working_rate_Hz (10 times the greatest edge is plenty)")
     for index, requirement in enumerate(campaign.requirements):
         low, high = requirement.band
@@ -110,6 +112,10 @@ def _check_bands(campaign: Campaign, document: Document, problems: Problems) -> 
         elif low < bands.high_pass or high > bands.low_pass[-1]:
             wide = f"{bands.high_pass:g} to {bands.low_pass[-1]:g} Hz"
             problems.add(place, f"reaches beyond the [bands], {wide}", "widen the bands, or narrow this one")
+        elif not isclose(low, bands.high_pass) or not any(isclose(high, edge) for edge in bands.low_pass):
+            cut = " and ".join(f"{bands.high_pass:g} to {edge:g} Hz" for edge in bands.low_pass)
+            what = f"[{low:g}, {high:g}] is not cut, only {cut}: what is judged would not be what is stated"
+            problems.add(place, what, "state one of these bands, or change high_pass_Hz or low_pass_Hz")
         if requirement.frame == "S" and campaign.rig.spacecraft is None:
             place = document.place(("requirement", index, "frame"))
             what = '"S" needs to know where the spacecraft\'s centre of mass is'
