@@ -118,11 +118,13 @@ def against_published(sections: Sequence[Section]) -> Picture:
             axis.bar(place - 0.2, ours, 0.38, yerr=2.0 * np.array(sigma), color=draw.MEASURED, label="simulated, ± 2 σ",
                      error_kw={"elinewidth": 0.8, "capsize": 1.5, "ecolor": draw.INK})  # fmt: skip
             axis.bar(place + 0.2, theirs, 0.38, color=draw.PREDICTED, label="published")
-            axis.set_ylim(bottom=0.0)
             axis.set_xticks(place, [section.name for section in sections])
             axis.grid(visible=False, axis="x")
             axis.set_title(which)
             axis.set_xlabel("section")
+        figure.axes[0].set_ylim(
+            bottom=0.0
+        )  # shared; an error of a statistic may be greater than the statistic
         figure.axes[0].set_ylabel("95 % error / mdeg")
         figure.axes[0].legend(loc="upper left", fontsize=6.5)
         return draw.picture(figure, "95 % of the pointing error of each section, simulated and published")
