@@ -1,11 +1,19 @@
 """What processes a campaign cannot know how it was made: neither by its code nor by the files that it opens."""
 
 import ast
+import re
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
+from typing import IO
 
 import pytest
+from mcap.exceptions import EndOfFile
+from mcap.records import Attachment, Channel, Header, McapRecord, Metadata
+from mcap.stream_reader import StreamReader
+
+from engine.campaigns import CAMPAIGNS
 
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "pipeline" / "kbs_process"
@@ -72,3 +80,55 @@ def test_processing_opens_nothing_but_the_campaign(tmp_path: Path):
     strays = [path for path in below if not any(path.is_relative_to(place) for place in allowed)]
     assert campaign / "campaign.toml" in below
     assert not strays
+
+
+def numbers_of_truth() -> set[str]:
+    """Every number that was drawn, as it is written in the truth files, where it has enough digits to be known by."""
+    texts = (path.read_text() for path in (ROOT / "tests" / "archive" / "truth").glob("*.json"))
+    found = {number for text in texts for number in re.findall(r"-?\d\.\d+(?:e-?\d+)?", text)}
+    return {number.lstrip("-") for number in found if len(number) > 12}
+
+
+@pytest.mark.parametrize("name", CAMPAIGNS)
+def test_campaign_folders_hold_what_a_bench_gives_and_no_more(name: str):
+    """Description, parameters, recordings: no other file, no hint of an engine, seed or truth, no number drawn."""
+    folder = ROOT / "campaigns" / name
+    recordings = {f"recordings/{run.file}" for run in CAMPAIGNS[name].runs}
+    others = {
+        path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()
+    } - recordings
+    assert "campaign.toml" in others
+    assert all(re.fullmatch(r"campaign\.toml|parameters/\w+\.(toml|csv|json)", other) for other in others), (
+        others
+    )
+    drawn = numbers_of_truth()
+    assert len(drawn) > 300
+    for other in others:
+        text = (folder / other).read_text()
+        assert not re.search(r"truth|seed|mujoco|engine that|simulat|synthetic", text, re.IGNORECASE), other
+        assert not {number.lstrip("-") for number in re.findall(r"-?\d\.\d+(?:e-?\d+)?", text)} & drawn, other
+
+
+@pytest.mark.parametrize("name", CAMPAIGNS)
+def test_recordings_carry_nothing_beside_their_messages(name: str):
+    """No attachments or metadata, one library's name, topics in one order: nothing tells one campaign from another."""
+    for run in CAMPAIGNS[name].runs:
+        path = ROOT / "campaigns" / name / "recordings" / run.file
+        topics = []
+        with path.open("rb") as file:
+            for record in records(file):
+                assert not isinstance(record, Attachment | Metadata), run.file
+                if isinstance(record, Header):
+                    assert record.library == "kbs engine", run.file
+                if isinstance(record, Channel):
+                    assert record.metadata == {}, run.file
+                    topics.append(record.topic)
+        assert topics[:4] == ["/transducer/wrench", "/encoder", "/command", "/motor/field"], run.file
+
+
+def records(file: IO[bytes]) -> Iterator[McapRecord]:
+    """Every record up to where the recorder lost power."""
+    try:
+        yield from StreamReader(file).records
+    except EndOfFile:
+        return

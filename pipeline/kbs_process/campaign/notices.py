@@ -65,15 +65,22 @@ def _losses(analyses: Sequence[Analysis]) -> Iterable[results.Notice]:
         if kinds:
             yield results.Notice(
                 severity="warning",
-                what="; ".join(f"{kind}: {_extent(losses)}" for kind, losses in kinds.items()),
+                what="; ".join(
+                    f"{kind}: {_extent(losses, analysis.entry.path.name)}" for kind, losses in kinds.items()
+                ),
                 where=analysis.entry.name,
                 remedy=f"kbs-process inspect recordings/{analysis.entry.path.name} lists each with its time",
             )
 
 
-def _extent(losses: Sequence[Loss]) -> str:
-    """How many, and from when to when: "3, between 12.0 s and 14.2 s"."""
-    count = str(sum(max(loss.count, 1) for loss in losses))
+def _extent(losses: Sequence[Loss], file: str) -> str:
+    """How many, and from when to when: "3, between 12.0 s and 14.2 s".
+
+    What the reader of the file found and a stage behind it found again counts once.
+    """
+    by_reader = sum(max(loss.count, 1) for loss in losses if loss.where.startswith(file))
+    behind_it = sum(max(loss.count, 1) for loss in losses if not loss.where.startswith(file))
+    count = str(max(by_reader, behind_it))
     starts = [loss.start_s for loss in losses if loss.start_s is not None]
     ends = [loss.end_s for loss in losses if loss.end_s is not None]
     if not starts:

@@ -1,0 +1,39 @@
+"""EL089's description with recordings of twenty seconds: the whole way takes a moment."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from campaign.campaign_folder import CampaignFolder, make_folder
+from kbs_process.ingest.encoding import OutStream
+from kbs_process.ingest.writer import write_mcap
+
+JOINTS = ("az", "el")
+
+
+def short_campaign(target: Path) -> CampaignFolder:
+    """Make the campaign's folder."""
+    folder = make_folder(target)
+    for path in (folder.path / "recordings").iterdir():
+        record(path)
+    return folder
+
+
+def record(path: Path, *, moving: bool = True) -> None:
+    """Write twenty seconds: elevation at rest, or swinging; a wrench that is constant."""
+    stamp = np.arange(2000) * 10_000_000
+    cycle = stamp[::10]
+    swing = 0.1 * np.sin(0.5 * stamp * 1e-9) if moving else np.zeros(len(stamp))
+    angle = np.stack([np.zeros(len(stamp)), 1.3 + swing], axis=1)
+    command = np.concatenate([angle[::10], np.gradient(angle[::10], 0.1, axis=0)], axis=1)
+    wrench = np.tile([0.0, 0.0, -274.0, -6.0, 5.0, 0.0], (len(stamp), 1))
+    write_mcap(
+        path,
+        [
+            OutStream("/transducer/wrench", "wrench", stamp, stamp, wrench),
+            OutStream("/encoder", "joints", stamp, stamp, angle, JOINTS),
+            OutStream("/command", "joints", cycle, cycle, command, JOINTS),
+        ],
+    )
