@@ -148,3 +148,16 @@ def test_a_low_pass_alone_is_over_in_seconds() -> None:
     said = statement(Band("lp", None, 1.0), DT, 4000)
     assert said.edge_error < 1e-3 and 1.0 < said.flagged_s < 4.0
     assert edge_seconds(UNFILTERED, DT) == 0.0
+
+
+def test_what_was_invented_in_a_gap_leaks_nowhere():
+    rng = np.random.default_rng(5)
+    x = rng.normal(size=(4000, 1))
+    valid = np.ones(4000, dtype=bool)
+    valid[2000:2100] = False
+    valid[3500:] = False  # to the end: a stream that stopped
+    wild = np.where(valid[:, None], x, 300.0)
+    y, clean = apply(signal(wild, valid), BELOW_1), apply(signal(x, valid), BELOW_1)
+    np.testing.assert_allclose(y.values[y.valid], clean.values[clean.valid], atol=1e-9)
+    whole = apply(signal(x), BELOW_1)
+    assert np.abs(y.values - whole.values)[y.valid].max() < 0.3 * whole.values.std()

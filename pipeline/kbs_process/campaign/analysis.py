@@ -9,6 +9,7 @@ import numpy as np
 
 from kbs_process.campaign.config import Bands, Campaign, RecordingEntry
 from kbs_process.campaign.predicting import predict_run
+from kbs_process.campaign.settings import motion_settings
 from kbs_process.plant.rigid import static_wrench
 from kbs_process.signals.records import WRENCH_CHANNELS, Run, Signal
 from kbs_process.stages import bandpass, gravity
@@ -71,6 +72,7 @@ def analyse(
     residual = wrench.derive(
         model.without_coupling(wrench.values - static.wrench.values),
         "fitted static wrench and the fitted rest of the cross-coupling removed",
+        valid=wrench.valid & static.wrench.valid,
     )
     predicted = disturbance = None
     if entry.role != "calibration":
@@ -104,7 +106,7 @@ def _predict(
     settings = CondenseSettings(working_rate_Hz=campaign.bands.working_rate)
     predicted = predict_run(model.rig, campaign.effects, run, settings, update)
     total = _wrench(predicted)
-    angles = estimate(predicted, model.rig)
+    angles = estimate(predicted, model.rig, motion_settings(campaign))
     static = static_wrench(model.rig, angles.q)
     left = total.derive(total.values - static, "static wrench of the plant removed")
     return predicted, select(left, _wrench(run).channels)

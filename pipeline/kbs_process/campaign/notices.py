@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
 
+import numpy as np
+
 from kbs_process.campaign.analysis import Analysis, bands_of
 from kbs_process.campaign.config import Campaign
 from kbs_process.campaign.findings import Findings
@@ -21,6 +23,8 @@ NEXT_TO = 4.0
 WEAK = 0.5
 # Repeats with less signal than this many times their noise are dominated by noise.
 NOISY = 1.0
+# Samples: where fewer are missing together, and at the ends of every record, nothing is lost that matters.
+UNJUDGED = 40
 # Characters of a check's detail that a notice quotes.
 LONG = 160
 QUANTITY = {"torque": "T", "force": "F"}  # first letter of its channels
@@ -36,6 +40,7 @@ def notices(
     """Yield everything worth a notice, worst first."""
     yield from _conventions(conventions)
     yield from _losses(analyses)
+    yield from _unjudged(analyses)
     yield from _static_load(campaign, analyses, model)
     yield from _fit(model)
     yield from _taring(analyses)
@@ -70,6 +75,24 @@ def _losses(analyses: Sequence[Analysis]) -> Iterable[results.Notice]:
                 ),
                 where=analysis.entry.name,
                 remedy=f"kbs-process inspect recordings/{analysis.entry.path.name} lists each with its time",
+            )
+
+
+def _unjudged(analyses: Sequence[Analysis]) -> Iterable[results.Notice]:
+    """Stretches of a recording in which the disturbance is not known, and so in no figure."""
+    for analysis in analyses:
+        residual = analysis.residual
+        edges = np.flatnonzero(np.diff(np.concatenate(([True], residual.valid, [True])).astype(np.int8)))
+        stretches = [stretch for stretch in edges.reshape(-1, 2) if np.diff(stretch)[0] > UNJUDGED]
+        if stretches:
+            start, stop = max(stretches, key=lambda stretch: float(stretch[1] - stretch[0]))
+            lost = sum(float(end - begin) for begin, end in stretches) * residual.dt
+            yield results.Notice(
+                severity="warning",
+                what=f"{lost:.1f} s of {len(residual) * residual.dt:.0f} s are in no figure: wrench or angles are "
+                f"missing, longest from {residual.t[start]:.1f} s to {residual.t[stop - 1]:.1f} s",
+                where=analysis.entry.name,
+                remedy="what the article did in that time is not judged: record it again",
             )
 
 

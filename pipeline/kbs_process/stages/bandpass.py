@@ -13,6 +13,7 @@ from kbs_process.stages.lowfrequency import METHOD, high_pass, high_pass_gain
 
 ORDER = 4  # of the low-pass, run forwards and backwards
 TOLERANCE = 1e-3  # an edge ends where the error is this part of the signal's rms
+NEAR = 1.0  # s on either side of invalid samples, whose means a straight line joins
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,15 +79,35 @@ def crossing_rate(band: Band, dt: float) -> float:
 def apply(signal: Signal, band: Band) -> Signal:
     """Return the signal's part in the band; samples that lean on unknown ones by more than 0.1 % are flagged.
 
-    The high-pass comes first: the low-pass then has no trend left to continue beyond the ends.
+    Invalid samples are bridged before anything is filtered: what was invented there, such as a static wrench of angles
+    that were not recorded, would leak into samples around it for as long as the high-pass remembers. The high-pass
+    comes first: the low-pass then has no trend left to continue beyond the ends.
     """
-    values, valid = signal.values, signal.valid
+    valid = signal.valid
+    values = signal.values if band == UNFILTERED else _bridged(signal.values, valid, signal.dt)
     if band.high_pass_Hz is not None:
         values = high_pass(values, band.high_pass_Hz, signal.dt)
     if band.low_pass_Hz is not None:
         values = _low_pass(values, band.low_pass_Hz, signal.dt)
         valid = _known(valid, band.low_pass_Hz, signal.dt)
     return signal.derive(values, _step(band), valid=valid)
+
+
+def _bridged(values: Array, valid: Mask, dt: float) -> Array:
+    """Replace runs of invalid samples by straight lines between the means of the valid ones near them.
+
+    At the ends of a record, and where one side has none, by the mean of the other.
+    """
+    if valid.all() or not valid.any():
+        return values
+    bridged = values.copy()
+    reach = max(1, round(NEAR / dt))
+    ends = np.flatnonzero(np.diff(np.concatenate(([True], valid, [True])).astype(np.int8)))
+    for start, stop in ends.reshape(-1, 2):
+        sides = [slice(max(start - reach, 0), start), slice(stop, stop + reach)]
+        means = [values[side][valid[side]].mean(axis=0) for side in sides if valid[side].any()]
+        bridged[start:stop] = np.linspace(means[0], means[-1], stop - start + 2)[1:-1]
+    return bridged
 
 
 def _step(band: Band) -> str:
