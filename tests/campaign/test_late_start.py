@@ -1,0 +1,66 @@
+"""A recording that was started late: the prediction is that of the whole run, not of a plant thrown into motion."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from campaign.campaign_folder import EXAMPLE
+from kbs_process.campaign.load import load_campaign
+from kbs_process.campaign.predicting import LEAD, approached
+from kbs_process.plant.predict import predict
+from kbs_process.plant.schedule import Schedule
+
+RATE = np.radians(0.3)
+
+
+def slew(duration: float = 40.0) -> Schedule:
+    """Rest, a ramp of ten seconds, then a constant rate."""
+    t = 0.1 * np.arange(round(duration / 0.1))
+    ramp = np.clip(t - 2.0, 0.0, 10.0)
+    angle = RATE * (ramp**2 / 20.0 + np.clip(t - 12.0, 0.0, None))
+    position = np.stack([np.zeros(len(t)), 1.2 + angle], axis=1)
+    return Schedule(t, position, np.gradient(position, 0.1, axis=0), field=100.0 * position)
+
+
+def late(schedule: Schedule, start: float) -> Schedule:
+    kept = schedule.t >= start - 1e-9
+    return Schedule(
+        schedule.t[kept] - start, *(x[kept] for x in (schedule.position, schedule.rate, schedule.field))
+    )
+
+
+def test_what_preceded_is_smooth_and_ends_where_the_recording_begins() -> None:
+    given = replace(late(slew(), 20.0), encoder=late(slew(), 20.0).position)
+    whole = approached(given)
+    lead = len(whole.t) - len(given.t)
+    assert whole.t[0] == pytest.approx(-2.0 * LEAD)
+    for name in ("t", "position", "rate", "field", "encoder"):
+        np.testing.assert_array_equal(getattr(whole, name)[lead:], getattr(given, name))
+    speed = np.diff(whole.position[:, 1]) / 0.1
+    assert abs(speed[0]) < 0.02 * RATE
+    assert speed[lead - 50 : lead + 50] == pytest.approx(RATE)
+    assert np.abs(np.diff(speed)).max() < 0.011 * RATE
+    np.testing.assert_allclose(whole.field, 100.0 * whole.position)
+    np.testing.assert_allclose(whole.encoder, whole.position)
+    np.testing.assert_allclose(whole.rate[1:lead, 1], speed[: lead - 1], atol=0.011 * RATE)
+
+
+def test_a_recording_that_begins_at_rest_is_left_alone() -> None:
+    given = slew()
+    assert approached(given) is given
+
+
+def test_late_recording_is_predicted_as_the_whole_one() -> None:
+    campaign = load_campaign(EXAMPLE, checksums=False)
+
+    def wrench(schedule: Schedule, duration: float) -> np.ndarray:
+        settings = {"rate_Hz": 100.0, "angle_rate_Hz": 10.0, "duration_s": duration}
+        blocks = predict(campaign.rig, campaign.effects, schedule, **settings)
+        return np.concatenate([block.values for key, block in blocks if key == "wrench"])
+
+    whole, cut = wrench(slew(), 40.0)[2500:], late(slew(), 25.0)
+    assert np.ptp(wrench(cut, 15.0)[:500, 4] - whole[:500, 4]) > 0.2  # N m, of a slew that makes 0.06
+    assert np.ptp(wrench(approached(cut), 15.0)[:, 4] - whole[:, 4]) < 0.02
