@@ -10,6 +10,7 @@ import numpy as np
 from kbs_process.campaign.analysis import Analysis, bands_of, passband
 from kbs_process.campaign.config import Campaign
 from kbs_process.report import results
+from kbs_process.rig.model import Amplifier
 from kbs_process.signals.records import WRENCH_CHANNELS, Array, Signal
 from kbs_process.stages import bandpass, budget, gravity_error
 from kbs_process.stages.bandpass import Band, BandStatement
@@ -79,7 +80,7 @@ def _entries(
         sensor,
         budget.cross_coupling(cut(analysis.run.wrench), decoupling.sigma),
         *gravity_error.entries(analysis.motion, analysis.static, model, cut),
-        budget.clock(analysis.static.wrench, _clock_sigma(analysis), cut),
+        budget.clock(analysis.static.wrench, _late_sigma(analysis, campaign.rig.transducer.amplifier), cut),
         budget.filter_edges(measured, stated.edge_error),
         budget.resonance(measured, resonance, limits),
     ]
@@ -88,10 +89,14 @@ def _entries(
     return entries
 
 
-def _clock_sigma(analysis: Analysis) -> float:
+def _late_sigma(analysis: Analysis, amplifier: Amplifier | None) -> float:
+    """How well it is known when angles and wrench belong together, s: their clocks, and the amplifier's delay."""
     clock = analysis.run.clocks.get("angle") or analysis.run.clocks.get("rate")
-    sigma = 0.0 if clock is None else float(np.hypot(clock.sigma_offset_s, clock.latency_s))
-    return sigma if np.isfinite(sigma) else 0.0
+    known = 0.0 if clock is None else float(np.hypot(clock.sigma_offset_s, clock.latency_s))
+    known = known if np.isfinite(known) else 0.0
+    if amplifier is None:
+        return known
+    return float(np.hypot(known, amplifier.delay * float(amplifier.corner.sigma) / float(amplifier.corner)))
 
 
 def _repeat_noise(

@@ -58,7 +58,7 @@ def cross_coupling(wrench: Signal, sigma: Array) -> Entry:
 def clock(static: Signal, sigma_s: float, band: Filter) -> Entry:
     """Error of the static model evaluated `sigma_s` s early or late: its time derivative times that."""
     slope = static.derive(np.gradient(static.values, static.dt, axis=0) * sigma_s, "time derivative")
-    return Entry("clocks", "encoder against transducer clock", rms(band(slope)))
+    return Entry("clocks", "encoder against transducer: clocks, amplifier's delay", rms(band(slope)))
 
 
 def repeatability(noise_rms: Array, explained: Array) -> Entry:
