@@ -16,7 +16,7 @@ from typing import Any
 
 import numba
 
-from kbs_process.plant import kernels
+from kbs_process.plant import elementary, kernels
 from kbs_process.plant.generate import module_text
 from kbs_process.plant.structure import Structure
 
@@ -60,7 +60,7 @@ def cache_folder() -> Path:
 
 def _fingerprint(text: str, structure: Structure) -> str:
     """Hash everything that decides the machine code: numba does not notice edits in imported files."""
-    modules = [kernels, *(inspect.getmodule(effect.equation) for effect in structure.effects)]
+    modules = [elementary, kernels, *(inspect.getmodule(effect.equation) for effect in structure.effects)]
     sources = [inspect.getsource(module) for module in modules if module is not None]
     parts = [text, *sources, numba.__version__, sys.version]
     return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:24]

@@ -8,7 +8,7 @@ import numpy as np
 
 from kbs_process.errors import SimulationError
 from kbs_process.plant.compile import Compiled
-from kbs_process.plant.generate import state_layout
+from kbs_process.plant.stepping import state_layout
 from kbs_process.plant.structure import JOINTS, MICROSTEP, RATIO, Structure
 from kbs_process.signals.records import Array
 

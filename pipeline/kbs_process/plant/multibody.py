@@ -54,8 +54,8 @@ def _place(structure: Structure) -> list[str]:
     ]
     for j, parent in enumerate(structure.parents):
         k = joint_offset(structure, j)
-        axis, origin = f"triple(p, {k + AXIS})", f"triple(p, {k + ORIGIN})"
-        rotation = f"joint_rotation(p, {k + TURN}, q_{j})"
+        axis, origin = f"triple(p, int({k + AXIS}))", f"triple(p, int({k + ORIGIN}))"
+        rotation = f"joint_rotation(p, int({k + TURN}), q_{j})"
         if parent >= 0:
             axis, rotation = f"rotate(R_{parent}, {axis})", f"chain(R_{parent}, {rotation})"
             origin = f"add3(o_{parent}, rotate(R_{parent}, {origin}))"
@@ -64,7 +64,7 @@ def _place(structure: Structure) -> list[str]:
             f"    a_{j} = {axis}",
             f"    o_{j} = {origin}",
             f"    S_{j} = screw(a_{j}, o_{j})",
-            f"    I_{j} = placed(inertia(p, {k + LINK}), R_{j}, o_{j})",
+            f"    I_{j} = placed(inertia(p, int({k + LINK})), R_{j}, o_{j})",
         ]
     return [*lines, f"    return {unrolled('a_#, S_#, I_#', n)}"]
 
@@ -78,7 +78,7 @@ def _base(structure: Structure) -> list[str]:
         '    """Gravity (m/s^2) and the moment of stiffness and damping on the plate (N m), in its axes."""',
         "    rates = plate_rates(alpha, omega)",
         f"    moment = plate_moment(alpha, ({', '.join(springs)}))",
-        f"    return in_plate(alpha, triple(p, {GRAVITY})), moment",
+        f"    return in_plate(alpha, triple(p, int({GRAVITY}))), moment",
     ]
 
 
@@ -90,14 +90,15 @@ def _accelerate(structure: Structure) -> list[str]:
         "def accelerate(",
         "    alpha, omega,",
         *[f"    {unrolled(pattern, n)}," for pattern in given],
-        "    p,",
+        "    guess, yields, p,",
         "):",
         '    """Accelerations of plate and joints, and the wrench on the transducer, force first.',
         "",
-        "    `out` is the torque on a joint's output, `drag` the rate of its rotor's momentum.",
+        "    `out` is the torque on a joint's output, `drag` the rate of its rotor's momentum. `out` and `alpha` go",
+        "    with the accelerations `guess`; the torques fall by `yields` for each unit that the true ones are above.",
         '    """',
         "    g, moment = base(alpha, omega, p)",
-        f"    I_T = inertia(p, {PLATE})",
+        f"    I_T = inertia(p, int({PLATE}))",
         "    V_T = (omega[0], omega[1], omega[2], 0.0, 0.0, 0.0)",
         "    A_T = (0.0, 0.0, 0.0, -g[0], -g[1], -g[2])",
         "    F_T = add6(momentum(I_T, A_T), cross_force(V_T, momentum(I_T, V_T)), 1.0)",
@@ -144,10 +145,12 @@ def _solve(structure: Structure) -> list[str]:
     for j in range(size):
         for i in range(j, size):
             terms = "".join(f" - l{i}{m} * l{j}{m} * d{m}" for m in range(j))
-            value = f"{_mass(structure, i, j)}{terms}"
+            soft = f" + yields[{i + 3 - base}]" if i == j else ""
+            value = f"{_mass(structure, i, j)}{soft}{terms}"
             lines.append(f"    d{j} = {value}" if i == j else f"    l{i}{j} = ({value}) / d{j}")
     for i in range(size):
         right = f"moment[{i}] - F_T[{i}]" if i < base else f"b_{i - base}"
+        right += f" + yields[{i + 3 - base}] * guess[{i + 3 - base}]"
         lines.append(f"    x{i} = {right}" + "".join(f" - l{i}{m} * x{m}" for m in range(i)))
     for i in reversed(range(size)):
         lines.append(f"    x{i} = x{i} / d{i}" + "".join(f" - l{m}{i} * x{m}" for m in range(i + 1, size)))

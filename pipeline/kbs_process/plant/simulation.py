@@ -9,8 +9,8 @@ from kbs_process.plant.amplifier import discretised, steady
 from kbs_process.plant.compile import compiled_plant
 from kbs_process.plant.effect import Effect
 from kbs_process.plant.equilibrium import at_rest
-from kbs_process.plant.generate import state_layout
 from kbs_process.plant.schedule import Schedule, covering
+from kbs_process.plant.stepping import state_layout
 from kbs_process.plant.structure import JOINTS, MICROSTEP, RATIO, parameters, structure_of
 from kbs_process.rig.model import Rig
 from kbs_process.signals.records import Array

@@ -1,0 +1,242 @@
+"""Write the step of the plant: the multibody part once, each rotor `ROTOR_STEPS` times within it.
+
+The multibody part turns at frequencies far below the rotors' and gets steps of its own, of position Verlet
+(positions drift half a step, momenta get the step's impulse, positions drift the other half) with the force
+that Stoermer and Cowell's method wants: the one at positions ahead by a H^2/12, a being the acceleration.
+That makes the frequencies right to (omega H)^4 / 480, and solved for a with the stiffness of base and gears
+(Newmark's method with beta = 1/12) it is stable up to omega H = 2.4. The dampers act at the mean rate.
+
+The rotors turn against the outputs' parabolas, the field's staircase averaged over each of their steps. The
+velocity-dependent torque, whose slope reaches 2e4 1/s at standstill, is integrated exponentially, along the
+secant between the rates before and after; Coulomb friction exactly: the rotor stands where it can hold it.
+The carriers get the change of the rotors' momenta to the last bit, the outputs the mean torque of their gears.
+(E. Hairer, C. Lubich, G. Wanner, Geometric Numerical Integration, 2006, chapters I, VIII and XIII.)
+"""
+
+from __future__ import annotations
+
+from kbs_process.plant.multibody import carrier, joint_offset, unrolled
+from kbs_process.plant.structure import DAMPING, DRIVE, MICROSTEP, RATIO, ROTOR, STIFFNESS, Structure
+
+ROTOR_STEPS = 10
+NUDGE = 1e-6  # rad, rad/s: difference that gives a slope; effects need no derivatives
+
+
+def state_layout(structure: Structure) -> dict[str, slice]:
+    """Return where each part of the state vector is."""
+    n, z = structure.joints, len(structure.states)
+    sizes = {
+        "alpha": 3,  # base angles, rad
+        "omega": 3,  # rate of the plate in its own axes, rad/s
+        "q": n,  # joint angles, rad
+        "qd": n,
+        "theta": n,  # rotor angles with respect to their carriers, rad
+        "spin": n,  # absolute rates of the rotors about their axes, rad/s
+        "omegad": 3,  # accelerations of the step before, which predict those of the next
+        "qdd": n,
+        "z": n * z,  # the effects' own states, drive by drive
+        "zd": n * z,
+    }
+    layout, start = {}, 0
+    for name, size in sizes.items():
+        layout[name] = slice(start, start + size)
+        start += size
+    return layout
+
+
+def tuple_of(names: list[str]) -> str:
+    """Return a tuple of some expressions; the compiler wants one that is not empty."""
+    return "(" + ", ".join(names or ["0.0"]) + ",)"
+
+
+def stepping_text(structure: Structure) -> list[str]:
+    """Return `turn_rotor` and `step`."""
+    return [*_rotor(structure), "", "", *_step(structure), "", ""]
+
+
+def accelerated(structure: Structure) -> list[str]:
+    """Return the call that solves for the accelerations."""
+    n = structure.joints
+    given = ("a_#, S_#, I_#", "qd_#", "out_#", "drag_#", "momentum_#")
+    return [
+        f"    omegad, {unrolled('qdd_#', n)}, wrench = accelerate(",
+        "        alpha, omega,",
+        *[f"        {unrolled(pattern, n)}," for pattern in given],
+        "        guess, yields, p,",
+        "    )",
+    ]
+
+
+def _rotor(structure: Structure) -> list[str]:
+    """Emit the motion of a rotor through one step of its own."""
+    z = len(structure.states)
+    rates = [f"d{i}" for i in range(z)]
+    state = tuple_of([f"z[{i}] + 0.5 * h * zd[{i}]" for i in range(z)])
+    after = tuple_of([f"z[{i}] + h * d{i}" for i in range(z)])
+
+    def drive(results: list[str], w: str) -> str:
+        given = f"field, middle, {w}, angle, rate, ratio, time, state, p, k + {DRIVE}"
+        return f"{', '.join(results)} = drive({given})"
+
+    secant = [
+        "    drop = mobility * (motor_1 - gear_1 / ratio - (motor - gear / ratio))",
+        "    impulse = mobility * yielding(w_1 - w, drop)",
+        "    free = w + impulse * torque",
+        "    w_1 = free - max(-impulse * limit, min(impulse * limit, free))",
+        "    " + drive(["motor_1", "_", "gear_1", "joint_1", *["_"] * z], "w_1"),
+    ]
+    return [
+        "@compiled",
+        "def turn_rotor(theta, w, carrier_rate, field, angle, rate, time, h, z, zd, p, k):",
+        '    """Angle and rate after `h`, mean torque on the output, the effects\' states and their rates.',
+        "",
+        "    `carrier_rate` is the carrier's acceleration about the rotor's axis, `angle` and `rate` the output's in",
+        "    the middle of the step, `field` the mean over it.",
+        '    """',
+        f"    ratio = p[k + {RATIO}]",
+        f"    mobility = h / p[k + {ROTOR}]",
+        "    middle = theta + 0.5 * h * w",
+        f"    state = {state}",
+        "    " + drive(["motor", "limit", "gear", "joint", *rates], "w"),
+        f"    w_1 = w + {NUDGE}",
+        "    " + drive(["motor_1", "_", "gear_1", "joint_1", *["_"] * z], "w_1"),
+        f"    torque = motor - gear / ratio - p[k + {ROTOR}] * carrier_rate",
+        *secant,
+        *secant[:-1],
+        "    output = 0.5 * (gear + joint + gear_1 + joint_1)",
+        f"    return middle + 0.5 * h * w_1, w_1, output, {after}, {tuple_of(rates)}",
+    ]
+
+
+def _step(structure: Structure) -> list[str]:
+    return [
+        "@compiled",
+        "def step(x, field_0, field_1, time, H, p):",
+        '    """Advance the state `x` by H; return the mean wrench over the step, force first."""',
+        *_drifted(structure),
+        *_turned(structure),
+        *_kicked(structure),
+        "    return wrench",
+    ]
+
+
+def _at(structure: Structure, name: str, i: int = 0) -> str:
+    return f"x[{state_layout(structure)[name].start + i}]"
+
+
+def _vector(structure: Structure, name: str) -> str:
+    return f"triple(x, int({state_layout(structure)[name].start}))"
+
+
+def _drifted(structure: Structure) -> list[str]:
+    """Emit positions, rates and geometry in the middle of the step."""
+    n = structure.joints
+    qdd = [_at(structure, "qdd", j) for j in range(n)]
+    lines = [
+        "    half = 0.5 * H",
+        "    ahead = H * H / 12.0",
+        f"    alpha_0 = {_vector(structure, 'alpha')}",
+        f"    omega_0 = {_vector(structure, 'omega')}",
+        f"    omegad_T = {_vector(structure, 'omegad')}",
+        f"    guess = (omegad_T[0], omegad_T[1], omegad_T[2], {', '.join(qdd)})",
+        "    drifted = drift(alpha_0, plate_rates(alpha_0, omega_0), half)",
+        "    alpha = drift(drifted, omegad_T, ahead)",
+        "    omega = omega_T = drift(omega_0, omegad_T, half)",
+    ]
+    for j in range(n):
+        # The middle of the parabola through which the output passes is below its mean, which is `ahead`.
+        lines += [
+            f"    drifted_{j} = {_at(structure, 'q', j)} + half * {_at(structure, 'qd', j)}",
+            f"    q_{j} = drifted_{j} + 0.5 * ahead * {qdd[j]}",
+            f"    qd_{j} = {_at(structure, 'qd', j)} + half * {qdd[j]}",
+        ]
+    return [*lines, f"    {unrolled('a_#, S_#, I_#', n)} = place({unrolled('q_#', n)}, p)"]
+
+
+def _turned(structure: Structure) -> list[str]:
+    """Emit the rotors' motion: side by side, so that the processor need not wait for one of them."""
+    n, z = structure.joints, len(structure.states)
+    lines = [f"    h = H / {ROTOR_STEPS}"]
+    loop = [f"    for i in range({ROTOR_STEPS}):", "        off = (i + 0.5) * h - half"]
+    after = []
+    for j in range(n):
+        c, k, qdd = carrier(structure, j), joint_offset(structure, j), _at(structure, "qdd", j)
+        own = range(j * z, (j + 1) * z)
+        if j in structure.parents:
+            lines += [
+                f"    omega_{j} = drift(omega_{c}, a_{j}, qd_{j})",
+                f"    turning = drift(omegad_{c}, a_{j}, {qdd})",
+                f"    omegad_{j} = drift(turning, cross3(omega_{c}, a_{j}), qd_{j})",
+            ]
+        lines += [
+            f"    carrier_{j} = dot3(a_{j}, omega_{c})",
+            f"    turning_{j} = dot3(a_{j}, omegad_{c})",
+            f"    spin_{j} = {_at(structure, 'spin', j)}",
+            f"    theta_{j} = {_at(structure, 'theta', j)}",
+            f"    w_{j} = spin_{j} - (carrier_{j} - half * turning_{j})",
+            f"    z_{j} = {tuple_of([_at(structure, 'z', i) for i in own])}",
+            f"    zd_{j} = {tuple_of([_at(structure, 'zd', i) for i in own])}",
+            f"    share_{j} = (field_1[{j}] - field_0[{j}]) / {ROTOR_STEPS}",
+            f"    inverse_{j} = 1.0 / share_{j}",
+            f"    pitch_{j} = 1.0 / p[{k + MICROSTEP}]",
+            f"    out_{j} = 0.0",
+        ]
+        loop += [
+            f"        from_ = field_0[{j}] + i * share_{j}",
+            f"        field = mean_rounded(from_, from_ + share_{j}, inverse_{j}) * pitch_{j}",
+            f"        angle = q_{j} + off * (qd_{j} + 0.5 * off * {qdd})",
+            f"        rate = qd_{j} + off * {qdd}",
+            f"        theta_{j}, w_{j}, out, z_{j}, zd_{j} = turn_rotor(",
+            f"            theta_{j}, w_{j}, turning_{j}, field, angle, rate, time + half + off, h,",
+            f"            z_{j}, zd_{j}, p, int({k}),",
+            "        )",
+            f"        out_{j} += out / {ROTOR_STEPS}",
+        ]
+        after += [
+            f"    {_at(structure, 'spin', j)} = w_{j} + (carrier_{j} + half * turning_{j})",
+            f"    {_at(structure, 'theta', j)} = theta_{j}",
+            f"    drag_{j} = p[{k + ROTOR}] * ({_at(structure, 'spin', j)} - spin_{j}) / H",
+            f"    momentum_{j} = p[{k + ROTOR}] * 0.5 * ({_at(structure, 'spin', j)} + spin_{j})",
+            *[f"    {_at(structure, 'z', i)} = z_{j}[{m}]" for m, i in enumerate(own)],
+            *[f"    {_at(structure, 'zd', i)} = zd_{j}[{m}]" for m, i in enumerate(own)],
+        ]
+    return [*lines, *loop, *after]
+
+
+def _kicked(structure: Structure) -> list[str]:
+    """Emit the multibody part's accelerations, and the end of its step."""
+    n, z = structure.joints, len(structure.states)
+    lines = []
+    for j in range(n):
+        k = joint_offset(structure, j)
+
+        def gear(tag: str, angle: str, rate: str, j: int = j, k: int = k) -> str:
+            given = f"0.0, theta_{j}, w_{j}, {angle}, {rate}, p[{k + RATIO}], time + half, z_{j}, p, int({k + DRIVE})"
+            results = ", ".join(["_", "_", f"gear{tag}", f"joint{tag}", *["_"] * z])
+            return f"    {results} = drive({given})"
+
+        lines += [
+            gear("", f"q_{j}", f"qd_{j}"),
+            gear("_q", f"q_{j} + {NUDGE}", f"qd_{j}"),
+            gear("_qd", f"q_{j}", f"qd_{j} + {NUDGE}"),
+            "    stiffness = gear + joint - gear_q - joint_q",
+            "    damping = gear + joint - gear_qd - joint_qd",
+            f"    yields_{j} = max(0.0, ahead * stiffness + half * damping) / {NUDGE}",
+        ]
+    base = [f"ahead * p[{STIFFNESS + i}] + half * p[{DAMPING + i}]" for i in range(3)]
+    lines += [f"    yields = ({', '.join(base)}, {unrolled('yields_#', n)})", *accelerated(structure)]
+    if structure.elastic:
+        for i in range(3):
+            lines += [
+                f"    {_at(structure, 'omegad', i)} = omegad[{i}]",
+                f"    {_at(structure, 'omega', i)} += H * omegad[{i}]",
+            ]
+        lines.append(f"    drifted = drift(drifted, plate_rates(alpha, {_vector(structure, 'omega')}), half)")
+        lines += [f"    {_at(structure, 'alpha', i)} = drifted[{i}]" for i in range(3)]
+    for j in range(n):
+        lines += [
+            f"    {_at(structure, 'qdd', j)} = qdd_{j}",
+            f"    {_at(structure, 'qd', j)} += H * qdd_{j}",
+            f"    {_at(structure, 'q', j)} = drifted_{j} + half * {_at(structure, 'qd', j)}",
+        ]
+    return lines
