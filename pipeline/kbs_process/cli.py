@@ -414,6 +414,50 @@ def modal(
     click.echo(f"Modes: {file}")
 
 
+@cli.command(epilog=examples("identify campaign/DUMMY1", "identify campaign/DUMMY1 --starts 3 --run-to-run 0.01"))
+@campaign_argument
+@click.option(
+    "--starts",
+    type=click.IntRange(min=1),
+    default=2,
+    show_default=True,
+    help="Starting points that are followed.",
+)
+@click.option(
+    "--run-to-run",
+    type=click.FloatRange(min=0.0, min_open=True),
+    default=0.02,
+    show_default=True,
+    metavar="SHARE",
+    help="By how much a friction torque differs from run to run, one sigma, of itself.",
+)
+@output_option
+@pdf_option
+@quiet_option
+def identify(
+    campaign: str, starts: int, run_to_run: float, output: Path | None, pdf: bool | None, quiet: bool
+) -> None:
+    """Identify the motor-gears of CAMPAIGN from its recordings with the role "fit".
+
+    Writes corrected parameter files (identified/parameters), and a report with intervals, checks, correlations and the
+    prediction of held-out recordings before and after.
+    """
+    from kbs_process.campaign.load import load_campaign
+    from kbs_process.campaign.locate import find_campaign, results_folder
+
+    folder = find_campaign(campaign)
+    target = results_folder(folder, output, suffix="-identify")
+    loaded = load_campaign(folder)
+    from kbs_process.campaign.identify import identify as run
+    from kbs_process.stages.identification import Settings
+
+    settings = Settings(starts=starts, run_to_run=run_to_run)
+    outcome = run(loaded, target, settings=settings, progress=_progress(quiet), pdf=pdf)
+    for line in outcome.verdict_lines:
+        click.echo(line)
+    click.echo(f"Report: {outcome.report}")
+
+
 @cli.command(epilog=examples("report reports/EL089", "report reports/EL089 --no-pdf"))
 @click.argument("results", type=click.Path(path_type=Path))
 @pdf_option

@@ -83,18 +83,23 @@ def fit_map(
     *,
     jacobian: Callable[[Array], Array] | None = None,
     series: Sequence[tuple[int, int]] | None = None,
+    scores: Callable[[Array, Array], Array] | None = None,
     start: Array | None = None,
+    gain: float = 0.0,
+    iterations: int = _MAX_ITERATIONS,
 ) -> Fit:
     """Fit `parameters` to a residual (n,) that is measured less modelled over its standard deviation.
 
     `series` says how the residual is laid out: (samples, channels) of each independent stretch of uniformly
-    sampled data, row-major, in order; without it residuals are taken as white. The search begins at `start`, or
-    at the prior's mean. Raises FitError where data and prior leave a combination of parameters undetermined,
-    and names it.
+    sampled data, row-major, in order; without it residuals are taken as white. `scores` gives, from the residual and
+    its Jacobian (n, p), the covariance (p, p) of J^T r by a model of the errors, for what residuals hide; the
+    parameters' is then no smaller. The search begins at `start`, or at the prior's mean, and ends where the next
+    step promises to lower the cost by less than `gain`, or after
+    `iterations`. Raises FitError where data and prior leave a combination of parameters undetermined, and names it.
     """
     gradient = jacobian or (lambda theta: difference_jacobian(residual, theta, parameters.scale))
     begin = parameters.value if start is None else start
-    theta, iterations, converged = _minimise(residual, gradient, parameters, begin)
+    theta, taken, converged = _minimise(residual, gradient, parameters, begin, gain, iterations)
     r, J = residual(theta), gradient(theta)
     precision = parameters.sigma**-2.0
     H_inverse = _inverse(J, precision, parameters)
@@ -102,9 +107,12 @@ def fit_map(
     if series is not None:
         S = longrun_covariance(r[:, None] * J, series) + np.diag(precision)
         covariance = _at_least(H_inverse @ S @ H_inverse, H_inverse)
+    if scores is not None:
+        S = scores(r, J) + np.diag(precision)
+        covariance = _at_least(H_inverse @ S @ H_inverse, covariance)
     sigma = np.sqrt(np.diag(covariance))
     checks = (
-        Check("converged", converged, f"{iterations} iterations"),
+        Check("converged", converged, f"{taken} iterations"),
         _bounds_check(theta, parameters),
         _identifiable_check(J, sigma, covariance, parameters),
     )
@@ -117,7 +125,7 @@ def fit_map(
         checks=checks,
         residual_rms=float(np.sqrt(np.mean(r**2))),
         dof=len(r) - len(theta),
-        iterations=iterations,
+        iterations=taken,
     )
 
 
@@ -132,11 +140,17 @@ def difference_jacobian(residual: Residual, theta: Array, scale: Array) -> Array
 
 
 def _minimise(
-    residual: Residual, gradient: Callable[[Array], Array], parameters: Parameters, start: Array
+    residual: Residual,
+    gradient: Callable[[Array], Array],
+    parameters: Parameters,
+    start: Array,
+    least: float,
+    most: int,
 ) -> tuple[Array, int, bool]:
     root = 1.0 / parameters.sigma
-    low = -np.inf if parameters.lower is None else parameters.lower
-    high = np.inf if parameters.upper is None else parameters.upper
+    unbounded = np.full(len(parameters.value), np.inf)
+    low = -unbounded if parameters.lower is None else parameters.lower
+    high = unbounded if parameters.upper is None else parameters.upper
 
     def augmented(theta: Array) -> Array:
         return np.concatenate([residual(theta), (theta - parameters.value) * root])
@@ -145,7 +159,7 @@ def _minimise(
     scale = parameters.scale
     misfit = augmented(theta)
     cost, damping = _cost(misfit), 0.0
-    for iteration in range(1, _MAX_ITERATIONS + 1):
+    for iteration in range(1, most + 1):
         # One QR carries the normal equations of all samples into a triangle of the parameters' size.
         A = np.column_stack([np.vstack([gradient(theta), np.diag(root)]) * scale, -misfit])
         triangle = _triangle(A)
@@ -153,9 +167,10 @@ def _minimise(
         if iteration == 1:
             _refuse_singular(R, parameters.names)
         while True:
-            damped = np.vstack([R, np.sqrt(damping) * np.diag(np.linalg.norm(R, axis=0))])
-            step = lstsq(damped, np.concatenate([rhs, np.zeros(len(theta))]))[0] * scale
-            candidate = np.clip(theta + step, low, high)
+            whole = _damped_step(R, rhs, damping, (low - theta) / scale, (high - theta) / scale)
+            if least > 0.0 and _promised(R, rhs, whole) < least:
+                return theta, iteration, True
+            candidate = np.clip(theta + whole * scale, low, high)
             candidate_misfit = augmented(candidate)
             new = _cost(candidate_misfit)
             if new <= cost or damping > _LARGEST_DAMPING:
@@ -168,7 +183,28 @@ def _minimise(
         damping = 0.0 if damping <= 1e-6 else damping / 10.0
         if gained <= _GAIN * cost or moved < _MOVE:
             return theta, iteration, True
-    return theta, _MAX_ITERATIONS, False
+    return theta, most, False
+
+
+def _damped_step(R: Array, rhs: Array, damping: float, lowest: Array, highest: Array) -> Array:
+    """Step within bounds (p,) each: those that it would cross are held at theirs, and the others follow."""
+    damped = np.vstack([R, np.sqrt(damping) * np.diag(np.linalg.norm(R, axis=0))])
+    wanted = np.concatenate([rhs, np.zeros(R.shape[1])])
+    step = np.asarray(lstsq(damped, wanted)[0])
+    held = np.zeros(len(step), dtype=np.bool_)
+    while (crossing := ~held & ((step < lowest) | (step > highest))).any():
+        held |= crossing
+        step[held] = np.clip(step, lowest, highest)[held]
+        if held.all():
+            break
+        step[~held] = lstsq(damped[:, ~held], wanted - damped[:, held] @ step[held])[0]
+    return step
+
+
+def _promised(R: Array, rhs: Array, step: Array) -> float:
+    """What the linear model says a step lowers the cost by."""
+    left = rhs - R @ step
+    return float(rhs @ rhs - left @ left)
 
 
 def _cost(r: Array) -> float:

@@ -1,0 +1,44 @@
+"""From a condensed recording to what the identification compares with the plant."""
+
+from __future__ import annotations
+
+import math
+
+from kbs_process.campaign.predicting import schedule_of
+from kbs_process.errors import RecordingError
+from kbs_process.rig.model import Rig
+from kbs_process.signals.records import Run
+from kbs_process.stages.output_error import Measured
+
+_UNKNOWN_CLOCK_S = 1e-3  # taken for a clock that cannot be compared with another
+
+
+def measured(run: Run, rig: Rig) -> Measured:
+    """Return wrench and angles of a run with what drove it.
+
+    Raises RecordingError where there is no wrench, no angle or no command.
+    """
+    if run.wrench is None or run.angle is None:
+        raise RecordingError(
+            "an identification needs wrench and joint angles",
+            where=run.name,
+            remedy="give this recording another role than 'fit'",
+        )
+    driven = "field" if run.field is not None else "command"
+    return Measured(
+        name=run.name,
+        dt=run.wrench.dt,
+        wrench=run.wrench.values,
+        angle=run.angle.values,
+        valid=run.wrench.valid & run.angle.valid,
+        schedule=schedule_of(run, rig),
+        wrench_rate=run.rates["wrench"],
+        angle_rate=run.rates["angle"],
+        clock_sigma=_clock_sigma(run, driven),
+        angle_clock_sigma=math.hypot(_clock_sigma(run, driven), _clock_sigma(run, "angle")),
+    )
+
+
+def _clock_sigma(run: Run, stream: str) -> float:
+    sigma = run.clocks[stream].sigma_offset_s
+    return sigma if math.isfinite(sigma) else _UNKNOWN_CLOCK_S

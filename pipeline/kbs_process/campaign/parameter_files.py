@@ -1,0 +1,100 @@
+"""Parameter files with new values: the campaign's own, number by number, as TOML that loads at once."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from kbs_process.campaign.config import Campaign
+from kbs_process.campaign.documents import Document, Tree, read
+from kbs_process.rig.model import Quantity
+
+_HEAD = "# {name}, with numbers identified from {source}.\n# Everything else is as it was; comments were left out.\n"
+
+
+def corrected(campaign: Campaign, changed: Mapping[str, Quantity], source: str) -> Iterator[tuple[str, str]]:
+    """Yield name and text of each parameter file of the campaign with the quantities of `changed` in place.
+
+    New quantities are in SI. Raises ConfigError where a file has gone since the campaign was loaded.
+    """
+    for path in campaign.inputs[1:]:
+        if path.suffix == ".toml":
+            document = read(path, role="the parameter file", remedy="keep the campaign as it is meanwhile")
+            yield path.name, _HEAD.format(name=path.name, source=source) + _text(_replaced(document, changed))
+
+
+def _replaced(document: Document, changed: Mapping[str, Quantity]) -> Tree:
+    def walk(node: Tree, path: tuple[str, ...]) -> Tree:
+        new: Tree = {}
+        for key, child in node.items():
+            here = (*path, key)
+            if not isinstance(child, dict):
+                new[key] = child
+            elif "value" in child:
+                # The rig's own names have no "parameters" in them.
+                name = ".".join(part for part in here if part != "parameters")
+                new[key] = _entry(changed[name]) if name in changed else child
+            else:
+                new[key] = walk(child, here)
+        return new
+
+    return walk(document.tree, ())
+
+
+def _entry(quantity: Quantity) -> dict[str, Any]:
+    return {
+        "value": _numbers(quantity.value),
+        "unit": quantity.unit,
+        "sigma": _numbers(quantity.sigma),
+        "source": quantity.source,
+    }
+
+
+def _numbers(array: np.ndarray[Any, Any]) -> Any:
+    return array.tolist()
+
+
+def _text(tree: Tree) -> str:
+    return "\n".join(_table(tree, ())).strip() + "\n"
+
+
+def _table(node: Tree, path: tuple[str, ...]) -> Iterator[str]:
+    """Leaves first, as keys of this table, then its sub-tables."""
+    leaves = {key: child for key, child in node.items() if not isinstance(child, dict) or "value" in child}
+    if leaves and path:
+        yield ""
+        yield f"[{'.'.join(map(_key, path))}]"
+    for key, child in leaves.items():
+        yield f"{_key(key)} = {_value(child)}"
+    for key, child in node.items():
+        if key not in leaves:
+            yield from _table(child, (*path, key))
+
+
+def _key(key: str) -> str:
+    return key if key.replace("_", "").replace("-", "").isalnum() and key.isascii() else json.dumps(key)
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{_key(key)} = {_value(child)}" for key, child in value.items()) + " }"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(_value, value)) + "]"
+    if isinstance(value, bool | str | int):
+        return json.dumps(value, ensure_ascii=False)
+    return repr(float(value))
+
+
+def write_parameters(folder: Path, files: Iterator[tuple[str, str]]) -> tuple[Path, ...]:
+    """Write them into `folder`; return their paths."""
+    folder.mkdir(parents=True)
+    written = []
+    for name, text in files:
+        path = folder / name
+        path.write_text(text, encoding="utf-8")
+        written.append(path)
+    return tuple(written)
