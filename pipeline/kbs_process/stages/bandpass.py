@@ -96,7 +96,8 @@ def apply(signal: Signal, band: Band) -> Signal:
 def _bridged(values: Array, valid: Mask, dt: float) -> Array:
     """Replace runs of invalid samples by straight lines between the means of the valid ones near them.
 
-    At the ends of a record, and where one side has none, by the mean of the other.
+    Where one side has none, by the mean of the other. Runs of less than that at the ends of a record stay: decimation
+    flags them for the little that it continued, and most of them was measured.
     """
     if valid.all() or not valid.any():
         return values
@@ -104,6 +105,8 @@ def _bridged(values: Array, valid: Mask, dt: float) -> Array:
     reach = max(1, round(NEAR / dt))
     ends = np.flatnonzero(np.diff(np.concatenate(([True], valid, [True])).astype(np.int8)))
     for start, stop in ends.reshape(-1, 2):
+        if stop - start <= reach and (start == 0 or stop == len(valid)):
+            continue
         sides = [slice(max(start - reach, 0), start), slice(stop, stop + reach)]
         means = [values[side][valid[side]].mean(axis=0) for side in sides if valid[side].any()]
         bridged[start:stop] = np.linspace(means[0], means[-1], stop - start + 2)[1:-1]
