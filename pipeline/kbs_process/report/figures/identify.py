@@ -74,8 +74,8 @@ def spectra(table: Table, channels: tuple[str, ...], title: str) -> Picture:
         for axis, channel in zip(axes, channels, strict=False):
             for side, look in _LOOKS.items():
                 centre, level = _smoothed(f, table.columns[f"{channel}.{side}"])
-                axis.loglog(centre, level, color=look["color"], linewidth=1.0, label=side)
-            axis.loglog(
+                axis.plot(centre, level, color=look["color"], linewidth=1.0, label=side)
+            axis.plot(
                 f,
                 table.columns[f"{channel}.noise"],
                 color=draw.LIMIT,
@@ -83,6 +83,9 @@ def spectra(table: Table, channels: tuple[str, ...], title: str) -> Picture:
                 linestyle="--",
                 label="sensor's noise",
             )
+            shown = np.concatenate([line.get_ydata() for line in axis.lines])
+            draw.logarithmic(axis, "x", float(f[0]), float(f[-1]))
+            draw.logarithmic(axis, "y", 0.5 * float(shown.min()), 2.0 * float(shown.max()))
             axis.set_title(channel)
             axis.set_ylabel(unit(table.unit(f"{channel}.after")))
         for axis in axes[len(channels) :]:
