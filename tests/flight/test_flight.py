@@ -46,6 +46,11 @@ def test_results_of_one_seed_are_the_same_bytes_and_complete(tmp_path):
     worst = results["requirements"][0]["worst"]
     assert worst["greatest"] == pytest.approx(peaks.max())
     assert 0.0 < worst["q05"] < worst["q95"]
+    pointing = {one["statistic"]: one for one in results["requirements"] if one["quantity"] == "pointing"}
+    assert pointing["bias"]["limit"] == pytest.approx(0.066)
+    assert pointing["bias"]["unit"] == "deg"
+    # Wind-up of the gear by friction and its own acceleration: far below a limit, far above nothing.
+    assert 1e-6 < pointing["percentile"]["worst"]["median"] < 0.044
     html = (tmp_path / "a" / "index.html").read_text()
     assert "Probability of meeting" in html
     assert "flight motor-gear and antenna" in html

@@ -24,6 +24,19 @@ class Requirement:
     source: str
 
 
+PointingStatistic = Literal["random", "bias", "orbit", "percentile"]
+
+
+@dataclass(frozen=True, slots=True)
+class PointingRequirement:
+    """A limit on a statistic of the pointing error; each axis must meet it alone."""
+
+    name: str
+    statistic: PointingStatistic
+    limit: float  # rad
+    source: str
+
+
 @dataclass(frozen=True, slots=True)
 class Bands:
     """The frequency bands in which histories are compared."""
@@ -105,6 +118,7 @@ class Campaign:
     rig: Rig
     inputs: tuple[Path, ...]  # files of the description: campaign.toml, parameter files, CSV matrices
     mission: Path | None = None  # orbit, relay satellites and limits of a reference day
+    flight_pointing: tuple[PointingRequirement, ...] = ()  # of the flight model alone
     modal: Path | None = None  # modes of the article on its transducer; None: derived from the plant
 
     def recording(self, name: str) -> RecordingEntry:

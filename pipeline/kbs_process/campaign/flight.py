@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
 from kbs_process.campaign.analysis import bands_of
 from kbs_process.campaign.commands import read_commands
-from kbs_process.campaign.config import Campaign, Requirement
+from kbs_process.campaign.config import Campaign, PointingRequirement, Requirement
 from kbs_process.campaign.flight_files import write_flight
 from kbs_process.campaign.judging import band_of
 from kbs_process.campaign.parallel import ordered_map
@@ -24,8 +23,8 @@ from kbs_process.plant.effects import select
 from kbs_process.plant.predict import Schedule, predict
 from kbs_process.plant.sampling import Uncertain, draw, uncertain, values
 from kbs_process.rig.model import Amplifier, Quantity, Rig, substitute
-from kbs_process.signals.records import WRENCH_CHANNELS, Array
-from kbs_process.stages import bandpass
+from kbs_process.signals.records import WRENCH_CHANNELS, Array, Run
+from kbs_process.stages import bandpass, pointing
 from kbs_process.stages.bandpass import Band
 from kbs_process.stages.condense import CondenseSettings, condense
 from kbs_process.stages.to_cog import to_spacecraft
@@ -37,11 +36,25 @@ _RATE = 100.0  # Hz, of the simulated wrench: its amplifier lets nothing alias i
 
 @dataclass(frozen=True, slots=True)
 class Judged:
-    """A requirement, and the band and channels in which it is judged."""
+    """A requirement on the disturbance in a band, or without a band on pointing, and the channels it is judged on."""
 
-    requirement: Requirement
-    band: Band
+    requirement: Requirement | PointingRequirement
+    band: Band | None
     channels: tuple[str, ...]
+
+    @property
+    def unit(self) -> str:
+        """Of statistics, histories and limit; pointing is specified in degrees."""
+        return "deg" if isinstance(self.requirement, PointingRequirement) else self.requirement.unit
+
+    @property
+    def limit(self) -> float:
+        limit = self.requirement.limit
+        return float(np.degrees(limit)) if isinstance(self.requirement, PointingRequirement) else limit
+
+    @property
+    def frame(self) -> str:
+        return "joint" if isinstance(self.requirement, PointingRequirement) else self.requirement.frame
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -93,7 +106,10 @@ def predict_flight(
 ) -> Outcome:
     """Fly `samples` units that the parameters' uncertainties allow along a trajectory."""
     rig = in_orbit(campaign.rig)
-    judged = tuple(_judged(campaign, requirement) for requirement in campaign.requirements)
+    judged = (
+        *(_judged(campaign, requirement) for requirement in campaign.requirements),
+        *(Judged(requirement, None, rig.joint_names) for requirement in campaign.flight_pointing),
+    )
     if not judged:
         raise ConfigError(
             "the campaign states no requirement", where=campaign.name, remedy="add [[requirement]]"
@@ -147,32 +163,44 @@ def fly(job: Job) -> Flown | None:
             job.effects,
             job.schedule,
             rate_Hz=rate,
-            angle_rate_Hz=job.working_rate_Hz,
+            angle_rate_Hz=rate,
             duration_s=job.duration_s,
+            quantise=False,
         )
-        streams = ((key, block) for key, block in blocks if key == "wrench")
-        settings = CondenseSettings(working_rate_Hz=job.working_rate_Hz)
-        run = condense("flight", streams, {"wrench": WRENCH_CHANNELS}, settings)
+        streams = ((key, block) for key, block in blocks if key != "field")
+        channels = {"wrench": WRENCH_CHANNELS, "angle": job.rig.joint_names}
+        run = condense("flight", streams, channels, CondenseSettings(working_rate_Hz=job.working_rate_Hz))
     except SimulationError:
         return None
-    assert run.wrench is not None
-    statistics, envelopes = [], []
-    for one in job.judged:
-        signal = bandpass.apply(run.wrench, one.band)
-        if one.requirement.frame == "S":
-            assert job.rig.spacecraft is not None  # or the requirement would have been refused
-            signal = to_spacecraft(signal, job.rig.spacecraft)
-        columns = [signal.channels.index(channel) for channel in one.channels]
-        x = np.where(signal.valid[:, None], signal.values[:, columns], 0.0)
-        statistics.append(_statistic(x, signal.valid.sum(), one.requirement.statistic))
-        envelopes.append(_envelope(x))
-    return Flown(tuple(statistics), tuple(envelopes))
+    found = [_found(job, run, one) for one in job.judged]
+    return Flown(tuple(statistic for statistic, _ in found), tuple(_envelope(x) for _, x in found))
 
 
-def _statistic(x: Array, valid: int, statistic: Literal["peak", "rms"]) -> Array:
-    if statistic == "rms":
-        return np.asarray(np.sqrt(np.sum(x**2, axis=0) / valid))
-    return np.asarray(np.max(np.abs(x), axis=0))
+def _found(job: Job, run: Run, one: Judged) -> tuple[Array, Array]:
+    """Return a requirement's statistic (channels,) and the history (n, channels) that it is one of."""
+    if isinstance(one.requirement, PointingRequirement):
+        return _pointing(job, run, one.requirement)
+    assert run.wrench is not None and one.band is not None
+    signal = bandpass.apply(run.wrench, one.band)
+    if one.requirement.frame == "S":
+        assert job.rig.spacecraft is not None  # or the requirement would have been refused
+        signal = to_spacecraft(signal, job.rig.spacecraft)
+    columns = [signal.channels.index(channel) for channel in one.channels]
+    x = np.where(signal.valid[:, None], signal.values[:, columns], 0.0)
+    if one.requirement.statistic == "rms":
+        return np.asarray(np.sqrt(np.sum(x**2, axis=0) / signal.valid.sum())), x
+    return np.asarray(np.max(np.abs(x), axis=0)), x
+
+
+def _pointing(job: Job, run: Run, requirement: PointingRequirement) -> tuple[Array, Array]:
+    """True angle less the desired one, deg: what the encoder's offset hides from the loop is in it."""
+    assert run.angle is not None
+    offset = np.array([float(joint.encoder.offset) if joint.encoder else 0.0 for joint in job.rig.joints])
+    true = run.angle.derive(run.angle.values - offset, "encoder's offset taken out")
+    error = pointing.error(true, job.schedule.t, job.schedule.position)
+    every = pointing.statistics(error, period=job.duration_s, smoothing=job.duration_s)
+    statistic = np.abs([getattr(one, requirement.statistic) for one in every])
+    return np.degrees(statistic), np.degrees(np.where(error.valid[:, None], error.values, 0.0))
 
 
 def _envelope(x: Array) -> Array:

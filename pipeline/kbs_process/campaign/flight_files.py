@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kbs_process.campaign import provenance
-from kbs_process.campaign.config import Campaign
+from kbs_process.campaign.config import Campaign, PointingRequirement
 from kbs_process.campaign.run import Outcome
 from kbs_process.campaign.store import writing
 from kbs_process.campaign.tables import write_table
@@ -82,15 +82,15 @@ def _requirement(flight: Flight, index: int) -> records.FlightRequirement:
     statistics = np.stack([unit.statistics[index] for unit in flight.units])
     nominal = flight.nominal.statistics[index]
     worst = statistics.max(axis=1)
-    found = probability(int(np.sum(worst <= requirement.limit)), len(worst))
+    found = probability(int(np.sum(worst <= judged.limit)), len(worst))
     return records.FlightRequirement(
         name=requirement.name,
-        quantity=requirement.quantity,
-        frame=requirement.frame,
+        quantity="pointing" if isinstance(requirement, PointingRequirement) else requirement.quantity,
+        frame=judged.frame,
         statistic=requirement.statistic,
-        band_Hz=requirement.band,
-        limit=requirement.limit,
-        unit=requirement.unit,
+        band_Hz=(None, None) if isinstance(requirement, PointingRequirement) else requirement.band,
+        limit=judged.limit,
+        unit=judged.unit,
         source=requirement.source,
         meets=records.Likelihood(value=found.value, low=found.low, high=found.high),
         channels=tuple(
@@ -117,7 +117,7 @@ def _distribution(channel: str, nominal: float, outcomes: Array) -> records.Dist
 
 def _conclusion(requirements: Sequence[records.FlightRequirement]) -> Conclusion:
     """Pass where 95 % of all units meet every requirement with confidence, fail where fewer do."""
-    worst = min(requirements, key=lambda one: (one.meets.low, one.meets.value))
+    worst = min(requirements, key=lambda one: (one.meets.low, -one.worst.q95 / one.limit))
     status: Status = "undecided"
     if all(one.worst.bound is not None and one.worst.bound <= one.limit for one in requirements):
         status = "pass"
@@ -126,8 +126,8 @@ def _conclusion(requirements: Sequence[records.FlightRequirement]) -> Conclusion
     sentence = (
         f"{worst.name}: a flight unit meets it with a probability of {100 * worst.meets.value:.1f} % "
         f"({100 * worst.meets.low:.1f} to {100 * worst.meets.high:.1f} %). {worst.statistic.capitalize()} "
-        f"{worst.worst.nominal:.4f} {worst.unit} nominally, {worst.worst.q05:.4f} to {worst.worst.q95:.4f} "
-        f"{worst.unit} in 90 % of the units; limit {worst.limit:g} {worst.unit}."
+        f"{worst.worst.nominal:.3g} {worst.unit} nominally, {worst.worst.q05:.3g} to {worst.worst.q95:.3g} "
+        f"{worst.unit} in 90 % of the units; limit {worst.limit:.3g} {worst.unit}."
     )
     return Conclusion(status=status, sentence=sentence)
 
@@ -192,7 +192,6 @@ def _histories(folder: Path, flight: Flight, index: int, judged: Judged) -> None
             f"{channel}.q05": low[:, column],
             f"{channel}.q95": high[:, column],
         }
-    unit = judged.requirement.unit
-    units = dict.fromkeys(columns, unit) | {"t": "s"}
+    units = dict.fromkeys(columns, judged.unit) | {"t": "s"}
     path = folder / "tables" / "flight" / f"requirement_{index}.parquet"
-    write_table(path, columns, units, frame=judged.requirement.frame)
+    write_table(path, columns, units, frame=judged.frame)

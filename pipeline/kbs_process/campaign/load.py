@@ -7,12 +7,12 @@ from dataclasses import replace
 from pathlib import Path
 
 from kbs_process.campaign.checks import check_campaign
-from kbs_process.campaign.config import Bands, Campaign, RecordingEntry, Requirement, Topic, Topics
+from kbs_process.campaign.config import Bands, Campaign, RecordingEntry, Topic, Topics
 from kbs_process.campaign.documents import Document, Merged, Tree, check_finite, merge, read, substituted
 from kbs_process.campaign.problems import Problems
+from kbs_process.campaign.requirements import disturbance, pointing
 from kbs_process.campaign.rig_builder import RigBuilder
 from kbs_process.campaign.schema import violations
-from kbs_process.campaign.units import UnitMismatchError, factor
 from kbs_process.plant.effects import CATALOGUE
 from kbs_process.rig.model import Rig
 
@@ -103,7 +103,7 @@ def _campaign(folder: Path, document: Document, tables: Merged, rig: Rig, proble
     effects = tree.get("model", {}).get("effects", [])
     modal = folder / tree["model"]["modal"] if "modal" in tree.get("model", {}) else None
     requirements = (
-        _requirement(index, table, document, problems)
+        disturbance(table, ("requirement", index), document, problems)
         for index, table in enumerate(tree.get("requirement", []))
     )
     bands = tree["bands"]
@@ -131,27 +131,11 @@ def _campaign(folder: Path, document: Document, tables: Merged, rig: Rig, proble
             *(() if modal is None else (modal,)),
         ),
         mission=folder / tree["mission"]["file"] if "mission" in tree else None,
+        flight_pointing=tuple(
+            pointing(table, ("flight", "pointing", index), document, problems)
+            for index, table in enumerate(tree.get("flight", {}).get("pointing", []))
+        ),
         modal=modal,
-    )
-
-
-def _requirement(index: int, table: Tree, document: Document, problems: Problems) -> Requirement:
-    unit = "N m" if table["quantity"] == "torque" else "N"
-    scale = 1.0
-    try:
-        scale = factor(table["limit"]["unit"], unit)
-    except UnitMismatchError as error:
-        problems.add(document.place(("requirement", index, "limit", "unit")), str(error), error.remedy)
-    low, high = table["band_Hz"]
-    return Requirement(
-        name=table["name"],
-        quantity=table["quantity"],
-        frame=table["frame"],
-        statistic=table["statistic"],
-        limit=table["limit"]["value"] * scale,
-        unit=unit,
-        band=(float(low), float(high)),
-        source=table["source"],
     )
 
 

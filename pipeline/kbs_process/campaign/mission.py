@@ -10,17 +10,15 @@ from typing import Any, Literal
 
 import numpy as np
 
-from kbs_process.campaign.config import Campaign
+from kbs_process.campaign.config import Campaign, PointingRequirement
 from kbs_process.campaign.documents import Document, check_finite, read
 from kbs_process.campaign.problems import Problems
 from kbs_process.campaign.quantities import Kind, read_quantity
+from kbs_process.campaign.requirements import pointing
 from kbs_process.campaign.schema import violations
-from kbs_process.campaign.units import UnitMismatchError, factor
 from kbs_process.errors import ConfigError
 from kbs_process.mission.model import Limits, Mission, Orbit, Relay
 from kbs_process.rig.model import Quantity
-
-Statistic = Literal["random", "bias", "orbit", "percentile"]
 
 _ANGLE = Kind("rad", ())
 _PAIR = Kind("rad", (2,))
@@ -45,16 +43,6 @@ class SectionEntry:
     until: Literal["loss", "acquisition", "azimuth-extreme", "elevation-extreme", "end"]
     near: float  # s
     published: Published | None
-
-
-@dataclass(frozen=True, slots=True)
-class PointingRequirement:
-    """A limit on a statistic of the pointing error; each axis must meet it in each section."""
-
-    name: str
-    statistic: Statistic
-    limit: float  # rad
-    source: str
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -148,7 +136,8 @@ def _day(reader: _Reader, cycle: float) -> Day:
         mission=mission,
         sections=tuple(_section(table) for table in tree["section"]),
         requirements=tuple(
-            _requirement(reader, index, table) for index, table in enumerate(tree.get("requirement", []))
+            pointing(table, ("requirement", index), reader.document, reader.problems)
+            for index, table in enumerate(tree.get("requirement", []))
         ),
         lead=reader.number(Kind("s", (), low=0.0), "day", "lead"),
         smoothing=reader.number(positive, "day", "smoothing"),
@@ -200,16 +189,4 @@ def _section(table: Mapping[str, Any]) -> SectionEntry:
         until=table["until"],
         near=float(table["near_s"]),
         published=Published(**published) if published else None,
-    )
-
-
-def _requirement(reader: _Reader, index: int, table: Mapping[str, Any]) -> PointingRequirement:
-    scale = 1.0
-    try:
-        scale = factor(table["limit"]["unit"], "rad")
-    except UnitMismatchError as error:
-        place = reader.document.place(("requirement", index, "limit", "unit"))
-        reader.problems.add(place, str(error), error.remedy)
-    return PointingRequirement(
-        table["name"], table["statistic"], table["limit"]["value"] * scale, table["source"]
     )

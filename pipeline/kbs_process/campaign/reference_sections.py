@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from kbs_process.campaign.analysis import bands_of, passband
-from kbs_process.campaign.config import Campaign
-from kbs_process.campaign.mission import Day, PointingRequirement, SectionEntry
+from kbs_process.campaign.config import Campaign, PointingRequirement
+from kbs_process.campaign.mission import Day, SectionEntry
 from kbs_process.errors import ConfigError
 from kbs_process.mission.planner import Plan
 from kbs_process.signals.grid import overlap

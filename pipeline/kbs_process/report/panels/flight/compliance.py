@@ -7,7 +7,7 @@ from kbs_process.report.panel import Block, Caption, Cell, Figure, Grid, Notices
 from kbs_process.report.panels.choose import frame_label
 from kbs_process.report.records.flight import Distribution, FlightRequirement, FlightResults
 from kbs_process.report.tables import Tables
-from kbs_process.report.text import MISSING, band_hz, count, exact, number, percent, unit
+from kbs_process.report.text import MISSING, band_hz, count, number, percent, unit
 
 _SPREAD = Caption(
     shown="The share of the units that stay below each value, on every channel and for the greatest of them; the "
@@ -43,8 +43,8 @@ def _probabilities(results: FlightResults) -> Grid:
     rows = tuple(
         (
             f"{one.name} ({one.statistic}, {frame_label(one.frame)})",
-            band_hz(*one.band_Hz),
-            f"{exact(one.limit)} {unit(one.unit)}",
+            "" if one.quantity == "pointing" else band_hz(*one.band_Hz),
+            f"{number(one.limit)} {unit(one.unit)}",
             f"{number(one.worst.nominal)} {unit(one.unit)}",
             f"{number(one.worst.q05)} to {number(one.worst.q95)} {unit(one.unit)}",
             _bound(one),

@@ -26,7 +26,8 @@ def panel(results: FlightResults, tables: Tables) -> Panel:
     for index, requirement in enumerate(results.requirements):
         table = tables.read("flight", f"requirement_{index}")
         if table is not None:
-            title = f"{requirement.name}, {band_hz(*requirement.band_Hz)}, {frame_label(requirement.frame)}"
+            where = (band_hz(*requirement.band_Hz), frame_label(requirement.frame))
+            title = ", ".join((requirement.name, *(() if requirement.quantity == "pointing" else where)))
             blocks.append(Figure(title, (figures.histories(requirement, table),), _CAPTION))
     return Panel(
         "histories",
