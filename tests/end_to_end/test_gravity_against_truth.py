@@ -55,7 +55,7 @@ def _fitted(campaign: Processed) -> Fitted:
 
 
 def test_stated_sigmas_cover_the_truth(fitted: dict[str, Fitted]) -> None:
-    """The limits leave room for encoder rounding at rest, which the covariance does not hold, and no more."""
+    """On many campaigns, drawn for nothing else: `python -m gravity.coverage`."""
     z = np.concatenate([one.z for one in fitted.values()])
     gain = np.concatenate([one.prior_sigma / one.sigma for one in fitted.values()])
     informed = z[gain > INFORMED]
@@ -68,7 +68,8 @@ def test_stated_sigmas_cover_the_truth(fitted: dict[str, Fitted]) -> None:
     assert 0.8 < _rms(z) < 1.2
     assert np.mean(np.abs(z) < 2) > 0.9
     assert len(informed) > 40
-    assert _rms(informed) < 1.6
+    assert 0.6 < _rms(informed) < 1.3
+    assert np.mean(np.abs(informed) < 2) > 0.87
 
 
 def test_centre_of_gravity_of_the_antenna(fitted: dict[str, Fitted]) -> None:

@@ -28,6 +28,7 @@ from kbs_process.stages.gravity_solve import (
     refuse_uninformed,
     residual_sigma,
     solve,
+    zeros,
 )
 from kbs_process.stages.gravity_taring import Taring, estimate, of_fit
 from kbs_process.stages.motion import Motion
@@ -145,11 +146,11 @@ def fit(
         if len(sigmas) != len(used):
             sigmas = [residual_sigma(equation, theta, p, rig) for p in used]
         weighed = sigmas
-        result = solve(equation, used, sigmas, theta)
+        result = solve(equation, used, sigmas, theta, settings.low_pass_Hz)
         theta = result.value[: equation.size]
         sigmas = [residual_sigma(equation, theta, p, rig) for p in used]
     refuse_uninformed(equation, data, sigmas, theta)
-    biases = result.value[equation.size :].reshape(len(data), -1)
+    biases = zeros(equation, result)[:, 0]
     taring = {
         p.name: of_fit(equation, theta, p, bias, sigma)
         for p, bias, sigma in zip(data, biases, weighed, strict=True)
@@ -280,12 +281,14 @@ def _from_motion(motion: Motion, equation: Equation) -> Prepared:
     return Prepared(
         name="",
         dt=motion.dt,
+        t=motion.dt * np.arange(len(motion), dtype=np.float64),
         q=motion.q + motion.offset,
         qd=motion.qd if moving else rest,
         qdd=motion.qdd if moving else rest,
         before=None if equation.response_sigma is None else Prepared.neighbour(motion, -1),
         after=None if equation.response_sigma is None else Prepared.neighbour(motion, 1),
         sigma_q=motion.sigma_q,
+        rounding=motion.sigma_rounding,
         wrench=np.zeros((len(motion), len(equation.channels))),
     )
 

@@ -27,24 +27,28 @@ class Prepared:
 
     name: str
     dt: float  # s, between `before`, the instant and `after`
+    t: Array  # (n,) s from the recording's start
     q: Array  # (n, joints) rad, no offset taken off
     qd: Array
     qdd: Array
     before: Angles | None
     after: Angles | None
     sigma_q: Array
+    rounding: Array  # (n, joints) rad, the encoders' part of sigma_q
     wrench: Array  # (n, c) low-passed
 
     def rows(self, which: slice | Index) -> Prepared:
         """The same at some of the instants."""
         return replace(
             self,
+            t=self.t[which],
             q=self.q[which],
             qd=self.qd[which],
             qdd=self.qdd[which],
             before=None if self.before is None else _pick(self.before, which),
             after=None if self.after is None else _pick(self.after, which),
             sigma_q=self.sigma_q[which],
+            rounding=self.rounding[which],
             wrench=self.wrench[which],
         )
 
@@ -81,12 +85,14 @@ def prepare(name: str, motion: Motion, wrench: Signal, low_pass: float, *, with_
     smoothed = Prepared(
         name=name,
         dt=motion.dt,
+        t=motion.dt * np.arange(len(motion), dtype=np.float64),
         q=motion.q + motion.offset,
         qd=motion.qd,
         qdd=motion.qdd,
         before=Prepared.neighbour(motion, -1) if with_neighbours else None,
         after=Prepared.neighbour(motion, 1) if with_neighbours else None,
         sigma_q=motion.sigma_q,
+        rounding=motion.sigma_rounding,
         wrench=smooth(wrench.values, wrench.dt, low_pass),
     )
     return smoothed.rows(at)

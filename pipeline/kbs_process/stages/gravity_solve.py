@@ -1,59 +1,111 @@
-"""The gravity equation solved for the rig and every recording's taring bias at once, with the weights it takes."""
+"""The gravity equation solved for the rig and every recording's zero at once, with the weights it takes.
+
+A recording's zero is a constant (its taring) and a slow drift: the first and second Legendre polynomial over its
+length, which hold a transducer's warming up. Each has the prior that the rig file gives the bias. Drift is thus told
+from gravity where the motion repeats; where it does not, it widens the parameters' uncertainty.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.polynomial.legendre import legvander
 
 from kbs_process.errors import FitError
 from kbs_process.estimation.fit import Fit, Parameters, combination, fit_map
+from kbs_process.estimation.flicker import flicker_scores
 from kbs_process.estimation.longrun import variance_inflation
 from kbs_process.rig.model import Rig
 from kbs_process.signals.records import WRENCH_CHANNELS, Array
+from kbs_process.stages.gravity_angles import rounding_scores
 from kbs_process.stages.gravity_equation import Equation, Prepared
 
+_ZERO = ("bias", "drift", "drift curvature")
+_TERMS = len(_ZERO)
 
-def solve(equation: Equation, prepared: Sequence[Prepared], sigmas: Sequence[Array], theta: Array) -> Fit:
-    c, k = len(equation.channels), len(prepared)
+
+def solve(
+    equation: Equation,
+    prepared: Sequence[Prepared],
+    sigmas: Sequence[Array],
+    theta: Array,
+    low_pass_Hz: float,
+) -> Fit:
+    c, size = len(equation.channels), equation.size
+    bases = [zero_basis(p) for p in prepared]
 
     def residual(full: Array) -> Array:
-        biases = full[equation.size :].reshape(k, c)
         parts = [
-            (equation.predict(full[: equation.size], p) + bias - p.wrench) / sigma
-            for p, bias, sigma in zip(prepared, biases, sigmas, strict=True)
+            (equation.predict(full[:size], p) + basis @ zero - p.wrench) / sigma
+            for p, basis, zero, sigma in zip(prepared, bases, _zeros(full[size:], c), sigmas, strict=True)
         ]
         return np.concatenate([part.ravel() for part in parts])
 
     def jacobian(full: Array) -> Array:
         blocks = []
-        for index, (p, sigma) in enumerate(zip(prepared, sigmas, strict=True)):
+        for index, (p, basis, sigma) in enumerate(zip(prepared, bases, sigmas, strict=True)):
             block = np.zeros((len(p.q), c, len(full)))
-            block[:, :, : equation.size] = equation.jacobian(full[: equation.size], p).reshape(
+            block[:, :, :size] = equation.jacobian(full[:size], p).reshape(len(p.q), c, -1)
+            at = size + index * _TERMS * c
+            block[:, :, at : at + _TERMS * c] = np.einsum("nk,cd->nckd", basis, np.eye(c)).reshape(
                 len(p.q), c, -1
             )
-            at = equation.size + c * index
-            block[:, :, at : at + c] = np.eye(c)
             blocks.append((block / sigma[:, None]).reshape(len(p.q) * c, -1))
         return np.concatenate(blocks)
 
-    bias_names = tuple(f"bias[{p.name}].{channel}" for p in prepared for channel in equation.channels)
-    prior = equation.start()
-    zero = np.zeros(k * c)
-    parameters = Parameters(
-        names=equation.names + bias_names,
-        value=np.concatenate([prior, zero]),
-        sigma=np.concatenate([equation.sigma(), np.tile(equation.bias_sigma, k)]),
-        lower=np.concatenate([equation.lower(), np.full(k * c, -np.inf)]),
+    series = [(len(p.q), c) for p in prepared]
+    intervals = [float(np.median(np.diff(p.t))) for p in prepared]
+
+    def scores(r: Array, J: Array) -> Array:
+        noise = flicker_scores(r, J, series, intervals, low_pass_Hz)
+        return noise + rounding_scores(equation, theta, prepared, sigmas, J)
+
+    names = tuple(
+        f"{term}[{p.name}].{channel}" for p in prepared for term in _ZERO for channel in equation.channels
     )
-    first_bias = [np.mean(p.wrench - equation.predict(theta, p), axis=0) for p in prepared]
+    parameters = Parameters(
+        names=equation.names + names,
+        value=np.concatenate([equation.start(), np.zeros(len(names))]),
+        sigma=np.concatenate([equation.sigma(), np.tile(equation.bias_sigma, _TERMS * len(prepared))]),
+        lower=np.concatenate([equation.lower(), np.full(len(names), -np.inf)]),
+    )
+    first = [
+        np.linalg.lstsq(basis, p.wrench - equation.predict(theta, p))[0].ravel()
+        for p, basis in zip(prepared, bases, strict=True)
+    ]
     return fit_map(
         residual,
         parameters,
         jacobian=jacobian,
-        series=[(len(p.q), c) for p in prepared],
-        start=np.concatenate([theta, *first_bias]),
+        series=series,
+        scores=scores,
+        start=np.concatenate([theta, *first]),
     )
+
+
+def zeros(equation: Equation, fit: Fit) -> Array:
+    """Fitted coefficients of each recording's zero: (recordings, terms, c) N and N m, the constant first."""
+    return _zeros(fit.value[equation.size :], len(equation.channels))
+
+
+def _zeros(values: Array, c: int) -> Array:
+    return values.reshape(-1, _TERMS, c)
+
+
+def zero_basis(p: Prepared) -> Array:
+    """Legendre polynomials (n, terms) of order 0, 1, ... over the recording's instants."""
+    x = 2.0 * (p.t - p.t[0]) / (p.t[-1] - p.t[0]) - 1.0
+    basis: Array = legvander(x, _TERMS - 1)
+    return basis
+
+
+def _without_zero(values: Array, p: Prepared) -> Array:
+    """Take constant and drift, by least squares, off values (n, ...)."""
+    basis = zero_basis(p)
+    flat = values.reshape(len(values), -1)
+    left: Array = flat - basis @ np.linalg.lstsq(basis, flat)[0]
+    return left.reshape(values.shape)
 
 
 def first_sigma(p: Prepared, rig: Rig) -> Array:
@@ -68,8 +120,7 @@ def first_sigma(p: Prepared, rig: Rig) -> Array:
 
 def residual_sigma(equation: Equation, theta: Array, p: Prepared, rig: Rig) -> Array:
     """Standard deviation (c,) of white noise that would leave the parameters as uncertain as this residual."""
-    residual = p.wrench - equation.predict(theta, p)
-    residual = residual - residual.mean(axis=0)
+    residual = _without_zero(p.wrench - equation.predict(theta, p), p)
     coloured = np.sqrt(np.mean(residual**2, axis=0) * variance_inflation(residual))
     sigma: Array = np.maximum(coloured, least_sigma(p, rig))
     return sigma
@@ -86,11 +137,11 @@ def least_sigma(p: Prepared, rig: Rig) -> Array:
 def refuse_uninformed(
     equation: Equation, prepared: Sequence[Prepared], sigmas: Sequence[Array], theta: Array
 ) -> None:
-    """Refuse data whose strongest message about the rig, bias aside, is weaker than the prior."""
+    """Refuse data whose strongest message about the rig, zero and drift aside, is weaker than the prior."""
     blocks = []
     for p, sigma in zip(prepared, sigmas, strict=True):
         J = equation.jacobian(theta, p).reshape(len(p.q), len(equation.channels), -1)
-        blocks.append(((J - J.mean(axis=0)) / sigma[:, None]).reshape(-1, equation.size))
+        blocks.append((_without_zero(J, p) / sigma[:, None]).reshape(-1, equation.size))
     _, s, Vt = np.linalg.svd(np.concatenate(blocks) * equation.sigma(), full_matrices=False)
     if s[0] < 1.0:
         direction = combination(Vt[0], equation.names)

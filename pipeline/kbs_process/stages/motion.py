@@ -60,6 +60,13 @@ class Motion:
     def __len__(self) -> int:
         return len(self.q)
 
+    @property
+    def sigma_rounding(self) -> Array:
+        """The part (n, joints) of `sigma_q` that is the encoders' rounding, rad."""
+        return np.stack(
+            [rounding_error(of_joint, self.dt) for of_joint in self.rounding.T.swapaxes(1, 2)], axis=1
+        )
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Angle:
