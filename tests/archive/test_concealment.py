@@ -56,7 +56,7 @@ def strings(source: Path) -> set[str]:
 @pytest.mark.parametrize("folder", COMPUTING)
 def test_code_names_neither_campaigns_nor_truth(folder: str):
     campaigns = {path.name for path in (ROOT / "campaigns").iterdir() if path.is_dir()}
-    secrets = campaigns | {"truth", "tests/", "seed"}
+    secrets = campaigns | {"truth", "tests/"}
     modules = [path for path in (PACKAGE / folder).rglob("*.py") if "importers" not in path.parts]
     assert modules
     for module in modules:
