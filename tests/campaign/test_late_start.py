@@ -9,11 +9,14 @@ import pytest
 
 from campaign.campaign_folder import EXAMPLE
 from kbs_process.campaign.load import load_campaign
-from kbs_process.campaign.predicting import LEAD, approached
+from kbs_process.campaign.predicting import LEAD, approached, predict_run
 from kbs_process.plant.predict import predict
 from kbs_process.plant.schedule import Schedule
+from kbs_process.signals.records import WRENCH_CHANNELS, WRENCH_UNITS, Events, Run, Signal
+from kbs_process.stages.condense import CondenseSettings
 
 RATE = np.radians(0.3)
+EMPTY = Run("late", None, None, None, None, None, None, None, None, None, 0)
 
 
 def slew(duration: float = 40.0) -> Schedule:
@@ -51,6 +54,27 @@ def test_what_preceded_is_smooth_and_ends_where_the_recording_begins() -> None:
 def test_a_recording_that_begins_at_rest_is_left_alone() -> None:
     given = slew()
     assert approached(given) is given
+
+
+def test_nothing_is_predicted_for_a_time_without_commands() -> None:
+    campaign = load_campaign(EXAMPLE, checksums=False)
+    names = campaign.rig.joint_names
+    slewed = slew(30.0)
+    events = Events(slewed.t + 12.0, slewed.position, names)
+    t = np.arange(800) * 0.05
+    wrench = Signal(
+        0.0, 0.05, np.zeros((800, 6)), WRENCH_CHANNELS, WRENCH_UNITS, "T", np.ones(len(t), dtype=bool)
+    )
+    run = replace(EMPTY, wrench=wrench, command=events, rates={"wrench": 100.0, "angle": 20.0})
+    predicted = predict_run(campaign.rig, campaign.effects, run, CondenseSettings(working_rate_Hz=20.0))
+    for signal in (predicted.wrench, predicted.angle):
+        assert signal is not None
+        assert not signal.valid[signal.t < 11.8].any()
+        assert signal.valid[(signal.t > 12.0) & (signal.t < 35.0)].all()
+    punctual = replace(run, command=replace(events, t=slewed.t + 0.05))
+    known = predict_run(campaign.rig, campaign.effects, punctual, CondenseSettings(working_rate_Hz=20.0))
+    assert known.wrench is not None
+    assert known.wrench.valid[20:-20].all()
 
 
 def test_late_recording_is_predicted_as_the_whole_one() -> None:

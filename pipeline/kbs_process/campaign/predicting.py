@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from kbs_process.errors import RecordingError
 from kbs_process.plant.predict import Schedule, predict
 from kbs_process.rig.model import Rig
-from kbs_process.signals.records import WRENCH_CHANNELS, Array, Events, Run
+from kbs_process.signals.records import WRENCH_CHANNELS, Array, Events, Run, Signal
 from kbs_process.stages.condense import CondenseSettings, condense
 
 LEAD = (
@@ -89,7 +90,7 @@ def predict_run(
 ) -> Run:
     """Predict wrench and encoder angles of a command-driven run, on its own time grid.
 
-    A run that begins in motion is led into it, see `approached`.
+    A run that begins in motion is led into it, see `approached`. Before the first recorded command nothing is valid.
     """
     wrench = run.wrench
     if wrench is None:
@@ -105,7 +106,24 @@ def predict_run(
         progress=progress,
     )
     channels = {"wrench": WRENCH_CHANNELS, "angle": rig.joint_names, "field": rig.joint_names}
-    return condense(run.name, blocks, channels, settings)
+    predicted = condense(run.name, blocks, channels, settings)
+    start = _commanded_from(run)
+    return replace(predicted, wrench=_known(predicted.wrench, start), angle=_known(predicted.angle, start))
+
+
+def _commanded_from(run: Run) -> float:
+    """Return the time, s, from which commands are known to have driven the joints: a cycle before the first."""
+    assert run.command is not None  # `schedule_of` demands it
+    t = run.command.t
+    return float(t[0] - np.median(np.diff(t))) if len(t) > 1 else float(t[0])
+
+
+def _known(signal: Signal | None, start: float) -> Signal | None:
+    """Flag what was predicted for a time before `start`: nobody recorded what drove the joints then."""
+    if signal is None or start <= signal.t0:
+        return signal
+    step = f"not known before {start:.2f} s, the first command"
+    return signal.derive(signal.values, step, valid=signal.valid & (signal.t >= start))
 
 
 def _columns(events: Events, names: Sequence[str]) -> Array:
