@@ -100,7 +100,9 @@ def test_error_in_the_band_is_what_the_budget_states(
     cut = bandpass.apply(true, Band(name, 0.01, edge))
     valid = table["valid"] & cut.valid
     stated = {
-        b["channel"]: b["total"] for b in campaign.results["budget"] if (b["frame"], b["band"]) == ("T", name)
+        b["channel"]: b["total"]
+        for b in campaign.results["budget"]
+        if (b["recording"], b["frame"], b["band"]) == (run.recording, "T", name)
     }
     for index, channel in enumerate(WRENCH_CHANNELS):
         error = _rms(table[f"{channel}.measured"][valid] - cut.values[valid, index])

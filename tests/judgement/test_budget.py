@@ -5,7 +5,7 @@ import pytest
 
 from kbs_process.signals.records import WRENCH_CHANNELS, WRENCH_UNITS, Signal
 from kbs_process.stages import budget
-from kbs_process.stages.bandpass import Band, apply, noise_bandwidth
+from kbs_process.stages.bandpass import Band, apply, noise_bandwidth, statement
 
 RNG = np.random.default_rng(20)
 DT = 0.05
@@ -75,6 +75,38 @@ def test_a_resonance_amplifies_what_lies_below_it(frequency: float, gain: float)
 
 def test_without_a_resonance_there_is_no_amplification():
     assert not budget.resonance(signal(np.ones((100, 6))), None, (0.01, 1.0)).sigma.any()
+
+
+def test_neither_rest_nor_motion_makes_the_other_better_known():
+    t = DT * np.arange(8000)
+    moving = t > 300.0
+    burst = np.zeros((len(t), 6))
+    burst[moving, 0] = np.sin(2 * np.pi * 0.2 * t[moving])
+    rest = signal(burst * [1, 0, 0, 0, 0, 0] + [0.0, 1.0, 0.0, 0.0, 0.0, 0.0])
+    assert budget.rms(rest)[0] == pytest.approx(0.5 * budget.rms(rest, moving)[0], rel=0.01)
+    assert budget.rms(rest, moving)[1] == pytest.approx(1.0)  # what is as large at rest is not lost
+    entry = budget.from_shapes("s", "x", [rest, rest], lambda one: one, moving)
+    np.testing.assert_allclose(entry.sigma, np.sqrt(2.0) * budget.rms(rest, moving))
+    np.testing.assert_allclose(budget.rms(rest, np.zeros(len(t), dtype=bool)), budget.rms(rest))
+
+
+def test_ends_err_by_what_drifts_and_by_what_is_flat():
+    band, n, runs = Band("lt1Hz", 0.01, 1.0), 4000, 20
+    stated = statement(band, DT, n)
+    for integrated, share in ((False, 0.0), (True, 1.0)):
+        errors, budgeted, parts = np.zeros(6), np.zeros(6), np.zeros(6)
+        for _ in range(runs):
+            x = RNG.normal(size=(3 * n, 6))
+            whole = signal(np.cumsum(x, axis=0) if integrated else x)
+            known = cut(signal(whole.values[n : 2 * n]))
+            part = budget.drifting_part(known, band)
+            entries = budget.filter_edges(known, stated.edge_error, stated.edge_error_drift, part)
+            wrong = known.derive(known.values - cut(whole).values[n : 2 * n], "error")
+            errors += budget.rms(wrong) ** 2
+            budgeted += budget.total(entries) ** 2
+            parts += part / runs
+        assert parts == pytest.approx(share, abs=0.15)
+        assert np.sqrt(errors.sum() / budgeted.sum()) == pytest.approx(1.0, abs=0.3)
 
 
 def test_the_total_is_the_root_of_the_sum_of_squares():

@@ -7,7 +7,7 @@ import pytest
 
 from kbs_process.signals.records import Signal
 from kbs_process.stages.bandpass import Band, apply, crossing_rate
-from kbs_process.stages.verdict import extremes, judge, peak_coverage
+from kbs_process.stages.verdict import extremes, interval, judge, peak_coverage
 
 
 @pytest.mark.parametrize(
@@ -30,10 +30,11 @@ def run(values: np.ndarray, valid: np.ndarray) -> Signal:
     return Signal(10.0, 0.5, values, ("Tx", "Ty"), ("N m", "N m"), "S", valid)
 
 
-def test_the_worst_recording_decides_and_invalid_samples_do_not_count():
+def test_every_recording_has_its_own_peak_and_invalid_samples_do_not_count():
     a = run(np.array([[1.0, 0.1], [-3.0, 0.2], [9.0, 0.0]]), np.array([True, True, False]))
     b = run(np.array([[2.0, -0.5], [0.0, 0.0], [0.0, 0.0]]), np.ones(3, dtype=bool))
-    tx, ty = extremes([("a", a), ("b", b)], ("Tx", "Ty"), "peak")
+    tx, other, _, ty = extremes([("a", a), ("b", b)], ("Tx", "Ty"), "peak")
+    assert (other.value, other.recording) == (2.0, "b")
     assert (tx.value, tx.recording, tx.time_s) == (3.0, "a", 10.5)
     assert (ty.value, ty.recording, ty.time_s) == (0.5, "b", 10.0)
     (rms,) = extremes([("a", a)], ("Tx",), "rms")
@@ -58,6 +59,13 @@ def test_noise_alone_breaks_no_limit_by_its_peak():
     assert failed <= 5  # of 80, each with a probability of 2.3 %
     assert by_two_sigma > 60
     assert above > 40
+
+
+def test_the_interval_of_a_peak_reaches_further_down_than_up():
+    below = peak_coverage(700.0)
+    assert interval(1.0, 0.1, below) == pytest.approx((1.0 - 0.1 * below, 1.2))
+    assert interval(0.3, 0.1, below) == pytest.approx((0.0, 0.5))
+    assert interval(1.0, 0.1) == pytest.approx((0.8, 1.2))
 
 
 def test_how_often_noise_in_a_band_crosses_zero():

@@ -77,6 +77,7 @@ def _band(stated: BandStatement) -> results.Band:
         method=stated.method,
         edge_s=stated.edge_s,
         edge_error=stated.edge_error,
+        edge_error_drift=stated.edge_error_drift,
     )
 
 
@@ -121,7 +122,7 @@ def _merits(
     campaign: Campaign, runs: Sequence[Analysis], bands: Sequence[Band], budget: Sequence[results.Budget]
 ) -> Iterable[results.Merit]:
     by_name = {band.name: band for band in bands}
-    sigma = {(entry.frame, entry.band, entry.channel): entry.total for entry in budget}
+    sigma = {(entry.recording, entry.frame, entry.band, entry.channel): entry.total for entry in budget}
     for analysis in runs:
         for (frame, name), pair in analysis.pairs.items():
             if pair.predicted is None:
@@ -144,7 +145,7 @@ def _merits(
                     fraction_of_variance=merit.fraction_of_variance,
                     spectral_ratio=merit.spectral_ratio,
                     pessimism=merit.pessimism,
-                    sigma=sigma.get((_frame(frame), name, merit.channel)),
+                    sigma=sigma.get((analysis.entry.name, _frame(frame), name, merit.channel)),
                 )
 
 

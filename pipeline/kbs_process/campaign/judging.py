@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,9 +13,31 @@ from kbs_process.errors import ConfigError
 from kbs_process.report import results
 from kbs_process.signals.records import Signal
 from kbs_process.stages.bandpass import Band, crossing_rate
-from kbs_process.stages.verdict import COVERAGE, Judgement, extremes, judge, peak_coverage
+from kbs_process.stages.verdict import COVERAGE, Extreme, Judgement, extremes, interval, judge, peak_coverage
 
 SEVERITY: dict[Judgement, int] = {"pass": 0, "undecided": 1, "fail": 2}
+
+
+@dataclass(frozen=True, slots=True)
+class _Candidate:
+    """One channel of one recording against the limit, by its own uncertainty."""
+
+    extreme: Extreme
+    sigma: float
+    limit: float
+    below: float  # sigmas that the true statistic may lie below
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        return interval(self.extreme.value, self.sigma, self.below)
+
+    @property
+    def verdict(self) -> Judgement:
+        return judge(self.extreme.value, self.sigma, self.limit, self.below)
+
+    def severity(self) -> tuple[int, float]:
+        """Order of candidates: the worst verdict, then the highest end of the interval."""
+        return SEVERITY[self.verdict], self.interval[1]
 
 
 def judged(
@@ -35,26 +58,22 @@ def judged(
             remedy="give [spacecraft] in the parameter files and all six channels, or frame = 'T'",
         )
     channels = [channel for channel in pairs[0][1].measured.channels if channel.startswith(prefix)]
-    sigmas = {
-        entry.channel: entry.total
-        for entry in budgets
-        if (entry.frame, entry.band) == (requirement.frame, band.name)
-    }
-    measured = extremes([(name, pair.measured) for name, pair in pairs], channels, requirement.statistic)
-    predicted = {
-        extreme.channel: extreme.value
-        for extreme in extremes(
-            [(name, pair.predicted) for name, pair in pairs if pair.predicted is not None],
-            channels,
-            requirement.statistic,
-        )
-    }
-    worst = max(measured, key=lambda extreme: extreme.value + COVERAGE * sigmas[extreme.channel])
     below = coverage_below(requirement.statistic, [pair.measured for _, pair in pairs], band)
-    verdict = max(
-        (judge(extreme.value, sigmas[extreme.channel], requirement.limit, below) for extreme in measured),
-        key=SEVERITY.__getitem__,
+    sigmas = {
+        (entry.recording, entry.channel): entry.total for entry in budgets if (entry.frame, entry.band) == key
+    }
+    measured = [
+        _Candidate(extreme, sigmas[extreme.recording, extreme.channel], requirement.limit, below)
+        for extreme in extremes(
+            [(name, pair.measured) for name, pair in pairs], channels, requirement.statistic
+        )
+    ]
+    predicted = extremes(
+        [(name, pair.predicted) for name, pair in pairs if pair.predicted is not None],
+        channels,
+        requirement.statistic,
     )
+    worst = max(measured, key=_Candidate.severity)
     return results.Requirement(
         name=requirement.name,
         quantity=requirement.quantity,
@@ -64,26 +83,39 @@ def judged(
         band_Hz=requirement.band,
         limit=requirement.limit,
         unit=requirement.unit,
-        value=worst.value,
-        sigma=sigmas[worst.channel],
-        margin=requirement.limit - worst.value,
-        verdict=verdict,
-        recording=worst.recording,
-        channel=worst.channel,
-        time_s=worst.time_s,
-        predicted_value=max(predicted.values(), default=None),
+        value=worst.extreme.value,
+        sigma=worst.sigma,
+        low=worst.interval[0],
+        high=worst.interval[1],
+        margin=requirement.limit - worst.extreme.value,
+        verdict=worst.verdict,
+        recording=worst.extreme.recording,
+        channel=worst.extreme.channel,
+        time_s=worst.extreme.time_s,
+        predicted_value=max((extreme.value for extreme in predicted), default=None),
         channels=tuple(
-            results.ChannelResult(
-                channel=extreme.channel,
-                value=extreme.value,
-                sigma=sigmas[extreme.channel],
-                predicted=predicted.get(extreme.channel),
-                recording=extreme.recording,
-                time_s=extreme.time_s,
-            )
-            for extreme in measured
+            _channel(channel, measured, predicted)
+            for channel in channels
+            if any(one.extreme.channel == channel for one in measured)
         ),
         source=requirement.source,
+    )
+
+
+def _channel(
+    channel: str, measured: Sequence[_Candidate], predicted: Sequence[Extreme]
+) -> results.ChannelResult:
+    """The recording in which a channel is closest to failing, beside the largest prediction of any."""
+    worst = max((one for one in measured if one.extreme.channel == channel), key=_Candidate.severity)
+    return results.ChannelResult(
+        channel=channel,
+        value=worst.extreme.value,
+        sigma=worst.sigma,
+        low=worst.interval[0],
+        high=worst.interval[1],
+        predicted=max((one.value for one in predicted if one.channel == channel), default=None),
+        recording=worst.extreme.recording,
+        time_s=worst.extreme.time_s,
     )
 
 

@@ -8,9 +8,8 @@ from kbs_process.campaign.predicting import schedule_of
 from kbs_process.errors import RecordingError
 from kbs_process.rig.model import Rig
 from kbs_process.signals.records import Run
+from kbs_process.stages.clocks import offset_sigma
 from kbs_process.stages.output_error import Measured
-
-_UNKNOWN_CLOCK_S = 1e-3  # taken for a clock that cannot be compared with another
 
 
 def measured(run: Run, rig: Rig) -> Measured:
@@ -34,11 +33,6 @@ def measured(run: Run, rig: Rig) -> Measured:
         schedule=schedule_of(run, rig),
         wrench_rate=run.rates["wrench"],
         angle_rate=run.rates["angle"],
-        clock_sigma=_clock_sigma(run, driven),
-        angle_clock_sigma=math.hypot(_clock_sigma(run, driven), _clock_sigma(run, "angle")),
+        clock_sigma=offset_sigma(run.clocks[driven]),
+        angle_clock_sigma=math.hypot(offset_sigma(run.clocks[driven]), offset_sigma(run.clocks["angle"])),
     )
-
-
-def _clock_sigma(run: Run, stream: str) -> float:
-    sigma = run.clocks[stream].sigma_offset_s
-    return sigma if math.isfinite(sigma) else _UNKNOWN_CLOCK_S

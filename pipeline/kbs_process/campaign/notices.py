@@ -13,6 +13,7 @@ from kbs_process.campaign.findings import Findings
 from kbs_process.campaign.judging import band_of, coverage_below
 from kbs_process.report import results
 from kbs_process.signals.records import Loss
+from kbs_process.stages.clocks import UNKNOWN_OFFSET_S
 from kbs_process.stages.gravity import GravityModel
 from kbs_process.stages.gravity_quality import Misfit
 from kbs_process.stages.verdict import COVERAGE
@@ -49,6 +50,7 @@ def notices(
     yield from _resonance(findings)
     yield from _predictions(findings)
     yield from _edges(findings)
+    yield from _clocks(analyses)
 
 
 def _conventions(conventions: Sequence[results.Convention]) -> Iterable[results.Notice]:
@@ -252,13 +254,31 @@ def at_the_noise(merit: results.Merit) -> bool:
     return merit.sigma is not None and (merit.measured_rms or 0.0) < COVERAGE * merit.sigma
 
 
+def _clocks(analyses: Sequence[Analysis]) -> Iterable[results.Notice]:
+    """Clocks that nothing in the file relates: an uncertainty was assumed, which nobody has measured."""
+    unknown: dict[str, list[str]] = defaultdict(list)
+    for analysis in analyses:
+        for stream, clock in analysis.run.clocks.items():
+            if not np.isfinite(clock.sigma_offset_s):
+                unknown[stream].append(analysis.entry.name)
+    for stream, names in unknown.items():
+        yield results.Notice(
+            severity="info",
+            what=f"the clock of '{stream}' cannot be compared with the wrench's: its stamps are taken as they are, "
+            f"with a standard uncertainty of {1e3 * UNKNOWN_OFFSET_S:g} ms in the budget and in an identification",
+            where=", ".join(names),
+            remedy="let the recorder's own time of every message be written beside the sensors' stamps",
+        )
+
+
 def _edges(findings: Findings) -> Iterable[results.Notice]:
     for band in findings.bands:
         if band.edge_s > 0.0 and band.edge_error:
             yield results.Notice(
                 severity="info",
                 what=f"within {band.edge_s:.0f} s of the ends the filter errs by more than 0.1 % "
-                f"({100 * band.edge_error:.2g} % rms over the record)",
+                f"({100 * band.edge_error:.2g} % rms over the record where the spectrum is flat, "
+                f"{100 * (band.edge_error_drift or 0.0):.2g} % of what drifts)",
                 where=band.label,
                 remedy="record longer before and after the motion",
             )

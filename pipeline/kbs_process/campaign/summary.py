@@ -23,7 +23,6 @@ from kbs_process.stages.gravity_equation import RESPONSE
 from kbs_process.stages.gravity_quality import feasibility
 from kbs_process.stages.repeats import commanded
 from kbs_process.stages.to_cog import ASSUMPTION
-from kbs_process.stages.verdict import COVERAGE
 
 RESPONSE_UNITS = dict(zip(RESPONSE, ("s", "s^2"), strict=True))
 
@@ -70,10 +69,10 @@ def _conclusion(requirements: Sequence[results.Requirement]) -> results.Conclusi
         return results.Conclusion(status="none", sentence="The campaign states no requirement.")
     worst = max(requirements, key=lambda one: ("pass", "undecided", "fail").index(one.verdict))
     words = {"pass": "met", "fail": "not met", "undecided": "neither met nor broken within the uncertainty"}
-    value, sigma = worst.value or 0.0, worst.sigma or 0.0
+    value, low, high = (figure or 0.0 for figure in (worst.value, worst.low, worst.high))
     sentence = (
-        f"{worst.name}: {words[worst.verdict]}. {worst.statistic.capitalize()} {value:.4f} +- {COVERAGE * sigma:.4f} "
-        f"{worst.unit} (k = {COVERAGE:g}) on {worst.channel} in {worst.recording}, "
+        f"{worst.name}: {words[worst.verdict]}. {worst.statistic.capitalize()} {value:.4f} {worst.unit} "
+        f"({low:.4g} to {high:.4f} at 95 %) on {worst.channel} in {worst.recording}, "
         f"{worst.band_Hz[0] or 0:g} to {worst.band_Hz[1] or 0:g} Hz; limit {worst.limit:g} {worst.unit}."
     )
     return results.Conclusion(status=worst.verdict, sentence=sentence)

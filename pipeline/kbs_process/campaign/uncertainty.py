@@ -1,4 +1,4 @@
-"""The uncertainty budget of every channel, in every band, at the transducer and at the spacecraft."""
+"""The uncertainty budget of every recording: each channel, in every band, at the transducer and at the spacecraft."""
 
 from __future__ import annotations
 
@@ -11,9 +11,10 @@ from kbs_process.campaign.analysis import Analysis, bands_of, passband
 from kbs_process.campaign.config import Campaign
 from kbs_process.report import results
 from kbs_process.rig.model import Amplifier
-from kbs_process.signals.records import WRENCH_CHANNELS, Array, Signal
+from kbs_process.signals.records import WRENCH_CHANNELS, Array, Clock, Signal
 from kbs_process.stages import bandpass, budget, gravity_error
 from kbs_process.stages.bandpass import Band, BandStatement
+from kbs_process.stages.clocks import offset_sigma
 from kbs_process.stages.decouple import Decoupling
 from kbs_process.stages.gravity import GravityModel
 from kbs_process.stages.to_cog import sigma_at_spacecraft, sigma_of_pose
@@ -28,28 +29,27 @@ def budgets(
     repeated: Sequence[results.Repeatability],
     resonances: Sequence[results.Resonance],
 ) -> Iterable[results.Budget]:
-    if not runs:
-        return
+    """Yield every recording's own budget; where nothing of a recording is known in a band, there is none."""
     lowest = min((mode.frequency_Hz for mode in resonances), default=None)
+    spacecraft = campaign.rig.spacecraft
     for band in bands_of(campaign.bands)[1:]:
-        channels, units = runs[0].residual.channels, runs[0].residual.units
-        noise = _repeat_noise(repeated, band.name, channels)
-        of_runs = [
-            _entries(campaign, analysis, model, decoupling, band, statements[band.name], noise, lowest)
-            for analysis in runs
-        ]
-        entries = _quadratic_mean(of_runs)
-        yield from _rows(entries, "T", band.name, channels, units)
-        spacecraft = campaign.rig.spacecraft
-        if spacecraft is not None and channels == WRENCH_CHANNELS:
-            moved = [
-                budget.Entry(entry.stage, entry.source, sigma_at_spacecraft(entry.sigma, spacecraft))
-                for entry in entries
-            ]
-            poses = [sigma_of_pose(analysis.pairs["T", band.name].measured, spacecraft) for analysis in runs]
-            pose = np.sqrt(np.mean(np.square(poses), axis=0))
-            moved.append(budget.Entry("to the spacecraft", "position and attitude of S in T", pose))
-            yield from _rows(moved, "S", band.name, channels, units)
+        for analysis in runs:
+            measured = analysis.pairs["T", band.name].measured
+            if not measured.valid.any():
+                continue
+            noise = _repeat_noise(repeated, band.name, measured.channels, analysis.entry.trajectory)
+            entries = _entries(
+                campaign, analysis, model, decoupling, band, statements[band.name], noise, lowest
+            )
+            yield from _rows(entries, "T", band.name, analysis.entry.name, measured)
+            if spacecraft is not None and measured.channels == WRENCH_CHANNELS:
+                moved = [
+                    budget.Entry(entry.stage, entry.source, sigma_at_spacecraft(entry.sigma, spacecraft))
+                    for entry in entries
+                ]
+                pose = sigma_of_pose(measured, spacecraft)
+                moved.append(budget.Entry("to the spacecraft", "position and attitude of S in T", pose))
+                yield from _rows(moved, "S", band.name, analysis.entry.name, measured)
 
 
 def _entries(
@@ -70,18 +70,20 @@ def _entries(
     measured = analysis.pairs["T", band.name].measured
     limits = passband(band, campaign.bands.working_rate)
     index = [WRENCH_CHANNELS.index(channel) for channel in measured.channels]
-    assert analysis.run.wrench is not None
     sensor = budget.sensor_noise(
         campaign.rig.transducer.noise.value[index],
         analysis.run.rates["wrench"],
         bandpass.noise_bandwidth(band, measured.dt),
     )
+    late = late_sigma(analysis.run.clocks, campaign.rig.transducer.amplifier)
     entries = [
         sensor,
-        budget.cross_coupling(cut(analysis.run.wrench), decoupling.sigma),
+        _cross_coupling(analysis, model, decoupling, band),
         *gravity_error.entries(analysis.motion, analysis.static, model, cut),
-        budget.clock(analysis.static.wrench, _late_sigma(analysis, campaign.rig.transducer.amplifier), cut),
-        budget.filter_edges(measured, stated.edge_error),
+        budget.clock(analysis.static.wrench, late, cut, gravity_error.moving(analysis.motion)),
+        *budget.filter_edges(
+            measured, stated.edge_error, stated.edge_error_drift, budget.drifting_part(measured, band)
+        ),
         budget.resonance(measured, resonance, limits),
     ]
     if repeat_noise is not None:
@@ -89,51 +91,55 @@ def _entries(
     return entries
 
 
-def _late_sigma(analysis: Analysis, amplifier: Amplifier | None) -> float:
+def _cross_coupling(
+    analysis: Analysis, model: GravityModel, decoupling: Decoupling, band: Band
+) -> budget.Entry:
+    """What the matrix's uncertainty makes of a recording's wrench, counted once.
+
+    Where the gravity fit estimates what the calibration left, its covariance holds the leak of the static wrench; here
+    remains that of the disturbance, by the fit's own sigmas. Where it does not, the calibration's sigmas concern all.
+    """
+    assert analysis.run.wrench is not None
+    if not model.settings.cross_coupling:
+        return budget.cross_coupling(bandpass.apply(analysis.run.wrench, band), decoupling.sigma)
+    index = model.equation.index
+    fitted = model.equation.coupling(model.fit.sigma[: model.equation.size])[np.ix_(index, index)]
+    return budget.cross_coupling(analysis.pairs["T", band.name].measured, fitted)
+
+
+def late_sigma(clocks: Mapping[str, Clock], amplifier: Amplifier | None) -> float:
     """How well it is known when angles and wrench belong together, s: their clocks, and the amplifier's delay."""
-    clock = analysis.run.clocks.get("angle") or analysis.run.clocks.get("rate")
-    known = 0.0 if clock is None else float(np.hypot(clock.sigma_offset_s, clock.latency_s))
-    known = known if np.isfinite(known) else 0.0
+    clock = clocks.get("angle") or clocks["rate"]
+    late = float(np.hypot(offset_sigma(clock), np.nan_to_num(clock.latency_s)))
     if amplifier is None:
-        return known
-    return float(np.hypot(known, amplifier.delay * float(amplifier.corner.sigma) / float(amplifier.corner)))
+        return late
+    return float(np.hypot(late, amplifier.delay * float(amplifier.corner.sigma) / float(amplifier.corner)))
 
 
 def _repeat_noise(
-    repeated: Sequence[results.Repeatability], band: str, channels: Sequence[str]
+    repeated: Sequence[results.Repeatability], band: str, channels: Sequence[str], trajectory: str
 ) -> Array | None:
-    """The largest noise of the trajectories in T, (c,); None without repeats."""
-    worst = np.zeros(len(channels))
+    """The noise of a trajectory's repeats in T, (c,); the largest of all where it was not repeated; else None."""
     of_band = [entry for entry in repeated if entry.band == band and entry.frame == "T"]
-    for entry in of_band:
+    own = [entry for entry in of_band if entry.trajectory == trajectory]
+    worst = np.zeros(len(channels))
+    for entry in own or of_band:
         column = channels.index(entry.channel)
         worst[column] = max(worst[column], entry.noise_rms or 0.0)
     return worst if of_band else None
 
 
-def _quadratic_mean(of_runs: Sequence[Sequence[budget.Entry]]) -> list[budget.Entry]:
-    return [
-        budget.Entry(
-            same[0].stage, same[0].source, np.sqrt(np.mean([entry.sigma**2 for entry in same], axis=0))
-        )
-        for same in zip(*of_runs, strict=True)
-    ]
-
-
 def _rows(
-    entries: Sequence[budget.Entry],
-    frame: Literal["S", "T"],
-    band: str,
-    channels: Sequence[str],
-    units: Sequence[str],
+    entries: Sequence[budget.Entry], frame: Literal["S", "T"], band: str, recording: str, measured: Signal
 ) -> Iterable[results.Budget]:
     sums = budget.total(entries)
-    for index, channel in enumerate(channels):
+    for index, (channel, unit) in enumerate(zip(measured.channels, measured.units, strict=True)):
         yield results.Budget(
             channel=channel,
-            unit=units[index],
+            unit=unit,
             frame=frame,
             band=band,
+            recording=recording,
             contributions=tuple(
                 results.BudgetItem(stage=entry.stage, source=entry.source, sigma=float(entry.sigma[index]))
                 for entry in entries

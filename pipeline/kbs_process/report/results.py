@@ -48,6 +48,8 @@ class ChannelResult(Record, frozen=True, kw_only=True):
     predicted: float | None
     recording: str | None  # where the measured value occurs
     time_s: float | None
+    low: float | None = None  # the true one lies between low and high, at 95 %
+    high: float | None = None
 
 
 class Requirement(Record, frozen=True, kw_only=True):
@@ -72,6 +74,8 @@ class Requirement(Record, frozen=True, kw_only=True):
     predicted_sigma: float | None = None
     channels: tuple[ChannelResult, ...] = ()
     source: str = ""
+    low: float | None = None  # the true value lies between low and high, at 95 %
+    high: float | None = None
 
 
 class LossEntry(Record, frozen=True, kw_only=True):
@@ -200,7 +204,8 @@ class Band(Record, frozen=True, kw_only=True):
     low_pass_Hz: float | None
     method: str
     edge_s: float = 0.0  # at each end, where the filter's transient exceeds `edge_error`
-    edge_error: float | None = None  # relative to the signal
+    edge_error: float | None = None  # relative to the signal, whose spectrum is flat
+    edge_error_drift: float | None = None  # relative to a signal that drifts like a random walk
 
 
 class Repeatability(Record, frozen=True, kw_only=True):
@@ -263,7 +268,7 @@ class BudgetItem(Record, frozen=True, kw_only=True):
 
 
 class Budget(Record, frozen=True, kw_only=True):
-    """The uncertainty budget of one channel in one band; `total` is the root sum of squares."""
+    """The uncertainty budget of one channel of a recording in one band; `total` is the root sum of squares."""
 
     channel: str
     unit: str
@@ -271,6 +276,7 @@ class Budget(Record, frozen=True, kw_only=True):
     band: str
     contributions: tuple[BudgetItem, ...]
     total: float
+    recording: str | None = None  # None: of all recordings alike
 
 
 class Results(Record, frozen=True, kw_only=True):

@@ -1,7 +1,9 @@
-"""The uncertainty budget: what every stage may be wrong by, in one band, on every channel.
+"""The uncertainty budget: what every stage may be wrong by, in one band, on every channel of one recording.
 
 Every entry is the rms over the run of a one-sigma error, taken through the same linear stages as the signal.
-Entries are independent causes; the total is the root of their sum of squares (JCGM 100:2008, 5.1.2).
+Errors that depend on motion count with their rms in motion or at rest, whichever is larger: neither makes a peak in
+the other better known. Entries are independent causes; the total is the root of their sum of squares
+(JCGM 100:2008, 5.1.2).
 """
 
 from __future__ import annotations
@@ -11,9 +13,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kbs_process.signals.records import Array, Signal
+from kbs_process.signals.records import Array, Mask, Signal
+from kbs_process.stages.bandpass import Band, gain
 
 Filter = Callable[[Signal], Signal]
+
+TWO_OCTAVES = 4.0
+TELLING = 0.1  # least difference of the shares by which noise and drift are told apart in a band
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,10 +37,20 @@ def total(entries: Sequence[Entry]) -> Array:
     return squares
 
 
-def rms(signal: Signal) -> Array:
-    """Root mean square of the valid samples of every channel, (c,)."""
-    values: Array = np.sqrt(np.mean(signal.values[signal.valid] ** 2, axis=0))
-    return values
+def rms(signal: Signal, moving: Mask | None = None) -> Array:
+    """Root mean square of the valid samples of every channel, (c,).
+
+    With `moving` (n,): of those in motion or of those at rest, whichever is larger.
+    """
+    return _root_mean(signal.values**2, signal.valid, moving)
+
+
+def _root_mean(variance: Array, valid: Mask, moving: Mask | None) -> Array:
+    """Root of the mean of a variance (n, c) over valid samples; the larger of motion's and rest's, given `moving`."""
+    states = [valid] if moving is None else [valid & moving, valid & ~moving]
+    means = [np.mean(variance[state], axis=0) for state in states if state.any()]
+    root: Array = np.sqrt(np.max(means, axis=0))
+    return root
 
 
 def sensor_noise(noise: Array, rate: float, bandwidth: float) -> Entry:
@@ -42,23 +58,28 @@ def sensor_noise(noise: Array, rate: float, bandwidth: float) -> Entry:
     return Entry("transducer", "noise of the transducer, white", noise * np.sqrt(2.0 * bandwidth / rate))
 
 
-def from_shapes(stage: str, source: str, shapes: Sequence[Signal], band: Filter) -> Entry:
+def from_shapes(
+    stage: str, source: str, shapes: Sequence[Signal], band: Filter, moving: Mask | None = None
+) -> Entry:
     """Entry of a stage whose independent one-sigma errors have known time histories `shapes` (at least one)."""
-    squares = sum((rms(band(shape)) ** 2 for shape in shapes), np.zeros(len(shapes[0].channels)))
-    return Entry(stage, source, np.sqrt(squares))
+    variance = np.zeros_like(shapes[0].values)
+    valid = np.ones(len(shapes[0]), dtype=np.bool_)
+    for shape in shapes:
+        cut = band(shape)
+        variance += cut.values**2
+        valid &= cut.valid
+    return Entry(stage, source, _root_mean(variance, valid, moving))
 
 
 def cross_coupling(wrench: Signal, sigma: Array) -> Entry:
     """Error of each channel from the uncertainty `sigma` (c, c) of the matrix, for a wrench within the band."""
-    return Entry(
-        "cross-coupling", "uncertainty of the calibrated matrix", np.sqrt(sigma**2 @ rms(wrench) ** 2)
-    )
+    return Entry("cross-coupling", "what is not known of the matrix", np.sqrt(sigma**2 @ rms(wrench) ** 2))
 
 
-def clock(static: Signal, sigma_s: float, band: Filter) -> Entry:
+def clock(static: Signal, sigma_s: float, band: Filter, moving: Mask | None = None) -> Entry:
     """Error of the static model evaluated `sigma_s` s early or late: its time derivative times that."""
     slope = static.derive(np.gradient(static.values, static.dt, axis=0) * sigma_s, "time derivative")
-    return Entry("clocks", "encoder against transducer: clocks, amplifier's delay", rms(band(slope)))
+    return Entry("clocks", "encoder against transducer: clocks, amplifier's delay", rms(band(slope), moving))
 
 
 def repeatability(noise_rms: Array, explained: Array) -> Entry:
@@ -67,9 +88,44 @@ def repeatability(noise_rms: Array, explained: Array) -> Entry:
     return Entry("repeatability", "differences of repeats beyond sensor noise", excess)
 
 
-def filter_edges(signal: Signal, relative: float) -> Entry:
-    """Transient of the band's filter at the ends of the record: `relative` of the signal."""
-    return Entry("band filter", "transient at the ends of the record", relative * rms(signal))
+def filter_edges(signal: Signal, flat: float, drift: float, drifting: Array) -> tuple[Entry, Entry]:
+    """Transient of the band's filter at the ends of the record, of what is flat and of what drifts.
+
+    What lay beyond the ends is not known. Relative to its own rms in the band a signal with a flat spectrum (noise,
+    bursts) errs by `flat`, one that drifts like a random walk (what gravity, warming up or a cable leave) by `drift`.
+    `drifting` (c,) is the part of the signal's power that is the latter, see `drifting_part`.
+    """
+    power = rms(signal) ** 2
+    return (
+        Entry("band filter", "ends of the record: flat spectrum", flat * np.sqrt((1.0 - drifting) * power)),
+        Entry("band filter", "ends of the record: drift", drift * np.sqrt(drifting * power)),
+    )
+
+
+def drifting_part(signal: Signal, band: Band) -> Array:
+    """Part (c,) of the power of a signal in a band that drifts; none where no high-pass remembers what was before.
+
+    White noise and a random walk have known shares of their power in the band's lowest two octaves; a mixture of both
+    has what lies between. Invalid samples count as zero; records are taken as they are, without a window.
+    """
+    if band.high_pass_Hz is None:
+        return np.zeros(len(signal.channels))
+    below = TWO_OCTAVES * band.high_pass_Hz
+    f = np.geomspace(0.1 * band.high_pass_Hz, 0.5 / signal.dt, 4001)[:-1]
+    passed = gain(band, f, signal.dt) ** 2
+    white, walk = _share_below(below, f, passed * f), _share_below(below, f, passed / f)  # d ln f
+    if walk - white < TELLING:
+        return np.ones(len(signal.channels))
+    known = np.where(signal.valid[:, None], signal.values, 0.0)
+    power = np.abs(np.fft.rfft(known, axis=0)) ** 2
+    low = np.sum(power[np.fft.rfftfreq(len(known), signal.dt) <= below], axis=0)
+    whole = np.sum(power, axis=0)
+    part: Array = np.clip((low / np.where(whole > 0.0, whole, 1.0) - white) / (walk - white), 0.0, 1.0)
+    return part
+
+
+def _share_below(limit: float, f: Array, density: Array) -> float:
+    return float(np.sum(density[f <= limit]) / np.sum(density))
 
 
 def resonance(signal: Signal, frequency: float | None, passband: tuple[float, float]) -> Entry:

@@ -17,6 +17,7 @@ from kbs_process.signals.records import Array, Clock, Stamps
 
 STRETCHES = 256  # bound on the pairs kept, however long the recording
 LEAST_PAIRS = 8
+UNKNOWN_OFFSET_S = 1e-3  # standard uncertainty taken for clocks that cannot be compared
 LARGEST_SKEW = 0.01  # beyond it the recorder's clock is not a clock (a file written in one go)
 
 
@@ -146,6 +147,11 @@ def align(streams: dict[str, ClockData], reference: str) -> dict[str, Clock]:
         if key != reference:
             clocks[key] = _place(data, streams, clocks, reference)
     return clocks
+
+
+def offset_sigma(clock: Clock) -> float:
+    """Return the standard uncertainty of a clock's offset, s; a conventional one where nothing was there to tell."""
+    return clock.sigma_offset_s if np.isfinite(clock.sigma_offset_s) else UNKNOWN_OFFSET_S
 
 
 def _own_source(data: ClockData, otherwise: str) -> str:

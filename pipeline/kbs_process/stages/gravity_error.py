@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kbs_process.signals.records import Array
+from kbs_process.signals.records import Array, Mask
 from kbs_process.stages.budget import Entry, Filter, from_shapes
 from kbs_process.stages.gravity import GravityModel, Static, angle_slopes, derivatives
 from kbs_process.stages.gravity_parameters import Index
@@ -12,6 +12,7 @@ from kbs_process.stages.gravity_taring import Taring
 from kbs_process.stages.motion import Motion
 
 _POINTS = 1000  # of a recording at which the shapes are computed, linear in between
+_SLOW = 0.1  # of a recording's greatest rate, below which a joint counts as at rest
 _NEGLIGIBLE = 1e-6  # part of the greatest eigenvalue from which a direction is left out
 
 
@@ -23,13 +24,15 @@ def entries(motion: Motion, static: Static, model: GravityModel, band: Filter) -
     signal is. The recording's own constant takes up the mean of these errors (`Taring.slope`); what its noise leaves
     is constant, and vanishes in a band without zero frequency. The angles' error goes the same way, (dW/dq) times the
     histories of the encoders' rounding; what the angles' source misses of the real motion counts in full, wherever in
-    the band it lies.
+    the band it lies, and all of it is taken to fall into the time in which the joints move. Entries are rms over
+    that time or over the rest, whichever is larger.
     """
+    in_motion = moving(motion)
     shapes = [
         static.wrench.derive(shape, "error of the gravity model")
         for shape in _shapes(motion, model, static.taring)
     ]
-    parameters = from_shapes("gravity", "covariance of the fitted parameters", shapes, band)
+    parameters = from_shapes("gravity", "covariance of the fitted parameters", shapes, band, in_motion)
     constant = np.broadcast_to(static.taring.noise, static.wrench.values.shape)
     tared = from_shapes(
         "gravity",
@@ -45,10 +48,18 @@ def entries(motion: Motion, static: Static, model: GravityModel, band: Filter) -
         for phase in motion.rounding
         for joint, history in enumerate(phase.T)
     ]
-    rounded = from_shapes("gravity", "", rounding, band).sigma
-    missed = np.sqrt(np.mean((slope * motion.missed) ** 2, axis=0).sum(axis=1))
+    rounded = from_shapes("gravity", "", rounding, band, in_motion).sigma
+    share = np.mean(in_motion) if in_motion.any() else 1.0
+    missed = np.sqrt(np.mean((slope * motion.missed) ** 2, axis=0).sum(axis=1) / share)
     angles = Entry("gravity", "angles: encoder rounding and missed motion", np.hypot(rounded, missed))
     return parameters, tared, angles
+
+
+def moving(motion: Motion) -> Mask:
+    """When (n,) any joint moves faster than a tenth of the recording's greatest rate."""
+    rate = np.max(np.abs(motion.qd), axis=1)
+    mask: Mask = rate > _SLOW * np.max(rate, initial=0.0)
+    return mask
 
 
 def _slope(motion: Motion, model: GravityModel) -> Array:

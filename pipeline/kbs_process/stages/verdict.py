@@ -19,7 +19,7 @@ Judgement = Literal["pass", "fail", "undecided"]
 
 @dataclass(frozen=True, slots=True)
 class Extreme:
-    """The statistic of one channel, over several recordings, and where it occurs."""
+    """The statistic of one channel in one recording, and when it occurs."""
 
     channel: str
     value: float
@@ -30,17 +30,13 @@ class Extreme:
 def extremes(
     signals: Sequence[tuple[str, Signal]], channels: Sequence[str], statistic: Literal["peak", "rms"]
 ) -> tuple[Extreme, ...]:
-    """Return the largest `statistic` of each channel over (recording, signal) pairs, valid samples only."""
-    found = []
-    for channel in channels:
-        candidates = [
-            _extreme(name, signal, channel, statistic)
-            for name, signal in signals
-            if channel in signal.channels and signal.valid.any()
-        ]
-        if candidates:
-            found.append(max(candidates, key=lambda extreme: extreme.value))
-    return tuple(found)
+    """Return the `statistic` of each channel in each of (recording, signal) pairs, valid samples only."""
+    return tuple(
+        _extreme(name, signal, channel, statistic)
+        for channel in channels
+        for name, signal in signals
+        if channel in signal.channels and signal.valid.any()
+    )
 
 
 def _extreme(name: str, signal: Signal, channel: str, statistic: Literal["peak", "rms"]) -> Extreme:
@@ -63,15 +59,22 @@ def peak_coverage(crossings: float) -> float:
     return float(np.sqrt(max(2.0 * np.log(2.0 * max(crossings, 1.0) / ONE_SIDED), COVERAGE**2)))
 
 
+def interval(value: float, sigma: float, below: float = COVERAGE) -> tuple[float, float]:
+    """Return between which figures the true peak or rms lies, at 95 %: value - `below` sigma, value + 2 sigma.
+
+    Noise raises a peak and never lowers it: the true one is below the measured one by up to `peak_coverage` sigmas.
+    Neither statistic is negative.
+    """
+    return max(value - below * sigma, 0.0), value + COVERAGE * sigma
+
+
 def judge(value: float, sigma: float, limit: float, below: float = COVERAGE) -> Judgement:
     """Compare a value with its limit: decided only where the expanded uncertainty leaves no doubt.
 
-    Simple acceptance with guard bands on both sides (JCGM 106:2012, 8.3): "pass" if value + 2 sigma <= limit,
-    "fail" if value - `below` sigma > limit, else "undecided". Noise raises a peak and never lowers it: the true one
-    is below the measured one by up to `peak_coverage` sigmas.
+    Simple acceptance with guard bands on both sides (JCGM 106:2012, 8.3): "pass" if all of the `interval` is within
+    the limit, "fail" if all of it is beyond, else "undecided".
     """
-    if value + COVERAGE * sigma <= limit:
+    low, high = interval(value, sigma, below)
+    if high <= limit:
         return "pass"
-    if value - below * sigma > limit:
-        return "fail"
-    return "undecided"
+    return "fail" if low > limit else "undecided"

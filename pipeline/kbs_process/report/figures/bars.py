@@ -10,14 +10,14 @@ from matplotlib.figure import Figure
 
 from kbs_process.report.figures import draw
 from kbs_process.report.panel import Picture
-from kbs_process.report.results import Budget, FittedParameter, Repeatability, Requirement
+from kbs_process.report.results import Budget, ChannelResult, FittedParameter, Repeatability, Requirement
 from kbs_process.report.text import label, number, unit
 
 _ROWS = 24  # of parameters in one column
 
 
 def against_limit(requirement: Requirement, alt: str) -> Picture:
-    """Draw each channel's measured (with two sigma) and predicted value, and the limit."""
+    """Draw each channel's measured value with its 95 % interval, the predicted one, and the limit."""
     rows = requirement.channels
     with draw.style():
         figure, axis = draw.canvas(0.75 + 0.36 * len(rows))
@@ -26,10 +26,10 @@ def against_limit(requirement: Requirement, alt: str) -> Picture:
             place - 0.19,
             [row.value or 0.0 for row in rows],
             0.34,
-            xerr=[2.0 * (row.sigma or 0.0) for row in rows],
+            xerr=_reach(rows),
             color=draw.MEASURED,
             error_kw={"elinewidth": 0.9, "capsize": 2, "ecolor": draw.INK},
-            label="measured, ± 2 σ",
+            label="measured, 95 % interval",
         )
         if any(row.predicted is not None for row in rows):
             axis.barh(
@@ -47,6 +47,17 @@ def against_limit(requirement: Requirement, alt: str) -> Picture:
         axis.set_xlabel(f"{requirement.statistic} / {unit(requirement.unit)}")
         _legend_above(figure)
         return draw.picture(figure, alt)
+
+
+def _reach(rows: Sequence[ChannelResult]) -> list[list[float]]:
+    """How far each channel's interval reaches below and above its value; not at all where there is none."""
+    values = [row.value or 0.0 for row in rows]
+    lows = [value if row.low is None else row.low for value, row in zip(values, rows, strict=True)]
+    highs = [value if row.high is None else row.high for value, row in zip(values, rows, strict=True)]
+    return [
+        [value - low for value, low in zip(values, lows, strict=True)],
+        [high - value for value, high in zip(values, highs, strict=True)],
+    ]
 
 
 def signal_and_noise(rows: Sequence[Repeatability], alt: str, title: str) -> Picture:

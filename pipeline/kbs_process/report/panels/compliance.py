@@ -10,9 +10,10 @@ from kbs_process.report.tables import Tables
 from kbs_process.report.text import MISSING, band_hz, count, exact, measure, number, percent, unit
 
 _CAPTION = Caption(
-    shown="The largest measured value of each channel over all recordings that count, with two standard "
-    "deviations, the prediction's, and the limit.",
-    good="Every bar with its uncertainty ends left of the limit, and the prediction is a little above "
+    shown="Each channel's measured value in the recording that is nearest to failing, with the interval that holds the "
+    "true one at 95 %, the prediction's largest, and the limit. The interval of a peak reaches further down than up: "
+    "noise raises a peak and never lowers it.",
+    good="Every bar with its interval ends left of the limit, and the prediction is a little above "
     "the measurement.",
     bad="An error bar that reaches the limit: the verdict is then undecided. A prediction well below the "
     "measurement: it must not be used to extrapolate to flight.",
@@ -46,7 +47,8 @@ def _table(results: Results) -> Grid:
         (
             f"{entry.name} ({entry.statistic}, {entry.frame})",
             band_hz(*entry.band_Hz),
-            f"{measure(entry.value, entry.sigma)} {unit(entry.unit)}",
+            f"{number(entry.value)} {unit(entry.unit)}",
+            _interval(entry),
             f"{exact(entry.limit)} {unit(entry.unit)}",
             _margin(entry),
             _where(entry),
@@ -55,10 +57,30 @@ def _table(results: Results) -> Grid:
         )
         for entry in results.requirements
     )
-    head = ("Requirement", "Band", "Measured", "Limit", "Margin", "Worst case", "Predicted", "Verdict")
-    note = "± is one standard deviation throughout this report. Margin: limit less measured value."
+    head = (
+        "Requirement",
+        "Band",
+        "Measured",
+        "Interval, 95 %",
+        "Limit",
+        "Margin",
+        "Worst case",
+        "Predicted",
+        "Verdict",
+    )
+    note = (
+        "Interval: two standard deviations above the measured value; below it two for an rms, for a peak as many as "
+        "noise alone may make of one. Elsewhere in this report ± is one standard deviation. Margin: limit less "
+        "measured value."
+    )
     sources = "; ".join(dict.fromkeys(entry.source for entry in results.requirements if entry.source))
-    return Grid("Compliance", head, rows, "llrrrlrc", f"{note} Source: {sources}." if sources else note)
+    return Grid("Compliance", head, rows, "llrrrrlrc", f"{note} Source: {sources}." if sources else note)
+
+
+def _interval(entry: Requirement) -> str:
+    if entry.low is None or entry.high is None:
+        return MISSING
+    return f"{number(entry.low)} to {number(entry.high)} {unit(entry.unit)}"
 
 
 def _margin(entry: Requirement) -> str:
