@@ -414,7 +414,9 @@ def modal(
     click.echo(f"Modes: {file}")
 
 
-@cli.command(epilog=examples("identify campaign/DUMMY1", "identify campaign/DUMMY1 --starts 3 --run-to-run 0.01"))
+@cli.command(
+    epilog=examples("identify campaign/DUMMY1", "identify campaign/DUMMY1 --starts 3 --run-to-run 0.01")
+)
 @campaign_argument
 @click.option(
     "--starts",
@@ -530,7 +532,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         error.show()
         sys.exit(error.exit_code)
     except click.Abort:
-        _complain("interrupted; results of before are whole")
+        _complain("interrupted: nothing was written, and earlier results are untouched")
         sys.exit(INTERRUPTED)
     except KbsError as error:
         if debug:

@@ -9,14 +9,13 @@ from pathlib import Path
 from kbs_process.campaign.checks import check_campaign
 from kbs_process.campaign.config import Bands, Campaign, RecordingEntry, Topic, Topics
 from kbs_process.campaign.documents import Document, Merged, Tree, check_finite, merge, read, substituted
+from kbs_process.campaign.locate import CAMPAIGN_FILE
 from kbs_process.campaign.problems import Problems
 from kbs_process.campaign.requirements import disturbance, pointing
 from kbs_process.campaign.rig_builder import RigBuilder
 from kbs_process.campaign.schema import violations
 from kbs_process.plant.effects import CATALOGUE
 from kbs_process.rig.model import Rig
-
-CAMPAIGN_FILE = "campaign.toml"
 
 
 def load_campaign(

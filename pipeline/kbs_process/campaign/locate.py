@@ -8,6 +8,7 @@ from kbs_process.errors import ConfigError, OutputError, did_you_mean
 
 CAMPAIGNS = "campaigns"
 REPORTS = "reports"
+CAMPAIGN_FILE = "campaign.toml"
 
 
 def find_campaign(name: str) -> Path:
@@ -16,15 +17,19 @@ def find_campaign(name: str) -> Path:
     Raises ConfigError that lists the campaigns there are.
     """
     path = Path(name)
-    if path.is_file() and path.name == "campaign.toml":
+    if path.is_file() and path.name == CAMPAIGN_FILE:
         return path.absolute().parent
-    if path.is_dir():
+    if path.is_dir() and (path / CAMPAIGN_FILE).is_file():
         return path.absolute()
     parts = PurePath(name).parts
     if len(parts) == 2 and parts[0] in ("campaign", CAMPAIGNS):
         for root in (Path.cwd(), *Path.cwd().parents):
             if (root / CAMPAIGNS / parts[1]).is_dir():
                 return root / CAMPAIGNS / parts[1]
+    if path.is_dir():
+        raise ConfigError(
+            f"the folder '{name}' is no campaign: it holds no {CAMPAIGN_FILE}", remedy=_remedy(name)
+        )
     raise ConfigError(f"there is no campaign '{name}'", remedy=_remedy(name))
 
 
@@ -39,7 +44,7 @@ def known_campaigns() -> tuple[str, ...]:
     """Return the names in the nearest folder campaigns/, here or above."""
     for root in (Path.cwd(), *Path.cwd().parents):
         if (root / CAMPAIGNS).is_dir():
-            return tuple(sorted(path.parent.name for path in (root / CAMPAIGNS).glob("*/campaign.toml")))
+            return tuple(sorted(path.parent.name for path in (root / CAMPAIGNS).glob(f"*/{CAMPAIGN_FILE}")))
     return ()
 
 

@@ -238,7 +238,7 @@ class Merit(Record, frozen=True, kw_only=True):
     predicted_peak: float | None
     correlation: float | None
     fraction_of_variance: float | None  # 1 - var(measured - predicted) / var(measured)
-    spectral_ratio: float | None  # predicted over measured power within the band
+    spectral_ratio: float | None  # predicted over measured power density, geometric mean over the band
     pessimism: float | None  # predicted over measured peak
     sigma: float | None = None  # of the measured channel in this band
 

@@ -21,7 +21,8 @@ from kbs_process.campaign.importers.mapping import (
     load_mapping,
 )
 from kbs_process.campaign.importers.streams import Findings, read_part
-from kbs_process.campaign.load import CAMPAIGN_FILE, load_campaign
+from kbs_process.campaign.load import load_campaign
+from kbs_process.campaign.locate import CAMPAIGN_FILE
 from kbs_process.campaign.progress import Progress, SilentProgress
 from kbs_process.campaign.provenance import sha256
 from kbs_process.campaign.store import writing
@@ -82,7 +83,7 @@ def _source_files(mapping: Mapping, source: Path) -> dict[str, Path]:
             where=shown(source),
             remedy=f"give the folder that holds {', '.join(names)}",
         )
-    found = [path.name for path in source.iterdir()]
+    found = [path.name for path in source.iterdir() if not path.name.startswith(".")]
     for name in names:
         if not (source / name).is_file():
             origin = f" (published: {mapping.source.origin})" if mapping.source.origin else ""

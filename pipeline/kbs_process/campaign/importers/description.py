@@ -16,7 +16,8 @@ from typing import Any
 from kbs_process.campaign.config import Campaign
 from kbs_process.campaign.documents import Document, read, shown
 from kbs_process.campaign.importers.mapping import Mapping
-from kbs_process.campaign.load import CAMPAIGN_FILE, load_campaign
+from kbs_process.campaign.load import load_campaign
+from kbs_process.campaign.locate import CAMPAIGN_FILE
 from kbs_process.campaign.reading import OPTIONAL_STREAMS
 from kbs_process.errors import ConfigError, did_you_mean
 

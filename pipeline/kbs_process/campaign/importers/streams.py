@@ -16,6 +16,7 @@ from kbs_process.errors import RecordingError
 from kbs_process.signals.records import Array, Block, Mask, Stamps
 
 _NO_STAMPS = np.empty(0, dtype=np.int64)
+_TIMELESS = "rows have no time, left out"
 Piece = dict[str, Block]  # by stream key; the streams of one pass over the file
 
 
@@ -77,8 +78,17 @@ def read_part(
             raise RecordingError(
                 f"no sample of '{key}' for recording '{part.stem}'",
                 where=str(table.path),
-                remedy="check start_s and end_s (s from the file's first sample), and that the file is whole",
+                remedy=_why_empty(findings),
             )
+
+
+def _why_empty(findings: Findings) -> str:
+    if findings.counts[_TIMELESS]:
+        return (
+            "no row has a time that is a number: check [time] and, of a text file, delimiter, decimal, units_row and "
+            "skip_rows in [text]; `kbs-process import --describe` shows what the columns hold"
+        )
+    return "check start_s and end_s (s from the file's first sample), and that the file is whole"
 
 
 def _side_by_side(passes: Sequence[Iterator[Piece]]) -> Iterator[Piece]:
@@ -130,7 +140,7 @@ def _pieces(
         _check_lengths(table, named)
         stamp, known = _stamps(table, time, clocks, named, rows)
         rows += len(stamp)
-        findings.counts["rows have no time, left out"] += int((~known).sum())
+        findings.counts[_TIMELESS] += int((~known).sum())
         values = {
             channel.field: _si(named[column.name], channel, carry)
             for channel, column in zip(channels, columns, strict=True)

@@ -12,7 +12,7 @@ from kbs_process.report.text import number
 
 def matrix(coupling: CrossCoupling, alt: str) -> Picture:
     """Draw every element in thousandths with its sigma; the colour is its size over its sigma."""
-    values, sigma = np.array(coupling.matrix), np.array(coupling.sigma)
+    values, sigma = np.round(coupling.matrix, 12), np.array(coupling.sigma)  # rounding errors are no coupling
     known = sigma > 0
     significance = np.divide(np.abs(values), sigma, out=np.zeros_like(values), where=known)
     n = len(coupling.channels)

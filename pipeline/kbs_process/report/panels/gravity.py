@@ -62,6 +62,8 @@ def _parameters(gravity: Gravity) -> Grid:
         quality = (
             f"{count(gravity.samples, 'sample')}; reduced chi-square {number(gravity.reduced_chi_square)}."
         )
+    if any(entry.name.startswith("transducer.cross_coupling") for entry in gravity.parameters):
+        quality += " Cross-coupling: dX in (I + X) = (I + X₀)(I + dX), X₀ as stated."
     return Grid("Fitted parameters", ("Parameter", "Before (prior)", "Fitted", "Unit"), rows, "lrrl", quality)
 
 

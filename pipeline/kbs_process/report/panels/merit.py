@@ -31,7 +31,8 @@ _CAPTION = Caption(
 )
 _NOTE = (
     "FVE: fraction of the measured variance that the prediction explains; 100 % is perfect, 0 no better "
-    "than no prediction, negative worse. Spectral ratio: predicted over measured power within the band. "
+    "than no prediction, negative worse. Spectral ratio: predicted over measured power density, geometric mean "
+    "over the band's frequencies: a quiet frequency counts as much as a loud one. "
     "Pessimism: predicted over measured peak. At the noise: the measured rms is less than twice its uncertainty, "
     "so that the figures in grey describe the noise and not the prediction."
 )
