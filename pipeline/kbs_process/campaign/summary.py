@@ -70,9 +70,10 @@ def _conclusion(requirements: Sequence[results.Requirement]) -> results.Conclusi
     worst = max(requirements, key=lambda one: ("pass", "undecided", "fail").index(one.verdict))
     words = {"pass": "met", "fail": "not met", "undecided": "neither met nor broken within the uncertainty"}
     value, low, high = (figure or 0.0 for figure in (worst.value, worst.low, worst.high))
+    least = f"{low:.4f}" if low > 0.0 else "0"
     sentence = (
         f"{worst.name}: {words[worst.verdict]}. {worst.statistic.capitalize()} {value:.4f} {worst.unit} "
-        f"({low:.4g} to {high:.4f} at 95 %) on {worst.channel} in {worst.recording}, "
+        f"({least} to {high:.4f} at 95 %) on {worst.channel} in {worst.recording}, "
         f"{worst.band_Hz[0] or 0:g} to {worst.band_Hz[1] or 0:g} Hz; limit {worst.limit:g} {worst.unit}."
     )
     return results.Conclusion(status=worst.verdict, sentence=sentence)
