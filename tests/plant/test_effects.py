@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from kbs_process.errors import ConfigError
 from kbs_process.plant.effect import SIGNALS, Effect, LogNormal, Normal, Parameter, Port, State, Uniform
 from kbs_process.plant.effects import CATALOGUE, select
+from kbs_process.plant.effects.tooth_stiction import limit as tooth_stiction
 
 UNITS = {"1", "rad", "rad/s", "N m", "N m/rad", "N m s/rad", "s", "1/s", "K"}
 
@@ -108,3 +109,17 @@ Z = State("z", "N m", 0.0, "memory")
 def test_wrong_wiring_is_an_error_at_import(equation, parameters, states, message) -> None:  # type: ignore[no-untyped-def]
     with pytest.raises(TypeError, match=message):
         Effect("trial", Port.MOTOR_TORQUE, equation, parameters, "test", states=states)
+
+
+def test_tooth_stiction_over_a_travel_is_the_mean_of_that_at_instants() -> None:
+    rng = np.random.default_rng(7)
+    for angle, travel, delta, phase in zip(
+        rng.uniform(-3.0, 3.0, 200),
+        rng.choice([1e-4, 3e-3, 0.02, -0.05], 200),
+        rng.uniform(0.05, 3.1, 200),
+        rng.uniform(-3.0, 3.0, 200),
+        strict=True,
+    ):
+        within = angle + travel * (np.arange(4000) / 4000.0 - 0.5 + 0.5 / 4000.0)
+        mean = np.mean([tooth_stiction(x, 0.0, 1.0, delta, phase) for x in within])
+        assert tooth_stiction(angle, travel, 1.0, delta, phase) == pytest.approx(mean, abs=2e-3)

@@ -19,6 +19,8 @@ SIGNALS = {
     "field": "rad, position of the magnetic field in whole microsteps, as an angle of the motor",
     "rotor_angle": "rad, with respect to the body that carries the motor",
     "rotor_rate": "rad/s, with respect to the same body",
+    "rotor_travel": "rad, what the rotor turns about rotor_angle while the value holds: an equation that jumps gives "
+    "its mean over it, so that no jump is rounded to a time step; 0 at an instant",
     "joint_angle": "rad, output with respect to the same body",
     "joint_rate": "rad/s, output with respect to the same body",
     "ratio": "1, motor turns in a turn of the output",

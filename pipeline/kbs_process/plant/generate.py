@@ -55,7 +55,7 @@ def _drive(structure: Structure) -> list[str]:
     }
     lines = [
         "@compiled",
-        "def drive(field, rotor_angle, rotor_rate, joint_angle, joint_rate, ratio, time, z, p, k):",
+        "def drive(field, rotor_angle, rotor_rate, rotor_travel, joint_angle, joint_rate, ratio, time, z, p, k):",
         '    """Motor torque, Coulomb limit, gear torque, joint torque, then the rates of the states."""',
         *[f"    {total} = 0.0" for total in totals.values()],
     ]
@@ -97,7 +97,7 @@ def _balance(structure: Structure) -> list[str]:
         lines += [
             f"    field_{j} = floor(field[{j}] + 0.5) / p[{k + MICROSTEP}]",
             f"    {', '.join(['motor', '_', 'gear', 'joint', *['_'] * z])} = drive(",
-            f"        field_{j}, {rotor}, 0.0, q_{j}, 0.0, p[{k + RATIO}], 0.0, {states}, p, int({k + DRIVE})",
+            f"        field_{j}, {rotor}, 0.0, 0.0, q_{j}, 0.0, p[{k + RATIO}], 0.0, {states}, p, int({k + DRIVE})",
             "    )",
             f"    out_{j} = gear + joint",
             f"    drag_{j} = motor - gear / p[{k + RATIO}]",

@@ -75,7 +75,7 @@ def _rotor(structure: Structure) -> list[str]:
     after = tuple_of([f"z[{i}] + h * d{i}" for i in range(z)])
 
     def drive(results: list[str], w: str) -> str:
-        given = f"field, middle, {w}, angle, rate, ratio, time, state, p, k + {DRIVE}"
+        given = f"field, middle, {w}, h * w, angle, rate, ratio, time, state, p, k + {DRIVE}"
         return f"{', '.join(results)} = drive({given})"
 
     secant = [
@@ -211,7 +211,7 @@ def _kicked(structure: Structure) -> list[str]:
         k = joint_offset(structure, j)
 
         def gear(tag: str, angle: str, rate: str, j: int = j, k: int = k) -> str:
-            given = f"0.0, theta_{j}, w_{j}, {angle}, {rate}, p[{k + RATIO}], time + half, z_{j}, p, int({k + DRIVE})"
+            given = f"0.0, theta_{j}, w_{j}, 0.0, {angle}, {rate}, p[{k + RATIO}], time + half, z_{j}, p, int({k + DRIVE})"
             results = ", ".join(["_", "_", f"gear{tag}", f"joint{tag}", *["_"] * z])
             return f"    {results} = drive({given})"
 

@@ -7,17 +7,30 @@ import math
 from kbs_process.plant.effect import Effect, LogNormal, Parameter, Port, Uniform
 
 
-def limit(rotor_angle: float, Ts0: float, delta: float, phi_stat: float) -> float:
-    r"""Greatest Coulomb friction torque on the rotor.
+_INSTANT = 1e-6  # rad of tooth phase
+
+
+def limit(rotor_angle: float, rotor_travel: float, Ts0: float, delta: float, phi_stat: float) -> float:
+    r"""Greatest Coulomb friction torque on the rotor, mean over what it turns in a step.
 
     Equation: $T_s = T_{s0}$ where $|wrap(200 \theta_r + \phi_{stat})| < \delta$, else 0; wrap to (-pi, pi].
-    Units: rad, N m, rad, rad -> N m.
+        Over a travel, $T_{s0}$ times the share of it within the teeth's contact.
+    Units: rad, rad, N m, rad, rad -> N m.
     Validity: 0 <= delta <= pi; the plant holds the rotor exactly, without a regularised sign.
     Source: ENVISAT Ka-band subsystem (1996), section 5, static friction.
     """
     phase = 200.0 * rotor_angle + phi_stat
     wrapped = phase - 2.0 * math.pi * math.floor(phase / (2.0 * math.pi) + 0.5)
-    return Ts0 if abs(wrapped) < delta else 0.0
+    half = abs(100.0 * rotor_travel)
+    if half < _INSTANT:
+        return Ts0 if abs(wrapped) < delta else 0.0
+    # Contact passed since phase 0, which grows by 2 delta a turn: the integral of the equation.
+    begin, end = wrapped - half, wrapped + half
+    turn_0 = math.floor(begin / (2.0 * math.pi) + 0.5)
+    turn_1 = math.floor(end / (2.0 * math.pi) + 0.5)
+    passed_0 = max(-delta, min(delta, begin - 2.0 * math.pi * turn_0)) + 2.0 * delta * turn_0
+    passed_1 = max(-delta, min(delta, end - 2.0 * math.pi * turn_1)) + 2.0 * delta * turn_1
+    return Ts0 * max(0.0, passed_1 - passed_0) / (2.0 * half)
 
 
 TOOTH_STICTION = Effect(
