@@ -72,8 +72,8 @@ def _rates(structure: Structure) -> list[str]:
         lines += [
             f"    omega_{j} = drift(omega_{c}, a_{j}, qd_{j})",
             f"    w = x[{spin}] - dot3(a_{j}, omega_{c})",
-            f"    motor, limit, gear, joint = drive(field[{j}] / p[{k + MICROSTEP}], x[{theta}], w, 0.0, q_{j}, qd_{j},",
-            f"        p[{k + RATIO}], 0.0, (0.0,), p, {k + DRIVE})",
+            f"    motor, limit, gear, joint = drive(field[{j}] / p[{k + MICROSTEP}], x[{theta}], w, 0.0,",
+            f"        q_{j}, qd_{j}, p[{k + RATIO}], 0.0, (0.0,), p, {k + DRIVE})",
             f"    out_{j} = gear + joint",
             f"    drag_{j} = motor - gear / p[{k + RATIO}] - limit * max(-1.0, min(1.0, w / width))",
             f"    momentum_{j} = p[{k + ROTOR}] * x[{spin}]",

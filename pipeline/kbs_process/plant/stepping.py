@@ -211,7 +211,8 @@ def _kicked(structure: Structure) -> list[str]:
         k = joint_offset(structure, j)
 
         def gear(tag: str, angle: str, rate: str, j: int = j, k: int = k) -> str:
-            given = f"0.0, theta_{j}, w_{j}, 0.0, {angle}, {rate}, p[{k + RATIO}], time + half, z_{j}, p, int({k + DRIVE})"
+            rotor = f"0.0, theta_{j}, w_{j}, 0.0"
+            given = f"{rotor}, {angle}, {rate}, p[{k + RATIO}], time + half, z_{j}, p, int({k + DRIVE})"
             results = ", ".join(["_", "_", f"gear{tag}", f"joint{tag}", *["_"] * z])
             return f"    {results} = drive({given})"
 

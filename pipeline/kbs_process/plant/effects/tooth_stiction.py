@@ -6,7 +6,6 @@ import math
 
 from kbs_process.plant.effect import Effect, LogNormal, Parameter, Port, Uniform
 
-
 _INSTANT = 1e-6  # rad of tooth phase
 
 
