@@ -28,7 +28,8 @@ def find_campaign(name: str) -> Path:
                 return root / CAMPAIGNS / parts[1]
     if path.is_dir():
         raise ConfigError(
-            f"the folder '{name}' is no campaign: it holds no {CAMPAIGN_FILE}", remedy=_remedy(name)
+            f"the folder '{name}' is no campaign: it holds no {CAMPAIGN_FILE}",
+            remedy="name the folder that holds it, or campaign/NAME for campaigns/NAME",
         )
     raise ConfigError(f"there is no campaign '{name}'", remedy=_remedy(name))
 
