@@ -32,7 +32,8 @@ from kbs_process.stages.stream import Collected, Timeline, Uniform
 
 Progress = Callable[[str, int], None]  # stream, samples just taken
 
-SAMPLED = ("wrench", "angle", "rate", "pointing")  # brought to the working rate; the first one present is the reference
+# Brought to the working rate; the first one present is the reference.
+SAMPLED = ("wrench", "angle", "rate", "pointing")
 SLOW = ("command", "field", "temperature")  # kept sample by sample: one a control cycle, or slower
 DOUBT = 1e-3  # largest weight of invented samples in a valid one
 
