@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import deque
+
 import lz4.frame
 import numpy as np
 import zstandard
@@ -9,6 +11,7 @@ import zstandard
 from kbs_process.ingest.framing import MalformedError
 from kbs_process.ingest.kernels import Bytes
 
+ALIVE = 3  # results: the one in use, one that waits, one in the making
 LARGEST = 1 << 28  # bytes of one chunk, compressed or not
 # The ratio keeps the work proportional to the file: sensor data reach 50, a bomb of zstd 32 000.
 RATIO = 1024
@@ -16,9 +19,10 @@ ALLOWANCE = 1 << 16  # bytes that any chunk may declare
 
 
 class Decompressor:
-    """Decompresses chunks."""
+    """Decompresses chunks; the result of one holds until two more have been made."""
 
     def __init__(self) -> None:
+        self._spaces = deque([np.zeros(0, dtype=np.uint8)] * ALIVE)
         self._zstd = zstandard.ZstdDecompressor(max_window_size=LARGEST)
 
     def __call__(self, compression: str, compressed: memoryview, declared: int) -> Bytes:
@@ -43,8 +47,12 @@ class Decompressor:
         return result
 
     def _decompress_zstd(self, compressed: memoryview, declared: int) -> Bytes:
-        buffer = np.empty(declared, dtype=np.uint8)
-        target = memoryview(buffer)  # type: ignore[arg-type]
+        # Memory that was used before is at hand; new memory has to be cleared and mapped, page by page.
+        buffer = self._spaces.popleft()
+        if len(buffer) < declared:
+            buffer = np.zeros(declared + declared // 4, dtype=np.uint8)
+        self._spaces.append(buffer)
+        target = memoryview(buffer)[:declared]  # type: ignore[arg-type]
         size = 0
         try:
             with self._zstd.stream_reader(compressed, read_across_frames=True) as reader:

@@ -102,7 +102,8 @@ class Container:
     def _carry(self, end: int, stop: int) -> None:
         self._add_crc(self._buffer[:end])
         self._left = stop - end
-        self._buffer[: self._left] = self._buffer[end:stop].copy()
+        view = memoryview(self._buffer)  # type: ignore[arg-type]
+        view[: self._left] = view[end:stop]  # unlike numpy's arrays, moved without a copy where they overlap
         self._at += end
 
     def _oversized(self, file: BinaryIO, stop: int) -> None:

@@ -113,7 +113,8 @@ class JsonDecoder:
             values[good], missing[good] = decoded, absent
             present |= ~absent.all(axis=0)
         lacking: Mask = np.logical_or.reduce(missing, axis=1)
-        return Decoded(stamp, values, good, present, lacking)
+        flawless = bool(good.all() and not lacking.any() and np.isfinite(values).all())
+        return Decoded(stamp, values, good, present, lacking, flawless)
 
     def _stamps(self, messages: list[Any]) -> Stamps:
         assert self._get_stamp is not None

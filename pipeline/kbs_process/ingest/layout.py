@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kbs_process.ingest.framing import MalformedError
-from kbs_process.ingest.kernels import FLOAT64, MISSING, UNSIGNED, ZERO, Bytes, Words, decode
+from kbs_process.ingest.kernels import FLOAT64, LITTLE, MISSING, UNSIGNED, ZERO, Bytes, Words, decode
 from kbs_process.signals.records import Array, Mask, Stamps
 
 KNOWN_LAYOUTS = 32  # kept for a stream
@@ -92,6 +92,37 @@ class Decoded:
     good: Mask  # (n,)
     present: Mask  # (c,), fields that at least one message has
     lacking: Mask  # (n,), messages that lack a field
+    flawless: bool  # all are good, lack nothing, and every number is finite
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Packed:
+    """Several layouts of one stream, side by side as the kernel takes them: see `kernels.decode`."""
+
+    lengths: Words
+    ends: Words
+    guards: Words
+    clocks: Words
+    cells: Words
+    plain: Mask
+    lacks: Mask  # (k, c)
+    lack: bool
+
+    @classmethod
+    def of(cls, layouts: Sequence[Layout]) -> _Packed:
+        cells = np.stack([one.cells for one in layouts])
+        usual = (cells[..., 1] == 8) & (cells[..., 2] == LITTLE) & (cells[..., 3] == FLOAT64)
+        lacks = np.stack([one.lacks for one in layouts])
+        return cls(
+            lengths=np.array([one.length for one in layouts], dtype=np.uint64),
+            ends=np.cumsum([0, *(len(one.guards) for one in layouts)], dtype=np.uint64),
+            guards=np.concatenate([one.guards for one in layouts]),
+            clocks=np.stack([one.clock for one in layouts]),
+            cells=cells,
+            plain=usual.all(axis=1),
+            lacks=lacks,
+            lack=bool(lacks.any()),
+        )
 
 
 class LayoutDecoder:
@@ -104,47 +135,99 @@ class LayoutDecoder:
         self._trace = trace
         self._columns = columns
         self._layouts: list[Layout] = []
+        self._packed: _Packed | None = None
 
     def __call__(self, buffer: Bytes, at: Words, size: Words, log: Stamps) -> Decoded:
-        n = len(at)
-        stamp, values = log.copy(), np.empty((n, self._columns))
-        good, todo = np.ones(n, dtype=np.bool_), np.ones(n, dtype=np.bool_)
-        present, lacking = np.zeros(self._columns, dtype=np.bool_), np.zeros(n, dtype=np.bool_)
-        left = n
+        job = _Job.of(buffer, at, size, log, self._columns)
+        layouts, packed, counts = list(self._layouts), self._packed, [0] * len(self._layouts)
+        left = len(at)
+        if packed is not None:
+            fitted, left = job.apply(packed, slice(None), 0)
+            counts = fitted.tolist()
+        if left:
+            for traced, count in self._trace_others(job, len(layouts)):
+                layouts.append(traced)
+                counts.append(count)
+            packed = _Packed.of(layouts) if layouts else None
+        self._remember(layouts, counts)
+        present, lacking = np.ones(self._columns, dtype=np.bool_), np.zeros(len(at), dtype=np.bool_)
+        lack = packed is None or packed.lack
+        if packed is not None and packed.lack:
+            used = np.array(counts) > 0
+            present = np.logical_or.reduce(~packed.lacks[used], axis=0)
+            lacking = job.good & np.logical_or.reduce(packed.lacks, axis=1)[job.which]
+        flawless = job.finite and not lack and bool(job.good.all())
+        return Decoded(job.stamp, job.values, job.good, present, lacking, flawless)
 
-        def apply(known: Layout, part: slice) -> int:
-            nonlocal present
-            before = todo[part].copy() if known.lacks.any() else None
-            args = (np.uint64(known.length), known.guards, known.clock, known.cells)
-            done = decode(buffer, at[part], size[part], *args, todo[part], stamp[part], values[part])
-            if done:
-                present |= ~known.lacks
-                if before is not None:
-                    lacking[part] |= before & ~todo[part]
-            return done
-
-        counts: list[int] = []
-        for known in self._layouts:
-            counts.append(apply(known, slice(None)) if left else 0)
-            left -= counts[-1]
-        # The commonest first: most segments then need no more than that one.
-        order = sorted(range(len(counts)), key=counts.__getitem__, reverse=True)
-        self._layouts = [self._layouts[i] for i in order]
-        if not left:
-            return Decoded(stamp, values, good, present, lacking)
-        fresh = 0
-        for first in np.flatnonzero(todo).tolist():
-            if not todo[first]:
+    def _trace_others(self, job: _Job, known: int) -> list[tuple[Layout, int]]:
+        """Trace the messages that no known layout fits, and try each new layout on those that follow."""
+        fresh: list[tuple[Layout, int]] = []
+        for first in np.flatnonzero(job.which < 0).tolist():
+            if job.which[first] >= 0:
                 continue
-            start = int(at[first])
             try:
-                traced = self._trace(buffer[start : start + int(size[first])].tobytes())
+                traced = self._trace(job.payload(first))
             except MalformedError:
-                good[first] = todo[first] = False
+                job.good[first] = False
                 continue
             # With too many layouts in a segment, comparing all messages with each would cost more than tracing.
-            fresh += 1
-            apply(traced, slice(first, None if fresh <= KNOWN_LAYOUTS else first + 1))
-            if fresh <= KNOWN_LAYOUTS:
-                self._layouts = [traced, *self._layouts[: KNOWN_LAYOUTS - 1]]
-        return Decoded(stamp, values, good, present, lacking)
+            part = slice(first, None if len(fresh) < KNOWN_LAYOUTS else first + 1)
+            counts, _ = job.apply(_Packed.of([traced]), part, known + len(fresh))
+            fresh.append((traced, int(counts[0])))
+        return fresh
+
+    def _remember(self, layouts: Sequence[Layout], counts: Sequence[int]) -> None:
+        """Keep the layouts, the commonest first: the kernel tries them in this order."""
+        order = sorted(range(len(layouts)), key=counts.__getitem__, reverse=True)[:KNOWN_LAYOUTS]
+        kept = [layouts[i] for i in order]
+        if kept and kept != self._layouts:
+            self._layouts, self._packed = kept, _Packed.of(kept)
+
+
+@dataclass(slots=True, eq=False)
+class _Job:
+    """The messages of one segment on their way to numbers."""
+
+    buffer: Bytes
+    at: Words
+    size: Words
+    which: Stamps  # (n,) number of the layout that fitted, or -1
+    stamp: Stamps
+    values: Array
+    good: Mask
+    finite: bool = True
+
+    @classmethod
+    def of(cls, buffer: Bytes, at: Words, size: Words, log: Stamps, columns: int) -> _Job:
+        n = len(at)
+        values, good = np.empty((n, columns)), np.ones(n, dtype=np.bool_)
+        return cls(buffer, at, size, np.full(n, -1, dtype=np.int64), log.copy(), values, good)
+
+    def payload(self, i: int) -> bytes:
+        start = int(self.at[i])
+        return self.buffer[start : start + int(self.size[i])].tobytes()
+
+    def apply(self, packed: _Packed, part: slice, number: int) -> tuple[Stamps, int]:
+        """Decode what fits one of the layouts, the first of which has this number.
+
+        Return how many messages fitted each, and how many of the part none has fitted so far.
+        """
+        counts = np.zeros(len(packed.lengths), dtype=np.int64)
+        left, finite = decode(
+            self.buffer,
+            self.at[part],
+            self.size[part],
+            packed.lengths,
+            packed.ends,
+            packed.guards,
+            packed.clocks,
+            packed.cells,
+            packed.plain,
+            number,
+            counts,
+            self.which[part],
+            self.stamp[part],
+            self.values[part],
+        )
+        self.finite &= finite
+        return counts, left

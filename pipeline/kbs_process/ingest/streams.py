@@ -73,12 +73,12 @@ class Reading:
 
     def block(self, segment: Segment) -> Block | None:
         """Return the stream's messages in the segment, in their order; None where there is none."""
-        channels = segment.dictionary.channels
+        dictionary = segment.dictionary
         parts = []
-        for number in [n for n, channel in channels.items() if channel.topic == self.stream.topic]:
-            chosen = select(segment.table, np.uint64(number))
-            if chosen.shape[1]:
-                parts.append(self._decode(number, segment, chosen))
+        for number in [n for n, channel in dictionary.channels.items() if channel.topic == self.stream.topic]:
+            places, log, at, size = select(segment.table, np.uint64(number))
+            if len(places):
+                parts.append(self._decode(number, segment, places, log, at, size))
         if len(parts) < 2:
             return parts[0][1] if parts else None
         order = np.argsort(np.concatenate([places for places, _ in parts]))
@@ -96,9 +96,9 @@ class Reading:
             first, last = self._tally.spans[kind]
             yield Loss(kind, self._where, count, seconds(first), seconds(last))
 
-    def _decode(self, number: int, segment: Segment, chosen: Words) -> tuple[Stamps, Block]:
-        places, log = chosen[0].view(np.int64), chosen[1].view(np.int64)
-        at, size = chosen[2], chosen[3]
+    def _decode(
+        self, number: int, segment: Segment, places: Stamps, log: Stamps, at: Words, size: Words
+    ) -> tuple[Stamps, Block]:
         if not self.stream.fields:  # messages of any type can be counted
             return places, Block(log, log, np.empty((len(log), 0)))
         fresh = number not in self._plans
@@ -110,18 +110,16 @@ class Reading:
         if fresh and good.any():
             payload = next(payloads(segment.buffer, at[good], size[good]))
             _require_names(plan, decoded.present.tolist(), payload, self._where)
+        if decoded.flawless:
+            return places, Block(decoded.stamp, log, decoded.values)
         self._tally.add("missing field", log[decoded.lacking])
         values, stamp, lacking = decoded.values, decoded.stamp, decoded.lacking
         if not good.all():
             self._tally.add("undecodable", log[~good])
             places, log, lacking = places[good], log[good], lacking[good]
             stamp, values = stamp[good], values[good]
-        # A sum is finite only if all of its terms are; the rows are searched only where it is not.
-        with np.errstate(all="ignore"):
-            finite = np.isfinite(values.sum())
-        if not finite:
-            bad = ~np.isfinite(values).all(axis=1)
-            self._tally.add("non-finite", log[bad & ~lacking])
+        bad = ~np.isfinite(values).all(axis=1)
+        self._tally.add("non-finite", log[bad & ~lacking])
         return places, Block(stamp, log, values)
 
     def _plan(self, number: int, dictionary: Dictionary, samples: Iterator[bytes]) -> _Plan:
