@@ -4,7 +4,7 @@
 
 Each seed draws hardware from the priors of campaigns/DUMMY1 (every uncertain number, phases from the whole circle),
 makes one recording of 66 s with the independent engine (its own equations, integrator, noise, clocks and codes),
-condenses it as any recording is, and identifies it with a plant step of 0.5 ms. What the engine lets friction differ by
+condenses it as any recording is, and identifies it. What the engine lets friction differ by
 from run to run is given to the identification as it is (rms 1.15 %), since the method is on trial here, not that
 assumption. Printed are, for each gearbox parameter, the coverage of 95 % intervals with its own binomial interval, and
 the rms error over the Cramer-Rao bound: the inverse of the information that data and priors hold, at the estimate.
@@ -35,7 +35,6 @@ from kbs_process.stages.identification import Identification, Settings, gearbox,
 from kbs_process.stages.output_error import Experiment, residual
 from kbs_process.stages.screening import Evaluate, Task
 
-STEP = 5e-4  # s
 RUN_TO_RUN = FRICTION_SPREAD / np.sqrt(3.0)  # a uniform distribution's standard deviation
 
 
@@ -55,7 +54,7 @@ def make(seed: int, path: Commands) -> tuple[Hardware, Recording]:
     return hardware, record(hardware, path, seed=seed, epoch_ns=0, wrench_hz=100.0, encoder_hz=20.0)
 
 
-def experiment(recording: Recording, step: float) -> Experiment:
+def experiment(recording: Recording) -> Experiment:
     """What the pipeline knows of it: the campaign's description and the recorded streams."""
     campaign = load_campaign(CAMPAIGNS_FOLDER / "DUMMY1", checksums=False)
     rig = campaign.rig
@@ -68,9 +67,7 @@ def experiment(recording: Recording, step: float) -> Experiment:
     blocks = ((key, _block(stream)) for key, stream in streams.items())
     channels = campaign.topics.channels()
     run = condense("coverage", blocks, channels, CondenseSettings(working_rate_Hz=100.0))
-    return Experiment(
-        rig, campaign.effects, gearbox(rig, campaign.effects), (measured(run, rig),), 0.05, step
-    )
+    return Experiment(rig, campaign.effects, gearbox(rig, campaign.effects), (measured(run, rig),), 0.05)
 
 
 def _block(stream: Stream) -> Block:
@@ -104,7 +101,7 @@ def errors(found: Identification, truth: Array) -> Array:
 def trial(seed: int) -> list[dict[str, float | str | bool]]:
     """One seed: each gearbox parameter's error, sigma, and whether its intervals hold the truth."""
     hardware, recording = make(seed, short_sweeps())
-    setting = experiment(recording, STEP)
+    setting = experiment(recording)
     found = identify(setting, serial, Settings(run_to_run=RUN_TO_RUN, starts=1), silent)
     profiled = {profile.name: profile for profile in intervals(found, serial)}
     truth = true_values(hardware, found)

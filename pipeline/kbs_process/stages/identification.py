@@ -28,13 +28,16 @@ from kbs_process.stages.output_error import (
     sensor_spectra,
     unexplained,
 )
+from kbs_process.stages.polar import Polar
 from kbs_process.stages.screening import Evaluate, Start, match_resonances, phases, starts
 
 _DIFFERENCE = 0.05  # prior sigmas (phases: rad), first difference
-_SEEN = 10.0  # what a difference should move the whitened residual by: above its jumps where friction sticks
-_LEAST_DIFFERENCE = 2e-3  # prior sigmas
+_SEEN = 5.0  # what a difference should move the whitened residual by: above its jumps where friction sticks
+_LEAST_DIFFERENCE, _MOST_DIFFERENCE = 2e-3, 0.4  # prior sigmas
 _BETTER = 10.0  # of -2 log likelihood: a phase is moved for more
 _CALM = 0.9  # weight from which a search is near its end
+_ROUGH = 10.0  # what ends a search, over what ends a refinement
+_REPHASED = 2  # every how many rounds weak effects' phases are looked for again
 _NOT_MOVING = ("spacecraft.", "controller.", "transducer.noise", "transducer.resolution", "transducer.bias")
 _PROJECTED = ("transducer.cross_coupling",)
 _NO_EFFECT = ("steps_per_turn", "encoder.offset", "gravity.magnitude")
@@ -48,13 +51,11 @@ class Settings:
 
     run_to_run: float = 0.02  # standard deviation of a friction torque from run to run, of itself
     starts: int = 2  # that are followed
-    coarse_step_s: float = 5e-4  # of the plant while it is far off, and for slopes
     screening_lowest_Hz: float = 0.5  # above what masses and CoGs do
     lowest_Hz: float = 0.05
     negligible: float = 0.1  # a number of the rig that moves all residuals by less, at one sigma, is fixed
-    rephased: int = 2  # round after which weak effects' phases are looked for again
-    rounds: int = 5  # of a search, two steps each
-    iterations: int = 5  # of a refinement
+    rounds: int = 8  # of a search, two steps each
+    iterations: int = 8  # of a refinement
     gain: float = 1.0  # of -2 log likelihood: a step that promises less ends a search
 
 
@@ -160,16 +161,15 @@ Say = Callable[[str], AbstractContextManager[object]]  # opens a piece of work t
 class Objective:
     """Whitened residual and its Jacobian over all recordings; theta is free numbers, then run-to-run factors less 1.
 
-    Differences are taken on the step of `slopes`, which may be coarser: an error of the Jacobian makes no error of the
-    estimate where the residual is exact. Columns of numbers from `gears` on, which hardly move from their priors, are
-    differenced once, to one side, and kept; the others at every point, to both sides if `central`.
+    Columns of numbers from `gears` on, which hardly move from their priors, are differenced once and kept; the others
+    at every point. To both sides if `central`.
     """
 
     def __init__(
         self,
         experiment: Experiment,
         spectra: Sequence[Spectra],
-        evaluators: tuple[Evaluate, Evaluate],
+        evaluate: Evaluate,
         differences: Array,
         gears: int,
         *,
@@ -177,11 +177,12 @@ class Objective:
         columns: Mapping[int, list[Array]] | None = None,
     ) -> None:
         self.experiment, self.spectra, self.gears, self.central = experiment, spectra, gears, central
-        self.evaluate, self.evaluate_slope = evaluators
+        self.evaluate = evaluate
         self.differences = differences
         self.columns = dict(columns or {})
         self.scaled = frictions(experiment)
         self._last: tuple[bytes, list[Array]] = (b"", [])
+        self._sloped = b""  # where the columns were taken
 
     def in_recordings(self, theta: Array) -> list[Array]:
         """Free numbers as each recording has them."""
@@ -225,22 +226,25 @@ class Objective:
 
     def difference(self, theta: Array) -> None:
         """Bring the columns that are due to `theta`."""
+        if theta.tobytes() == self._sloped and len(self.columns) == len(self.experiment.free):
+            return
+        self._sloped = theta.tobytes()
         base = self.in_recordings(theta)
         due = [i for i in range(len(self.experiment.free)) if i < self.gears or i not in self.columns]
-        sides = {i: (1.0, -1.0) if self.central and i < self.gears else (1.0,) for i in due}
+        sides = (1.0, -1.0) if self.central else (1.0,)
         tasks = [(r, values, self.spectra[r]) for r, values in enumerate(base)]
         for i in due:
-            for side in sides[i]:
+            for side in sides:
                 for r, values in enumerate(base):
                     moved = values.copy()
                     moved[i] += side * self.differences[i]
                     tasks.append((r, moved, self.spectra[r]))
-        found = iter(self.evaluate_slope(tasks))
+        found = iter(self.evaluate(tasks))
         here = [next(found) for _ in base]
         for i in due:
             forward = [next(found) for _ in base]
-            back = [next(found) for _ in base] if len(sides[i]) == 2 else here
-            span = len(sides[i]) * self.differences[i]
+            back = [next(found) for _ in base] if self.central else here
+            span = len(sides) * self.differences[i]
             self.columns[i] = [(a - b) / span for a, b in zip(forward, back, strict=True)]
 
     def assembled(self, theta: Array) -> Array:
@@ -284,10 +288,10 @@ def identify(
 ) -> Identification:
     """Identify the free numbers of `experiment` (see `gearbox`) and of the rest that shows.
 
-    Starts are found and followed on a coarse step of the plant and without the lowest frequencies; the best is refined
-    on all of them with the plant's own step, central differences, and noise spectra taken from the residual.
+    Starts are found and followed without the lowest frequencies; the best is refined on all of them with central
+    differences and noise spectra taken from the residual.
     """
-    coarse = replace(experiment, step_s=settings.coarse_step_s, lowest_Hz=settings.screening_lowest_Hz)
+    coarse = replace(experiment, lowest_Hz=settings.screening_lowest_Hz)
     sensor = [sensor_spectra(coarse, recording) for recording in coarse.recordings]
     gears = len(experiment.free)
     with say("Screening: resonances and phases"):
@@ -320,7 +324,7 @@ def _with_others(
     evaluate = evaluate_with(wide)
     blank: dict[int, list[Array]] = {index: [] for index in range(gears)}
     objective = Objective(
-        wide, spectra, (evaluate, evaluate), _first_differences(parameters), 0, central=False, columns=blank
+        wide, spectra, evaluate, _first_differences(parameters), 0, central=False, columns=blank
     )
     objective.difference(np.concatenate([values, parameters.value[gears:]]))
     length = _lengths(objective.columns, range(gears, len(wide.free)))
@@ -348,27 +352,46 @@ def _search(
     objective = Objective(
         coarse,
         sensor,
-        (evaluate, evaluate),
+        evaluate,
         _first_differences(prior(coarse)),
         gears,
         central=False,
         columns=columns,
     )
 
+    polar = Polar.of(phases(coarse.rig, coarse.effects, coarse.free), parameters)
+
     def weighted(weight: float) -> tuple[Residual, Residual]:
-        return lambda at: weight * objective.residual(at), lambda at: weight * objective.jacobian(at)
+        def misfit(u: Array) -> Array:
+            at = polar.back(u)
+            return np.concatenate([weight * objective.residual(at), polar.excess(at)])
+
+        def slopes(u: Array) -> Array:
+            at = polar.back(u)
+            return polar.jacobian(weight * objective.jacobian(at), at)
+
+        return misfit, slopes
 
     for number in range(1, settings.rounds + 1):
         weight = 1.0 / max(1.0, float(np.sqrt(np.mean(objective.residual(theta) ** 2))))
         residual, jacobian = weighted(weight)
-        fit = fit_map(residual, parameters, jacobian=jacobian, start=theta, gain=settings.gain, iterations=2)
-        theta = fit.value
+        fit = fit_map(
+            residual,
+            polar.flat_parameters,
+            jacobian=jacobian,
+            start=polar.flat(theta),
+            gain=_ROUGH * settings.gain,
+            iterations=2,
+        )
+        theta = polar.back(fit.value)
         objective.differences = _settled(objective.columns, prior(coarse))
-        if number == settings.rephased:
-            theta = _rephased(objective, theta, parameters)
-        objective.columns.clear()  # the others' were those of a plant further off
-        if weight > _CALM and number > settings.rephased and fit.checks[0].passed:
-            break
+        calm = weight > _CALM and fit.checks[0].passed
+        if calm or number % _REPHASED == 0:
+            moved = _rephased(objective, theta, parameters)
+            if calm and np.array_equal(moved, theta):
+                break
+            theta = moved
+            objective.columns.clear()  # the others' were those of a plant further off
     misfit = objective.residual(theta)
     excess = (theta - parameters.value) / parameters.sigma
     return Mode(start, theta, float(misfit @ misfit + excess @ excess), objective.differences)
@@ -420,7 +443,7 @@ def _settled(columns: Mapping[int, list[Array]], parameters: Parameters) -> Arra
     size = np.where(np.isfinite(parameters.sigma), parameters.sigma, 1.0)
     length = _lengths(columns, range(len(size)))
     settled: Array = np.clip(
-        _SEEN / np.maximum(length, 1e-30), _LEAST_DIFFERENCE * size, 2.0 * _DIFFERENCE * size
+        _SEEN / np.maximum(length, 1e-30), _LEAST_DIFFERENCE * size, _MOST_DIFFERENCE * size
     )
     return settled
 
@@ -436,11 +459,11 @@ def _refine(
 ) -> Identification:
     """First with the sensor's noise, then with that of the residual."""
     parameters = with_factors(prior(final), final, settings.run_to_run)
-    evaluators = (evaluate_with(final), evaluate_with(replace(final, step_s=settings.coarse_step_s)))
+    evaluate = evaluate_with(final)
     theta = min(modes, key=lambda mode: mode.cost).values
     spectra: Sequence[Spectra] = sensor
     for last in (False, True):
-        objective = Objective(final, spectra, evaluators, differences, gears, central=True)
+        objective = Objective(final, spectra, evaluate, differences, gears, central=True)
         fit = fit_map(
             objective.residual,
             parameters,
@@ -471,7 +494,7 @@ def intervals(found: Identification, evaluate_with: Evaluators) -> tuple[Profile
     objective = Objective(
         found.experiment,
         found.spectra,
-        (evaluate_with(found.experiment),) * 2,
+        evaluate_with(found.experiment),
         np.ones(len(found.experiment.free)),
         len(found.experiment.free),
         central=False,

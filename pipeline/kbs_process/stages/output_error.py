@@ -12,7 +12,7 @@ parameters like all others, with the priors of the parameter files.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -180,11 +180,21 @@ def unexplained(experiment: Experiment, recording: Measured, values: Array, spec
 
 
 def estimated_spectra(experiment: Experiment, recording: Measured, left: Array) -> Spectra:
-    """Noise spectra out of what no parameter explains, (n, channels)."""
-    return tuple(
+    """Noise spectra out of what no parameter explains, (n, channels).
+
+    An encoder's is no less than that of its rounding: a joint at rest shows one code, which is no lack of noise.
+    """
+    found = tuple(
         estimated(column, recording.valid, recording.dt, band)
         for column, band in zip(left.T, experiment.bands(recording), strict=True)
     )
+    wrench = len(experiment.rig.transducer.channels)
+    rounding = sensor_spectra(experiment, recording)[wrench:]
+    angles = (
+        replace(angle, density=np.maximum(angle.density, least.density[0]))
+        for angle, least in zip(found[wrench:], rounding, strict=True)
+    )
+    return (*found[:wrench], *angles)
 
 
 def _whiteners(experiment: Experiment, recording: Measured, spectra: Spectra) -> list[Whitener]:
