@@ -43,7 +43,8 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
         shutil.copytree(ROOT / name, tree / name, ignore=ignored)
     source = build(tree, "sdist", place / "sdist")
     with tarfile.open(source) as archive:
-        archive.extractall(place / "unpacked", filter="data")
+        archive.extraction_filter = getattr(tarfile, "data_filter", None)  # early releases of 3.11 have none
+        archive.extractall(place / "unpacked")
     (unpacked,) = (place / "unpacked").iterdir()
     return tree, build(unpacked, "wheel", place / "wheel")
 

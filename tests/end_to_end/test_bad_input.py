@@ -72,7 +72,9 @@ def test_descriptions(folder: CampaignFolder, refused: Callable[[], str], fault:
 
 def test_no_description(folder: CampaignFolder, refused: Callable[[], str]) -> None:
     (folder.path / CAMPAIGN).unlink()
-    assert f"{CAMPAIGN}: the campaign's description does not exist" in refused()
+    message = refused()
+    assert f"is no campaign: it holds no {CAMPAIGN}" in message
+    assert "name the folder that holds it" in message
 
 
 @pytest.mark.parametrize(
