@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from kbs_process import __version__
+from kbs_process import __version__, interruption
 from kbs_process.errors import KbsError, did_you_mean
 
 if TYPE_CHECKING:
@@ -525,9 +525,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     words = list(sys.argv[1:] if arguments is None else arguments)
     debug = "--debug" in words
     try:
-        cli.main(
-            [word for word in words if word != "--debug"], prog_name="kbs-process", standalone_mode=False
-        )
+        with interruption.heeded():
+            cli.main(
+                [word for word in words if word != "--debug"], prog_name="kbs-process", standalone_mode=False
+            )
     except click.ClickException as error:
         error.show()
         sys.exit(error.exit_code)

@@ -292,10 +292,6 @@ def test_an_interrupted_simulation_leaves_the_old_one(folder: CampaignFolder, tm
     (target / "provenance.json").write_text("old")
     (tmp_path / "long.csv").write_text("t,az,el\n0,0,1.3\n1,0,1.3\n20000,0,1.31\n")
     command = [sys.executable, "-m", "kbs_process", "simulate", str(folder.path), "-o", str(target)]
-    # The plant is compiled before: the compiler's callbacks do not pass an interrupt on.
-    (tmp_path / "short.csv").write_text("t,az,el\n0,0,1.3\n1,0,1.3\n2,0,1.3\n")
-    warm = [*command[:-1], str(tmp_path / "warm"), "--command", str(tmp_path / "short.csv")]
-    subprocess.run(warm, check=True, capture_output=True)
     process = subprocess.Popen(
         [*command, "--command", str(tmp_path / "long.csv")],
         stdout=subprocess.PIPE,

@@ -9,6 +9,8 @@ from dataclasses import dataclass, field
 from time import monotonic
 from typing import Protocol, TextIO
 
+from kbs_process import interruption
+
 
 class Task(Protocol):
     """One piece of work under way."""
@@ -25,8 +27,12 @@ class Progress(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class _Update:
-    update: Callable[[float], None]
+class _Task:
+    show: Callable[[float], object]
+
+    def update(self, fraction: float) -> None:
+        interruption.check()
+        self.show(fraction)
 
 
 class SilentProgress:
@@ -34,7 +40,7 @@ class SilentProgress:
 
     @contextmanager
     def task(self, label: str) -> Iterator[Task]:
-        yield _Update(lambda fraction: None)
+        yield _Task(lambda fraction: None)
 
 
 @dataclass(slots=True)
@@ -46,7 +52,7 @@ class PlainProgress:
     @contextmanager
     def task(self, label: str) -> Iterator[Task]:
         print(label, file=self.stream, flush=True)
-        yield _Update(lambda fraction: None)
+        yield _Task(lambda fraction: None)
 
 
 class TerminalProgress:
@@ -70,7 +76,7 @@ class TerminalProgress:
             self._bars.start()
         self._depth += 1
         try:
-            yield _Update(lambda fraction: self._bars.update(bar, completed=fraction))
+            yield _Task(lambda fraction: self._bars.update(bar, completed=fraction))
             if self._depth == 1:
                 self._console.print(f"{label}  [dim]{monotonic() - begin:.1f} s[/dim]", highlight=False)
         finally:

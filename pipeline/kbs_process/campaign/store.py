@@ -20,6 +20,7 @@ from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from kbs_process import interruption
 from kbs_process.errors import OutputError
 
 RESULTS = "results.json"  # a folder that holds this file is one that may be replaced
@@ -47,6 +48,7 @@ def writing(target: Path, *, marker: str = RESULTS) -> Iterator[Path]:
             if not (private / marker).is_file():
                 raise RuntimeError(f"results without {marker}")
             _flush(private)
+            interruption.check()
             _put_in_place(private, target)
         finally:
             shutil.rmtree(private, ignore_errors=True)

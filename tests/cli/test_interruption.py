@@ -1,0 +1,45 @@
+"""An interrupt that foreign code swallows is raised again at the next check."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+from pathlib import Path
+
+import pytest
+
+from kbs_process import interruption
+from kbs_process.campaign.progress import SilentProgress
+from kbs_process.campaign.store import RESULTS, writing
+
+
+def interrupt_that_is_swallowed() -> None:
+    with contextlib.suppress(KeyboardInterrupt):
+        os.kill(os.getpid(), signal.SIGINT)
+
+
+def test_progress_raises_it_again() -> None:
+    with SilentProgress().task("Simulating") as task, interruption.heeded():
+        interruption.check()
+        interrupt_that_is_swallowed()
+        with pytest.raises(KeyboardInterrupt):
+            task.update(0.5)
+
+
+def test_results_are_not_put_in_place(tmp_path: Path) -> None:
+    def run() -> None:
+        with writing(tmp_path / "out") as folder:
+            (folder / RESULTS).write_text("{}")
+            interrupt_that_is_swallowed()
+
+    with interruption.heeded(), pytest.raises(KeyboardInterrupt):
+        run()
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_handler_of_before_is_put_back() -> None:
+    before = signal.getsignal(signal.SIGINT)
+    with interruption.heeded():
+        assert signal.getsignal(signal.SIGINT) is not before
+    assert signal.getsignal(signal.SIGINT) is before
