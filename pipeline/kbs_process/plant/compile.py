@@ -23,11 +23,12 @@ from kbs_process.plant.structure import Structure
 
 @dataclass(frozen=True, slots=True)
 class Compiled:
-    """The two entries of a generated module; see its text at `path`."""
+    """The entries of a generated module; see its text at `path`."""
 
     path: Path
     balance: Callable[..., Any]
     advance: Callable[..., Any]
+    tap: Callable[..., Any]
 
 
 @cache
@@ -42,7 +43,7 @@ def compiled_plant(structure: Structure) -> Compiled:
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
     spec.loader.exec_module(module)
-    return Compiled(path, module.balance, module.advance)
+    return Compiled(path, module.balance, module.advance, module.tap)
 
 
 def cache_folder() -> Path:

@@ -7,6 +7,7 @@ from kbs_process.plant.loop import LOOP
 from kbs_process.plant.multibody import joint_offset, multibody_text, unrolled
 from kbs_process.plant.stepping import accelerated, state_layout, stepping_text, tuple_of
 from kbs_process.plant.structure import DRIVE, MICROSTEP, RATIO, ROTOR, Structure
+from kbs_process.plant.taps import taps_text
 
 
 def module_text(structure: Structure) -> str:
@@ -18,6 +19,7 @@ def module_text(structure: Structure) -> str:
             *multibody_text(structure),
             *stepping_text(structure),
             *_balance(structure),
+            *taps_text(structure),
             LOOP,
         ]
     )

@@ -31,13 +31,14 @@ def control(
 @njit(cache=True, error_model="numpy")
 def advance(
     first, count, H, p, x, cursor, closed, recorded, latency, command, rate, encoder, readings, gains, sums,
-    knots, fields, per_sample, held, low_pass, drive_in, amplifier, wrench, angle_rate, angle_first, angle,
+    knots, fields, per_sample, held, low_pass, drive_in, amplifier, wrench, angle_rate, angle_first, angle, states,
 ):
     """Advance `count` steps from step number `first`; return how many samples of the angles were taken.
 
     Step i covers i H to (i + 1) H of the recording's time. `cursor` holds the last step's cycle and the
     number of cycles controlled, `held` the wrench of the step before. Without an amplifier (`drive_in` is empty) a
-    sample is the mean of the two steps beside it.
+    sample is the mean of the two steps beside it. `states`, unless it is empty, gets the state at each sample, with the
+    fields behind it.
     """
     n = angle.shape[1]
     order = drive_in.shape[0]
@@ -74,6 +75,11 @@ def advance(
         if sampling and order > 0:
             for c in range(6):
                 wrench[samples, c] = amplifier[c, order - 1]
+        if sampling and states.shape[0] > 0:
+            for c in range(x.shape[0]):
+                states[samples, c] = x[c]
+            for j in range(n):
+                states[samples, x.shape[0] + j] = field_0[j]
         force = step(x, field_0, field_1, time, H, p)
         if sampling:
             if order == 0:

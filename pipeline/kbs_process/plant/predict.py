@@ -14,10 +14,11 @@ from kbs_process.plant.linear import linearise
 from kbs_process.plant.schedule import Schedule
 from kbs_process.plant.simulation import Simulation
 from kbs_process.plant.structure import parameters, structure_of
+from kbs_process.plant.taps import tap_columns
 from kbs_process.rig.model import Rig
 from kbs_process.signals.records import Array, Block
 
-__all__ = ["DEFAULT_STEP", "Schedule", "predict"]
+__all__ = ["DEFAULT_STEP", "Schedule", "predict", "tap_columns"]
 
 DEFAULT_STEP = 2e-3  # s; tests/plant/test_convergence.py shows what it costs in units of the sensors' noise
 FINEST_STEP = 2.5e-4  # s; nothing in the plant asks for less
@@ -38,6 +39,7 @@ def predict(
     duration_s: float,
     step_s: float | None = None,
     quantise: bool = True,
+    taps: bool = False,
     progress: Callable[[float], None] | None = None,
 ) -> Iterator[tuple[str, Block]]:
     """Return the streams "wrench", "angle" and "field" of a predicted recording, a block of each at a time.
@@ -46,6 +48,9 @@ def predict(
     amplifier, without cross-coupling, bias and noise, at `rate_Hz`. "angle": (n, joints) encoder readings at
     `angle_rate_Hz`, offset included, rounded to the encoder's codes where `quantise`. "field": (n, joints)
     field position at the start of each cycle, motor rad, not rounded to microsteps.
+    With `taps` also "state", at the wrench's samples: the plant's own signals at those instants, in the columns that
+    `tap_columns` names (field in whole microsteps, rotor and joint angles and rates unquantised, the plate's angles
+    and rates), rad and rad/s.
 
     Samples lie at 0, 1/rate, ... before `duration_s`; stamps count from the recording's time zero. The run
     starts in static equilibrium at the first command; where that precedes time zero, the time between is
@@ -65,6 +70,7 @@ def predict(
         per_sample=per_sample,
         angle_rate=angle_rate_Hz,
         end=duration_s,
+        taps=taps,
     )
     return _blocks(simulation, rate_Hz, duration_s, quantise, progress)
 
@@ -105,9 +111,11 @@ def _blocks(
     angle_done = 1
     while done < samples:
         count = min(block, samples - done)
-        wrench, angle = simulation.advance(count * per_sample, angle_done)
+        wrench, angle, state = simulation.advance(count * per_sample, angle_done)
         angle = angle[: angles - angle_done]
         yield "wrench", _block((done + np.arange(count)) / rate, wrench)
+        if simulation.taps:
+            yield "state", _block((done + np.arange(count)) / rate, state)
         if len(angle):
             yield (
                 "angle",

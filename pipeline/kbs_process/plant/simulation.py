@@ -12,6 +12,7 @@ from kbs_process.plant.equilibrium import at_rest
 from kbs_process.plant.schedule import Schedule, covering
 from kbs_process.plant.stepping import state_layout
 from kbs_process.plant.structure import JOINTS, MICROSTEP, RATIO, parameters, structure_of
+from kbs_process.plant.taps import OF_JOINTS
 from kbs_process.rig.model import Rig
 from kbs_process.signals.records import Array
 
@@ -32,8 +33,9 @@ class Simulation:
         per_sample: int,
         angle_rate: float,
         end: float,
+        taps: bool = False,
     ) -> None:
-        self.step, self.per_sample, self.angle_rate = step, per_sample, angle_rate
+        self.step, self.per_sample, self.angle_rate, self.taps = step, per_sample, angle_rate, taps
         self.structure = structure_of(rig, effects)
         self.plant = compiled_plant(self.structure)
         self.p = parameters(rig, self.structure)
@@ -75,21 +77,24 @@ class Simulation:
         view: Array = self.state[state_layout(self.structure)[name]]
         return view
 
-    def advance(self, steps: int, angle_first: int) -> tuple[Array, Array]:
-        """Move on by `steps` (whole sample intervals); return the wrench and angle samples taken.
+    def advance(self, steps: int, angle_first: int) -> tuple[Array, Array, Array]:
+        """Move on by `steps` (whole sample intervals); return the samples taken of wrench, angles and taps.
 
         The wrench, shape (n, 6), is that at the steps that `per_sample` divides; angles, shape (m, joints),
         are unquantised, from sample number `angle_first` on, at times after the start and up to the end.
+        Taps, at the instants of the wrench's samples, have the columns of `taps.tap_columns`, and no rows unless
+        the simulation was made with `taps`.
         """
         n = self.structure.joints
         wrench = np.empty((-(-steps // self.per_sample), 6))
         span = steps * self.step
         angle = np.empty((int(span * self.angle_rate) + 2, n))
+        states = np.empty((len(wrench) if self.taps else 0, len(self.state) + n))
         taken = self.plant.advance(
             self.first, steps, self.step, self.p, self.state, self._cursor, self._closed, self._recorded,
             self._latency, self._cycles.position, self._cycles.rate, self.encoder, self._readings,
             self._gains, self._sums, self.knots, self.fields, self.per_sample, self.wrench, self._low_pass,
-            self._drive_in, self._amplified, wrench, self.angle_rate, angle_first, angle,
+            self._drive_in, self._amplified, wrench, self.angle_rate, angle_first, angle, states,
         )  # fmt: skip
         self.first += steps
         angle = angle[:taken]
@@ -99,4 +104,7 @@ class Simulation:
                 where="plant",
                 remedy="check stiffness, damping and inertia of the parameters, or take a smaller step",
             )
-        return wrench, angle
+        tapped = np.empty((len(states), len(OF_JOINTS) * n + 6))
+        if self.taps:
+            self.plant.tap(states, self.p, tapped)
+        return wrench, angle, tapped
