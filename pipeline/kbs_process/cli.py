@@ -470,6 +470,9 @@ def report(results: Path, pdf: bool | None) -> None:
 
     with revising(results, without=("index.html", "report.pdf")) as folder:
         page = build(folder, pdf)
+        stale = (results / "report.pdf").is_file() and not (folder / "report.pdf").is_file()
+    if stale:
+        click.echo(f"{results / 'report.pdf'} showed the report of before, and is gone: --pdf makes it again")
     click.echo(f"Report: {results / page.name}")
 
 

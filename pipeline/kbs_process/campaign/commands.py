@@ -17,9 +17,10 @@ from kbs_process.signals.records import Array
 def read_commands(path: Path, joints: tuple[str, ...]) -> Schedule:
     """Return the schedule in a CSV or Parquet file.
 
-    Columns: `t` (s, increasing), for each joint its desired angle, called like the joint (rad), and, where
-    all of them are given, its desired rate `JOINT.rate` (rad/s); otherwise rates are differences of angles.
-    Raises RecordingError that names the column.
+    Columns: `t` (s, increasing), for each joint its desired angle, called like the joint (rad) or `JOINT.deg`
+    (degrees), and, where all of them are given, its desired rate `JOINT.rate` (rad/s); otherwise rates are differences
+    of angles. Raises RecordingError that names the column, and for angles that look like degrees called radians: a run
+    that starts beyond a turn.
     """
     table = _read(path)
     t = _column(table, "t", path)
@@ -29,13 +30,27 @@ def read_commands(path: Path, joints: tuple[str, ...]) -> Schedule:
             where=str(path),
             remedy="sort the rows by time, and delete repeated ones",
         )
-    position = np.stack([_column(table, joint, path) for joint in joints], axis=1)
+    position = np.stack([_angle(table, joint, path) for joint in joints], axis=1)
     names = [f"{joint}.rate" for joint in joints]
     if set(names) <= set(table.column_names):
         rate: Array = np.stack([_column(table, name, path) for name in names], axis=1)
     else:
         rate = np.gradient(position, t, axis=0)
     return Schedule(t=t, position=position, rate=rate)
+
+
+def _angle(table: pa.Table, joint: str, path: Path) -> Array:
+    degrees = f"{joint}.deg"
+    if degrees in table.column_names:
+        return np.radians(_column(table, degrees, path))
+    angle = _column(table, joint, path)
+    if abs(angle[0]) > 2.0 * np.pi:
+        raise RecordingError(
+            f"column '{joint}' starts at {angle[0]:g} rad, more than a turn away",
+            where=str(path),
+            remedy=f"give radians, or call the column '{degrees}' if these are degrees",
+        )
+    return angle
 
 
 def _read(path: Path) -> pa.Table:

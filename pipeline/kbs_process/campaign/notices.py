@@ -26,6 +26,8 @@ WEAK = 0.5
 NOISY = 1.0
 # Samples: where fewer are missing together, and at the ends of every record, nothing is lost that matters.
 UNJUDGED = 40
+# rad, standard deviation: a phase that may lie anywhere in a turn has 1.8.
+UNKNOWN_PHASE = 1.0
 # Characters of a check's detail that a notice quotes.
 LONG = 160
 QUANTITY = {"torque": "T", "force": "F"}  # first letter of its channels
@@ -49,6 +51,7 @@ def notices(
     yield from _repeats(campaign, findings)
     yield from _resonance(findings)
     yield from _predictions(findings)
+    yield from _phases(campaign, analyses)
     yield from _edges(findings)
     yield from _clocks(analyses)
 
@@ -193,11 +196,12 @@ def _repeats(campaign: Campaign, findings: Findings) -> Iterable[results.Notice]
             remedy="run every trajectory two or three times",
         )
     judged = {(one.frame, one.band, QUANTITY[one.quantity]) for one in findings.requirements}
+    labels = {band.name: band.label for band in findings.bands}
     noisy: dict[str, list[results.Repeatability]] = defaultdict(list)
     for entry in findings.repeatability:
         key = (entry.frame, entry.band, entry.channel[0])
         if key in judged and entry.ratio is not None and entry.ratio < NOISY:
-            noisy[f"{entry.trajectory}, {entry.band}, frame {entry.frame}"].append(entry)
+            noisy[f"{entry.trajectory}, {labels[entry.band]}, frame {entry.frame}"].append(entry)
     for where, entries in noisy.items():
         each = ", ".join(
             f"{e.channel} {e.noise_rms:.2g} against {e.signal_rms:.2g} {e.unit}" for e in entries
@@ -238,15 +242,39 @@ def _predictions(findings: Findings) -> Iterable[results.Notice]:
             "the prediction cannot be tested there",
             remedy="look at wider bands and at the transducer (frame T) for the correlation",
         )
+    labels = {band.name: band.label for band in findings.bands}
     for merit in of_judged:
         explained = merit.fraction_of_variance
         if not at_the_noise(merit) and explained is not None and explained < WEAK:
             yield results.Notice(
                 severity="warning",
                 what=f"the prediction explains {100 * explained:.0f} % of the variance of {merit.channel}",
-                where=f"{merit.recording}, {merit.band}, frame {merit.frame}",
+                where=f"{merit.recording}, {labels[merit.band]}, frame {merit.frame}",
                 remedy="see figures of merit; phases of cogging and friction are unknown before identification",
             )
+
+
+def _phases(campaign: Campaign, analyses: Sequence[Analysis]) -> Iterable[results.Notice]:
+    """Phases of which nothing is known, in a prediction: its bursts have a size and a time, and no sign."""
+    drives = {
+        joint.name: [
+            name
+            for name, quantity in joint.drive.parameters.items()
+            if quantity.unit == "rad" and float(quantity.sigma) > UNKNOWN_PHASE
+        ]
+        for joint in campaign.rig.joints
+        if joint.drive is not None
+    }
+    unknown = [f"{name} ({joint})" for joint, names in drives.items() for name in names]
+    if unknown and any(one.predicted is not None for one in analyses):
+        yield results.Notice(
+            severity="info",
+            what=f"phases of which the parameter files know nothing: {', '.join(unknown)}. What they time, as bursts "
+            "where tooth passing crosses the resonance, is predicted in size and place, and may be measured with the "
+            "opposite sign",
+            where="prediction",
+            remedy="compare sizes there, not histories; kbs-process identify finds the phases of one article",
+        )
 
 
 def at_the_noise(merit: results.Merit) -> bool:

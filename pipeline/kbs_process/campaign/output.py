@@ -73,6 +73,9 @@ def _recording(folder: Path, analysis: Analysis) -> None:
                 topic = f"/{kind}/{band}/{'spacecraft' if frame == 'S' else 'transducer'}/wrench"
                 streams.append(_stream(topic, signal, analysis.run.epoch_ns))
     streams.append(_stream("/gravity/transducer/wrench", analysis.static.wrench, analysis.run.epoch_ns))
+    for topic, joints in (("/encoder", analysis.run.angle), ("/command", commanded(analysis.run))):
+        if joints is not None:
+            streams.append(_joints(topic, joints, analysis.run.epoch_ns))
     folder.mkdir(exist_ok=True)
     write_mcap(folder / f"{analysis.entry.name}.mcap", streams)
 
@@ -82,4 +85,13 @@ def _stream(topic: str, signal: Signal, epoch_ns: int) -> OutStream:
     values = np.full((len(signal), len(WRENCH_CHANNELS)), np.nan)
     values[:, [WRENCH_CHANNELS.index(channel) for channel in signal.channels]] = signal.values
     stamp = epoch_ns + np.rint(signal.t * 1e9).astype(np.int64)
-    return OutStream(topic=topic, kind="wrench", stamp=stamp, log=stamp, values=values)
+    frame = "spacecraft" if signal.frame == "S" else "transducer"
+    return OutStream(topic=topic, kind="wrench", stamp=stamp, log=stamp, values=values, frame=frame)
+
+
+def _joints(topic: str, signal: Signal, epoch_ns: int) -> OutStream:
+    """Angles of the joints that a signal has."""
+    stamp = epoch_ns + np.rint(signal.t * 1e9).astype(np.int64)
+    return OutStream(
+        topic=topic, kind="joints", stamp=stamp, log=stamp, values=signal.values, names=signal.channels
+    )
