@@ -22,6 +22,7 @@ import numpy as np
 from numba import njit
 
 from engine.hardware import Hardware
+from engine.ports import OUT
 
 _STEPS = 200  # electrical and tooth cycles: T_cog and T_stat repeat 200 times a motor turn
 _ELECTRICAL = np.pi / 64  # electrical angle of a microstep, rad
@@ -124,18 +125,54 @@ def bungee_force(cord: tuple[float, float, float, float, float], at: Any, force:
 
 
 @njit(error_model="numpy")
+def copy_bodies(view: Any, bodies: Any) -> None:
+    """Fill `bodies` (2, 18) from views of MuJoCo's own xpos, xmat, xipos and cacc, in its c-frame, about `com`."""
+    for row in range(2):
+        origin, axes, centre, cacc = view[4 * row], view[4 * row + 1], view[4 * row + 2], view[4 * row + 3]
+        com = view[8]
+        for k in range(3):
+            bodies[row, k] = origin[k]
+            bodies[row, 12 + k] = centre[k]
+        for k in range(9):
+            bodies[row, 3 + k] = axes[k]
+        r0, r1, r2 = origin[0] - com[0], origin[1] - com[1], origin[2] - com[2]
+        bodies[row, 15] = cacc[3] + cacc[1] * r2 - cacc[2] * r1
+        bodies[row, 16] = cacc[4] + cacc[2] * r0 - cacc[0] * r2
+        bodies[row, 17] = cacc[5] + cacc[0] * r1 - cacc[1] * r0
+
+
+@njit(error_model="numpy")
 def run_cycle(
     mj_step: Any, model: int, data: int, state: Any, az: DriveNumbers, el: DriveNumbers, cord: Any,
-    field: Any, dt: float, wrench: Any, q: Any,
+    field: Any, dt: float, wrench: Any, q: Any, act: Any, acts: bool, extra: Any, start: float,
 ) -> None:  # fmt: skip
     """Integrate one real-time cycle while each field moves linearly from field[0] to field[1].
 
     `state` holds views of MuJoCo's own qpos, qvel, qacc, qfrc_applied, sensordata, the antenna's xipos
-    and its row of xfrc_applied. Row n of `wrench` (n, 6) and `q` (n, 7) belongs to t = (n + 1/2) dt.
+    and its row of xfrc_applied. Row n of `wrench` (n, 6) and `q` (n, 7) belongs to t = start + (n + 1/2) dt.
+    `act` and `extra` are what acts beyond the drives (engine.ports), with its numbers and memory, the azimuth body's
+    row of xfrc_applied, MuJoCo's gravity, gravity at rest, and what `copy_bodies` reads.
     """
     qpos, qvel, qacc, qfrc, sensor, xipos, xfrc = state
+    numbers, memory, xfrc_azimuth, gravity, still, view = extra
+    motion, bodies, out = np.zeros((3, 7)), np.zeros((2, 18)), np.zeros(OUT)
     steps = len(wrench)
     for n in range(steps):
+        if acts:
+            for k in range(7):
+                motion[0, k] = qpos[k]
+                motion[1, k] = qvel[k] + 0.5 * dt * qacc[k]
+            for axis in range(2):
+                motion[2, axis] = field[0, axis] + (field[1, axis] - field[0, axis]) * ((n + 0.5) / steps)
+            copy_bodies(view, bodies)
+            out[:] = 0.0
+            act(start + (n + 0.5) * dt, dt, numbers, memory, motion, bodies, out)
+            for k in range(3):
+                qfrc[k] = out[k]
+                gravity[k] = still[k] - out[19 + k]
+            for k in range(6):
+                xfrc_azimuth[k] = out[7 + k]
+                xfrc[k] = out[13 + k]
         for axis in range(2):
             p = az if axis == 0 else el
             rotor = 3 + 2 * axis
@@ -148,10 +185,19 @@ def run_cycle(
                 p, th_r, field[0, axis] + travel * (n / steps), field[0, axis] + travel * ((n + 1) / steps)
             )
             T += p.tcog * np.sin(_STEPS * th_r + p.phi_cog) - T_gear / p.R
+            if acts:
+                T += out[rotor]
             qfrc[rotor] = T - friction_torque(p, T, th_r, qvel[rotor], dt)
             qfrc[rotor + 1] = T_gear
+            if acts:
+                qfrc[rotor + 1] += out[rotor + 1]
         if cord[3] > 0:
+            x, y, z = xfrc[0], xfrc[1], xfrc[2]
             bungee_force(cord, xipos, xfrc)
+            if acts:
+                xfrc[0] += x
+                xfrc[1] += y
+                xfrc[2] += z
         q[n] = qpos
         mj_step(model, data)
         for channel in range(6):

@@ -18,7 +18,7 @@ from engine.hardware import Array, Hardware
 # Order of the joints, thus of generalised positions and velocities.
 PLATE = slice(0, 3)
 ROTOR_AZ, AZ, ROTOR_EL, EL = 3, 4, 5, 6
-ANTENNA_BODY = "antenna"
+BODY_NAMES = ("base", "azimuth", "antenna")
 
 _ROTOR_MASS = 1e-9  # kg: MuJoCo wants some; the rotor's real mass counts in the body that carries it
 
@@ -29,7 +29,9 @@ class RigidModel:
 
     model: mujoco.MjModel
     data: mujoco.MjData
-    antenna: int  # body index
+    base: int  # body indices
+    azimuth: int
+    antenna: int
 
 
 def gravity_in_plate(hardware: Hardware) -> Array:
@@ -85,7 +87,7 @@ def build(hardware: Hardware, timestep: float) -> RigidModel:
     ET.SubElement(azimuth, "joint", name="az", axis=_text(axis_az))
     cross_el = _rotor(azimuth, "el", mount_el, axis_el, hardware)
     _inertial(azimuth, "azimuth", hardware, _turned(cross_el, hardware["joint.el.misalignment"]))
-    antenna = ET.SubElement(azimuth, "body", name=ANTENNA_BODY, **mount_el)
+    antenna = ET.SubElement(azimuth, "body", name="antenna", **mount_el)
     ET.SubElement(antenna, "joint", name="el", axis=_text(axis_el))
     _inertial(antenna, "antenna", hardware, np.zeros((3, 3)))
 
@@ -96,7 +98,7 @@ def build(hardware: Hardware, timestep: float) -> RigidModel:
     model = mujoco.MjModel.from_xml_string(ET.tostring(root, encoding="unicode"))
     names = [model.joint(index).name for index in range(model.njnt)]
     assert names == ["plate_x", "plate_y", "plate_z", "rotor_az", "az", "rotor_el", "el"], names
-    return RigidModel(model, mujoco.MjData(model), model.body(ANTENNA_BODY).id)
+    return RigidModel(model, mujoco.MjData(model), *(model.body(name).id for name in BODY_NAMES))
 
 
 def rotation(vector: Array) -> Array:

@@ -9,13 +9,16 @@ import numpy as np
 from scipy.optimize import root
 from scipy.signal import butter, sosfilt, sosfilt_zi
 
-from engine.drive import bungee_force, drive_numbers, motor_torque, run_cycle
+from engine.drive import bungee_force, copy_bodies, drive_numbers, motor_torque, run_cycle
 from engine.hardware import AXES, Array, Hardware
+from engine.ports import GENERALISED, NONE, ON_ANTENNA, ON_AZIMUTH, OUT, Extra
 from engine.rigid import AZ, EL, PLATE, ROTOR_AZ, ROTOR_EL, RigidModel, build, mj_step_function
 from engine.trajectories import Commands
 
 # s; halving it moves no channel by a tenth of its noise (tests/engine/test_engine_convergence.py).
 TIME_STEP = 1e-4
+
+_RATE_SPAN = 5e-3  # s, each way: the rates that an encoder's error depends on
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,26 +52,35 @@ def simulate(
     *,
     rate_hz: float = 100.0,
     time_step: float = TIME_STEP,
+    extra: Extra = NONE,
 ) -> Result:
     """Drive `hardware` along `commands`; sample wrench and encoders at `rate_hz` without noise.
 
     The run starts at rest in static equilibrium at the first commanded angles and lasts until the
-    last command.
+    last command. `extra` acts beyond the engine's own physics (engine.ports); what it does to the
+    transducer's reading and to clocks is the recorder's.
     """
-    dense = integrate(hardware, commands, time_step=time_step)
+    dense = integrate(hardware, commands, time_step=time_step, extra=extra)
     t = np.arange(0.0, dense.field_t[-1] + 1e-9, 1.0 / rate_hz)
-    return sample(hardware, dense, t, t)
+    return sample(hardware, dense, t, t, extra=extra)
 
 
-def sample(hardware: Hardware, dense: Dense, wrench_t: Array, angle_t: Array) -> Result:
+def sample(
+    hardware: Hardware, dense: Dense, wrench_t: Array, angle_t: Array, *, extra: Extra = NONE
+) -> Result:
     """Read the sensors at instants of their own: the wrench behind its amplifier, the angles at once."""
     q = at(dense.t, dense.q, angle_t)
     angles = q[:, [AZ, EL]]
+    shown = angles
+    if extra.encoder is not None:
+        before = at(dense.t, dense.q[:, [AZ, EL]], angle_t - _RATE_SPAN)
+        after = at(dense.t, dense.q[:, [AZ, EL]], angle_t + _RATE_SPAN)
+        shown = angles + extra.encoder(angle_t, angles, (after - before) / (2 * _RATE_SPAN))
     return Result(
         t=wrench_t,
         wrench=at(dense.t, amplify(hardware, dense), wrench_t),
         angles=angles,
-        encoder=encode(hardware, angles),
+        encoder=encode(hardware, shown),
         rotors=q[:, [ROTOR_AZ, ROTOR_EL]],
         plate=q[:, PLATE],
         field_t=dense.field_t,
@@ -76,8 +88,18 @@ def sample(hardware: Hardware, dense: Dense, wrench_t: Array, angle_t: Array) ->
     )
 
 
-def integrate(hardware: Hardware, commands: Commands, *, time_step: float = TIME_STEP) -> Dense:
-    """Run the controller, the drives and the rigid bodies from the first command to the last."""
+def integrate(
+    hardware: Hardware,
+    commands: Commands,
+    *,
+    time_step: float = TIME_STEP,
+    extra: Extra = NONE,
+    field: Array | None = None,
+) -> Dense:
+    """Run the controller, the drives and the rigid bodies from the first command to the last.
+
+    With a `field` (cycles + 1, 2), motor rad at the cycles' starts, the drives follow it in place of the controller.
+    """
     cycle = hardware.scalar("controller.cycle")
     steps = round(cycle / time_step)
     dt = cycle / steps
@@ -86,13 +108,20 @@ def integrate(hardware: Hardware, commands: Commands, *, time_step: float = TIME
     ratio = np.array([az.R, el.R])
 
     rigid = build(hardware, dt)
-    field = np.empty((cycles + 1, 2))
-    field[0] = ratio * commands.position[0]
+    commanded = np.empty((cycles + 1, 2))
+    first = commands.position[0] if field is None else field[0] / ratio
+    commanded[0] = ratio * first
+    applied = np.tile(commanded[0], (2, 1))  # where the motors' fields are at a cycle's start and end
     data = rigid.data
-    data.qpos[:] = equilibrium(hardware, rigid, commands.position[0])
+    data.qpos[:] = equilibrium(hardware, rigid, first, extra)
     state = (
         data.qpos, data.qvel, data.qacc, data.qfrc_applied, data.sensordata,
         data.xipos[rigid.antenna], data.xfrc_applied[rigid.antenna],
+    )  # fmt: skip
+    gravity = rigid.model.opt.gravity
+    memory = np.zeros((len(extra.numbers), extra.states))
+    more = (
+        extra.numbers, memory, data.xfrc_applied[rigid.azimuth], gravity, gravity.copy(), _view(rigid)
     )  # fmt: skip
     addresses = rigid.model._address, data._address
     cord = _cord(hardware)
@@ -104,23 +133,35 @@ def integrate(hardware: Hardware, commands: Commands, *, time_step: float = TIME
     error_sum = np.zeros(2)
     for k in range(cycles):
         now = data.qpos - 0.5 * dt * data.qvel  # positions are half a step ahead
-        codes[k] = encode(hardware, now[[AZ, EL]])
-        if hardware.loop == "open":
-            field[k + 1] = ratio * commands.position[k + 1]
+        shown = now[[AZ, EL]]
+        if extra.encoder is not None:
+            rates = data.qvel[[AZ, EL]]
+            shown = shown + extra.encoder(np.array([k * cycle]), shown[None], rates[None])[0]
+        codes[k] = encode(hardware, shown)
+        if field is not None:
+            commanded[k + 1] = field[k + 1]
+        elif hardware.loop == "open":
+            commanded[k + 1] = ratio * commands.position[k + 1]
         else:
             error = commands.position[k] - codes[max(k - hardware.latency, 0)]
             error_sum += error
             correction = hardware["controller.Kp"] * error + hardware["controller.Ki"] * cycle * error_sum
-            field[k + 1] = field[k] + ratio * (commands.rate[k] * cycle + correction)
+            commanded[k + 1] = commanded[k] + ratio * (commands.rate[k] * cycle + correction)
+        applied[0], applied[1] = applied[1], commanded[k + 1]
+        if extra.drive is not None:
+            applied[1] += extra.drive(k, commanded[k], commanded[k + 1])
         rows = slice(k * steps, (k + 1) * steps)
-        run_cycle(step, *addresses, state, az, el, cord, field[k : k + 2], dt, wrench[rows], q[rows])
+        run_cycle(
+            step, *addresses, state, az, el, cord, applied, dt, wrench[rows], q[rows],
+            extra.act, extra.acts, more, k * cycle,
+        )  # fmt: skip
     if not np.all(np.isfinite(q)):
         raise FloatingPointError("the simulation diverged")
     t = (np.arange(cycles * steps) + 0.5) * dt
-    return Dense(t, wrench, q, cycle * np.arange(cycles + 1), field)
+    return Dense(t, wrench, q, cycle * np.arange(cycles + 1), commanded)
 
 
-def equilibrium(hardware: Hardware, rigid: RigidModel, angles: Array) -> Array:
+def equilibrium(hardware: Hardware, rigid: RigidModel, angles: Array, extra: Extra = NONE) -> Array:
     """Generalised positions at rest under gravity (and bungee), field at R times `angles`, no friction.
 
     Shape (7,). Solved to 1e-12 N m on every coordinate; leaves MuJoCo's data at that state.
@@ -128,6 +169,9 @@ def equilibrium(hardware: Hardware, rigid: RigidModel, angles: Array) -> Array:
     drives = [drive_numbers(hardware, axis) for axis in AXES]
     cord = _cord(hardware)
     data = rigid.data
+    memory = np.zeros((len(extra.numbers), extra.states))
+    motion, bodies, out = np.zeros((3, 7)), np.zeros((2, 18)), np.zeros(OUT)
+    motion[2, :2] = [p.R * angle for p, angle in zip(drives, angles, strict=True)]
 
     def unbalanced(q: Array) -> Array:
         data.qpos[:] = q
@@ -143,6 +187,15 @@ def equilibrium(hardware: Hardware, rigid: RigidModel, angles: Array) -> Array:
             T = motor_torque(p, q[rotor], p.R * angles[axis], p.R * angles[axis])
             data.qfrc_applied[rotor] = T + p.tcog * np.sin(200 * q[rotor] + p.phi_cog) - T_gear / p.R
             data.qfrc_applied[rotor + 1] = T_gear
+        if extra.acts:
+            motion[0] = q
+            copy_bodies(_view(rigid), bodies)
+            bodies[:, 15:] = -rigid.model.opt.gravity  # at rest
+            out[:] = 0.0
+            extra.act(0.0, 0.0, extra.numbers, memory, motion, bodies, out)
+            data.qfrc_applied[:] += out[GENERALISED]
+            data.xfrc_applied[rigid.azimuth] += out[ON_AZIMUTH]
+            data.xfrc_applied[rigid.antenna] += out[ON_ANTENNA]
         mujoco.mj_forward(rigid.model, data)
         force = np.zeros(7)
         mujoco.mj_mulM(rigid.model, data, force, data.qacc)
@@ -157,6 +210,15 @@ def equilibrium(hardware: Hardware, rigid: RigidModel, angles: Array) -> Array:
         raise FloatingPointError(f"no static equilibrium at {angles}: {residual} N m are left")
     data.qacc[:] = 0
     return solution.x * scale
+
+
+def _view(rigid: RigidModel) -> tuple[Array, ...]:
+    """MuJoCo's own memory that `copy_bodies` reads."""
+    data = rigid.data
+    rows: list[Array] = []
+    for body in (rigid.azimuth, rigid.antenna):
+        rows += [data.xpos[body], data.xmat[body], data.xipos[body], data.cacc[body]]
+    return (*rows, data.subtree_com[rigid.base])
 
 
 def amplify(hardware: Hardware, dense: Dense) -> Array:

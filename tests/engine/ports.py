@@ -1,0 +1,69 @@
+"""Where physics beyond the engine's own drives can enter a simulation; nothing does by itself.
+
+An `Extra` acts at any of the engine's ports. Its compiled part, `act`, is called once a step::
+
+    act(t, dt, numbers, memory, motion, bodies, out)
+
+- `t`: instant, s; `dt`: step, s (0 while the static start is sought: states have to stay as they are)
+- `numbers`: the extra's own (k, n) float64; `memory`: its states (k, m) float64, 0 at the start, kept from step to step
+- `motion` (3, 7): positions, rates, and in the first two of the last row the fields of az and el (motor rad).
+  Columns: plate x, y, z, rotor az, az, rotor el, el
+- `bodies` (2, 18): azimuth body, antenna: origin (3) and axes (9, row by row) of its frame, its centre of mass (3), all
+  in undeflected T; then, for the specific force that an appendage feels, acceleration less gravity of its origin (3)
+- `out` (22,), zero before the call: generalised forces in the columns' order (7); force and torque from the laboratory
+  on the azimuth body (6) and on the antenna (6), in undeflected T, torque about their centre of mass; acceleration of
+  the floor (3)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from engine.hardware import Array
+
+# Places in `out`.
+GENERALISED, ON_AZIMUTH, ON_ANTENNA, FLOOR = slice(0, 7), slice(7, 13), slice(13, 19), slice(19, 22)
+OUT = 22
+
+Act = Callable[..., None]
+FieldChange = Callable[[int, Array, Array], Array]
+EncoderChange = Callable[[Array, Array, Array], Array]
+TransducerChange = Callable[[Array, Array], Array]
+ClockChange = Callable[[Array], Array]
+
+
+@njit(error_model="numpy")
+def nothing(
+    t: float, dt: float, numbers: Any, memory: Any, motion: Any, bodies: Any, out: Any
+) -> None:  # pragma: no cover
+    """Leave everything as it is."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Extra:
+    """What acts beyond the engine's own physics. The default acts nowhere, to the bit."""
+
+    act: Act = nothing
+    numbers: Array = field(default_factory=lambda: np.zeros((0, 1)))  # (k, n)
+    states: int = 1  # columns of its memory
+    # (cycle k, field commanded at its start (2,), at its end (2,)) -> what the motor's field does not do of the end
+    drive: FieldChange | None = None
+    # (t (n,), joint angles (n, 2), rates (n, 2)) -> change (n, 2) of what the discs show, rad
+    encoder: EncoderChange | None = None
+    # (t (n,), wrench (n, 6) behind cross-coupling) -> change (n, 6) of the reading before noise and rounding
+    transducer: TransducerChange | None = None
+    # "wrench" and "encoder" -> (true t (n,)) -> change (n,) of the clock's reading, s
+    clocks: Mapping[str, ClockChange] = field(default_factory=dict)
+
+    @property
+    def acts(self) -> bool:
+        """Whether anything acts on the mechanism."""
+        return self.act is not nothing
+
+
+NONE = Extra()
