@@ -10,11 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kbs_process.errors import ConfigError
-from kbs_process.plant.effect import SIGNALS, Effect, LogNormal, Normal, Parameter, Port, State, Uniform
+from kbs_process.plant.effect import Effect, LogNormal, Normal, Parameter, Port, State, Uniform
 from kbs_process.plant.effects import CATALOGUE, select
 from kbs_process.plant.effects.tooth_stiction import limit as tooth_stiction
 
-UNITS = {"1", "rad", "rad/s", "N m", "N m/rad", "N m s/rad", "s", "1/s", "K"}
+UNITS = {"1", "m", "N/m", "rad", "rad/s", "N m", "N m/rad", "N m s/rad", "s", "1/s", "K"}
 
 
 def typical(parameter: Parameter) -> float:
@@ -48,7 +48,7 @@ class TestCatalogue:
     @given(data=st.data())
     def test_finite_and_passive_where_claimed(self, effect: Effect, data: st.DataObject) -> None:
         near = st.floats(-1e3, 1e3)
-        values = {name: data.draw(near, name) for name in effect.arguments if name in SIGNALS}
+        values = {name: data.draw(near, name) for name in effect.arguments if name in effect.port.signals}
         values |= {state.name: data.draw(near, state.name) for state in effect.states}
         values |= {parameter.name: typical(parameter) for parameter in effect.parameters}
         if "ratio" in values:

@@ -31,7 +31,7 @@ def stiff() -> Linear:
     """One joint that follows its field within a thousandth of a cycle."""
     k = 1e10
     eye = np.eye(1)
-    return Linear(0, ("tip",), eye, 2e5 * eye, k * eye, k * eye, np.zeros((6, 1)), np.zeros((6, 1)))
+    return Linear(0, ("tip",), eye, 2e5 * eye, k * eye, k * eye, *[np.zeros((6, 1))] * 3)
 
 
 def flexible() -> tuple[Linear, Controller]:

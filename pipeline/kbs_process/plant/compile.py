@@ -8,10 +8,11 @@ import inspect
 import os
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numba
@@ -34,8 +35,15 @@ class Compiled:
 @cache
 def compiled_plant(structure: Structure) -> Compiled:
     """Return the compiled plant of `structure`, from this process, from the cache, or made now."""
-    text = module_text(structure)
-    name = f"plant_{_fingerprint(text, structure)}"
+    effects = [*structure.effects, *(load.effect for load in structure.loads)]
+    modules = [inspect.getmodule(effect.equation) for effect in effects]
+    module = compiled_module("plant", module_text(structure), modules)
+    return Compiled(Path(str(module.__file__)), module.balance, module.advance, module.tap)
+
+
+def compiled_module(kind: str, text: str, modules: Iterable[ModuleType | None]) -> ModuleType:
+    """Import `text` as a module, kept in the cache; `modules` are those whose functions it calls."""
+    name = f"{kind}_{_fingerprint(text, modules)}"
     path = _written(name, text)
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:
@@ -43,7 +51,7 @@ def compiled_plant(structure: Structure) -> Compiled:
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
     spec.loader.exec_module(module)
-    return Compiled(path, module.balance, module.advance, module.tap)
+    return module
 
 
 def cache_folder() -> Path:
@@ -59,10 +67,10 @@ def cache_folder() -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "kbs-process"
 
 
-def _fingerprint(text: str, structure: Structure) -> str:
+def _fingerprint(text: str, called: Iterable[ModuleType | None]) -> str:
     """Hash everything that decides the machine code: numba does not notice edits in imported files."""
-    modules = [elementary, kernels, *(inspect.getmodule(effect.equation) for effect in structure.effects)]
-    sources = [inspect.getsource(module) for module in modules if module is not None]
+    modules = [elementary, kernels, *(module for module in called if module is not None)]
+    sources = [inspect.getsource(module) for module in modules]
     parts = [text, *sources, numba.__version__, sys.version]
     return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:24]
 

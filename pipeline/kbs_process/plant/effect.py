@@ -1,7 +1,7 @@
-"""One piece of physics of a drive: an equation, where it acts, and its parameters.
+"""One piece of physics: an equation, where it acts, and its parameters.
 
-An effect is a plain typed function whose argument names are its wiring: signals of the plant
-(`SIGNALS`), the effect's own states, and parameters of the drive. The declaration beneath it is checked
+An effect is a plain typed function whose argument names are its wiring: signals of the plant at its port
+(`Port.signals`), the effect's own states, and its parameters. The declaration beneath it is checked
 when it is made, so a wrong name is an error at import, not in the middle of a run. The plant compiles the
 function; it has to use floats and `math` alone.
 """
@@ -9,10 +9,11 @@ function; it has to use floats and `math` alone.
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
-from dataclasses import dataclass
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from enum import Enum
-from typing import Any
+from typing import Any, Literal, get_type_hints
 
 # What every equation can ask for by name, for the drive that it is part of.
 SIGNALS = {
@@ -28,13 +29,57 @@ SIGNALS = {
 }
 
 
+# Phases that a search tries, rad.
+EIGHTHS = tuple(math.pi * (i / 4.0 - 1.0) for i in range(8))
+
+# What the equation of a load from the laboratory can ask for: the motion of the point at which it acts.
+POINT_SIGNALS = {
+    "x": "m, position of the point from T's origin, along the undeflected T's x axis",
+    "y": "m, along y",
+    "z": "m, along z",
+    "vx": "m/s, its velocity along the same axes",
+    "vy": "m/s",
+    "vz": "m/s",
+    "time": SIGNALS["time"],
+}
+FLOOR_SIGNALS = {"time": SIGNALS["time"]}
+
+
 class Port(Enum):
-    """Where an equation's value acts. Every torque is reacted by the body that carries the motor."""
+    """Where an equation's value acts.
+
+    Motor torque, friction, transmission and joint torque act between a joint's output, its rotor and the body that
+    carries the motor: what they do is internal. The others come from the laboratory, and the transducer feels them.
+    Ports of a drive have their parameters at every joint, the others once in the rig (`rig.model.External`).
+    """
 
     MOTOR_TORQUE = "torque on the rotor, N m"
     MOTOR_FRICTION = "greatest Coulomb friction torque on the rotor, N m, >= 0: opposes motion, holds at rest"
     TRANSMISSION = "torque of the gear on the output, N m; the rotor gets -1/ratio of it"
-    JOINT_TORQUE = "torque on the output, N m"
+    JOINT_TORQUE = "torque on the output, N m, reacted by the body that carries the motor"
+    GROUND_TORQUE = "torque on the output about the joint's axis, N m, reacted by the laboratory"
+    EXTERNAL_FORCE = (
+        "force (x, y, z) of the laboratory on a point of a link, N, along the undeflected T's axes"
+    )
+    BASE_ACCELERATION = (
+        "acceleration (x, y, z) of the laboratory's floor, m/s^2, along the undeflected T's axes"
+    )
+
+    @property
+    def of_drive(self) -> bool:
+        """Whether it is a port of every driven joint, and not one of the rig."""
+        return self not in (Port.EXTERNAL_FORCE, Port.BASE_ACCELERATION)
+
+    @property
+    def signals(self) -> dict[str, str]:
+        """What an equation at this port can ask for by name, with its unit and meaning."""
+        match self:
+            case Port.EXTERNAL_FORCE:
+                return POINT_SIGNALS
+            case Port.BASE_ACCELERATION:
+                return FLOOR_SIGNALS
+            case _:
+                return SIGNALS
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +89,16 @@ class Normal:
     mean: float
     sigma: float
 
+    @property
+    def middle(self) -> float:
+        """Mean."""
+        return self.mean
+
+    @property
+    def spread(self) -> float:
+        """Standard deviation."""
+        return self.sigma
+
 
 @dataclass(frozen=True, slots=True)
 class LogNormal:
@@ -51,6 +106,17 @@ class LogNormal:
 
     median: float
     sigma: float
+
+    @property
+    def middle(self) -> float:
+        """Median."""
+        return self.median
+
+    @property
+    def spread(self) -> float:
+        """Standard deviation."""
+        square = self.sigma**2
+        return self.median * math.sqrt(math.expm1(square) * math.exp(square))
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,16 +126,34 @@ class Uniform:
     low: float
     high: float
 
+    @property
+    def middle(self) -> float:
+        """Mean."""
+        return 0.5 * (self.low + self.high)
+
+    @property
+    def spread(self) -> float:
+        """Standard deviation."""
+        return (self.high - self.low) / math.sqrt(12.0)
+
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """A parameter of the drive that an equation asks for by name."""
+    """A parameter that an equation asks for by name.
+
+    An "amplitude" is one that the equation is linear in: without its amplitudes an effect is absent. A "shared" one
+    belongs to another effect, without which this one says nothing. Any other is a "shape"; a search tries those of
+    its `grid`, which are values, or, where `over` names a signal, shares (0 to 1) of the range that the signal sweeps.
+    """
 
     name: str
     unit: str
     prior: Normal | LogNormal | Uniform
     description: str
     bounds: tuple[float, float]
+    role: Literal["amplitude", "shape", "shared"] = "shape"
+    grid: tuple[float, ...] = ()
+    over: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,8 +170,10 @@ class State:
 class Effect:
     """An equation, the port at which its value acts, and what it is wired to.
 
-    An effect with n states returns a tuple: its value, then the n time derivatives in their order.
-    `passive` claims that its torque never does positive work; the conformance test holds it to that.
+    An effect with n states returns a tuple: its value, then the n time derivatives in their order. At a port of the
+    rig, an equation returns three components.
+    `passive` claims that it never does positive work; the conformance test holds it to that. What comes from outside
+    has amplitudes of its own in `each_trial`. An effect can act several times: see `instance`.
     """
 
     name: str
@@ -97,27 +183,66 @@ class Effect:
     reference: str
     states: tuple[State, ...] = ()
     passive: bool = False
+    each_trial: bool = False
+    tag: str = ""  # what `instance` has added to the names of parameters and states
 
     def __post_init__(self) -> None:
         where = f"effect '{self.name}'"
         if not self.name.isidentifier():
             raise TypeError(f"{where}: the name is not an identifier")
+        signals = self.port.signals
         own = [state.name for state in self.states] + [parameter.name for parameter in self.parameters]
-        if clash := (set(own) & set(SIGNALS)) | {name for name in own if own.count(name) > 1}:
+        if clash := (set(own) & set(signals)) | {name for name in own if own.count(name) > 1}:
             raise TypeError(f"{where}: {sorted(clash)} declared twice, or named like a signal of the plant")
-        if unknown := set(self.arguments) - set(SIGNALS) - set(own):
+        if unknown := set(self.arguments) - set(signals) - set(own):
             raise TypeError(
-                f"{where}: {sorted(unknown)} is neither a signal ({', '.join(SIGNALS)}) nor declared"
+                f"{where}: {sorted(unknown)} is neither a signal ({', '.join(signals)}) nor declared"
             )
         if unused := set(own) - set(self.arguments):
             raise TypeError(f"{where}: {sorted(unused)} is declared, but not an argument of the equation")
-        signature = inspect.signature(self.equation, eval_str=True)
-        untyped = [a.name for a in signature.parameters.values() if a.annotation is not float]
-        returns = float if not self.states else tuple[(float,) * (1 + len(self.states))]  # type: ignore[misc]
-        if untyped or signature.return_annotation != returns:
+        if self.states and not self.port.of_drive:
+            raise TypeError(f"{where}: states of its own belong to a drive")
+        hints = get_type_hints(self.equation)
+        untyped = [
+            name for name in inspect.signature(self.equation).parameters if hints.get(name) is not float
+        ]
+        returns: Any = float if self.port.of_drive else tuple[float, float, float]
+        if self.states:
+            returns = tuple[(float,) * (1 + len(self.states))]  # type: ignore[misc]
+        if untyped or hints.get("return") != returns:
             raise TypeError(f"{where}: arguments {untyped} are not float, or the result is not {returns}")
 
     @property
     def arguments(self) -> tuple[str, ...]:
-        """Names of the equation's arguments, in order."""
-        return tuple(inspect.signature(self.equation).parameters)
+        """Names that the equation's arguments are wired to, in order."""
+        names = [entry.name for entry in self.parameters] + [state.name for state in self.states]
+        own = {name.removesuffix(self.tag): name for name in names}
+        return tuple(own.get(name, name) for name in inspect.signature(self.equation).parameters)
+
+    def value(self, known: Mapping[str, float]) -> tuple[float, ...]:
+        """Return the equation's components for numbers by name; its own states are at their initial values."""
+        wired = {state.name: state.initial for state in self.states} | dict(known)
+        result = self.equation(*(wired[name] for name in self.arguments))
+        if self.states:
+            return (result[0],)
+        return (result,) if self.port.of_drive else tuple(result)
+
+
+def instance(effect: Effect, number: int) -> Effect:
+    """Return `effect` for its second, third, ... action, with names of its own: `motor_order_2` has `order_2`."""
+    tag = f"_{number}"
+    return replace(
+        effect,
+        name=effect.name + tag,
+        parameters=tuple(
+            entry if entry.role == "shared" else replace(entry, name=entry.name + tag)
+            for entry in effect.parameters
+        ),
+        states=tuple(replace(state, name=state.name + tag) for state in effect.states),
+        tag=tag,
+    )
+
+
+def shared(effect: Effect, name: str) -> Parameter:
+    """Return the parameter of `effect` for another effect to use."""
+    return replace(next(entry for entry in effect.parameters if entry.name == name), role="shared")

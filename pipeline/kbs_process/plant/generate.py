@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from kbs_process.plant.effect import Port
 from kbs_process.plant.loop import LOOP
-from kbs_process.plant.multibody import joint_offset, multibody_text, unrolled
+from kbs_process.plant.multibody import joint_offset, multibody_text, placing, unrolled
 from kbs_process.plant.stepping import accelerated, state_layout, stepping_text, tuple_of
 from kbs_process.plant.structure import DRIVE, MICROSTEP, RATIO, ROTOR, Structure
 from kbs_process.plant.taps import taps_text
@@ -27,21 +27,19 @@ def module_text(structure: Structure) -> str:
 
 def _head(structure: Structure) -> list[str]:
     shape = f"parents {structure.parents}, {'elastic' if structure.elastic else 'rigid'} base"
+    every = [*structure.effects, *(load.effect for load in structure.loads)]
     return [
-        f'"""Generated: plant with {shape}, effects {", ".join(e.name for e in structure.effects)}."""',
+        f'"""Generated: plant with {shape}, effects {", ".join(e.name for e in every)}."""',
         "import numpy as np",
         "from numba import njit",
         "from kbs_process.plant.kernels import (",
         "    add3, add6, add_inertia, chain, compiled, compiled_effect, cross3, cross_force, cross_motion, dot3, dot6,",
-        "    drift, floor, in_plate, inertia, joint_rotation, mean_rounded, momentum, placed, plate_moment,",
-        "    plate_rates, rotate, rotor_moment, screw, triple, yielding,",
+        "    drift, floor, force_at, from_plate, in_plate, inertia, joint_rotation, mean_rounded, momentum, placed,",
+        "    plate_moment, plate_rates, rotate, rotor_moment, screw, triple, velocity_at, yielding,",
         ")",
-        *[
-            f"from {e.equation.__module__} import {e.equation.__qualname__} as _{e.name}"
-            for e in structure.effects
-        ],
+        *[f"from {e.equation.__module__} import {e.equation.__qualname__} as _{e.name}" for e in every],
         "",
-        *[f"{e.name} = compiled_effect(_{e.name})" for e in structure.effects],
+        *[f"effect_{e.name} = compiled_effect(_{e.name})" for e in every],
         "",
         "",
     ]
@@ -55,11 +53,13 @@ def _drive(structure: Structure) -> list[str]:
         Port.TRANSMISSION: "gear",
         Port.JOINT_TORQUE: "joint",
     }
+    # The ground's share of the torque on the output comes last, where there is one.
+    ground = ["ground"] * structure.grounded
     lines = [
         "@compiled",
         "def drive(field, rotor_angle, rotor_rate, rotor_travel, joint_angle, joint_rate, ratio, time, z, p, k):",
         '    """Motor torque, Coulomb limit, gear torque, joint torque, then the rates of the states."""',
-        *[f"    {total} = 0.0" for total in totals.values()],
+        *[f"    {total} = 0.0" for total in [*totals.values(), *ground]],
     ]
     rates: list[str] = []
     parameter = 0
@@ -73,10 +73,11 @@ def _drive(structure: Structure) -> list[str]:
             wires[state.name] = f"z[{len(rates)}]"
             rates.append(f"{effect.name}_{state.name}")
             results.append(rates[-1])
-        call = f"{effect.name}({', '.join(wires.get(name, name) for name in effect.arguments)})"
+        call = f"effect_{effect.name}({', '.join(wires.get(name, name) for name in effect.arguments)})"
         lines.append(f"    {', '.join(['value', *results])} = {call}")
-        lines.append(f"    {totals[effect.port]} += value")
-    return [*lines, f"    return {', '.join([*totals.values(), *rates])}", "", ""]
+        lines.append(f"    {totals.get(effect.port, 'joint')} += value")
+        lines += ["    ground += value"] * (effect.port is Port.GROUND_TORQUE)
+    return [*lines, f"    return {', '.join([*totals.values(), *rates, *ground])}", "", ""]
 
 
 def _balance(structure: Structure) -> list[str]:
@@ -84,21 +85,24 @@ def _balance(structure: Structure) -> list[str]:
     layout = state_layout(structure)
     n, z = structure.joints, len(structure.states)
     lines = [
-        '@njit(cache=True, error_model="numpy")',
+        '@njit(cache=True, nogil=True, error_model="numpy")',
         "def balance(x, field, p, acceleration):",
         '    """Accelerations at rest of base, outputs and rotors, less Coulomb friction; return the wrench."""',
         f"    alpha = triple(x, int({layout['alpha'].start}))",
         "    omega = (0.0, 0.0, 0.0)",
         *[f"    q_{j} = x[{layout['q'].start + j}]\n    qd_{j} = 0.0" for j in range(n)],
-        f"    {unrolled('a_#, S_#, I_#', n)} = place({unrolled('q_#', n)}, p)",
+        f"    {placing(structure)} = place({unrolled('q_#', n)}, p)",
+        *["    instant = 0.0"] * bool(structure.forces),
+        *["    shaken = (0.0, 0.0, 0.0)"] * bool(structure.shakes),
     ]
     for j in range(n):
         k = joint_offset(structure, j)
+        earth = [f"ground_{j}"] * structure.grounded
         states = tuple_of([f"x[{layout['z'].start + i}]" for i in range(j * z, (j + 1) * z)])
         rotor = f"x[{layout['theta'].start + j}]"
         lines += [
             f"    field_{j} = floor(field[{j}] + 0.5) / p[{k + MICROSTEP}]",
-            f"    {', '.join(['motor', '_', 'gear', 'joint', *['_'] * z])} = drive(",
+            f"    {', '.join(['motor', '_', 'gear', 'joint', *['_'] * z, *earth])} = drive(",
             f"        field_{j}, {rotor}, 0.0, 0.0, q_{j}, 0.0, p[{k + RATIO}], 0.0, {states}, p, int({k + DRIVE})",
             "    )",
             f"    out_{j} = gear + joint",

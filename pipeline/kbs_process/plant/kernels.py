@@ -287,6 +287,34 @@ def in_plate(alpha: Vector, v: Vector) -> Vector:
 
 
 @compiled
+def from_plate(alpha: Vector, v: Vector) -> Vector:
+    """Components in the undeflected T of a vector given in the plate's axes, deflected by `alpha`."""
+    c1, s1 = cos(alpha[0]), sin(alpha[0])
+    c2, s2 = cos(alpha[1]), sin(alpha[1])
+    c3, s3 = cos(alpha[2]), sin(alpha[2])
+    x = c3 * v[0] - s3 * v[1]
+    y = s3 * v[0] + c3 * v[1]
+    z = c2 * v[2] - s2 * x
+    return (c2 * x + s2 * v[2], c1 * y - s1 * z, s1 * y + c1 * z)
+
+
+@compiled
+def velocity_at(v: Spatial, r: Vector) -> Vector:
+    """Velocity of the point at `r` of a body that moves with `v`."""
+    return (
+        v[3] + v[1] * r[2] - v[2] * r[1],
+        v[4] + v[2] * r[0] - v[0] * r[2],
+        v[5] + v[0] * r[1] - v[1] * r[0],
+    )
+
+
+@compiled
+def force_at(r: Vector, f: Vector) -> Spatial:
+    """The force `f` at `r`, referred to T's origin."""
+    return (r[1] * f[2] - r[2] * f[1], r[2] * f[0] - r[0] * f[2], r[0] * f[1] - r[1] * f[0], f[0], f[1], f[2])
+
+
+@compiled
 def yielding(change: float, drop: float) -> float:
     """Share of a step's impulse left by a damping that takes `drop` (of rate) when the rate grows by `change`.
 

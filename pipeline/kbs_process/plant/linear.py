@@ -7,18 +7,28 @@ gear ratio. So everything is in rad, of the plate or of the output.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from kbs_process.plant.effect import SIGNALS, Effect, Port
+from kbs_process.plant.effect import POINT_SIGNALS, SIGNALS, Effect, Port
 from kbs_process.plant.rigid import LinkMotion, inertia_matrix, kinematics, links_beyond
+from kbs_process.plant.structure import external_of
 from kbs_process.rig.model import LAB, TRANSDUCER, Drive, Joint, Rig
 from kbs_process.signals.frames import from_rotation_vector, rotate
 from kbs_process.signals.records import Array
 
 _STEP = 1e-6  # rad and rad/s, of central differences
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Freedom:
+    """A rotation: about `axis` through `point`, both in the laboratory, of the links it carries."""
+
+    axis: Array  # (3,)
+    point: Array  # (3,) m
+    carries: frozenset[str]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,20 +42,13 @@ class Linear:
     K: Array  # (c, c) N m/rad, gravity's included
     B: Array  # (c, n) N m/rad
     momentum: Array  # (6, c) linear, and angular momentum about T's origin, in T, for unit rates
-    gravity: Array  # (6, c) change of the weight's wrench in the plate's own axes, for unit angles
+    gravity: Array  # (6, c) change of the wrench of weight and other loads in the plate's own axes, for unit angles
+    drag: Array  # (6, c) change of the other loads' wrench, for unit rates
+    freedoms: tuple[Freedom, ...] = ()  # of plate and outputs, in the coordinates' order
 
     def output(self, joint: str) -> int:
         """Return the coordinate of a driven joint's angle."""
         return self.plate + self.joints.index(joint)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Freedom:
-    """A rotation: about `axis` through `point`, both in the laboratory, of the links it carries."""
-
-    axis: Array  # (3,)
-    point: Array  # (3,) m
-    carries: frozenset[str]
 
 
 def linearise(rig: Rig, effects: Sequence[Effect], q: Array) -> Linear:
@@ -56,10 +59,13 @@ def linearise(rig: Rig, effects: Sequence[Effect], q: Array) -> Linear:
         $M_{ij} = \sum_b m_b v_{bi} \cdot v_{bj} + a_i \cdot I_b a_j$, each rotor adds
         $J_r t_i t_j$, t being its absolute turns, and gravity adds $-m_b g \cdot (a_i \times v_{bj})$ to $K_{ij}$ for i
         inboard of j, the Hessian of its potential.
+        A force $f(x, v)$ of the laboratory adds $-v_i \cdot f_x v_j - f \cdot (a_i \times v_j)$ to $K_{ij}$ and
+        $-v_i \cdot f_v v_j$ to $C_{ij}$, $v_i$ being its point's; a torque of its the slopes, for all that carry it.
     Units: kg, m, rad, s.
-    Validity: small motions about rest. Slopes are those of the drives' equations at rest without load: at a fifth of
-        Tmax a motor's is 2 % less, in series with a gear that is 35 times as soft. Coulomb friction has no slope and
-        is left out, effects' own states are held, and the pose is the one without sag.
+    Validity: small motions about rest, at time 0. Slopes are those of the equations at rest, of a drive's without load:
+        at a fifth of Tmax a motor's is 2 % less, in series with a gear that is 35 times as soft. Coulomb friction has
+        no slope and is left out, effects' own states are held, the ground's torques count with their slopes alone, and
+        the pose is the one without sag.
     Source: R. Featherstone, Rigid Body Dynamics Algorithms (2008), chapters 3 and 6.
     """
     pose = np.asarray(q, dtype=float)[None, :]
@@ -70,7 +76,11 @@ def linearise(rig: Rig, effects: Sequence[Effect], q: Array) -> Linear:
     plate, size = turning - n, turning + n
     M, C, K = (np.zeros((size, size)) for _ in range(3))
     B, momentum, gravity = np.zeros((size, n)), np.zeros((6, size)), np.zeros((6, size))
+    drag = np.zeros((6, size))
     _add_bodies(rig, links, freedoms, M, K, momentum, gravity)
+    for effect in effects:
+        if effect.port is Port.EXTERNAL_FORCE:
+            _add_force(rig, effect, links, freedoms, (K, C), (gravity, drag))
     if plate:
         assert rig.transducer.stiffness is not None
         K[:3, :3] += np.diag(rig.transducer.stiffness.value)
@@ -90,53 +100,80 @@ def linearise(rig: Rig, effects: Sequence[Effect], q: Array) -> Linear:
         stiffness, damping, B[[out, rotor], index] = drive_slopes(joint.drive, effects)
         K[pair] += stiffness
         C[pair] += damping
-    return Linear(plate, tuple(joint.name for joint in driven), M, C, K, B, momentum, gravity)
+        grounded = ground_slopes(joint.drive, effects)
+        for matrix, external, slope in zip((K, C), (gravity, drag), grounded, strict=True):
+            inboard = [i for i in range(out) if joint.name in freedoms[i].carries]
+            matrix[inboard, out] -= slope * np.array([freedoms[i].axis @ axis for i in inboard])
+            matrix[out, out] -= slope
+            external[3:, out] += slope * (R_TL @ axis)
+    return Linear(
+        plate, tuple(joint.name for joint in driven), M, C, K, B, momentum, gravity, drag, tuple(freedoms)
+    )
 
 
-def drive_slopes(drive: Drive, effects: Sequence[Effect]) -> tuple[Array, Array, Array]:
-    """Return stiffness (2, 2), damping (2, 2) and the field's action (2,) on output and rotor, at rest.
+def drive_slopes(
+    drive: Drive, effects: Sequence[Effect], at: Mapping[str, float] | None = None
+) -> tuple[Array, Array, Array]:
+    """Return stiffness (2, 2), damping (2, 2) and the field's action (2,) on output and rotor.
 
     Rotor and field count as angles at the output, their torques `ratio` times those at the motor: N m/rad, N m s/rad.
+    The slopes are those at the signals `at`, without which all are zero: at rest, unloaded.
     """
+    around = dict(at or {})
     ratio = float(drive.ratio)
     parameters = {name: float(quantity) for name, quantity in drive.parameters.items()}
 
     def torques(**signals: float) -> Array:
-        known = dict.fromkeys(SIGNALS, 0.0) | {"ratio": ratio} | parameters | signals
+        known = dict.fromkeys(SIGNALS, 0.0) | {"ratio": ratio} | parameters | around | signals
         totals = dict.fromkeys(Port, 0.0)
         for effect in effects:
-            if effect.port is not Port.MOTOR_FRICTION:
-                known |= {state.name: state.initial for state in effect.states}
-                value = effect.equation(*(known[name] for name in effect.arguments))
-                totals[effect.port] += value[0] if effect.states else value
+            if effect.port.of_drive and effect.port is not Port.MOTOR_FRICTION:
+                totals[effect.port] += effect.value(known)[0]
         gear = totals[Port.TRANSMISSION]
         return np.array([gear + totals[Port.JOINT_TORQUE], ratio * totals[Port.MOTOR_TORQUE] - gear])
 
     def slope(signal: str, scale: float) -> Array:
-        return scale * (torques(**{signal: _STEP}) - torques(**{signal: -_STEP})) / (2.0 * _STEP)
+        here = around.get(signal, 0.0)
+        return scale * (torques(**{signal: here + _STEP}) - torques(**{signal: here - _STEP})) / (2.0 * _STEP)
 
     stiffness = -np.stack([slope("joint_angle", 1.0), slope("rotor_angle", ratio)], axis=1)
     damping = -np.stack([slope("joint_rate", 1.0), slope("rotor_rate", ratio)], axis=1)
     return stiffness, damping, slope("field", ratio)
 
 
-def _freedoms(rig: Rig, links: dict[str, LinkMotion], driven: Sequence[Joint]) -> list[_Freedom]:
+def ground_slopes(
+    drive: Drive, effects: Sequence[Effect], at: Mapping[str, float] | None = None
+) -> tuple[float, float]:
+    """Return the slopes of the laboratory's torques on an output with its angle and rate: N m/rad, N m s/rad."""
+    known = dict.fromkeys(SIGNALS, 0.0) | {"ratio": float(drive.ratio)}
+    known |= {name: float(quantity) for name, quantity in drive.parameters.items()} | dict(at or {})
+    slopes = dict.fromkeys(("joint_angle", "joint_rate"), 0.0)
+    for effect in effects:
+        if effect.port is not Port.GROUND_TORQUE:
+            continue
+        for signal in slopes:
+            ahead, behind = (effect.value(known | {signal: known[signal] + step}) for step in (_STEP, -_STEP))
+            slopes[signal] += (ahead[0] - behind[0]) / (2.0 * _STEP)
+    return slopes["joint_angle"], slopes["joint_rate"]
+
+
+def _freedoms(rig: Rig, links: dict[str, LinkMotion], driven: Sequence[Joint]) -> list[Freedom]:
     """The plate's axes where it is elastic, then the driven joints', from the laboratory outwards."""
     T = links[TRANSDUCER]
     freedoms = []
     if rig.transducer.stiffness is not None and rig.transducer.on == LAB:
-        freedoms = [_Freedom(axis, T.r[0], links_beyond(rig)) for axis in T.R[0].T]
+        freedoms = [Freedom(axis, T.r[0], links_beyond(rig)) for axis in T.R[0].T]
     for joint in driven:
         turned = from_rotation_vector(joint.misalignment.value) @ np.asarray(joint.axis)
         axis = rotate(links[joint.parent].R, turned)[0]
-        freedoms.append(_Freedom(axis, links[joint.name].r[0], _outwards(rig, joint.name)))
+        freedoms.append(Freedom(axis, links[joint.name].r[0], _outwards(rig, joint.name)))
     return freedoms
 
 
 def _add_bodies(
     rig: Rig,
     links: dict[str, LinkMotion],
-    freedoms: Sequence[_Freedom],
+    freedoms: Sequence[Freedom],
     M: Array,
     K: Array,
     momentum: Array,
@@ -170,6 +207,54 @@ def _add_bodies(
             moved = np.zeros(3) if on_plate else arm[:, j]
             gravity[:3, j] += R_TL @ (mass * tilted)
             gravity[3:, j] += R_TL @ (mass * (np.cross(lever, tilted) + np.cross(moved, down)))
+
+
+def _add_force(
+    rig: Rig,
+    effect: Effect,
+    links: dict[str, LinkMotion],
+    freedoms: Sequence[Freedom],
+    matrices: tuple[Array, Array],
+    wrench: tuple[Array, Array],
+) -> None:
+    """Add what a force of the laboratory on a point contributes to stiffness, damping and the wrench, all in T."""
+    external = external_of(rig, effect)
+    assert external.point is not None
+    T, link = links[TRANSDUCER], links[external.on]
+    R_TL = T.R[0].T
+    point = (link.r + rotate(link.R, external.point.value))[0]
+    lever = R_TL @ (point - T.r[0])
+    parameters = {name: float(quantity) for name, quantity in external.parameters.items()}
+    rest = dict.fromkeys(POINT_SIGNALS, 0.0) | dict(zip("xyz", lever, strict=True)) | parameters
+    force = np.array(effect.value(rest))
+
+    def slope(signals: Sequence[str]) -> Array:
+        ahead, behind = (
+            np.array([effect.value(rest | {name: rest[name] + step}) for name in signals])
+            for step in (_STEP, -_STEP)
+        )
+        slopes: Array = (ahead - behind).T / (2.0 * _STEP)
+        return slopes
+
+    spin = np.stack([R_TL @ f.axis * (external.on in f.carries) for f in freedoms], axis=1)
+    arm = np.stack(
+        [R_TL @ np.cross(f.axis, point - f.point) * (external.on in f.carries) for f in freedoms], 1
+    )
+    on_plate = np.array([TRANSDUCER in f.carries for f in freedoms])
+    count = len(freedoms)
+    for matrix, out, change in zip(matrices, wrench, (slope("xyz"), slope(("vx", "vy", "vz"))), strict=True):
+        matrix[:count, :count] -= arm.T @ change @ arm
+        out[:3, :count] += change @ arm
+        out[3:, :count] += np.cross(lever, change @ arm, axisb=0).T
+    # The force turns in the plate's axes as the plate does, and a joint moves its point there.
+    tilted = np.cross(force, spin, axisb=0).T * on_plate
+    wrench[0][:3, :count] += tilted
+    wrench[0][3:, :count] += np.cross(lever, tilted, axisb=0).T + np.cross(arm * ~on_plate, force, axisa=0).T
+    for j in range(count):
+        for i in range(j + 1):
+            second = -force @ np.cross(spin[:, i], arm[:, j])
+            matrices[0][i, j] += second
+            matrices[0][j, i] += second * (i != j)
 
 
 def _outwards(rig: Rig, name: str) -> frozenset[str]:

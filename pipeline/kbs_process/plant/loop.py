@@ -28,7 +28,7 @@ def control(
             fields[cycle + 1, j] = fields[cycle, j] + gains[2, j] * turn
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def advance(
     first, count, H, p, x, cursor, closed, recorded, latency, command, rate, encoder, readings, gains, sums,
     knots, fields, per_sample, held, low_pass, drive_in, amplifier, wrench, angle_rate, angle_first, angle, states,

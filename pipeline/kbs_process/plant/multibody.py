@@ -9,6 +9,9 @@ rotor's spin follows from its own torque, and its carrier feels the change of it
 
 from __future__ import annotations
 
+from functools import partial
+
+from kbs_process.plant.effect import Port
 from kbs_process.plant.structure import (
     AXIS,
     DAMPING,
@@ -19,6 +22,7 @@ from kbs_process.plant.structure import (
     PLATE,
     STIFFNESS,
     TURN,
+    Load,
     Structure,
 )
 
@@ -35,7 +39,33 @@ def unrolled(pattern: str, count: int) -> str:
 
 def multibody_text(structure: Structure) -> list[str]:
     """Return `place` (where the links are) and `accelerate` (what they do)."""
-    return [*_place(structure), "", "", *_base(structure), "", "", *_accelerate(structure), "", ""]
+    parts = [_place(structure), _base(structure), *map(partial(_load, structure), structure.loads)]
+    return [line for part in [*parts, _accelerate(structure)] for line in [*part, "", ""]]
+
+
+def placing(structure: Structure) -> str:
+    """Return the call's result names of `place`: axis, screw and inertia of each link, then points of loads."""
+    points = [f"r_{load.effect.name}" for load in structure.forces]
+    return ", ".join([unrolled("a_#, S_#, I_#", structure.joints), *points])
+
+
+def given(structure: Structure) -> list[str]:
+    """Return what `accelerate` is given beside the base's angles and rates, as lines of names."""
+    patterns = ["qd_#", "out_#", "drag_#", "momentum_#", *["ground_#"] * structure.grounded]
+    extra = [["instant"], ["shaken"]]
+    wanted = [bool(structure.forces), bool(structure.shakes)]
+    names = [name for part, needed in zip(extra, wanted, strict=True) if needed for name in part]
+    return [placing(structure), *(unrolled(pattern, structure.joints) for pattern in patterns), *names]
+
+
+def shaking(structure: Structure, instant: str) -> list[str]:
+    """Return the sum of all accelerations of the floor, where there is one."""
+    if not structure.shakes:
+        return []
+    sums = ["    shaken = (0.0, 0.0, 0.0)"]
+    return sums + [
+        f"    shaken = add3(shaken, load_{load.effect.name}({instant}, p))" for load in structure.shakes
+    ]
 
 
 def carrier(structure: Structure, joint: int) -> str:
@@ -66,30 +96,54 @@ def _place(structure: Structure) -> list[str]:
             f"    S_{j} = screw(a_{j}, o_{j})",
             f"    I_{j} = placed(inertia(p, int({k + LINK})), R_{j}, o_{j})",
         ]
-    return [*lines, f"    return {unrolled('a_#, S_#, I_#', n)}"]
+    for load in structure.forces:
+        point = f"triple(p, int({structure.offset(load)}))"
+        if load.link >= 0:
+            point = f"add3(o_{load.link}, rotate(R_{load.link}, {point}))"
+        lines.append(f"    r_{load.effect.name} = {point}")
+    return [*lines, f"    return {placing(structure)}"]
+
+
+def _load(structure: Structure, load: Load) -> list[str]:
+    """Emit what one effect of the laboratory does: a force referred to T's origin, or the floor's acceleration."""
+    effect, start = load.effect, structure.offset(load) + 3
+    wires = {entry.name: f"p[{start + i}]" for i, entry in enumerate(effect.parameters)}
+    call = f"effect_{effect.name}({', '.join(wires.get(name, name) for name in effect.arguments)})"
+    if effect.port is Port.BASE_ACCELERATION:
+        return ["@compiled", f"def load_{effect.name}(time, p):", f"    return {call}"]
+    return [
+        "@compiled",
+        f"def load_{effect.name}(alpha, V, r, time, p):",
+        "    x, y, z = from_plate(alpha, r)",
+        "    vx, vy, vz = from_plate(alpha, velocity_at(V, r))",
+        f"    return force_at(r, in_plate(alpha, {call}))",
+    ]
 
 
 def _base(structure: Structure) -> list[str]:
     """Emit gravity in the plate's axes and the moment of the transducer's elasticity on the plate."""
+    field = f"triple(p, int({GRAVITY}))"
+    shaken = ", shaken" * bool(structure.shakes)
+    if structure.shakes:  # on a floor that accelerates, everything falls the other way
+        field = f"drift({field}, shaken, -1.0)"
     springs = [f"-p[{STIFFNESS + i}] * alpha[{i}] - p[{DAMPING + i}] * rates[{i}]" for i in range(3)]
     return [
         "@compiled",
-        "def base(alpha, omega, p):",
+        f"def base(alpha, omega{shaken}, p):",
         '    """Gravity (m/s^2) and the moment of stiffness and damping on the plate (N m), in its axes."""',
         "    rates = plate_rates(alpha, omega)",
         f"    moment = plate_moment(alpha, ({', '.join(springs)}))",
-        f"    return in_plate(alpha, triple(p, int({GRAVITY}))), moment",
+        f"    return in_plate(alpha, {field}), moment",
     ]
 
 
 def _accelerate(structure: Structure) -> list[str]:
     n = structure.joints
-    given = ("a_#, S_#, I_#", "qd_#", "out_#", "drag_#", "momentum_#")
     lines = [
         "@compiled",
         "def accelerate(",
         "    alpha, omega,",
-        *[f"    {unrolled(pattern, n)}," for pattern in given],
+        *[f"    {names}," for names in given(structure)],
         "    guess, yields, p,",
         "):",
         '    """Accelerations of plate and joints, and the wrench on the transducer, force first.',
@@ -97,7 +151,7 @@ def _accelerate(structure: Structure) -> list[str]:
         "    `out` is the torque on a joint's output, `drag` the rate of its rotor's momentum. `out` and `alpha` go",
         "    with the accelerations `guess`; the torques fall by `yields` for each unit that the true ones are above.",
         '    """',
-        "    g, moment = base(alpha, omega, p)",
+        f"    g, moment = base(alpha, omega{', shaken' * bool(structure.shakes)}, p)",
         f"    I_T = inertia(p, int({PLATE}))",
         "    V_T = (omega[0], omega[1], omega[2], 0.0, 0.0, 0.0)",
         "    A_T = (0.0, 0.0, 0.0, -g[0], -g[1], -g[2])",
@@ -115,11 +169,18 @@ def _accelerate(structure: Structure) -> list[str]:
         for j in range(n)
         for c in [carrier(structure, j)]
     ]
+    for load in structure.forces:
+        name, link = load.effect.name, "T" if load.link < 0 else load.link
+        lines.append(
+            f"    F_{link} = add6(F_{link}, load_{name}(alpha, V_{link}, r_{name}, instant, p), -1.0)"
+        )
     for j in reversed(range(n)):
         c = carrier(structure, j)
         lines += [
             f"    U_{j} = momentum(I_{j}, S_{j})",
             f"    b_{j} = out_{j} - dot6(S_{j}, F_{j})",
+            # What the ground reacts does not pass through the carrier.
+            *[f"    F_{j} = add6(F_{j}, (*a_{j}, 0.0, 0.0, 0.0), -ground_{j})"] * structure.grounded,
             f"    F_{c} = add6(F_{c}, F_{j}, 1.0)",
             f"    I_{c} = add_inertia(I_{c}, I_{j})",
         ]

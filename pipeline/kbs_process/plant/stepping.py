@@ -15,7 +15,7 @@ The carriers get the change of the rotors' momenta to the last bit, the outputs 
 
 from __future__ import annotations
 
-from kbs_process.plant.multibody import carrier, joint_offset, unrolled
+from kbs_process.plant.multibody import carrier, given, joint_offset, placing, shaking, unrolled
 from kbs_process.plant.structure import DAMPING, DRIVE, MICROSTEP, RATIO, ROTOR, STIFFNESS, Structure
 
 ROTOR_STEPS = 10
@@ -56,12 +56,10 @@ def stepping_text(structure: Structure) -> list[str]:
 
 def accelerated(structure: Structure) -> list[str]:
     """Return the call that solves for the accelerations."""
-    n = structure.joints
-    given = ("a_#, S_#, I_#", "qd_#", "out_#", "drag_#", "momentum_#")
     return [
-        f"    omegad, {unrolled('qdd_#', n)}, wrench = accelerate(",
+        f"    omegad, {unrolled('qdd_#', structure.joints)}, wrench = accelerate(",
         "        alpha, omega,",
-        *[f"        {unrolled(pattern, n)}," for pattern in given],
+        *[f"        {names}," for names in given(structure)],
         "        guess, yields, p,",
         "    )",
     ]
@@ -71,6 +69,9 @@ def _rotor(structure: Structure) -> list[str]:
     """Emit the motion of a rotor through one step of its own."""
     z = len(structure.states)
     rates = [f"d{i}" for i in range(z)]
+    unused = ["_"] * z
+    ground, ground_1 = (["ground"], ["ground_1"]) if structure.grounded else ([], [])
+    earth = ", 0.5 * (ground + ground_1)" * structure.grounded
     state = tuple_of([f"z[{i}] + 0.5 * h * zd[{i}]" for i in range(z)])
     after = tuple_of([f"z[{i}] + h * d{i}" for i in range(z)])
 
@@ -83,7 +84,7 @@ def _rotor(structure: Structure) -> list[str]:
         "    impulse = mobility * yielding(w_1 - w, drop)",
         "    free = w + impulse * torque",
         "    w_1 = free - max(-impulse * limit, min(impulse * limit, free))",
-        "    " + drive(["motor_1", "_", "gear_1", "joint_1", *["_"] * z], "w_1"),
+        "    " + drive(["motor_1", "_", "gear_1", "joint_1", *unused, *ground_1], "w_1"),
     ]
     return [
         "@compiled",
@@ -97,14 +98,14 @@ def _rotor(structure: Structure) -> list[str]:
         f"    mobility = h / p[k + {ROTOR}]",
         "    middle = theta + 0.5 * h * w",
         f"    state = {state}",
-        "    " + drive(["motor", "limit", "gear", "joint", *rates], "w"),
+        "    " + drive(["motor", "limit", "gear", "joint", *rates, *ground], "w"),
         f"    w_1 = w + {NUDGE}",
-        "    " + drive(["motor_1", "_", "gear_1", "joint_1", *["_"] * z], "w_1"),
+        "    " + drive(["motor_1", "_", "gear_1", "joint_1", *unused, *ground_1], "w_1"),
         f"    torque = motor - gear / ratio - p[k + {ROTOR}] * carrier_rate",
         *secant,
         *secant[:-1],
         "    output = 0.5 * (gear + joint + gear_1 + joint_1)",
-        f"    return middle + 0.5 * h * w_1, w_1, output, {after}, {tuple_of(rates)}",
+        f"    return middle + 0.5 * h * w_1, w_1, output, {after}, {tuple_of(rates)}{earth}",
     ]
 
 
@@ -150,7 +151,7 @@ def _drifted(structure: Structure) -> list[str]:
             f"    q_{j} = drifted_{j} + 0.5 * ahead * {qdd[j]}",
             f"    qd_{j} = {_at(structure, 'qd', j)} + half * {qdd[j]}",
         ]
-    return [*lines, f"    {unrolled('a_#, S_#, I_#', n)} = place({unrolled('q_#', n)}, p)"]
+    return [*lines, f"    {placing(structure)} = place({unrolled('q_#', n)}, p)"]
 
 
 def _turned(structure: Structure) -> list[str]:
@@ -180,17 +181,19 @@ def _turned(structure: Structure) -> list[str]:
             f"    inverse_{j} = 1.0 / share_{j}",
             f"    pitch_{j} = 1.0 / p[{k + MICROSTEP}]",
             f"    out_{j} = 0.0",
+            *[f"    ground_{j} = 0.0"] * structure.grounded,
         ]
         loop += [
             f"        from_ = field_0[{j}] + i * share_{j}",
             f"        field = mean_rounded(from_, from_ + share_{j}, inverse_{j}) * pitch_{j}",
             f"        angle = q_{j} + off * (qd_{j} + 0.5 * off * {qdd})",
             f"        rate = qd_{j} + off * {qdd}",
-            f"        theta_{j}, w_{j}, out, z_{j}, zd_{j} = turn_rotor(",
+            f"        theta_{j}, w_{j}, out, z_{j}, zd_{j}{', earth' * structure.grounded} = turn_rotor(",
             f"            theta_{j}, w_{j}, turning_{j}, field, angle, rate, time + half + off, h,",
             f"            z_{j}, zd_{j}, p, int({k}),",
             "        )",
             f"        out_{j} += out / {ROTOR_STEPS}",
+            *[f"        ground_{j} += earth / {ROTOR_STEPS}"] * structure.grounded,
         ]
         after += [
             f"    {_at(structure, 'spin', j)} = w_{j} + (carrier_{j} + half * turning_{j})",
@@ -213,7 +216,7 @@ def _kicked(structure: Structure) -> list[str]:
         def gear(tag: str, angle: str, rate: str, j: int = j, k: int = k) -> str:
             rotor = f"0.0, theta_{j}, w_{j}, 0.0"
             given = f"{rotor}, {angle}, {rate}, p[{k + RATIO}], time + half, z_{j}, p, int({k + DRIVE})"
-            results = ", ".join(["_", "_", f"gear{tag}", f"joint{tag}", *["_"] * z])
+            results = ", ".join(["_", "_", f"gear{tag}", f"joint{tag}", *["_"] * (z + structure.grounded)])
             return f"    {results} = drive({given})"
 
         lines += [
@@ -225,7 +228,9 @@ def _kicked(structure: Structure) -> list[str]:
             f"    yields_{j} = max(0.0, ahead * stiffness + half * damping) / {NUDGE}",
         ]
     base = [f"ahead * p[{STIFFNESS + i}] + half * p[{DAMPING + i}]" for i in range(3)]
-    lines += [f"    yields = ({', '.join(base)}, {unrolled('yields_#', n)})", *accelerated(structure)]
+    lines.append(f"    yields = ({', '.join(base)}, {unrolled('yields_#', n)})")
+    lines += ["    instant = time + half"] * bool(structure.loads)
+    lines += [*shaking(structure, "instant"), *accelerated(structure)]
     if structure.elastic:
         for i in range(3):
             lines += [

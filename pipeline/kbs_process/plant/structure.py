@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from kbs_process.errors import ConfigError, did_you_mean
 from kbs_process.plant.effect import Effect, Port
-from kbs_process.rig.model import LAB, TRANSDUCER, Body, Joint, Rig
+from kbs_process.rig.model import LAB, TRANSDUCER, Body, External, Joint, Rig
 from kbs_process.signals.records import Array
 
 GRAVITY, STIFFNESS, DAMPING, PLATE = 0, 3, 6, 9  # offsets in the parameter vector
@@ -19,12 +19,21 @@ AXIS, ORIGIN, TURN, LINK, RATIO, ROTOR, MICROSTEP, DRIVE = 0, 3, 6, 33, 43, 44, 
 
 
 @dataclass(frozen=True, slots=True)
+class Load:
+    """An effect of the laboratory on the rig."""
+
+    effect: Effect
+    link: int  # joint whose link it acts on; -1 is the top plate, and where the floor moves
+
+
+@dataclass(frozen=True, slots=True)
 class Structure:
     """Shape of a plant: two rigs of equal structure share one compiled module."""
 
     parents: tuple[int, ...]  # joint whose link carries each joint; -1 is the top plate
     elastic: bool  # the base turns about three axes
-    effects: tuple[Effect, ...]
+    effects: tuple[Effect, ...]  # of every drive
+    loads: tuple[Load, ...] = ()
 
     @property
     def joints(self) -> int:
@@ -39,6 +48,27 @@ class Structure:
     def unknowns(self) -> int:
         """Accelerations that the mass matrix couples; rotors follow from their own torques."""
         return 3 * self.elastic + self.joints
+
+    @property
+    def grounded(self) -> bool:
+        """Whether a torque on an output is reacted by the laboratory."""
+        return any(effect.port is Port.GROUND_TORQUE for effect in self.effects)
+
+    @property
+    def forces(self) -> tuple[Load, ...]:
+        """Forces of the laboratory on points of the rig."""
+        return tuple(load for load in self.loads if load.effect.port is Port.EXTERNAL_FORCE)
+
+    @property
+    def shakes(self) -> tuple[Load, ...]:
+        """What moves the laboratory's floor."""
+        return tuple(load for load in self.loads if load.effect.port is Port.BASE_ACCELERATION)
+
+    def offset(self, load: Load) -> int:
+        """Return where the numbers of a load begin in the parameter vector: its point, then its parameters."""
+        before = self.loads[: self.loads.index(load)]
+        start = JOINTS + self.joints * self.stride
+        return start + sum(3 + len(other.effect.parameters) for other in before)
 
     @property
     def states(self) -> tuple[float, ...]:
@@ -69,7 +99,48 @@ def structure_of(rig: Rig, effects: Sequence[Effect]) -> Structure:
         raise ConfigError(
             "no effect connects motor and output", where="[model] effects", remedy="add 'flexspline'"
         )
-    return Structure(tuple(parents), rig.transducer.stiffness is not None, tuple(effects))
+    loads = tuple(
+        Load(effect, links.get(external_of(rig, effect).on, -1))
+        for effect in effects
+        if not effect.port.of_drive
+    )
+    of_drives = tuple(effect for effect in effects if effect.port.of_drive)
+    return Structure(tuple(parents), rig.transducer.stiffness is not None, of_drives, loads)
+
+
+def external_of(rig: Rig, effect: Effect) -> External:
+    """Return what the rig says of an effect of the laboratory; its numbers are complete."""
+    where = f"[external.{effect.name}]"
+    given = next((entry for entry in rig.external if entry.name == effect.name), None)
+    if given is None:
+        names = ", ".join(parameter.name for parameter in effect.parameters)
+        raise ConfigError(
+            f"the model has the effect '{effect.name}', and nothing says where it acts and how large it is",
+            where=where,
+            remedy=f"add the section to a parameter file, with its parameters {names}, or leave the effect out",
+        )
+    if effect.port is Port.EXTERNAL_FORCE:
+        links = {TRANSDUCER, *rig.joint_names}
+        if given.on not in links:
+            raise ConfigError(
+                f"'{given.on}' is no link that hangs on the transducer",
+                where=f"{where} on",
+                remedy=did_you_mean(given.on, links),
+            )
+        if given.point is None:
+            raise ConfigError(
+                "the force needs a point to act at",
+                where=where,
+                remedy="add point, (x, y, z) in the link's axes",
+            )
+    for parameter in effect.parameters:
+        if parameter.name not in given.parameters:
+            raise ConfigError(
+                f"'{effect.name}' needs '{parameter.name}' ({parameter.description}, {parameter.unit})",
+                where=where,
+                remedy=did_you_mean(parameter.name, given.parameters),
+            )
+    return given
 
 
 def turn(joint: Joint) -> tuple[Array, Array]:
@@ -112,7 +183,14 @@ def parameters(rig: Rig, structure: Structure) -> Array:
     for index, joint in enumerate(rig.joints):
         start = JOINTS + index * structure.stride
         p[start : start + structure.stride] = _joint(rig, joint, structure)
-    return p
+    return np.concatenate([p, *[_external(rig, load) for load in structure.loads]])
+
+
+def _external(rig: Rig, load: Load) -> Array:
+    """Return the numbers of a load: its point, then its parameters in order."""
+    given = external_of(rig, load.effect)
+    point = np.zeros(3) if given.point is None else given.point.value
+    return np.array([*point, *(float(given.parameters[entry.name]) for entry in load.effect.parameters)])
 
 
 def _joint(rig: Rig, joint: Joint, structure: Structure) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from kbs_process.plant.multibody import carrier, joint_offset, unrolled
+from kbs_process.plant.multibody import carrier, joint_offset, placing
 from kbs_process.plant.stepping import state_layout
 from kbs_process.plant.structure import MICROSTEP, Structure
 from kbs_process.rig.model import TRANSDUCER, Rig
@@ -25,7 +25,7 @@ def taps_text(structure: Structure) -> list[str]:
 
     behind = layout["zd"].stop
     lines = [
-        '@njit(cache=True, error_model="numpy")',
+        '@njit(cache=True, nogil=True, error_model="numpy")',
         "def tap(states, p, out):",
         '    """Signals of all joints, then the plate\'s angles and their rates, a row for each state."""',
         "    for row in range(states.shape[0]):",
@@ -33,7 +33,7 @@ def taps_text(structure: Structure) -> list[str]:
         f"        alpha = triple(x, int({layout['alpha'].start}))",
         f"        omega_T = triple(x, int({layout['omega'].start}))",
         "        rates = plate_rates(alpha, omega_T)",
-        f"        {unrolled('a_#, S_#, I_#', n)} = place({', '.join(part('q', j) for j in range(n))}, p)",
+        f"        {placing(structure)} = place({', '.join(part('q', j) for j in range(n))}, p)",
     ]
     values = [f"floor(x[{behind + j}] + 0.5) / p[{joint_offset(structure, j) + MICROSTEP}]" for j in range(n)]
     values += [part("theta", j) for j in range(n)]

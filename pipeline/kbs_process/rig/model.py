@@ -117,6 +117,16 @@ class Transducer:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class External:
+    """What the laboratory does to the rig besides carrying it; `name` is that of the plant's effect."""
+
+    name: str
+    on: str  # link, or "lab" for what moves the floor
+    point: Quantity | None  # (3,) m in the link's axes, from its origin: where a force acts
+    parameters: dict[str, Quantity]  # those that the effect asks for by name
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Controller:
     """The pointing controller; gains may differ from joint to joint."""
 
@@ -145,6 +155,7 @@ class Rig:
     joints: tuple[Joint, ...]  # from the laboratory outwards
     controller: Controller | None
     spacecraft: Spacecraft | None
+    external: tuple[External, ...] = ()
 
     @property
     def joint_names(self) -> tuple[str, ...]:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from kbs_process.errors import ConfigError, did_you_mean
 from kbs_process.plant.effect import Effect
+from kbs_process.plant.effects.bungee import BUNGEE
 from kbs_process.plant.effects.cogging import COGGING
 from kbs_process.plant.effects.dynamic_friction import DYNAMIC_FRICTION
 from kbs_process.plant.effects.flexspline import FLEXSPLINE
@@ -21,6 +22,7 @@ CATALOGUE: tuple[Effect, ...] = (
     DYNAMIC_FRICTION,
     TOOTH_STICTION,
     FLEXSPLINE,
+    BUNGEE,
 )
 
 

@@ -1,0 +1,65 @@
+"""A rig with the numbers that one more effect asks for: how a hypothesis about the plant begins."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from kbs_process.plant.effect import Effect, Parameter, Port
+from kbs_process.rig.model import LAB, External, Joint, Quantity, Rig
+from kbs_process.signals.records import Array
+
+
+def attach(
+    rig: Rig,
+    effect: Effect,
+    values: Mapping[str, float] | None = None,
+    *,
+    joints: Sequence[str] | None = None,
+    on: str = LAB,
+    point: Array | None = None,
+) -> Rig:
+    """Return `rig` with the parameters of `effect`: `values`, else what the rig has, else none of an amplitude.
+
+    A shape without a value is in the middle of its prior; sigmas are the priors'. An effect of the drives gets
+    `values` at `joints` (all, by default), and no amplitude at the others. An effect of the laboratory acts on the link
+    `on`, a force at `point` (3,) m in the link's axes.
+    """
+    given = values or {}
+    if unknown := set(given) - {parameter.name for parameter in effect.parameters}:
+        raise KeyError(f"'{effect.name}' has no {sorted(unknown)}")
+    if effect.port.of_drive:
+        chosen = rig.joint_names if joints is None else joints
+        return replace(
+            rig,
+            joints=tuple(
+                _joint(joint, effect, given if joint.name in chosen else {}) for joint in rig.joints
+            ),
+        )
+    path = f"external.{effect.name}"
+    at = None
+    if effect.port is Port.EXTERNAL_FORCE:
+        at = Quantity(f"{path}.point", np.zeros(3) if point is None else point, "m", np.zeros(3), "assumed")
+    parameters = {entry.name: _quantity(path, entry, given) for entry in effect.parameters}
+    others = tuple(entry for entry in rig.external if entry.name != effect.name)
+    return replace(rig, external=(*others, External(effect.name, on, at, parameters)))
+
+
+def _joint(joint: Joint, effect: Effect, given: Mapping[str, float]) -> Joint:
+    if joint.drive is None:
+        return joint
+    parameters = dict(joint.drive.parameters)
+    for entry in effect.parameters:
+        if entry.name in given or (entry.name not in parameters and entry.role != "shared"):
+            parameters[entry.name] = _quantity(f"joint.{joint.name}.drive", entry, given)
+    return replace(joint, drive=replace(joint.drive, parameters=parameters))
+
+
+def _quantity(path: str, entry: Parameter, given: Mapping[str, float]) -> Quantity:
+    absent = 0.0 if entry.role == "amplitude" else entry.prior.middle
+    value, sigma = given.get(entry.name, absent), entry.prior.spread
+    return Quantity(
+        f"{path}.{entry.name}", np.asarray(value), entry.unit, np.asarray(sigma), "prior of the effect"
+    )
