@@ -13,6 +13,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from enum import Enum
+from functools import cache
 from typing import Any, Literal, get_type_hints
 
 # What every equation can ask for by name, for the drive that it is part of.
@@ -143,7 +144,8 @@ class Parameter:
 
     An "amplitude" is one that the equation is linear in: without its amplitudes an effect is absent. A "shared" one
     belongs to another effect, without which this one says nothing. Any other is a "shape"; a search tries those of
-    its `grid`, which are values, or, where `over` names a signal, shares (0 to 1) of the range that the signal sweeps.
+    its `grid`, which are values, or, where `over` names a signal, shares (0 to 1) of the range that the signal sweeps:
+    with "joint_angle" places in that range, with "joint_angle.span" widths; over a "spectrum" it is a residual's tones.
     """
 
     name: str
@@ -217,7 +219,7 @@ class Effect:
         """Names that the equation's arguments are wired to, in order."""
         names = [entry.name for entry in self.parameters] + [state.name for state in self.states]
         own = {name.removesuffix(self.tag): name for name in names}
-        return tuple(own.get(name, name) for name in inspect.signature(self.equation).parameters)
+        return tuple(own.get(name, name) for name in _asked(self.equation))
 
     def value(self, known: Mapping[str, float]) -> tuple[float, ...]:
         """Return the equation's components for numbers by name; its own states are at their initial values."""
@@ -226,6 +228,12 @@ class Effect:
         if self.states:
             return (result[0],)
         return (result,) if self.port.of_drive else tuple(result)
+
+
+@cache
+def _asked(equation: Callable[..., Any]) -> tuple[str, ...]:
+    """Names of an equation's arguments; looking at a signature takes longer than the equation."""
+    return tuple(inspect.signature(equation).parameters)
 
 
 def instance(effect: Effect, number: int) -> Effect:
