@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 # Before numpy is imported: two test processes share two cores, and sums keep their order.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import pytest
 
