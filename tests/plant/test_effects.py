@@ -9,22 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from kbs_process.campaign.units import DIMENSIONS
 from kbs_process.errors import ConfigError
-from kbs_process.plant.effect import Effect, LogNormal, Normal, Parameter, Port, State, Uniform
+from kbs_process.plant.effect import Effect, LogNormal, Parameter, Port, State
 from kbs_process.plant.effects import CATALOGUE, select
 from kbs_process.plant.effects.tooth_stiction import limit as tooth_stiction
 
-UNITS = {"1", "m", "N/m", "rad", "rad/s", "N m", "N m/rad", "N m s/rad", "s", "1/s", "K"}
-
-
-def typical(parameter: Parameter) -> float:
-    match parameter.prior:
-        case Normal(mean, _):
-            return mean
-        case LogNormal(median, _):
-            return median
-        case Uniform(low, high):
-            return 0.5 * (low + high)
+UNITS = {unit for units in DIMENSIONS.values() for unit in units}
 
 
 @pytest.mark.parametrize("effect", CATALOGUE, ids=lambda effect: effect.name)
@@ -35,7 +26,7 @@ class TestCatalogue:
             assert parameter.unit in UNITS
             assert parameter.description
             low, high = parameter.bounds
-            assert low <= typical(parameter) <= high
+            assert low <= parameter.prior.middle <= high
 
     def test_docstring_says_what_a_reviewer_asks(self, effect: Effect) -> None:
         text = effect.equation.__doc__ or ""
@@ -50,7 +41,7 @@ class TestCatalogue:
         near = st.floats(-1e3, 1e3)
         values = {name: data.draw(near, name) for name in effect.arguments if name in effect.port.signals}
         values |= {state.name: data.draw(near, state.name) for state in effect.states}
-        values |= {parameter.name: typical(parameter) for parameter in effect.parameters}
+        values |= {entry.name: entry.prior.middle or entry.prior.spread for entry in effect.parameters}
         if "ratio" in values:
             values["ratio"] = 100.0
         result = effect.equation(**values)
@@ -59,7 +50,7 @@ class TestCatalogue:
         if effect.port is Port.MOTOR_FRICTION:
             assert torque >= 0.0  # the plant opposes motion with it
         elif effect.passive:
-            rate = "joint_rate" if effect.port is Port.JOINT_TORQUE else "rotor_rate"
+            rate = "rotor_rate" if effect.port is Port.MOTOR_TORQUE else "joint_rate"
             assert torque * values[rate] <= 0.0
 
 

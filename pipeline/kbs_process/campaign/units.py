@@ -49,6 +49,9 @@ DIMENSIONS: dict[str, dict[str, float]] = {
         "N m s/deg": 180.0 / pi,
         "N m/rpm": 30.0 / pi,
     },
+    "cubic rotational stiffness": {"N m/rad^3": 1.0},
+    "rotational drag": {"N m s^2/rad^2": 1.0},
+    "linear stiffness": {"N/m": 1.0, "N/mm": 1e3},
     "temperature": {"degC": 1.0},
 }
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from kbs_process.plant.effect import Effect, LogNormal, Parameter, Port, Uniform
+from kbs_process.plant.effect import EIGHTHS, Effect, LogNormal, Parameter, Port, Uniform
 
 
 def torque(rotor_angle: float, tcog: float, phi_cog: float) -> float:
@@ -23,9 +23,21 @@ COGGING = Effect(
     port=Port.MOTOR_TORQUE,
     equation=torque,
     parameters=(
-        Parameter("tcog", "N m", LogNormal(6e-3, 0.25), "amplitude of the cogging torque", bounds=(0.0, 1.0)),
         Parameter(
-            "phi_cog", "rad", Uniform(-math.pi, math.pi), "phase of cogging", bounds=(-math.pi, math.pi)
+            "tcog",
+            "N m",
+            LogNormal(6e-3, 0.25),
+            "amplitude of the cogging torque",
+            bounds=(0.0, 1.0),
+            role="amplitude",
+        ),
+        Parameter(
+            "phi_cog",
+            "rad",
+            Uniform(-math.pi, math.pi),
+            "phase of cogging",
+            bounds=(-math.pi, math.pi),
+            grid=EIGHTHS,
         ),
     ),
     reference="Measurement and prediction of the performance of a satellite based antenna pointing mechanism "

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from kbs_process.plant.effect import Effect, LogNormal, Parameter, Port, Uniform
+from kbs_process.plant.effect import EIGHTHS, Effect, LogNormal, Parameter, Port, Uniform
 
 
 def torque(
@@ -26,9 +26,25 @@ DYNAMIC_FRICTION = Effect(
     port=Port.MOTOR_TORQUE,
     equation=torque,
     parameters=(
-        Parameter("d0", "N m", LogNormal(0.012, 0.25), "mean resistance torque", bounds=(0.0, 1.0)),
-        Parameter("d1", "N m", LogNormal(0.006, 0.25), "its twice-a-turn fluctuation", bounds=(0.0, 1.0)),
-        Parameter("phi_dyn", "rad", Uniform(-math.pi, math.pi), "its phase", bounds=(-math.pi, math.pi)),
+        Parameter(
+            "d0", "N m", LogNormal(0.012, 0.25), "mean resistance torque", bounds=(0.0, 1.0), role="amplitude"
+        ),
+        Parameter(
+            "d1",
+            "N m",
+            LogNormal(0.006, 0.25),
+            "its twice-a-turn fluctuation",
+            bounds=(0.0, 1.0),
+            role="amplitude",
+        ),
+        Parameter(
+            "phi_dyn",
+            "rad",
+            Uniform(-math.pi, math.pi),
+            "its phase",
+            bounds=(-math.pi, math.pi),
+            grid=EIGHTHS,
+        ),
         Parameter("w_dyn", "rad/s", LogNormal(0.05, 0.2), "rate of full resistance", bounds=(1e-4, 10.0)),
     ),
     reference="Measurement and prediction of the performance of a satellite based antenna pointing mechanism "

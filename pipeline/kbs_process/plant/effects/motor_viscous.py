@@ -22,7 +22,12 @@ MOTOR_VISCOUS = Effect(
     equation=torque,
     parameters=(
         Parameter(
-            "b_m", "N m s/rad", LogNormal(2e-3, 0.2), "viscous friction of the motor", bounds=(0.0, 1.0)
+            "b_m",
+            "N m s/rad",
+            LogNormal(2e-3, 0.2),
+            "viscous friction of the motor",
+            bounds=(0.0, 1.0),
+            role="amplitude",
         ),
     ),
     reference="Measurement and prediction of the performance of a satellite based antenna pointing mechanism "

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from kbs_process.plant.effect import Effect, LogNormal, Parameter, Port, Uniform
+from kbs_process.plant.effect import EIGHTHS, Effect, LogNormal, Parameter, Port, Uniform
 
 _INSTANT = 1e-6  # rad of tooth phase
 
@@ -38,10 +38,29 @@ TOOTH_STICTION = Effect(
     equation=limit,
     parameters=(
         Parameter(
-            "Ts0", "N m", LogNormal(6e-3, 0.25), "Coulomb torque while a tooth passes", bounds=(0.0, 1.0)
+            "Ts0",
+            "N m",
+            LogNormal(6e-3, 0.25),
+            "Coulomb torque while a tooth passes",
+            bounds=(0.0, 1.0),
+            role="amplitude",
         ),
-        Parameter("delta", "rad", LogNormal(0.5, 0.2), "half width of tooth contact", bounds=(0.0, math.pi)),
-        Parameter("phi_stat", "rad", Uniform(-math.pi, math.pi), "its phase", bounds=(-math.pi, math.pi)),
+        Parameter(
+            "delta",
+            "rad",
+            LogNormal(0.5, 0.2),
+            "half width of tooth contact",
+            bounds=(0.0, math.pi),
+            grid=(0.25, 0.5, 1.0),
+        ),
+        Parameter(
+            "phi_stat",
+            "rad",
+            Uniform(-math.pi, math.pi),
+            "its phase",
+            bounds=(-math.pi, math.pi),
+            grid=EIGHTHS,
+        ),
     ),
     reference="Measurement and prediction of the performance of a satellite based antenna pointing mechanism "
     "and controller, Trans. Built Environment 19 (1996), section 5",

@@ -1,0 +1,134 @@
+"""Conformance of every sensing effect, and the laws against closed forms."""
+
+from __future__ import annotations
+
+import inspect
+
+import numpy as np
+import pytest
+
+from kbs_process.plant.effect import Normal, Parameter
+from kbs_process.plant.sensing import SENSING, Sensing, SensingPort
+from kbs_process.plant.sensing.sensing import READINGS
+from kbs_process.signals.records import Array
+
+T = np.arange(2000) * 0.05
+READING = 3.0 * np.sin(2.0 * np.pi * T / 40.0) + 0.2 * T
+KNOWN: dict[str, Array | float] = {
+    "reading": READING,
+    "acting": 10.0 + np.cos(T),
+    "rate": 3.0 * 2.0 * np.pi / 40.0 * np.cos(2.0 * np.pi * T / 40.0) + 0.2,
+    "time": T,
+    "temperature": 20.0 + 0.01 * T,
+    "code": 2.0 * np.pi / 2**14,
+}
+
+
+def changed(effect: Sensing, **given: float) -> Array:
+    shapes = {entry.name: entry.prior.middle for entry in effect.parameters if entry.role == "shape"}
+    return effect.equation(**{name: (KNOWN | shapes | given)[name] for name in effect.arguments})
+
+
+def law(name: str) -> Sensing:
+    return next(effect for effect in SENSING if effect.name == name)
+
+
+@pytest.mark.parametrize("effect", SENSING, ids=lambda effect: effect.name)
+class TestSensing:
+    def test_declaration(self, effect: Sensing) -> None:
+        text = inspect.getdoc(effect.equation) or ""
+        assert all(heading in text for heading in ("Equation:", "Units:", "Validity:", "Source:"))
+        assert effect.reference
+        assert (effect.port is SensingPort.COUPLING) == ("acting" in effect.arguments)
+        assert "code" not in effect.arguments or effect.port is SensingPort.ENCODER
+        for entry in effect.parameters:
+            low, high = entry.bounds
+            assert entry.description
+            assert low <= entry.prior.middle <= high
+            if entry.role == "amplitude":
+                assert 0.0 < entry.prior.spread < high
+            elif not entry.over:
+                assert all(low <= point <= high for point in entry.grid)
+
+    def test_is_absent_without_amplitude_and_linear_in_it(self, effect: Sensing) -> None:
+        names = [entry.name for entry in effect.parameters if entry.role == "amplitude"]
+        zero = dict.fromkeys(names, 0.0)
+        assert not changed(effect, **zero).any()
+        units = [changed(effect, **zero | {name: 1.0}) for name in names]
+        weights = np.linspace(0.3, -1.7, len(names))
+        mixed = changed(effect, **dict(zip(names, weights, strict=True)))
+        assert mixed.shape == T.shape and np.isfinite(mixed).all()
+        np.testing.assert_allclose(mixed, np.tensordot(weights, units, axes=1), rtol=1e-12, atol=1e-12)
+        assert all(unit.any() for unit in units)
+
+    def test_leaves_what_it_is_given(self, effect: Sensing) -> None:
+        kept = {name: np.copy(KNOWN[name]) for name in READINGS}
+        changed(effect, **{entry.name: 1.0 for entry in effect.parameters if entry.role == "amplitude"})
+        for name, values in kept.items():
+            np.testing.assert_array_equal(KNOWN[name], values)
+
+
+def test_names_belong_to_one_effect() -> None:
+    names = [entry.name for effect in SENSING for entry in effect.parameters]
+    assert sorted(names) == sorted(set(names))
+
+
+def test_lag_is_a_first_order_low_pass() -> None:
+    late = READING + changed(law("channel_lag"), lag_share=1.0, lag_time=2.0)
+    slope = np.gradient(late, T)
+    np.testing.assert_allclose(2.0 * slope[5:-5], (READING - late)[5:-5], atol=5e-3)
+
+
+def test_hysteresis_depends_on_the_way_and_not_on_time() -> None:
+    effect = law("channel_hysteresis")
+    loop = changed(effect, loop=1.0, loop_memory=0.2)
+    slower = np.interp(np.arange(4000) / 2.0, np.arange(2000), READING)
+    again = effect.equation(reading=slower, loop=1.0, loop_memory=0.2)
+    np.testing.assert_allclose(again[::2], loop, atol=1e-3)
+    assert loop.min() < -0.99 and loop.max() > 0.99
+
+
+def test_a_coarse_encoder_reads_whole_coarse_codes() -> None:
+    coarse = READING + changed(law("encoder_quantisation"), coarse_share=1.0, coarse_codes=8.0)
+    codes = coarse / (8.0 * float(np.asarray(KNOWN["code"])))
+    np.testing.assert_allclose(codes, np.rint(codes), atol=1e-6)
+
+
+def test_clocks_shift_the_reading() -> None:
+    late = READING + changed(law("clock_offset"), late=0.02)
+    np.testing.assert_allclose(late[1:], np.interp(T - 0.02, T, READING)[1:], atol=1e-4)
+    dropped = changed(law("clock_drops"), dropped=0.02, drop_time=50.0)
+    assert not dropped[T <= 50.0].any() and dropped[T > 50.0].all()
+
+
+def test_switching_is_a_square_wave_of_the_code() -> None:
+    wave = changed(law("encoder_switching"), switching=1.0, switching_bit=11.0)
+    period = 2.0 * np.pi / 2**14 * 2**11
+    inside = READING % period
+    np.testing.assert_array_equal(wave[(inside > 0.01) & (inside < 0.5 * period - 0.01)], 1.0)
+    np.testing.assert_array_equal(wave[(inside > 0.5 * period + 0.01) & (inside < period - 0.01)], -1.0)
+
+
+def constant(reading: Array, g: float) -> Array:
+    return g * reading
+
+
+def misspelt(readin: Array, g: float) -> Array:
+    return g * readin
+
+
+def mistyped(reading: float, g: float) -> Array:
+    return np.array([g * reading])
+
+
+G = Parameter("g", "1", Normal(0.0, 1.0), "gain", (-1.0, 1.0), role="amplitude")
+SPARE = Parameter("h", "1", Normal(0.0, 1.0), "unused", (-1.0, 1.0))
+
+
+@pytest.mark.parametrize(
+    ("equation", "parameters", "message"),
+    [(misspelt, (G,), "readin"), (constant, (G, SPARE), "not an argument"), (mistyped, (G,), "reading")],
+)
+def test_wrong_wiring_is_an_error_at_import(equation, parameters, message) -> None:  # type: ignore[no-untyped-def]
+    with pytest.raises(TypeError, match=message):
+        Sensing("trial", SensingPort.CHANNEL, equation, parameters, "test")
