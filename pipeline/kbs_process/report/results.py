@@ -24,7 +24,7 @@ from kbs_process.report.records.transducer import OnTransducer
 SCHEMA_VERSION: Literal[1] = 1
 
 Verdict = Literal["pass", "fail", "undecided"]
-Frame = Literal["T", "S"]
+Frame = Literal["T", "S", "joint"]  # the transducer's, the spacecraft's, or the joints' own, of their efforts
 Role = Literal["calibration", "fit", "held-out"]
 Statistic = Literal["peak", "rms"]
 

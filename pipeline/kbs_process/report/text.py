@@ -82,6 +82,11 @@ def power(value: float) -> str:
     return f"{'' if mantissa == 1 else f'{mantissa}·'}10{_raised(exponent)}"
 
 
+def chance(log10: float) -> str:
+    """Return a probability from its logarithm, which may be too small for a float: 0.04, 10⁻²²⁰."""
+    return number(10.0**log10, 2) if log10 > -3.0 else f"10{_raised(round(log10))}"
+
+
 def steps(values: Sequence[float]) -> list[str]:
     """Return labels for ticks at equal steps, all with the decimals that tell them apart: 0.00, 0.25, 2·10⁻⁶."""
     largest = max((abs(value) for value in values), default=0.0)

@@ -1,0 +1,75 @@
+"""How far each recording is from the floor, step by step, and the laws that were found."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from kbs_process.report.figures import draw
+from kbs_process.report.panel import Picture
+from kbs_process.report.records.diagnosis import Curve, Find, Trial
+from kbs_process.report.text import label, number, unit
+
+STEPS = {"nominal": draw.SERIES[4], "known": draw.PREDICTED, "corrected": draw.MEASURED}
+_WIDTH = 0.26
+
+
+def trials(entries: tuple[Trial, ...]) -> Picture:
+    """Draw residual over floor of each recording: nominal, known parameters refitted, corrected."""
+    with draw.style():
+        figure, axis = draw.canvas(0.9 + 0.34 * len(entries))
+        places = np.arange(len(entries))[::-1]
+        for index, (step, color) in enumerate(STEPS.items()):
+            values = [getattr(entry, step) for entry in entries]
+            axis.barh(places + (1 - index) * _WIDTH, values, _WIDTH, color=color, label=step, left=0.0)
+        axis.axvline(1.0, color=draw.LIMIT, linewidth=0.8, linestyle="--", label="floor")
+        most = max(max(entry.nominal, entry.known, entry.corrected) for entry in entries)
+        draw.logarithmic(axis, "x", 0.5, 1.3 * max(most, 2.0))
+        axis.set_yticks(places, [f"{label(entry.recording, 24)} ({entry.role})" for entry in entries])
+        axis.grid(visible=False, axis="y")
+        axis.set_xlabel("residual over floor, rms")
+        axis.legend(ncols=4, loc="lower right", bbox_to_anchor=(1.0, 1.0))
+        worst = max(entries, key=lambda entry: entry.corrected)
+        alt = (
+            f"Residual over floor of {len(entries)} recordings; corrected, at most {number(worst.corrected)}"
+        )
+        return draw.picture(figure, alt)
+
+
+def law(find: Find, curve: Curve) -> Picture:
+    """Draw what enters at the port, with its band of two sigmas, and the accepted law through it."""
+    x, y, sigma = (np.asarray(values) for values in (curve.x, curve.y, curve.sigma))
+    with draw.style():
+        figure, axis = draw.canvas(2.3)
+        axis.fill_between(
+            x, y - 2.0 * sigma, y + 2.0 * sigma, color=draw.SHADE, linewidth=0.0, label="2 sigma"
+        )
+        axis.plot(x, y, color=draw.MEASURED, linewidth=0.9, label="measured")
+        if curve.fitted:
+            axis.plot(x, curve.fitted, color=draw.PREDICTED, linewidth=1.6, zorder=1, label=find.name)
+        axis.set_xlabel(f"{curve.regressor} / {unit(curve.x_unit)}")
+        axis.set_ylabel(f"{find.place.port} / {unit(curve.y_unit)}")
+        axis.legend()
+        return draw.picture(figure, f"{find.name} at {find.place.site}: measured law over {curve.regressor}")
+
+
+def channels(entries: tuple[Trial, ...]) -> Picture:
+    """Draw what is left over the floor, channel by channel."""
+    names = tuple(dict.fromkeys(name for entry in entries for name in entry.channels))
+    values = np.array([[entry.channels.get(name, np.nan) for name in names] for entry in entries])
+    with draw.style():
+        figure = Figure(figsize=(draw.WIDTH, 0.7 + 0.26 * len(entries)), layout="constrained")
+        axis = figure.subplots()
+        top = max(2.0, float(np.nanmax(values)))
+        image = axis.imshow(values, cmap="Blues", vmin=1.0, vmax=top, aspect="auto")
+        axis.set_xticks(range(len(names)), names)
+        axis.set_yticks(range(len(entries)), [label(entry.recording, 24) for entry in entries])
+        axis.grid(visible=False)
+        for row, column in np.argwhere(np.isfinite(values)):
+            value = values[row, column]
+            color = "white" if value > 0.5 * (1.0 + top) else draw.INK
+            axis.text(column, row, number(value), ha="center", va="center", color=color, fontsize=6)
+        figure.colorbar(image, ax=axis, label="over floor")
+        return draw.picture(
+            figure, f"Residual over floor by channel, at most {number(float(np.nanmax(values)))}"
+        )

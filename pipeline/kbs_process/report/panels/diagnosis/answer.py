@@ -1,0 +1,88 @@
+"""Is there a mismatch, and what was left out?"""
+
+from __future__ import annotations
+
+from kbs_process.report.figures import diagnosis as figures
+from kbs_process.report.panel import Block, Caption, Cell, Figure, Grid, Notices, Panel, Text
+from kbs_process.report.records.diagnosis import DiagnosisResults, Find, Place, Trial
+from kbs_process.report.tables import Tables
+from kbs_process.report.text import MISSING, chance, number
+
+_TRIALS = Caption(
+    shown="Whitened residual over the floor, rms, of every recording: with the parameter files' numbers, with known "
+    "parameters refitted under their priors, and with what was found. Held-out recordings were used by neither.",
+    good="Corrected bars end at the floor (dashed), those of held-out recordings as well.",
+    bad="A held-out bar far above those of the fit: what was found does not carry over. All above: something is left.",
+    do="See what remains, and record the trajectory where it is strongest.",
+)
+AT_FLOOR = 1.1
+
+
+def where(place: Place) -> str:
+    """A place in words."""
+    return f"{place.port}, {place.site}" if place.site else place.port
+
+
+def panel(results: DiagnosisResults, tables: Tables) -> Panel:
+    """The paragraph, notices, finds and residuals over the floor."""
+    blocks: list[Block] = [Text(results.paragraph)]
+    if results.warnings:
+        blocks.append(
+            Notices(
+                tuple((entry.severity, entry.what, entry.where, entry.remedy) for entry in results.warnings)
+            )
+        )
+    if results.finds:
+        blocks.append(_finds(results.finds))
+    blocks.append(Figure("Residual over the floor", (figures.trials(results.trials),), _TRIALS))
+    blocks.append(_trials(results.trials))
+    blocks.append(Text(f"Floor: {results.floor}"))
+    if results.files:
+        blocks.append(
+            Text(
+                "Corrected model, for `kbs-process predict` and for any campaign's parameter files:",
+                results.files,
+            )
+        )
+    return Panel("answer", "Answer", "Is there a mismatch, and what was left out?", tuple(blocks))
+
+
+def _finds(finds: tuple[Find, ...]) -> Grid:
+    rows = tuple(
+        (
+            find.name,
+            find.family,
+            where(find.place),
+            ", ".join(find.place.channels[:3]) or MISSING,
+            number(find.probability, 3),
+            number(find.distance, 3),
+            MISSING if find.required is None else number(find.required, 2),
+        )
+        for find in finds
+    )
+    head = (
+        "Find",
+        "Physics",
+        "Enters at",
+        "Seen in",
+        "Probability",
+        "Distance / sigma",
+        "In the requirement's band",
+    )
+    return Grid("Physics that was left out", head, rows, "klllrrr")
+
+
+def _trials(trials: tuple[Trial, ...]) -> Grid:
+    rows = tuple(
+        (
+            entry.recording,
+            entry.role,
+            number(entry.nominal),
+            number(entry.known),
+            Cell(number(entry.corrected), "pass" if entry.corrected < AT_FLOOR else "undecided"),
+            chance(entry.log10_p),
+        )
+        for entry in trials
+    )
+    head = ("Recording", "Role", "Nominal", "Known refitted", "Corrected", "p of what is left")
+    return Grid("Residual over the floor, rms", head, rows, "klrrrr")

@@ -1,0 +1,90 @@
+"""What law is it, how well is it known, and what else could it be?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from kbs_process.report.figures import diagnosis as figures
+from kbs_process.report.panel import Block, Caption, Cell, Figure, Grid, Panel, Text
+from kbs_process.report.panels.diagnosis.answer import where
+from kbs_process.report.records.diagnosis import DiagnosisResults, Find
+from kbs_process.report.tables import Tables
+from kbs_process.report.text import MISSING, band_hz, number, percent, unit
+
+_LAW = Caption(
+    shown="What enters at the port, estimated from the residual without presuming a law, against what orders it, and "
+    "the law that was put into the plant.",
+    good="The law within the band everywhere.",
+    bad="A stretch of the band that the law leaves: it holds elsewhere only.",
+    do="Take the measured curve there, or widen the motion.",
+)
+
+INDISTINGUISHABLE = 4.65  # sigma: the wrong one of two laws is taken in 1 of 100 cases
+
+
+def panel(results: DiagnosisResults, tables: Tables) -> Panel:
+    """A find after the other: law, parameters, gate, rivals."""
+    blocks = tuple(block for find in results.finds for block in _find(find))
+    nothing = Text("No law passed the gate: nothing is claimed to have been left out.")
+    return Panel("finds", "Finds", "What law is it, and what else could it be?", blocks or (nothing,))
+
+
+def _find(find: Find) -> Iterator[Block]:
+    known = (
+        "" if find.named else " No effect of the catalogue passed the gate: the law is as it was measured."
+    )
+    yield Text(
+        f"{find.name}, {where(find.place)}. {find.says}{known} Nine tenths of its signature lie from "
+        f"{band_hz(*find.band_Hz)}; known parameters could have taken up {percent(find.absorbed, 2)} of it."
+    )
+    if find.equation:
+        yield Text(find.equation, (f"Source: {find.reference}",) if find.reference else ())
+    rows = tuple(
+        (
+            entry.name,
+            unit(entry.unit),
+            number(entry.value, 4),
+            number(entry.sigma, 2),
+            f"{number(entry.low, 4)} to {number(entry.high, 4)}",
+        )
+        for entry in find.parameters
+    )
+    if rows:
+        yield Grid(f"{find.name}: parameters", ("Parameter", "Unit", "Value", "Sigma", "95 %"), rows, "klrrr")
+    if find.curve is not None:
+        yield Figure(f"{find.name}: the law", (figures.law(find, find.curve),), _LAW)
+    gate = tuple(
+        (
+            entry.recording,
+            entry.role,
+            number(entry.before),
+            Cell(number(entry.after), "pass" if entry.after <= entry.before else "fail"),
+            number(entry.gain),
+        )
+        for entry in find.gate
+    )
+    note = "Held-out recordings decide: each of them has to be predicted better."
+    head = ("Recording", "Role", "Before", "After", "Gain (-2 log likelihood)")
+    yield Grid(f"{find.name}: residual over the floor, without and with it", head, gate, "klrrr", note)
+    if find.rivals:
+        yield Grid(
+            f"{find.name}: other laws",
+            ("Law", "Physics", "Enters at", "Gain", "Distance / sigma", "Probability"),
+            tuple(
+                (
+                    rival.name,
+                    rival.family,
+                    where(rival.place),
+                    number(rival.gain),
+                    MISSING
+                    if rival.distance is None
+                    else Cell(
+                        number(rival.distance), "undecided" if rival.distance < INDISTINGUISHABLE else ""
+                    ),
+                    number(rival.probability, 2),
+                )
+                for rival in find.rivals
+            ),
+            "kllrrr",
+            f"Laws nearer than {INDISTINGUISHABLE} sigma cannot be told apart by these recordings.",
+        )

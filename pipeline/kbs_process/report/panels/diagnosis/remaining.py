@@ -1,0 +1,50 @@
+"""What is left, and where does it live?"""
+
+from __future__ import annotations
+
+from kbs_process.report.figures import diagnosis as figures
+from kbs_process.report.figures import identify as curves
+from kbs_process.report.panel import Block, Caption, Figure, Panel, Text
+from kbs_process.report.records.diagnosis import DiagnosisResults
+from kbs_process.report.tables import Tables
+
+_CHANNELS = Caption(
+    shown="What is left of each channel over the floor, with everything that was found in the plant.",
+    good="About 1 everywhere.",
+    bad="One channel far above the others: its own sensor. One axis' channels: physics of that axis.",
+    do="Look at that channel's spectrum and history below.",
+)
+_SPECTRA = Caption(
+    shown="Power spectral density of what is unexplained: known parameters refitted (before), with the finds (after), "
+    "and the floor (dashed).",
+    good="After lies on the floor at all frequencies.",
+    bad="A hump above the floor: physics that is still left out.",
+    do="Find the motor order or resonance at the hump.",
+)
+_HISTORIES = Caption(
+    shown="The same in time.",
+    good="After looks like noise, whatever the drives do.",
+    bad="Bursts that come again with position, rate or time.",
+    do="Compare their instants with the commands.",
+)
+
+
+def panel(results: DiagnosisResults, tables: Tables) -> Panel:
+    """Channels of all recordings, spectra and histories of those held out."""
+    blocks: list[Block] = [
+        Figure("What is left, channel by channel", (figures.channels(results.trials),), _CHANNELS)
+    ]
+    shown = [entry for entry in results.trials if entry.role == "held-out"] or list(results.trials)
+    spectra, histories = [], []
+    for entry in shown:
+        channels = tuple(entry.channels)
+        if (table := tables.read("residual_spectrum", entry.recording)) is not None:
+            spectra.append(curves.spectra(table, channels, entry.recording))
+        if (table := tables.read("residual", entry.recording)) is not None:
+            histories.append(curves.histories(table, channels, entry.recording))
+    if spectra:
+        blocks.append(Figure("Spectra of the residual", tuple(spectra), _SPECTRA))
+    if histories:
+        blocks.append(Figure("Histories of the residual", tuple(histories), _HISTORIES))
+    blocks += [Text(note) for note in results.notes]
+    return Panel("remaining", "What remains", "What is left, and where does it live?", tuple(blocks))

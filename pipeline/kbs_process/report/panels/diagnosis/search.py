@@ -1,0 +1,83 @@
+"""Where does it enter, and what was tried?"""
+
+from __future__ import annotations
+
+from kbs_process.report.panel import Block, Cell, Fold, Grid, Panel
+from kbs_process.report.panels.diagnosis.answer import where
+from kbs_process.report.records.diagnosis import DiagnosisResults, Moved, PortTest, Suspect
+from kbs_process.report.tables import Tables
+from kbs_process.report.text import MISSING, chance, count, measure, number, percent, unit
+
+_FAR = 3.0  # sigma
+
+
+def panel(results: DiagnosisResults, tables: Tables) -> Panel:
+    """Known parameters, ports, suspects, checks."""
+    blocks: list[Block] = []
+    far = tuple(entry for entry in results.moved if entry.sigmas is not None and abs(entry.sigmas) > _FAR)
+    if far:
+        blocks.append(_moved(f"Known parameters that moved by more than {_FAR:g} sigma", far))
+    if results.ports:
+        blocks.append(_ports(results.ports))
+    if results.suspects:
+        blocks.append(_suspects(results.suspects))
+    checks = tuple(
+        (check.name, Cell("yes" if check.ok else "no", "pass" if check.ok else "undecided"), check.detail)
+        for check in results.checks
+    )
+    if checks:
+        blocks.append(Grid("Checks of the refit", ("Check", "Passed", "Detail"), checks, "kcl"))
+    if results.moved:
+        title = f"All known parameters ({count(len(results.moved), 'number')})"
+        blocks.append(Fold(title, (_moved("Known parameters", results.moved),)))
+    return Panel("search", "Search", "Where does it enter, and what was tried?", tuple(blocks))
+
+
+def _ports(entries: tuple[PortTest, ...]) -> Grid:
+    rows = tuple(
+        (
+            where(entry.place),
+            percent(entry.share, 3),
+            chance(entry.log10_p),
+            Cell("yes" if entry.sufficient else "no", "pass" if entry.sufficient else ""),
+            ", ".join(entry.same_as) or MISSING,
+        )
+        for entry in entries
+    )
+    note = "An input that is free to be anything at one port: if it cannot explain the residual, no law there can."
+    head = ("Port", "Takes up of the excess", "p", "Suffices", "Looks the same as")
+    return Grid("Where it enters", head, rows, "krrcl", note)
+
+
+def _suspects(entries: tuple[Suspect, ...]) -> Grid:
+    rows = tuple(
+        (
+            entry.name,
+            entry.family,
+            where(entry.place),
+            ", ".join(f"{name} {number(value)}" for name, value in entry.shape.items()) or MISSING,
+            number(entry.gain),
+            percent(entry.absorbed, 2),
+            entry.outcome,
+        )
+        for entry in entries
+    )
+    head = ("Suspect", "Physics", "Enters at", "Shape", "Gain", "Absorbed", "Outcome")
+    note = "Gain: what it takes off -2 log likelihood by the linearised plant, known parameters refitted."
+    return Grid("Suspects, strongest first", head, rows, "klllrrl", note)
+
+
+def _moved(title: str, entries: tuple[Moved, ...]) -> Grid:
+    rows = tuple(
+        (
+            entry.name,
+            unit(entry.unit),
+            "unknown phase" if entry.prior_sigma is None else measure(entry.prior, entry.prior_sigma),
+            measure(entry.value, entry.sigma),
+            MISSING
+            if entry.sigmas is None
+            else Cell(number(entry.sigmas, 2), "undecided" if abs(entry.sigmas) > _FAR else ""),
+        )
+        for entry in entries
+    )
+    return Grid(title, ("Number", "Unit", "Prior", "Refitted", "Moved / sigma"), rows, "klrrr")

@@ -1,0 +1,129 @@
+"""The diagnosis' page: what is known is on it, and what is not is said."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import msgspec
+import numpy as np
+
+from kbs_process.report.build import build
+from kbs_process.report.records import diagnosis as d
+from kbs_process.report.records.common import Check, Conclusion, encode
+from report import sample
+
+
+def trial(name: str, role: str, corrected: float) -> d.Trial:
+    return msgspec.convert(
+        {
+            "recording": name,
+            "trajectory": "SWEEP",
+            "role": role,
+            "nominal": 8.0,
+            "known": 3.0,
+            "corrected": corrected,
+            "log10_p": -220.0,
+            "channels": {"Tx": corrected, "Ty": 1.3, "el": 0.98},
+        },
+        d.Trial,
+    )
+
+
+def find() -> d.Find:
+    x = np.linspace(1.2, 1.5, 40)
+    place = d.Place(port="joint torque", site="el", channels=("el", "Ty"))
+    return d.Find(
+        name="harness",
+        family="harness",
+        named=True,
+        place=place,
+        says="A torque that grows with the angle.",
+        equation="T = -k (q - q0)",
+        reference="harness handbook",
+        parameters=(d.Fitted(name="k_harness", unit="N m/rad", value=0.8, sigma=0.05, low=0.7, high=0.9),),
+        probability=0.93,
+        distance=310.0,
+        absorbed=0.2,
+        band_Hz=(0.01, 0.3),
+        rivals=(
+            d.Rival(name="dahl", family="friction", place=place, gain=90.0, distance=2.1, probability=0.06),
+        ),
+        gate=(d.Gated(recording="run_2", role="held-out", before=3.0, after=1.02, gain=900.0),),
+        curve=d.Curve(
+            regressor="angle of el",
+            x_unit="rad",
+            y_unit="N m",
+            x=tuple(x.tolist()),
+            y=tuple((-0.8 * (x - 1.2)).tolist()),
+            sigma=(0.02,) * len(x),
+            fitted=tuple((-0.81 * (x - 1.2)).tolist()),
+        ),
+    )
+
+
+def results(*finds: d.Find) -> d.DiagnosisResults:
+    return d.DiagnosisResults(
+        name="RIG<7>",
+        title="A rig",
+        article="an article",
+        verdict=Conclusion(status="none", sentence="Left out: harness in el."),
+        provenance=sample.PROVENANCE,
+        answer="physics",
+        paragraph="Prediction and recordings differ by 3.0 times what repeats differ by.",
+        floor="from 3 repeats",
+        log10_p=-220.0,
+        moved=(
+            d.Moved(
+                name="joint.el.drive.Ka",
+                unit="N m/rad",
+                prior=1e4,
+                prior_sigma=1e3,
+                value=1.4e4,
+                sigma=80.0,
+                sigmas=4.0,
+            ),
+        ),
+        finds=finds,
+        trials=(trial("run_1", "fit", 1.01), trial("run_2", "held-out", 1.02)),
+        ports=(d.PortTest(place=d.Place(port="joint torque", site="el"), log10_p=-0.2, sufficient=True, share=0.99),),
+        suspects=(
+            d.Suspect(
+                name="harness",
+                family="harness",
+                place=d.Place(port="joint torque", site="el"),
+                shape={"angle": 1.2},
+                gain=1e5,
+                distance=310.0,
+                absorbed=0.2,
+                log10_p=-300.0,
+                outcome="accepted",
+            ),
+        ),
+        checks=(Check(name="converged", ok=True, detail="3 steps"),),
+    )  # fmt: skip
+
+
+def page(folder: Path, found: d.DiagnosisResults) -> str:
+    folder.mkdir(exist_ok=True)
+    (folder / "results.json").write_bytes(encode(found))
+    return re.sub(r"data:image[^\"]*", "", build(folder, pdf=False).read_text())
+
+
+def test_a_find_is_told_with_its_law_its_gate_and_its_rivals(tmp_path: Path) -> None:
+    text = page(tmp_path, results(find()))
+    for said in (
+        "T = -k (q - q0)",
+        "k_harness",
+        "0.7000 to 0.9000",
+        "dahl",
+        "run_2",
+        "10⁻²²⁰",
+        "joint.el.drive.Ka",
+    ):
+        assert said in text.replace("\u00a0", " "), said
+    assert "RIG&lt;7&gt;" in text
+
+
+def test_nothing_found_is_said(tmp_path: Path) -> None:
+    assert "No law passed the gate" in page(tmp_path, results())
