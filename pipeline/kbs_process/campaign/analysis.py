@@ -11,7 +11,7 @@ from kbs_process.campaign.config import Bands, Campaign, RecordingEntry
 from kbs_process.campaign.predicting import predict_run
 from kbs_process.campaign.settings import motion_settings
 from kbs_process.plant.rigid import static_wrench
-from kbs_process.signals.records import WRENCH_CHANNELS, Run, Signal
+from kbs_process.signals.records import WRENCH_CHANNELS, Array, Run, Signal
 from kbs_process.stages import bandpass, gravity
 from kbs_process.stages.bandpass import UNFILTERED, Band
 from kbs_process.stages.condense import CondenseSettings
@@ -34,11 +34,11 @@ class Analysis:
     """Everything that is known about one recording once it has been processed."""
 
     entry: RecordingEntry
-    raw: Signal  # wrench at the working rate, cross-coupling and bias still in
+    raw: Signal  # loads at the working rate, the wrench's cross-coupling and bias still in
     run: Run  # decoupled
     motion: Motion
-    static: Static  # the fitted static wrench along the motion, with its uncertainty
-    misfits: tuple[Misfit, ...]  # of the static wrench, channel by channel
+    static: Static  # the fitted static loads along the motion, with their uncertainty
+    misfits: tuple[Misfit, ...]  # of the static loads, channel by channel
     residual: Signal  # decoupled less static
     predicted: Run | None
     pairs: Mapping[tuple[str, str], Pair]  # by frame and band
@@ -65,7 +65,7 @@ def analyse(
     update: Callable[[float], None],
 ) -> Analysis:
     """Remove gravity from measurement and prediction alike, cut the bands, move them to the spacecraft."""
-    wrench = _wrench(run)
+    wrench = _loads(run)
     sample = Sample(entry.name, motion, wrench)
     taring = gravity.tare(sample, model)
     static = gravity.apply(_at_rest(motion), model, taring)
@@ -83,7 +83,7 @@ def analyse(
         run=run,
         motion=motion,
         static=static,
-        misfits=misfits(sample, model, taring),
+        misfits=misfits(sample, model, taring, _cords(campaign, entry, wrench, motion)),
         residual=residual,
         predicted=predicted,
         pairs=_pairs(campaign, residual, disturbance),
@@ -95,8 +95,8 @@ def _predict(
 ) -> tuple[Run | None, Signal]:
     """Return the predicted run (of a plant with drives) and its wrench without gravity.
 
-    The plant has the masses and CoGs that the gravity fit found. Its static wrench is taken at its own angles, as the
-    measurement's is. A rig that is driven by its motion has no drives to predict: inertia is all there is.
+    The plant has the masses and CoGs that the gravity fit found. Its static wrench, and that of the rig's cords, is
+    taken at its own angles, as the measurement's is. A rig that is driven by its motion has no drives to predict: inertia is all there is.
     """
     if campaign.drive == "motion":
         moving = gravity.apply(motion, model).wrench
@@ -105,11 +105,11 @@ def _predict(
         return None, moving.derive(model.without_coupling(inertia), "inertia")
     settings = CondenseSettings(working_rate_Hz=campaign.bands.working_rate)
     predicted = predict_run(model.rig, campaign.effects, run, settings, update)
-    total = _wrench(predicted)
+    total = _loads(predicted)
     angles = estimate(predicted, model.rig, motion_settings(campaign))
     static = static_wrench(model.rig, angles.q)
     left = total.derive(total.values - static, "static wrench of the plant removed")
-    return predicted, select(left, _wrench(run).channels)
+    return predicted, select(left, _loads(run).channels)
 
 
 def _pairs(campaign: Campaign, residual: Signal, disturbance: Signal | None) -> dict[tuple[str, str], Pair]:
@@ -118,7 +118,7 @@ def _pairs(campaign: Campaign, residual: Signal, disturbance: Signal | None) -> 
     for band in bands_of(campaign.bands):
         measured = bandpass.apply(residual, band)
         predicted = None if disturbance is None else bandpass.apply(disturbance, band)
-        pairs["T", band.name] = Pair(measured, predicted)
+        pairs[campaign.rig.frame, band.name] = Pair(measured, predicted)
         if spacecraft is not None and measured.channels == WRENCH_CHANNELS:
             pairs["S", band.name] = Pair(
                 to_spacecraft(measured, spacecraft),
@@ -146,6 +146,7 @@ def select(signal: Signal, channels: Sequence[str]) -> Signal:
     )
 
 
-def _wrench(run: Run) -> Signal:
-    assert run.wrench is not None  # every campaign names the wrench's topic, and reading demands it
-    return run.wrench
+def _loads(run: Run) -> Signal:
+    loads = run.loads
+    assert loads is not None  # every campaign names the topic of a load, and reading demands it
+    return loads

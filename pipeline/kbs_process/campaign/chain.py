@@ -11,13 +11,15 @@ from kbs_process.rig.model import LAB, TRANSDUCER
 
 
 def order(
-    joints: Mapping[str, Tree], transducer_on: str, tables: Merged, problems: Problems
+    joints: Mapping[str, Tree], transducer_on: str | None, tables: Merged, problems: Problems
 ) -> tuple[str, ...]:
-    """Return the names of the joints from the laboratory outwards.
+    """Return the names of the joints from the laboratory outwards; a rig without a transducer is a chain of joints.
 
     Notes a parent that does not exist, two links on one parent, and links that do not lead to the laboratory.
     """
-    parents = {TRANSDUCER: transducer_on} | {name: table["parent"] for name, table in joints.items()}
+    parents = {name: table["parent"] for name, table in joints.items()}
+    if transducer_on is not None:
+        parents[TRANSDUCER] = transducer_on
     places: dict[str, Key] = {name: ("joint", name, "parent") for name in joints}
     places[TRANSDUCER] = ("transducer", "on")
 

@@ -22,6 +22,7 @@ def check_campaign(
     """Note everything in which the campaign contradicts itself or the files on disk."""
     _check_effects(document, problems)
     _check_drive(campaign, document, tables, problems)
+    _check_loads(campaign, document, tables, problems)
     _check_topics(campaign, document, problems)
     _check_bands(campaign, document, problems)
     for index, entry in enumerate(campaign.recordings):
@@ -63,6 +64,35 @@ def _check_drive(campaign: Campaign, document: Document, tables: Merged, problem
         problems.add(tables.place(("controller",)), "is missing", 'describe it, or set drive = "motion"')
     for joint in rig.joints:
         _check_joint(joint, campaign.effects, tables, problems)
+
+
+def _check_loads(campaign: Campaign, document: Document, tables: Merged, problems: Problems) -> None:
+    """What is recorded is described, what is described is recorded, and there is something to compare with."""
+    topics, rig = campaign.topics, campaign.rig
+    if topics.wrench is None and rig.transducer.channels:
+        problems.add(document.place(("topics", "wrench")), "is missing", "name it, or leave [transducer] out")
+    if topics.wrench is not None and not rig.transducer.channels:
+        problems.add(tables.place(("transducer",)), "is missing", "describe it, or leave topics.wrench out")
+    driven = [joint.name for joint in rig.joints if joint.effort is not None]
+    if topics.effort is None and driven:
+        remedy = f"name it, or leave joint.{driven[0]}.effort out"
+        problems.add(document.place(("topics", "effort")), "is missing", remedy)
+    if topics.effort is not None and not driven:
+        place = tables.place(("joint", rig.joint_names[0], "effort"))
+        problems.add(place, "is missing", "describe the joint's effort, or leave topics.effort out")
+    if not rig.channels:
+        remedy = "name the wrench of a transducer, or the effort of a joint"
+        problems.add(document.place(("topics",)), "holds no load to compare a prediction with", remedy)
+    for joint in rig.joints if campaign.drive == "command" else ():
+        for key, special in (
+            ("type", joint.type != "revolute"),
+            ("viscous", joint.viscous is not None),
+            ("effort", joint.effort is not None),
+        ):
+            if special:
+                place = tables.place(("joint", joint.name, key))
+                what = "goes with a rig that its measured motion drives; the model of a drive turns its joint"
+                problems.add(place, what, 'leave it out, or set drive = "motion"')
 
 
 def _check_joint(joint: Joint, effects: tuple[str, ...], tables: Merged, problems: Problems) -> None:

@@ -50,17 +50,19 @@ class Bands:
 class Topic:
     """Where a stream of the pipeline is in a recording."""
 
-    key: str  # the stream: "wrench", "angle", "rate", "command", "field", "temperature" or "pointing"
+    key: str  # the stream: "wrench", "effort", "angle", "rate", "command", "field", "temperature" or "pointing"
     topic: str
     fields: tuple[str, ...]  # place of each channel in a message: "wrench.force.x", "position[az]"
     channels: tuple[str, ...]  # names of the channels: "Fx"; "az"; "az.rate"
+    units: tuple[str, ...]  # of the channels, SI
 
 
 @dataclass(frozen=True, slots=True)
 class Topics:
     """The streams of a campaign's recordings; None where the rig records no such thing."""
 
-    wrench: Topic
+    wrench: Topic | None
+    effort: Topic | None
     angle: Topic | None
     rate: Topic | None
     command: Topic | None
@@ -69,9 +71,10 @@ class Topics:
     pointing: Topic | None  # angles by an external instrument
 
     def present(self) -> tuple[Topic, ...]:
-        """Return the streams that the campaign names, wrench first."""
+        """Return the streams that the campaign names, loads first."""
         streams = (
             self.wrench,
+            self.effort,
             self.angle,
             self.rate,
             self.command,
@@ -84,6 +87,10 @@ class Topics:
     def channels(self) -> Mapping[str, tuple[str, ...]]:
         """Return the names of the channels by stream key."""
         return {stream.key: stream.channels for stream in self.present()}
+
+    def units(self) -> Mapping[str, tuple[str, ...]]:
+        """Return the units of the channels by stream key."""
+        return {stream.key: stream.units for stream in self.present()}
 
 
 @dataclass(frozen=True, slots=True)

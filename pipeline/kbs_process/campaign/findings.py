@@ -22,7 +22,7 @@ from kbs_process.stages.compare import compare
 from kbs_process.stages.decouple import Decoupling
 from kbs_process.stages.gravity import GravityModel
 
-Frame = Literal["S", "T"]
+Frame = Literal["S", "T", "joint"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -155,7 +155,7 @@ def _resonances(
     """Modes on the transducer at the first and the last pose of the first run: they move with the joints."""
     if not runs:
         return ()
-    q, nyquist = runs[0].motion.q, 0.5 * runs[0].run.rates["wrench"]
+    q, nyquist = runs[0].motion.q, 0.5 * float(runs[0].run.load_rates.max())
     found = []
     for where, pose in (("first pose", q[0]), ("last pose", q[-1])):
         angles = ", ".join(
@@ -175,4 +175,4 @@ def _resonances(
 
 
 def _frame(name: str) -> Frame:
-    return "S" if name == "S" else "T"
+    return "S" if name == "S" else "joint" if name == "joint" else "T"

@@ -16,6 +16,7 @@ from kbs_process.campaign.rig_builder import RigBuilder
 from kbs_process.campaign.schema import violations
 from kbs_process.plant.effects import CATALOGUE
 from kbs_process.rig.model import Rig
+from kbs_process.signals.records import WRENCH_CHANNELS, WRENCH_UNITS
 
 
 def load_campaign(
@@ -139,33 +140,43 @@ def _campaign(folder: Path, document: Document, tables: Merged, rig: Rig, proble
 
 
 def _topics(tree: Tree, rig: Rig) -> Topics:
-    joints = rig.joint_names
+    joints = {joint.name: joint.unit for joint in rig.joints}
+    rates = {name: f"{unit}/s" for name, unit in joints.items()}
+    wrench = {channel: WRENCH_UNITS[WRENCH_CHANNELS.index(channel)] for channel in rig.transducer.channels}
+    efforts = {joint.name: joint.effort.unit for joint in rig.joints if joint.effort is not None}
     position = tuple(f"position[{name}]" for name in joints)
     velocity = tuple(f"velocity[{name}]" for name in joints)
-    wrench = tuple(
-        f"wrench.{'force' if channel[0] == 'F' else 'torque'}.{channel[1]}"
-        for channel in rig.transducer.channels
+    components = tuple(
+        f"wrench.{'force' if channel[0] == 'F' else 'torque'}.{channel[1]}" for channel in wrench
     )
 
-    def topic(name: str, key: str, fields: tuple[str, ...], channels: tuple[str, ...]) -> Topic | None:
+    def topic(name: str, key: str, fields: tuple[str, ...], units: dict[str, str]) -> Topic | None:
         given = tree.get(name)
         if given is None:
             return None
-        if isinstance(given, str):
-            return Topic(key, given, fields, channels)
-        return Topic(key, given["topic"], tuple(given.get("fields", fields)), channels)
+        if isinstance(given, dict):
+            fields = tuple(given.get("fields", fields))
+            given = given["topic"]
+        return Topic(key, given, fields, tuple(units), tuple(units.values()))
 
-    measured = topic("wrench", "wrench", wrench, rig.transducer.channels)
-    assert measured is not None  # by the schema
     return Topics(
-        wrench=measured,
-        angle=topic("encoder", "angle", position, joints),
-        rate=topic("rate", "rate", velocity, joints),
-        command=topic(
-            "command", "command", position + velocity, joints + tuple(f"{name}.rate" for name in joints)
+        wrench=topic("wrench", "wrench", components, wrench),
+        effort=topic(
+            "effort",
+            "effort",
+            tuple(f"effort[{name}]" for name in efforts),
+            {f"{name}.effort": unit for name, unit in efforts.items()},
         ),
-        field=topic("field", "field", position, joints),
-        temperature=topic("temperature", "temperature", ("temperature",), ("temperature",)),
+        angle=topic("encoder", "angle", position, joints),
+        rate=topic("rate", "rate", velocity, rates),
+        command=topic(
+            "command",
+            "command",
+            position + velocity,
+            joints | {f"{name}.rate": unit for name, unit in rates.items()},
+        ),
+        field=topic("field", "field", position, dict.fromkeys(joints, "rad")),
+        temperature=topic("temperature", "temperature", ("temperature",), {"temperature": "degC"}),
         pointing=topic("pointing", "pointing", position, joints),
     )
 

@@ -17,23 +17,31 @@ def methods(campaign: Campaign, analyses: Sequence[Analysis], findings: Findings
 
 
 def _reduction(campaign: Campaign, analyses: Sequence[Analysis]) -> str:
-    rates = sorted({f"{analysis.run.rates['wrench']:.6g}" for analysis in analyses})
-    return (
-        f"{len(analyses)} recordings of the transducer's wrench at {', '.join(rates)} Hz were brought "
+    rates = sorted({f"{rate:.6g}" for analysis in analyses for rate in analysis.run.load_rates})
+    driven = [joint.name for joint in campaign.rig.joints if joint.effort is not None]
+    loads = [
+        *(["the transducer's wrench"] if campaign.rig.transducer.channels else []),
+        *([f"the effort of {', '.join(driven)}"] if driven else []),
+    ]
+    reduced = (
+        f"{len(analyses)} recordings of {' and '.join(loads)} at {', '.join(rates)} Hz were brought "
         f"to one clock each and to {campaign.bands.working_rate:g} Hz by linear-phase Kaiser filters (gain error at "
-        "most 1e-5, aliases at most -120 dB). Cross-coupling was undone by the calibrated matrix: "
-        "w = (I + X)^-1 (raw - bias)."
+        "most 1e-5, aliases at most -120 dB)."
     )
+    undone = " Cross-coupling was undone by the calibrated matrix: w = (I + X)^-1 (raw - bias)."
+    return reduced + (undone if campaign.rig.transducer.channels else "")
 
 
 def _gravity(campaign: Campaign, analyses: Sequence[Analysis]) -> str:
     used = [analysis.entry.name for analysis in analyses if analysis.entry.role != "held-out"]
     angles = [line for line in analyses[-1].motion.history if ": " in line]
     what = "Gravity and inertia were" if campaign.drive == "motion" else "Gravity was"
+    efforts = any(joint.effort is not None for joint in campaign.rig.joints)
     return (
         f"{what} fitted to {', '.join(used)} by maximum a posteriori least squares over masses, centres of gravity, "
-        "tilt, misalignments and residual cross-coupling, with the one-sigma values of the parameter files as priors "
-        f"and a taring bias for each recording; g = {float(campaign.rig.gravity):g} m/s^2. The static part was "
+        f"{'inertia, viscous friction and gains of the efforts, ' if efforts else ''}tilt, misalignments and residual "
+        "cross-coupling, with the one-sigma values of the parameter files as priors and a taring bias for each "
+        f"recording; g = {float(campaign.rig.gravity):g} m/s^2. The static part was "
         "subtracted from all recordings. Held-out ones were not fitted; of each one constant a channel was estimated "
         "(location under Student's t with 4 degrees of freedom about the spread of the fitted residuals) and "
         f"subtracted as well. Angles: {'; '.join(angles)}."

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import msgspec
@@ -44,18 +44,19 @@ def _curves(folder: Path, found: Study) -> None:
 
 
 def _tables(writer: TableWriter, analysis: Analysis) -> None:
-    run = analysis.run
-    assert run.wrench is not None
+    run, loads = analysis.run, analysis.run.loads
+    assert loads is not None
     joints = {
         kind: signal
         for kind, signal in (("angle", run.angle), ("rate", run.rate), ("command", commanded(run)))
         if signal is not None
     }
     writer.aligned(analysis.raw, joints)
-    writer.gravity(run.wrench, analysis.static.wrench, analysis.residual)
-    units = dict(zip(run.wrench.channels, run.wrench.units, strict=True))
+    writer.gravity(loads, analysis.static.wrench, analysis.residual)
+    units = dict(zip(loads.channels, loads.units, strict=True))
     if run.envelope is not None:
-        writer.envelope(run.envelope, run.wrench.channels, run.wrench.units)
+        whole = loads if run.wrench is None else run.wrench  # what has an envelope
+        writer.envelope(run.envelope, whole.channels, whole.units)
     if run.spectrum is not None:
         writer.spectrum(
             run.spectrum, None if analysis.predicted is None else analysis.predicted.spectrum, units
@@ -66,13 +67,12 @@ def _tables(writer: TableWriter, analysis: Analysis) -> None:
 
 def _recording(folder: Path, analysis: Analysis) -> None:
     """One MCAP file a recording: every band and frame, measured and predicted, as any viewer opens it."""
-    streams = []
-    for (frame, band), pair in sorted(analysis.pairs.items()):
+    streams: list[OutStream] = []
+    for (_, band), pair in sorted(analysis.pairs.items()):
         for kind, signal in (("measured", pair.measured), ("predicted", pair.predicted)):
             if signal is not None:
-                topic = f"/{kind}/{band}/{'spacecraft' if frame == 'S' else 'transducer'}/wrench"
-                streams.append(_stream(topic, signal, analysis.run.epoch_ns))
-    streams.append(_stream("/gravity/transducer/wrench", analysis.static.wrench, analysis.run.epoch_ns))
+                streams += _streams(f"/{kind}/{band}", signal, analysis.run.epoch_ns)
+    streams += _streams("/gravity", analysis.static.wrench, analysis.run.epoch_ns)
     for topic, joints in (("/encoder", analysis.run.angle), ("/command", commanded(analysis.run))):
         if joints is not None:
             streams.append(_joints(topic, joints, analysis.run.epoch_ns))
@@ -80,13 +80,26 @@ def _recording(folder: Path, analysis: Analysis) -> None:
     write_mcap(folder / f"{analysis.entry.name}.mcap", streams)
 
 
-def _stream(topic: str, signal: Signal, epoch_ns: int) -> OutStream:
-    """A wrench of all six components; those without a channel are not a number."""
-    values = np.full((len(signal), len(WRENCH_CHANNELS)), np.nan)
-    values[:, [WRENCH_CHANNELS.index(channel) for channel in signal.channels]] = signal.values
+def _streams(topic: str, signal: Signal, epoch_ns: int) -> Iterator[OutStream]:
+    """A wrench of all six components, those without a channel not a number; and the efforts of joints."""
     stamp = epoch_ns + np.rint(signal.t * 1e9).astype(np.int64)
-    frame = "spacecraft" if signal.frame == "S" else "transducer"
-    return OutStream(topic=topic, kind="wrench", stamp=stamp, log=stamp, values=values, frame=frame)
+    components = [channel for channel in signal.channels if channel in WRENCH_CHANNELS]
+    if components:
+        wrench = np.full((len(signal), len(WRENCH_CHANNELS)), np.nan)
+        for channel in components:
+            wrench[:, WRENCH_CHANNELS.index(channel)] = signal.column(channel)
+        frame = "spacecraft" if signal.frame == "S" else "transducer"
+        yield OutStream(
+            topic=f"{topic}/{frame}/wrench", kind="wrench", stamp=stamp, log=stamp, values=wrench, frame=frame
+        )
+    efforts = [channel for channel in signal.channels if channel not in WRENCH_CHANNELS]
+    if efforts:
+        unknown = np.full((len(signal), 2 * len(efforts)), np.nan)  # positions and velocities
+        values = np.column_stack([unknown, *(signal.column(channel) for channel in efforts)])
+        names = tuple(channel.removesuffix(".effort") for channel in efforts)
+        yield OutStream(
+            topic=f"{topic}/joints", kind="joints", stamp=stamp, log=stamp, values=values, names=names
+        )
 
 
 def _joints(topic: str, signal: Signal, epoch_ns: int) -> OutStream:

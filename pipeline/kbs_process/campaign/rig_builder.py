@@ -15,19 +15,27 @@ from kbs_process.campaign.problems import Problems
 from kbs_process.campaign.quantities import CHANNELWISE, PAIRWISE, Kind, read_quantity
 from kbs_process.errors import ConfigError, did_you_mean
 from kbs_process.rig.model import (
+    COORDINATE,
     LAB,
     TRANSDUCER,
     Amplifier,
     Body,
     Controller,
     Drive,
+    Effort,
     Encoder,
     Joint,
+    JointType,
     Quantity,
     Rig,
     Spacecraft,
     Transducer,
+    no_transducer,
 )
+
+# Units of a joint's viscous friction and effort, by the joint's type.
+VISCOUS: dict[JointType, str] = {"revolute": "N m s/rad", "prismatic": "N s/m"}
+EFFORT: dict[JointType, str] = {"revolute": "N m", "prismatic": "N"}
 
 LENGTHS = Kind("m", (3,))
 ANGLES = Kind("rad", (3,))
@@ -48,12 +56,12 @@ class RigBuilder:
     def build(self) -> Rig:
         """Return the rig; it is to be trusted only if `problems` is empty afterwards."""
         tree = self.tables.tree
-        channels = tuple(tree["transducer"]["channels"])
-        joints = order(tree["joint"], tree["transducer"]["on"], self.tables, self.problems)
-        links = {LAB, TRANSDUCER, *joints}
+        bench = tree.get("transducer")
+        joints = order(tree["joint"], bench and bench["on"], self.tables, self.problems)
+        links = {LAB, *((TRANSDUCER,) if bench else ()), *joints}
         return Rig(
             gravity=self._quantity(Kind("m/s^2", (), low=0.0), "gravity", "magnitude"),
-            transducer=self._transducer(tree["transducer"], channels),
+            transducer=self._transducer(bench) if bench else no_transducer(),
             bodies=tuple(self._body(name, table, links) for name, table in tree.get("body", {}).items()),
             joints=tuple(self._joint(name, tree["joint"][name]) for name in joints),
             controller=self._controller(tree["controller"], joints) if "controller" in tree else None,
@@ -73,7 +81,9 @@ class RigBuilder:
             zero = np.zeros(kind.shape)
             return Quantity(".".join(key), zero, "", zero, "")
 
-    def _transducer(self, table: Tree, channels: tuple[str, ...]) -> Transducer:
+    def _transducer(self, table: Tree) -> Transducer:
+        channels = tuple(table["channels"])
+
         def quantity(kind: Kind, *key: str) -> Quantity:
             return self._quantity(kind, "transducer", *key)
 
@@ -128,20 +138,48 @@ class RigBuilder:
             place = self.tables.place(("joint", name, "axis"))
             self.problems.add(place, "has no direction", "give a direction, such as [0, 0, 1]")
         x, y, z = (axis / (length or 1.0)).tolist()
+        kind: JointType = table.get("type", "revolute")
         return Joint(
             name=name,
             parent=table["parent"],
             axis=(x, y, z),
             origin=self._quantity(LENGTHS, "joint", name, "origin"),
             misalignment=self._quantity(ANGLES, "joint", name, "misalignment"),
-            encoder=self._encoder(name) if "encoder" in table else None,
+            encoder=self._encoder(name, COORDINATE[kind]) if "encoder" in table else None,
             drive=self._drive(name, table["drive"]) if "drive" in table else None,
+            type=kind,
+            viscous=self._quantity(Kind(VISCOUS[kind], (), low=0.0), "joint", name, "viscous")
+            if "viscous" in table
+            else None,
+            effort=self._effort(name, EFFORT[kind], table["effort"]) if "effort" in table else None,
         )
 
-    def _encoder(self, joint: str) -> Encoder:
+    def _encoder(self, joint: str, unit: str) -> Encoder:
         return Encoder(
-            step=self._quantity(Kind("rad", (), low=0.0), "joint", joint, "encoder", "step"),
-            offset=self._quantity(Kind("rad", ()), "joint", joint, "encoder", "offset"),
+            step=self._quantity(Kind(unit, (), low=0.0), "joint", joint, "encoder", "step"),
+            offset=self._quantity(Kind(unit, ()), "joint", joint, "encoder", "offset"),
+        )
+
+    def _effort(self, joint: str, unit: str, table: Tree) -> Effort:
+        """A force or torque (gain "1"), or the current or voltage that makes it, as the gain's unit says."""
+        readings = {"1": unit, f"{unit}/A": "A", f"{unit}/V": "V"}
+        given = table["gain"]["unit"]
+        if given not in readings:
+            place = self.tables.place(("joint", joint, "effort", "gain", "unit"))
+            what = f"'{given}' is the unit of no gain of this joint's effort"
+            self.problems.add(place, what, f"give one of {', '.join(map(repr, readings))}")
+            given = "1"
+
+        def quantity(name: str, kind: Kind) -> Quantity:
+            return self._quantity(kind, "joint", joint, "effort", name)
+
+        reading = readings[given]
+        return Effort(
+            unit=reading,
+            gain=quantity("gain", Kind(given, (), low=0.0, strict=True)),
+            bias=quantity("bias", Kind(reading, ())),
+            noise=quantity("noise", Kind(reading, (), low=0.0)),
+            resolution=quantity("resolution", Kind(reading, (), low=0.0)),
         )
 
     def _drive(self, joint: str, table: Tree) -> Drive:

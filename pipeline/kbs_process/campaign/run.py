@@ -66,11 +66,13 @@ def _prepare(
 ) -> Prepared:
     with progress.task(f"Reading {entry.name}"):
         run = read_run(campaign, entry)
-        if run.wrench is None:
-            raise RecordingError("there is no wrench in this recording", where=str(entry.path))
+        if run.loads is None:
+            raise RecordingError(
+                "there is neither wrench nor effort in this recording", where=str(entry.path)
+            )
         return Prepared(
             entry,
-            run.wrench,
+            run.loads,
             decouple.apply(run, decoupling),
             motion.estimate(run, campaign.rig, motion_settings(campaign)),
         )
@@ -83,9 +85,9 @@ def _fit_gravity(campaign: Campaign, prepared: list[Prepared], progress: Progres
     """
     with progress.task("Fitting gravity and centres of gravity"):
         samples = [
-            Sample(one.entry.name, one.motion, one.run.wrench, calibration=one.entry.role == "calibration")
+            Sample(one.entry.name, one.motion, loads, calibration=one.entry.role == "calibration")
             for one in prepared
-            if one.entry.role != "held-out" and one.run.wrench is not None
+            if one.entry.role != "held-out" and (loads := one.run.loads) is not None
         ]
         return gravity.fit(
             samples,

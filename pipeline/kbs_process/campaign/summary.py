@@ -7,15 +7,15 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from kbs_process.campaign import provenance
-from kbs_process.campaign.analysis import Analysis
+from kbs_process.campaign.analysis import Analysis, select
 from kbs_process.campaign.config import Campaign
 from kbs_process.campaign.findings import Findings
 from kbs_process.campaign.methods import methods
 from kbs_process.campaign.notices import notices
 from kbs_process.campaign.pointing import recorded_pointing
-from kbs_process.plant.rigid import static_wrench
+from kbs_process.plant.rigid import loads
 from kbs_process.report import results
-from kbs_process.signals.records import WRENCH_CHANNELS, Signal
+from kbs_process.signals.records import Signal
 from kbs_process.stages.conventions import SignCheck, check_encoder_sense, check_gravity_sign, check_weight
 from kbs_process.stages.decouple import Decoupling
 from kbs_process.stages.gravity import GravityModel, taring_error
@@ -51,7 +51,7 @@ def summarise(
         recordings=tuple(_recording(analysis) for analysis in analyses),
         conventions=conventions,
         gravity=_gravity(campaign, analyses, model),
-        cross_coupling=_cross_coupling(analyses, decoupling),
+        cross_coupling=_cross_coupling(analyses, decoupling) if decoupling.channels else None,
         bands=findings.bands,
         repeatability=findings.repeatability,
         merit=findings.merit,
@@ -116,13 +116,13 @@ def _recording(analysis: Analysis) -> results.Recording:
 def _conventions(campaign: Campaign, analyses: Sequence[Analysis]) -> Iterable[results.Convention]:
     checks: list[SignCheck] = [*check_weight(campaign.rig)]
     for analysis in analyses[:2]:  # the calibration and the first run: signs do not change within a campaign
-        measured = analysis.run.wrench
+        measured, rest = analysis.run.loads, np.zeros_like(analysis.motion.q)
         assert measured is not None
-        index = [WRENCH_CHANNELS.index(channel) for channel in measured.channels]
-        nominal = measured.derive(
-            static_wrench(campaign.rig, analysis.motion.q)[:, index], "nominal static wrench"
-        )
-        found = [*check_gravity_sign(measured, nominal, campaign.rig.transducer.noise.value[index])]
+        every = campaign.rig.loads
+        index = every.index(measured.channels)
+        static = loads(campaign.rig, analysis.motion.q, rest, rest)[:, index]
+        nominal = measured.derive(static, "nominal static loads")
+        found = [*check_gravity_sign(measured, nominal, every.noise[index])]
         command, angle = commanded(analysis.run), analysis.run.angle
         if command is not None and angle is not None:
             found += check_encoder_sense(angle, command)
@@ -204,6 +204,8 @@ def _gravity_channel(analyses: Sequence[Analysis], index: int) -> results.Gravit
 def _feasible(campaign: Campaign, model: GravityModel) -> str:
     """Is gravity compensation by computation feasible? Its error on each torque channel against the tightest limit."""
     limits = [requirement.limit for requirement in campaign.requirements if requirement.quantity == "torque"]
+    if not campaign.rig.transducer.channels:
+        return ""
     if not limits:
         return "There is no limit on a torque to measure the compensation's error against."
     found = feasibility(model, {channel: min(limits) for channel in ("Tx", "Ty", "Tz")})
@@ -220,12 +222,13 @@ def _feasible(campaign: Campaign, model: GravityModel) -> str:
 def _cross_coupling(analyses: Sequence[Analysis], decoupling: Decoupling) -> results.CrossCoupling:
     channels = decoupling.channels
     X = np.linalg.inv(decoupling.matrix) - np.eye(len(channels))
-    raw = np.concatenate([analysis.raw.values[analysis.raw.valid] for analysis in analyses])
+    wrenches = [select(analysis.raw, channels) for analysis in analyses]
+    raw = np.concatenate([wrench.values[wrench.valid] for wrench in wrenches])
     decoupled = (raw - decoupling.bias) @ decoupling.matrix.T
     removed = raw - decoupling.bias - decoupled
     share = np.abs(X) * np.std(decoupled, axis=0)
     row, column = np.unravel_index(int(np.argmax(share / np.std(decoupled, axis=0)[:, None])), share.shape)
-    units = analyses[0].raw.units
+    units = wrenches[0].units
     largest = (
         f"Relative to what varies on the channel itself, {channels[column]} leaks most into {channels[row]}: "
         f"{share[row, column]:.3g} {units[row]} rms."

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Literal
 
 import numpy as np
 
 from kbs_process.campaign.analysis import Analysis, bands_of, passband
 from kbs_process.campaign.config import Campaign
 from kbs_process.report import results
+from kbs_process.report.results import Frame
 from kbs_process.rig.model import Amplifier
 from kbs_process.signals.records import WRENCH_CHANNELS, Array, Clock, Signal
 from kbs_process.stages import bandpass, budget, gravity_error
@@ -31,17 +31,19 @@ def budgets(
 ) -> Iterable[results.Budget]:
     """Yield every recording's own budget; where nothing of a recording is known in a band, there is none."""
     lowest = min((mode.frequency_Hz for mode in resonances), default=None)
-    spacecraft = campaign.rig.spacecraft
+    spacecraft, own = campaign.rig.spacecraft, campaign.rig.frame
     for band in bands_of(campaign.bands)[1:]:
         for analysis in runs:
-            measured = analysis.pairs["T", band.name].measured
+            measured = analysis.pairs[own, band.name].measured
             if not measured.valid.any():
                 continue
-            noise = _repeat_noise(repeated, band.name, measured.channels, analysis.entry.trajectory)
+            of_band = [entry for entry in repeated if (entry.frame, entry.band) == (own, band.name)]
+            noise = _repeat_noise(of_band, measured.channels, analysis.entry.trajectory)
             entries = _entries(
                 campaign, analysis, model, decoupling, band, statements[band.name], noise, lowest
             )
-            yield from _rows(entries, "T", band.name, analysis.entry.name, measured)
+            frame: Frame = "joint" if own == "joint" else "T"
+            yield from _rows(entries, frame, band.name, analysis.entry.name, measured)
             if spacecraft is not None and measured.channels == WRENCH_CHANNELS:
                 moved = [
                     budget.Entry(entry.stage, entry.source, sigma_at_spacecraft(entry.sigma, spacecraft))
@@ -62,23 +64,23 @@ def _entries(
     repeat_noise: Array | None,
     resonance: float | None,
 ) -> list[budget.Entry]:
-    """The budget of one recording in one band, in T."""
+    """The budget of one recording in one band, in the frame of the recorded loads."""
 
     def cut(signal: Signal) -> Signal:
         return bandpass.apply(signal, band)
 
-    measured = analysis.pairs["T", band.name].measured
+    rig = campaign.rig
+    measured = analysis.pairs[rig.frame, band.name].measured
     limits = passband(band, campaign.bands.working_rate)
-    index = [WRENCH_CHANNELS.index(channel) for channel in measured.channels]
     sensor = budget.sensor_noise(
-        campaign.rig.transducer.noise.value[index],
-        analysis.run.rates["wrench"],
+        rig.loads.noise[rig.loads.index(measured.channels)],
+        analysis.run.load_rates,
         bandpass.noise_bandwidth(band, measured.dt),
     )
-    late = late_sigma(analysis.run.clocks, campaign.rig.transducer.amplifier)
+    late = late_sigma(analysis.run.clocks, rig.transducer.amplifier)
     entries = [
         sensor,
-        _cross_coupling(analysis, model, decoupling, band),
+        *([_cross_coupling(analysis, model, decoupling, band)] if rig.transducer.channels else []),
         *gravity_error.entries(analysis.motion, analysis.static, model, cut),
         budget.clock(analysis.static.wrench, late, cut, gravity_error.moving(analysis.motion)),
         *budget.filter_edges(
@@ -99,12 +101,16 @@ def _cross_coupling(
     Where the gravity fit estimates what the calibration left, its covariance holds the leak of the static wrench; here
     remains that of the disturbance, by the fit's own sigmas. Where it does not, the calibration's sigmas concern all.
     """
-    assert analysis.run.wrench is not None
+    measured = analysis.pairs["T", band.name].measured
     if not model.settings.cross_coupling:
-        return budget.cross_coupling(bandpass.apply(analysis.run.wrench, band), decoupling.sigma)
+        assert analysis.run.wrench is not None  # of a rig with a transducer
+        wrench = bandpass.apply(analysis.run.wrench, band)
+        leak = budget.cross_coupling(wrench, decoupling.sigma)
+        efforts = len(measured.channels) - len(wrench.channels)
+        return budget.Entry(leak.stage, leak.source, np.append(leak.sigma, np.zeros(efforts)))
     index = model.equation.index
-    fitted = model.equation.coupling(model.fit.sigma[: model.equation.size])[np.ix_(index, index)]
-    return budget.cross_coupling(analysis.pairs["T", band.name].measured, fitted)
+    fitted = model.equation.whole_coupling(model.fit.sigma[: model.equation.size])[np.ix_(index, index)]
+    return budget.cross_coupling(measured, fitted)
 
 
 def late_sigma(clocks: Mapping[str, Clock], amplifier: Amplifier | None) -> float:
@@ -117,10 +123,9 @@ def late_sigma(clocks: Mapping[str, Clock], amplifier: Amplifier | None) -> floa
 
 
 def _repeat_noise(
-    repeated: Sequence[results.Repeatability], band: str, channels: Sequence[str], trajectory: str
+    of_band: Sequence[results.Repeatability], channels: Sequence[str], trajectory: str
 ) -> Array | None:
-    """The noise of a trajectory's repeats in T, (c,); the largest of all where it was not repeated; else None."""
-    of_band = [entry for entry in repeated if entry.band == band and entry.frame == "T"]
+    """The noise of a trajectory's repeats, (c,); the largest of all where it was not repeated; else None."""
     own = [entry for entry in of_band if entry.trajectory == trajectory]
     worst = np.zeros(len(channels))
     for entry in own or of_band:
@@ -130,7 +135,7 @@ def _repeat_noise(
 
 
 def _rows(
-    entries: Sequence[budget.Entry], frame: Literal["S", "T"], band: str, recording: str, measured: Signal
+    entries: Sequence[budget.Entry], frame: Frame, band: str, recording: str, measured: Signal
 ) -> Iterable[results.Budget]:
     sums = budget.total(entries)
     for index, (channel, unit) in enumerate(zip(measured.channels, measured.units, strict=True)):

@@ -49,6 +49,9 @@ DIMENSIONS: dict[str, dict[str, float]] = {
         "N m s/deg": 180.0 / pi,
         "N m/rpm": 30.0 / pi,
     },
+    "linear damping": {"N s/m": 1.0, "N s/mm": 1e3},
+    "electric current": {"A": 1.0, "mA": 1e-3},
+    "electric tension": {"V": 1.0, "mV": 1e-3},
     "cubic rotational stiffness": {"N m/rad^3": 1.0},
     "rotational drag": {"N m s^2/rad^2": 1.0},
     "linear stiffness": {"N/m": 1.0, "N/mm": 1e3},
@@ -64,6 +67,11 @@ class UnitMismatchError(ValueError):
     def __init__(self, what: str, remedy: str) -> None:
         super().__init__(what)
         self.remedy = remedy
+
+
+def alike(unit: str, other: str) -> bool:
+    """Say whether two units are of one dimension; units that are not in the table are alike if they are the same."""
+    return unit == other or (unit in _DIMENSION_OF and _DIMENSION_OF[unit] == _DIMENSION_OF.get(other))
 
 
 def factor(unit: str, expected: str) -> float:

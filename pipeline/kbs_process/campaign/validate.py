@@ -42,7 +42,7 @@ def describe(campaign: Campaign, findings: Sequence[Finding]) -> Iterator[str]:
     yield f"{campaign.name}: {campaign.title}"
     yield (
         f"  {len(rig.quantities())} quantities, joints {', '.join(rig.joint_names)}, "
-        f"channels {', '.join(rig.transducer.channels)}, driven by {campaign.drive}"
+        f"channels {', '.join(rig.channels)}, driven by {campaign.drive}"
     )
     width = max(len(finding.name) for finding in findings)
     for finding in findings:

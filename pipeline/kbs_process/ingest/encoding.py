@@ -17,6 +17,7 @@ from kbs_process.signals.records import Array, Stamps
 Encoding = Literal["ros2", "json", "protobuf"]
 LITTLE_ENDIAN_CDR = b"\x00\x01\x00\x00"
 WIDTHS = {"wrench": 6, "temperature": 1}
+JOINT_PARTS = ("position", "velocity", "effort")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -24,7 +25,8 @@ class OutStream:
     """A topic to be written.
 
     Columns of `values`: a wrench's Fx, Fy, Fz, Tx, Ty, Tz (N, N m); a temperature (degC); for joints the
-    position of each of `names` (rad), then, where it is known, the velocity of each (rad/s).
+    position of each of `names` (rad; m of a prismatic joint), then, where they are known, the velocity of each (rad/s,
+    m/s), then the effort of each (N m, N, or what it was recorded in).
     """
 
     topic: str
@@ -38,7 +40,8 @@ class OutStream:
 
     def __post_init__(self) -> None:
         n, c = self.values.shape
-        widths = (WIDTHS[self.kind],) if self.kind in WIDTHS else (len(self.names), 2 * len(self.names))
+        joints = len(self.names)
+        widths = (WIDTHS[self.kind],) if self.kind in WIDTHS else (joints, 2 * joints, 3 * joints)
         if c not in widths or c == 0 or len(self.stamp) != n or len(self.log) != n:
             raise ValueError(
                 f"{self.topic}: {n} x {c} values of kind {self.kind} with names {self.names}, "
@@ -52,7 +55,7 @@ class OutStream:
             return tuple(f"wrench.{part}.{axis}" for part in ("force", "torque") for axis in "xyz")
         if self.kind == "temperature":
             return ("temperature",)
-        parts = ("position", "velocity")[: self.values.shape[1] // len(self.names)]
+        parts = JOINT_PARTS[: self.values.shape[1] // len(self.names)]
         return tuple(f"{part}[{name}]" for part in parts for name in self.names)
 
 
@@ -109,8 +112,8 @@ def _ros2(stream: OutStream) -> Iterator[bytes]:
         for name in stream.names:
             layout.text(name)
         joints = len(stream.names)
-        for columns in (stream.values[:, :joints], stream.values[:, joints:], stream.values[:, :0]):
-            layout.sequence(columns)  # position, velocity, no effort
+        for first in range(0, joints * len(JOINT_PARTS), joints):
+            layout.sequence(stream.values[:, first : first + joints])  # none of a part that is not known
     else:
         for column in stream.values.T:
             layout.number("<f8", column)
@@ -131,7 +134,9 @@ def _json(stream: OutStream) -> Iterator[bytes]:
             force, torque = (dict(zip("xyz", part, strict=True)) for part in (row[:3], row[3:]))
             message["wrench"] = {"force": force, "torque": torque}
         elif stream.kind == "joints":
-            message |= {"name": stream.names, "position": row[:joints], "velocity": row[joints:]}
+            message |= {"name": stream.names, "position": row[:joints], "velocity": row[joints : 2 * joints]}
+            if len(row) > 2 * joints:
+                message["effort"] = row[2 * joints :]
         else:
             message["temperature"] = row[0]
         yield encode(message)
@@ -150,7 +155,10 @@ def _protobuf(stream: OutStream) -> Iterator[bytes]:
                 2, delimited(1, _doubles(1, row[:3])) + delimited(2, _doubles(1, row[3:]))
             )
         elif stream.kind == "joints":
-            yield header + names + _packed(3, row[:joints]) + _packed(4, row[joints:])
+            parts = (row[:joints], row[joints : 2 * joints], row[2 * joints :])
+            yield (
+                header + names + b"".join(_packed(number, part) for number, part in enumerate(parts, start=3))
+            )
         else:
             yield header + _doubles(2, row)
 

@@ -110,6 +110,7 @@ def json_schema(kind: Kind) -> bytes:
             "name": {"type": "array", "items": {"type": "string"}},
             "position": {"type": "array", "items": _number()},
             "velocity": {"type": "array", "items": _number()},
+            "effort": {"type": "array", "items": _number()},
         },
         "temperature": {"temperature": _number()},
     }

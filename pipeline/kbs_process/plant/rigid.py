@@ -1,4 +1,4 @@
-"""Inverse dynamics of the rig's rigid bodies: from measured angles to the wrench on the transducer.
+"""Inverse dynamics of the rig's rigid bodies: from measured motion to the wrench on the transducer and the efforts.
 
 Vectorised over time. Everything is first expressed in the laboratory's axes and then turned into T's. An
 acceleration here has gravity taken off (what an accelerometer would read), so weight and inertia are one.
@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kbs_process.rig.model import LAB, TRANSDUCER, Rig
+from kbs_process.rig.model import LAB, TRANSDUCER, Joint, Rig
 from kbs_process.signals.frames import (
     about_axis,
     cross,
@@ -51,6 +51,47 @@ def inverse_dynamics(rig: Rig, q: Array, qd: Array, qdd: Array, *, sag: bool = T
     if not sag or rig.transducer.stiffness is None:
         return wrench
     return _sagged(wrench, rig, links, rig.transducer.stiffness.value)
+
+
+def loads(rig: Rig, q: Array, qd: Array, qdd: Array, *, sag: bool = True) -> Array:
+    """What the rig's instruments read (n, 6 + joints), in the order of `rig.loads`: wrench, then efforts.
+
+    The effort of a joint that nobody measures is zero.
+    """
+    measured = [index for index, joint in enumerate(rig.joints) if joint.effort is not None]
+    readings = np.zeros((len(q), len(rig.joints)))
+    if measured:
+        efforts = joint_efforts(rig, q, qd, qdd)
+        for index in measured:
+            effort = rig.joints[index].effort
+            assert effort is not None
+            readings[:, index] = efforts[:, index] / float(effort.gain) + float(effort.bias)
+    return np.concatenate([inverse_dynamics(rig, q, qd, qdd, sag=sag), readings], axis=1)
+
+
+def joint_efforts(rig: Rig, q: Array, qd: Array, qdd: Array) -> Array:
+    r"""Efforts (n, joints), N m or N, that the drives put into the joints to make them move so.
+
+    Equation: $\tau_j = s_j^T \sum_b w_b + b_j \dot q_j + R_j J_{r,j} (R_j \ddot q_j + e_j \cdot \alpha_c)$ with
+    $s_j$ the joint's screw, $w_b$ the wrench that accelerates and carries each body beyond it (outer rotors' spin
+    included), $b_j$ its viscous friction, and the last term its own rotor's on its carrier's rotation.
+    Validity: rigid bodies on a rigid base. Source: Featherstone, Rigid Body Dynamics Algorithms (2008), 5.3.
+    """
+    links = kinematics(rig, q, qd, qdd)
+    efforts = np.empty((len(q), len(rig.joints)))
+    for index, joint in enumerate(rig.joints):
+        link, carrier = links[joint.name], links[joint.parent]
+        force, moment = _reaction(rig, links, links_beyond(rig, joint.name), link.r)
+        e = _axis(joint, carrier)
+        turn, slide = joint.screw
+        efforts[:, index] = -np.sum(e * (turn * moment + slide * force), axis=1)
+        if joint.viscous is not None:
+            efforts[:, index] += float(joint.viscous) * qd[:, index]
+        if joint.drive is not None:
+            ratio = float(joint.drive.ratio)
+            spin_rate = ratio * qdd[:, index] + np.sum(e * carrier.alpha, axis=1)
+            efforts[:, index] += ratio * float(joint.drive.rotor_inertia) * spin_rate
+    return efforts
 
 
 def static_wrench(rig: Rig, q: Array, *, sag: bool = True) -> Array:
@@ -94,12 +135,12 @@ def inertia_matrix(elements: Array) -> Array:
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
-def links_beyond(rig: Rig) -> frozenset[str]:
-    """T and the links that hang on it: what their bodies do is what the transducer feels."""
-    beyond = {TRANSDUCER}
-    for joint in rig.joints:
-        if joint.parent in beyond:
-            beyond.add(joint.name)
+def links_beyond(rig: Rig, link: str = TRANSDUCER) -> frozenset[str]:
+    """A link and those that hang on it: what their bodies do is what the transducer, or the link's joint, feels."""
+    parents = {TRANSDUCER: rig.transducer.on} | {joint.name: joint.parent for joint in rig.joints}
+    beyond = {link}
+    for _ in parents:  # as often as the longest chain has links
+        beyond |= {name for name, parent in parents.items() if parent in beyond}
     return frozenset(beyond)
 
 
@@ -118,22 +159,26 @@ def kinematics(rig: Rig, q: Array, qd: Array, qdd: Array) -> dict[str, LinkMotio
     if rig.transducer.on == LAB:
         place_transducer(LAB)
     for index, joint in enumerate(rig.joints):
-        parent = links[joint.parent]
+        parent, (turn, slide) = links[joint.parent], joint.screw
         R_J = from_rotation_vector(joint.misalignment.value)
-        axis = np.asarray(joint.axis, dtype=float)
-        e = rotate(parent.R, R_J @ axis)
-        rate = e * qd[:, index, None]
-        d = rotate(parent.R, joint.origin.value)
+        e = _axis(joint, parent)
+        rate, acceleration = e * qd[:, index, None], e * qdd[:, index, None]
+        d = rotate(parent.R, joint.origin.value) + slide * e * q[:, index, None]
         links[joint.name] = LinkMotion(
-            R=parent.R @ R_J @ about_axis(axis, q[:, index]),
+            R=parent.R @ R_J @ about_axis(np.asarray(joint.axis, dtype=float), turn * q[:, index]),
             r=parent.r + d,
-            omega=parent.omega + rate,
-            alpha=parent.alpha + e * qdd[:, index, None] + cross(parent.omega, rate),
-            accel=_accel_at(parent, d),
+            omega=parent.omega + turn * rate,
+            alpha=parent.alpha + turn * (acceleration + cross(parent.omega, rate)),
+            accel=_accel_at(parent, d) + slide * (acceleration + 2.0 * cross(parent.omega, rate)),
         )
         if rig.transducer.on == joint.name:
             place_transducer(joint.name)
     return links
+
+
+def _axis(joint: Joint, carrier: LinkMotion) -> Array:
+    """The joint's axis (n, 3) in the laboratory's axes."""
+    return rotate(carrier.R, from_rotation_vector(joint.misalignment.value) @ np.asarray(joint.axis))
 
 
 def _accel_at(link: LinkMotion, d: Array) -> Array:
@@ -143,9 +188,20 @@ def _accel_at(link: LinkMotion, d: Array) -> Array:
 
 
 def _wrench(rig: Rig, links: dict[str, LinkMotion]) -> Array:
-    beyond = links_beyond(rig)
     T = links[TRANSDUCER]
-    force, moment = np.zeros_like(T.r), np.zeros_like(T.r)
+    force, moment = _reaction(rig, links, links_beyond(rig), T.r)
+    R_TL = np.swapaxes(T.R, 1, 2)
+    return np.concatenate([rotate(R_TL, force), rotate(R_TL, moment)], axis=1)
+
+
+def _reaction(
+    rig: Rig, links: dict[str, LinkMotion], beyond: frozenset[str], about: Array
+) -> tuple[Array, Array]:
+    """Force and moment (n, 3) that the bodies and rotors on the links `beyond` exert on what carries them.
+
+    The moment is about points `about` (n, 3); all in the laboratory's axes.
+    """
+    force, moment = np.zeros_like(about), np.zeros_like(about)
     for body in rig.bodies:
         if body.on not in beyond:
             continue
@@ -155,10 +211,8 @@ def _wrench(rig: Rig, links: dict[str, LinkMotion]) -> Array:
         I_link = link.R @ inertia_matrix(body.inertia.value) @ np.swapaxes(link.R, 1, 2)
         spin = rotate(I_link, link.alpha) + cross(link.omega, rotate(I_link, link.omega))
         force += F
-        moment += cross(link.r + c - T.r, F) - spin
-    moment += _rotors(rig, links, beyond)
-    R_TL = np.swapaxes(T.R, 1, 2)
-    return np.concatenate([rotate(R_TL, force), rotate(R_TL, moment)], axis=1)
+        moment += cross(link.r + c - about, F) - spin
+    return force, moment + _rotors(rig, links, beyond)
 
 
 def _sagged(wrench: Array, rig: Rig, links: dict[str, LinkMotion], stiffness: Array) -> Array:
@@ -191,7 +245,7 @@ def _rotors(rig: Rig, links: dict[str, LinkMotion], beyond: frozenset[str]) -> A
             continue
         carrier, link = links[joint.parent], links[joint.name]
         Jr, ratio = float(joint.drive.rotor_inertia), float(joint.drive.ratio)
-        e = rotate(carrier.R, from_rotation_vector(joint.misalignment.value) @ np.asarray(joint.axis))
+        e = _axis(joint, carrier)
         rate = _along(link.omega - carrier.omega, e)
         acceleration = _along(link.alpha - carrier.alpha, e)
         spin = _along(carrier.omega, e) + ratio * rate

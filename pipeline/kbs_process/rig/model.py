@@ -1,25 +1,28 @@
 """The rig: a serial chain of joints and bodies on (or under) a six-component transducer.
 
 A rig is data. It names links: the laboratory `lab`, the transducer's top plate `T`, and one link a
-joint, called like the joint. Each joint turns its link about `axis` with respect to its parent; bodies
-are fixed to links. A pointing mechanism on a test bench is lab -> T -> az -> el; an instrumented wheel,
-whose transducer turns with it, is lab -> wheel -> T.
+joint, called like the joint. Each joint turns its link about `axis` with respect to its parent, or slides it
+along; bodies are fixed to links. A pointing mechanism on a test bench is lab -> T -> az -> el; an instrumented
+wheel, whose transducer turns with it, is lab -> wheel -> T; a linear axis without a transducer is lab -> axis.
 
-The wrench is what everything beyond T (seen from the laboratory) exerts on the transducer.
+Its loads are what it is measured by. The wrench is what everything beyond T (seen from the laboratory) exerts on the
+transducer; the effort of a joint is what its drive puts into it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, fields, is_dataclass
 from typing import Literal
 
 import numpy as np
 
-from kbs_process.signals.records import Array
+from kbs_process.signals.records import WRENCH_CHANNELS, WRENCH_UNITS, Array
 
 LAB = "lab"
 TRANSDUCER = "T"
+JointType = Literal["revolute", "prismatic"]
+COORDINATE: dict[JointType, str] = {"revolute": "rad", "prismatic": "m"}  # unit of a joint's coordinate
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,8 +78,26 @@ class Drive:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Effort:
+    """What the drive puts into a joint, as it is recorded: reading = effort / gain + bias + noise.
+
+    A current's gain is the torque constant, a voltage's that of the amplifier and motor together; a force or torque
+    that is recorded as such has a gain of 1.
+    """
+
+    unit: str  # of the reading
+    gain: Quantity  # N (N m where the joint turns) a unit of the reading
+    bias: Quantity  # in the reading's unit, as the three below
+    noise: Quantity  # rms a sample at the recorded rate
+    resolution: Quantity
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Joint:
-    """A revolute joint: its link turns by the joint angle about `axis` (parent's axes, right-handed)."""
+    """A joint along or about `axis` (parent's axes): its link turns by the joint's angle, right-handed, or slides.
+
+    What is an angle in rad of a revolute joint is a way in m of a prismatic one, and N m are N.
+    """
 
     name: str
     parent: str  # "lab", "T" or another joint
@@ -85,6 +106,19 @@ class Joint:
     misalignment: Quantity  # (3,) rad, small rotation of the axis with respect to the parent
     encoder: Encoder | None
     drive: Drive | None
+    type: JointType = "revolute"
+    viscous: Quantity | None = None  # N m s/rad, viscous friction between parent and link
+    effort: Effort | None = None  # None: nobody measures it
+
+    @property
+    def screw(self) -> tuple[float, float]:
+        """Turn about the axis (rad) and slide along it (m) of a unit of the joint's coordinate."""
+        return (1.0, 0.0) if self.type == "revolute" else (0.0, 1.0)
+
+    @property
+    def unit(self) -> str:
+        """Unit of the joint's coordinate."""
+        return COORDINATE[self.type]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -105,7 +139,9 @@ class Transducer:
     """raw = (I + cross_coupling) wrench + bias + noise, quantised to `resolution`."""
 
     on: str  # "lab" or a joint
-    channels: tuple[str, ...]  # those recorded, a subset of WRENCH_CHANNELS
+    channels: tuple[
+        str, ...
+    ]  # those recorded, a subset of WRENCH_CHANNELS; none on a rig without a transducer
     tilt: Quantity  # (2,) rad, tx about x and ty about y
     stiffness: Quantity | None  # (3,) N m/rad about x, y, z; None: rigid
     damping: Quantity | None  # (3,) N m s/rad
@@ -124,6 +160,26 @@ class External:
     on: str  # link, or "lab" for what moves the floor
     point: Quantity | None  # (3,) m in the link's axes, from its origin: where a force acts
     parameters: dict[str, Quantity]  # those that the effect asks for by name
+
+
+def no_transducer() -> Transducer:
+    """Return what stands for the transducer of a rig that has none: a level plate in the laboratory, not recorded."""
+
+    def zero(name: str, *shape: int) -> Quantity:
+        return Quantity(f"transducer.{name}", np.zeros(shape), "", np.zeros(shape), "there is no transducer")
+
+    return Transducer(
+        on=LAB,
+        channels=(),
+        tilt=zero("tilt", 2),
+        stiffness=None,
+        damping=None,
+        cross_coupling=zero("cross_coupling", 6, 6),
+        bias=zero("bias", 6),
+        noise=zero("noise", 6),
+        resolution=zero("resolution", 6),
+        amplifier=None,
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -146,6 +202,20 @@ class Spacecraft:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Loads:
+    """All loads of a rig in one order: the six components of the wrench, then the effort of each joint, as read."""
+
+    channels: tuple[str, ...]
+    units: tuple[str, ...]  # "" of an effort that is not measured
+    bias_sigma: Array  # (6 + joints,), prior of a recording's zero
+    noise: Array  # (6 + joints,), rms a sample at the recorded rate
+
+    def index(self, channels: Iterable[str]) -> list[int]:
+        """Return where `channels` stand."""
+        return [self.channels.index(channel) for channel in channels]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Rig:
     """Everything about the hardware that the pipeline knows."""
 
@@ -165,9 +235,38 @@ class Rig:
         """Return the joint of that name."""
         return next(joint for joint in self.joints if joint.name == name)
 
+    @property
+    def loads(self) -> Loads:
+        """Return every load that the rig's inverse dynamics gives, measured or not."""
+        efforts = [joint.effort for joint in self.joints]
+        t = self.transducer
+
+        def full(wrench: Array, of: Callable[[Effort], Array]) -> Array:
+            return np.append(wrench, [0.0 if effort is None else float(of(effort)) for effort in efforts])
+
+        return Loads(
+            channels=(*WRENCH_CHANNELS, *(f"{joint.name}.effort" for joint in self.joints)),
+            units=(*WRENCH_UNITS, *("" if effort is None else effort.unit for effort in efforts)),
+            bias_sigma=full(t.bias.sigma, lambda effort: effort.bias.sigma),
+            noise=full(t.noise.value, lambda effort: effort.noise.value),
+        )
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Return the loads that are recorded: the transducer's channels, then the joints' efforts."""
+        measured = (f"{joint.name}.effort" for joint in self.joints if joint.effort is not None)
+        return (*self.transducer.channels, *measured)
+
+    @property
+    def frame(self) -> str:
+        """Return the frame of the recorded loads: the transducer's, or the joints' own where there is none."""
+        return TRANSDUCER if self.transducer.channels else "joint"
+
     def quantities(self) -> dict[str, Quantity]:
-        """Return every quantity of the rig by its dotted name."""
-        return {quantity.name: quantity for quantity in _walk(self)}
+        """Return every quantity of the rig by its dotted name; a transducer that is not there has none."""
+        absent = () if self.transducer.channels else ("transducer",)
+        parts = tuple(getattr(self, entry.name) for entry in fields(self) if entry.name not in absent)
+        return {quantity.name: quantity for quantity in _walk(parts)}
 
 
 def _walk(node: object) -> Iterator[Quantity]:

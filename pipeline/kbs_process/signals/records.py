@@ -84,6 +84,18 @@ class Signal:
         )
 
 
+def beside(first: Signal, second: Signal) -> Signal:
+    """Return the channels of two signals on one grid, those of `first` before the others; the frame is its own."""
+    return replace(
+        first,
+        values=np.concatenate([first.values, second.values], axis=1),
+        channels=first.channels + second.channels,
+        units=first.units + second.units,
+        valid=first.valid & second.valid,
+        history=(*first.history, *(f"{', '.join(second.channels)}: {step}" for step in second.history)),
+    )
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Events:
     """A slow stream kept sample by sample: commands, field positions, temperatures."""
@@ -151,14 +163,36 @@ class Run:
     field: Events | None  # field position of each motor, motor rad
     temperature: Signal | None  # degC
     encoder: Events | None  # encoder angles at their own rate, where the controller needs them
-    spectrum: Spectrum | None  # of the wrench
-    envelope: Envelope | None  # of the wrench
+    spectrum: Spectrum | None  # of the wrench, or of the efforts of a rig without a transducer
+    envelope: Envelope | None  # likewise
     epoch_ns: int  # sensor clock at the recording's time zero
     log_epoch_ns: int = 0  # recorder clock at the recording's time zero
     rates: dict[str, float] = dataclasses.field(default_factory=dict)  # Hz, measured, by stream
     losses: tuple[Loss, ...] = ()
     clocks: dict[str, Clock] = dataclasses.field(default_factory=dict)  # by stream
     pointing: Signal | None = None  # angle of each joint by an external instrument, rad
+    effort: Signal | None = None  # of each joint that has it measured, in the unit in which it is recorded
+
+    @property
+    def loads(self) -> Signal | None:
+        """Return all loads that were recorded as one signal: the wrench's channels, then the efforts."""
+        if self.wrench is None:
+            return self.effort
+        return self.wrench if self.effort is None else beside(self.wrench, self.effort)
+
+    @property
+    def load_rates(self) -> Array:
+        """Rate (c,) at which each channel of `loads` was sampled, Hz."""
+        measured = {"wrench": self.wrench, "effort": self.effort}
+        return np.array(
+            [
+                self.rates[key]
+                for key, signal in measured.items()
+                if signal is not None
+                for _ in signal.channels
+            ],
+            dtype=np.float64,
+        )
 
     def with_wrench(self, wrench: Signal) -> Run:
         """Return the same run with another wrench."""

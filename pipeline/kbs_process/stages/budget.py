@@ -53,7 +53,7 @@ def _root_mean(variance: Array, valid: Mask, moving: Mask | None) -> Array:
     return root
 
 
-def sensor_noise(noise: Array, rate: float, bandwidth: float) -> Entry:
+def sensor_noise(noise: Array, rate: Array | float, bandwidth: float) -> Entry:
     """White noise of rms `noise` (c,) a sample at `rate` Hz, in a band `bandwidth` Hz wide: noise sqrt(2 B / rate)."""
     return Entry("transducer", "noise of the transducer, white", noise * np.sqrt(2.0 * bandwidth / rate))
 

@@ -33,7 +33,8 @@ from kbs_process.stages.stream import Collected, Timeline, Uniform
 Progress = Callable[[str, int], None]  # stream, samples just taken
 
 # Brought to the working rate; the first one present is the reference.
-SAMPLED = ("wrench", "angle", "rate", "pointing")
+SAMPLED = ("wrench", "effort", "angle", "rate", "pointing")
+LOADS = ("wrench", "effort")  # the first one present has spectrum and envelope
 SLOW = ("command", "field", "temperature")  # kept sample by sample: one a control cycle, or slower
 DOUBT = 1e-3  # largest weight of invented samples in a valid one
 
@@ -55,8 +56,11 @@ def condense(
     channels: Mapping[str, tuple[str, ...]],
     settings: CondenseSettings,
     progress: Progress | None = None,
+    units: Mapping[str, tuple[str, ...]] | None = None,
 ) -> Run:
     """Reduce a recording to a `Run`; `channels` names the columns of every stream that `blocks` brings.
+
+    `units` are those of streams of the joints that are not rad or rad/s throughout.
 
     Time zero is the reference stream's first sample (the wrench's, where there is one), and the axis covers
     that stream. Samples that lean on invented input (gaps, the ends' continuation, times at which a stream
@@ -64,8 +68,9 @@ def condense(
 
     Raises RecordingError where a sampled stream is empty or shorter than the filters.
     """
+    load = next((key for key in LOADS if key in channels), None)
     streams: dict[str, Uniform | Collected] = {
-        key: _stream(name, key, columns, settings) for key, columns in channels.items()
+        key: _stream(name, key, columns, settings, is_load=key == load) for key, columns in channels.items()
     }
     for key, block in blocks:
         if len(block):
@@ -78,7 +83,7 @@ def condense(
     collected = {key: stream.finish() for key, stream in slow.items()}
     if not kept:
         raise RecordingError(
-            "the recording brings neither wrench nor joint angles",
+            "the recording brings neither wrench nor joint angles, and no effort",
             where=name,
             remedy="check the [topics] of campaign.toml",
         )
@@ -88,14 +93,15 @@ def condense(
 
     dt = 1.0 / settings.working_rate_Hz
     count = int(np.floor(sampled[reference].line.span / dt * (1.0 + 1e-12))) + 1
-    signals = {key: _signal(key, kept[key], channels[key], clocks[key], dt, count) for key in kept}
+    meanings = {key: _meaning(key, channels[key], (units or {}).get(key)) for key in kept}
+    signals = {key: _signal(kept[key], channels[key], meanings[key], clocks[key], dt, count) for key in kept}
     events = {
         key: Events(_on_axis(own, clocks[key]), values, channels[key])
         for key, (own, values) in collected.items()
         if len(own)
     }
     encoder = sampled["angle"].samples() if "angle" in sampled else None
-    wrench = sampled.get("wrench")
+    loaded = None if load is None else sampled.get(load)
     return Run(
         name=name,
         wrench=signals.get("wrench"),
@@ -107,14 +113,15 @@ def condense(
         encoder=Events(_on_axis(encoder[0], clocks["angle"]), encoder[1], channels["angle"])
         if encoder
         else None,
-        spectrum=wrench.welch.result() if wrench and wrench.welch else None,
-        envelope=_envelope(wrench) if wrench else None,
+        spectrum=loaded.welch.result() if loaded and loaded.welch else None,
+        envelope=_envelope(loaded) if loaded else None,
         epoch_ns=present[reference].first_stamp,
         log_epoch_ns=present[reference].clock().first_log,
         rates={key: line.grid.rate for key, line in present.items() if line.grid is not None},
         losses=(*_losses(present, clocks), *(_missing(s.line) for s in slow.values() if not s.line.samples)),
         clocks=clocks,
         pointing=signals.get("pointing"),
+        effort=signals.get("effort"),
     )
 
 
@@ -130,13 +137,15 @@ def _missing(line: Timeline) -> Loss:
     return Loss("missing", line.where, 0, detail="not one sample")
 
 
-def _stream(name: str, key: str, columns: tuple[str, ...], settings: CondenseSettings) -> Uniform | Collected:
+def _stream(
+    name: str, key: str, columns: tuple[str, ...], settings: CondenseSettings, *, is_load: bool
+) -> Uniform | Collected:
     where = f"{name}: {key}"
     if key in SLOW:
         return Collected(where, len(columns))
     if key not in SAMPLED:
         raise KeyError(f"no stream is called {key!r}")
-    if key == "wrench":
+    if is_load:
         return Uniform(
             where,
             columns,
@@ -149,7 +158,7 @@ def _stream(name: str, key: str, columns: tuple[str, ...], settings: CondenseSet
         where,
         columns,
         settings.working_rate_Hz,
-        unwrap=key != "rate",
+        unwrap=key in ("angle", "pointing"),
         keep_below=settings.encoder_limit_Hz if angle else 0.0,
     )
 
@@ -179,17 +188,27 @@ def _on_axis(own: Array, clock: Clock) -> Array:
     return t
 
 
-def _signal(key: str, kept: Kept, columns: tuple[str, ...], clock: Clock, dt: float, count: int) -> Signal:
+def _signal(
+    kept: Kept,
+    columns: tuple[str, ...],
+    meaning: tuple[tuple[str, ...], str],
+    clock: Clock,
+    dt: float,
+    count: int,
+) -> Signal:
     t = dt * np.arange(count, dtype=np.float64)
     values, doubt = kept.at((t - clock.offset_s) / (1.0 + clock.skew))
-    units, frame = _meaning(key, columns)
+    units, frame = meaning
     return Signal(0.0, dt, values, columns, units, frame, doubt <= DOUBT, (_story(kept, clock, dt),))
 
 
-def _meaning(key: str, columns: tuple[str, ...]) -> tuple[tuple[str, ...], str]:
+def _meaning(
+    key: str, columns: tuple[str, ...], units: tuple[str, ...] | None
+) -> tuple[tuple[str, ...], str]:
+    """Units and frame of a stream."""
     if key == "wrench":
         return tuple(WRENCH_UNITS[WRENCH_CHANNELS.index(channel)] for channel in columns), "T"
-    return ("rad/s" if key == "rate" else "rad",) * len(columns), "joint"
+    return units or ("rad/s" if key == "rate" else "rad",) * len(columns), "joint"
 
 
 def _story(kept: Kept, clock: Clock, dt: float) -> str:

@@ -31,10 +31,10 @@ class SignCheck:
 def check_weight(rig: Rig) -> tuple[SignCheck, ...]:
     """At rest on a level plate the unit pushes the transducer down by its weight.
 
-    Says nothing about a transducer that turns with a joint, stands upright, or is not under gravity.
+    Says nothing about a transducer that turns with a joint, stands upright, is not under gravity, or is not there.
     """
     level = bool(np.all(np.abs(rig.transducer.tilt.value) < LEVEL))
-    if rig.transducer.on != LAB or not level or float(rig.gravity) == 0.0:
+    if not rig.transducer.channels or rig.transducer.on != LAB or not level or float(rig.gravity) == 0.0:
         return ()
     force = static_wrench(rig, np.zeros((1, len(rig.joints))))[0, :3]
     return (
@@ -58,7 +58,7 @@ def check_gravity_sign(measured: Signal, static: Signal, noise: Array) -> tuple[
         x = static.values[measured.valid, index]
         y = measured.values[measured.valid, index]
         x, y = x - x.mean(), y - y.mean()
-        if np.std(x) < MIN_VARIATION * noise[index]:
+        if np.std(x) <= MIN_VARIATION * noise[index]:
             continue
         slope = float(x @ y / (x @ x))
         tests.append(

@@ -43,6 +43,8 @@ def apply(run: Run, model: Decoupling) -> Run:
     if run.wrench is not None:
         values = (run.wrench.values - model.bias) @ model.matrix.T
         wrench = run.wrench.derive(values, "cross-coupling removed by the calibrated matrix")
+    if wrench is None:  # spectrum and envelope are of something else
+        return run
     spectrum = None if run.spectrum is None else _spectrum(run.spectrum, model)
     envelope = None if run.envelope is None else _envelope(run.envelope, model)
     return replace(run, wrench=wrench, spectrum=spectrum, envelope=envelope)

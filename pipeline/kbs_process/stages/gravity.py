@@ -19,7 +19,7 @@ import numpy as np
 from kbs_process.errors import FitError
 from kbs_process.estimation.fit import Fit
 from kbs_process.rig.model import Rig
-from kbs_process.signals.records import WRENCH_UNITS, Array, Signal
+from kbs_process.signals.records import Array, Signal
 from kbs_process.stages.gravity_equation import Equation, Prepared, at_rest, prepare
 from kbs_process.stages.gravity_parameters import Index
 from kbs_process.stages.gravity_solve import (
@@ -41,7 +41,7 @@ _CHUNK = 65536  # samples a step, which bounds memory
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sample:
-    """A recording for the fit: its motion and its decoupled wrench, on one grid."""
+    """A recording for the fit: its motion and its loads, the wrench decoupled, on one grid."""
 
     name: str
     motion: Motion
@@ -85,7 +85,7 @@ class GravityModel:
 
     @property
     def units(self) -> tuple[str, ...]:
-        return tuple(WRENCH_UNITS[index] for index in self.equation.index)
+        return self.equation.units
 
     @property
     def unexplained(self) -> Array:
@@ -96,7 +96,7 @@ class GravityModel:
     def without_coupling(self, residual: Array) -> Array:
         """Undo the fitted rest of the cross-coupling on a residual (n, c): (I + dX)^-1."""
         index = self.equation.index
-        dX = self.equation.coupling(self.fit.value[: self.equation.size])[np.ix_(index, index)]
+        dX = self.equation.whole_coupling(self.fit.value[: self.equation.size])[np.ix_(index, index)]
         undone = np.linalg.solve(np.eye(len(index)) + dX, residual.T).T
         return np.ascontiguousarray(undone, dtype=np.float64)
 
@@ -150,7 +150,7 @@ def fit(
         theta = result.value[: equation.size]
         sigmas = [residual_sigma(equation, theta, p, rig) for p in used]
     refuse_uninformed(equation, data, sigmas, theta)
-    biases = zeros(equation, result)[:, 0]
+    biases = zeros(equation, result, len(data))[:, 0]
     taring = {
         p.name: of_fit(equation, theta, p, bias, sigma)
         for p, bias, sigma in zip(data, biases, weighed, strict=True)
@@ -229,7 +229,7 @@ def apply(motion: Motion, model: GravityModel, taring: Taring | None = None) -> 
         values=values,
         channels=model.channels,
         units=model.units,
-        frame="T",
+        frame=model.rig.frame,
         valid=motion.valid,
         history=(*motion.history, f"{kind} of the fitted gravity model"),
     )

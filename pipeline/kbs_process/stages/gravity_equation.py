@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kbs_process.errors import RecordingError
-from kbs_process.plant.rigid import inverse_dynamics
+from kbs_process.plant.rigid import loads
 from kbs_process.rig.model import Rig
-from kbs_process.signals.records import WRENCH_CHANNELS, Array, Mask, Signal
+from kbs_process.signals.records import Array, Mask, Signal
 from kbs_process.signals.smoothing import kernel_length, smooth
 from kbs_process.stages.gravity_parameters import Index, RigElements, coupling_elements, rig_elements
 from kbs_process.stages.motion import Motion
@@ -35,7 +35,7 @@ class Prepared:
     after: Angles | None
     sigma_q: Array
     rounding: Array  # (n, joints) rad, the encoders' part of sigma_q
-    wrench: Array  # (n, c) low-passed
+    wrench: Array  # (n, c) wrench and efforts, low-passed
 
     def rows(self, which: slice | Index) -> Prepared:
         """The same at some of the instants."""
@@ -105,8 +105,8 @@ def at_rest(p: Prepared, rig: Rig) -> Prepared:
     estimates towards zero (errors in variables); taken off once, it is but noise.
     """
     q, rest = p.q - encoder_offsets(rig), np.zeros_like(p.q)
-    inertial = inverse_dynamics(rig, q, p.qd, p.qdd) - inverse_dynamics(rig, q, rest, rest)
-    index = [WRENCH_CHANNELS.index(channel) for channel in rig.transducer.channels]
+    inertial = loads(rig, q, p.qd, p.qdd) - loads(rig, q, rest, rest)
+    index = rig.loads.index(rig.channels)
     return replace(p, qd=rest, qdd=rest, before=None, after=None, wrench=p.wrench - inertial[:, index])
 
 
@@ -132,7 +132,8 @@ class Equation:
     """predicted = (I + dX) (W + delay W' + inertia W''), over the recorded channels, the bias aside.
 
     The response's two terms are the low-frequency expansion of what lies between the angles and the
-    wrench: a delay, and a first resonance at f_n, which gives inertia = -1 / (2 pi f_n)^2.
+    wrench: a delay, and a first resonance at f_n, which gives inertia = -1 / (2 pi f_n)^2. They and dX are the
+    transducer's; efforts have neither.
     """
 
     elements: RigElements
@@ -147,16 +148,16 @@ class Equation:
     def of(
         rig: Rig, *, include_inertia: bool, cross_coupling: bool, response_sigma: tuple[float, float] | None
     ) -> Equation:
-        rows, columns, names = coupling_elements(rig, rig.transducer.channels)
+        rows, columns, names = coupling_elements(rig)
         keep = len(rows) if cross_coupling else 0
         return Equation(
             elements=rig_elements(rig, include_inertia=include_inertia),
-            channels=rig.transducer.channels,
+            channels=rig.channels,
             include_inertia=include_inertia,
             rows=rows[:keep],
             columns=columns[:keep],
             coupling_names=names[:keep],
-            response_sigma=response_sigma,
+            response_sigma=response_sigma if rig.transducer.channels else None,
         )
 
     @property
@@ -169,12 +170,17 @@ class Equation:
 
     @property
     def index(self) -> list[int]:
-        return [WRENCH_CHANNELS.index(channel) for channel in self.channels]
+        return self.elements.rig.loads.index(self.channels)
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        units = self.elements.rig.loads.units
+        return tuple(units[index] for index in self.index)
 
     @property
     def bias_sigma(self) -> Array:
-        """(c,) prior of a recording's taring bias."""
-        return self.elements.rig.transducer.bias.sigma[self.index]
+        """(c,) prior of a recording's taring bias; 0 of a channel whose zero is exact."""
+        return self.elements.rig.loads.bias_sigma[self.index]
 
     def start(self) -> Array:
         return np.concatenate([self.elements.value, np.zeros(self.size - len(self.elements.names))])
@@ -201,18 +207,16 @@ class Equation:
         return RigElements(rig, (X,), (np.ones((6, 6), dtype=bool),)).rig_at(total.ravel(), spread.ravel())
 
     def predict(self, theta: Array, p: Prepared) -> Array:
-        """(n, c) N and N m."""
-        total = self._responded(theta, self._wrenches(theta, p), p.dt)
-        values: Array = (total @ (np.eye(6) + self.coupling(theta)).T)[:, self.index]
+        """(n, c) in the channels' units."""
+        values: Array = self._responded(theta, self._loads(theta, p), p.dt) @ self._mixing(theta)
         return values
 
     def jacobian(self, theta: Array, p: Prepared) -> Array:
         """(n c, size): rig elements by differences, the rest is linear."""
         n, c, count = len(p.q), len(self.channels), len(self.elements.names)
         J = np.zeros((n, c, self.size))
-        wrenches = self._wrenches(theta, p)
-        W = self._responded(theta, wrenches, p.dt)
-        mixing = (np.eye(6) + self.coupling(theta)).T[:, self.index]
+        moments = self._loads(theta, p)
+        W, mixing = self._responded(theta, moments, p.dt), self._mixing(theta)
         base = W @ mixing
         for column, scale in enumerate(self.elements.sigma):
             moved = theta.copy()
@@ -221,7 +225,7 @@ class Equation:
         for column, (i, j) in enumerate(zip(self.rows, self.columns, strict=True), start=count):
             J[:, self.index.index(i), column] = W[:, j]
         if self.response_sigma is not None:
-            first, second = _derivatives(wrenches, p.dt)
+            first, second = _derivatives(moments, p.dt)
             J[:, :, -2], J[:, :, -1] = first @ mixing, second @ mixing
         return J.reshape(n * c, self.size)
 
@@ -247,23 +251,37 @@ class Equation:
         dX[self.rows, self.columns] = theta[start : start + len(self.rows)]
         return dX
 
-    def _wrenches(self, theta: Array, p: Prepared) -> tuple[Array, ...]:
-        """W at the instants and, where known, one sample before and after."""
+    def _mixing(self, theta: Array) -> Array:
+        """(6 + joints, c) from all loads to the recorded channels."""
+        whole = self.whole_coupling(theta)
+        return (np.eye(len(whole)) + whole.T)[:, self.index]
+
+    def whole_coupling(self, theta: Array) -> Array:
+        """`coupling` among all loads, (6 + joints, 6 + joints): efforts have none."""
+        count = len(self.elements.rig.loads.channels)
+        dX = np.zeros((count, count))
+        dX[:6, :6] = self.coupling(theta)
+        return dX
+
+    def _loads(self, theta: Array, p: Prepared) -> tuple[Array, ...]:
+        """All loads at the instants and, where known, one sample before and after."""
         rig = self.elements.rig_at(theta[: len(self.elements.names)])
         offset = encoder_offsets(rig)
         moments = [(p.q, p.qd, p.qdd)] + [angles for angles in (p.before, p.after) if angles is not None]
-        return tuple(inverse_dynamics(rig, q - offset, qd, qdd) for q, qd, qdd in moments)
+        return tuple(loads(rig, q - offset, qd, qdd) for q, qd, qdd in moments)
 
-    def _responded(self, theta: Array, wrenches: tuple[Array, ...], dt: float) -> Array:
-        if self.response_sigma is None or len(wrenches) == 1:
-            return wrenches[0]
-        first, second = _derivatives(wrenches, dt)
+    def _responded(self, theta: Array, moments: tuple[Array, ...], dt: float) -> Array:
+        if self.response_sigma is None or len(moments) == 1:
+            return moments[0]
+        first, second = _derivatives(moments, dt)
         delay, inertia = theta[-2:]
-        total: Array = wrenches[0] + delay * first + inertia * second
+        total: Array = moments[0] + delay * first + inertia * second
         return total
 
 
-def _derivatives(wrenches: tuple[Array, ...], dt: float) -> tuple[Array, Array]:
-    """First and second central difference, exact to (2 pi f dt)^2 / 6 and / 12."""
-    now, before, after = wrenches
-    return (after - before) / (2 * dt), (after - 2 * now + before) / dt**2
+def _derivatives(moments: tuple[Array, ...], dt: float) -> tuple[Array, Array]:
+    """First and second central difference of the wrench, exact to (2 pi f dt)^2 / 6 and / 12; zero of the efforts."""
+    now, before, after = moments
+    first, second = (after - before) / (2 * dt), (after - 2 * now + before) / dt**2
+    first[:, 6:] = second[:, 6:] = 0.0
+    return first, second

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kbs_process.plant.rigid import links_beyond
-from kbs_process.rig.model import Quantity, Rig, substitute
+from kbs_process.rig.model import Joint, Quantity, Rig, substitute
 from kbs_process.signals.records import WRENCH_CHANNELS, Array, Mask
 
 CROSS_COUPLING = "transducer.cross_coupling"
@@ -42,11 +42,9 @@ class RigElements:
 
     @property
     def lower(self) -> Array:
-        """Masses and stiffnesses stay positive."""
-        bounds = [
-            np.full(q.shape, 1e-6 if q.name.endswith((".mass", ".stiffness")) else -np.inf)
-            for q in self.quantities
-        ]
+        """Masses, stiffnesses and gains stay positive."""
+        positive = (".mass", ".stiffness", ".gain")
+        bounds = [np.full(q.shape, 1e-6 if q.name.endswith(positive) else -np.inf) for q in self.quantities]
         return self._gather(bounds)
 
     def _gather(self, arrays: list[Array]) -> Array:
@@ -68,14 +66,14 @@ class RigElements:
 
 
 def rig_elements(rig: Rig, *, include_inertia: bool) -> RigElements:
-    """All elements with a prior sigma above zero of the quantities that shape the wrench on the transducer."""
+    """All elements with a prior sigma above zero of the quantities that shape the recorded loads."""
     free = [q for q in _candidates(rig, include_inertia) if np.any(q.sigma > 0.0)]
     return RigElements(rig, tuple(free), tuple(q.sigma > 0.0 for q in free))
 
 
-def coupling_elements(rig: Rig, channels: tuple[str, ...]) -> tuple[Index, Index, tuple[str, ...]]:
+def coupling_elements(rig: Rig) -> tuple[Index, Index, tuple[str, ...]]:
     """Row and column indices of the cross-coupling's free elements (rows: recorded channels), and their names."""
-    recorded = np.isin(WRENCH_CHANNELS, channels)
+    recorded = np.isin(WRENCH_CHANNELS, rig.transducer.channels)
     free = (rig.transducer.cross_coupling.sigma > 0.0) & recorded[:, None]
     rows, columns = np.nonzero(free)
     names = tuple(element_name(CROSS_COUPLING, (int(i), int(j))) for i, j in zip(rows, columns, strict=True))
@@ -87,7 +85,7 @@ def element_name(name: str, index: tuple[int, ...]) -> str:
 
 
 def _candidates(rig: Rig, include_inertia: bool) -> Iterator[Quantity]:
-    beyond = links_beyond(rig)
+    beyond = links_beyond(rig).union(*(links_beyond(rig, joint.name) for joint in _driven(rig)))
     for body in rig.bodies:
         if body.on in beyond:
             yield body.mass
@@ -102,6 +100,16 @@ def _candidates(rig: Rig, include_inertia: bool) -> Iterator[Quantity]:
         yield joint.misalignment
         if joint.encoder is not None:
             yield joint.encoder.offset
+    for joint in _driven(rig):
+        assert joint.effort is not None
+        yield joint.effort.gain
+        if include_inertia and joint.viscous is not None:
+            yield joint.viscous
+
+
+def _driven(rig: Rig) -> list[Joint]:
+    """Joints whose effort is measured."""
+    return [joint for joint in rig.joints if joint.effort is not None]
 
 
 def _filled(array: Array, mask: Mask, values: Array) -> Array:

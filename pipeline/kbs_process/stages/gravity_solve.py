@@ -1,7 +1,8 @@
 """The gravity equation solved for the rig and every recording's zero at once, with the weights it takes.
 
 A recording's zero is a constant (its taring) and a slow drift: the first and second Legendre polynomial over its
-length, which hold a transducer's warming up. Each has the prior that the rig file gives the bias. Drift is thus told
+length, which hold a transducer's warming up. Each has the prior that the rig file gives the bias; a channel whose
+bias is exact has none of them. Drift is thus told
 from gravity where the motion repeats; where it does not, it widens the parameters' uncertainty.
 """
 
@@ -17,9 +18,10 @@ from kbs_process.estimation.fit import Fit, Parameters, combination, fit_map
 from kbs_process.estimation.flicker import flicker_scores
 from kbs_process.estimation.longrun import variance_inflation
 from kbs_process.rig.model import Rig
-from kbs_process.signals.records import WRENCH_CHANNELS, Array
+from kbs_process.signals.records import Array
 from kbs_process.stages.gravity_angles import rounding_scores
 from kbs_process.stages.gravity_equation import Equation, Prepared
+from kbs_process.stages.gravity_parameters import Index
 
 _ZERO = ("bias", "drift", "drift curvature")
 _TERMS = len(_ZERO)
@@ -33,12 +35,17 @@ def solve(
     low_pass_Hz: float,
 ) -> Fit:
     c, size = len(equation.channels), equation.size
+    loose = _loose(equation)
+    width = _TERMS * len(loose)  # zeros of a recording
     bases = [zero_basis(p) for p in prepared]
+
+    def drifting(full: Array) -> Array:
+        return _zeros(full[size:], len(prepared), equation)
 
     def residual(full: Array) -> Array:
         parts = [
             (equation.predict(full[:size], p) + basis @ zero - p.wrench) / sigma
-            for p, basis, zero, sigma in zip(prepared, bases, _zeros(full[size:], c), sigmas, strict=True)
+            for p, basis, zero, sigma in zip(prepared, bases, drifting(full), sigmas, strict=True)
         ]
         return np.concatenate([part.ravel() for part in parts])
 
@@ -47,9 +54,9 @@ def solve(
         for index, (p, basis, sigma) in enumerate(zip(prepared, bases, sigmas, strict=True)):
             block = np.zeros((len(p.q), c, len(full)))
             block[:, :, :size] = equation.jacobian(full[:size], p).reshape(len(p.q), c, -1)
-            at = size + index * _TERMS * c
-            block[:, :, at : at + _TERMS * c] = np.einsum("nk,cd->nckd", basis, np.eye(c)).reshape(
-                len(p.q), c, -1
+            at = size + index * width
+            block[:, :, at : at + width] = np.einsum("nk,cd->nckd", basis, np.eye(c)[:, loose]).reshape(
+                len(p.q), c, width
             )
             blocks.append((block / sigma[:, None]).reshape(len(p.q) * c, -1))
         return np.concatenate(blocks)
@@ -62,16 +69,16 @@ def solve(
         return noise + rounding_scores(equation, theta, prepared, sigmas, J)
 
     names = tuple(
-        f"{term}[{p.name}].{channel}" for p in prepared for term in _ZERO for channel in equation.channels
+        f"{term}[{p.name}].{equation.channels[index]}" for p in prepared for term in _ZERO for index in loose
     )
     parameters = Parameters(
         names=equation.names + names,
         value=np.concatenate([equation.start(), np.zeros(len(names))]),
-        sigma=np.concatenate([equation.sigma(), np.tile(equation.bias_sigma, _TERMS * len(prepared))]),
+        sigma=np.concatenate([equation.sigma(), np.tile(equation.bias_sigma[loose], _TERMS * len(prepared))]),
         lower=np.concatenate([equation.lower(), np.full(len(names), -np.inf)]),
     )
     first = [
-        np.linalg.lstsq(basis, p.wrench - equation.predict(theta, p))[0].ravel()
+        np.linalg.lstsq(basis, (p.wrench - equation.predict(theta, p))[:, loose])[0].ravel()
         for p, basis in zip(prepared, bases, strict=True)
     ]
     return fit_map(
@@ -84,13 +91,21 @@ def solve(
     )
 
 
-def zeros(equation: Equation, fit: Fit) -> Array:
-    """Fitted coefficients of each recording's zero: (recordings, terms, c) N and N m, the constant first."""
-    return _zeros(fit.value[equation.size :], len(equation.channels))
+def zeros(equation: Equation, fit: Fit, recordings: int) -> Array:
+    """Fitted coefficients of each recording's zero: (recordings, terms, c), the constant first."""
+    return _zeros(fit.value[equation.size :], recordings, equation)
 
 
-def _zeros(values: Array, c: int) -> Array:
-    return values.reshape(-1, _TERMS, c)
+def _zeros(values: Array, recordings: int, equation: Equation) -> Array:
+    loose = _loose(equation)
+    every = np.zeros((recordings, _TERMS, len(equation.channels)))
+    every[:, :, loose] = values.reshape(recordings, _TERMS, len(loose))
+    return every
+
+
+def _loose(equation: Equation) -> Index:
+    """The channels whose zero is not exact."""
+    return np.flatnonzero(equation.bias_sigma > 0.0)
 
 
 def zero_basis(p: Prepared) -> Array:
@@ -127,10 +142,8 @@ def residual_sigma(equation: Equation, theta: Array, p: Prepared, rig: Rig) -> A
 
 
 def least_sigma(p: Prepared, rig: Rig) -> Array:
-    index = [WRENCH_CHANNELS.index(channel) for channel in rig.transducer.channels]
-    floor: Array = np.maximum(
-        0.1 * rig.transducer.noise.value[index], 1e-9 * (1.0 + np.ptp(p.wrench, axis=0))
-    )
+    noise = rig.loads.noise[rig.loads.index(rig.channels)]
+    floor: Array = np.maximum(0.1 * noise, 1e-9 * (1.0 + np.ptp(p.wrench, axis=0)))
     return floor
 
 

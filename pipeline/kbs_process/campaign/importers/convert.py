@@ -28,6 +28,7 @@ from kbs_process.campaign.provenance import sha256
 from kbs_process.campaign.store import writing
 from kbs_process.errors import OutputError, RecordingError, did_you_mean
 from kbs_process.ingest import OutStream, write_pieces
+from kbs_process.ingest.encoding import JOINT_PARTS
 from kbs_process.signals.records import Array, Block
 
 LATEST_NS = (1 << 31) * 1_000_000_000  # the seconds of a ROS 2 time stamp are a signed 32-bit number
@@ -141,9 +142,9 @@ def _out_stream(stream: StreamMap, block: Block, topic: Topic, path: Path) -> Ou
             return OutStream(topic.topic, "temperature", block.stamp, block.log, block.values)
         case _:
             names = tuple(dict.fromkeys(field.partition("[")[2].rstrip("]") for field in columns))
-            fields = [f"position[{name}]" for name in names]
-            if any(field.startswith("velocity") for field in columns):
-                fields += [f"velocity[{name}]" for name in names]
+            # A message has its parts in this order; those before the last that is known may hold nothing.
+            last = max(JOINT_PARTS.index(field.partition("[")[0]) for field in columns)
+            fields = [f"{part}[{name}]" for part in JOINT_PARTS[: last + 1] for name in names]
             values = _columns(columns, fields, len(block))
             return OutStream(topic.topic, "joints", block.stamp, block.log, values, names)
 

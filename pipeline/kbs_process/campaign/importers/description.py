@@ -166,7 +166,8 @@ def _lines(table: MappingOf[str, Any]) -> str:
 def _check_streams(mapping: Mapping, campaign: Campaign) -> None:
     """Check that the mapping fills exactly the channels that the campaign reads."""
     topics = campaign.topics
-    wanted = {"encoder" if topic.key == "angle" else topic.key: topic.fields for topic in topics.present()}
+    read = {"encoder" if topic.key == "angle" else topic.key: topic for topic in topics.present()}
+    wanted = {key: topic.fields for key, topic in read.items()}
     given = {stream.key: {channel.field for channel in stream.channels} for stream in mapping.streams}
     named = Counter(topic.topic for topic in topics.present())
     if shared := [name for name, count in named.items() if count > 1]:
@@ -194,3 +195,15 @@ def _check_streams(mapping: Mapping, campaign: Campaign) -> None:
                 if key in wanted
                 else f"name a topic for '{key}' in [topics] of {shown(mapping.template)}",
             )
+    for stream in mapping.streams:
+        topic = read[stream.key]
+        units = dict(zip(topic.fields, topic.units, strict=True))
+        for channel in stream.channels:
+            if channel.unit != units[channel.field]:
+                raise ConfigError(
+                    f"[{stream.key}] gives {channel.field} in {channel.unit}, which the campaign reads in "
+                    f"{units[channel.field]}",
+                    where=shown(mapping.path),
+                    remedy="correct unit and scale, or the joint's type or effort in the rig of "
+                    f"{shown(mapping.template)}",
+                )

@@ -21,7 +21,8 @@ SUFFIXES: dict[str, Format] = {
     ".h5": "hdf5",
     ".hdf5": "hdf5",
     ".hdf": "hdf5",
-    ".mat": "hdf5",  # MATLAB's format since 7.3
+    ".mat": "matlab",
+    ".npy": "numpy",
     ".tdms": "tdms",
     ".mf4": "mdf",
     ".mdf": "mdf",
@@ -40,7 +41,8 @@ def open_table(path: Path, format_name: Format | None = None, text: Text | None 
         raise RecordingError(
             f"suffix '{path.suffix}' tells no format",
             where=str(path),
-            remedy='give format = "text", "parquet", "hdf5", "tdms" or "mdf" in the mapping, or rename the file',
+            remedy='give format = "text", "parquet", "hdf5", "tdms", "mdf", "matlab" or "numpy" in the mapping, '
+            "or rename the file",
         )
     if found == "text":
         return TextTable(path, text or Text())

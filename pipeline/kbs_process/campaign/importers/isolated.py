@@ -24,7 +24,14 @@ import numpy as np
 from kbs_process.campaign.importers.tables import Cells, Column, Table
 from kbs_process.errors import KbsError, RecordingError
 
-LIBRARIES = {"parquet": "pyarrow", "hdf5": "h5py", "tdms": "nptdms", "mdf": "asammdf"}
+LIBRARIES = {
+    "parquet": "pyarrow",
+    "hdf5": "h5py",
+    "tdms": "nptdms",
+    "mdf": "asammdf",
+    "matlab": "scipy",  # and h5py, for what MATLAB has written since 7.3
+    "numpy": "numpy",
+}
 MODULE = "kbs_process.campaign.importers.isolated"
 SILENCE_S = 300.0  # a child that sends nothing for so long hangs
 DATA_FLOOR = 1 << 30  # bytes that a file of any size may expand to
@@ -126,7 +133,7 @@ def _receive(child: subprocess.Popen[bytes]) -> Cells | None:
 
 
 def _open(format_name: str, path: Path) -> Table:
-    from kbs_process.campaign.importers import binary, parquet
+    from kbs_process.campaign.importers import arrays, binary, parquet
 
     match format_name:
         case "parquet":
@@ -135,6 +142,10 @@ def _open(format_name: str, path: Path) -> Table:
             return binary.SeriesTable(path, binary.open_hdf5(path))
         case "tdms":
             return binary.SeriesTable(path, binary.open_tdms(path))
+        case "matlab":
+            return binary.SeriesTable(path, arrays.open_matlab(path))
+        case "numpy":
+            return binary.SeriesTable(path, arrays.open_numpy(path))
         case _:
             return binary.SeriesTable(path, binary.open_mdf(path))
 

@@ -12,14 +12,14 @@ import msgspec
 from kbs_process.campaign.documents import Document, Key, read, shown
 from kbs_process.campaign.problems import Problems
 from kbs_process.campaign.schema import violations
-from kbs_process.campaign.units import UnitMismatchError, factor
+from kbs_process.campaign.units import UnitMismatchError, alike, factor
 from kbs_process.errors import ConfigError, did_you_mean
 from kbs_process.signals.records import WRENCH_CHANNELS, WRENCH_UNITS
 
 PRESETS = Path(__file__).parent / "presets"
 KELVIN = 273.15  # 0 degC, K
 
-Format = Literal["text", "parquet", "hdf5", "tdms", "mdf"]
+Format = Literal["text", "parquet", "hdf5", "tdms", "mdf", "matlab", "numpy"]
 TimeUnit = Literal["s", "ms", "us", "ns", "min", "datetime"]
 
 
@@ -70,10 +70,11 @@ class Part(msgspec.Struct, frozen=True):
 
 
 class Channel(msgspec.Struct, frozen=True):
-    """One channel of a stream: SI value = gain * cell + offset."""
+    """One channel of a stream: value in `unit` = gain * cell + offset."""
 
     field: str  # place in the message: "wrench.force.x", "position[az]"
     column: int | str
+    unit: str  # SI
     gain: float
     offset: float = 0.0
     unwrap: bool = False
@@ -115,7 +116,13 @@ WRENCH_FIELDS = dict(
         strict=True,
     )
 )
-STREAMS = ("wrench", "encoder", "rate", "command", "field", "temperature")
+STREAMS = ("wrench", "effort", "encoder", "rate", "command", "field", "temperature")
+# SI units that the numbers of a joint may have: of one that turns first, then of one that slides.
+JOINT_UNITS = {
+    "position": ("rad", "m"),
+    "velocity": ("rad/s", "m/s"),
+    "effort": ("N m", "N", "A", "V"),
+}
 
 
 def preset_names() -> tuple[str, ...]:
@@ -170,32 +177,40 @@ def load_mapping(path: Path) -> Mapping:
 
 def _stream(document: Document, key: str, problems: Problems) -> StreamMap:
     table = document.tree[key]
-    rows: list[tuple[Key, str, str, dict[str, Any]]] = []  # key, field, SI unit, column table
+    rows: list[tuple[Key, str, tuple[str, ...], dict[str, Any]]] = []  # key, field, SI units, column table
     match key:
         case "wrench":
             units = dict(zip(WRENCH_CHANNELS, WRENCH_UNITS, strict=True))
-            rows = [((key, name), WRENCH_FIELDS[name], units[name], cell) for name, cell in table.items()]
+            rows = [((key, name), WRENCH_FIELDS[name], (units[name],), cell) for name, cell in table.items()]
         case "command":
-            si = {"position": "rad", "velocity": "rad/s"}
             rows = [
-                ((key, kind, joint), f"{kind}[{joint}]", si[kind], cell)
+                ((key, kind, joint), f"{kind}[{joint}]", JOINT_UNITS[kind], cell)
                 for kind, joints in table.items()
                 for joint, cell in joints.items()
             ]
         case "temperature":
-            rows = [((key,), "temperature", "degC", table)]
-        case "rate":
-            rows = [((key, joint), f"velocity[{joint}]", "rad/s", cell) for joint, cell in table.items()]
+            rows = [((key,), "temperature", ("degC",), table)]
         case _:
-            rows = [((key, joint), f"position[{joint}]", "rad", cell) for joint, cell in table.items()]
+            part = {"rate": "velocity", "effort": "effort"}.get(key, "position")
+            rows = [
+                ((key, joint), f"{part}[{joint}]", JOINT_UNITS[part], cell) for joint, cell in table.items()
+            ]
     channels = tuple(_channel(document, *row, problems) for row in rows)
     return StreamMap(key, _time(document, key, problems), channels)
 
 
 def _channel(
-    document: Document, key: Key, field: str, si: str, cell: MappingOf[str, Any], problems: Problems
+    document: Document,
+    key: Key,
+    field: str,
+    allowed: tuple[str, ...],
+    cell: MappingOf[str, Any],
+    problems: Problems,
 ) -> Channel:
     unit, scale, radius = cell["unit"], float(cell.get("scale", 1.0)), cell.get("radius_m")
+    # A way along a surface of some radius is an angle; any other unit tells by itself which one it is of.
+    kin = [] if radius is not None else [si for si in allowed if alike(unit, si)]
+    si = kin[0] if kin else allowed[0]
     if cell.get("unwrap") and si != "rad":
         problems.add(document.place((*key, "unwrap")), "only an angle can be unwrapped", "delete unwrap")
     if radius is not None and si not in ("rad", "rad/s"):
@@ -209,7 +224,7 @@ def _channel(
             gain = factor(unit, si) if radius is None else factor(unit, si.replace("rad", "m")) / radius
         except UnitMismatchError as error:
             problems.add(document.place((*key, "unit")), str(error), error.remedy)
-    return Channel(field, cell["column"], gain * scale, offset, bool(cell.get("unwrap", False)))
+    return Channel(field, cell["column"], si, gain * scale, offset, bool(cell.get("unwrap", False)))
 
 
 def _time(document: Document, key: str, problems: Problems) -> Time | None:
