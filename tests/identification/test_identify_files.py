@@ -17,15 +17,9 @@ from kbs_process.estimation.fit import Check, Fit
 from kbs_process.estimation.profile import Profile
 from kbs_process.report.records.common import load
 from kbs_process.report.records.identify import IdentifyResults
-from kbs_process.stages.identification import (
-    Identification,
-    Settings,
-    frictions,
-    gearbox,
-    prior,
-    with_factors,
-)
+from kbs_process.stages.identification import Identification, Settings
 from kbs_process.stages.output_error import Experiment, sensor_spectra
+from kbs_process.stages.unknowns import frictions, gearbox, prior, with_factors
 
 DUMMY1 = Path(__file__).parents[2] / "campaigns" / "DUMMY1"
 
@@ -48,7 +42,7 @@ def test_folder(tmp_path: Path) -> None:
         names, value, sigma, np.diag(sigma**2), parameters.sigma, (Check("converged", True, "3"),), 1.0, 9, 3
     )
     noise = sensor_spectra(setting, recording)
-    found = Identification(setting, fit, np.zeros((9, len(names))), (noise,), (), parameters)
+    found = Identification(setting, fit, np.zeros((9, len(names))), (noise,), (), (), parameters)
     x = value[at] + sigma[at] * np.array([-2.0, 0.0, 2.0])
     profile = Profile("joint.el.drive.Ka", x, np.array([4.0, 0.0, 4.0]), float(x[0]), float(x[2]))
     shape = (len(recording.valid), len(setting.channels))

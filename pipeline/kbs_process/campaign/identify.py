@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from kbs_process.campaign.config import Campaign
-from kbs_process.campaign.evaluation import Workers
+from kbs_process.campaign.evaluation import evaluator
 from kbs_process.campaign.identify_files import write_identification
 from kbs_process.campaign.measured import measured
+from kbs_process.campaign.parallel import Crew
 from kbs_process.campaign.progress import Progress
 from kbs_process.campaign.reading import read_run
 from kbs_process.campaign.run import Outcome
@@ -23,6 +24,7 @@ from kbs_process.signals.records import Array
 from kbs_process.stages import identification
 from kbs_process.stages.identification import Identification, Settings
 from kbs_process.stages.output_error import Experiment, Measured, Spectra, sensor_spectra, unexplained
+from kbs_process.stages.unknowns import gearbox
 
 _HIGHEST_RATE = 200.0  # Hz; what lies above 80 Hz the amplifiers of such transducers have taken off
 
@@ -70,7 +72,7 @@ def identify(
     base = Experiment(
         campaign.rig,
         campaign.effects,
-        identification.gearbox(campaign.rig, campaign.effects),
+        gearbox(campaign.rig, campaign.effects),
         fitted,
         settings.lowest_Hz,
     )
@@ -80,10 +82,11 @@ def identify(
         with progress.task(what):
             yield
 
-    with Workers(fitted, processes or len(os.sched_getaffinity(0))) as workers:
-        found = identification.identify(base, workers.evaluator, settings, say)
+    with Crew(fitted, processes) as crew:
+        evaluate_with = partial(evaluator, crew)
+        found = identification.identify(base, evaluate_with, settings, say)
         with progress.task("Profile likelihood"):
-            profiles = identification.intervals(found, workers.evaluator)
+            profiles = identification.intervals(found, evaluate_with)
     with progress.task("Predicting held-out recordings"):
         predictions = tuple(
             _predicted(found, recording, role)

@@ -21,8 +21,8 @@ from kbs_process.report.records import identify as records
 from kbs_process.report.records.common import Check, Conclusion, Notice, encode
 from kbs_process.rig.model import Quantity
 from kbs_process.signals.records import WRENCH_CHANNELS, WRENCH_UNITS, Array, Mask
-from kbs_process.stages.identification import CRITICAL
 from kbs_process.stages.screening import Phase, phases
+from kbs_process.stages.unknowns import CRITICAL
 
 if TYPE_CHECKING:
     from kbs_process.campaign.identify import Outcomes, Prediction
@@ -203,6 +203,15 @@ def _checks(outcomes: Outcomes, parameters: Sequence[records.Identified]) -> Ite
         name="least cost",
         ok=not lost,
         detail="lower on the profile of " + ", ".join(lost) if lost else "on no profile",
+    )
+    unsettled = [str(number) for number, mode in enumerate(outcomes.found.modes, 1) if not mode.settled]
+    best = min(outcomes.found.modes, key=lambda mode: mode.cost, default=None)
+    yield Check(
+        name="no better phase or contact edge",
+        ok=best is None or best.settled,
+        detail=f"search not ended from start {', '.join(unsettled)}"
+        if unsettled
+        else "looked for around the whole turn",
     )
     rough = [
         f"{misfit.channel} of {misfit.recording} ({misfit.after:.2f})"

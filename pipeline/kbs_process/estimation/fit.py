@@ -162,12 +162,12 @@ def _minimise(
     for iteration in range(1, most + 1):
         # One QR carries the normal equations of all samples into a triangle of the parameters' size.
         A = np.column_stack([np.vstack([gradient(theta), np.diag(root)]) * scale, -misfit])
-        triangle = _triangle(A)
-        R, rhs = triangle[:, :-1], triangle[:, -1]
+        reduced = triangle(A)
+        R, rhs = reduced[:, :-1], reduced[:, -1]
         if iteration == 1:
             _refuse_singular(R, parameters.names)
         while True:
-            whole = _damped_step(R, rhs, damping, (low - theta) / scale, (high - theta) / scale)
+            whole = damped_step(R, rhs, damping, (low - theta) / scale, (high - theta) / scale)
             if least > 0.0 and _promised(R, rhs, whole) < least:
                 return theta, iteration, True
             candidate = np.clip(theta + whole * scale, low, high)
@@ -186,7 +186,7 @@ def _minimise(
     return theta, most, False
 
 
-def _damped_step(R: Array, rhs: Array, damping: float, lowest: Array, highest: Array) -> Array:
+def damped_step(R: Array, rhs: Array, damping: float, lowest: Array, highest: Array) -> Array:
     """Step within bounds (p,) each: those that it would cross are held at theirs, and the others follow."""
     damped = np.vstack([R, np.sqrt(damping) * np.diag(np.linalg.norm(R, axis=0))])
     wanted = np.concatenate([rhs, np.zeros(R.shape[1])])
@@ -212,14 +212,14 @@ def _cost(r: Array) -> float:
     return cost if np.isfinite(cost) else np.inf
 
 
-def _triangle(A: Array) -> Array:
-    """R of A = Q R."""
+def triangle(A: Array) -> Array:
+    """Return R of A = Q R."""
     return np.asarray(np.linalg.qr(A, mode="r"), dtype=np.float64)
 
 
 def _inverse(J: Array, precision: Array, parameters: Parameters) -> Array:
     scale = parameters.scale
-    R = _triangle(np.vstack([J, np.diag(np.sqrt(precision))]) * scale)
+    R = triangle(np.vstack([J, np.diag(np.sqrt(precision))]) * scale)
     _refuse_singular(R, parameters.names)
     _, s, Vt = np.linalg.svd(R)
     root = Vt.T / s * scale[:, None]

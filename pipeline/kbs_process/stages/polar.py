@@ -13,9 +13,7 @@ import numpy as np
 
 from kbs_process.estimation.fit import Parameters
 from kbs_process.signals.records import Array
-from kbs_process.stages.screening import Phase
-
-_LEAST = 0.05  # of the prior's amplitude: a phase is differenced at no less
+from kbs_process.stages.screening import LEAST, Phase
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,7 +53,7 @@ class Polar:
         """Numbers (p,) of chart coordinates (p,); no amplitude is quite zero."""
         theta = u.copy()
         for a, phi in zip(self.amplitude, self.phase, strict=True):
-            least = _LEAST * self.parameters.value[a]
+            least = LEAST * self.parameters.value[a]
             theta[[a, phi]] = max(float(np.hypot(u[a], u[phi])), least), np.arctan2(u[phi], u[a])
         return theta
 

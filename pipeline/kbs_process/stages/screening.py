@@ -19,10 +19,12 @@ from kbs_process.plant.effects import select
 from kbs_process.plant.modes import modes
 from kbs_process.rig.model import Rig
 from kbs_process.signals.records import WRENCH_CHANNELS, Array
-from kbs_process.stages.output_error import Experiment, Scalar, Spectra, simulate
+from kbs_process.stages.output_error import Experiment, Measured, Output, Scalar, Spectra, simulate
 
 Task = tuple[int, Array, Spectra]  # recording, values of the free numbers, noise
 Evaluate = Callable[[Sequence[Task]], list[Array]]
+
+LEAST = 0.05  # of its prior: an amplitude is no less, so that its phase has a meaning
 
 _AXES = "xyz"
 _ROUNDS = 2  # of matching: channels see each other's resonances
@@ -40,6 +42,15 @@ class Phase:
     phase: int  # index among the free numbers
     amplitude: int
     smooth: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Contact:
+    """Indices among the free numbers of a contact's torque, its half width and its phase."""
+
+    torque: int
+    width: int
+    phase: int
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,7 +79,32 @@ def phases(rig: Rig, effects: Sequence[str], free: Sequence[Scalar]) -> tuple[Ph
     return tuple(found)
 
 
-def match_resonances(experiment: Experiment, values: Array, spectra: Sequence[Spectra]) -> Array:
+def contacts(rig: Rig, effects: Sequence[str], free: Sequence[Scalar]) -> tuple[Contact, ...]:
+    """Find frictions with a torque, a half width and a phase that are all free."""
+    place = {scalar.name: index for index, scalar in enumerate(free)}
+    found = []
+    for joint in rig.joints:
+        for effect in select(effects):
+            if effect.port is not Port.MOTOR_FRICTION:
+                continue
+            roles: dict[str, int] = {}
+            for parameter in effect.parameters:
+                index = place.get(f"joint.{joint.name}.drive.{parameter.name}")
+                turns = isinstance(parameter.prior, Uniform)
+                role = {"N m": "torque", "rad": "phase" if turns else "width"}.get(parameter.unit)
+                if index is not None and role is not None:
+                    roles[role] = index
+            if len(roles) == 3:
+                found.append(Contact(**roles))
+    return tuple(found)
+
+
+Run = Callable[[Experiment, Measured, Array], Output]
+
+
+def match_resonances(
+    experiment: Experiment, values: Array, spectra: Sequence[Spectra], run: Run = simulate
+) -> Array:
     """Return `values` with the transducer's stiffness such that the plant's resonances lie where measured.
 
     Each torque channel's spectrum around the plant's lowest resonance about that axis is shifted along log f until it
@@ -76,7 +112,7 @@ def match_resonances(experiment: Experiment, values: Array, spectra: Sequence[Sp
     """
     free = {scalar: index for index, scalar in enumerate(experiment.free)}
     for _ in range(_ROUNDS):
-        outputs = [simulate(experiment, recording, values).wrench for recording in experiment.recordings]
+        outputs = [run(experiment, recording, values).wrench for recording in experiment.recordings]
         rig = experiment.rig_at(values)
         changed = values.copy()
         for axis, letter in enumerate(_AXES):

@@ -1,0 +1,99 @@
+"""Where tooth contact begins and ends, searched over the whole turn.
+
+A Coulomb friction that is there while |wrap(psi + phi)| < delta begins at psi = -phi - delta and ends at -phi + delta;
+either edge meets its own events, and the cost has minima in which one edge is right and the other is not. But while the
+rotor moves, friction torques add: a contact's response is the sum of those of the narrow contacts that it is made of.
+So the plant runs with each narrow contact once, and every pair of edges is judged from these by linear least squares,
+its torque and all other numbers following. Only the search is one of edges: they are linear in phi and delta, so that
+a descent takes the same steps in either.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kbs_process.estimation.fit import Parameters
+from kbs_process.signals.records import Array
+from kbs_process.stages.objective import Objective
+from kbs_process.stages.screening import Contact
+
+_NARROW = 32  # contacts in a turn
+_FINE = 4  # places of an edge in a narrow contact
+
+
+def edge_minima(
+    objective: Objective, theta: Array, J: Array, parameters: Parameters, contact: Contact, most: int
+) -> list[Array]:
+    """Return up to `most` points like `theta` (p,) with the contact moved, best first: local minima over both edges.
+
+    J (n, p): slopes of the residual at `theta`, by which the other numbers follow.
+    """
+    own = [contact.torque, contact.width, contact.phase]
+    rest = np.delete(np.arange(len(theta)), own)
+    responses, off = _responses(objective, theta, parameters, contact)
+    weight = parameters.sigma[rest] ** -2.0
+    excess = weight * (theta - parameters.value)[rest]
+    J = J[:, rest]
+    cross = J.T @ responses
+    solved = np.linalg.solve(J.T @ J + np.diag(weight), np.column_stack([cross, J.T @ off + excess]))
+    gram = responses.T @ responses - cross.T @ solved[:, :-1]
+    slope = responses.T @ off - cross.T @ solved[:, -1]
+    places = []
+    for torque, begin, width in _minima(gram, slope, parameters, contact)[:most]:
+        moved = theta.copy()
+        moved[own] = torque, 0.5 * width, -(begin + 0.5 * width)
+        # The turn that is nearest to where it was.
+        moved[contact.phase] += 2.0 * np.pi * np.rint((theta - moved)[contact.phase] / (2.0 * np.pi))
+        places.append(moved)
+    return places
+
+
+def _responses(
+    objective: Objective, theta: Array, parameters: Parameters, contact: Contact
+) -> tuple[Array, Array]:
+    """Of narrow contacts side by side from -pi on, (n, narrow) per N m, and the residual without any (n,)."""
+    points = [theta.copy()]
+    points[0][contact.torque] = 0.0
+    for k in range(_NARROW):
+        one = theta.copy()
+        one[contact.torque] = parameters.value[contact.torque]
+        one[contact.width] = np.pi / _NARROW
+        one[contact.phase] = np.pi - (2 * k + 1) * np.pi / _NARROW
+        points.append(one)
+    off, *found = objective.residuals(points)
+    return (np.column_stack(found) - off[:, None]) / parameters.value[contact.torque], off
+
+
+def _minima(
+    gram: Array, slope: Array, parameters: Parameters, contact: Contact
+) -> list[tuple[float, float, float]]:
+    """Torque, where it begins and how wide it is, of the local minima of -2 log posterior, best first."""
+    places = _NARROW * _FINE
+    step = 2.0 * np.pi / places
+    # Share of each narrow contact that lies before an edge; a second turn for contacts across its end.
+    edge = np.arange(2 * places)[:, None] / _FINE - np.arange(_NARROW)
+    before = np.clip(edge, 0.0, 1.0) + np.clip(edge - _NARROW, 0.0, 1.0)
+    begin, width = np.meshgrid(np.arange(places), np.arange(1, places), indexing="ij")
+    covered = before[begin + width] - before[begin]
+    half = 0.5 * step * width
+    mean, sigma = parameters.value, parameters.sigma
+    curvature = np.einsum("...i,ij,...j", covered, gram, covered) + sigma[contact.torque] ** -2.0
+    pull = covered @ slope - mean[contact.torque] * sigma[contact.torque] ** -2.0
+    torque = np.maximum(-pull / curvature, 0.0)
+    cost = torque * (torque * curvature + 2.0 * pull)
+    cost += ((half - mean[contact.width]) / sigma[contact.width]) ** 2
+    around = np.pad(np.pad(cost, ((1, 1), (0, 0)), mode="wrap"), ((0, 0), (1, 1)), constant_values=np.inf)
+    least = np.min(
+        [
+            around[1 + i : 1 + i + cost.shape[0], 1 + j : 1 + j + cost.shape[1]]
+            for i in (-1, 0, 1)
+            for j in (-1, 0, 1)
+        ],
+        axis=0,
+    )
+    rows, columns = np.nonzero((cost <= least) & (torque > 0.0))
+    order = np.argsort(cost[rows, columns], kind="stable")
+    return [
+        (float(torque[i, j]), float(-np.pi + step * i), float(step * (j + 1)))
+        for i, j in zip(rows[order], columns[order], strict=True)
+    ]
