@@ -477,6 +477,38 @@ def report(results: Path, pdf: bool | None) -> None:
 
 
 @cli.command(
+    epilog=examples("prove", "prove --full --jobs 8", "prove --full --dask tcp://10.0.0.5:8786")
+    + "\n\nFrom a checkout; an interrupted bench goes on where it stopped. Exit status 1: a find in a trial without "
+    "a concealed effect."
+)
+@click.option(
+    "--full", is_flag=True, help="All validation trials and all rivals: hours, to reports/proof/full."
+)
+@click.option("--trials", type=click.IntRange(1), metavar="N", help="How many [default: 6; 200 with --full].")
+@click.option(
+    "--work", type=FOLDER, metavar="FOLDER", help="Where trials and answers are kept [default: .proof]."
+)
+@click.option(
+    "--output", "-o", type=FOLDER, metavar="FOLDER", help="Where the score goes [default: reports/proof]."
+)
+@click.option("--jobs", type=click.IntRange(1), metavar="N", help="Processes [default: one a core].")
+@click.option("--dask", metavar="ADDRESS", help="Scheduler of a Dask cluster to run on: tcp://HOST:PORT.")
+def prove(
+    full: bool, trials: int | None, work: Path | None, output: Path | None, jobs: int | None, dask: str | None
+) -> None:
+    """Prove the diagnosis on campaigns with concealed effects.
+
+    Makes campaigns, conceals in each nothing or up to three effects, seals what is concealed, has each diagnosed by a
+    process that cannot read the seals, then breaks them and scores: found, placed, named, measured, beside rivals.
+    """
+    from kbs_process.campaign.prove import run_bench
+
+    given = {"trials": trials, "work": work, "output": output, "jobs": jobs, "dask": dask}
+    options = [f"--{name}={value}" for name, value in given.items() if value is not None]
+    sys.exit(run_bench([*(["--full"] if full else []), *options]))
+
+
+@cli.command(
     "import",
     epilog=examples(
         "import --describe bench.tdms > mapping.toml", "import mapping.toml /data/bench campaigns/BENCH"

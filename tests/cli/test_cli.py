@@ -21,7 +21,7 @@ from kbs_process.errors import RecordingError
 from kbs_process.ingest.encoding import OutStream
 from kbs_process.ingest.writer import write_mcap
 
-VERBS = ("process", "validate", "inspect", "simulate", "predict", "import", "report")
+VERBS = ("process", "validate", "inspect", "simulate", "predict", "import", "report", "prove")
 RATE = 100.0
 
 

@@ -1,0 +1,119 @@
+"""The bench: make trials, let every method answer, close the ledger, break the seals, score."""
+
+from __future__ import annotations
+
+import itertools
+import os
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
+from contextlib import contextmanager
+from multiprocessing import get_context
+from pathlib import Path
+from typing import TypeVar
+
+import msgspec
+
+from proof import isolate
+from proof.methods import Job, answer_trial
+from proof.page import write_page
+from proof.score import Bench, Row, score
+from proof.trials import make_sealed
+from proof.work import BenchError, Work
+
+W = TypeVar("W")
+R = TypeVar("R")
+Tell = Callable[[str], None]
+
+_IN_FLIGHT = 64
+_PATIENCE = 10.0  # s, for a scheduler to answer
+
+
+@contextmanager
+def workers(jobs: int, dask: str | None) -> Iterator[Executor]:
+    """Processes of this machine, or the workers of a Dask cluster by the address of its scheduler.
+
+    Work and results travel as bytes: a cluster's workers need a checkout with its environment, no shared files.
+    """
+    if dask is None:
+        with ProcessPoolExecutor(
+            jobs, mp_context=get_context("forkserver"), initializer=os.nice, initargs=(5,)
+        ) as pool:
+            yield pool
+        return
+    try:
+        from distributed import Client
+    except ImportError:
+        raise BenchError(
+            "a Dask cluster needs the package distributed\n  -> pip install -e '.[test]'"
+        ) from None
+    try:
+        client = Client(dask, timeout=_PATIENCE)
+    except (OSError, ValueError) as error:
+        raise BenchError(
+            f"no Dask scheduler answers at {dask}: {error}\n  -> start one with 'dask scheduler'"
+        ) from None
+    with client, client.get_executor(pure=False) as pool:
+        yield pool
+
+
+def prove(
+    work: Work,
+    methods: tuple[str, ...],
+    target: Path,
+    *,
+    jobs: int,
+    dask: str | None,
+    command: str,
+    tell: Tell,
+) -> tuple[Row, ...]:
+    """Run what is left of a bench, and write score and page to `target`."""
+    tell(f"Methods are kept from the seals' key by: {_ISOLATION[isolate.level()]}")
+    with workers(jobs, dask) as pool:
+        orders = work.orders()
+        for order, content in _each(pool, make_sealed, orders):
+            work.keep_trial(order.name, content)
+            tell(f"made {order.name}")
+        todo = (
+            Job(name, work.trial(name), left, hidden=(work.folder,))
+            for name, left in work.unanswered(methods)
+        )
+        for job, given in _each(pool, answer_trial, todo):
+            for method, content in given.items():
+                work.keep_answer(job.trial, method, content)
+            tell(f"answered {job.trial}: {', '.join(given)}")
+    truths, answers = work.open(work.close(methods))
+    rows = score(truths, [entry for entry in answers if entry.method in methods])
+    bench = Bench(
+        split=work.plan.split,
+        seed=str(work.plan.seed),
+        command=command,
+        isolation=_ISOLATION[isolate.level()],
+        rows=rows,
+        truths=tuple(truths),
+        answers=tuple(answers),
+    )
+    target.mkdir(parents=True, exist_ok=True)
+    content = msgspec.json.format(msgspec.json.encode(bench, order="deterministic"), indent=1) + b"\n"
+    (target / "score.json").write_bytes(content)
+    (target / "ledger.json").write_bytes((work.folder / "ledger.json").read_bytes())
+    write_page(bench, target / "index.html")
+    return rows
+
+
+_ISOLATION = {
+    "namespace": "namespaces of its own: the seals' key, the generator, other processes and the network are not there",
+    "process": "a process, an environment and a folder of its own, and no more: there are no user namespaces here",
+}
+
+
+def _each(pool: Executor, function: Callable[[W], R], work: Iterable[W]) -> Iterator[tuple[W, R]]:
+    """Yield each piece of work with its result as it is done; no more than `_IN_FLIGHT` trials are held at a time."""
+    waiting = iter(work)
+    pending: dict[Future[R], W] = {}
+    while True:
+        for piece in itertools.islice(waiting, _IN_FLIGHT - len(pending)):
+            pending[pool.submit(function, piece)] = piece
+        if not pending:
+            return
+        for future in wait(pending, return_when=FIRST_COMPLETED).done:
+            yield pending.pop(future), future.result()

@@ -1,0 +1,130 @@
+"""The bench from trials to its page, with a maker and methods made up; on threads, and on a Dask cluster."""
+
+from __future__ import annotations
+
+import json
+import operator
+import subprocess
+import sys
+from collections.abc import Iterator
+from concurrent.futures import Executor, ThreadPoolExecutor
+from contextlib import contextmanager
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from kbs_process.campaign import prove as verb
+from kbs_process.errors import ConfigError
+from proof import answer, prove, trials
+from proof.answer import Answer, Claim
+from proof.methods import Job, failed
+from proof.words import OURS
+from proof.work import BenchError, Work
+
+COGGING = {"port": "motor torque", "axis": "el", "family": "cogging"}
+
+
+def draw(split: str, count: int, seed: int) -> list[int]:
+    return list(range(count))
+
+
+def make(specification: int, folder: Path) -> dict[str, Any]:
+    (folder / "campaign.toml").write_text("schema = 1\n")
+    told = {"trial": folder.name, "kind": "nothing", "split": "development"}
+    if specification % 3:
+        effect = COGGING | {"name": "law", "rho": 300.0, "rho_eff": 300.0}
+        told |= {"kind": "concealed", "level": 300.0, "rho_eff": 300.0, "effects": [effect]}
+    return told
+
+
+def guess(job: Job) -> dict[str, bytes]:
+    """A method that always claims cogging, and one that never answers."""
+    claimed = Answer(
+        method=OURS,
+        trial=job.trial,
+        detected=True,
+        verdict="physics",
+        finds=(Claim(**COGGING),),  # type: ignore[arg-type]
+        seconds=1.0,
+    )
+    given = {OURS: claimed, "sparse": failed("sparse", job.trial, 2.0, "gave up")}
+    return {method: answer.encode(given[method]) for method in job.methods}
+
+
+@pytest.fixture(autouse=True)
+def made_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    maker = SimpleNamespace(draw=draw, make=make)
+    monkeypatch.setattr(trials, "maker", lambda: maker)
+    monkeypatch.setattr("proof.work.maker", lambda: maker)
+    monkeypatch.setattr(prove, "answer_trial", guess)
+
+    @contextmanager
+    def threads(jobs: int, dask: str | None) -> Iterator[Executor]:
+        with ThreadPoolExecutor(jobs) as pool:
+            yield pool
+
+    monkeypatch.setattr(prove, "workers", threads)
+
+
+def test_a_bench_ends_with_a_score_a_ledger_and_a_page(tmp_path: Path) -> None:
+    said: list[str] = []
+
+    def run(methods: tuple[str, ...]) -> dict[tuple[str, str], float | None]:
+        bench = Work(tmp_path / "work", "development", 4, 1, "kbs-process prove")
+        rows = prove.prove(
+            bench, methods, tmp_path / "out", jobs=2, dask=None, command="kbs-process prove", tell=said.append
+        )
+        return {(row.method, row.metric): row.value for row in rows if row.group == "all"}
+
+    values = run((OURS,))
+    assert values[OURS, "false find"] == 1.0 and values[OURS, "physics"] == 1.0
+    assert sum(line.startswith("made") for line in said) == 4
+    score, ledger = (
+        json.loads((tmp_path / "out" / name).read_text()) for name in ("score.json", "ledger.json")
+    )
+    assert (
+        {truth["trial"] for truth in score["truths"]} == set(ledger["seals"]) == set(ledger["answers"][OURS])
+    )
+    assert (tmp_path / "out" / "index.html").stat().st_size > 50_000
+    said.clear()
+    values = run((OURS, "sparse"))  # a rival that comes later finds trials and answers as they are
+    assert values["sparse", "physics"] == 0.0 and values["sparse", "answered"] == 0.0
+    assert not any(line.startswith("made") for line in said)
+    assert sum("sparse" in line for line in said) == 4 and not any(OURS in line for line in said)
+
+
+@pytest.mark.filterwarnings("ignore")  # of a library that is not ours, on its way up and down
+def test_work_runs_on_a_dask_cluster(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.undo()
+    from distributed import LocalCluster
+
+    with (
+        LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None) as cluster,
+        prove.workers(1, cluster.scheduler_address) as pool,
+    ):
+        found = dict(prove._each(pool, operator.neg, range(150)))
+    assert found == {k: -k for k in range(150)}
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_a_cluster_that_is_not_there_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.undo()
+    monkeypatch.setattr(prove, "_PATIENCE", 0.2)
+    with pytest.raises(BenchError, match="dask scheduler"), prove.workers(1, "tcp://127.0.0.1:9"):
+        pass
+
+
+def test_the_verb_needs_a_checkout(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    installed = tmp_path / "site-packages" / "kbs_process" / "__init__.py"
+    monkeypatch.setattr(verb.kbs_process, "__file__", str(installed))
+    with pytest.raises(ConfigError, match="clone the repository"):
+        verb.run_bench([])
+
+
+def test_the_verb_runs_the_bench_of_its_checkout() -> None:
+    command = [sys.executable, "-c", "from kbs_process.cli import main; main()", "prove", "--trials", "none"]
+    refused = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert refused.returncode == 2 and "--trials" in refused.stderr
+    assert verb.run_bench(["--help"]) == 0
