@@ -68,12 +68,15 @@ class Judged:
         if self.claim is None or not self.physics:
             return ()
         comparable = [truth for truth in self.effect.parameters if truth.sigma_cr is not None]
-        pairs = []
-        for truth in comparable:
-            named = [estimate for estimate in self.claim.parameters if estimate.name == truth.name]
-            if named:
-                pairs.append((named[0], truth))
-        return tuple(pairs)
+        pairs = ((_of(truth, self.claim.parameters), truth) for truth in comparable)
+        return tuple((estimate, truth) for estimate, truth in pairs if estimate is not None)
+
+
+def _of(truth: TrueParameter, estimates: Sequence[Estimate]) -> Estimate | None:
+    """The estimate of a parameter: of its name, or else the only one of its unit, as two formulas' names differ."""
+    named = [estimate for estimate in estimates if estimate.name == truth.name]
+    alike = named or [estimate for estimate in estimates if estimate.unit == truth.unit]
+    return alike[0] if len(alike) == 1 else None
 
 
 def same_place(one: Suspect, other: Suspect) -> bool:

@@ -67,27 +67,28 @@ def prove(
     tell: Tell,
 ) -> tuple[Row, ...]:
     """Run what is left of a bench, and write score and page to `target`."""
-    tell(f"Methods are kept from the seals' key by: {_ISOLATION[isolate.level()]}")
+    isolation = _ISOLATION[isolate.level()]
+    if dask is not None:
+        isolation += " (on the machine of this command; each machine of the cluster does what it can)"
+    tell(f"Each method runs in {isolation}")
     with workers(jobs, dask) as pool:
         orders = work.orders()
-        for order, content in _each(pool, make_sealed, orders):
+        for done, (order, content) in enumerate(_each(pool, make_sealed, orders), start=1):
             work.keep_trial(order.name, content)
-            tell(f"made {order.name}")
-        todo = (
-            Job(name, work.trial(name), left, hidden=(work.folder,))
-            for name, left in work.unanswered(methods)
-        )
-        for job, given in _each(pool, answer_trial, todo):
+            tell(f"made {order.name}, {done} of {len(orders)}")
+        unanswered = work.unanswered(methods)
+        todo = (Job(name, work.trial(name), left, hidden=(work.folder,)) for name, left in unanswered)
+        for done, (job, given) in enumerate(_each(pool, answer_trial, todo), start=1):
             for method, content in given.items():
                 work.keep_answer(job.trial, method, content)
-            tell(f"answered {job.trial}: {', '.join(given)}")
+            tell(f"answered {job.trial}, {done} of {len(unanswered)}: {', '.join(given)}")
     truths, answers = work.open(work.close(methods))
     rows = score(truths, [entry for entry in answers if entry.method in methods])
     bench = Bench(
         split=work.plan.split,
         seed=str(work.plan.seed),
         command=command,
-        isolation=_ISOLATION[isolate.level()],
+        isolation=isolation,
         rows=rows,
         truths=tuple(truths),
         answers=tuple(answers),

@@ -180,6 +180,14 @@ def test_parameters_are_measured_by_the_bound_and_phases_on_the_circle() -> None
     assert value(rows, "interval covers") == pytest.approx(2 / 3)
 
 
+def test_a_parameter_of_another_formula_is_known_by_its_unit_if_it_is_the_only_one() -> None:
+    law = effect(parameters=(TrueParameter(name="amplitude", unit="N m", value=1.0, sigma_cr=0.1),))
+    torque, rate = Estimate(name="T_c", unit="N m", value=1.1), Estimate(name="w_s", unit="rad/s", value=1.0)
+    (one,) = match(answer("A", claim(parameters=(rate, torque))), [law])
+    (two,) = match(answer("A", claim(parameters=(torque, torque))), [law])
+    assert [estimate.name for estimate, _ in one.parameters] == ["T_c"] and two.parameters == ()
+
+
 def test_nulls_count_finds_and_parameters_off() -> None:
     kinds = ("nothing", "within", "beyond", "beyond")
     off = {"beyond": (Beyond(name="joint.az.drive.Ka", sigmas=5.0),)}
