@@ -42,6 +42,7 @@ from kbs_process.plant.effects.motor_viscous import MOTOR_VISCOUS
 from kbs_process.plant.effects.stiffness_hardening import STIFFNESS_HARDENING
 from kbs_process.plant.effects.stribeck import STRIBECK
 from kbs_process.plant.effects.synchronous_motor import SYNCHRONOUS_MOTOR
+from kbs_process.plant.effects.tether import TETHER
 from kbs_process.plant.effects.tooth_stiction import TOOTH_STICTION
 from kbs_process.plant.effects.transmission_hysteresis import TRANSMISSION_HYSTERESIS
 
@@ -82,6 +83,7 @@ CATALOGUE: tuple[Effect, ...] = (
     AIR_DRAG,
     APPENDAGE,
     BUNGEE,
+    TETHER,
     FLOOR_VIBRATION,
 )
 
@@ -96,6 +98,12 @@ def find(name: str) -> Effect | None:
     if again is None or again[1] not in _POSITION:
         return None
     return instance(CATALOGUE[_POSITION[again[1]]], int(again[2]))
+
+
+def catalogue_with(names: Sequence[str]) -> tuple[Effect, ...]:
+    """Return the catalogue, each effect followed by its further actions among `names`."""
+    again = [name for name in names if name not in _POSITION and find(name) is not None]
+    return select([*_POSITION, *again])
 
 
 def select(names: Sequence[str]) -> tuple[Effect, ...]:
