@@ -83,7 +83,7 @@ def prove(
                 work.keep_answer(job.trial, method, content)
             tell(f"answered {job.trial}, {done} of {len(unanswered)}: {', '.join(given)}")
     truths, answers = work.open(work.close(methods))
-    rows = score(truths, [entry for entry in answers if entry.method in methods])
+    rows = score(truths, answers)
     bench = Bench(
         split=work.plan.split,
         seed=str(work.plan.seed),
