@@ -132,3 +132,13 @@ SPARE = Parameter("h", "1", Normal(0.0, 1.0), "unused", (-1.0, 1.0))
 def test_wrong_wiring_is_an_error_at_import(equation, parameters, message) -> None:  # type: ignore[no-untyped-def]
     with pytest.raises(TypeError, match=message):
         Sensing("trial", SensingPort.CHANNEL, equation, parameters, "test")
+
+
+def test_a_power_about_any_reading_is_in_the_span_of_the_curved_characteristic() -> None:
+    effect, given = law("channel_nonlinearity"), {"bend_power": 3.0, "bend_middle": 10.0, "bend_range": 8.0}
+    zero = dict.fromkeys(("bend_slope", "bend_even", "bend_odd"), 0.0)
+    columns = [changed(effect, **given | zero | {name: 1.0}) for name in zero]
+    basis = np.stack([*columns, np.ones_like(T)], axis=1)
+    cubic = READING**3
+    left = cubic - basis @ np.linalg.lstsq(basis, cubic)[0]
+    assert np.abs(left).max() < 1e-9 * np.abs(cubic).max()

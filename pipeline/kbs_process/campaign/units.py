@@ -52,6 +52,7 @@ DIMENSIONS: dict[str, dict[str, float]] = {
     "linear damping": {"N s/m": 1.0, "N s/mm": 1e3},
     "electric current": {"A": 1.0, "mA": 1e-3},
     "electric tension": {"V": 1.0, "mV": 1e-3},
+    "curved rotational stiffness": {"N m/rad^2": 1.0},
     "cubic rotational stiffness": {"N m/rad^3": 1.0},
     "rotational drag": {"N m s^2/rad^2": 1.0},
     "linear stiffness": {"N/m": 1.0, "N/mm": 1e3},

@@ -37,7 +37,10 @@ from kbs_process.plant.effects.load_friction import LOAD_FRICTION
 from kbs_process.plant.effects.local_torque import LOCAL_TORQUE
 from kbs_process.plant.effects.lugre import LUGRE
 from kbs_process.plant.effects.microstep_error import MICROSTEP_ERROR
+from kbs_process.plant.effects.motor_asymmetry import MOTOR_ASYMMETRY
+from kbs_process.plant.effects.motor_drag import MOTOR_DRAG
 from kbs_process.plant.effects.motor_order import MOTOR_ORDER
+from kbs_process.plant.effects.motor_stribeck import MOTOR_STRIBECK
 from kbs_process.plant.effects.motor_viscous import MOTOR_VISCOUS
 from kbs_process.plant.effects.stiffness_hardening import STIFFNESS_HARDENING
 from kbs_process.plant.effects.stribeck import STRIBECK
@@ -60,6 +63,9 @@ CATALOGUE: tuple[Effect, ...] = (
     MICROSTEP_ERROR,
     FRICTION_RIPPLE,
     FRICTION_WARMUP,
+    MOTOR_STRIBECK,
+    MOTOR_ASYMMETRY,
+    MOTOR_DRAG,
     # gear
     KINEMATIC_ERROR,
     BACKLASH,

@@ -1,4 +1,4 @@
-"""Harness or cable drum across a joint: a spring with friction between its wires."""
+"""Harness or cable drum across a joint: a curved spring with friction between its wires."""
 
 from __future__ import annotations
 
@@ -9,21 +9,28 @@ def torque(
     joint_angle: float,
     joint_rate: float,
     harness_bend: float,
-    harness_spring: float,
     harness_offset: float,
+    harness_spring: float,
+    harness_curve: float,
+    harness_cubic: float,
     harness_friction: float,
+    harness_middle: float,
     harness_memory: float,
 ) -> tuple[float, float]:
     r"""Torque on the output, reacted by the body that carries the motor.
 
-    Equation: $T = -k \theta_l + T_0 - T_h z$, $\dot z = (\omega_l - |\omega_l| z) / x_0$.
-    Units: rad, rad/s, 1, N m/rad, N m, N m, rad -> N m, 1/s.
-    Validity: small bending; internal, so it shows in the windup and leaves no wrench of its own.
+    Equation: with $u = \theta_l - \theta_m$, $T = T_0 - k u - k_2 u^2 - k_3 u^3 - T_h z$,
+        $\dot z = (\omega_l - |\omega_l| z) / x_0$.
+    Units: rad, rad/s, 1, N m, N m/rad, N m/rad^2, N m/rad^3, N m, rad, rad -> N m, 1/s.
+    Validity: internal, so it shows in the windup and leaves no wrench of its own. The series holds where the joint has
+        been.
     Source: Y. K. Wen, Method for random vibration of hysteretic systems, J. Engineering Mechanics Division ASCE 102
         (1976) 249, with exponent 1 and equal shape factors, which is Dahl's law.
     """
-    value = -harness_spring * joint_angle + harness_offset - harness_friction * harness_bend
-    return value, (joint_rate - abs(joint_rate) * harness_bend) / harness_memory
+    bent = joint_angle - harness_middle
+    spring = harness_offset - bent * (harness_spring + bent * (harness_curve + bent * harness_cubic))
+    rate = (joint_rate - abs(joint_rate) * harness_bend) / harness_memory
+    return spring - harness_friction * harness_bend, rate
 
 
 HARNESS = Effect(
@@ -31,14 +38,18 @@ HARNESS = Effect(
     port=Port.JOINT_TORQUE,
     equation=torque,
     parameters=(
-        Parameter("harness_spring", "N m/rad", Normal(0.0, 2.0), "stiffness", (-1e3, 1e3), role="amplitude"),
         Parameter(
             "harness_offset",
             "N m",
             Normal(0.0, 1.0),
-            "torque at angle zero",
+            "torque in the middle",
             (-100.0, 100.0),
             role="amplitude",
+        ),
+        Parameter("harness_spring", "N m/rad", Normal(0.0, 3.0), "stiffness", (-1e3, 1e3), role="amplitude"),
+        Parameter("harness_curve", "N m/rad^2", Normal(0.0, 3.0), "its slope", (-1e4, 1e4), role="amplitude"),
+        Parameter(
+            "harness_cubic", "N m/rad^3", Normal(0.0, 10.0), "its curvature", (-1e5, 1e5), role="amplitude"
         ),
         Parameter(
             "harness_friction",
@@ -47,6 +58,15 @@ HARNESS = Effect(
             "between its wires",
             (-100.0, 100.0),
             role="amplitude",
+        ),
+        Parameter(
+            "harness_middle",
+            "rad",
+            Normal(0.0, 3.0),
+            "angle of the series",
+            (-1e2, 1e2),
+            grid=(0.5,),
+            over="joint_angle",
         ),
         Parameter(
             "harness_memory",

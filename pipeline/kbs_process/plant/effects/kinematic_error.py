@@ -39,10 +39,10 @@ KINEMATIC_ERROR = Effect(
     equation=torque,
     parameters=(
         Parameter(
-            "kinematic_sin", "rad", Normal(0.0, 1e-4), "sine of the error", (-0.01, 0.01), role="amplitude"
+            "kinematic_sin", "rad", Normal(0.0, 5e-4), "sine of the error", (-0.01, 0.01), role="amplitude"
         ),
         Parameter(
-            "kinematic_cos", "rad", Normal(0.0, 1e-4), "cosine of the error", (-0.01, 0.01), role="amplitude"
+            "kinematic_cos", "rad", Normal(0.0, 5e-4), "cosine of the error", (-0.01, 0.01), role="amplitude"
         ),
         Parameter(
             "kinematic_order",

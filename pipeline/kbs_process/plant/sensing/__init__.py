@@ -17,6 +17,7 @@ from kbs_process.plant.sensing.drift_linear import DRIFT_LINEAR
 from kbs_process.plant.sensing.drift_temperature import DRIFT_TEMPERATURE
 from kbs_process.plant.sensing.encoder_eccentricity import ENCODER_ECCENTRICITY
 from kbs_process.plant.sensing.encoder_hysteresis import ENCODER_HYSTERESIS
+from kbs_process.plant.sensing.encoder_interpolation import ENCODER_INTERPOLATION
 from kbs_process.plant.sensing.encoder_quantisation import ENCODER_QUANTISATION
 from kbs_process.plant.sensing.encoder_step import ENCODER_STEP
 from kbs_process.plant.sensing.encoder_switching import ENCODER_SWITCHING
@@ -36,6 +37,7 @@ SENSING: tuple[Sensing, ...] = (
     DRIFT_TEMPERATURE,
     MAINS,
     ENCODER_ECCENTRICITY,
+    ENCODER_INTERPOLATION,
     ENCODER_SWITCHING,
     ENCODER_STEP,
     ENCODER_QUANTISATION,

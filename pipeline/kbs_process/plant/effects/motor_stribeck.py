@@ -1,0 +1,44 @@
+"""Friction of the motor or the wave generator that falls as its lubricant begins to carry."""
+
+from __future__ import annotations
+
+import math
+
+from kbs_process.plant.effect import Effect, LogNormal, Normal, Parameter, Port
+
+
+def torque(rotor_rate: float, breakaway: float, breakaway_rate: float, breakaway_start: float) -> float:
+    r"""Torque on the rotor beyond its friction at speed.
+
+    Equation: $T = -T_s e^{-(\omega_r/\omega_s)^2} \max(-1, \min(1, \omega_r / \omega_0))$.
+    Units: rad/s, N m, rad/s, rad/s -> N m.
+    Validity: rates above $\omega_0$; its level at speed is that of `dynamic_friction`.
+    Source: B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, A survey of models, analysis tools and compensation
+        methods for the control of machines with friction, Automatica 30 (1994) 1083.
+    """
+    share = rotor_rate / breakaway_rate
+    return -breakaway * math.exp(-share * share) * max(-1.0, min(1.0, rotor_rate / breakaway_start))
+
+
+MOTOR_STRIBECK = Effect(
+    name="motor_stribeck",
+    port=Port.MOTOR_TORQUE,
+    equation=torque,
+    parameters=(
+        Parameter(
+            "breakaway", "N m", Normal(0.0, 0.01), "excess at breakaway", (-1.0, 1.0), role="amplitude"
+        ),
+        Parameter(
+            "breakaway_rate",
+            "rad/s",
+            LogNormal(0.3, 1.0),
+            "rate at which the excess has fallen to 1/e",
+            (1e-3, 1e3),
+            grid=(0.05, 0.15, 0.5, 1.5),
+        ),
+        Parameter("breakaway_start", "rad/s", LogNormal(0.02, 0.5), "rate of full friction", (1e-4, 10.0)),
+    ),
+    reference="B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, A survey of models, analysis tools and "
+    "compensation methods for the control of machines with friction, Automatica 30 (1994) 1083",
+    passive=True,
+)
