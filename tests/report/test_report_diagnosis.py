@@ -23,7 +23,6 @@ def trial(name: str, role: str, corrected: float) -> d.Trial:
             "nominal": 8.0,
             "known": 3.0,
             "corrected": corrected,
-            "log10_p": -220.0,
             "channels": {"Tx": corrected, "Ty": 1.3, "el": 0.98},
         },
         d.Trial,
@@ -38,16 +37,16 @@ def find() -> d.Find:
         family="harness",
         named=True,
         place=place,
-        says="A torque that grows with the angle.",
         equation="T = -k (q - q0)",
         reference="harness handbook",
         parameters=(d.Fitted(name="k_harness", unit="N m/rad", value=0.8, sigma=0.05, low=0.7, high=0.9),),
         probability=0.93,
         distance=310.0,
         absorbed=0.2,
-        band_Hz=(0.01, 0.3),
         rivals=(
-            d.Rival(name="dahl", family="friction", place=place, gain=90.0, distance=2.1, probability=0.06),
+            d.Rival(
+                name="dahl", family="friction", place=place, distance=2.1, probability=0.06, simulated=True
+            ),
         ),
         gate=(d.Gated(recording="run_2", role="held-out", before=3.0, after=1.02, gain=900.0),),
         curve=d.Curve(
@@ -86,17 +85,14 @@ def results(*finds: d.Find) -> d.DiagnosisResults:
         ),
         finds=finds,
         trials=(trial("run_1", "fit", 1.01), trial("run_2", "held-out", 1.02)),
-        ports=(d.PortTest(place=d.Place(port="joint torque", site="el"), log10_p=-0.2, sufficient=True, share=0.99),),
+        ports=(d.PortTest(port="joint torque el", log10_p=-0.2, sufficient=True, share=0.99),),
         suspects=(
             d.Suspect(
                 name="harness",
                 family="harness",
                 place=d.Place(port="joint torque", site="el"),
-                shape={"angle": 1.2},
-                gain=1e5,
                 distance=310.0,
                 absorbed=0.2,
-                log10_p=-300.0,
                 outcome="accepted",
             ),
         ),

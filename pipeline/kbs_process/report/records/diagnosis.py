@@ -38,10 +38,8 @@ class Rival(Record, frozen=True, kw_only=True):
     name: str
     family: str
     place: Place
-    gain: float  # -2 log likelihood that it takes off the fit's residual
-    distance: (
-        float | None
-    )  # of the two laws' predictions after the rival is refitted, sigma; None: not worked out
+    distance: float  # of the two laws' predictions after the rival is refitted, sigma
+    simulated: bool  # in the non-linear plant; else along the linear one
     probability: float
 
 
@@ -74,21 +72,17 @@ class Find(Record, frozen=True, kw_only=True):
     family: str
     named: bool
     place: Place
-    says: str  # the law in words
     equation: str
     reference: str
     parameters: tuple[Fitted, ...]
     probability: float
     distance: float  # whitened distance of the signature, known parameters refitted (rho_eff)
     absorbed: float  # kappa: share that known parameters could have taken up
-    band_Hz: tuple[float, float]  # that holds nine tenths of its signature
     rivals: tuple[Rival, ...]  # best first
     gate: tuple[Gated, ...]
     curve: Curve | None = None
     held_out_variance: float | None = None  # share of the held-out excess that it explains
-    required: float | None = (
-        None  # greatest value in the requirement's band and frame, in the requirement's unit
-    )
+    same_ports: tuple[str, ...] = ()  # that these channels cannot tell from its own
 
 
 class Moved(Record, frozen=True, kw_only=True):
@@ -112,14 +106,13 @@ class Trial(Record, frozen=True, kw_only=True):
     nominal: float
     known: float  # known parameters refitted
     corrected: float  # with everything that was found
-    log10_p: float  # of `corrected`, by the F-distribution
     channels: dict[str, float]  # `corrected`, channel by channel
 
 
 class PortTest(Record, frozen=True, kw_only=True):
     """Does a free input at one port suffice? And which other ports look the same from these channels?"""
 
-    place: Place
+    port: str
     log10_p: float
     sufficient: bool
     share: float  # of the excess that it can take up
@@ -132,12 +125,9 @@ class Suspect(Record, frozen=True, kw_only=True):
     name: str
     family: str
     place: Place
-    shape: dict[str, float]
-    gain: float
-    distance: float
-    absorbed: float
-    log10_p: float
-    outcome: str  # "accepted", "refused: held-out no better", "absorbed by ...", "not simulated"
+    distance: float  # of its signature, known parameters refitted; of one that they absorb, without
+    absorbed: float | None = None
+    outcome: str  # "accepted", "refused: ...", "absorbed by ..."
 
 
 class DiagnosisResults(Record, frozen=True, kw_only=True):

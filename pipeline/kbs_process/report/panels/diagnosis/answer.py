@@ -6,7 +6,7 @@ from kbs_process.report.figures import diagnosis as figures
 from kbs_process.report.panel import Block, Caption, Cell, Figure, Grid, Notices, Panel, Text
 from kbs_process.report.records.diagnosis import DiagnosisResults, Find, Place, Trial
 from kbs_process.report.tables import Tables
-from kbs_process.report.text import MISSING, chance, number
+from kbs_process.report.text import MISSING, chance, number, percent
 
 _TRIALS = Caption(
     shown="Whitened residual over the floor, rms, of every recording: with the parameter files' numbers, with known "
@@ -36,7 +36,9 @@ def panel(results: DiagnosisResults, tables: Tables) -> Panel:
         blocks.append(_finds(results.finds))
     blocks.append(Figure("Residual over the floor", (figures.trials(results.trials),), _TRIALS))
     blocks.append(_trials(results.trials))
-    blocks.append(Text(f"Floor: {results.floor}"))
+    blocks.append(
+        Text(f"Floor: {results.floor}. Chance of what the known parameters leave: {chance(results.log10_p)}.")
+    )
     if results.files:
         blocks.append(
             Text(
@@ -56,7 +58,7 @@ def _finds(finds: tuple[Find, ...]) -> Grid:
             ", ".join(find.place.channels[:3]) or MISSING,
             number(find.probability, 3),
             number(find.distance, 3),
-            MISSING if find.required is None else number(find.required, 2),
+            MISSING if find.held_out_variance is None else percent(find.held_out_variance, 2),
         )
         for find in finds
     )
@@ -80,9 +82,8 @@ def _trials(trials: tuple[Trial, ...]) -> Grid:
             number(entry.nominal),
             number(entry.known),
             Cell(number(entry.corrected), "pass" if entry.corrected < AT_FLOOR else "undecided"),
-            chance(entry.log10_p),
         )
         for entry in trials
     )
-    head = ("Recording", "Role", "Nominal", "Known refitted", "Corrected", "p of what is left")
-    return Grid("Residual over the floor, rms", head, rows, "klrrrr")
+    head = ("Recording", "Role", "Nominal", "Known refitted", "Corrected")
+    return Grid("Residual over the floor, rms", head, rows, "klrrr")

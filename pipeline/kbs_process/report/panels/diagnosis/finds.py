@@ -9,7 +9,7 @@ from kbs_process.report.panel import Block, Caption, Cell, Figure, Grid, Panel, 
 from kbs_process.report.panels.diagnosis.answer import where
 from kbs_process.report.records.diagnosis import DiagnosisResults, Find
 from kbs_process.report.tables import Tables
-from kbs_process.report.text import MISSING, band_hz, number, percent, unit
+from kbs_process.report.text import number, percent, unit
 
 _LAW = Caption(
     shown="What enters at the port, estimated from the residual without presuming a law, against what orders it, and "
@@ -30,12 +30,13 @@ def panel(results: DiagnosisResults, tables: Tables) -> Panel:
 
 
 def _find(find: Find) -> Iterator[Block]:
-    known = (
-        "" if find.named else " No effect of the catalogue passed the gate: the law is as it was measured."
+    known = "" if find.named else " No effect of the catalogue passed the gate: the law is as measured."
+    alike = (
+        f" These channels cannot tell that port from {', '.join(find.same_ports)}." if find.same_ports else ""
     )
     yield Text(
-        f"{find.name}, {where(find.place)}. {find.says}{known} Nine tenths of its signature lie from "
-        f"{band_hz(*find.band_Hz)}; known parameters could have taken up {percent(find.absorbed, 2)} of it."
+        f"{find.name}, {where(find.place)}.{known} Known parameters could have taken up "
+        f"{percent(find.absorbed, 2)} of its signature.{alike}"
     )
     if find.equation:
         yield Text(find.equation, (f"Source: {find.reference}",) if find.reference else ())
@@ -69,22 +70,18 @@ def _find(find: Find) -> Iterator[Block]:
     if find.rivals:
         yield Grid(
             f"{find.name}: other laws",
-            ("Law", "Physics", "Enters at", "Gain", "Distance / sigma", "Probability"),
+            ("Law", "Physics", "Enters at", "Simulated", "Distance / sigma", "Probability"),
             tuple(
                 (
                     rival.name,
                     rival.family,
                     where(rival.place),
-                    number(rival.gain),
-                    MISSING
-                    if rival.distance is None
-                    else Cell(
-                        number(rival.distance), "undecided" if rival.distance < INDISTINGUISHABLE else ""
-                    ),
+                    "yes" if rival.simulated else "no",
+                    Cell(number(rival.distance), "undecided" if rival.distance < INDISTINGUISHABLE else ""),
                     number(rival.probability, 2),
                 )
                 for rival in find.rivals
             ),
-            "kllrrr",
+            "kllcrr",
             f"Laws nearer than {INDISTINGUISHABLE} sigma cannot be told apart by these recordings.",
         )

@@ -36,7 +36,7 @@ def panel(results: DiagnosisResults, tables: Tables) -> Panel:
 def _ports(entries: tuple[PortTest, ...]) -> Grid:
     rows = tuple(
         (
-            where(entry.place),
+            entry.port,
             percent(entry.share, 3),
             chance(entry.log10_p),
             Cell("yes" if entry.sufficient else "no", "pass" if entry.sufficient else ""),
@@ -55,16 +55,15 @@ def _suspects(entries: tuple[Suspect, ...]) -> Grid:
             entry.name,
             entry.family,
             where(entry.place),
-            ", ".join(f"{name} {number(value)}" for name, value in entry.shape.items()) or MISSING,
-            number(entry.gain),
-            percent(entry.absorbed, 2),
+            number(entry.distance),
+            MISSING if entry.absorbed is None else percent(entry.absorbed, 2),
             entry.outcome,
         )
         for entry in entries
     )
-    head = ("Suspect", "Physics", "Enters at", "Shape", "Gain", "Absorbed", "Outcome")
-    note = "Gain: what it takes off -2 log likelihood by the linearised plant, known parameters refitted."
-    return Grid("Suspects, strongest first", head, rows, "klllrrl", note)
+    head = ("Suspect", "Physics", "Enters at", "Distance / sigma", "Absorbed", "Outcome")
+    note = "Distance: the whitened size of its signature, without what known parameters can take up."
+    return Grid("Suspects, strongest first", head, rows, "kllrrl", note)
 
 
 def _moved(title: str, entries: tuple[Moved, ...]) -> Grid:
