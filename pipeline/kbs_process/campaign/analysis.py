@@ -11,7 +11,7 @@ from kbs_process.campaign.config import Bands, Campaign, RecordingEntry
 from kbs_process.campaign.predicting import predict_run
 from kbs_process.campaign.settings import motion_settings
 from kbs_process.plant.rigid import static_wrench
-from kbs_process.signals.records import WRENCH_CHANNELS, Array, Run, Signal
+from kbs_process.signals.records import WRENCH_CHANNELS, Run, Signal
 from kbs_process.stages import bandpass, gravity
 from kbs_process.stages.bandpass import UNFILTERED, Band
 from kbs_process.stages.condense import CondenseSettings
@@ -83,7 +83,7 @@ def analyse(
         run=run,
         motion=motion,
         static=static,
-        misfits=misfits(sample, model, taring, _cords(campaign, entry, wrench, motion)),
+        misfits=misfits(sample, model, taring),
         residual=residual,
         predicted=predicted,
         pairs=_pairs(campaign, residual, disturbance),
@@ -95,8 +95,8 @@ def _predict(
 ) -> tuple[Run | None, Signal]:
     """Return the predicted run (of a plant with drives) and its wrench without gravity.
 
-    The plant has the masses and CoGs that the gravity fit found. Its static wrench, and that of the rig's cords, is
-    taken at its own angles, as the measurement's is. A rig that is driven by its motion has no drives to predict: inertia is all there is.
+    The plant has the masses and CoGs that the gravity fit found. Its static wrench is taken at its own angles, as the
+    measurement's is. A rig that is driven by its motion has no drives to predict: inertia is all there is.
     """
     if campaign.drive == "motion":
         moving = gravity.apply(motion, model).wrench

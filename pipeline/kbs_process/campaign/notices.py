@@ -155,7 +155,8 @@ def _left(misfit: Misfit) -> str:
 
 
 def _taring(analyses: Sequence[Analysis]) -> Iterable[results.Notice]:
-    alone = [analysis.entry.name for analysis in analyses if not analysis.static.taring.fitted]
+    tared = [analysis for analysis in analyses if np.any(analysis.static.taring.noise > 0.0)]
+    alone = [analysis.entry.name for analysis in tared if not analysis.static.taring.fitted]
     if alone:
         yield results.Notice(
             severity="info",

@@ -43,6 +43,7 @@ def summarise(
             article=campaign.article,
             configuration=campaign.configuration,
             drive=campaign.drive,
+            frame="joint" if campaign.rig.frame == "joint" else "T",
         ),
         verdict=_conclusion(findings.requirements),
         provenance=provenance.made(f"kbs-process {campaign.name}", campaign),

@@ -86,7 +86,7 @@ def _entries(
         *budget.filter_edges(
             measured, stated.edge_error, stated.edge_error_drift, budget.drifting_part(measured, band)
         ),
-        budget.resonance(measured, resonance, limits),
+        *([budget.resonance(measured, resonance, limits)] if rig.transducer.channels else []),
     ]
     if repeat_noise is not None:
         entries.append(budget.repeatability(repeat_noise, sensor.sigma))

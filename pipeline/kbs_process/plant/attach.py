@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from kbs_process.plant.effect import Effect, Parameter, Port
-from kbs_process.rig.model import LAB, External, Joint, Quantity, Rig
+from kbs_process.rig.model import LAB, Drive, External, Joint, Quantity, Rig
 from kbs_process.signals.records import Array
 
 
@@ -24,8 +24,8 @@ def attach(
     """Return `rig` with the parameters of `effect`: `values`, else what the rig has, else none of an amplitude.
 
     A shape without a value is in the middle of its prior; sigmas are the priors'. An effect of the drives gets
-    `values` at `joints` (all, by default), and no amplitude at the others. An effect of the laboratory acts on the link
-    `on`, a force at `point` (3,) m in the link's axes.
+    `values` at `joints` (all, by default), and no amplitude at the others; a joint without a drive gets a direct one.
+    An effect of the laboratory acts on the link `on`, a force at `point` (3,) m in the link's axes.
     """
     given = values or {}
     if unknown := set(given) - {parameter.name for parameter in effect.parameters}:
@@ -48,13 +48,24 @@ def attach(
 
 
 def _joint(joint: Joint, effect: Effect, given: Mapping[str, float]) -> Joint:
-    if joint.drive is None:
-        return joint
-    parameters = dict(joint.drive.parameters)
+    drive = joint.drive or _direct(joint)
+    parameters = dict(drive.parameters)
     for entry in effect.parameters:
         if entry.name in given or (entry.name not in parameters and entry.role != "shared"):
             parameters[entry.name] = _quantity(f"joint.{joint.name}.drive", entry, given)
-    return replace(joint, drive=replace(joint.drive, parameters=parameters))
+    return replace(joint, drive=replace(drive, parameters=parameters))
+
+
+def _direct(joint: Joint) -> Drive:
+    """A drive that turns with its joint, its rotor a part of the body that it drives."""
+
+    def exact(name: str, value: float, unit: str) -> Quantity:
+        path = f"joint.{joint.name}.drive.{name}"
+        return Quantity(path, np.asarray(value), unit, np.zeros(()), "definition of a direct drive")
+
+    return Drive(
+        exact("ratio", 1.0, "1"), exact("rotor_inertia", 0.0, "kg m^2"), exact("steps_per_turn", 1.0, "1"), {}
+    )
 
 
 def _quantity(path: str, entry: Parameter, given: Mapping[str, float]) -> Quantity:

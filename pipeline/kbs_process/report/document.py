@@ -21,10 +21,11 @@ class Document(Generic[R]):
     title: str  # of its schema
     record: type[R]
     head: Callable[[R], Head]
-    panels: tuple[Callable[[R, Tables], Panel], ...]
+    panels: tuple[Callable[[R, Tables], Panel | None], ...]  # None: the section does not apply
 
     def read(self, folder: Path) -> tuple[Head, tuple[Panel, ...]]:
         """Return head and sections of the results in `folder`."""
         results = load(folder, self.record)
         tables = Tables(folder)
-        return self.head(results), tuple(make(results, tables) for make in self.panels)
+        made = (make(results, tables) for make in self.panels)
+        return self.head(results), tuple(section for section in made if section is not None)

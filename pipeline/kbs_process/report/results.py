@@ -37,6 +37,7 @@ class CampaignSummary(Record, frozen=True, kw_only=True):
     article: str
     configuration: str
     drive: Literal["command", "motion"]  # what drives the plant: the commands, or the measured angles
+    frame: Frame = "T"  # of the loads that were recorded
 
 
 class ChannelResult(Record, frozen=True, kw_only=True):

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from kbs_process.report.document import Document
-from kbs_process.report.panel import Head
+from kbs_process.report.panel import Head, Panel
 from kbs_process.report.panels import (
     budget,
     compliance,
@@ -22,6 +24,7 @@ from kbs_process.report.panels import (
     transducer,
 )
 from kbs_process.report.results import Results
+from kbs_process.report.tables import Tables
 
 _DRIVE = {"command": "command-driven prediction", "motion": "motion-driven prediction"}
 
@@ -41,6 +44,11 @@ def head(results: Results) -> Head:
     )
 
 
+def _on_transducer(make: Callable[[Results, Tables], Panel]) -> Callable[[Results, Tables], Panel | None]:
+    """A section that says nothing about a rig whose loads are the efforts of its joints alone."""
+    return lambda results, tables: make(results, tables) if results.campaign.frame == "T" else None
+
+
 DOCUMENT = Document(
     title="Results of a processed campaign",
     record=Results,
@@ -50,15 +58,15 @@ DOCUMENT = Document(
         disturbance.panel,
         merit.panel,
         spectra.panel,
-        transducer.panel,
-        static.panel,
+        _on_transducer(transducer.panel),
+        _on_transducer(static.panel),
         gravity.panel,
-        coupling.panel,
+        _on_transducer(coupling.panel),
         repeatability.panel,
         budget.panel,
-        pointing.panel,
+        _on_transducer(pointing.panel),
         recordings.panel,
-        conventions.panel,
+        _on_transducer(conventions.panel),
         methods.panel,
         provenance.panel,
     ),

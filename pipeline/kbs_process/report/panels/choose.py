@@ -20,8 +20,8 @@ def main_band(results: Results) -> str:
 
 
 def main_frame(results: Results) -> Frame:
-    """Return the requirement's frame, or the transducer's where nothing is required."""
-    return results.requirements[0].frame if results.requirements else "T"
+    """Return the requirement's frame, or that of the recorded loads where nothing is required."""
+    return results.requirements[0].frame if results.requirements else results.campaign.frame
 
 
 def band_names(results: Results) -> tuple[str, ...]:
@@ -42,7 +42,8 @@ def band_range(band: Band) -> str:
 
 def frame_label(frame: str) -> str:
     """Return a frame in words."""
-    return {"S": "spacecraft (S)", "T": "transducer (T)"}.get(frame, frame)
+    names = {"S": "spacecraft (S)", "T": "transducer (T)", "joint": "effort of the joints"}
+    return names.get(frame, frame)
 
 
 def by_role(recordings: tuple[Recording, ...]) -> tuple[Recording, ...]:

@@ -45,7 +45,7 @@ def panel(results: Results, tables: Tables) -> Panel:
         return Panel("disturbance", "Disturbance", question, (Text("No band table to show."),))
     scenes = [_scene(results, *entry) for entry in found]
     main = (main_band(results), main_frame(results))
-    bursts = (_whole_band(results), "T")
+    bursts = (_whole_band(results), results.campaign.frame)
     live = views(scenes)
     shown = {view.choice for view in live}
     shortcuts = {
@@ -84,7 +84,8 @@ def _found(results: Results, tables: Tables) -> Iterator[Entry]:
     """
     main = main_frame(results)
     compared = [recording for recording in by_role(results.recordings) if recording.role != "calibration"]
-    frames: tuple[Frame, Frame] = ("S", "T") if main == "S" else ("T", "S")
+    own = results.campaign.frame
+    frames: tuple[Frame, Frame] = ("S", own) if main == "S" else (own, "S")
     for band in band_names(results):
         for frame in frames:
             for recording in compared:

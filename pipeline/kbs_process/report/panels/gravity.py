@@ -22,11 +22,17 @@ _CAPTION = Caption(
 
 def panel(results: Results, tables: Tables) -> Panel:
     """Parameters with prior and posterior, checks, and the residual of every channel."""
-    question = "Which masses explain the static wrench, and is computed compensation feasible?"
+    weighs = results.campaign.frame == "T"  # efforts show inertia and friction, and weight only in passing
+    title = "Gravity fit" if weighs else "Fit of the rigid bodies"
+    question = (
+        "Which masses explain the static wrench, and is computed compensation feasible?"
+        if weighs
+        else "Which masses, inertias and viscous frictions explain the efforts?"
+    )
     gravity = results.gravity
     if gravity is None:
         text = Text("Nothing was fitted: the static wrench is that of the parameter files.")
-        return Panel("gravity", "Gravity fit", question, (text,))
+        return Panel("gravity", title, question, (text,))
     blocks: list[Block] = []
     if gravity.feasible:
         blocks.append(Text(gravity.feasible))
@@ -35,16 +41,19 @@ def panel(results: Results, tables: Tables) -> Panel:
         alt = "Fitted parameters against their priors, in prior sigma"
         picture = bars.shifts(gravity.parameters, alt)
         blocks.append(Figure("Fitted parameters against their priors", (picture,), _CAPTION))
-    blocks.append(_channels(gravity))
+    if weighs:
+        blocks.append(_channels(gravity))
+    if any(channel.sigma for entry in gravity.recordings for channel in entry.channels):
+        blocks.append(_taring(gravity))
     if gravity.recordings:
-        blocks.extend((_taring(gravity), _left(gravity)))
+        blocks.append(_left(gravity))
     if gravity.checks:
         rows = tuple(
             (entry.name, Cell("ok" if entry.ok else "not met", "pass" if entry.ok else "fail"), entry.detail)
             for entry in gravity.checks
         )
         blocks.append(Grid("Checks on the fit", ("Check", "Outcome", "Detail"), rows, "lcl"))
-    return Panel("gravity", "Gravity fit", question, tuple(blocks))
+    return Panel("gravity", title, question, tuple(blocks))
 
 
 def _parameters(gravity: Gravity) -> Grid:

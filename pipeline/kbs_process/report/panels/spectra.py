@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from kbs_process.report.figures import spectra
 from kbs_process.report.panel import Block, Caption, Figure, Grid, Panel, Text
-from kbs_process.report.panels.choose import by_role
+from kbs_process.report.panels.choose import by_role, frame_label
 from kbs_process.report.panels.static import PLATES
 from kbs_process.report.results import Results
 from kbs_process.report.tables import Tables
@@ -46,7 +46,8 @@ def panel(results: Results, tables: Tables) -> Panel:
     )
     blocks: list[Block] = []
     if pictures:
-        blocks.append(Figure("Power spectral densities at the transducer (frame T)", pictures, _CAPTION))
+        title = f"Power spectral densities, {frame_label(results.campaign.frame)}"
+        blocks.append(Figure(title, pictures, _CAPTION))
     else:
         blocks.append(Text("No recording has a spectrum table."))
     if results.resonances:
