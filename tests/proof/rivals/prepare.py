@@ -79,7 +79,10 @@ def _averaged(taps: Tapped, column: str, time: Array, dt: float) -> Array:
 
 
 def _repeatability(experiment: Experiment, left: list[Array]) -> Array:
-    """Rms by which repeats differ, by channel, over sqrt 2; of residuals alone where nothing was repeated."""
+    """Rms by which repeats differ, by channel, over sqrt 2; of residuals alone where nothing was repeated.
+
+    No less than the rounding of codes: an encoder at rest repeats itself exactly.
+    """
     apart = []
     for members in experiment.repeats:
         for one, other in itertools.pairwise(members):
@@ -87,7 +90,13 @@ def _repeatability(experiment: Experiment, left: list[Array]) -> Array:
             difference = (left[one] - left[other])[valid]
             apart.append((difference - difference.mean(axis=0)) / np.sqrt(2.0))
     rows = np.concatenate(apart or [r[t.valid] for r, t in zip(left, experiment.trials, strict=True)])
-    return np.maximum(np.sqrt(np.mean(rows**2, axis=0)), 1e-12)
+    transducer = experiment.rig.transducer
+    codes = [float(transducer.resolution.value[WRENCH_CHANNELS.index(c)]) for c in transducer.channels]
+    for joint in experiment.angle_joints:
+        encoder = experiment.rig.joints[joint].encoder
+        codes.append(float(encoder.step) if encoder else 0.0)
+    least = np.maximum(np.array(codes) / np.sqrt(12.0), 1e-12)
+    return np.maximum(np.sqrt(np.mean(rows**2, axis=0)), least)
 
 
 def _recording(
