@@ -22,7 +22,7 @@ import numpy as np
 from numba import njit
 
 from engine.hardware import Hardware
-from engine.ports import OUT
+from engine.ports import BODY, OUT
 
 _STEPS = 200  # electrical and tooth cycles: T_cog and T_stat repeat 200 times a motor turn
 _ELECTRICAL = np.pi / 64  # electrical angle of a microstep, rad
@@ -98,9 +98,12 @@ def _sliding_rate(p: DriveNumbers, rhs: float, w0: float, c: float, h: float) ->
 
 
 @njit(error_model="numpy")
-def friction_torque(p: DriveNumbers, T: float, th_r: float, w0: float, dt: float) -> float:
-    """Return T_motf + T_dyn + T_stat over one step, given the torque T of everything else, N m."""
-    h = dt / p.Jr
+def friction_torque(p: DriveNumbers, T: float, th_r: float, w0: float, dt: float, loss: float = 0.0) -> float:
+    """Return T_motf + T_dyn + T_stat over one step, given the torque T of everything else, N m.
+
+    T may fall with the rate, by `loss` N m s/rad; what it has lost at the step's end is returned with the friction.
+    """
+    h = dt / (p.Jr + loss * dt)
     c = p.d0 + p.d1 * np.sin(2 * th_r + p.phi_dyn)
     level = stiction_level(p, th_r, w0, dt)
     free = w0 + h * T
@@ -112,7 +115,7 @@ def friction_torque(p: DriveNumbers, T: float, th_r: float, w0: float, dt: float
         backwards = _sliding_rate(p, free + h * level, w0, c, h)
         if backwards < 0:
             w1 = backwards
-    return (free - w1) / h
+    return (free - w1) / h + loss * (w1 - w0)
 
 
 @njit(error_model="numpy")
@@ -125,14 +128,26 @@ def bungee_force(cord: tuple[float, float, float, float, float], at: Any, force:
 
 
 @njit(error_model="numpy")
+def pull_at(cord: tuple[float, float, float, float, float], hook: Any, centre: Any, wrench: Any) -> None:
+    """Add to `wrench` (force, then torque about `centre`) what a cord pulls at `hook` with."""
+    force = np.zeros(3)
+    bungee_force(cord, hook, force)
+    for k in range(3):
+        i, j = (k + 1) % 3, (k + 2) % 3
+        wrench[k] += force[k]
+        wrench[3 + k] += (hook[i] - centre[i]) * force[j] - (hook[j] - centre[j]) * force[i]
+
+
+@njit(error_model="numpy")
 def copy_bodies(view: Any, bodies: Any) -> None:
-    """Fill `bodies` (2, 18) from views of MuJoCo's own xpos, xmat, xipos and cacc, in its c-frame, about `com`."""
+    """Fill `bodies` (2, 21) from views of MuJoCo's own xpos, xmat, xipos and cacc, in its c-frame, about `com`."""
     for row in range(2):
         origin, axes, centre, cacc = view[4 * row], view[4 * row + 1], view[4 * row + 2], view[4 * row + 3]
         com = view[8]
         for k in range(3):
             bodies[row, k] = origin[k]
             bodies[row, 12 + k] = centre[k]
+            bodies[row, 18 + k] = cacc[k]
         for k in range(9):
             bodies[row, 3 + k] = axes[k]
         r0, r1, r2 = origin[0] - com[0], origin[1] - com[1], origin[2] - com[2]
@@ -150,18 +165,18 @@ def run_cycle(
 
     `state` holds views of MuJoCo's own qpos, qvel, qacc, qfrc_applied, sensordata, the antenna's xipos
     and its row of xfrc_applied. Row n of `wrench` (n, 6) and `q` (n, 7) belongs to t = start + (n + 1/2) dt.
-    `act` and `extra` are what acts beyond the drives (engine.ports), with its numbers and memory, the azimuth body's
-    row of xfrc_applied, MuJoCo's gravity, gravity at rest, and what `copy_bodies` reads.
+    `act` and `extra` are what acts beyond the drives (engine.ports): its numbers and memory, the azimuth
+    body's row of xfrc_applied, MuJoCo's gravity, gravity at rest, and what `copy_bodies` reads.
     """
-    qpos, qvel, qacc, qfrc, sensor, xipos, xfrc = state
+    qpos, qvel, qacc, qfrc, sensor, xipos, xfrc, hook = state
     numbers, memory, xfrc_azimuth, gravity, still, view = extra
-    motion, bodies, out = np.zeros((3, 7)), np.zeros((2, 18)), np.zeros(OUT)
+    motion, bodies, out = np.zeros((3, 7)), np.zeros((2, BODY)), np.zeros(OUT)
     steps = len(wrench)
     for n in range(steps):
         if acts:
             for k in range(7):
                 motion[0, k] = qpos[k]
-                motion[1, k] = qvel[k] + 0.5 * dt * qacc[k]
+                motion[1, k] = qvel[k] if k == 3 or k == 5 else qvel[k] + 0.5 * dt * qacc[k]
             for axis in range(2):
                 motion[2, axis] = field[0, axis] + (field[1, axis] - field[0, axis]) * ((n + 0.5) / steps)
             copy_bodies(view, bodies)
@@ -187,17 +202,14 @@ def run_cycle(
             T += p.tcog * np.sin(_STEPS * th_r + p.phi_cog) - T_gear / p.R
             if acts:
                 T += out[rotor]
-            qfrc[rotor] = T - friction_torque(p, T, th_r, qvel[rotor], dt)
+            qfrc[rotor] = T - friction_torque(p, T, th_r, qvel[rotor], dt, out[22 + axis])
             qfrc[rotor + 1] = T_gear
             if acts:
                 qfrc[rotor + 1] += out[rotor + 1]
         if cord[3] > 0:
-            x, y, z = xfrc[0], xfrc[1], xfrc[2]
-            bungee_force(cord, xipos, xfrc)
-            if acts:
-                xfrc[0] += x
-                xfrc[1] += y
-                xfrc[2] += z
+            if not acts:
+                xfrc[:] = 0.0
+            pull_at(cord, hook, xipos, xfrc)
         q[n] = qpos
         mj_step(model, data)
         for channel in range(6):

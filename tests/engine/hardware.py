@@ -24,7 +24,7 @@ BODIES = ("base", "azimuth", "antenna")
 # Factor to SI of every unit that the archive's parameter files use; another one is a KeyError.
 _SI = {"mrad": 1e-3, "deg": np.pi / 180, "mm": 1e-3} | dict.fromkeys(
     (
-        "1", "rad", "m", "s", "kg", "N", "N m", "Hz", "1/s", "m/s^2", "rad/s", "kg m^2", "N m/rad",
+        "1", "rad", "m", "s", "kg", "N", "N m", "Hz", "1/s", "m/s^2", "rad/s", "kg m^2", "N m/rad", "N/m",
         "N m s/rad", "SI by channel pair",
     ),
     1.0,
@@ -37,7 +37,7 @@ _TRUNCATION = 2.0  # sigmas; hardware further off than that would have been sent
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Bungee:
-    """An elastic cord from an anchor in the laboratory to the antenna's CoG (configuration 4).
+    """An elastic cord from an anchor in the laboratory to the antenna (configurations 3 and 4).
 
     Tension = stiffness * max(length - free_length, 0), along the cord.
     """
@@ -45,10 +45,11 @@ class Bungee:
     anchor: tuple[float, float, float]  # m, in undeflected T
     stiffness: float  # N/m
     free_length: float  # m
+    hook: tuple[float, float, float] | None = None  # m, in the antenna's axes; None: at its CoG
 
     def as_dict(self) -> dict[str, Any]:
         """Its numbers by name."""
-        return asdict(self)
+        return {name: value for name, value in asdict(self).items() if value is not None}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -119,6 +120,13 @@ class Hardware:
 
     def __getitem__(self, name: str) -> Array:
         return self.values[name]
+
+    def cord(self) -> Bungee:
+        """Return the bungee that the parameter files describe."""
+        x, y, z = (self.scalar(f"external.bungee.anchor_{axis}") for axis in "xyz")
+        a, b, c = self["external.bungee.point"].tolist()
+        stiffness, free = (self.scalar(f"external.bungee.{name}") for name in ("stiffness", "free_length"))
+        return Bungee((x, y, z), stiffness, free, hook=(a, b, c))
 
     def scalar(self, name: str) -> float:
         """Return a number that is not an array."""

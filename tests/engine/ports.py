@@ -8,11 +8,12 @@ An `Extra` acts at any of the engine's ports. Its compiled part, `act`, is calle
 - `numbers`: the extra's own (k, n) float64; `memory`: its states (k, m) float64, 0 at the start, kept from step to step
 - `motion` (3, 7): positions, rates, and in the first two of the last row the fields of az and el (motor rad).
   Columns: plate x, y, z, rotor az, az, rotor el, el
-- `bodies` (2, 18): azimuth body, antenna: origin (3) and axes (9, row by row) of its frame, its centre of mass (3), all
-  in undeflected T; then, for the specific force that an appendage feels, acceleration less gravity of its origin (3)
-- `out` (22,), zero before the call: generalised forces in the columns' order (7); force and torque from the laboratory
+- `bodies` (2, 21): azimuth body, antenna: origin (3) and axes (9, row by row) of its frame, its centre of mass (3), all
+  in undeflected T; for what an appendage feels, acceleration less gravity of its origin (3), angular acceleration (3)
+- `out` (24,), zero before the call: generalised forces in the columns' order (7); force and torque from the laboratory
   on the azimuth body (6) and on the antenna (6), in undeflected T, torque about their centre of mass; acceleration of
-  the floor (3)
+  the floor (3); what the rotors' torques lose with their rates (2), N m s/rad, by which a steep friction is implicit
+- rates of the rotors are those at the step's start, other rates are extrapolated to its middle
 """
 
 from __future__ import annotations
@@ -28,7 +29,8 @@ from engine.hardware import Array
 
 # Places in `out`.
 GENERALISED, ON_AZIMUTH, ON_ANTENNA, FLOOR = slice(0, 7), slice(7, 13), slice(13, 19), slice(19, 22)
-OUT = 22
+OUT = 24
+BODY = 21
 
 Act = Callable[..., None]
 FieldChange = Callable[[int, Array, Array], Array]

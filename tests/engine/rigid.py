@@ -18,6 +18,7 @@ from engine.hardware import Array, Hardware
 # Order of the joints, thus of generalised positions and velocities.
 PLATE = slice(0, 3)
 ROTOR_AZ, AZ, ROTOR_EL, EL = 3, 4, 5, 6
+HOOK = "hook"  # site where a cord pulls at the antenna
 BODY_NAMES = ("base", "azimuth", "antenna")
 
 _ROTOR_MASS = 1e-9  # kg: MuJoCo wants some; the rotor's real mass counts in the body that carries it
@@ -89,6 +90,8 @@ def build(hardware: Hardware, timestep: float) -> RigidModel:
     _inertial(azimuth, "azimuth", hardware, _turned(cross_el, hardware["joint.el.misalignment"]))
     antenna = ET.SubElement(azimuth, "body", name="antenna", **mount_el)
     ET.SubElement(antenna, "joint", name="el", axis=_text(axis_el))
+    if hardware.bungee is not None and hardware.bungee.hook is not None:
+        ET.SubElement(antenna, "site", name=HOOK, pos=_text(hardware.bungee.hook))
     _inertial(antenna, "antenna", hardware, np.zeros((3, 3)))
 
     sensor = ET.SubElement(root, "sensor")

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from engine.hardware import AXES, Array, Hardware
+from engine.ports import NONE, Extra
 from engine.simulation import TIME_STEP, integrate, sample
 from engine.trajectories import Commands
 
@@ -89,20 +90,20 @@ def record(
     """Simulate one run and record it. The same arguments give the same recording, bit by bit."""
     run, clocks, noise, *arrivals = (np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(7))
     hardware = vary(hardware, run)
-    wrench_clock, encoder_clock = _clock(clocks, wrench_hz), _clock(clocks, encoder_hz)
+    wrench_clock, encoder_clock = draw_clock(clocks, wrench_hz), draw_clock(clocks, encoder_hz)
     dense = integrate(hardware, commands, time_step=time_step)
     duration = float(commands.t[-1])
-    wrench_reading, wrench_t = _ticks(wrench_clock, wrench_hz, duration)
-    encoder_reading, encoder_t = _ticks(encoder_clock, encoder_hz, duration)
+    wrench_reading, wrench_t = ticks(wrench_clock, wrench_hz, duration)
+    encoder_reading, encoder_t = ticks(encoder_clock, encoder_hz, duration)
     result = sample(hardware, dense, wrench_t, encoder_t)
     drift = DRIFT_SPREAD * hardware.sigmas["transducer.bias"] * run.standard_normal(6)
     raw = read_transducer(hardware, wrench_t, result.wrench, drift, noise)
     command_values = np.hstack([commands.position, commands.rate])
     return Recording(
-        wrench=_stream(epoch_ns, wrench_reading, wrench_t, raw, arrivals[0]),
-        encoder=_stream(epoch_ns, encoder_reading, encoder_t, result.encoder, arrivals[1]),
-        command=_stream(epoch_ns, commands.t, commands.t, command_values, arrivals[2]),
-        field=_stream(epoch_ns, dense.field_t, dense.field_t, dense.field, arrivals[3]),
+        wrench=stream(epoch_ns, wrench_reading, wrench_t, raw, arrivals[0]),
+        encoder=stream(epoch_ns, encoder_reading, encoder_t, result.encoder, arrivals[1]),
+        command=stream(epoch_ns, commands.t, commands.t, command_values, arrivals[2]),
+        field=stream(epoch_ns, dense.field_t, dense.field_t, dense.field, arrivals[3]),
         hardware=hardware,
         drift=drift,
         wrench_clock=wrench_clock,
@@ -123,13 +124,21 @@ def vary(hardware: Hardware, rng: np.random.Generator) -> Hardware:
 
 
 def read_transducer(
-    hardware: Hardware, t: Array, wrench: Array, drift: Array, rng: np.random.Generator
+    hardware: Hardware,
+    t: Array,
+    wrench: Array,
+    drift: Array,
+    rng: np.random.Generator,
+    *,
+    extra: Extra = NONE,
 ) -> Array:
     """Return raw = (I + X) w + bias + drift + noise, rounded to the resolution; shape (n, 6).
 
     `drift` (6,) is how far the zero wanders until the end of warming up.
     """
     coupled = wrench @ (np.eye(6) + hardware["transducer.cross_coupling"]).T
+    if extra.transducer is not None:
+        coupled = coupled + extra.transducer(t, coupled)
     wandering = drift * (1 - np.exp(-t / DRIFT_TIME))[:, None]
     noise = hardware["transducer.noise"] * coloured(rng, len(t), 1.0 / (t[1] - t[0]))
     raw = coupled + hardware["transducer.bias"] + wandering + noise
@@ -160,20 +169,22 @@ def _stationary(first: Array, a: float) -> Array:
     return ((1 - np.sqrt(1 - a**2)) * first)[None, :]
 
 
-def _clock(rng: np.random.Generator, rate: float) -> Clock:
+def draw_clock(rng: np.random.Generator, rate: float) -> Clock:
+    """Draw a recorder's clock with `rate` ticks a second."""
     offset, skew = rng.normal(0.0, CLOCK_OFFSET), rng.normal(0.0, CLOCK_SKEW)
     return Clock(offset, skew, float(np.round(rng.uniform(0.0, 1.0 / rate), 6)))
 
 
-def _ticks(clock: Clock, rate: float, duration: float) -> tuple[Array, Array]:
-    """Readings of the clock at its ticks, and the true instants of these, within the run."""
+def ticks(clock: Clock, rate: float, duration: float) -> tuple[Array, Array]:
+    """Return readings of the clock at its ticks, and the true instants of these, within the run."""
     reading = clock.phase + np.arange(-100, round((duration + 1) * rate)) / rate
     t = (reading - clock.offset) / (1 + clock.skew)
     inside = (t >= 0) & (t <= duration)
     return reading[inside], t[inside]
 
 
-def _stream(epoch_ns: int, reading: Array, t: Array, values: Array, rng: np.random.Generator) -> Stream:
+def stream(epoch_ns: int, reading: Array, t: Array, values: Array, rng: np.random.Generator) -> Stream:
+    """Stamp messages with what the clock read, s, and with when they arrived after t, s."""
     spread = rng.exponential(LATENCY_MEAN, len(t))
     latency = np.minimum(LATENCY_LEAST + spread, LATENCY_MOST)
     log = epoch_ns + 1000 * np.round((t + latency) * 1e6).astype(np.int64)

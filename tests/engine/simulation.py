@@ -9,10 +9,10 @@ import numpy as np
 from scipy.optimize import root
 from scipy.signal import butter, sosfilt, sosfilt_zi
 
-from engine.drive import bungee_force, copy_bodies, drive_numbers, motor_torque, run_cycle
+from engine.drive import copy_bodies, drive_numbers, motor_torque, pull_at, run_cycle
 from engine.hardware import AXES, Array, Hardware
-from engine.ports import GENERALISED, NONE, ON_ANTENNA, ON_AZIMUTH, OUT, Extra
-from engine.rigid import AZ, EL, PLATE, ROTOR_AZ, ROTOR_EL, RigidModel, build, mj_step_function
+from engine.ports import BODY, GENERALISED, NONE, ON_ANTENNA, ON_AZIMUTH, OUT, Extra
+from engine.rigid import AZ, EL, HOOK, PLATE, ROTOR_AZ, ROTOR_EL, RigidModel, build, mj_step_function
 from engine.trajectories import Commands
 
 # s; halving it moves no channel by a tenth of its noise (tests/engine/test_engine_convergence.py).
@@ -116,7 +116,7 @@ def integrate(
     data.qpos[:] = equilibrium(hardware, rigid, first, extra)
     state = (
         data.qpos, data.qvel, data.qacc, data.qfrc_applied, data.sensordata,
-        data.xipos[rigid.antenna], data.xfrc_applied[rigid.antenna],
+        data.xipos[rigid.antenna], data.xfrc_applied[rigid.antenna], _hook(hardware, rigid),
     )  # fmt: skip
     gravity = rigid.model.opt.gravity
     memory = np.zeros((len(extra.numbers), extra.states))
@@ -170,7 +170,7 @@ def equilibrium(hardware: Hardware, rigid: RigidModel, angles: Array, extra: Ext
     cord = _cord(hardware)
     data = rigid.data
     memory = np.zeros((len(extra.numbers), extra.states))
-    motion, bodies, out = np.zeros((3, 7)), np.zeros((2, 18)), np.zeros(OUT)
+    motion, bodies, out = np.zeros((3, 7)), np.zeros((2, BODY)), np.zeros(OUT)
     motion[2, :2] = [p.R * angle for p, angle in zip(drives, angles, strict=True)]
 
     def unbalanced(q: Array) -> Array:
@@ -180,7 +180,8 @@ def equilibrium(hardware: Hardware, rigid: RigidModel, angles: Array, extra: Ext
         data.xfrc_applied[:] = 0
         mujoco.mj_kinematics(rigid.model, data)
         if cord[3] > 0:
-            bungee_force(cord, data.xipos[rigid.antenna], data.xfrc_applied[rigid.antenna])
+            centre = data.xipos[rigid.antenna]
+            pull_at(cord, _hook(hardware, rigid), centre, data.xfrc_applied[rigid.antenna])
         for axis, p in enumerate(drives):
             rotor = 3 + 2 * axis
             T_gear = p.Ka * (q[rotor] / p.R - q[rotor + 1])
@@ -190,7 +191,8 @@ def equilibrium(hardware: Hardware, rigid: RigidModel, angles: Array, extra: Ext
         if extra.acts:
             motion[0] = q
             copy_bodies(_view(rigid), bodies)
-            bodies[:, 15:] = -rigid.model.opt.gravity  # at rest
+            bodies[:, 15:18] = -rigid.model.opt.gravity  # at rest
+            bodies[:, 18:] = 0.0
             out[:] = 0.0
             extra.act(0.0, 0.0, extra.numbers, memory, motion, bodies, out)
             data.qfrc_applied[:] += out[GENERALISED]
@@ -243,6 +245,13 @@ def encode(hardware: Hardware, angles: Array) -> Array:
 def at(t: Array, values: Array, instants: Array) -> Array:
     """Interpolate columns linearly; the step is 1/500 of the amplifier's fastest period."""
     return np.column_stack([np.interp(instants, t, column) for column in values.T])
+
+
+def _hook(hardware: Hardware, rigid: RigidModel) -> Array:
+    """Where a cord pulls at the antenna: a view of MuJoCo's own numbers."""
+    if hardware.bungee is None or hardware.bungee.hook is None:
+        return rigid.data.xipos[rigid.antenna]
+    return rigid.data.site_xpos[rigid.model.site(HOOK).id]
 
 
 def _cord(hardware: Hardware) -> tuple[float, float, float, float, float]:

@@ -1,0 +1,63 @@
+"""Make concealed campaigns, from tests/: `python -m proof.concealed --seed S --set dev --count N --out FOLDER`."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import multiprocessing
+import os
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from proof.concealed import trials
+from proof.concealed.ranges import Split
+from proof.concealed.trials import Spec
+
+_SPLITS: dict[str, Split] = {"dev": "development", "validation": "validation"}
+
+
+def one(spec: Spec, out: Path, truth: Path) -> dict[str, Any]:
+    """Make one trial under a name that says nothing, and put its truth aside."""
+    name = np.random.default_rng([spec.seed, spec.index, len(spec.split), 4]).bytes(4).hex()
+    made = trials.make(spec, out / name)
+    (truth / f"{name}.json").write_text(json.dumps(made, indent=1) + "\n")
+    return made
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Make trials in processes of low priority."""
+    parser = argparse.ArgumentParser(prog="python -m proof.concealed", description=__doc__)
+    parser.add_argument("--seed", type=int, required=True)
+    parser.add_argument("--set", choices=_SPLITS, required=True)
+    parser.add_argument("--count", type=int, default=1)
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--truth", type=Path, help="folder for what is concealed; default: OUT-truth")
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--only", help="conceal this physics alone")
+    parser.add_argument("--null", choices=("nothing", "within", "beyond"), help="conceal nothing")
+    parser.add_argument("--level", type=float, default=300.0, help="with --only: rho_eff")
+    parser.add_argument("--first", type=int, default=0, help="number of the first trial")
+    asked = parser.parse_args(arguments)
+    split, numbers = _SPLITS[asked.set], range(asked.first, asked.first + asked.count)
+    if asked.only:
+        specs = [trials.single(split, asked.seed, k, asked.only, asked.level) for k in numbers]
+    elif asked.null:
+        specs = [Spec(split, asked.seed, k, asked.null) for k in numbers]
+    else:
+        specs = trials.draw(split, asked.first + asked.count, asked.seed)[asked.first :]
+    truth = asked.truth or asked.out.with_name(f"{asked.out.name}-truth")
+    truth.mkdir(parents=True, exist_ok=True)
+    spawn = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(asked.jobs, mp_context=spawn, initializer=os.nice, initargs=(10,)) as pool:
+        jobs = [pool.submit(one, spec, asked.out, truth) for spec in specs]
+        for job in jobs:
+            made = job.result()
+            print(made["trial"], f"rho_eff {made['rho_eff']:.0f}", flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,149 @@
+"""A trial's rig with its metric: how strong an effect is there, and how large it has to be."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from engine.hardware import Array, Hardware
+from engine.ports import Extra
+from engine.trajectories import Commands
+from proof.concealed import effects as catalogue
+from proof.concealed.observed import Motion
+from proof.concealed.physics import Effect, Physics
+from proof.concealed.ranges import BEYOND_SIGMAS, LEVELS, Split
+from proof.concealed.sensitivity import Named, columns, perturbed
+from proof.concealed.strength import Setting, Strength, Whitening, own_columns, strength
+
+_REPEATS = 2  # of each trajectory that models are fitted to
+_NEAR = 0.12  # a strength is close enough to its level
+_SEARCH = 5  # amplitudes tried after the first
+
+# Not moved beyond: phases are unknown anyway, the others would not be physical or not be seen.
+_KEPT = (".phi_", "misalignment", "body.base", "body.azimuth.inertia")
+_LEAST_BEYOND = 60.0  # rho of parameters that are off beyond their uncertainty
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Bench:
+    """A trial's rig, trajectories and metric."""
+
+    hardware: Hardware
+    trajectories: tuple[Commands, ...]  # the last one is held out
+    rates: tuple[float, float]  # Hz, of wrench and encoders
+    settings: tuple[Setting, ...]  # of the trajectories that models are fitted to
+    readings: tuple[Array, ...]
+    columns: tuple[dict[Named, Array], ...]
+
+    @property
+    def fitted(self) -> tuple[Commands, ...]:
+        """Trajectories that models are fitted to."""
+        return self.trajectories[:-1]
+
+    def spans(self) -> Array:
+        """Least and greatest reading of each channel, (6, 2)."""
+        all_ = np.concatenate(self.readings)[:, :6]
+        return np.column_stack([all_.min(axis=0), all_.max(axis=0)])
+
+    def extra(self, effects: Sequence[Effect], duration: float) -> Extra:
+        """What the engine lets act."""
+        return catalogue.extra(tuple(effects), self.hardware, self.spans(), duration)
+
+    def strength(self, effects: Sequence[Effect]) -> Strength:
+        """Distance of some effects from the floor."""
+        changes: list[Array] = []
+        for setting, readings in zip(self.settings, self.readings, strict=True):
+            duration = float(setting.motion.path.t[-1])
+            changes.append(
+                setting.whiten(setting.motion.observed(extra=self.extra(effects, duration)) - readings)
+            )
+        return strength(self.settings, changes)
+
+
+def measure(hardware: Hardware, trajectories: Sequence[Commands], rates: tuple[float, float]) -> Bench:
+    """Work out the metric of a rig along all trajectories but the last, each driven twice."""
+    settings, readings, sensitivities = [], [], []
+    for path in trajectories[:-1]:
+        motion = Motion.of(hardware, path)
+        seen = motion.observed()
+        common, varying = columns(motion)
+        whiten = Whitening.of(hardware, seen, *rates)
+        stacked = whiten(np.stack(list(common.values()), axis=2))
+        settings.append(Setting(motion, whiten, _REPEATS, stacked, own_columns(whiten, seen, varying)))
+        readings.append(seen)
+        sensitivities.append(common)
+    return Bench(hardware, tuple(trajectories), rates, tuple(settings), tuple(readings), tuple(sensitivities))
+
+
+def beyond(
+    bench: Bench, nominal: Hardware, rng: np.random.Generator, split: Split
+) -> tuple[Hardware, list[dict[str, Any]]]:
+    """Move one to three parameters beyond their uncertainty, far enough to be seen."""
+    scale = {name: _sigma(nominal, name) for name in bench.columns[0]}
+    names = [name for name, sigma in scale.items() if not any(word in name[0] for word in _KEPT)]
+    for _ in range(100):
+        count = int(rng.integers(1, 4))
+        hardware, moved = bench.hardware, []
+        total = [np.zeros_like(readings) for readings in bench.readings]
+        for k in rng.permutation(len(names))[:count]:
+            name = names[k]
+            value = float(np.ravel(nominal[name[0]])[name[1]])
+            sigmas = BEYOND_SIGMAS.draw(rng, split) * float(rng.choice([-1.0, 1.0]))
+            if value > 0 and value + sigmas * scale[name] < 0.3 * value:
+                sigmas = abs(sigmas)
+            hardware = perturbed(
+                hardware, name, value + sigmas * scale[name] - float(np.ravel(hardware[name[0]])[name[1]])
+            )
+            element = f"[{name[1]}]" if np.ndim(nominal[name[0]]) else ""
+            moved.append({"name": f"{_dotted(name[0])}{element}", "sigmas": sigmas})
+            total = [part + sigmas * c[name] for part, c in zip(total, bench.columns, strict=True)]
+        seen = strength(
+            bench.settings, [s.whiten(part) for s, part in zip(bench.settings, total, strict=True)]
+        )
+        if seen.rho > _LEAST_BEYOND:
+            return hardware, moved
+    raise ValueError("no parameter of this rig can be seen to be off")
+
+
+def _sigma(hardware: Hardware, name: Named) -> float:
+    return float(np.ravel(hardware.sigmas[name[0]])[name[1]])
+
+
+def _dotted(name: str) -> str:
+    """The name that the campaign's parameter files give."""
+    head, dot, last = name.rpartition(".drive.")
+    return f"{head}.drive.parameters.{last}" if dot else name
+
+
+def scaled(bench: Bench, effect: Effect, level: float) -> tuple[Effect, Strength, float] | None:
+    """Find the amplitude at which an effect has the strength asked for, or else a weaker one of LEVELS.
+
+    Returns effect, strength and level; None where the effect stays below the weakest level.
+    """
+    physics: Physics = effect.physics
+    amplitude, low, high = physics.first, 0.0, np.inf
+    for attempt in range(1 + _SEARCH):
+        effect = effect.scaled(amplitude)
+        found = bench.strength([effect])
+        if amplitude >= physics.most and found.rho_eff < level:
+            reached = [weaker for weaker in LEVELS if weaker < found.rho_eff]
+            if not reached:
+                return None
+            level = max(reached)
+        ratio = level / max(found.rho_eff, 1e-3)
+        if abs(ratio - 1) < _NEAR:
+            return effect, found, level
+        if ratio > 1:
+            low = max(low, amplitude)
+        else:
+            high = min(high, amplitude)
+        if (
+            attempt > 0 and not low < amplitude * ratio < high
+        ):  # far from linear: halve what is known to hold it
+            amplitude = float(np.sqrt(max(low, 1e-3 * high) * high)) if np.isfinite(high) else physics.most
+        else:
+            amplitude = min(amplitude * ratio, physics.most)
+    return None

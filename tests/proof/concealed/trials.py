@@ -1,0 +1,235 @@
+"""Trials: what each one is (`draw`), and making it (`make`)."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+
+from engine.hardware import Hardware
+from engine.mcap_file import Format, write
+from engine.ports import NONE
+from proof.concealed import articles, campaign, effects, paths
+from proof.concealed.bench import Bench, beyond, measure, scaled
+from proof.concealed.physics import Effect
+from proof.concealed.ranges import ARTICLE, LEVELS, Split
+from proof.concealed.recording import record
+from proof.concealed.strength import Strength
+
+Kind = Literal["nothing", "within", "beyond", "concealed"]
+
+_NULLS: tuple[Kind, ...] = ("within", "nothing", "beyond")
+_NULL_SHARE = 0.25
+_SEVERAL = (0.8, 0.93)  # one effect below the first share of trials, two below the second, else three
+_TRIES = 4
+
+_EPOCH_FIRST, _EPOCH_LAST = 803_206_800, 1_700_000_000  # s: days of a test programme somewhere in these years
+_RUN_S = 900
+
+
+@dataclass(frozen=True, slots=True)
+class Spec:
+    """One trial, fixed by its numbers: the same spec makes the same bytes."""
+
+    split: Split
+    seed: int
+    index: int
+    kind: Kind
+    physics: tuple[str, ...] = ()  # in order of preference: those that this rig cannot show are passed over
+    count: int = 0  # of them to conceal
+    levels: tuple[float, ...] = ()  # one for each concealed
+
+
+class Run(NamedTuple):
+    """A recording to be made."""
+
+    file: str
+    path: int  # -1: calibration
+    role: str
+    repeat: int
+
+
+def draw(split: Split, count: int, seed: int) -> list[Spec]:
+    """Say what each of `count` trials is. More trials of the same seed begin with the same ones.
+
+    Every physics comes once before any comes again.
+    """
+    order = np.random.default_rng([seed, len(split), 1])
+    specs: list[Spec] = []
+    deck: list[str] = []
+    nulls = 0
+    for index in range(count):
+        rng = np.random.default_rng([seed, len(split), 2, index])
+        u = rng.uniform(size=2)
+        levels = tuple(float(level) for level in rng.permutation(LEVELS)[:3])
+        if u[0] < _NULL_SHARE:
+            specs.append(Spec(split, seed, index, _NULLS[nulls % 3]))
+            nulls += 1
+            continue
+        if len(deck) < 8:
+            deck += [effects.PHYSICS[k].name for k in order.permutation(len(effects.PHYSICS))]
+        several = 1 + sum(u[1] > share for share in _SEVERAL)
+        named = [deck.pop(0) for _ in range(several)]
+        spare = [
+            effects.PHYSICS[k].name
+            for k in rng.permutation(len(effects.PHYSICS))
+            if effects.PHYSICS[k].name not in named
+        ]
+        specs.append(Spec(split, seed, index, "concealed", (*named, *spare), several, levels[:several]))
+    return specs
+
+
+def single(split: Split, seed: int, index: int, physics: str, level: float) -> Spec:
+    """One trial with one physics at one level."""
+    return Spec(split, seed, index, "concealed", (physics,), 1, (level,))
+
+
+def _generators(spec: Spec) -> list[np.random.SeedSequence]:
+    """Streams of random numbers: what is seen of a trial does not depend on what is concealed in it."""
+    return np.random.SeedSequence([spec.seed, len(spec.split), 3, spec.index]).spawn(6)
+
+
+def prepare(spec: Spec, folder: Path) -> tuple[Bench, list[dict[str, Any]]]:
+    """Write the parameter files; draw hardware and trajectories; work out the metric."""
+    article, drawn, motions, _, _, off = _generators(spec)
+    rng = np.random.default_rng(article)
+    loop = str(rng.choice(["open", "closed"]))
+    articles.write(folder, rng, spec.split, loop)
+    wrench_hz, encoder_hz = articles.rates(rng, spec.split)
+    articles.set_corner(folder, round(wrench_hz * ARTICLE["transducer.corner"].draw(rng, spec.split), 1))
+    campaign.describe(folder, [])
+    nominal = Hardware.from_campaign(folder)
+    hardware = _hardware(nominal, spec, np.random.default_rng(drawn))
+    trajectories = paths.draw(np.random.default_rng(motions), spec.split, 3)
+    bench = measure(hardware, trajectories, (wrench_hz, encoder_hz))
+    if spec.kind != "beyond":
+        return bench, []
+    hardware, moved = beyond(bench, nominal, np.random.default_rng(off), spec.split)
+    return replace(bench, hardware=hardware), moved
+
+
+def _hardware(nominal: Hardware, spec: Spec, rng: np.random.Generator) -> Hardware:
+    drawn = nominal.drawn(rng)
+    if spec.kind != "nothing":
+        return drawn
+    unknown = {
+        name: value
+        for name, value in drawn.values.items()
+        if name == "transducer.bias" or ".drive.phi_" in name
+    }
+    return nominal.with_values(unknown)
+
+
+def conceal(bench: Bench, spec: Spec, rng: np.random.Generator) -> list[tuple[Effect, Strength, float]]:
+    """Draw the effects and scale each, alone, to its level."""
+    concealed: list[tuple[Effect, Strength, float]] = []
+    swept = paths.swept(list(bench.fitted))
+    for name in spec.physics:
+        if len(concealed) == spec.count:
+            break
+        for _ in range(_TRIES if len(spec.physics) == 1 else 2):
+            effect = effects.draw(effects.BY_NAME[name], rng, spec.split, swept)
+            if any(effect.place == other.place and effect.physics.port == other.physics.port
+                   for other, _, _ in concealed):  # fmt: skip
+                continue
+            found = scaled(bench, effect, spec.levels[len(concealed)])
+            if found is not None:
+                concealed.append(found)
+                break
+    if len(concealed) < spec.count:
+        raise ValueError(
+            f"trial {spec.index}: no physics of {spec.physics[:3]}... reaches its level on this rig"
+        )
+    return concealed
+
+
+def make(spec: Spec, folder: Path) -> dict[str, Any]:
+    """Make a trial's campaign in `folder`, which may not exist yet; return its truth."""
+    folder.mkdir(parents=True, exist_ok=True)
+    bench, moved = prepare(spec, folder)
+    *_, concealing, runs_, _ = _generators(spec)
+    concealed = conceal(bench, spec, np.random.default_rng(concealing)) if spec.count else []
+    hidden = [effect for effect, _, _ in concealed]
+    total = bench.strength(hidden).rho_eff if hidden else 0.0
+    _record(spec, folder, bench, hidden, runs_)
+    return {
+        "trial": folder.name,
+        "kind": spec.kind,
+        "split": spec.split,
+        "level": max((level for _, _, level in concealed), default=0.0),
+        "effects": [_truth(bench, effect, found) for effect, found, _ in concealed],
+        "beyond": moved,
+        "rho_eff": total,
+    }
+
+
+def _truth(bench: Bench, effect: Effect, found: Strength) -> dict[str, Any]:
+    physics = effect.physics
+    shapes = [
+        {"name": shape.name, "unit": shape.unit, "value": value, "sigma_cr": None}
+        for shape, value in zip(physics.shapes, effect.shapes, strict=True)
+        if shape.name
+    ]
+    amplitude = {
+        "name": "amplitude",
+        "unit": physics.unit,
+        "value": effect.amplitude,
+        "sigma_cr": effect.amplitude / found.rho_eff if physics.comparable else None,
+    }
+    return {
+        "name": physics.name,
+        "port": physics.port,
+        "axis": effect.axis,
+        "channels": list(effect.channels),
+        "family": physics.family,
+        "catalogued": physics.catalogued,
+        "rho": found.rho,
+        "kappa": found.kappa,
+        "rho_eff": found.rho_eff,
+        "parameters": [amplitude, *shapes],
+        "equivalents": None,
+    }
+
+
+def _record(
+    spec: Spec, folder: Path, bench: Bench, hidden: Sequence[Effect], seed: np.random.SeedSequence
+) -> None:
+    """Record all runs and describe the campaign."""
+    names, starts, *streams = seed.spawn(10)
+    runs = _runs(np.random.default_rng(names), len(bench.trajectories))
+    start = int(np.random.default_rng(starts).integers(_EPOCH_FIRST, _EPOCH_LAST))
+    calibration = paths.calibration(np.random.default_rng(starts))
+    (folder / "recordings").mkdir(exist_ok=True)
+    checked: list[dict[str, Any]] = []
+    for k, run in enumerate(runs):
+        path = calibration if run.path < 0 else bench.trajectories[run.path]
+        recording = record(
+            bench.hardware,
+            path,
+            bench.extra(hidden, float(path.t[-1])) if hidden else NONE,
+            seed=streams[k],
+            epoch_ns=(start + k * _RUN_S) * 1_000_000_000,
+            wrench_hz=bench.rates[0],
+            encoder_hz=bench.rates[1],
+        )
+        file = folder / "recordings" / run.file
+        write(file, recording, Format(message_index=False))
+        digest = hashlib.sha256(file.read_bytes()).hexdigest()
+        trajectory = "CALIBRATION" if run.path < 0 else f"TRACK{run.path + 1}"
+        checked.append(
+            {"file": f"recordings/{run.file}", "sha256": digest, "trajectory": trajectory, "role": run.role,
+             "repeat": run.repeat}
+        )  # fmt: skip
+    campaign.describe(folder, checked)
+
+
+def _runs(rng: np.random.Generator, trajectories: int) -> list[Run]:
+    """Calibration, two runs of each trajectory for fitting, one more of the first and two of the last held out."""
+    planned = [(-1, "calibration", 1)]
+    planned += [(path, "fit", repeat) for path in range(trajectories - 1) for repeat in (1, 2)]
+    planned += [(0, "held-out", 3), (trajectories - 1, "held-out", 1)]
+    return [Run(f"{rng.bytes(4).hex()}.mcap", *one) for one in planned]

@@ -1,0 +1,108 @@
+"""The metric: noise is white in it, known parameters are absorbed, steps do not matter."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from engine.hardware import Hardware
+from engine.sensors import coloured
+from engine.simulation import integrate
+from engine.trajectories import Axis, commands
+from proof.concealed import effects, sensitivity
+from proof.concealed.bench import Bench, measure, scaled
+from proof.concealed.effects import BY_NAME
+from proof.concealed.observed import FINE_HZ, Motion, read, to_working_rate
+from proof.concealed.strength import Whitening, strength
+
+CAMPAIGN = Path(__file__).parents[2] / "campaigns" / "EL089"
+HARDWARE = Hardware.from_campaign(CAMPAIGN, seed=5)
+PATH = commands(
+    Axis(10.0).rest(1.0).accelerate(0.4, 0.2).accelerate(-0.4, 0.2),
+    Axis(70.0).rest(1.0).accelerate(0.5, 0.15).rest(2.0),
+    10.0,
+)
+
+
+@cache
+def bench() -> Bench:
+    """The metric with those parameters of the drives that matter here, which is quicker."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sensitivity, "DRIVE", ("tcog", "Ka", *sensitivity.RUN_FRICTION))
+        return measure(HARDWARE, [PATH, PATH], (100.0, 50.0))
+
+
+def test_noise_of_the_sensors_is_white() -> None:
+    rng = np.random.default_rng(1)
+    n = 20000
+    noise = HARDWARE["transducer.noise"] * coloured(rng, n, FINE_HZ)
+    step = HARDWARE["transducer.resolution"]
+    readings = to_working_rate(np.hstack([np.round((noise + 5.0) / step) * step - 5.0, np.zeros((n, 2))]))
+    entries = Whitening.of(HARDWARE, readings, FINE_HZ, 50.0)(readings).reshape(-1, 8)[:, :6]
+    lost = np.mean(np.square(Whitening.of(HARDWARE, readings, FINE_HZ, 50.0).window[:, 0]))  # by the taper
+    assert np.mean(np.square(entries)) / lost == pytest.approx(1.0, abs=0.08)
+
+
+def test_known_parameters_are_absorbed_and_what_is_beyond_is_not() -> None:
+    """A parameter by one sigma keeps sqrt(1/(1 + rho^2)) of its distance, if nothing else looks like it."""
+    setting = bench().settings[0]
+    for name in (
+        ("joint.el.drive.Ka", 0),
+        ("joint.el.drive.tcog", 0),
+        ("transducer.stiffness", 1),
+        ("body.antenna.cog", 0),
+    ):
+        change = setting.whiten(bench().columns[0][name])
+        found = strength(bench().settings, [change])
+        assert found.rho_eff < 1.0
+        assert found.rho > 5.0 and found.kappa > 0.9, name
+
+
+def test_the_engines_own_error_is_far_below_the_weakest_effect() -> None:
+    setting = bench().settings[0]
+    coarse, fine = (
+        read(HARDWARE, integrate(HARDWARE, PATH, time_step=step, field=setting.motion.field))
+        for step in (1e-4, 5e-5)
+    )
+    assert strength(bench().settings, [setting.whiten(coarse - fine)]).rho < 2.0
+
+
+@pytest.mark.parametrize(
+    "name", ["cogging of another shape", "mass on a spring", "interpolation of the code"]
+)
+def test_strength_does_not_depend_on_the_step(name: str) -> None:
+    effect = effects.draw(BY_NAME[name], np.random.default_rng(3), "development", {})
+    coarse, fine = (at_step(step).strength([effect]).rho for step in (5e-4, 2e-4))
+    assert coarse == pytest.approx(fine, rel=0.1)
+
+
+@cache
+def at_step(step: float) -> Bench:
+    """The bench with its metric as it is and its motion at another step."""
+    motion = Motion.of(HARDWARE, PATH, step)
+    setting = replace(bench().settings[0], motion=motion)
+    return replace(bench(), settings=(setting,), readings=(motion.observed(),))
+
+
+def test_the_amplitude_found_has_the_strength_asked_for() -> None:
+    effect = effects.draw(BY_NAME["interpolation of the code"], np.random.default_rng(3), "development", {})
+    found = scaled(bench(), effect, 100.0)
+    assert found is not None
+    hidden, strength_of_it, level = found
+    assert level == 100.0 and strength_of_it.rho_eff == pytest.approx(100.0, rel=0.12)
+    twice = bench().strength([hidden.scaled(2 * hidden.amplitude)])
+    assert twice.rho_eff == pytest.approx(2 * strength_of_it.rho_eff, rel=0.01)
+
+
+def test_what_cannot_reach_its_level_gets_a_weaker_one_or_none() -> None:
+    effect = effects.draw(BY_NAME["interpolation of the code"], np.random.default_rng(3), "development", {})
+    found = scaled(bench(), effect, 100.0)
+    assert found is not None
+    for share, expected in ((2.0, 100.0), (0.6, 40.0), (0.1, None)):
+        bounded = replace(effect, physics=replace(effect.physics, most=share * found[0].amplitude))
+        bounded = scaled(bench(), bounded, 100.0)
+        assert (None if bounded is None else bounded[2]) == expected
