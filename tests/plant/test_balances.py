@@ -10,7 +10,8 @@ import pytest
 from plant_rigs import NOMINAL, body, joint, one_axis, rig, three_axis, two_axis
 from scipy.linalg import eigh
 
-from kbs_process.plant.effects import select
+from kbs_process.plant.attach import attach
+from kbs_process.plant.effects import find, select
 from kbs_process.plant.modes import modes as modes_on_transducer
 from kbs_process.plant.predict import predict
 from kbs_process.plant.schedule import Schedule
@@ -269,3 +270,20 @@ def test_base_resonance_is_the_eigenvalue() -> None:
     named = modes_on_transducer(of, select(NOMINAL), position)
     assert named[0].frequency == pytest.approx(expected, rel=1e-4)
     assert [mode.axis for mode in named[:3]] == ["y", "x", "z"]
+
+
+def test_a_gear_with_play_rests_on_one_side_of_it() -> None:
+    """A loaded output sags by half the play more; one that nothing loads rests somewhere within it."""
+    play, law = 4e-4, find("backlash")
+    assert law is not None
+    of, names = two_axis(), (*NOMINAL, "backlash")
+    schedule = standing(np.array([0.0, 0.5]))
+
+    def at_rest(width: float) -> Array:
+        loose = attach(of, law, {"lost_motion": width, "soft_zone": max(width, 1e-6)})
+        made = Simulation(loose, select(names), schedule, step=2e-3, per_sample=1, angle_rate=1.0, end=1.0)
+        return made.part("q").copy()
+
+    sag = np.abs(at_rest(play) - at_rest(0.0))
+    assert sag[0] <= play
+    assert sag[1] == pytest.approx(play, abs=1e-7)

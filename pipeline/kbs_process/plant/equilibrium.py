@@ -14,13 +14,19 @@ from kbs_process.signals.records import Array
 
 ITERATIONS = 60
 STANDSTILL = 1e-6  # rad/s^2, of base, outputs and rotors
+# rad, by which gears are wound up to begin with: one with play has no stiffness unloaded
+WOUND = (0.0, 3e-4, 2.1e-3, 1.1e-2)
+UNHELD = (
+    1e8  # condition of the accelerations' slopes above which something turns freely; held, it is some 1e5
+)
 
 
 def at_rest(plant: Compiled, structure: Structure, p: Array, field: Array) -> tuple[Array, Array]:
     """Return state and wrench in static equilibrium with `field`, in microsteps, shape (joints,).
 
-    Newton's method from the unloaded position. Coulomb friction carries nothing there: with the smooth
-    torques in balance it need not, and what it could hold beside that depends on a history nobody knows.
+    Newton's method from the unloaded position, or from a wound up one where that fails. Coulomb friction carries
+    nothing there: with the smooth torques in balance it need not, and what it could hold beside that depends on a
+    history nobody knows.
     """
     layout = state_layout(structure)
     x = np.zeros(max(part.stop for part in layout.values()))
@@ -43,10 +49,32 @@ def at_rest(plant: Compiled, structure: Structure, p: Array, field: Array) -> tu
         plant.balance(trial, field, p, out)
         return out[rows]
 
-    values, residual = x[free], acceleration(x[free])
+    unloaded = x[free]
+    outputs = slice(rows.size - 2 * structure.joints, rows.size - structure.joints)
+    falling = acceleration(unloaded)[outputs]
+    pushed = np.sign(falling) * (np.abs(falling) > STANDSTILL)
+    for wound in WOUND:
+        start = unloaded.copy()
+        start[outputs] += wound * pushed
+        values, residual = _settled(acceleration, start)
+        if np.abs(residual).max() < STANDSTILL:
+            break
+    else:
+        raise SimulationError(
+            "no static equilibrium at the first command: a motor cannot hold its load there",
+            remedy="check Tmax and ratio of the drives, and mass and CoG of the bodies",
+        )
+    x[free] = values
+    wrench = np.array(plant.balance(x, field, p, np.empty(3 + 2 * structure.joints)))
+    return x, wrench
+
+
+def _settled(acceleration: Callable[[Array], Array], values: Array) -> tuple[Array, Array]:
+    """Position to which Newton's method leads from `values`, and the accelerations left there."""
+    residual = acceleration(values)
     for _ in range(ITERATIONS):
         jacobian = np.stack([_slope(acceleration, values, i) for i in range(len(values))], axis=1)
-        change = -np.linalg.solve(jacobian, residual)
+        change = -_solved(jacobian, residual)
         share = 1.0
         while (norm := float(np.linalg.norm(acceleration(values + share * change)))) > np.linalg.norm(
             residual
@@ -58,14 +86,14 @@ def at_rest(plant: Compiled, structure: Structure, p: Array, field: Array) -> tu
             break  # rounding is all that is left, or there is no equilibrium
         values = values + share * change
         residual = acceleration(values)
-    if not np.abs(residual).max() < STANDSTILL:
-        raise SimulationError(
-            "no static equilibrium at the first command: a motor cannot hold its load there",
-            remedy="check Tmax and ratio of the drives, and mass and CoG of the bodies",
-        )
-    x[free] = values
-    wrench = np.array(plant.balance(x, field, p, np.empty(3 + 2 * structure.joints)))
-    return x, wrench
+    return values, residual
+
+
+def _solved(jacobian: Array, residual: Array) -> Array:
+    """Solution; the least one where nothing holds a joint, as within the play of a gear without load."""
+    if np.linalg.cond(jacobian) < UNHELD:
+        return np.asarray(np.linalg.solve(jacobian, residual), dtype=np.float64)
+    return np.asarray(np.linalg.lstsq(jacobian, residual, rcond=1.0 / UNHELD)[0], dtype=np.float64)
 
 
 def _slope(function: Callable[[Array], Array], values: Array, i: int) -> Array:
