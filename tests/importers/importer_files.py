@@ -159,4 +159,14 @@ def write_mdf(path: Path, columns: dict[str, np.ndarray]) -> None:
         file.save(path, overwrite=True)
 
 
+def write_matlab(path: Path, columns: dict[str, np.ndarray]) -> None:
+    from scipy.io import savemat
+
+    savemat(path, {"gain": 2.5, **{name: x[:, None] for name, x in columns.items()}}, do_compression=True)
+
+
+def write_numpy(path: Path, columns: dict[str, np.ndarray]) -> None:
+    np.save(path, np.array([columns[name] for name in ("t", "Fx", "Fy", "Fz", "angle")]))
+
+
 Writer = Callable[[Path, dict[str, np.ndarray]], None]

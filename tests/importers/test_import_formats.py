@@ -16,7 +16,9 @@ from importer_files import (
     write_european,
     write_hdf5,
     write_mapping,
+    write_matlab,
     write_mdf,
+    write_numpy,
     write_parquet,
     write_tdms,
     write_tsv,
@@ -56,6 +58,16 @@ NO_TIME = MAPPING.replace('[time]\ncolumn = "t"\nunit = "s"\n', "")
             .replace('"run/fit"', '"fit"'),
         ),
         ("run.mf4", write_mdf, NO_TIME),
+        ("run.mat", write_matlab, MAPPING),
+        (
+            "run.npy",
+            write_numpy,
+            MAPPING.replace('column = "t"', "column = 1")
+            .replace('"Fx"', "2")
+            .replace('"Fy"', "3")
+            .replace('"Fz"', "4")
+            .replace('"angle"', '"[5]"'),
+        ),
     ],
     ids=lambda value: value if isinstance(value, str) and value.startswith("run") else "",
 )

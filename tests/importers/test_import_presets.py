@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from importer_files import read_streams
+from scipy.io import loadmat
 
 from kbs_process.campaign import importers
 from kbs_process.campaign.importers.mapping import find_mapping, load_mapping
@@ -85,3 +86,29 @@ def test_documented_mapping_is_one(tmp_path: Path) -> None:
     assert [stream.key for stream in mapping.streams] == ["wrench", "encoder", "command", "temperature"]
     for name in importers.preset_names():
         assert f"`{name}`" in page
+
+
+def test_emps(tmp_path: Path) -> None:
+    source = _source("emps")
+    folder = importers.import_recordings("emps", source, tmp_path / "emps")
+    raw = loadmat(source / "DATA_EMPS_PULSES.mat")
+    stamp, effort = _read(folder, "sweeps_with_pulses_1", "effort")
+    _, way = _read(folder, "sweeps_with_pulses_1", "angle")
+    np.testing.assert_array_equal(stamp, np.rint(raw["t"][:, 0] * 1e9))
+    np.testing.assert_allclose(effort, raw["vir"] * raw["gtau"], rtol=1e-15)  # volts to newtons
+    np.testing.assert_array_equal(way, raw["qm"])
+    joint = load_campaign(folder).rig.joints[0]
+    assert (joint.type, joint.unit, joint.drive) == ("prismatic", "m", None)
+
+
+def test_odrive(tmp_path: Path) -> None:
+    source = _source("odrive_cogging")
+    folder = importers.import_recordings("odrive", source, tmp_path / "odrive")
+    t, counts, current = np.load(source / "slow2_nocomp_1.npy")
+    begun = t - t[0] >= 0.3 - 1e-9
+    stamp, effort = _read(folder, "slow_2", "effort")
+    np.testing.assert_array_equal(stamp, np.rint(t[begun] * 1e9))
+    np.testing.assert_array_equal(effort[:, 0], current[begun])
+    _, angle = _read(folder, "slow_2", "angle")
+    np.testing.assert_allclose(angle[:, 0], counts[begun] * 2 * np.pi / 8192, rtol=1e-14)
+    assert load_campaign(folder).topics.effort.units == ("A",)

@@ -1,0 +1,87 @@
+"""A rig whose loads are the efforts of its joints: what its description may say, and what it may not."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+from campaign_folder import CampaignFolder, make_folder
+
+from kbs_process.campaign.importers.mapping import PRESETS
+from kbs_process.campaign.load import load_campaign
+
+RECORDING = """
+[[recording]]
+file = "run.mcap"
+trajectory = "run"
+role = "fit"
+"""
+
+
+CURRENT = """
+[joint.axis.effort]
+gain = { value = 50.0, unit = "N/A", sigma = 5.0, source = "test" }
+bias = { value = 20.0, unit = "mA", sigma = 10.0, source = "test" }
+noise = { value = 0.1, unit = "A", sigma = 0.0, source = "test" }
+resolution = { value = 0.0, unit = "A", sigma = 0.0, source = "test" }
+"""
+
+
+@pytest.fixture
+def axis(tmp_path: Path) -> CampaignFolder:
+    shutil.copytree(PRESETS / "emps", tmp_path, dirs_exist_ok=True)
+    (tmp_path / "run.mcap").touch()
+    folder = CampaignFolder(tmp_path)
+    folder.append("campaign.toml", RECORDING)
+    return folder
+
+
+def test_a_linear_axis_has_metres_and_newtons(axis: CampaignFolder) -> None:
+    campaign = load_campaign(axis.path)
+    rig, topics = campaign.rig, campaign.topics
+    assert topics.wrench is None
+    assert (topics.effort.fields, topics.effort.channels, topics.effort.units) == (
+        ("effort[axis]",),
+        ("axis.effort",),
+        ("N",),
+    )
+    assert topics.angle.units == ("m",)
+    assert rig.channels == ("axis.effort",)
+    assert rig.quantities()["joint.axis.viscous"].unit == "N s/m"
+
+
+def test_a_current_needs_the_gain_of_its_joints_type(axis: CampaignFolder) -> None:
+    rig = axis.path / "parameters/rig.toml"
+    before, _, after = rig.read_text().partition("[joint.axis.effort]")
+    rig.write_text(before + CURRENT + after[after.index("[body.car]") :])
+    assert load_campaign(axis.path).topics.effort.units == ("A",)
+    axis.replace("parameters/rig.toml", '"N/A"', '"N m/A"')
+    assert "is the unit of no gain" in str(axis.refusal())
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new", "what"),
+    [
+        ("campaign.toml", 'effort = "/motor"', "", "topics.effort: is missing"),
+        (
+            "campaign.toml",
+            'effort = "/motor"',
+            'effort = "/motor"\nwrench = "/wrench"',
+            "transducer: is missing",
+        ),
+        ("parameters/rig.toml", '"prismatic"', '"helical"', "'helical' is not allowed"),
+        ("parameters/rig.toml", 'unit = "N s/m"', 'unit = "N m s/rad"', "where linear damping"),
+        ("parameters/rig.toml", 'parent = "lab"', 'parent = "T"', "'T' is no other link"),
+    ],
+)
+def test_contradictions_are_refused(axis: CampaignFolder, file: str, old: str, new: str, what: str) -> None:
+    axis.replace(file, old, new)
+    assert what in str(axis.refusal())
+
+
+def test_what_only_a_measured_motion_can_drive_is_refused_under_commands(tmp_path: Path) -> None:
+    folder = make_folder(tmp_path)
+    viscous = 'viscous = { value = 1.0, unit = "N m s/rad", sigma = 0.0, source = "test" }'
+    folder.replace("parameters/rig.toml", "[joint.az]", f"[joint.az]\n{viscous}")
+    assert "joint.az.viscous: goes with a rig that its measured motion drives" in str(folder.refusal())
