@@ -9,9 +9,10 @@ import numpy as np
 
 from kbs_process.campaign.config import Bands, Campaign, RecordingEntry
 from kbs_process.campaign.predicting import predict_run
+from kbs_process.campaign.relief import errors, forces_in, without_forces
 from kbs_process.campaign.settings import motion_settings
 from kbs_process.plant.rigid import static_wrench
-from kbs_process.signals.records import WRENCH_CHANNELS, Run, Signal
+from kbs_process.signals.records import WRENCH_CHANNELS, Array, Run, Signal
 from kbs_process.stages import bandpass, gravity
 from kbs_process.stages.bandpass import UNFILTERED, Band
 from kbs_process.stages.condense import CondenseSettings
@@ -76,14 +77,14 @@ def analyse(
     )
     predicted = disturbance = None
     if entry.role != "calibration":
-        predicted, disturbance = _predict(campaign, run, motion, model, update)
+        predicted, disturbance = _predict(campaign, entry, run, motion, model, update)
     return Analysis(
         entry=entry,
         raw=raw,
         run=run,
         motion=motion,
         static=static,
-        misfits=misfits(sample, model, taring),
+        misfits=misfits(sample, model, taring, _cords(campaign, entry, wrench, motion)),
         residual=residual,
         predicted=predicted,
         pairs=_pairs(campaign, residual, disturbance),
@@ -91,12 +92,18 @@ def analyse(
 
 
 def _predict(
-    campaign: Campaign, run: Run, motion: Motion, model: GravityModel, update: Callable[[float], None]
+    campaign: Campaign,
+    entry: RecordingEntry,
+    run: Run,
+    motion: Motion,
+    model: GravityModel,
+    update: Callable[[float], None],
 ) -> tuple[Run | None, Signal]:
     """Return the predicted run (of a plant with drives) and its wrench without gravity.
 
-    The plant has the masses and CoGs that the gravity fit found. Its static wrench is taken at its own angles, as the
-    measurement's is. A rig that is driven by its motion has no drives to predict: inertia is all there is.
+    The plant has the masses and CoGs that the gravity fit found. Its static wrench, and that of the rig's cords, is
+    taken at its own angles, as the measurement's is. A rig that is driven by its motion has no drives to predict:
+    inertia is all there is.
     """
     if campaign.drive == "motion":
         moving = gravity.apply(motion, model).wrench
@@ -104,10 +111,10 @@ def _predict(
         # The measurement's residual had the fitted rest of the cross-coupling undone as well.
         return None, moving.derive(model.without_coupling(inertia), "inertia")
     settings = CondenseSettings(working_rate_Hz=campaign.bands.working_rate)
-    predicted = predict_run(model.rig, campaign.effects, run, settings, update)
-    total = _loads(predicted)
+    predicted = predict_run(model.rig, campaign.acting(entry), run, settings, update)
     angles = estimate(predicted, model.rig, motion_settings(campaign))
     static = static_wrench(model.rig, angles.q)
+    total = without_forces(_loads(predicted), model.rig, forces_in(campaign, entry), angles.q)
     left = total.derive(total.values - static, "static wrench of the plant removed")
     return predicted, select(left, _loads(run).channels)
 
@@ -125,6 +132,14 @@ def _pairs(campaign: Campaign, residual: Signal, disturbance: Signal | None) -> 
                 None if predicted is None else to_spacecraft(predicted, spacecraft),
             )
     return pairs
+
+
+def _cords(campaign: Campaign, entry: RecordingEntry, wrench: Signal, motion: Motion) -> Array:
+    """What the rig's cords may be wrong by: rms (c,) over a recording."""
+    forces = forces_in(campaign, entry)
+    variances = [np.mean(error.values**2, axis=0) for error in errors(wrench, campaign.rig, forces, motion.q)]
+    rms: Array = np.sqrt(np.sum(variances, axis=0)) if variances else np.zeros(len(wrench.channels))
+    return rms
 
 
 def _at_rest(motion: Motion) -> Motion:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import isclose
 from pathlib import Path
 
@@ -10,8 +11,9 @@ from kbs_process.campaign.documents import Document, Key, Merged, shown
 from kbs_process.campaign.problems import Problems
 from kbs_process.campaign.provenance import sha256
 from kbs_process.errors import did_you_mean
-from kbs_process.plant.effects import CATALOGUE
-from kbs_process.rig.model import Joint
+from kbs_process.plant.effect import Effect, Port
+from kbs_process.plant.effects import CATALOGUE, catalogue_with, find
+from kbs_process.rig.model import LAB, Joint, Quantity
 
 _KEPT = 0.4  # of the working rate: decimation changes nothing below (stages.resample)
 
@@ -23,6 +25,7 @@ def check_campaign(
     _check_effects(document, problems)
     _check_drive(campaign, document, tables, problems)
     _check_loads(campaign, document, tables, problems)
+    _check_external(campaign, tables, problems)
     _check_topics(campaign, document, problems)
     _check_bands(campaign, document, problems)
     for index, entry in enumerate(campaign.recordings):
@@ -35,7 +38,7 @@ def check_campaign(
 def _check_effects(document: Document, problems: Problems) -> None:
     known = {effect.name for effect in CATALOGUE}
     for index, name in enumerate(document.tree.get("model", {}).get("effects", [])):
-        if name not in known:
+        if find(name) is None:
             place = document.place(("model", "effects", index))
             problems.add(place, f"there is no effect '{name}'", did_you_mean(name, known))
 
@@ -100,17 +103,54 @@ def _check_joint(joint: Joint, effects: tuple[str, ...], tables: Merged, problem
     if joint.drive is None:
         problems.add(tables.place(key), "is missing", 'describe the drive, or set drive = "motion"')
         return
-    for effect in CATALOGUE:
-        for parameter in effect.parameters:
-            place = tables.place((*key, "parameters", parameter.name))
-            quantity = joint.drive.parameters.get(parameter.name)
-            if quantity is None and effect.name in effects:
-                remedy = f"give it ({parameter.description}, {parameter.unit}), or leave the effect out"
-                problems.add(place, f"is missing, although the model contains '{effect.name}'", remedy)
-            low, high = parameter.bounds
-            if quantity is not None and not low <= float(quantity) <= high:
-                what = f"{float(quantity):g} {parameter.unit} is out of bounds"
-                problems.add(place, what, f"give {low:g} to {high:g} {parameter.unit}")
+    for effect in catalogue_with(effects):
+        if effect.port.of_drive:
+            named = effect.name in effects
+            _check_parameters(effect, joint.drive.parameters, named, (*key, "parameters"), tables, problems)
+
+
+def _check_external(campaign: Campaign, tables: Merged, problems: Problems) -> None:
+    """Every effect of the laboratory in the model is described, and acts on what hangs on the transducer."""
+    described = {external.name: external for external in campaign.rig.external}
+    for effect in catalogue_with(campaign.effects):
+        key: Key = ("external", effect.name)
+        external, named = described.get(effect.name), effect.name in campaign.effects
+        if effect.port.of_drive or (external is None and not named):
+            continue
+        if external is None:
+            remedy = "say in a parameter file where it acts and how large it is, or leave the effect out"
+            problems.add(
+                tables.place(key), f"is missing, although the model contains '{effect.name}'", remedy
+            )
+            continue
+        if effect.port is Port.EXTERNAL_FORCE:
+            if external.on == LAB:
+                what = "'lab' does not hang on the transducer: nothing would feel the force"
+                problems.add(tables.place((*key, "on")), what, "name the link that it pulls at")
+            if external.point is None:
+                remedy = "give the place where it pulls, (x, y, z) in the link's axes"
+                problems.add(tables.place((*key, "point")), "is missing", remedy)
+        _check_parameters(effect, external.parameters, named, (*key, "parameters"), tables, problems)
+
+
+def _check_parameters(
+    effect: Effect,
+    given: Mapping[str, Quantity],
+    named: bool,
+    key: Key,
+    tables: Merged,
+    problems: Problems,
+) -> None:
+    for parameter in effect.parameters:
+        place = tables.place((*key, parameter.name))
+        quantity = given.get(parameter.name)
+        if quantity is None and named:
+            remedy = f"give it ({parameter.description}, {parameter.unit}), or leave the effect out"
+            problems.add(place, f"is missing, although the model contains '{effect.name}'", remedy)
+        low, high = parameter.bounds
+        if quantity is not None and not low <= float(quantity) <= high:
+            what = f"{float(quantity):g} {parameter.unit} is out of bounds"
+            problems.add(place, what, f"give {low:g} to {high:g} {parameter.unit}")
 
 
 def _check_topics(campaign: Campaign, document: Document, problems: Problems) -> None:
@@ -156,6 +196,11 @@ def _check_recording(
     campaign: Campaign, index: int, entry: RecordingEntry, document: Document, problems: Problems
 ) -> None:
     key: Key = ("recording", index)
+    effects = document.tree.get("model", {}).get("effects", [])
+    for position, name in enumerate(entry.without):
+        if name not in effects:
+            remedy = did_you_mean(name, effects) if effects else "leave it out"
+            problems.add(document.place((*key, "without", position)), f"the model has no '{name}'", remedy)
     if not entry.path.is_file():
         place = document.place((*key, "file"))
         problems.add(place, f"the recording '{shown(entry.path)}' does not exist", _neighbour(entry.path))

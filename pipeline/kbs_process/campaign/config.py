@@ -105,6 +105,7 @@ class RecordingEntry:
     sha256: str | None  # as the campaign states it, already found right
     start: float | None  # s from the recording's start; what is before is left out
     end: float | None  # s from the recording's start; what is after is left out
+    without: tuple[str, ...] = ()  # effects of the model that did not act in it
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,6 +128,10 @@ class Campaign:
     mission: Path | None = None  # orbit, relay satellites and limits of a reference day
     flight_pointing: tuple[PointingRequirement, ...] = ()  # of the flight model alone
     modal: Path | None = None  # modes of the article on its transducer; None: derived from the plant
+
+    def acting(self, entry: RecordingEntry) -> tuple[str, ...]:
+        """Return the effects of the nominal model that acted in a recording."""
+        return tuple(name for name in self.effects if name not in entry.without)
 
     def recording(self, name: str) -> RecordingEntry:
         """Return the recording of that name."""

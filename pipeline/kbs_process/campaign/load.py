@@ -14,7 +14,7 @@ from kbs_process.campaign.problems import Problems
 from kbs_process.campaign.requirements import disturbance, pointing
 from kbs_process.campaign.rig_builder import RigBuilder
 from kbs_process.campaign.schema import violations
-from kbs_process.plant.effects import CATALOGUE
+from kbs_process.plant.effects import catalogue_with, select
 from kbs_process.rig.model import Rig
 from kbs_process.signals.records import WRENCH_CHANNELS, WRENCH_UNITS
 
@@ -26,7 +26,8 @@ def load_campaign(
 
     Raises ConfigError with the file, the key and the remedy of up to five faults. `checksums` says
     whether recordings are read through to compare the SHA-256 that the campaign states; with `flight`, the
-    parameters of the flight model take the place of those of the test. Without `recordings` there need be none.
+    parameters of the flight model take the place of those of the test, and the laboratory stays behind. Without
+    `recordings` there need be none.
     """
     folder = folder.absolute()
     problems = Problems(subject=str(folder))
@@ -42,13 +43,20 @@ def load_campaign(
     tables = _read_parameters(folder, document.tree["parameters"]["files"], problems)
     if flight:
         tables = _substitute_flight(folder, document, tables, problems)
-    units = {parameter.name: parameter.unit for effect in CATALOGUE for parameter in effect.parameters}
-    rig = RigBuilder(tables, folder, units, problems).build()
+    known = catalogue_with(document.tree.get("model", {}).get("effects", []))
+    units = {effect: {entry.name: entry.unit for entry in effect.parameters} for effect in known}
+    of_drives = {
+        name: unit for effect, own in units.items() if effect.port.of_drive for name, unit in own.items()
+    }
+    of_rig = {effect.name: own for effect, own in units.items() if not effect.port.of_drive}
+    rig = RigBuilder(tables, folder, of_drives, of_rig, problems).build()
     problems.raise_any()
 
     campaign = _campaign(folder, document, tables, rig, problems)
     if flight:
-        campaign = replace(campaign, article=document.tree["flight"].get("article", campaign.article))
+        article = document.tree["flight"].get("article", campaign.article)
+        flown = tuple(effect.name for effect in select(campaign.effects) if effect.port.of_drive)
+        campaign = replace(campaign, article=article, effects=flown, rig=replace(rig, external=()))
     if recordings and not campaign.recordings:
         remedy = "add [[recording]], or simulate the campaign's mission: kbs-process reference-day"
         problems.add(document.place(("recording",)), "is missing: there is nothing to read", remedy)
@@ -121,7 +129,7 @@ def _campaign(folder: Path, document: Document, tables: Merged, rig: Rig, proble
             working_rate=float(bands["working_rate_Hz"]),
         ),
         topics=_topics(tree["topics"], rig),
-        effects=tuple(effect.name for effect in CATALOGUE if effect.name in effects),
+        effects=tuple(effect.name for effect in catalogue_with(effects) if effect.name in effects),
         recordings=tuple(_recording(folder, table) for table in tree.get("recording", [])),
         rig=rig,
         inputs=(
@@ -192,6 +200,7 @@ def _recording(folder: Path, table: Tree) -> RecordingEntry:
         sha256=table.get("sha256"),
         start=table.get("start_s"),
         end=table.get("end_s"),
+        without=tuple(table.get("without", ())),
     )
 
 

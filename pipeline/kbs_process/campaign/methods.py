@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from kbs_process.campaign.analysis import Analysis
 from kbs_process.campaign.config import Campaign
 from kbs_process.campaign.findings import Findings
+from kbs_process.campaign.relief import forces_in
 
 
 def methods(campaign: Campaign, analyses: Sequence[Analysis], findings: Findings) -> str:
@@ -63,5 +64,21 @@ def _plant(campaign: Campaign) -> str:
         "The prediction is the plant's, driven by the recorded field where there is one, else by the recorded "
         "commands through the controller, with the masses and centres of gravity that the fit found and the nominal "
         f"drives of the parameter files. Effects in the plant: {', '.join(campaign.effects)}. Its static wrench was "
-        "removed at its own angles."
+        f"removed at its own angles.{_relief(campaign)}"
+    )
+
+
+def _relief(campaign: Campaign) -> str:
+    acting = {
+        entry.name: [force.name for force in forces_in(campaign, entry)] for entry in campaign.recordings
+    }
+    names = sorted({force for forces in acting.values() for force in forces})
+    if not names:
+        return ""
+    recordings = ", ".join(name for name, forces in acting.items() if forces)
+    return (
+        f" The static wrench of the rig's own {', '.join(names)} in {recordings}, at the angles of each and with the "
+        "numbers of the parameter files, was taken from measurement and prediction alike: it is no disturbance of the "
+        "article. "
+        "Gravity was fitted without these recordings, where there are others."
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +24,7 @@ from kbs_process.rig.model import (
     Drive,
     Effort,
     Encoder,
+    External,
     Joint,
     JointType,
     Quantity,
@@ -45,12 +46,14 @@ ANGLES = Kind("rad", (3,))
 class RigBuilder:
     """Builds a rig out of tables that satisfy the schema; what is wrong is noted in `problems`.
 
-    `drive_units` gives the SI unit of every drive parameter that an effect of the plant asks for, by name.
+    `drive_units` gives the SI unit of every drive parameter that an effect of the plant asks for, by name, and
+    `external_units` those of the parameters of each effect of the laboratory, by its name.
     """
 
     tables: Merged
     folder: Path  # where CSV files of matrices are looked for
     drive_units: Mapping[str, str]
+    external_units: Mapping[str, Mapping[str, str]]
     problems: Problems
 
     def build(self) -> Rig:
@@ -66,6 +69,9 @@ class RigBuilder:
             joints=tuple(self._joint(name, tree["joint"][name]) for name in joints),
             controller=self._controller(tree["controller"], joints) if "controller" in tree else None,
             spacecraft=self._spacecraft() if "spacecraft" in tree else None,
+            external=tuple(
+                self._external(name, table, links) for name, table in tree.get("external", {}).items()
+            ),
         )
 
     def _quantity(self, kind: Kind, *key: str) -> Quantity:
@@ -219,6 +225,24 @@ class RigBuilder:
             position=self._quantity(LENGTHS, "spacecraft", "position"),
             attitude=self._quantity(ANGLES, "spacecraft", "attitude"),
         )
+
+    def _external(self, effect: str, table: Tree, links: set[str]) -> External:
+        key = ("external", effect)
+        units = self.external_units.get(effect)
+        if units is None:
+            self._unknown(key, effect, "effect of the laboratory on a rig", set(self.external_units))
+            units = {}
+        if table["on"] not in links:
+            self._unknown((*key, "on"), table["on"], "link", links)
+        parameters = {}
+        for name in table.get("parameters", {}):
+            if name not in units:
+                self._unknown((*key, "parameters", name), name, f"parameter of '{effect}'", units)
+                continue
+            quantity = self._quantity(Kind(units[name], ()), *key, "parameters", name)
+            parameters[name] = replace(quantity, name=f"external.{effect}.{name}")
+        point = self._quantity(LENGTHS, *key, "point") if "point" in table else None
+        return External(name=effect, on=table["on"], point=point, parameters=parameters)
 
     def _unknown(self, key: Key, found: str, role: str, known: set[str] | Mapping[str, str]) -> None:
         self.problems.add(self.tables.place(key), f"'{found}' is no {role}", did_you_mean(found, known))

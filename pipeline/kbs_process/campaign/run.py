@@ -11,6 +11,7 @@ from kbs_process.campaign.findings import find
 from kbs_process.campaign.output import write_results
 from kbs_process.campaign.progress import Progress
 from kbs_process.campaign.reading import read_run
+from kbs_process.campaign.relief import forces_in, relieved
 from kbs_process.campaign.settings import gravity_settings, motion_settings
 from kbs_process.campaign.store import writing
 from kbs_process.campaign.summary import summarise
@@ -81,13 +82,17 @@ def _prepare(
 def _fit_gravity(campaign: Campaign, prepared: list[Prepared], progress: Progress) -> GravityModel:
     """Fit over calibration and fit recordings; held-out ones are not looked at.
 
+    Nor are those in which the rig pulled at the article, where there are others: what is not known of the pull would be
+    taken for weight.
     A rig that is driven by its motion has its inertia fitted too; its commands, if any, drive nothing.
     """
     with progress.task("Fitting gravity and centres of gravity"):
+        fitted = [one for one in prepared if one.entry.role != "held-out"]
+        free = [one for one in fitted if not forces_in(campaign, one.entry)]
         samples = [
             Sample(one.entry.name, one.motion, loads, calibration=one.entry.role == "calibration")
-            for one in prepared
-            if one.entry.role != "held-out" and (loads := one.run.loads) is not None
+            for one in free or fitted
+            if (loads := relieved(campaign, one.entry, one.run, one.motion).loads) is not None
         ]
         return gravity.fit(
             samples,
@@ -99,7 +104,8 @@ def _fit_gravity(campaign: Campaign, prepared: list[Prepared], progress: Progres
 
 def _analyse(campaign: Campaign, one: Prepared, model: GravityModel, progress: Progress) -> Analysis:
     with progress.task(f"Analysing {one.entry.name}") as task:
-        return analyse(campaign, one.entry, one.raw, one.run, one.motion, model, task.update)
+        run = relieved(campaign, one.entry, one.run, one.motion)
+        return analyse(campaign, one.entry, one.raw, run, one.motion, model, task.update)
 
 
 def _outcome(summary: results.Results, report: Path) -> Outcome:

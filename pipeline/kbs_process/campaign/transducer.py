@@ -13,13 +13,14 @@ from kbs_process.campaign.analysis import Analysis, bands_of
 from kbs_process.campaign.config import Campaign
 from kbs_process.campaign.modal_file import read_modal
 from kbs_process.campaign.predicting import predict_run
+from kbs_process.campaign.relief import forces_in, without_forces
 from kbs_process.plant.effects import select
 from kbs_process.plant.modal import ModalTable, derive
 from kbs_process.plant.rigid import static_wrench
 from kbs_process.report.records.transducer import BothWays, FilterErrorIn, GainAt, ModeAt, OnTransducer
 from kbs_process.rig.model import Rig
 from kbs_process.signals.grid import overlap
-from kbs_process.signals.records import WRENCH_CHANNELS, WRENCH_UNITS, Array, Run, Signal
+from kbs_process.signals.records import WRENCH_CHANNELS, WRENCH_UNITS, Array, Signal
 from kbs_process.stages import bandpass
 from kbs_process.stages.bandpass import UNFILTERED
 from kbs_process.stages.budget import sensor_noise
@@ -64,7 +65,7 @@ def study(
     table, reason = _table(campaign, rig, first.motion.q)
     if table is None:
         return Study(OnTransducer(recording=name, reason=reason), {}, {})
-    load, angles = _disturbance(campaign, rigid_base(rig), first.run, update)
+    load, angles = _disturbance(campaign, rigid_base(rig), first, update)
     angle = angles[:, rig.joint_names.index(table.joint)]
     found = transmit(load, angle, table)
     poses = np.unique([angle.min(), 0.5 * (angle.min() + angle.max()), angle.max()])
@@ -101,14 +102,15 @@ def _table(campaign: Campaign, rig: Rig, q: Array) -> tuple[ModalTable | None, s
 
 
 def _disturbance(
-    campaign: Campaign, rig: Rig, run: Run, update: Callable[[float], None]
+    campaign: Campaign, rig: Rig, analysis: Analysis, update: Callable[[float], None]
 ) -> tuple[Signal, Array]:
     """Predict a run with another rig: its wrench less the static one at its own angles, and these angles."""
     settings = CondenseSettings(working_rate_Hz=campaign.bands.working_rate)
-    predicted = predict_run(rig, campaign.effects, run, settings, update)
+    entry = analysis.entry
+    predicted = predict_run(rig, campaign.acting(entry), analysis.run, settings, update)
     assert predicted.wrench is not None
     q = estimate(predicted, rig).q
-    wrench = predicted.wrench
+    wrench = without_forces(predicted.wrench, rig, forces_in(campaign, entry), q)
     return wrench.derive(wrench.values - static_wrench(rig, q), "static wrench of the plant removed"), q
 
 

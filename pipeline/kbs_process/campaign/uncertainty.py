@@ -8,6 +8,7 @@ import numpy as np
 
 from kbs_process.campaign.analysis import Analysis, bands_of, passband
 from kbs_process.campaign.config import Campaign
+from kbs_process.campaign.relief import errors, forces_in
 from kbs_process.report import results
 from kbs_process.report.results import Frame
 from kbs_process.rig.model import Amplifier
@@ -86,8 +87,12 @@ def _entries(
         *budget.filter_edges(
             measured, stated.edge_error, stated.edge_error_drift, budget.drifting_part(measured, band)
         ),
-        *([budget.resonance(measured, resonance, limits)] if rig.transducer.channels else []),
+        budget.resonance(measured, resonance, limits),
     ]
+    forces = forces_in(campaign, analysis.entry)
+    if unknown := list(errors(measured, rig, forces, analysis.motion.q)):
+        in_motion = gravity_error.moving(analysis.motion)
+        entries.append(budget.from_shapes("rig", "what is not known of its cords", unknown, cut, in_motion))
     if repeat_noise is not None:
         entries.append(budget.repeatability(repeat_noise, sensor.sigma))
     return entries

@@ -14,7 +14,7 @@ from kbs_process.signals.records import Array
 
 _UNKNOWN = 0.95  # of a uniform prior's standard deviation: a phase known no better than that is not known
 _POSITIVE = ("mass", "ratio", "rotor_inertia")
-_NOT_THE_PLANT = ("transducer.", "gravity.")  # of the test bench
+_NOT_THE_PLANT = ("transducer.", "gravity.", "external.")  # of the test bench
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,8 +61,8 @@ class Uncertain:
 def uncertain(rig: Rig, effects: Sequence[Effect]) -> tuple[Uncertain, ...]:
     """Return every number of the plant with a sigma above zero, in the order of their names.
 
-    The transducer and gravity belong to a test, not to the article; drive parameters that no effect asks for do
-    nothing.
+    The transducer, gravity and what else the laboratory does belong to a test, not to the article; drive parameters
+    that no effect asks for do nothing.
     """
     shapes = {parameter.name: parameter for effect in effects for parameter in effect.parameters}
     drives = {

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kbs_process.signals.records import Array
 from kbs_process.stages.gravity import GravityModel, Sample, error_of, prepared
 from kbs_process.stages.gravity_taring import Taring
 
@@ -59,15 +60,20 @@ class Misfit:
         return self.ratio < _FACTOR
 
 
-def misfits(sample: Sample, model: GravityModel, taring: Taring) -> tuple[Misfit, ...]:
-    """Compare what the model leaves of a recording with what its uncertainty lets it leave, channel by channel."""
+def misfits(
+    sample: Sample, model: GravityModel, taring: Taring, others: Array | float = 0.0
+) -> tuple[Misfit, ...]:
+    """Compare what the model leaves of a recording with what its uncertainty lets it leave, channel by channel.
+
+    `others` (c,) is the rms of what else the recording may err by.
+    """
     equation = model.equation
     data = prepared(sample, equation, model.settings, model.settings.low_pass_Hz)
     theta = model.fit.value[: equation.size]
     residual = data.wrench - equation.predict(theta, data) - taring.bias
     error = np.hypot(error_of(model, data, taring), equation.encoder_error(theta, data))
     left = np.sqrt(np.mean(residual**2, axis=0))
-    explained = np.sqrt(np.mean(error**2, axis=0) + model.unexplained**2)
+    explained = np.sqrt(np.mean(error**2, axis=0) + model.unexplained**2 + np.square(others))
     return tuple(
         Misfit(channel, unit, float(rms), float(allowed))
         for channel, unit, rms, allowed in zip(model.channels, model.units, left, explained, strict=True)

@@ -1,0 +1,76 @@
+"""What belongs to the rig and not to the article: the wrench of cords that the model knows, taken from recordings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from kbs_process.campaign.config import Campaign, RecordingEntry
+from kbs_process.plant.effect import Effect, Port
+from kbs_process.plant.effects import select
+from kbs_process.plant.external import external_wrench
+from kbs_process.rig.model import Rig, substitute
+from kbs_process.signals.records import WRENCH_CHANNELS, Array, Run, Signal
+from kbs_process.stages.motion import Motion
+
+_POINTS = 300  # of a recording at which the cords' uncertainty is computed, linear in between
+_SHARED = (
+    ".origin",
+    ".misalignment",
+    "transducer.tilt",
+    "transducer.stiffness",
+)  # where a cord pulls at what
+
+
+def forces_in(campaign: Campaign, entry: RecordingEntry) -> tuple[Effect, ...]:
+    """Return the forces of the laboratory that acted in a recording."""
+    return tuple(effect for effect in select(campaign.acting(entry)) if effect.port is Port.EXTERNAL_FORCE)
+
+
+def relieved(campaign: Campaign, entry: RecordingEntry, run: Run, motion: Motion) -> Run:
+    """Return the run less the static wrench of the laboratory's forces at the measured angles."""
+    forces = forces_in(campaign, entry)
+    if run.wrench is None or not forces:
+        return run
+    return replace(run, wrench=without_forces(run.wrench, campaign.rig, forces, motion.q))
+
+
+def without_forces(wrench: Signal, rig: Rig, forces: tuple[Effect, ...], q: Array) -> Signal:
+    """Return a wrench less the static one of `forces` at angles q (n, joints)."""
+    if not forces:
+        return wrench
+    names = ", ".join(effect.name for effect in forces)
+    load = external_wrench(rig, forces, q)[:, _columns(wrench)]
+    return wrench.derive(wrench.values - load, f"static wrench of {names} removed")
+
+
+def errors(wrench: Signal, rig: Rig, forces: tuple[Effect, ...], q: Array) -> Iterator[Signal]:
+    """Yield the histories of one-sigma errors of `forces`, one for each uncertain number that they depend on.
+
+    These are their own, where the joints are, and how the plate gives way. Histories are about their mean: a
+    recording's own constant takes that up.
+    """
+    if not forces:
+        return
+    at = np.unique(np.linspace(0, len(q) - 1, min(len(q), _POINTS)).astype(np.int64))
+    own = tuple(f"external.{effect.name}." for effect in forces)
+    nominal = external_wrench(rig, forces, q[at])
+    for name, quantity in rig.quantities().items():
+        if not name.startswith(own) and not name.endswith(_SHARED):
+            continue
+        for element in np.ndindex(quantity.shape):
+            if not quantity.sigma[element] > 0.0:
+                continue
+            moved = quantity.value.copy()
+            moved[element] += quantity.sigma[element]
+            change = (external_wrench(substitute(rig, {name: moved}), forces, q[at]) - nominal)[
+                :, _columns(wrench)
+            ]
+            history = np.stack([np.interp(np.arange(len(q)), at, column) for column in change.T], axis=1)
+            yield wrench.derive(history - history.mean(axis=0), f"error of {name}")
+
+
+def _columns(wrench: Signal) -> list[int]:
+    return [WRENCH_CHANNELS.index(channel) for channel in wrench.channels]
