@@ -87,7 +87,7 @@ def _entries(
         *budget.filter_edges(
             measured, stated.edge_error, stated.edge_error_drift, budget.drifting_part(measured, band)
         ),
-        budget.resonance(measured, resonance, limits),
+        *([budget.resonance(measured, resonance, limits)] if rig.transducer.channels else []),
     ]
     forces = forces_in(campaign, analysis.entry)
     if unknown := list(errors(measured, rig, forces, analysis.motion.q)):
