@@ -27,9 +27,9 @@ _KEPT = (
     ("held-out", 3),
 )  # role and repeat, of the first trajectory
 _SPECIFICATIONS = {
-    "T00000000A1": Spec("development", 4100, 0, "within"),
-    "T00000000B7": single("development", 4103, 0, "motor order, distorted", 1000.0),
-    "T00000000C4": single("development", 4102, 0, "S-shaped channel", 1000.0),
+    "T00000000A1": Spec("development", 7, 1, "within"),
+    "T00000000B7": single("development", 7, 0, "rounded triangle of transmission error", 300.0),
+    "T00000000C4": single("development", 7, 6, "S-shaped channel", 300.0),
 }
 
 

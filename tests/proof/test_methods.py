@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import Any, TypeVar, get_origin
 
+import msgspec
 import pytest
 
 from kbs_process.report.records.common import Conclusion, Provenance, encode
@@ -15,46 +17,51 @@ from proof.diagnosis import answer_of
 from proof.methods import Job, answer_trial
 from proof.words import OURS
 
-
-def trial(name: str, role: str, known: float, corrected: float) -> Trial:
-    return Trial(
-        recording=name,
-        trajectory="A",
-        role=role,  # type: ignore[arg-type]
-        nominal=9.0,
-        known=known,
-        corrected=corrected,
-        log10_p=-1.0,
-        channels={},
-    )
+R = TypeVar("R", bound=msgspec.Struct)
 
 
-def rival(family: str, place: Place, distance: float | None, probability: float) -> Rival:
-    return Rival(
-        name=family, family=family, place=place, gain=10.0, distance=distance, probability=probability
-    )
+def filled(record: type[R], **given: Any) -> R:
+    """A record of which only what the translation reads is given; all else is empty."""
+    empty = {float: 0.0, str: "", bool: True}
+    rest = {
+        field.name: empty.get(field.type, () if get_origin(field.type) is tuple else {})
+        for field in msgspec.structs.fields(record)
+        if field.required and field.name not in given
+    }
+    return record(**rest, **given)
+
+
+def rival(family: str, place: Place, distance: float, probability: float) -> Rival:
+    return filled(Rival, family=family, place=place, distance=distance, probability=probability)
 
 
 def results(port: str = "motor torque") -> DiagnosisResults:
     motor, channel = Place(port=port, site="el"), Place(port="transducer", site="Tx<-Fz")
-    find = Find(
-        name="motor_order", family="motor order", named=True, place=motor, says="", equation="", reference="",
+    find = filled(
+        Find,
+        family="motor order",
+        place=motor,
         parameters=(Fitted(name="amplitude", unit="N m", value=2.0, sigma=0.1, low=1.8, high=2.2),),
-        probability=0.9, distance=300.0, absorbed=0.1, band_Hz=(0.1, 2.0),
-        rivals=(rival("cross-coupling", channel, 80.0, 0.01), rival("cogging", motor, 3.0, 0.09)), gate=(),
-    )  # fmt: skip
-    off = Moved(
-        name="joint.az.drive.Ka", unit="N m", prior=1e4, prior_sigma=1e3, value=1.5e4, sigma=9.0, sigmas=5.0
+        probability=0.9,
+        rivals=(rival("cross-coupling", channel, 80.0, 0.01), rival("cogging", motor, 3.0, 0.09)),
     )
-    near = Moved(
-        name="joint.el.drive.Ka", unit="N m", prior=1e4, prior_sigma=1e3, value=1.1e4, sigma=9.0, sigmas=1.0
-    )
-    return DiagnosisResults(
-        name="T1", title="", article="", verdict=Conclusion(status="none", sentence=""),
+    off = filled(Moved, name="joint.az.drive.Ka", prior_sigma=1e3, sigmas=5.0)
+    near = filled(Moved, name="joint.el.drive.Ka", prior_sigma=1e3, sigmas=-1.0)
+    phase = filled(Moved, name="joint.el.drive.phi_cog", prior_sigma=None, sigmas=None)
+    return filled(
+        DiagnosisResults,
+        verdict=Conclusion(status="none", sentence=""),
         provenance=Provenance(version="1", python="3", libraries={}, platform="", command=""),
-        answer="physics", paragraph="", floor="", log10_p=-250.0, moved=(off, near), finds=(find,),
-        trials=(trial("1", "fit", 5.0, 3.0), trial("2", "held-out", 3.0, 1.0), trial("3", "held-out", 4.0, 1.0)),
-    )  # fmt: skip
+        answer="physics",
+        log10_p=-250.0,
+        moved=(off, near, phase),
+        finds=(find,),
+        trials=(
+            filled(Trial, role="fit", known=5.0, corrected=3.0),
+            filled(Trial, role="held-out", known=3.0, corrected=1.0),
+            filled(Trial, role="held-out", known=4.0, corrected=1.0),
+        ),
+    )
 
 
 def test_a_diagnosis_is_translated_word_by_word() -> None:
