@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from engine.hardware import Hardware
+from engine.hardware import Array, Hardware
+from engine.ports import NONE
 from engine.sensors import coloured
 from engine.simulation import integrate
 from engine.trajectories import Axis, commands
@@ -17,6 +18,7 @@ from proof.concealed import effects, sensitivity
 from proof.concealed.bench import Bench, measure, scaled
 from proof.concealed.effects import BY_NAME
 from proof.concealed.observed import FINE_HZ, Motion, read, to_working_rate
+from proof.concealed.recording import record
 from proof.concealed.strength import Whitening, strength
 
 CAMPAIGN = Path(__file__).parents[2] / "campaigns" / "EL089"
@@ -45,6 +47,22 @@ def test_noise_of_the_sensors_is_white() -> None:
     entries = Whitening.of(HARDWARE, readings, FINE_HZ, 50.0)(readings).reshape(-1, 8)[:, :6]
     lost = np.mean(np.square(Whitening.of(HARDWARE, readings, FINE_HZ, 50.0).window[:, 0]))  # by the taper
     assert np.mean(np.square(entries)) / lost == pytest.approx(1.0, abs=0.08)
+
+
+def test_repeats_differ_by_the_floor() -> None:
+    t = np.arange(0.0, PATH.t[-1] + 1e-9, 1.0 / FINE_HZ)
+
+    def wrench(seed: int) -> Array:
+        run = np.random.SeedSequence(seed)
+        stream = record(HARDWARE, PATH, NONE, seed=run, epoch_ns=0, wrench_hz=100.0, encoder_hz=50.0).wrench
+        values = np.column_stack([np.interp(t, 1e-9 * stream.stamp, column) for column in stream.values.T])
+        return to_working_rate(np.hstack([values, np.zeros((len(t), 2))]))
+
+    setting = bench().settings[0]
+    difference = setting.whiten((wrench(1) - wrench(2)) / np.sqrt(2.0))
+    raw, left = (entries.reshape(-1, 8)[:, :6] for entries in (difference, setting.above_floor(difference)))
+    assert np.mean(raw**2) > 1.5  # bias, friction, clocks
+    assert np.mean(left**2) == pytest.approx(0.92, abs=0.15)  # 0.94 by the taper
 
 
 def test_known_parameters_are_absorbed_and_what_is_beyond_is_not() -> None:
