@@ -215,3 +215,22 @@ def test_provenance_names_every_input_and_stays_the_same(folder: CampaignFolder)
 def test_schemas_are_schemas(name: str) -> None:
     jsonschema.Draft202012Validator.check_schema(load_schema(name))
     assert (schema_folder() / f"{name}.schema.json").is_file()
+
+
+def test_an_effect_may_act_twice(folder: CampaignFolder) -> None:
+    folder.replace("campaign.toml", '"cogging",', '"motor_order_2", "cogging", "motor_order",')
+    numbers = "".join(
+        f'{name} = {{ value = {value}, unit = "{unit}", sigma = 0.0, source = "found" }}\n'
+        for tag in ("", "_2")
+        for name, value, unit in (
+            (f"order_sin{tag}", 0.001, "N m"),
+            (f"order_cos{tag}", 0.0, "N m"),
+            (f"order{tag}", 7.0 if tag else 12.0, "1"),
+        )
+    )
+    for joint in ("az", "el"):
+        heading = f"[joint.{joint}.drive.parameters]\n"
+        folder.replace("parameters/drives.toml", heading, heading + numbers)
+    campaign = load_campaign(folder.path)
+    assert campaign.effects[-2:] == ("motor_order", "motor_order_2")
+    assert float(campaign.rig.quantities()["joint.el.drive.order_2"]) == 7.0
