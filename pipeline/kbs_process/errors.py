@@ -39,6 +39,10 @@ class SimulationError(KbsError):
     """The plant's solution is not finite, or its parameters make no sense."""
 
 
+class DivergenceError(SimulationError):
+    """The plant's solution grew beyond all bounds."""
+
+
 class MissionError(KbsError):
     """A mission's orbit, relay satellites and limits allow no trajectory."""
 

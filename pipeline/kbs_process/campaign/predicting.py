@@ -107,11 +107,11 @@ def predict_run(
     )
     channels = {"wrench": WRENCH_CHANNELS, "angle": rig.joint_names, "field": rig.joint_names}
     predicted = condense(run.name, blocks, channels, settings)
-    start = _commanded_from(run)
+    start = commanded_from(run)
     return replace(predicted, wrench=_known(predicted.wrench, start), angle=_known(predicted.angle, start))
 
 
-def _commanded_from(run: Run) -> float:
+def commanded_from(run: Run) -> float:
     """Return the time, s, from which commands are known to have driven the joints: a cycle before the first."""
     assert run.command is not None  # `schedule_of` demands it
     t = run.command.t

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kbs_process.errors import SimulationError
+from kbs_process.errors import DivergenceError
 from kbs_process.plant.amplifier import discretised, steady
 from kbs_process.plant.compile import compiled_plant
 from kbs_process.plant.effect import Effect
@@ -99,7 +99,7 @@ class Simulation:
         self.first += steps
         angle = angle[:taken]
         if not (np.isfinite(self.state).all() and np.isfinite(wrench).all() and np.isfinite(angle).all()):
-            raise SimulationError(
+            raise DivergenceError(
                 f"the solution is no longer finite before {self.first * self.step:.3f} s",
                 where="plant",
                 remedy="check stiffness, damping and inertia of the parameters, or take a smaller step",

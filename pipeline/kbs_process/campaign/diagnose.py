@@ -1,0 +1,115 @@
+"""Diagnose a campaign: is there a mismatch beyond what repeats differ by, and can the known parameters explain it?"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from kbs_process.campaign.config import Campaign, RecordingEntry
+from kbs_process.campaign.predicting import approached, commanded_from, schedule_of
+from kbs_process.campaign.progress import Progress
+from kbs_process.campaign.reading import read_run
+from kbs_process.campaign.settings import motion_settings
+from kbs_process.campaign.simulators import Simulators
+from kbs_process.diagnosis import detection, floor, known, phasing
+from kbs_process.diagnosis.detection import Detection
+from kbs_process.diagnosis.experiment import Experiment, Recorded, assemble
+from kbs_process.diagnosis.floor import Floor
+from kbs_process.diagnosis.hypothesis import Hypothesis, Simulate
+from kbs_process.diagnosis.known import Known
+from kbs_process.errors import ConfigError, RecordingError
+from kbs_process.signals.records import Run
+from kbs_process.stages import decouple, motion
+from kbs_process.stages.motion import Motion
+
+_STARTS = 2  # that are followed, the second where the first leads to no floor
+_REFITS = 2  # of the floor, where repeats were not driven alike
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Explained:
+    """How far the known parameters get, and what they leave."""
+
+    experiment: Experiment
+    floor: Floor
+    known: Known
+    before: Detection  # with the parameter files' numbers
+    after: Detection  # with the refitted ones, over the recordings that these were fitted to
+    held_out: Detection | None  # likewise over the others
+
+
+def experiment_of(campaign: Campaign, progress: Progress) -> Experiment:
+    """Read all recordings of a campaign and lay repeats on one grid."""
+    decoupling = decouple.fit(campaign.rig)
+    runs = []
+    for entry in campaign.recordings:
+        with progress.task(f"Reading {entry.name}"):
+            run = decouple.apply(read_run(campaign, entry), decoupling)
+            if run.loads is None:
+                raise RecordingError("there is neither wrench nor effort", where=str(entry.path))
+            runs.append((entry, run, motion.estimate(run, campaign.rig, motion_settings(campaign))))
+    with progress.task("Laying repeats on one grid"):
+        return assembled(campaign, runs)
+
+
+def assembled(campaign: Campaign, runs: Sequence[tuple[RecordingEntry, Run, Motion]]) -> Experiment:
+    """The experiment of recordings that are decoupled and whose joints' motion is known."""
+    if not any(entry.role != "held-out" for entry, _, _ in runs):
+        raise ConfigError("every recording is held out: there is nothing to fit", where=campaign.name)
+    recorded = [_recorded(campaign, entry, run, moved) for entry, run, moved in runs]
+    highest = motion_settings(campaign).band_Hz if campaign.drive == "motion" else None
+    return assemble(recorded, campaign.rig, campaign.effects, highest_Hz=highest)
+
+
+def _recorded(campaign: Campaign, entry: RecordingEntry, run: Run, moved: Motion) -> Recorded:
+    absent = tuple(name for name in campaign.effects if name not in campaign.acting(entry))
+    if campaign.drive == "motion":
+        return Recorded(entry.role, entry.trajectory, run, None, moved, absent=absent)
+    schedule = approached(schedule_of(run, campaign.rig))
+    return Recorded(entry.role, entry.trajectory, run, schedule, None, commanded_from(run), absent)
+
+
+def explain(experiment: Experiment, progress: Progress) -> Explained:
+    """Floor, detection, refit of the known parameters, detection of what they leave."""
+    with Simulators(experiment) as simulate:
+        nominal = Hypothesis(experiment.rig, experiment.effects)
+        with progress.task("Repeatability floor, and what exceeds it"):
+            noise = _floor(experiment, nominal, simulate)
+            before = _detected(experiment, noise, nominal, simulate, experiment.fit)
+        with progress.task("Phases of cogging, friction and tooth contact"):
+            starts = phasing.begin(experiment, nominal, noise, simulate, most=_STARTS)
+        with progress.task("Refitting the known parameters"):
+            found = known.best(experiment, starts, noise, simulate)
+            if not _driven_alike(experiment):
+                for _ in range(_REFITS):
+                    noise = _floor(experiment, found.hypothesis, simulate)
+                    found = known.refit(experiment, found.hypothesis, noise, simulate, rephased=0)
+        with progress.task("What the known parameters leave"):
+            after = _left(found, noise, simulate, experiment.fit)
+            held_out = _left(found, noise, simulate, experiment.held_out) if experiment.held_out else None
+    return Explained(experiment, noise, found, before, after, held_out)
+
+
+def _driven_alike(experiment: Experiment) -> bool:
+    return all(len({experiment.trials[k].drive for k in members}) == 1 for members in experiment.repeats)
+
+
+def _floor(experiment: Experiment, hypothesis: Hypothesis, simulate: Simulate) -> Floor:
+    predicted = dict(enumerate(simulate([(drive, hypothesis) for drive in range(len(experiment.drives))])))
+    left = {k: t.measured - predicted[t.drive].values for k, t in enumerate(experiment.trials)}
+    return floor.estimate(experiment, left)
+
+
+def _detected(
+    experiment: Experiment, noise: Floor, hypothesis: Hypothesis, simulate: Simulate, trials: Sequence[int]
+) -> Detection:
+    predicted = dict(enumerate(simulate([(drive, hypothesis) for drive in range(len(experiment.drives))])))
+    return detection.detect(experiment, noise, predicted, trials)
+
+
+def _left(found: Known, noise: Floor, simulate: Simulate, trials: Sequence[int]) -> Detection:
+    experiment = found.experiment
+    predicted = dict(
+        enumerate(simulate([(drive, found.hypothesis) for drive in range(len(experiment.drives))]))
+    )
+    return detection.detect(experiment, noise, predicted, trials, known=found)

@@ -1,0 +1,180 @@
+"""Is the mean residual of repeats greater than what repeats differ by? Cell by cell in frequency, with a p-value.
+
+With S estimated from nu complex degrees of freedom, U = sum over a cell's B frequencies of M zbar^H S^-1 zbar is no
+chi-square: S^-1 is too large in the mean and U has long tails. Its mean and variance for noise alone,
+
+    E U = B p nu / q,   var U = nu^2 (B E tr W^-2 + B^2 var tr W^-1),   q = nu - p,
+
+W complex Wishart of p channels (moments: Maiwald and Kraus, IEE Proc. Radar Sonar Navig. 147:162, 2000), are those of a
+multiple of an F variable, which is exact for B = 1. What fitted numbers have taken up is counted out. Cells combine by
+Fisher's method.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2 as chi_square
+from scipy.stats import f as fisher_f
+
+from kbs_process.diagnosis.experiment import Experiment
+from kbs_process.diagnosis.floor import Floor
+from kbs_process.diagnosis.hypothesis import Prediction
+from kbs_process.diagnosis.known import Known
+from kbs_process.diagnosis.nuisance import nuisances
+from kbs_process.diagnosis.whiten import Projector, Whitener
+from kbs_process.signals.records import Array
+
+_LEAST_LOG = -1e5
+_MOST_D2 = 1e7  # denominators that are as good as infinite
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Cell:
+    """A band of one trajectory."""
+
+    trajectory: int
+    low_Hz: float
+    high_Hz: float
+    ratio: float  # mean residual's power over the floor's
+    log_p: float  # natural logarithm
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Detection:
+    """Is there anything beyond the floor?"""
+
+    cells: tuple[Cell, ...]
+    log_p: float  # natural logarithm, of all cells
+    ratio: float  # power over the floor's, all cells
+
+    @property
+    def log10_p(self) -> float:
+        return self.log_p / float(np.log(10.0))
+
+
+def detect(
+    experiment: Experiment,
+    floor: Floor,
+    predicted: Mapping[int, Prediction],
+    trials: Sequence[int],
+    *,
+    known: Known | None = None,
+) -> Detection:
+    """Test the mean residuals of `trials`, trajectory by trajectory; `predicted` by drive.
+
+    Of trials that `known` numbers were fitted to, these have taken up part; to what was held out, they add what they
+    are uncertain by.
+    """
+    whitened = [
+        _mean(experiment, floor, predicted, members)
+        for own in experiment.repeats
+        if (members := [k for k in own if k in trials])
+    ]
+    cells: list[Cell] = []
+    power = expected = 0.0
+    for one in whitened:
+        lost = one.leverage.copy()
+        if known is not None and (slopes := known.slopes.get(experiment.reference(one.trajectory))):
+            J = one.project(one.whiten(np.moveaxis(slopes.columns, 0, 2)))[: len(lost)]
+            fitted = any(k in experiment.fit for k in experiment.repeats[one.trajectory] if k in trials)
+            share = np.einsum("rp,pq,rq->r", J, known.covariance, J, optimize=True)
+            lost += np.minimum(share, 1.0) if fitted else -share
+        for cell, u, mean in _cells(floor, one, lost):
+            cells.append(cell)
+            power, expected = power + u, expected + mean
+    total = sum(cell.log_p for cell in cells)
+    log_p = float(chi_square.logsf(-2.0 * total, 2 * len(cells)))
+    return Detection(tuple(cells), max(log_p, _LEAST_LOG), power / expected)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Mean:
+    """The whitened mean residual of a trajectory's repeats, nuisances out."""
+
+    trajectory: int
+    f: Array  # (b,)
+    z: Array  # (rows,)
+    leverage: Array  # (rows,) of the nuisances
+    channels: int  # that show something
+    spread: float  # by how much tapers correlate neighbours, mean over channels
+    project: Projector
+    whiten: Whitener
+
+
+def _mean(
+    experiment: Experiment, floor: Floor, predicted: Mapping[int, Prediction], members: Sequence[int]
+) -> _Mean:
+    trials = [experiment.trials[k] for k in members]
+    valid = np.logical_and.reduce([trial.valid for trial in trials])
+    near = predicted[trials[0].drive]
+    whiten = floor.whitener(trials[0], near.values, valid=valid, repeats=len(trials))
+    left = np.mean([trial.measured - predicted[trial.drive].values for trial in trials], axis=0)
+    N, precision = nuisances(experiment, trials[0], near)
+    project = Projector.of(whiten(N), precision * np.sqrt(len(trials)))
+    windows = whiten.window
+    seen = windows.any(axis=0)
+    power = np.sum(windows[:, seen] ** 2, axis=0)
+    span = valid.sum()
+    spread = float(np.mean(span * np.sum(windows[:, seen] ** 4, axis=0) / power**2))
+    size = 2 * len(whiten.f) * windows.shape[1]
+    return _Mean(
+        trials[0].trajectory,
+        whiten.f,
+        project(whiten(left))[:size],
+        np.sum(project.basis**2, axis=1),
+        int(seen.sum()),
+        spread,
+        project,
+        whiten,
+    )
+
+
+def _cells(floor: Floor, one: _Mean, taken: Array) -> list[tuple[Cell, float, float]]:
+    """Each cell with its statistic and the mean of that for noise."""
+    b = len(one.f)
+    z2 = np.sum((one.z.reshape(2, b, -1)) ** 2, axis=(0, 2))
+    lost = np.sum(taken.reshape(2, b, -1), axis=(0, 2))
+    edges = floor.edges
+    found = []
+    for low, high in itertools.pairwise(edges):
+        inside = (one.f > low) & (one.f <= high)
+        B = int(inside.sum())
+        if B == 0:
+            continue
+        nu = float(floor.freedom(one.f[inside]).mean())
+        full = float(B * one.channels)
+        left = max(full - 0.5 * float(lost[inside].sum()), 0.05 * full)
+        mean, variance = left, _variance(B, one.channels, nu) * (left / full) * one.spread
+        u = 0.5 * float(z2[inside].sum())
+        cell = Cell(one.trajectory, float(low), float(high), u / mean, _log_p(u, mean, variance, left))
+        found.append((cell, u, mean))
+    return found
+
+
+def _variance(B: int, p: int, nu: float) -> float:
+    """Of U (nu - p) / nu."""
+    q = nu - p
+    if not np.isfinite(nu) or q > 1e6:
+        return float(B * p)
+    q = max(q, 2.5)
+    cube = q**3 - q
+    squares = p * (q + p) / cube
+    spread = (q * p**2 + p) / cube - (p / q) ** 2
+    return float(q**2 * (B * squares + B**2 * spread))
+
+
+def _log_p(u: float, mean: float, variance: float, dims: float) -> float:
+    """Of a multiple of F(2 dims, d2) with that mean and variance."""
+    d1 = 2.0 * dims
+    # var F / mean^2 F = 2 (d1 + d2 - 2) / (d1 (d2 - 4))
+    ratio = variance / mean**2
+    excess = ratio - 2.0 / d1
+    if excess <= 0.0:
+        shape = mean**2 / variance  # narrower or as wide as chi-square: gamma
+        return float(max(chi_square.logsf(2.0 * shape * u / mean, 2.0 * shape), _LEAST_LOG))
+    d2 = min((2.0 * (d1 - 2.0) / d1 + 4.0 * ratio) / excess, _MOST_D2)
+    return float(max(fisher_f.logsf(u / mean * d2 / (d2 - 2.0), d1, d2), _LEAST_LOG))

@@ -1,0 +1,177 @@
+"""Can the known parameters explain it? Their maximum a posteriori over all trials that are not held out.
+
+    theta = argmin sum_trials |P W (y - m(theta))|^2 + sum ((theta - theta_0) / sigma_0)^2
+
+W whitens by the repeatability floor, P takes each trial's own nuisances out. Phases have no prior; they enter as cosine
+and sine amplitudes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from kbs_process.diagnosis.experiment import Experiment
+from kbs_process.diagnosis.floor import Floor
+from kbs_process.diagnosis.hypothesis import Hypothesis, Simulate
+from kbs_process.diagnosis.metric import Metric
+from kbs_process.diagnosis.parameters import Slopes, known_parameters
+from kbs_process.diagnosis.search import Found, Search
+from kbs_process.estimation.fit import Check, Parameters
+from kbs_process.signals.records import Array
+from kbs_process.stages.output_error import Scalar
+
+_ROUNDS = 12
+_REPHASED = 2  # times that phases are looked for again at the end
+_AT_FLOOR = 1.1  # level from which no other start is followed
+MOVED = 3.0  # sigmas, from which a parameter is said to be off
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Known:
+    """The known parameters as the recordings have them, and what they leave."""
+
+    experiment: Experiment
+    hypothesis: Hypothesis
+    free: tuple[Scalar, ...]
+    parameters: Parameters  # priors
+    value: Array  # (p,)
+    covariance: Array  # (p, p)
+    metric: tuple[Metric, ...]  # of each trial
+    slopes: dict[int, Slopes]  # by drive
+    residual: tuple[Array, ...]  # of each trial, whitened
+    chi2_before: Array  # (trials,)
+    checks: tuple[Check, ...]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(scalar.name for scalar in self.free)
+
+    @property
+    def sigma(self) -> Array:
+        """(p,) standard deviations; a phase that nothing shows has pi."""
+        return np.asarray(np.sqrt(np.diag(self.covariance)), dtype=np.float64)
+
+    @property
+    def moved(self) -> Array:
+        """(p,) prior sigmas; nan for phases, which have none."""
+        spread = self.parameters.sigma
+        finite = np.isfinite(spread)
+        return np.where(finite, (self.value - self.parameters.value) / np.where(finite, spread, 1.0), np.nan)
+
+    @property
+    def chi2(self) -> Array:
+        """(trials,) squared lengths of the residuals."""
+        return np.array([float(z @ z) for z in self.residual])
+
+    @property
+    def rows(self) -> Array:
+        """(trials,) numbers of noise in each."""
+        return np.array([metric.rows for metric in self.metric])
+
+    @property
+    def level(self) -> float:
+        """What is left of the trials that were fitted, over the floor."""
+        fit = list(self.experiment.fit)
+        return float(self.chi2[fit].sum() / self.rows[fit].sum())
+
+    @property
+    def cost(self) -> float:
+        """-2 log posterior, less a constant."""
+        return float(self.chi2[list(self.experiment.fit)].sum()) + self.prior_chi2
+
+    @property
+    def prior_chi2(self) -> float:
+        return float(np.nansum(self.moved**2))
+
+    def jacobian(self, trial: int) -> Array:
+        """(rows, p) by which a trial's prediction answers to the parameters, whitened as its residual is."""
+        reference = self.experiment.reference(self.experiment.trials[trial].trajectory)
+        return self.metric[trial](np.moveaxis(self.slopes[reference].columns, 0, 2))
+
+
+def refit(
+    experiment: Experiment,
+    hypothesis: Hypothesis,
+    floor: Floor,
+    simulate: Simulate,
+    *,
+    extra: Sequence[Scalar] = (),
+    rounds: int = _ROUNDS,
+    rephased: int = _REPHASED,
+) -> Known:
+    """Refit all known parameters from `hypothesis` on, whose phases are near their right values (see `phasing`).
+
+    `extra` are numbers of suspects in the hypothesis that are fitted beside them, with the priors of its rig.
+    """
+    free = (*known_parameters(experiment.rig, experiment.effects), *extra)
+    search = Search(experiment, floor, simulate, hypothesis, free)
+    begun = search.begin()
+    before = np.array([float(z @ z) for z in _residuals(search, begun)])
+    found = search.run(begun, rounds)
+    for _ in range(rephased):
+        moved = search.rephased(found)
+        if moved is None:
+            break
+        found = search.run(moved, rounds)
+    return _known(search, found, before)
+
+
+def best(experiment: Experiment, starts: Sequence[Hypothesis], floor: Floor, simulate: Simulate) -> Known:
+    """Refit from each start until one leads to the floor; else the one of least cost."""
+    found: list[Known] = []
+    for start in starts:
+        found.append(refit(experiment, start, floor, simulate))
+        if found[-1].level < _AT_FLOOR:
+            break
+    return min(found, key=lambda known: known.cost)
+
+
+def _residuals(search: Search, found: Found) -> tuple[Array, ...]:
+    return tuple(search.residual(k, found.predicted) for k in range(len(search.experiment.trials)))
+
+
+def _known(search: Search, found: Found, before: Array) -> Known:
+    predicted = search.predict([found.theta], search.everything)[0]
+    found = replace(found, predicted=predicted)
+    H, _ = search.normal(found.gradients, predicted)
+    precision = search.precision + search.ridge
+    size = 1.0 / np.sqrt(np.diag(H) + precision)
+    inverse = np.linalg.inv((H + np.diag(precision)) * np.outer(size, size))
+    known = Known(
+        experiment=search.experiment,
+        hypothesis=search.hypothesis.at(search.free, found.theta),
+        free=search.free,
+        parameters=search.parameters,
+        value=found.theta,
+        covariance=np.asarray(inverse * np.outer(size, size), dtype=np.float64),
+        metric=search.metric,
+        slopes=found.gradients,
+        residual=_residuals(search, found),
+        chi2_before=before,
+        checks=(),
+    )
+    return replace(known, checks=_checks(known, found))
+
+
+def _checks(known: Known, found: Found) -> tuple[Check, ...]:
+    far = [
+        f"{name} ({moved:+.1f})"
+        for name, moved in zip(known.names, known.moved, strict=True)
+        if abs(moved) > MOVED
+    ]
+    limits = known.parameters
+    assert limits.lower is not None and limits.upper is not None
+    stuck = [
+        name
+        for name, value, low, high in zip(known.names, known.value, limits.lower, limits.upper, strict=True)
+        if value <= low or value >= high
+    ]
+    within = f"all within {MOVED:g} sigma"
+    return (
+        Check("converged", found.converged, f"{found.rounds} rounds"),
+        Check("within bounds", not stuck, ", ".join(stuck) or "none at a bound"),
+        Check("within uncertainties", not far, "sigmas: " + ", ".join(far) if far else within),
+    )

@@ -1,0 +1,41 @@
+"""What differs from trial to trial and is no one's mismatch: zeros, their drift, the clocks."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kbs_process.diagnosis.experiment import Experiment, Trial
+from kbs_process.diagnosis.hypothesis import Prediction
+from kbs_process.signals.records import Array
+
+
+def nuisances(experiment: Experiment, trial: Trial, prediction: Prediction) -> tuple[Array, Array]:
+    """Columns (n, c, k) and one over their standard deviations (k,), 0 where nothing is known of them.
+
+    A constant and a slope of each load channel with a bias (taring and drift), a constant of each angle, and the
+    residual error of the wrench's and the encoders' clocks, one s each, first order in it.
+    """
+    n, c = prediction.values.shape
+    wrench = experiment.loads
+    t = np.linspace(-1.0, 1.0, n)
+    columns, precision = [np.zeros((n, c))], [1.0]  # none, where there are no others
+    rig = experiment.rig
+    tared = rig.loads.bias_sigma[rig.loads.index(rig.channels)] > 0.0
+    for channel in range(c):
+        shapes = (np.ones(n),) if channel >= wrench else (np.ones(n), t) if tared[channel] else ()
+        for shape in shapes:
+            column = np.zeros((n, c))
+            column[:, channel] = shape
+            columns.append(column)
+            precision.append(0.0)
+    late = np.gradient(prediction.values, experiment.dt, axis=0)
+    for channels, sigma in (
+        (slice(0, wrench), trial.wrench_clock_sigma),
+        (slice(wrench, c), trial.angle_clock_sigma),
+    ):
+        if sigma > 0.0 and channels.start < c:
+            column = np.zeros((n, c))
+            column[:, channels] = late[:, channels]
+            columns.append(column)
+            precision.append(1.0 / sigma)
+    return np.stack(columns, axis=2), np.array(precision)

@@ -1,0 +1,94 @@
+"""The numbers that are known with an uncertainty, and how a prediction answers to them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from kbs_process.diagnosis.experiment import Experiment
+from kbs_process.diagnosis.hypothesis import Hypothesis, Prediction, Simulate, Task, decoupling
+from kbs_process.estimation.fit import Parameters
+from kbs_process.rig.model import Rig, substitute
+from kbs_process.signals.records import WRENCH_CHANNELS, Array
+from kbs_process.stages import identification, output_error
+from kbs_process.stages.output_error import Scalar
+
+COUPLING = "transducer.cross_coupling"
+
+
+def known_parameters(rig: Rig, effects: Sequence[str]) -> tuple[Scalar, ...]:
+    """Every number with an uncertainty: of drives, transducer, bodies, then the cross-coupling's rows that are read."""
+    gears = identification.gearbox(rig, effects) if any(joint.drive for joint in rig.joints) else ()
+    others = identification.others(rig, gears)
+    quantity = rig.transducer.cross_coupling
+    rows = [WRENCH_CHANNELS.index(channel) for channel in rig.transducer.channels]
+    coupling = [Scalar(COUPLING, (i, j)) for i in rows for j in range(6) if quantity.sigma[i, j] > 0.0]
+    return (*gears, *others, *coupling)
+
+
+def prior(rig: Rig, nominal: Rig, effects: Sequence[str], free: Sequence[Scalar]) -> Parameters:
+    """Means, sigmas and bounds; phases have neither sigma nor bounds.
+
+    Numbers that the files' rig has are known as these say, wherever a search has taken them; others as `rig` says.
+    """
+    known = nominal.quantities()
+    own = {name: quantity for name, quantity in rig.quantities().items() if name in known}
+    mixed = substitute(
+        rig, {name: known[name].value for name in own}, {name: known[name].sigma for name in own}
+    )
+    return identification.prior(output_error.Experiment(mixed, tuple(effects), tuple(free), (), 0.0))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Slopes:
+    """Derivatives of what a drive shows by the free numbers, at some values of these."""
+
+    base: Prediction
+    columns: Array  # (p, n, c)
+
+
+def slopes(
+    experiment: Experiment,
+    hypothesis: Hypothesis,
+    free: Sequence[Scalar],
+    differences: Array,
+    drives: Sequence[int],
+    simulate: Simulate,
+    *,
+    keep: Mapping[int, tuple[Sequence[int], Array]] | None = None,
+) -> dict[int, Slopes]:
+    """Difference the plant in each free number by `differences` (p,); the cross-coupling's columns are exact.
+
+    `keep` holds, for some drives, which numbers' columns (indices) need not be taken again, and all columns.
+    """
+    base_values = hypothesis.values(free)
+    tasks: list[Task] = [(drive, hypothesis) for drive in drives]
+    places: list[tuple[int, int]] = []
+    kept = keep or {}
+    for drive in drives:
+        known = set(kept[drive][0]) if drive in kept else set()
+        for index, scalar in enumerate(free):
+            if scalar.quantity == COUPLING or index in known:
+                continue
+            places.append((drive, index))
+            moved = hypothesis.at([scalar], base_values[[index]] + differences[index])
+            tasks.append((drive, moved))
+    found = simulate(tasks)
+    bases = dict(zip(drives, found, strict=False))
+    columns = {
+        drive: kept[drive][1].copy() if drive in kept else np.zeros((len(free), *bases[drive].values.shape))
+        for drive in drives
+    }
+    for (drive, index), moved_prediction in zip(places, found[len(drives) :], strict=True):
+        columns[drive][index] = (moved_prediction.values - bases[drive].values) / differences[index]
+    M, wrench = decoupling(experiment), experiment.wrench_channels
+    rows = [WRENCH_CHANNELS.index(channel) for channel in experiment.rig.transducer.channels]
+    for index, scalar in enumerate(free):
+        if scalar.quantity == COUPLING:
+            i, j = scalar.element
+            for drive in drives:
+                acting = bases[drive].wrench[:, j]
+                columns[drive][index][:, :wrench] = acting[:, None] * M[:, rows.index(i)]
+    return {drive: Slopes(bases[drive], columns[drive]) for drive in drives}
