@@ -13,14 +13,14 @@ from engine.ports import Extra
 from engine.trajectories import Commands
 from proof.concealed import effects as catalogue
 from proof.concealed.observed import Motion
-from proof.concealed.physics import Effect, Physics
+from proof.concealed.physics import Effect
 from proof.concealed.ranges import BEYOND_SIGMAS, LEVELS, Split
 from proof.concealed.sensitivity import Named, columns, perturbed
 from proof.concealed.strength import Setting, Strength, Whitening, own_columns, strength
 
 _REPEATS = 2  # of each trajectory that models are fitted to
-_NEAR = 0.12  # a strength is close enough to its level
-_SEARCH = 5  # amplitudes tried after the first
+_NEAR = 0.2  # a strength is close enough to its level: its logarithm
+_SEARCH = 7  # amplitudes tried
 
 # Not moved beyond: phases are unknown anyway, the others would not be physical or not be seen.
 _KEPT = (".phi_", "misalignment", "body.base", "body.azimuth.inertia")
@@ -123,27 +123,28 @@ def scaled(bench: Bench, effect: Effect, level: float) -> tuple[Effect, Strength
 
     Returns effect, strength and level; None where the effect stays below the weakest level.
     """
-    physics: Physics = effect.physics
-    amplitude, low, high = physics.first, 0.0, np.inf
-    for attempt in range(1 + _SEARCH):
+    most = effect.physics.most
+    amplitude, low, high = effect.physics.first, 0.0, np.inf
+    power, tried = 1.0, (0.0, 0.0)  # rho_eff goes with this power of the amplitude
+    for _ in range(_SEARCH):
         effect = effect.scaled(amplitude)
         found = bench.strength([effect])
-        if amplitude >= physics.most and found.rho_eff < level:
+        if amplitude >= most and found.rho_eff < level:
             reached = [weaker for weaker in LEVELS if weaker < found.rho_eff]
             if not reached:
                 return None
             level = max(reached)
         ratio = level / max(found.rho_eff, 1e-3)
-        if abs(ratio - 1) < _NEAR:
+        if abs(np.log(ratio)) < _NEAR:
             return effect, found, level
         if ratio > 1:
             low = max(low, amplitude)
         else:
             high = min(high, amplitude)
-        if (
-            attempt > 0 and not low < amplitude * ratio < high
-        ):  # far from linear: halve what is known to hold it
-            amplitude = float(np.sqrt(max(low, 1e-3 * high) * high)) if np.isfinite(high) else physics.most
-        else:
-            amplitude = min(amplitude * ratio, physics.most)
+        if min(tried) > 0 and amplitude != tried[0]:
+            power = np.log(found.rho_eff / tried[1]) / np.log(amplitude / tried[0])
+        tried = (amplitude, found.rho_eff)
+        amplitude = min(float(amplitude * ratio ** (1 / np.clip(power, 0.4, 3.0))), most)
+        if not low < amplitude < high:
+            amplitude = most if np.isinf(high) else float(np.sqrt(max(low, 0.1 * high) * high))
     return None
