@@ -134,6 +134,14 @@ def test_effects_along_a_motion_are_read_with_the_drives_sign():
     assert not added[:, :6].any()
 
 
+def test_an_effect_of_a_slide_has_newtons_and_metres():
+    made = slide("axis", "lab", (1, 0, 0), measured=effort("axis"))
+    rig = attach(replace(_driven(1.0), joints=(made,)), COULOMB, {"coulomb": 20.0})
+    quantities = rig.quantities()
+    assert quantities["joint.axis.drive.coulomb"].unit == "N"
+    assert quantities["joint.axis.drive.coulomb_rate"].unit == "m/s"
+
+
 @pytest.mark.parametrize("f", [0.5, 5.0, 20.0])
 def test_means_give_back_what_they_are_means_of(f):
     dt = 0.01

@@ -42,7 +42,7 @@ def attach(
     at = None
     if effect.port is Port.EXTERNAL_FORCE:
         at = Quantity(f"{path}.point", np.zeros(3) if point is None else point, "m", np.zeros(3), "assumed")
-    parameters = {entry.name: _quantity(path, entry, given) for entry in effect.parameters}
+    parameters = {entry.name: _quantity(path, entry, given, entry.unit) for entry in effect.parameters}
     others = tuple(entry for entry in rig.external if entry.name != effect.name)
     return replace(rig, external=(*others, External(effect.name, on, at, parameters)))
 
@@ -50,9 +50,10 @@ def attach(
 def _joint(joint: Joint, effect: Effect, given: Mapping[str, float]) -> Joint:
     drive = joint.drive or _direct(joint)
     parameters = dict(drive.parameters)
+    path = f"joint.{joint.name}.drive"
     for entry in effect.parameters:
         if entry.name in given or (entry.name not in parameters and entry.role != "shared"):
-            parameters[entry.name] = _quantity(f"joint.{joint.name}.drive", entry, given)
+            parameters[entry.name] = _quantity(path, entry, given, joint.unit_of(entry.unit))
     return replace(joint, drive=replace(drive, parameters=parameters))
 
 
@@ -68,9 +69,7 @@ def _direct(joint: Joint) -> Drive:
     )
 
 
-def _quantity(path: str, entry: Parameter, given: Mapping[str, float]) -> Quantity:
+def _quantity(path: str, entry: Parameter, given: Mapping[str, float], unit: str) -> Quantity:
     absent = 0.0 if entry.role == "amplitude" else entry.prior.middle
     value, sigma = given.get(entry.name, absent), entry.prior.spread
-    return Quantity(
-        f"{path}.{entry.name}", np.asarray(value), entry.unit, np.asarray(sigma), "prior of the effect"
-    )
+    return Quantity(f"{path}.{entry.name}", np.asarray(value), unit, np.asarray(sigma), "prior of the effect")

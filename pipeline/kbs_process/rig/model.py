@@ -120,6 +120,10 @@ class Joint:
         """Unit of the joint's coordinate."""
         return COORDINATE[self.type]
 
+    def unit_of(self, turning: str) -> str:
+        """What is the unit `turning` of a joint that turns, for this one: N s/m of one that slides, for N m s/rad."""
+        return turning if self.type == "revolute" else turning.replace("N m", "N").replace("rad", "m")
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Amplifier:
