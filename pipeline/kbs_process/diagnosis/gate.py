@@ -1,0 +1,128 @@
+"""The gate: a law is accepted only inside the plant, refitted, and if it predicts recordings that were not used.
+
+Every held-out trial's whitened residual has to improve, the interval of the law's coefficients has to exclude zero, and
+the residual has to be no less white. Where nothing was held out, each fit trial is left out in turn, to first order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import norm
+
+from kbs_process.diagnosis.gls import Background
+from kbs_process.diagnosis.known import Known
+from kbs_process.diagnosis.tails import log_tail
+from kbs_process.diagnosis.thresholds import GATE_GAIN, GATE_SIGMA
+from kbs_process.signals.records import Array
+
+
+@dataclass(frozen=True, slots=True)
+class Fold:
+    """What a law does for a trial that it was not fitted to."""
+
+    trial: str
+    before: float  # whitened sum of squares over its expectation
+    after: float
+    gain: float  # -2 log likelihood
+
+
+@dataclass(frozen=True, slots=True)
+class Gate:
+    """Whether a law passes, and why not."""
+
+    passed: bool
+    folds: tuple[Fold, ...]
+    held_out: bool  # folds are recordings set apart; else fit trials left out in turn
+    sigmas: float  # by which the coefficients are off zero, as one normal number's
+    whiteness: tuple[float, float]  # before and after, see `whiteness`
+    reasons: tuple[str, ...]  # of a refusal
+
+
+def gate(before: Known, after: Known, coefficients: Sequence[int]) -> Gate:
+    """Judge the numbers `coefficients` of `after`, the amplitudes of a law that `before` is without."""
+    experiment = after.experiment
+    held_out = bool(experiment.held_out)
+    folds = _held_out(before, after) if held_out else _left_out(before, after)
+    index = np.asarray(coefficients)
+    a, C = after.value[index], after.covariance[np.ix_(index, index)]
+    size = 1.0 / np.sqrt(np.diag(C))
+    wald = float(size * a @ np.linalg.lstsq(C * np.outer(size, size), size * a, rcond=1e-10)[0])
+    far = log_tail(wald, len(index))
+    # As far out as a normal number of that two-sided chance; beyond its range the chi-square's own root.
+    sigmas = float(norm.isf(np.exp(far) / 2.0)) if far > -600.0 else float(np.sqrt(wald))
+    white = whiteness(before), whiteness(after)
+    reasons = []
+    # Written so that what is no number, of a plant that diverged, is refused.
+    if worse := [fold.trial for fold in folds if not fold.gain > 0.0]:
+        reasons.append(f"{', '.join(worse)} predicted no better")
+    if not sum(fold.gain for fold in folds) >= GATE_GAIN:
+        reasons.append("recordings that were not used gain less than chance could give")
+    if not sigmas >= GATE_SIGMA:
+        reasons.append(f"its coefficients are {sigmas:.1f} sigma off zero")
+    if not white[1] <= white[0] + _spread(after):
+        reasons.append("the residual is less white with it")
+    return Gate(not reasons, folds, held_out, sigmas, white, tuple(reasons))
+
+
+def whiteness(known: Known) -> float:
+    """Greatest distance of a cumulated periodogram from that of white noise, mean over fit trials and channels seen.
+
+    Kolmogorov's statistic of each channel's whitened power along frequency; 0 is white, a single line gives nearly 1.
+    """
+    found = []
+    for k in known.experiment.fit:
+        layout = known.metric[k].layout(known.residual[k])
+        power = np.sum(layout**2, axis=0)
+        for channel in power.T[known.metric[k].whiten.window.any(axis=0)]:
+            total = np.cumsum(channel) / np.sum(channel)
+            found.append(float(np.max(np.abs(total - np.arange(1, len(total) + 1) / len(total)))))
+    return float(np.mean(found))
+
+
+def _spread(known: Known) -> float:
+    """What `whiteness` may differ by through noise alone: one standard deviation of Kolmogorov's statistic."""
+    bins = np.mean([len(known.metric[k].whiten.f) for k in known.experiment.fit])
+    return float(0.26 / np.sqrt(bins))
+
+
+def _held_out(before: Known, after: Known) -> tuple[Fold, ...]:
+    return tuple(
+        _fold(
+            after,
+            k,
+            float(before.residual[k] @ before.residual[k]),
+            float(after.residual[k] @ after.residual[k]),
+        )
+        for k in after.experiment.held_out
+    )
+
+
+def _fold(known: Known, k: int, before: float, after: float) -> Fold:
+    rows = float(known.rows[k])
+    return Fold(known.experiment.trials[k].name, before / rows, after / rows, before - after)
+
+
+def _left_out(before: Known, after: Known) -> tuple[Fold, ...]:
+    """Each fit trial that is no calibration left out in turn: both models' numbers step to where the others pull."""
+    experiment = after.experiment
+    chosen = [k for k in experiment.fit if experiment.trials[k].role == "fit"] or list(experiment.fit)
+    if len(chosen) < 2:
+        # One recording alone: its first half says nothing about its second that a taper would not mix.
+        return ()
+    parts = []
+    for known in (before, after):
+        J = {k: known.jacobian(k) for k in experiment.fit}
+        precision = np.where(np.isfinite(known.parameters.sigma), known.parameters.sigma, np.inf) ** -2.0
+        offset = np.where(precision > 0.0, known.parameters.value - known.value, 0.0)
+        parts.append({k: _without(known, J, precision, offset, k) for k in chosen})
+    return tuple(_fold(after, k, parts[0][k], parts[1][k]) for k in chosen)
+
+
+def _without(known: Known, J: dict[int, Array], precision: Array, offset: Array, out: int) -> float:
+    others = [k for k in J if k != out]
+    rest = Background.of({k: known.residual[k] for k in others}, {k: J[k] for k in others}, precision, offset)
+    left = known.residual[out] - J[out] @ (rest.scale * rest.shift)
+    return float(left @ left)

@@ -1,0 +1,147 @@
+"""What a diagnosis says: every answer a number with an uncertainty, frozen, ready to be recorded."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from kbs_process.diagnosis.detection import Detection
+from kbs_process.diagnosis.gate import Gate
+from kbs_process.diagnosis.joint import Standing
+from kbs_process.diagnosis.ports import Cells, PortTest
+from kbs_process.signals.records import Array
+
+Verdict = Literal["none", "parameters off", "physics", "undecided"]
+
+
+@dataclass(frozen=True, slots=True)
+class Identity:
+    """What a law is and where it acts, in the field's words."""
+
+    port: str
+    axis: str  # joint, link or stream; "" for base and transducer
+    channels: tuple[str, ...]  # that it touches directly, of a transducer; else empty
+    family: str  # of physics; "unnamed" for a measured law
+    law: str  # name in the catalogue, or what the measured law is a function of
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """A number of a law with its 95 % interval; `sigma` 0 where it was chosen from a grid."""
+
+    name: str
+    unit: str
+    value: float
+    sigma: float
+
+    @property
+    def low(self) -> float:
+        return self.value - 1.96 * self.sigma
+
+    @property
+    def high(self) -> float:
+        return self.value + 1.96 * self.sigma
+
+
+@dataclass(frozen=True, slots=True)
+class Alternative:
+    """Another law for the same find."""
+
+    identity: Identity
+    probability: float
+    rho_delta: float  # whitened distance from the law taken, the rival refitted
+    p_wrong: float
+    indistinguishable: bool
+    refitted: bool  # in the non-linear plant; else along the linear one
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Curve:
+    """A measured law: value over regressor with one standard deviation."""
+
+    regressor: str
+    unit: str  # of the regressor
+    x: Array  # (m,)
+    value: Array  # (m,) at the port: N m
+    sigma: Array  # (m,)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Find:
+    """An accepted law."""
+
+    identity: Identity
+    named: bool
+    equation: str  # its docstring's
+    reference: str
+    estimates: tuple[Estimate, ...]
+    probability: float
+    rho: float  # whitened size, and
+    rho_eff: float  # behind the known parameters
+    kappa: float
+    gate: Gate
+    alternatives: tuple[Alternative, ...]  # most probable first
+    ports_alike: tuple[str, ...]  # ports that these channels cannot tell from its own
+    held_out_variance: float | None  # share of the excess on held-out recordings that it explains
+    curve: Curve | None
+
+    @property
+    def indistinguishable_from(self) -> tuple[Identity, ...]:
+        return tuple(other.identity for other in self.alternatives if other.indistinguishable)
+
+
+@dataclass(frozen=True, slots=True)
+class Refused:
+    """A suspect that the screen found and that did not become a find."""
+
+    identity: Identity
+    rho_eff: float
+    reasons: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Absorbed:
+    """A suspect whose signature the known parameters take up: it may be there, and cannot be told from them."""
+
+    identity: Identity
+    kappa: float
+    rho: float
+    by: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Moved:
+    """A known parameter that went beyond what was known of it."""
+
+    name: str
+    value: float
+    sigma: float
+    sigmas: float  # of its prior
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Place:
+    """Where the residual lives: the port test and its cells."""
+
+    test: PortTest
+    cells: Cells
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Outcome:
+    """All answers of a diagnosis."""
+
+    verdict: Verdict
+    before: Detection  # known parameters refitted, no law added
+    after: Detection  # with all finds
+    held_out: tuple[Detection, Detection] | None  # before and after, on recordings that were not used
+    log_p: float  # natural logarithm: that the recordings show nothing beyond floor and known parameters
+    moved: tuple[Moved, ...]
+    finds: tuple[Find, ...]
+    refused: tuple[Refused, ...]
+    absorbed: tuple[Absorbed, ...]
+    place: Place | None  # before any find; None for a rig that its motion drives
+    left: Place | None  # after all finds
+    whiteness: tuple[float, float]
+    looked_at: int  # suspects with all their shapes
+    standing: Standing  # the corrected model

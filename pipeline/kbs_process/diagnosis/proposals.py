@@ -1,0 +1,104 @@
+"""Where the residual has lines: frequencies, and orders of motors' turns, for suspects whose grid only data give."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kbs_process.diagnosis.known import Known
+from kbs_process.diagnosis.scene import Scene
+from kbs_process.diagnosis.thresholds import LINE_ALPHA, LINES
+from kbs_process.signals.records import Array
+
+_HIGHEST_ORDER = 420.0  # twice the teeth's passing and what lies around it
+_ORDER_STEP = 0.25
+_MOVING = 1e-3  # rad/s of a motor
+_BY_ORDER = ("order", "ripple_order")
+_BY_FREQUENCY = ("floor_frequency", "mains_frequency")
+
+
+def proposed(known: Known, scene: Scene) -> dict[str, tuple[float, ...]]:
+    """Values to try beside the grids: parameter name -> values, strongest lines of all fit trials."""
+    lines = _frequencies(known)
+    orders = _orders(known, scene)
+    found = dict.fromkeys(_BY_FREQUENCY, lines) | dict.fromkeys(_BY_ORDER, orders)
+    return {name: values for name, values in found.items() if values}
+
+
+def _frequencies(known: Known) -> tuple[float, ...]:
+    """Frequencies at which the whitened residual stands out of its neighbours, Hz."""
+    total: dict[int, tuple[Array, Array]] = {}
+    for k in known.experiment.fit:
+        layout = known.metric[k].layout(known.residual[k])
+        power = np.sum(layout**2, axis=0)
+        f = known.metric[k].whiten.f
+        best = power.max(axis=1)
+        total[k] = f, best
+    found: list[tuple[float, float]] = []
+    for f, best in total.values():
+        bound = -2.0 * np.log(LINE_ALPHA / (len(f) * len(total)))
+        peaks = (
+            np.flatnonzero((best[1:-1] >= best[:-2]) & (best[1:-1] >= best[2:]) & (best[1:-1] > bound)) + 1
+        )
+        found += [(float(best[i]), float(f[i])) for i in peaks]
+    return _apart([value for _, value in sorted(found, reverse=True)], 0.05)
+
+
+def _orders(known: Known, scene: Scene) -> tuple[float, ...]:
+    """Orders of motor turns at which the whitened residual stands out, whichever joint's.
+
+    The residual in time, white, against exp(i order theta): a line's power is chi-square with two degrees of freedom.
+    """
+    experiment = known.experiment
+    orders = np.arange(_ORDER_STEP, _HIGHEST_ORDER, _ORDER_STEP)
+    found: list[tuple[float, float]] = []
+    for k in experiment.fit:
+        trial = experiment.trials[k]
+        drive = experiment.reference(trial.trajectory)
+        if drive not in scene.signals:
+            continue
+        series = _in_time(known, k)
+        signals = scene.signals[drive]
+        t = np.arange(len(series)) * experiment.dt
+        own = np.arange(len(signals.values)) / signals.rate
+        for joint in experiment.rig.joint_names:
+            angle = np.interp(t, own, _column(signals.columns, signals.values, f"rotor_angle.{joint}"))
+            moves = (np.abs(np.gradient(angle, experiment.dt)) > _MOVING) & trial.valid
+            if np.count_nonzero(moves) < 100 or np.ptp(angle[moves]) < 1.8 * np.pi:
+                continue
+            x = series[moves] / np.maximum(np.std(series[moves], axis=0), 1e-300)
+            power = np.concatenate(
+                [
+                    np.max(np.abs(np.exp(-1j * np.outer(part, angle[moves])) @ x) ** 2, axis=1)
+                    for part in np.array_split(orders, 32)
+                ]
+            ) / np.count_nonzero(moves)
+            # Lines that turn faster than the working rate shows are seen as others.
+            fastest = 2.0 * np.pi * experiment.highest_Hz / np.max(np.abs(np.gradient(angle, experiment.dt)))
+            power[orders > 10.0 * fastest] = 0.0
+            bound = -np.log(LINE_ALPHA / (len(orders) * x.shape[1] * len(experiment.fit)))
+            inner = power[1:-1]
+            peaks = np.flatnonzero((inner >= power[:-2]) & (inner >= power[2:]) & (inner > bound)) + 1
+            found += [(float(power[i]), float(np.round(orders[i] * 2.0) / 2.0)) for i in peaks]
+    return _apart([value for _, value in sorted(found, reverse=True)], 0.5)
+
+
+def _column(columns: tuple[str, ...], values: Array, name: str) -> Array:
+    return np.asarray(values[:, columns.index(name)], dtype=np.float64)
+
+
+def _in_time(known: Known, k: int) -> Array:
+    """(n, c) whitened residual of a trial as a series."""
+    metric, n = known.metric[k], len(known.experiment.trials[k].valid)
+    layout = metric.layout(known.residual[k])
+    spectrum = np.zeros((n // 2 + 1, layout.shape[2]), dtype=complex)
+    spectrum[metric.whiten.inside] = layout[0] + 1j * layout[1]
+    return np.asarray(np.fft.irfft(spectrum, n, axis=0), dtype=np.float64)
+
+
+def _apart(values: list[float], least: float) -> tuple[float, ...]:
+    """The first few that lie apart from those before."""
+    kept: list[float] = []
+    for value in values:
+        if len(kept) < LINES and all(abs(value - other) > least for other in kept):
+            kept.append(value)
+    return tuple(kept)

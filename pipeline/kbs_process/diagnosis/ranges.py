@@ -1,0 +1,71 @@
+"""Over which places, widths, times and frequencies a search for suspects goes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from kbs_process.diagnosis.hypothesis import Tapped
+from kbs_process.plant.effect import Parameter
+from kbs_process.signals.records import Array
+
+SPECTRUM = "spectrum"  # grid of a parameter that only tones of a residual give
+
+
+@dataclass(frozen=True, slots=True)
+class Ranges:
+    """What signals sweep over all trials of an experiment, and what the residuals propose.
+
+    `spans`: (site, signal) -> least and greatest value. `proposed`: parameter -> values beside those of its grid.
+    """
+
+    spans: Mapping[tuple[str, str], tuple[float, float]]
+    proposed: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    temperature: bool = False  # whether it was recorded
+
+    def choices(self, entry: Parameter, site: str, own: float | None) -> tuple[float, ...]:
+        """Return the values of a shape parameter that are tried at a site, least first.
+
+        None, where its grid lies over a signal that nobody knows there. Without a grid: `own`, or its prior's middle.
+        """
+        proposed = self.proposed.get(entry.name, ())
+        if entry.over == SPECTRUM:
+            return tuple(sorted(proposed))
+        if not entry.over:
+            grid = tuple(sorted({*entry.grid, *proposed}))
+            return grid or (entry.prior.middle if own is None else own,)
+        signal, _, kind = entry.over.partition(".")
+        span = self.spans.get((site, signal))
+        if span is None:
+            return ()
+        low, high = span
+        start = 0.0 if kind == "span" else low
+        return tuple(sorted({*(start + share * (high - low) for share in entry.grid), *proposed}))
+
+
+def ranges_of(
+    tapped: Sequence[Tapped],
+    predictions: Sequence[Array],
+    channels: Sequence[str],
+    dt: float,
+    *,
+    proposed: Mapping[str, tuple[float, ...]] | None = None,
+    temperature: bool = False,
+) -> Ranges:
+    """Return what taps and predictions (n, c), `dt` s apart, of all trajectories sweep."""
+    spans: dict[tuple[str, str], tuple[float, float]] = {}
+
+    def extend(site: str, signal: str, values: Array) -> None:
+        low, high = spans.get((site, signal), (float(values.min()), float(values.max())))
+        spans[site, signal] = (min(low, float(values.min())), max(high, float(values.max())))
+
+    for one in tapped:
+        for k, column in enumerate(one.columns):
+            signal, _, joint = column.partition(".")
+            extend(joint, signal, one.values[:, k])
+    for prediction in predictions:
+        for k, channel in enumerate(channels):
+            extend(channel, "reading", prediction[:, k])
+    longest = max(len(prediction) for prediction in predictions) * dt
+    spans |= {(site, "time"): (0.0, longest) for site in ("wrench", "encoder")}
+    return Ranges(spans, dict(proposed or {}), temperature)

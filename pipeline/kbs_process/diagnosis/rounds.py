@@ -1,0 +1,393 @@
+"""Round by round: screen, simulate the leaders, gate, accept the most probable, and look again at what is left."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.stats import chi2
+
+from kbs_process.diagnosis.curves import REGRESSORS, CurveSuspect, curves
+from kbs_process.diagnosis.detection import Detection, detect
+from kbs_process.diagnosis.floor import Floor
+from kbs_process.diagnosis.gate import Fold, Gate, gate, whiteness
+from kbs_process.diagnosis.gls import Background, Sums, score
+from kbs_process.diagnosis.hypothesis import Prediction, Simulate
+from kbs_process.diagnosis.joint import Standing, with_extra
+from kbs_process.diagnosis.known import MOVED, Known
+from kbs_process.diagnosis.localise import cells_and_ports
+from kbs_process.diagnosis.outcome import (
+    Absorbed,
+    Alternative,
+    Curve,
+    Estimate,
+    Find,
+    Moved,
+    Outcome,
+    Place,
+    Refused,
+    Verdict,
+)
+from kbs_process.diagnosis.ports import port_test
+from kbs_process.diagnosis.proposals import proposed
+from kbs_process.diagnosis.ranges import ranges_of
+from kbs_process.diagnosis.rivals import probabilities, rivalry
+from kbs_process.diagnosis.scene import Scene
+from kbs_process.diagnosis.screen import Bench, Catalogued, Found, Screening, Suspect, screen
+from kbs_process.diagnosis.suspects import candidates
+from kbs_process.diagnosis.thresholds import (
+    DETECTED,
+    FALSE_ALARM,
+    LAW_VARIANCE,
+    LEAD,
+    LEADERS,
+    RIVALS,
+    ROUNDS,
+)
+from kbs_process.diagnosis.tryout import UNNAMED, extra_of, identity, in_plant
+from kbs_process.signals.records import Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Tried:
+    """A leader after its refit."""
+
+    found: Found
+    standing: Standing
+    gate: Gate
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Round:
+    find: Find | None
+    standing: Standing
+    screening: Screening
+    refused: tuple[Refused, ...]
+    place: Place | None
+
+
+def diagnose(
+    known: Known, floor: Floor, predicted: Mapping[int, Prediction], simulate: Simulate, before: Detection
+) -> Outcome:
+    """Find the laws that the refitted known parameters leave out.
+
+    `predicted` are the predictions of `known.hypothesis` by drive, `before` is what detection says of them.
+    """
+    standing = Standing(known, predicted, {})
+    finds: list[Find] = []
+    rounds: list[_Round] = []
+    for _ in range(ROUNDS):
+        rounds.append(_round(standing, floor, simulate))
+        standing = rounds[-1].standing
+        if rounds[-1].find is None:
+            break
+        finds.append(rounds[-1].find)
+    last = rounds[-1]
+    left = (
+        last.place
+        if last.find is None
+        else _place(standing, floor, Scene.of(known.experiment, standing.hypothesis, standing.predicted))
+    )
+    after = _detected(standing, floor, known.experiment.fit) if finds else before
+    held_out = None
+    if known.experiment.held_out:
+        begun = _detected(Standing(known, predicted, {}), floor, known.experiment.held_out)
+        held_out = begun, _detected(standing, floor, known.experiment.held_out) if finds else begun
+    moved = _moved(standing.known)
+    return Outcome(
+        verdict=_verdict(finds, moved, after),
+        before=before,
+        after=after,
+        held_out=held_out,
+        log_p=_mismatch(before, rounds[0].screening),
+        moved=moved,
+        finds=tuple(finds),
+        refused=last.refused,
+        absorbed=_absorbed(rounds[0].screening),
+        place=rounds[0].place,
+        left=left,
+        whiteness=(whiteness(known), whiteness(standing.known)),
+        looked_at=rounds[0].screening.looked_at,
+        standing=standing,
+    )
+
+
+def _mismatch(before: Detection, screening: Screening) -> float:
+    """The lesser of two p-values, of any mismatch and of the best suspect, times two (Bonferroni)."""
+    best = min((found.log_p for found in screening.candidates), default=0.0)
+    return float(min(0.0, np.log(2.0) + min(before.log_p, best)))
+
+
+def suspects_of(standing: Standing, scene: Scene) -> list[Suspect]:
+    """The catalogue at every site with every shape, then curves that no law of it has."""
+    experiment, rig = scene.experiment, standing.hypothesis.rig
+    references = sorted({experiment.reference(k) for k in range(len(experiment.repeats))})
+    ranges = ranges_of(
+        [scene.signals[drive] for drive in references if drive in scene.signals],
+        [standing.predicted[drive].values for drive in references],
+        experiment.channels,
+        experiment.dt,
+        proposed=proposed(standing.known, scene),
+        temperature=any(trial.temperature is not None for trial in experiment.trials),
+    )
+    columns = next((signals.columns for signals in scene.signals.values()), ())
+    recorded = all(one.schedule is None or one.schedule.field is not None for one in experiment.drives)
+    chosen = candidates(
+        rig,
+        experiment.effects,
+        ranges,
+        columns,
+        experiment.channels,
+        accepted=standing.hypothesis.effects,
+        field_recorded=recorded,
+    )
+    return [*(Catalogued(candidate, scene) for candidate in chosen), *curves(scene)]
+
+
+def _round(standing: Standing, floor: Floor, simulate: Simulate) -> _Round:
+    known = standing.known
+    scene = Scene.of(known.experiment, standing.hypothesis, standing.predicted)
+    bench = Bench.of(known, scene)
+    screening = screen(bench, suspects_of(standing, scene))
+    place = _place(standing, floor, scene)
+    refused: list[Refused] = []
+    tried: list[_Tried] = []
+    for found in _leaders(screening):
+        new, verdict = _try(found, standing, bench, scene, simulate)
+        if verdict.passed:
+            tried.append(_Tried(found, new, verdict))
+        else:
+            refused.append(Refused(identity(found.suspect), found.score.rho_eff, verdict.reasons))
+    if not tried:
+        return _Round(None, standing, screening, tuple(refused), place)
+    chances = probabilities([one.standing.known for one in tried], bench.background.rows)
+    best = int(np.argmax(chances))
+    find = _find(tried, best, chances, standing, screening, place)
+    return _Round(find, tried[best].standing, screening, tuple(refused), place)
+
+
+def _leaders(screening: Screening) -> list[Found]:
+    """The most probable suspects, as many as the linear plant may have in the wrong order."""
+    able = [found for found in screening.candidates if found.significant and not found.absorbed]
+    if not able:
+        return []
+    bound = (1.0 - LEAD) * able[0].score.gain
+    return [found for found in able if found.score.gain >= bound or found is able[0]][:LEADERS]
+
+
+def _try(
+    found: Found, standing: Standing, bench: Bench, scene: Scene, simulate: Simulate
+) -> tuple[Standing, Gate]:
+    if found.suspect.each_trial:
+        return _trial_by_trial(found.suspect, standing, bench)
+    new = with_extra(standing, extra_of(found, standing, bench, scene), simulate)
+    begin = len(standing.known.value)
+    verdict = gate(standing.known, new.known, range(begin, begin + len(found.suspect.amplitudes)))
+    share = _explained(standing.known, new.known)
+    if isinstance(found.suspect, CurveSuspect) and share is not None and not share >= LAW_VARIANCE:
+        reason = f"a curve that explains {100.0 * share:.0f} % of the held-out excess is no law"
+        verdict = replace(verdict, passed=False, reasons=(*verdict.reasons, reason))
+    return new, verdict
+
+
+def _trial_by_trial(suspect: Suspect, standing: Standing, bench: Bench) -> tuple[Standing, Gate]:
+    """A law whose size and phase are each recording's own is taken off each; every one set apart has to show it."""
+    known, experiment = standing.known, standing.known.experiment
+    precision = np.where(np.isfinite(known.parameters.sigma), known.sigma, np.inf) ** -2.0
+    plain = {experiment.reference(k): np.zeros(0) for k in range(len(experiment.repeats))}
+    plain = {drive: bench.signatures([suspect], drive) for drive in plain}
+    trials, residual, folds, strengths = list(experiment.trials), list(known.residual), [], []
+    for k, trial in enumerate(experiment.trials):
+        columns = plain[experiment.reference(trial.trajectory)]
+        whitened = known.metric[k](columns)
+        fitted = known.experiment.reference(trial.trajectory) in known.slopes
+        J = known.jacobian(k) if fitted else np.zeros((len(whitened), len(precision)))
+        background = Background.of({k: known.residual[k]}, {k: J}, precision)
+        own = score(background, Sums.over(background, {k: whitened}))
+        trials[k] = replace(trial, measured=trial.measured - (columns @ own.amplitude) * trial.valid[:, None])
+        residual[k] = known.residual[k] - whitened @ own.amplitude
+        strengths.append(own.gain)
+        if trial.role != "calibration":
+            rows = float(known.rows[k])
+            before, after = (float(z @ z) / rows for z in (known.residual[k], residual[k]))
+            bound = float(chi2.isf(FALSE_ALARM, max(own.rank, 1)))
+            folds.append(Fold(trial.name, before, after, own.gain - bound))
+    worse = tuple(fold.trial for fold in folds if fold.gain <= 0.0)
+    reasons = (f"{', '.join(worse)} do not show it",) if worse else ()
+    white = whiteness(known), whiteness(replace(known, residual=tuple(residual)))
+    changed = replace(known, experiment=replace(experiment, trials=tuple(trials)), residual=tuple(residual))
+    verdict = Gate(
+        not reasons, tuple(folds), bool(experiment.held_out), float(np.sqrt(min(strengths))), white, reasons
+    )
+    return replace(standing, known=changed), verdict
+
+
+def _find(
+    tried: Sequence[_Tried],
+    best: int,
+    chances: Array,
+    before: Standing,
+    screening: Screening,
+    place: Place | None,
+) -> Find:
+    taken = tried[best]
+    suspect, own = taken.found.suspect, identity(taken.found.suspect)
+    alternatives = []
+    for index, other in enumerate(tried):
+        if index != best and not other.found.suspect.each_trial and not suspect.each_trial:
+            apart = rivalry(taken.standing.known, other.standing.known)
+            alternatives.append(
+                Alternative(
+                    identity(other.found.suspect), float(chances[index]), apart.rho_delta, apart.p_wrong,
+                    apart.indistinguishable, True,
+                )
+            )  # fmt: skip
+    simulated = {one.found.suspect.family for one in tried}
+    for found in screening.candidates:
+        if found.suspect.family in simulated or found.absorbed or len(alternatives) >= 5:
+            continue
+        # Along the linear plant the distance is what the best leaves of the other's lack of gain.
+        rho = float(np.sqrt(max(taken.found.score.gain - found.score.gain, 0.0)))
+        alternatives.append(
+            Alternative(
+                identity(found.suspect), 0.0, rho, float(chi2.sf(0.25 * rho**2, 1) / 2.0), rho < RIVALS, False
+            )
+        )
+    alternatives.sort(key=lambda other: (-other.probability, other.rho_delta))
+    alike: tuple[str, ...] = ()
+    if place is not None:
+        named = f"{own.port} {own.axis}".strip()
+        alike = next((port.alike for port in place.test.ports if port.name == named), ())
+    return Find(
+        identity=own,
+        named=own.family != UNNAMED,
+        equation=_equation(suspect),
+        reference=suspect.candidate.effect.reference if isinstance(suspect, Catalogued) else "measured",
+        estimates=_estimates(taken, before),
+        probability=float(chances[best]),
+        rho=taken.found.score.rho,
+        rho_eff=taken.found.score.rho_eff,
+        kappa=taken.found.score.kappa,
+        gate=taken.gate,
+        alternatives=tuple(alternatives),
+        ports_alike=alike,
+        held_out_variance=_explained(before.known, taken.standing.known),
+        curve=_curve(suspect, taken, before) if isinstance(suspect, CurveSuspect) else None,
+    )
+
+
+def _equation(suspect: Suspect) -> str:
+    if not isinstance(suspect, Catalogued):
+        return "cubic spline"
+    text = suspect.candidate.effect.equation.__doc__ or ""
+    lines = [line.strip() for line in text.splitlines()]
+    begin = next((k for k, line in enumerate(lines) if line.startswith("Equation:")), None)
+    if begin is None:
+        return lines[0] if lines else ""
+    end = next(
+        (k for k in range(begin + 1, len(lines)) if lines[k].startswith(("Units:", "Validity:", "Source:"))),
+        len(lines),
+    )
+    return " ".join(lines[begin:end]).removeprefix("Equation:").strip()
+
+
+def _estimates(taken: _Tried, before: Standing) -> tuple[Estimate, ...]:
+    suspect, known = taken.found.suspect, taken.standing.known
+    begin = len(before.known.value)
+    units: dict[str, str] = {}
+    fixed: dict[str, float] = {}
+    if isinstance(suspect, Catalogued):
+        units = {entry.name: entry.unit for entry in suspect.candidate.effect.parameters}
+        fixed = dict(suspect.candidate.shape)
+    if suspect.each_trial:
+        spread = np.sqrt(np.diag(taken.found.score.covariance))
+        names = suspect.amplitudes
+        fitted = [
+            Estimate(name, units.get(name, ""), float(value), float(sigma))
+            for name, value, sigma in zip(names, taken.found.score.amplitude, spread, strict=False)
+        ]
+    else:
+        fitted = [
+            Estimate(
+                _short(known.free[k].name, in_plant(suspect)),
+                units.get(_short(known.free[k].name, True), ""),
+                float(known.value[k]),
+                float(known.sigma[k]),
+            )
+            for k in range(begin, len(known.value))
+        ]
+    done = {one.name for one in fitted}
+    return (*fitted, *(Estimate(n, units.get(n, ""), v, 0.0) for n, v in fixed.items() if n not in done))
+
+
+def _short(name: str, plant: bool) -> str:
+    return name.rpartition(".")[2] if plant or "." in name else name
+
+
+def _explained(before: Known, after: Known) -> float | None:
+    """Share of the held-out residual's excess over the floor that a law takes away."""
+    chosen = before.experiment.held_out
+    if not chosen:
+        return None
+    excess = sum(float(before.chi2[k] - before.rows[k]) for k in chosen)
+    gained = sum(float(before.chi2[k] - after.chi2[k]) for k in chosen)
+    return float(min(1.0, gained / excess)) if excess > 0.0 else None
+
+
+def _curve(suspect: CurveSuspect, taken: _Tried, before: Standing) -> Curve:
+    begin = len(before.known.value)
+    known = taken.standing.known
+    x = np.linspace(suspect.knots[0], suspect.knots[-1], 101)
+    basis = suspect.basis(x)
+    C = known.covariance[begin:, begin:]
+    spread = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", basis, C, basis), 0.0))
+    return Curve(suspect.regressor, REGRESSORS[suspect.regressor], x, basis @ known.value[begin:], spread)
+
+
+def _place(standing: Standing, floor: Floor, scene: Scene) -> Place | None:
+    if not scene.paths:
+        return None
+    cells, models, _ = cells_and_ports(standing, floor, scene.paths)
+    return Place(port_test(cells, models), cells) if len(cells.z) else None
+
+
+def _detected(standing: Standing, floor: Floor, trials: Sequence[int]) -> Detection:
+    """Detection on readings from which laws that are columns of the prediction are taken off."""
+    known = standing.known
+    experiment = known.experiment
+    if standing.laws:
+        corrected = tuple(
+            replace(
+                trial,
+                measured=trial.measured
+                - (standing.shown(k) - standing.predicted[trial.drive].values) * trial.valid[:, None],
+            )
+            for k, trial in enumerate(experiment.trials)
+        )
+        experiment = replace(experiment, trials=corrected)
+    return detect(experiment, floor, standing.predicted, trials, known=known)
+
+
+def _moved(known: Known) -> tuple[Moved, ...]:
+    return tuple(
+        Moved(name, float(value), float(sigma), float(sigmas))
+        for name, value, sigma, sigmas in zip(known.names, known.value, known.sigma, known.moved, strict=True)
+        if abs(sigmas) > MOVED
+    )
+
+
+def _absorbed(screening: Screening) -> tuple[Absorbed, ...]:
+    return tuple(
+        Absorbed(identity(found.suspect), found.score.kappa, found.score.rho, found.absorbed_by)
+        for found in screening.candidates
+        if found.absorbed and found.significant
+    )
+
+
+def _verdict(finds: Sequence[Find], moved: Sequence[Moved], after: Detection) -> Verdict:
+    if finds:
+        return "physics"
+    if after.log_p < np.log(DETECTED):
+        return "undecided"
+    return "parameters off" if moved else "none"

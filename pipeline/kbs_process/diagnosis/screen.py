@@ -1,0 +1,240 @@
+"""Every suspect along the linearised plant: what its best amplitudes would do for the residuals.
+
+Signatures are made in batches, whitened, and reduced at once to sums of products (`gls`), so that hundreds of
+candidates need the memory of one batch. Shapes are searched on their grids; amplitudes are linear. Recordings that are
+whitened alike share one pass.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from scipy.special import logsumexp
+
+from kbs_process.diagnosis import direct
+from kbs_process.diagnosis.gls import Background, Score, Sums, absorbing, per_trial, score
+from kbs_process.diagnosis.hypothesis import coupled
+from kbs_process.diagnosis.inlets import Inlet
+from kbs_process.diagnosis.known import Known
+from kbs_process.diagnosis.scene import Scene
+from kbs_process.diagnosis.signature import inputs, sensed
+from kbs_process.diagnosis.suspects import Candidate
+from kbs_process.diagnosis.tails import log_tail
+from kbs_process.diagnosis.thresholds import ABSORBED, FALSE_ALARM
+from kbs_process.diagnosis.transfer import BATCH, respond
+from kbs_process.plant.sensing import Sensing, SensingPort
+from kbs_process.signals.records import WRENCH_CHANNELS, Array
+
+
+class Suspect(Protocol):
+    """A candidate at one point of its shape's grid."""
+
+    @property
+    def family(self) -> tuple[str, str]:
+        """Name and site; candidates that share it differ by their shape alone."""
+
+    @property
+    def amplitudes(self) -> tuple[str, ...]: ...
+
+    @property
+    def each_trial(self) -> bool:
+        """Whether size and phase belong to a recording."""
+
+    def inputs(self, drive: int) -> Sequence[Mapping[Inlet, Array]] | None:
+        """For each amplitude what enters where, means over the path's steps; None where nothing goes through."""
+
+    def outputs(self, drive: int) -> Array:
+        """(n, c, amplitudes) change of the prediction, of what does not go through the plant."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Catalogued:
+    """A suspect of the catalogue at one point of its shape's grid."""
+
+    candidate: Candidate
+    scene: Scene
+
+    @property
+    def family(self) -> tuple[str, str]:
+        return self.candidate.name, self.candidate.site
+
+    @property
+    def amplitudes(self) -> tuple[str, ...]:
+        return tuple(entry.name for entry in self.candidate.amplitudes)
+
+    @property
+    def each_trial(self) -> bool:
+        return self.candidate.effect.each_trial
+
+    def inputs(self, drive: int) -> Sequence[Mapping[Inlet, Array]] | None:
+        if isinstance(self.candidate.effect, Sensing) and self.candidate.port is not SensingPort.CONTROLLER:
+            return None
+        hypothesis = self.scene.hypothesis
+        columns = inputs(self.candidate, self.scene.signals[drive], hypothesis.rig, hypothesis.effects)
+        return [self.scene.stepped(drive, column) for column in columns]
+
+    def outputs(self, drive: int) -> Array:
+        experiment = self.scene.experiment
+        prediction = self.scene.predicted[drive].values
+        t = np.asarray(np.arange(len(prediction)) * experiment.dt, dtype=np.float64)
+        temperature = next((one.temperature for one in experiment.trials if one.drive == drive), None)
+        return sensed(
+            self.candidate, t, prediction, experiment.channels, self.scene.hypothesis.rig, temperature
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Found:
+    """A suspect at the best point of its shape's grid, with what the screen says of it."""
+
+    suspect: Suspect
+    score: Score
+    log_evidence: float  # over no effect, natural logarithm; mean over the grid, penalised for its amplitudes
+    log_p: float  # of the best gain among all that were looked at, without any effect (Bonferroni)
+    grid: int  # points of the shape that were tried
+    absorbed_by: tuple[str, ...]  # known parameters, where kappa is beyond the bound
+
+    @property
+    def absorbed(self) -> bool:
+        """Whether nothing of it is left that is not also what known parameters do."""
+        if self.score.kappa <= ABSORBED:
+            return False
+        left = log_tail(self.score.free, self.score.free_rank) + np.log(self.grid)
+        return bool(left > np.log(FALSE_ALARM))
+
+    @property
+    def significant(self) -> bool:
+        return bool(self.log_p < np.log(FALSE_ALARM))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Screening:
+    """Suspects at their best shapes, most probable first."""
+
+    candidates: tuple[Found, ...]
+    looked_at: int  # points of all grids
+
+    @property
+    def probabilities(self) -> Array:
+        """(candidates,) that each is the one, all being equally likely before and one of them, or none, at work."""
+        logs = np.array([candidate.log_evidence for candidate in self.candidates] + [0.0])
+        found: Array = np.exp(logs - logsumexp(logs))[:-1]
+        return found
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Bench:
+    """What candidates are measured against: the fit trials' residuals behind the known parameters."""
+
+    known: Known
+    scene: Scene
+    background: Background
+    alike: tuple[tuple[int, ...], ...]  # trials that are whitened alike
+
+    @classmethod
+    def of(cls, known: Known, scene: Scene, trials: Sequence[int] | None = None) -> Bench:
+        """Over `trials`, else all that may be fitted."""
+        members = tuple(known.experiment.fit if trials is None else trials)
+        precision = np.where(np.isfinite(known.parameters.sigma), known.parameters.sigma, np.inf) ** -2.0
+        J = {k: known.jacobian(k) for k in members}
+        offset = np.where(precision > 0.0, known.parameters.value - known.value, 0.0)
+        background = Background.of({k: known.residual[k] for k in members}, J, precision, offset)
+        groups: dict[tuple[object, ...], list[int]] = {}
+        for k in members:
+            trial = known.experiment.trials[k]
+            window = known.metric[k].whiten.window
+            key = (trial.drive, window.tobytes(), trial.wrench_clock_sigma, trial.angle_clock_sigma)
+            groups.setdefault(key, []).append(k)
+        return cls(known, scene, background, tuple(tuple(group) for group in groups.values()))
+
+    def columns(self, suspects: Sequence[Suspect]) -> dict[int, Array]:
+        """Whitened signatures of all amplitudes of some suspects, side by side: by trial, (rows, m)."""
+        experiment = self.known.experiment
+        drives = {experiment.reference(experiment.trials[group[0]].trajectory) for group in self.alike}
+        plain = {drive: self.signatures(suspects, drive) for drive in drives}
+        found: dict[int, Array] = {}
+        for group in self.alike:
+            reference = experiment.reference(experiment.trials[group[0]].trajectory)
+            whitened = self.known.metric[group[0]](plain[reference])
+            found |= dict.fromkeys(group, whitened)
+        return found
+
+    def signatures(self, suspects: Sequence[Suspect], drive: int) -> Array:
+        """(n, c, m) change of the prediction by a unit of each amplitude of some suspects."""
+        experiment = self.known.experiment
+        through = [suspect.inputs(drive) for suspect in suspects]
+        driven = [column for columns in through if columns is not None for column in columns]
+        parts: list[Array] = []
+        n = experiment.drives[drive].n
+        if driven and drive not in self.scene.paths:
+            whole = direct.respond(self.scene.hypothesis.rig, driven, experiment.channels, n)
+            moved = iter(np.moveaxis(whole, 2, 0))
+        elif driven:
+            path = self.scene.paths[drive]
+            decimation = round(path.rate * experiment.dt)
+            whole = respond(path, driven, WRENCH_CHANNELS, decimation, n)
+            read = coupled(experiment.rig, experiment, np.eye(6)).T
+            wrench = np.einsum("cw,nwm->ncm", read, whole[:, :6])
+            rows = [6 + path.joints.index(name) for name in experiment.channels[experiment.loads :]]
+            moved = iter(np.moveaxis(np.concatenate([wrench, whole[:, rows]], axis=1), 2, 0))
+        for suspect, columns in zip(suspects, through, strict=True):
+            if columns is None:
+                parts.append(suspect.outputs(drive))
+            else:
+                parts.append(np.stack([next(moved) for _ in columns], axis=2))
+        return np.concatenate(parts, axis=2)
+
+
+def screen(bench: Bench, suspects: Sequence[Suspect]) -> Screening:
+    """Rank suspects; see `Found`."""
+    scores: dict[tuple[str, str], list[tuple[Suspect, Score, tuple[str, ...]]]] = {}
+    for batch in _batches(suspects):
+        columns = bench.columns(batch)
+        sums = Sums.over(bench.background, columns)
+        begin = 0
+        for suspect in batch:
+            own = np.arange(begin, begin + len(suspect.amplitudes))
+            begin += len(own)
+            mine = (
+                per_trial(bench.background, {k: x[:, own] for k, x in columns.items()})
+                if suspect.each_trial
+                else sums.pick(own)
+            )
+            found = score(bench.background, mine)
+            taken: tuple[str, ...] = ()
+            if found.kappa > ABSORBED:
+                taken = absorbing(bench.background, mine, found.amplitude, bench.known.names)
+            scores.setdefault(suspect.family, []).append((suspect, found, taken))
+    looked_at = sum(len(grid) for grid in scores.values())
+    rows = bench.background.rows
+    candidates = []
+    for grid in scores.values():
+        best = max(grid, key=lambda entry: _evidence(entry[1], rows))
+        mean = float(logsumexp([_evidence(entry[1], rows) for entry in grid]) - np.log(len(grid)))
+        lowest = min(entry[1].log_p for entry in grid)
+        candidates.append(
+            Found(best[0], best[1], mean, min(0.0, lowest + np.log(looked_at)), len(grid), best[2])
+        )
+    candidates.sort(key=lambda candidate: -candidate.log_evidence)
+    return Screening(tuple(candidates), looked_at)
+
+
+def _evidence(found: Score, rows: int) -> float:
+    """Schwarz's approximation to the logarithm of the Bayes factor against no effect (Ann. Stat. 6:461, 1978)."""
+    return float(0.5 * found.gain - 0.5 * found.rank * np.log(rows))
+
+
+def _batches(suspects: Sequence[Suspect]) -> Iterator[list[Suspect]]:
+    batch: list[Suspect] = []
+    count = 0
+    for suspect in suspects:
+        if batch and count + len(suspect.amplitudes) > 2 * BATCH:
+            yield batch
+            batch, count = [], 0
+        batch.append(suspect)
+        count += len(suspect.amplitudes)
+    if batch:
+        yield batch

@@ -1,0 +1,159 @@
+"""Signatures of suspects: what each would have added, a unit of each of its amplitudes.
+
+A suspect of the plant is run along the signals of the plant without it, which gives the inputs that it would have
+been; sent through the plant linearised along the trajectory they give its signature. A suspect of the sensing acts on
+the prediction itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from kbs_process.diagnosis.hypothesis import Tapped
+from kbs_process.diagnosis.inlets import BASE_PORT, WRENCH_PORT, Inlet
+from kbs_process.diagnosis.suspects import AXES, BY, Candidate, own_values
+from kbs_process.plant.along import along, signals_of
+from kbs_process.plant.effect import Effect, Port
+from kbs_process.plant.effects import select
+from kbs_process.plant.linear import drive_slopes
+from kbs_process.plant.rigid import kinematics
+from kbs_process.plant.sensing import Sensing, SensingPort
+from kbs_process.rig.model import TRANSDUCER, Rig
+from kbs_process.signals.frames import rotate
+from kbs_process.signals.records import WRENCH_CHANNELS, Array
+
+_POSITION = ("x", "y", "z")  # signals of an effect at a point
+
+
+def port_inputs(candidate: Candidate, tapped: Tapped, rig: Rig) -> Array:
+    """What a suspect of the plant puts in at its port, for a unit of each amplitude, (m, amplitudes, components).
+
+    Components: one at a drive (N m), three at a point of a link (N) or the floor (m/s^2), along the undeflected T's
+    axes. Each row is the mean from one tap to the next.
+    """
+    effect = candidate.effect
+    assert isinstance(effect, Effect)
+    columns = {name: k for k, name in enumerate(tapped.columns)}
+    signals: dict[str, Array] = {"time": np.arange(len(tapped.values)) / tapped.rate}
+    if effect.port is Port.EXTERNAL_FORCE:
+        signals |= dict(zip(_POSITION, _way(rig, candidate.site, tapped).T, strict=True))
+    elif effect.port.of_drive:
+        needed = [name for name in signals_of(effect) if name != "time"]
+        signals |= {name: tapped.values[:, columns[f"{name}.{candidate.site}"]] for name in needed}
+    values = own_values(rig, candidate.site) | dict(candidate.shape)
+    joint = next((joint for joint in rig.joints if joint.name == candidate.site), None)
+    if joint is not None and joint.drive is not None:
+        values["ratio"] = float(joint.drive.ratio)
+    whole = along(effect, signals, values, 1.0 / tapped.rate)
+    every = [entry.name for entry in effect.parameters if entry.role == "amplitude"]
+    return whole[:, [every.index(entry.name) for entry in candidate.amplitudes]]
+
+
+def point_of(rig: Rig, link: str) -> Array:
+    """Where a force of the laboratory is taken to act on a link: at the CoG of its bodies, (3,) m in its axes."""
+    bodies = [body for body in rig.bodies if body.on == link]
+    mass = sum(float(body.mass) for body in bodies)
+    if mass == 0.0:
+        return np.zeros(3)
+    moment = np.sum([float(body.mass) * body.cog.value for body in bodies], axis=0)
+    return np.asarray(moment / mass, dtype=np.float64)
+
+
+def _way(rig: Rig, link: str, tapped: Tapped) -> Array:
+    """Position (m, 3) of `point_of` a link from T's origin, in the undeflected T's axes."""
+    columns = {name: k for k, name in enumerate(tapped.columns)}
+    q = tapped.values[:, [columns[f"joint_angle.{name}"] for name in rig.joint_names]]
+    still = np.zeros_like(q)
+    links = kinematics(rig, q, still, still)
+    T, moved = links[TRANSDUCER], links[link]
+    from_T = moved.r + rotate(moved.R, point_of(rig, link)) - T.r
+    way: Array = np.einsum("nji,nj->ni", T.R, from_T)
+    return way
+
+
+def inputs(
+    candidate: Candidate, tapped: Tapped, rig: Rig, effects: Sequence[str]
+) -> list[dict[Inlet, Array]]:
+    """Inputs of the linearised plant for a unit of each amplitude: series (m,), means from one tap to the next.
+
+    A force at a point of a link is a wrench about T's origin. A change of the field is the torque by which the motor
+    follows it, as `effects`, those of the model, have it at rest.
+    """
+    site = candidate.site
+    if candidate.port is SensingPort.CONTROLLER:
+        changed = field_change(candidate, tapped)
+        drive = rig.joint(site).drive
+        assert drive is not None
+        _, _, by_field = drive_slopes(drive, select(effects))
+        # Both are meant at the output: the rotor's torque is `ratio` times the motor's, the field's angle a `ratio`-th.
+        torque = changed * by_field[1] / float(drive.ratio) ** 2
+        return [{Inlet("motor_torque", site): column} for column in torque.T]
+    values = port_inputs(candidate, tapped, rig)
+    if candidate.port is Port.BASE_ACCELERATION:
+        return [{Inlet(BASE_PORT, "", site): values[:, a, AXES.index(site)]} for a in range(values.shape[1])]
+    if candidate.port is Port.EXTERNAL_FORCE:
+        way = _way(rig, site, tapped)
+        middle = 0.5 * (way + np.vstack([way[1:], way[-1:]]))
+        wrenches = [np.hstack([values[:, a], np.cross(middle, values[:, a])]) for a in range(values.shape[1])]
+        return [
+            {Inlet(WRENCH_PORT, site, axis): wrench[:, k] for k, axis in enumerate(WRENCH_CHANNELS)}
+            for wrench in wrenches
+        ]
+    assert isinstance(candidate.port, Port)
+    return [{Inlet(candidate.port.name.lower(), site): values[:, a, 0]} for a in range(values.shape[1])]
+
+
+def field_change(candidate: Candidate, tapped: Tapped) -> Array:
+    """Change of a field (m, amplitudes), motor rad, by a unit of each amplitude of a suspect controller."""
+    field = tapped.values[:, tapped.columns.index(f"field.{candidate.site}")]
+    time = np.arange(len(field)) / tapped.rate
+    return _changes(candidate, time, field, {})
+
+
+def sensed(
+    candidate: Candidate,
+    t: Array,
+    prediction: Array,
+    channels: Sequence[str],
+    rig: Rig,
+    temperature: Array | None = None,
+) -> Array:
+    """Change of a prediction (n, c) by a unit of each amplitude of a suspect of the sensing, (n, c, amplitudes)."""
+    law, site = candidate.effect, candidate.site
+    assert isinstance(law, Sensing)
+    out = np.zeros((*prediction.shape, len(candidate.amplitudes)))
+    given: dict[str, Array | float] = {}
+    if temperature is not None:
+        given["temperature"] = temperature
+    match law.port:
+        case SensingPort.STREAM:
+            joints = rig.joint_names
+            acted = [k for k, name in enumerate(channels) if (name in joints) == (site == "encoder")]
+        case SensingPort.COUPLING:
+            reads, acts = site.split(BY)
+            acted = [channels.index(reads)]
+            given["acting"] = prediction[:, channels.index(acts)]
+        case _:
+            acted = [channels.index(site)]
+    if "code" in law.arguments:
+        encoder = rig.joint(site).encoder
+        given["code"] = float(encoder.step) if encoder is not None and float(encoder.step) > 0.0 else np.nan
+    for k in acted:
+        out[:, k] = _changes(candidate, t, prediction[:, k], given)
+    return out
+
+
+def _changes(candidate: Candidate, t: Array, reading: Array, given: Mapping[str, Array | float]) -> Array:
+    law = candidate.effect
+    assert isinstance(law, Sensing)
+    known: dict[str, Array | float] = {"time": t, "reading": reading, **given, **dict(candidate.shape)}
+    if "rate" in law.arguments:
+        known["rate"] = CubicSpline(t, reading)(t, 1)
+    columns = []
+    for amplitude in candidate.amplitudes:
+        units = {entry.name: float(entry is amplitude) for entry in candidate.amplitudes}
+        columns.append(law.equation(**{name: (known | units)[name] for name in law.arguments}))
+    return np.stack(columns, axis=1)

@@ -1,0 +1,174 @@
+"""Suspects of a rig: what its model leaves out, at every site and with every shape that a search tries."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+from kbs_process.diagnosis.ranges import Ranges
+from kbs_process.plant.along import signals_of
+from kbs_process.plant.effect import Effect, Parameter, Port, instance
+from kbs_process.plant.effects import CATALOGUE
+from kbs_process.plant.rigid import links_beyond
+from kbs_process.plant.sensing import SENSING, Sensing, SensingPort
+from kbs_process.rig.model import Joint, Rig
+from kbs_process.signals.records import WRENCH_CHANNELS
+
+AXES = ("x", "y", "z")
+BY = "<-"  # in the site of a coupling: channel that reads, channel that acts
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """One suspect at one site with one choice of its shape.
+
+    `site` is a joint (drives, encoders, the controller), a link (forces of the laboratory), an axis of the floor, a
+    channel ("Tx"), two of them ("Tx<-Fz"), or a stream ("wrench", "encoder").
+    """
+
+    effect: Effect | Sensing
+    site: str
+    shape: tuple[tuple[str, float], ...]  # every parameter that is neither an amplitude nor shared
+
+    @property
+    def name(self) -> str:
+        """The law's, whichever of its actions this is."""
+        return (
+            self.effect.name.removesuffix(self.effect.tag)
+            if isinstance(self.effect, Effect)
+            else self.effect.name
+        )
+
+    @property
+    def port(self) -> Port | SensingPort:
+        return self.effect.port
+
+    @property
+    def amplitudes(self) -> tuple[Parameter, ...]:
+        """Parameters that it is linear in and that act at the site: of a vibration, those along the axis."""
+        chosen = tuple(entry for entry in self.effect.parameters if entry.role == "amplitude")
+        if self.port is not Port.BASE_ACCELERATION:
+            return chosen
+        assert isinstance(self.effect, Effect)
+        return tuple(entry for entry in chosen if _along_axis(self.effect, entry, AXES.index(self.site)))
+
+
+def _along_axis(effect: Effect, amplitude: Parameter, axis: int) -> bool:
+    """Whether an amplitude of a vibration moves the floor along `axis`."""
+    values = {entry.name: entry.prior.middle for entry in effect.parameters if entry.role != "amplitude"}
+    values |= {
+        entry.name: float(entry is amplitude) for entry in effect.parameters if entry.role == "amplitude"
+    }
+    value = effect.equation(*(values.get(name, 0.1) for name in effect.arguments))
+    return bool(value[axis] != 0.0)
+
+
+def candidates(
+    rig: Rig,
+    nominal: Sequence[str],
+    ranges: Ranges,
+    columns: Sequence[str],
+    channels: Sequence[str],
+    *,
+    accepted: Sequence[str] = (),
+    field_recorded: bool = True,
+) -> tuple[Candidate, ...]:
+    """Every suspect of a rig: what the nominal model leaves out of the plant, then what sensors may do.
+
+    `columns` are those of the signals along which suspects are run, `channels` those of the prediction. An effect among
+    the `accepted` that acts at a site already is a suspect there once more, as its next action.
+    """
+    left_out = [effect for effect in CATALOGUE if effect.name not in nominal]
+    plant = [
+        Candidate(effect, site, shape)
+        for law in left_out
+        if any(entry.role == "amplitude" for entry in law.parameters)
+        for site in _sites(law, rig, columns)
+        for effect in [_next_action(law, rig, site, accepted)]
+        for shape in _grid(effect, site, ranges, own_values(rig, site))
+    ]
+    sensing = [
+        Candidate(law, site, shape)
+        for law in SENSING
+        for site in _sensed_sites(law, rig, channels, ranges, field_recorded)
+        for shape in _grid(law, site, ranges, {})
+    ]
+    return (*plant, *sensing)
+
+
+def _sites(effect: Effect, rig: Rig, columns: Sequence[str]) -> list[str]:
+    if effect.port is Port.BASE_ACCELERATION:
+        return list(AXES) if rig.transducer.channels else []
+    if effect.port is Port.EXTERNAL_FORCE:
+        return [name for name in rig.joint_names if name in links_beyond(rig)]
+    shared = [entry.name for entry in effect.parameters if entry.role == "shared"]
+    needed = [name for name in signals_of(effect) if name != "time"]
+
+    def fits(joint: Joint) -> bool:
+        own = {} if joint.drive is None else joint.drive.parameters
+        turned = joint.drive is not None or "ratio" not in effect.arguments
+        return (
+            turned
+            and all(name in own for name in shared)
+            and all(f"{name}.{joint.name}" in columns for name in needed)
+        )
+
+    return [joint.name for joint in rig.joints if fits(joint)]
+
+
+def _next_action(effect: Effect, rig: Rig, site: str, accepted: Sequence[str]) -> Effect:
+    """The effect itself, or its first instance that does not act at the site."""
+    own = own_values(rig, site)
+    for number in range(1, 10):
+        action = effect if number == 1 else instance(effect, number)
+        amplitudes = [entry.name for entry in action.parameters if entry.role == "amplitude"]
+        # A drive's effect has numbers at every joint; one of the laboratory acts at a single place.
+        here = not action.port.of_drive or any(own.get(name, 0.0) for name in amplitudes)
+        if action.name not in accepted or not here:
+            return action
+    return action
+
+
+def own_values(rig: Rig, site: str) -> dict[str, float]:
+    """Numbers that the rig has for the effects at a site."""
+    values: dict[str, float] = {}
+    for load in rig.external:
+        if load.on == site:
+            values |= {name: float(quantity) for name, quantity in load.parameters.items()}
+    for joint in rig.joints:
+        if joint.name == site and joint.drive is not None:
+            values |= {name: float(quantity) for name, quantity in joint.drive.parameters.items()}
+    return values
+
+
+def _grid(
+    effect: Effect | Sensing, site: str, ranges: Ranges, own: Mapping[str, float]
+) -> Iterator[tuple[tuple[str, float], ...]]:
+    """Every choice of an effect's shape; a parameter without a grid is what the rig has, or its prior's middle."""
+    shapes = [entry for entry in effect.parameters if entry.role == "shape"]
+    choices = [ranges.choices(entry, site, own.get(entry.name)) for entry in shapes]
+    for point in product(*choices):
+        yield tuple((entry.name, value) for entry, value in zip(shapes, point, strict=True))
+
+
+def _sensed_sites(
+    law: Sensing, rig: Rig, channels: Sequence[str], ranges: Ranges, field_recorded: bool
+) -> list[str]:
+    encoders = [name for name in rig.joint_names if name in channels]
+    loads = [name for name in channels if name not in encoders]
+    if "temperature" in law.arguments and not ranges.temperature:
+        return []
+    match law.port:
+        case SensingPort.CHANNEL:
+            return loads
+        case SensingPort.COUPLING:
+            wrench = [name for name in loads if name in WRENCH_CHANNELS]
+            return [f"{reads}{BY}{acts}" for reads in wrench for acts in wrench if reads != acts]
+        case SensingPort.ENCODER:
+            return encoders
+        case SensingPort.STREAM:
+            return [*(["wrench"] if loads else []), *(["encoder"] if encoders else [])]
+        case SensingPort.CONTROLLER:
+            driven = [joint.name for joint in rig.joints if joint.drive is not None]
+            return [] if field_recorded or rig.controller is None else driven

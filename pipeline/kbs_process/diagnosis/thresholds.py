@@ -1,0 +1,47 @@
+"""Every threshold of the diagnosis, with the reason for its value. They were set on development cases alone."""
+
+from __future__ import annotations
+
+from typing import Final
+
+# -- the plant linearised along a trajectory -----------------------------------------------------------------------
+# Relative error of a whitened signature through the linear plant; against the real plant 3 to 16 % were found
+# for effects that a floor can show, most of it where a tooth-passing tone crosses the resonance.
+TRANSFER_ERROR: Final = 0.10
+
+# -- port test -----------------------------------------------------------------------------------------------------
+WINDOW_S: Final = 16.0  # longer: the pose changes; shorter: the resonance (decay 3 s) is not over
+PORT_ALPHA: Final = 0.05  # family-wise (Holm), the port's level of diagnosis.md
+CELL_ALPHA: Final = 0.05  # false-discovery rate (Benjamini-Yekutieli) of cells of the maps
+# Relative error of transfer vectors beyond their change with frequency and pose, which is free in the test.
+PORT_ERROR: Final = 0.02
+
+# -- proposals: lines of the residual ---------------------------------------------------------------------------------
+LINES: Final = 6  # strongest, which are tried
+LINE_ALPHA: Final = 0.05  # of a line by chance; the screen judges what is proposed
+
+# -- screen --------------------------------------------------------------------------------------------------------
+FALSE_ALARM: Final = (
+    1e-3  # of the best candidate of a screen under the null, after Bonferroni; the gate follows
+)
+ABSORBED: Final = 0.99  # kappa: what a known parameter takes up of a signature (diagnosis.md)
+DEPENDENT: Final = 1e-8  # relative eigenvalue below which amplitudes of a candidate are one and the same
+# P-value below which what is left counts as there (diagnosis.md: 1 % of null campaigns at most claim a find).
+DETECTED: Final = 1e-3
+LEADERS: Final = 4  # candidates that are simulated; beyond it the linear plant's order has not been wrong
+# A leader's gain is wrong by about twice, at worst three times, the transfer's error of itself; candidates within that
+# are not yet ordered.
+LEAD: Final = 3.0 * TRANSFER_ERROR
+
+# -- gate ----------------------------------------------------------------------------------------------------------
+GATE_SIGMA: Final = 3.0  # by which a coefficient's interval has to exclude zero
+GATE_GAIN: Final = (
+    12.0  # of -2 log likelihood on each held-out trial's share: p = 5e-4 for one degree of freedom
+)
+ROUNDS: Final = 5  # finds in one campaign at most
+
+# -- two laws ------------------------------------------------------------------------------------------------------
+RIVALS: Final = 4.65  # rho_delta: P(wrong) = Q(rho_delta / 2) = 1 %
+
+# -- measured law --------------------------------------------------------------------------------------------------
+LAW_VARIANCE: Final = 0.5  # share of the residual's excess on trials not used that a curve has to explain

@@ -1,0 +1,105 @@
+"""How a suspect gets into the plant, or onto its prediction, with numbers to begin with."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kbs_process.diagnosis.curves import CurveSuspect
+from kbs_process.diagnosis.families import family, port_word
+from kbs_process.diagnosis.hypothesis import Hypothesis
+from kbs_process.diagnosis.joint import Extra, Standing
+from kbs_process.diagnosis.outcome import Identity
+from kbs_process.diagnosis.scene import Scene
+from kbs_process.diagnosis.screen import Bench, Catalogued, Found, Suspect
+from kbs_process.diagnosis.signature import point_of
+from kbs_process.diagnosis.suspects import BY
+from kbs_process.plant.attach import attach
+from kbs_process.plant.effect import Effect, LogNormal, Port
+from kbs_process.plant.effects import select
+from kbs_process.plant.sensing import SensingPort
+from kbs_process.stages.output_error import Scalar
+
+UNNAMED = "unnamed"
+
+
+def identity(suspect: Suspect) -> Identity:
+    """In the field's words."""
+    if isinstance(suspect, CurveSuspect):
+        port = "external wrench" if suspect.port == "ground_torque" else suspect.port.replace("_", " ")
+        return Identity(port, suspect.joint, (), UNNAMED, f"curve over {suspect.regressor.replace('_', ' ')}")
+    assert isinstance(suspect, Catalogued)
+    candidate = suspect.candidate
+    port = port_word(candidate.name, candidate.port)
+    of_channel = candidate.port in (SensingPort.CHANNEL, SensingPort.COUPLING)
+    channels = tuple(candidate.site.split(BY)) if of_channel else ()
+    axis = "" if of_channel or candidate.port is Port.BASE_ACCELERATION else candidate.site
+    return Identity(port, axis, channels, family(candidate.name), candidate.name)
+
+
+def in_plant(suspect: Suspect) -> bool:
+    """Whether it is simulated in the non-linear plant."""
+    return (
+        isinstance(suspect, Catalogued)
+        and isinstance(suspect.candidate.effect, Effect)
+        and not suspect.each_trial
+    )
+
+
+def extra_of(found: Found, standing: Standing, bench: Bench, scene: Scene) -> Extra:
+    """The suspect at the screen's amplitudes, its amplitudes without a prior."""
+    suspect, amplitude = found.suspect, found.score.amplitude
+    if not in_plant(suspect):
+        tag = ".".join(suspect.family)
+        used = sum(name.startswith(f"law.{tag}.") for name in standing.laws)
+        names = [f"law.{tag}.{name}{f'_{used}' if used else ''}" for name in suspect.amplitudes]
+        columns = {
+            drive: np.moveaxis(bench.signatures([suspect], drive), 2, 0)
+            for drive in sorted(_references(standing))
+        }
+        free = np.full(len(amplitude), np.inf)
+        linear = tuple(Scalar(name) for name in names)
+        return Extra(standing.hypothesis, (), amplitude, 0.0 * amplitude, free, np.zeros(0), linear, columns)
+    assert isinstance(suspect, Catalogued) and isinstance(suspect.candidate.effect, Effect)
+    candidate, effect = suspect.candidate, suspect.candidate.effect
+    shape = dict(candidate.shape)
+    values = shape | dict(zip(suspect.amplitudes, map(float, amplitude), strict=True))
+    present = standing.hypothesis
+    if effect.port.of_drive:
+        rig, path = (
+            attach(present.rig, effect, values, joints=[candidate.site]),
+            f"joint.{candidate.site}.drive",
+        )
+    else:
+        point = point_of(present.rig, candidate.site)
+        rig = attach(present.rig, effect, values, on=candidate.site, point=point)
+        path = f"external.{effect.name}"
+    effects = tuple(one.name for one in select([*dict.fromkeys([*present.effects, effect.name])]))
+    bends = [
+        entry.name for entry in effect.parameters
+        if entry.role == "shape" and isinstance(entry.prior, LogNormal) and not _counted(entry.name)
+    ]  # fmt: skip
+    size = np.sqrt(np.maximum(np.diag(found.score.covariance), 0.0))
+    start = np.array([*amplitude, *(shape[name] for name in bends)])
+    widths = [
+        shape[entry.name] * entry.prior.sigma
+        for entry in effect.parameters
+        if entry.name in bends and isinstance(entry.prior, LogNormal)
+    ]
+    return Extra(
+        hypothesis=Hypothesis(rig, effects),
+        plant=tuple(Scalar(f"{path}.{name}") for name in (*suspect.amplitudes, *bends)),
+        start=start,
+        prior=np.array([*(0.0 * amplitude), *(shape[name] for name in bends)]),
+        sigma=np.array([*np.full(len(amplitude), np.inf), *widths]),
+        scale=np.array([*np.maximum(np.abs(amplitude), 5.0 * size), *widths]),
+    )
+
+
+def _counted(name: str) -> bool:
+    """Orders, which are whole numbers or ratios of teeth, and frequencies stay where a line was found."""
+    return "order" in name or "frequency" in name
+
+
+def _references(standing: Standing) -> set[int]:
+    experiment = standing.known.experiment
+    return {experiment.reference(k) for k in range(len(experiment.repeats))}

@@ -1,0 +1,269 @@
+"""Which suspects a rig has, and that their signatures are what the non-linear plant shows of a little of each."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from kbs_process.campaign.load import load_campaign
+from kbs_process.diagnosis.families import FAMILIES, PORTS, family, port_word
+from kbs_process.diagnosis.hypothesis import Tapped
+from kbs_process.diagnosis.inlets import Inlet
+from kbs_process.diagnosis.ranges import Ranges, ranges_of
+from kbs_process.diagnosis.signature import field_change, inputs, point_of, port_inputs, sensed
+from kbs_process.diagnosis.suspects import Candidate, candidates
+from kbs_process.diagnosis.transfer import follow, respond
+from kbs_process.plant.attach import attach
+from kbs_process.plant.effect import Effect
+from kbs_process.plant.effects import CATALOGUE, select
+from kbs_process.plant.predict import Schedule, predict, tap_columns
+from kbs_process.plant.sensing import SENSING
+from kbs_process.rig.model import Rig
+from kbs_process.signals.records import Array
+from kbs_process.stages.resample import resample
+
+CHANNELS = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz", "az", "el")
+NOMINAL = tuple(effect.name for effect in CATALOGUE[:6])
+RATE, DT = 100.0, 0.05
+TONES = {"floor_frequency": (2.3,), "mains_frequency": (0.7, 1.1)}
+
+
+@cache
+def rig() -> Rig:
+    return load_campaign(Path(__file__).parents[2] / "campaigns" / "EL089", recordings=False).rig
+
+
+@cache
+def tapped() -> Tapped:
+    """Both joints turn ahead and back, without any windup."""
+    t = np.arange(2000) / RATE
+    q = np.stack([0.1 - 0.02 * np.cos(0.6 * t), 1.3 + 0.05 * np.sin(0.3 * t)], axis=1)
+    rate = np.gradient(q, t, axis=0)
+    plate = np.zeros((len(t), 6))
+    return Tapped(RATE, tap_columns(rig()), np.hstack([100.0 * q, 100.0 * q, 100.0 * rate, q, rate, plate]))
+
+
+@cache
+def prediction() -> Array:
+    t = np.arange(400) * DT
+    wrench = np.stack([(k + 1.0) * np.sin(0.4 * t + k) + 10.0 * k for k in range(6)], axis=1)
+    return np.hstack([wrench, tapped().values[::5, 6:8]])
+
+
+def ranges(**given: bool) -> Ranges:
+    return ranges_of([tapped()], [prediction()], CHANNELS, DT, proposed=TONES, **given)
+
+
+def suspects(
+    of: Rig | None = None, *, accepted: tuple[str, ...] = (), **given: bool
+) -> tuple[Candidate, ...]:
+    found = ranges(temperature=given.pop("temperature", False))
+    return candidates(of or rig(), NOMINAL, found, tapped().columns, CHANNELS, accepted=accepted, **given)
+
+
+def one(name: str, site: str, **shape: float) -> Candidate:
+    return next(
+        s
+        for s in suspects(field_recorded=False)
+        if (s.name, s.site) == (name, site) and shape.items() <= dict(s.shape).items()
+    )
+
+
+def test_every_law_that_the_model_leaves_out_is_a_suspect_once_a_site_and_shape() -> None:
+    every = suspects(temperature=True, field_recorded=False)
+    laws = {effect.name for effect in CATALOGUE} - set(NOMINAL) | {law.name for law in SENSING}
+    assert {suspect.name for suspect in every} == laws
+    assert len(set(every)) == len(every)
+    assert {s.site for s in every if s.name == "harness"} == {"az", "el"}
+    assert {s.site for s in every if s.name == "floor_vibration"} == {"x", "y", "z"}
+    assert len({s.site for s in every if s.name == "cross_coupling"}) == 30
+    for suspect in every:
+        shapes = [entry.name for entry in suspect.effect.parameters if entry.role == "shape"]
+        assert [name for name, _ in suspect.shape] == shapes
+        assert suspect.amplitudes
+
+
+def test_what_nobody_recorded_is_no_suspect() -> None:
+    names = {suspect.name for suspect in suspects()}
+    assert not names & {"controller_gain", "controller_latency", "drift_temperature"}
+    quiet = replace(ranges(), proposed={})
+    assert not {"mains", "floor_vibration"} & {
+        s.name for s in candidates(rig(), NOMINAL, quiet, tapped().columns, CHANNELS)
+    }
+    gearless = replace(
+        rig(),
+        joints=tuple(
+            replace(joint, drive=replace(joint.drive, parameters={"Ka": joint.drive.parameters["Ka"]}))
+            for joint in rig().joints
+            if joint.drive is not None
+        ),
+    )
+    names = {suspect.name for suspect in suspects(gearless)}
+    assert "kinematic_error" not in names and "backlash" in names  # fsv is missing, Ka is there
+
+
+def test_places_lie_where_the_joint_has_been() -> None:
+    angle = tapped().values[:, tapped().columns.index("joint_angle.el")]
+    places = {dict(s.shape)["local_angle"] for s in suspects() if (s.name, s.site) == ("local_torque", "el")}
+    assert len(places) == 24
+    assert angle.min() < min(places) and max(places) < angle.max()
+    assert {dict(s.shape)["mains_frequency"] for s in suspects() if s.name == "mains"} == {0.7, 1.1}
+
+
+def test_an_accepted_law_may_act_once_more_where_it_acts_already() -> None:
+    order = one("motor_order", "el", order=2.0).effect
+    assert isinstance(order, Effect)
+    acting = attach(rig(), order, {"order_sin": 1e-3, "order": 2.0}, joints=["el"])
+    found = {s.site: s for s in suspects(acting, accepted=("motor_order",)) if s.name == "motor_order"}
+    assert (found["az"].effect.name, found["el"].effect.name) == ("motor_order", "motor_order_2")
+    assert dict(found["el"].shape).keys() == {"order_2"}
+    twice = inputs(found["el"], tapped(), acting, NOMINAL)[0][Inlet("motor_torque", "el")]
+    once = next(
+        s
+        for s in suspects()
+        if s.name == "motor_order" and s.site == "el" and s.shape[0][1] == found["el"].shape[0][1]
+    )
+    np.testing.assert_array_equal(
+        twice, inputs(once, tapped(), rig(), NOMINAL)[0][Inlet("motor_torque", "el")]
+    )
+    assert [entry.name for entry in found["el"].amplitudes] == ["order_sin_2", "order_cos_2"]
+    pulled = {s.effect.name for s in suspects(accepted=("tether",)) if s.name == "tether"}
+    assert pulled == {"tether_2"}  # a force has one place, wherever the next is looked for
+
+
+def test_a_force_on_a_link_is_a_wrench_about_the_transducer() -> None:
+    bungee = one("bungee", "el")
+    (column,) = inputs(bungee, tapped(), rig(), NOMINAL)
+    F = np.stack([column[Inlet("external_wrench", "el", axis)] for axis in ("Fx", "Fy", "Fz")], axis=1)
+    M = np.stack([column[Inlet("external_wrench", "el", axis)] for axis in ("Tx", "Ty", "Tz")], axis=1)
+    np.testing.assert_allclose(F, port_inputs(bungee, tapped(), rig())[:, 0])
+    np.testing.assert_allclose(np.sum(F * M, axis=1), 0.0, atol=1e-9)
+    # At azimuth zero what is (x, y, z) in E lies at (x cos q - z sin q, y, x sin q + z cos q) from A.
+    (x, y, z), q = point_of(rig(), "el"), 1.3
+    height = 0.22 + x * np.sin(q) + z * np.cos(q)
+    still = Tapped(RATE, tapped().columns, np.zeros((5, len(tapped().columns))))
+    still.values[:, still.columns.index("joint_angle.el")] = q
+    (column,) = inputs(bungee, still, rig(), NOMINAL)
+    F0 = np.array([column[Inlet("external_wrench", "el", axis)][0] for axis in ("Fx", "Fy", "Fz")])
+    lever = np.array([x * np.cos(q) - z * np.sin(q), y, height])
+    M0 = np.array([column[Inlet("external_wrench", "el", axis)][0] for axis in ("Tx", "Ty", "Tz")])
+    np.testing.assert_allclose(M0, np.cross(lever, F0), atol=1e-9)
+
+
+def test_a_floor_shakes_along_one_axis_at_a_time() -> None:
+    shaken = one("floor_vibration", "y")
+    assert [entry.name for entry in shaken.amplitudes] == ["floor_y_sin", "floor_y_cos"]
+    sine, _ = inputs(shaken, tapped(), rig(), NOMINAL)
+    t = (np.arange(2000) + 0.5) / RATE
+    np.testing.assert_allclose(
+        sine[Inlet("base_acceleration", "", "y")][:-1], np.sin(2.0 * np.pi * 2.3 * t)[:-1], atol=0.01
+    )
+
+
+def test_a_wrong_field_is_followed_by_the_motor() -> None:
+    late = one("controller_latency", "el")
+    drive = rig().joint("el").drive
+    assert drive is not None
+    stiffness = float(drive.parameters["Tmax"]) * float(drive.parameters["Kangle"])
+    (column,) = inputs(late, tapped(), rig(), NOMINAL)
+    np.testing.assert_allclose(
+        column[Inlet("motor_torque", "el")], stiffness * field_change(late, tapped())[:, 0], rtol=1e-6
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "site", "touched"),
+    [
+        ("channel_gain", "Ty", {4}),
+        ("cross_coupling", "Tx<-Fz", {3}),
+        ("encoder_eccentricity", "el", {7}),
+        ("clock_offset", "wrench", set(range(6))),
+        ("clock_skew", "encoder", {6, 7}),
+    ],
+)
+def test_a_sensor_changes_its_own_channels(name: str, site: str, touched: set[int]) -> None:
+    t = np.arange(len(prediction())) * DT
+    change = sensed(one(name, site), t, prediction(), CHANNELS, rig())
+    assert set(np.flatnonzero(np.abs(change).max(axis=(0, 2)))) == touched
+    if name == "cross_coupling":
+        np.testing.assert_array_equal(change[:, 3, 0], prediction()[:, 2])
+    if name == "clock_offset":
+        np.testing.assert_allclose(change[:, 1, 0], -0.8 * np.cos(0.4 * t + 1.0), atol=1e-3)
+
+
+def test_every_law_has_a_family_and_a_port_in_words() -> None:
+    assert set(FAMILIES) == {e.name for e in CATALOGUE} - {"synchronous_motor", "flexspline"} | {
+        e.name for e in SENSING
+    }
+    for suspect in suspects(temperature=True, field_recorded=False):
+        assert family(suspect.name) and suspect.port in PORTS
+    assert port_word("appendage", one("appendage", "el").port) == "appendage"
+
+
+# name, amplitude, value, channels that show it, and how well: correlation of both, and their ratio
+SMALL = [
+    ("motor_order", "order_sin", 1e-3, ("el",), 0.99),
+    ("kinematic_error", "kinematic_sin", 1e-5, ("Ty", "el"), 0.99),
+    ("joint_viscous", "joint_viscous", 5.0, ("el",), 0.99),
+    ("harness", "harness_spring", 0.3, ("el",), 0.99),
+    ("ground_cable", "cable_spring", 0.1, ("Ty", "el"), 0.99),
+    ("appendage", "sway_inertia", 0.05, ("Ty",), 0.98),
+]
+
+
+def shown(of: Rig, effects: tuple[str, ...], *, taps: bool = False) -> tuple[Array, Array]:
+    """Channels at the working rate, and taps, of 12 s in which the antenna starts, turns by 1.5 deg and stops."""
+    t = np.arange(0.0, 12.2, 0.1)
+    rate = np.deg2rad(0.3) * np.clip(np.minimum(t - 2.0, 9.0 - t) / 2.0, 0.0, 1.0)
+    q = 1.3 + np.concatenate([[0.0], np.cumsum(rate)[:-1]]) * 0.1
+    schedule = Schedule(t, np.stack([0.0 * q, q], axis=1), np.stack([0.0 * q, rate], axis=1), None, None)
+    streams: dict[str, list[Array]] = {"wrench": [], "angle": [], "field": [], "state": []}
+    for key, block in predict(
+        of, effects, schedule, rate_Hz=RATE, angle_rate_Hz=RATE, duration_s=12.0, quantise=False, taps=taps
+    ):
+        streams[key].append(block.values)
+    fast = np.hstack([np.concatenate(streams["wrench"]), np.concatenate(streams["angle"])[:1200]])
+    return resample(fast, RATE, 20.0), np.concatenate(streams["state"]) if taps else fast
+
+
+@cache
+def without() -> tuple[Rig, tuple[str, ...], Array, Tapped]:
+    """One plant with all of them, at no amplitude: its module is compiled once."""
+    full, names = rig(), (*NOMINAL, *(name for name, *_ in SMALL))
+    for effect in select(names):
+        full = attach(full, effect)
+    base, state = shown(full, names, taps=True)
+    return full, names, base, Tapped(RATE, tap_columns(full), state)
+
+
+@pytest.mark.parametrize(("name", "amplitude", "value", "channels", "like"), SMALL)
+def test_a_little_of_it_in_the_plant_shows_as_its_signature(
+    name: str, amplitude: str, value: float, channels: tuple[str, ...], like: float
+) -> None:
+    full, names, base, along = without()
+    found = ranges_of([along], [base], CHANNELS, DT)
+    suspect = next(
+        s
+        for s in candidates(full, NOMINAL, found, along.columns, CHANNELS)
+        if (s.name, s.site) == (name, "el")
+    )
+    assert isinstance(suspect.effect, Effect)
+    changed, _ = shown(
+        attach(full, suspect.effect, dict(suspect.shape) | {amplitude: value}, joints=["el"]), names
+    )
+    index = [entry.name for entry in suspect.amplitudes].index(amplitude)
+    column = {inlet: value * series for inlet, series in inputs(suspect, along, full, names)[index].items()}
+    taps = dict(zip(along.columns, along.values.T, strict=True))
+    path = follow(full, select(NOMINAL), taps, RATE)
+    linear = respond(path, [column], CHANNELS[:6], 5, len(base))[:, :, 0]
+    inner = slice(10, -10)  # the resampling's edges
+    for channel in channels:
+        k = CHANNELS.index(channel)
+        true, expected = (changed - base)[inner, k], linear[inner, k]
+        ratio = np.sqrt(expected @ expected / (true @ true))
+        assert true @ expected / np.sqrt((true @ true) * (expected @ expected)) > like, channel
+        assert ratio == pytest.approx(1.0, abs=0.1), channel
