@@ -460,6 +460,32 @@ def identify(
     click.echo(f"Report: {outcome.report}")
 
 
+@cli.command(epilog=examples("diagnose campaign/EL089", "diagnose campaign/EL089 -o /data/why --no-pdf"))
+@campaign_argument
+@output_option
+@pdf_option
+@quiet_option
+def diagnose(campaign: str, output: Path | None, pdf: bool | None, quiet: bool) -> None:
+    """Find out why recordings of CAMPAIGN differ from their prediction.
+
+    Detects what exceeds the repeatability floor, refits the known parameters within their uncertainties, locates what
+    they leave, names its physics or measures its law, and proves it on recordings that were held out. Writes a
+    corrected model (corrected/) beside the report.
+    """
+    from kbs_process.campaign.load import load_campaign
+    from kbs_process.campaign.locate import find_campaign, results_folder
+
+    folder = find_campaign(campaign)
+    target = results_folder(folder, output, suffix="-diagnosis")
+    loaded = load_campaign(folder)
+    from kbs_process.campaign.diagnose import diagnose as run
+
+    outcome = run(loaded, target, progress=_progress(quiet), pdf=pdf)
+    for line in outcome.verdict_lines:
+        click.echo(line)
+    click.echo(f"Report: {outcome.report}")
+
+
 @cli.command(epilog=examples("report reports/EL089", "report reports/EL089 --no-pdf"))
 @click.argument("results", type=click.Path(path_type=Path))
 @pdf_option

@@ -1,21 +1,24 @@
-"""Diagnose a campaign: is there a mismatch beyond what repeats differ by, and can the known parameters explain it?"""
+"""Diagnose a campaign: what its recordings hold beyond what repeats differ by, and what explains it."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 from kbs_process.campaign.config import Campaign, RecordingEntry
+from kbs_process.campaign.diagnosis_files import write_diagnosis
 from kbs_process.campaign.predicting import approached, commanded_from, schedule_of
 from kbs_process.campaign.progress import Progress
 from kbs_process.campaign.reading import read_run
+from kbs_process.campaign.run import Outcome
 from kbs_process.campaign.settings import motion_settings
 from kbs_process.campaign.simulators import Simulators
-from kbs_process.diagnosis import detection, floor, known, phasing
+from kbs_process.diagnosis import detection, floor, known, phasing, rounds
 from kbs_process.diagnosis.detection import Detection
 from kbs_process.diagnosis.experiment import Experiment, Recorded, assemble
 from kbs_process.diagnosis.floor import Floor
-from kbs_process.diagnosis.hypothesis import Hypothesis, Simulate
+from kbs_process.diagnosis.hypothesis import Hypothesis, Prediction, Simulate
 from kbs_process.diagnosis.known import Known
 from kbs_process.errors import ConfigError, RecordingError
 from kbs_process.signals.records import Run
@@ -33,6 +36,7 @@ class Explained:
     experiment: Experiment
     floor: Floor
     known: Known
+    predicted: dict[int, Prediction]  # by drive, with the refitted numbers
     before: Detection  # with the parameter files' numbers
     after: Detection  # with the refitted ones, over the recordings that these were fitted to
     held_out: Detection | None  # likewise over the others
@@ -69,47 +73,54 @@ def _recorded(campaign: Campaign, entry: RecordingEntry, run: Run, moved: Motion
     return Recorded(entry.role, entry.trajectory, run, schedule, None, commanded_from(run), absent)
 
 
-def explain(experiment: Experiment, progress: Progress) -> Explained:
-    """Floor, detection, refit of the known parameters, detection of what they leave."""
+def diagnose(campaign: Campaign, target: Path, *, progress: Progress, pdf: bool | None = None) -> Outcome:
+    """Diagnose a campaign and write the answers to `target`."""
+    experiment = experiment_of(campaign, progress)
     with Simulators(experiment) as simulate:
-        nominal = Hypothesis(experiment.rig, experiment.effects)
-        with progress.task("Repeatability floor, and what exceeds it"):
-            noise = _floor(experiment, nominal, simulate)
-            before = _detected(experiment, noise, nominal, simulate, experiment.fit)
-        with progress.task("Phases of cogging, friction and tooth contact"):
-            starts = phasing.begin(experiment, nominal, noise, simulate, most=_STARTS)
-        with progress.task("Refitting the known parameters"):
-            found = known.best(experiment, starts, noise, simulate)
-            if not _driven_alike(experiment):
-                for _ in range(_REFITS):
-                    noise = _floor(experiment, found.hypothesis, simulate)
-                    found = known.refit(experiment, found.hypothesis, noise, simulate, rephased=0)
-        with progress.task("What the known parameters leave"):
-            after = _left(found, noise, simulate, experiment.fit)
-            held_out = _left(found, noise, simulate, experiment.held_out) if experiment.held_out else None
-    return Explained(experiment, noise, found, before, after, held_out)
+        explained = explain(experiment, simulate, progress)
+        with progress.task("Suspects: what the known parameters leave"):
+            outcome = rounds.diagnose(
+                explained.known, explained.floor, explained.predicted, simulate, explained.after
+            )
+    with progress.task("Writing the report"):
+        return write_diagnosis(
+            campaign, explained.floor, explained.known, explained.predicted, outcome, target, pdf
+        )
+
+
+def explain(experiment: Experiment, simulate: Simulate, progress: Progress) -> Explained:
+    """Floor, detection, refit of the known parameters, detection of what they leave."""
+    nominal = Hypothesis(experiment.rig, experiment.effects)
+    with progress.task("Repeatability floor, and what exceeds it"):
+        predicted = _predicted(experiment, nominal, simulate)
+        noise = _floor(experiment, predicted)
+        before = detection.detect(experiment, noise, predicted, experiment.fit)
+    with progress.task("Phases of cogging, friction and tooth contact"):
+        starts = phasing.begin(experiment, nominal, noise, simulate, most=_STARTS)
+    with progress.task("Refitting the known parameters"):
+        found = known.best(experiment, starts, noise, simulate)
+        for _ in range(0 if _driven_alike(experiment) else _REFITS):
+            noise = _floor(experiment, _predicted(experiment, found.hypothesis, simulate))
+            found = known.refit(experiment, found.hypothesis, noise, simulate, rephased=0)
+    with progress.task("What the known parameters leave"):
+        predicted = _predicted(experiment, found.hypothesis, simulate)
+        after = detection.detect(experiment, noise, predicted, experiment.fit, known=found)
+        held_out = (
+            detection.detect(experiment, noise, predicted, experiment.held_out, known=found)
+            if experiment.held_out
+            else None
+        )
+    return Explained(experiment, noise, found, predicted, before, after, held_out)
 
 
 def _driven_alike(experiment: Experiment) -> bool:
     return all(len({experiment.trials[k].drive for k in members}) == 1 for members in experiment.repeats)
 
 
-def _floor(experiment: Experiment, hypothesis: Hypothesis, simulate: Simulate) -> Floor:
-    predicted = dict(enumerate(simulate([(drive, hypothesis) for drive in range(len(experiment.drives))])))
+def _predicted(experiment: Experiment, hypothesis: Hypothesis, simulate: Simulate) -> dict[int, Prediction]:
+    return dict(enumerate(simulate([(drive, hypothesis) for drive in range(len(experiment.drives))])))
+
+
+def _floor(experiment: Experiment, predicted: dict[int, Prediction]) -> Floor:
     left = {k: t.measured - predicted[t.drive].values for k, t in enumerate(experiment.trials)}
     return floor.estimate(experiment, left)
-
-
-def _detected(
-    experiment: Experiment, noise: Floor, hypothesis: Hypothesis, simulate: Simulate, trials: Sequence[int]
-) -> Detection:
-    predicted = dict(enumerate(simulate([(drive, hypothesis) for drive in range(len(experiment.drives))])))
-    return detection.detect(experiment, noise, predicted, trials)
-
-
-def _left(found: Known, noise: Floor, simulate: Simulate, trials: Sequence[int]) -> Detection:
-    experiment = found.experiment
-    predicted = dict(
-        enumerate(simulate([(drive, found.hypothesis) for drive in range(len(experiment.drives))]))
-    )
-    return detection.detect(experiment, noise, predicted, trials, known=found)

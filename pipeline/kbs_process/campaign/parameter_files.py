@@ -24,7 +24,10 @@ def corrected(campaign: Campaign, changed: Mapping[str, Quantity], source: str) 
     for path in campaign.inputs[1:]:
         if path.suffix == ".toml":
             document = read(path, role="the parameter file", remedy="keep the campaign as it is meanwhile")
-            yield path.name, _HEAD.format(name=path.name, source=source) + _text(_replaced(document, changed))
+            yield (
+                path.name,
+                _HEAD.format(name=path.name, source=source) + text_of(_replaced(document, changed)),
+            )
 
 
 def _replaced(document: Document, changed: Mapping[str, Quantity]) -> Tree:
@@ -37,7 +40,7 @@ def _replaced(document: Document, changed: Mapping[str, Quantity]) -> Tree:
             elif "value" in child:
                 # The rig's own names have no "parameters" in them.
                 name = ".".join(part for part in here if part != "parameters")
-                new[key] = _entry(changed[name]) if name in changed else child
+                new[key] = entry(changed[name]) if name in changed else child
             else:
                 new[key] = walk(child, here)
         return new
@@ -45,7 +48,8 @@ def _replaced(document: Document, changed: Mapping[str, Quantity]) -> Tree:
     return walk(document.tree, ())
 
 
-def _entry(quantity: Quantity) -> dict[str, Any]:
+def entry(quantity: Quantity) -> dict[str, Any]:
+    """A quantity as a parameter file has it, in SI."""
     return {
         "value": _numbers(quantity.value),
         "unit": quantity.unit,
@@ -58,7 +62,8 @@ def _numbers(array: np.ndarray[Any, Any]) -> Any:
     return array.tolist()
 
 
-def _text(tree: Tree) -> str:
+def text_of(tree: Tree) -> str:
+    """TOML of a tree of tables."""
     return "\n".join(_table(tree, ())).strip() + "\n"
 
 
