@@ -24,6 +24,7 @@ _STEPS = 8
 _DIFFERENCE = 0.1  # of a suspect's number, by which the plant's slope is taken
 _GAIN = 1.0  # of -2 log likelihood: a step that promises less ends the search
 _TRIES, _LESS = 3, 0.2
+_FARTHEST = 30.0  # times, up or down, that a shape goes from where the grid had it
 _SHORTER = (1.0, 0.5, 0.2, 0.05)
 
 
@@ -75,6 +76,8 @@ def with_extra(standing: Standing, extra: Extra, simulate: Simulate, steps: int 
         laws=laws,
         precision=np.where(np.isfinite(parameters.sigma), parameters.sigma, np.inf) ** -2.0,
         prior=parameters.value,
+        lower=parameters.lower,
+        upper=parameters.upper,
     )
     everything = sorted({trial.drive for trial in experiment.trials})
     values = np.concatenate([known.value, extra.start])
@@ -141,6 +144,8 @@ class _State:
     laws: Mapping[str, Mapping[int, Array]]
     precision: Array
     prior: Array
+    lower: Array
+    upper: Array
 
     def at(self, values: Array) -> Hypothesis:
         inside = [k for k, scalar in enumerate(self.free) if scalar.name not in self.laws]
@@ -180,9 +185,8 @@ def _shortened(
     simulate: Simulate,
 ) -> tuple[Array, dict[int, Prediction], float] | None:
     """The longest of some steps that lowers the cost: values, predictions and cost after it."""
-    limits = _bounds(state)
     for share in _SHORTER:
-        candidate = np.clip(values + share * du, *limits)
+        candidate = np.clip(values + share * du, state.lower, state.upper)
         found = _predicted(state, candidate, drives, simulate)
         lower = state.cost(candidate, found)
         if lower < cost:
@@ -213,13 +217,6 @@ def _updated(
         miss = after[drive].values - before[drive].values - promised
         corrected[drive] = Slopes(kept.base, kept.columns + np.multiply.outer(share, miss))
     return replace(state, known=replace(known, slopes=corrected))
-
-
-def _bounds(state: _State) -> tuple[Array, Array]:
-    known = state.known.parameters
-    assert known.lower is not None and known.upper is not None
-    wide = np.full(len(state.free) - len(known.value), np.inf)
-    return np.concatenate([known.lower, -wide]), np.concatenate([known.upper, wide])
 
 
 def _linear(
@@ -267,8 +264,10 @@ def _gradients(state: _State, extra: Extra, values: Array, simulate: Simulate) -
 
 
 def _extended(parameters: Parameters, extra: Extra) -> Parameters:
-    count = len(extra.start)
-    wide = np.full(count, np.inf)
+    # A shape stays within what a search by slopes can be trusted over; amplitudes are free.
+    shape = np.isfinite(extra.sigma)
+    lower = np.where(shape, extra.prior / _FARTHEST, -np.inf)
+    upper = np.where(shape, extra.prior * _FARTHEST, np.inf)
     assert parameters.lower is not None and parameters.upper is not None
     names = tuple(scalar.name for scalar in (*extra.plant, *extra.linear))
     return replace(
@@ -276,6 +275,6 @@ def _extended(parameters: Parameters, extra: Extra) -> Parameters:
         names=(*parameters.names, *names),
         value=np.concatenate([parameters.value, extra.prior]),
         sigma=np.concatenate([parameters.sigma, extra.sigma]),
-        lower=np.concatenate([parameters.lower, -wide]),
-        upper=np.concatenate([parameters.upper, wide]),
+        lower=np.concatenate([parameters.lower, lower]),
+        upper=np.concatenate([parameters.upper, upper]),
     )

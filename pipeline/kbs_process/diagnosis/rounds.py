@@ -45,7 +45,7 @@ from kbs_process.diagnosis.thresholds import (
     RIVALS,
     ROUNDS,
 )
-from kbs_process.diagnosis.tryout import UNNAMED, extra_of, identity, in_plant
+from kbs_process.diagnosis.tryout import UNNAMED, extra_of, identity, in_plant, port_label
 from kbs_process.signals.records import Array
 
 
@@ -104,7 +104,7 @@ def diagnose(
         moved=moved,
         finds=tuple(finds),
         refused=last.refused,
-        absorbed=_absorbed(rounds[0].screening),
+        absorbed=_absorbed(last.screening),
         place=rounds[0].place,
         left=left,
         whiteness=(whiteness(known), whiteness(standing.known)),
@@ -207,8 +207,8 @@ def _trial_by_trial(suspect: Suspect, standing: Standing, bench: Bench) -> tuple
         own = score(background, Sums.over(background, {k: whitened}))
         trials[k] = replace(trial, measured=trial.measured - (columns @ own.amplitude) * trial.valid[:, None])
         residual[k] = known.residual[k] - whitened @ own.amplitude
-        strengths.append(own.gain)
         if trial.role != "calibration":
+            strengths.append(own.gain)
             rows = float(known.rows[k])
             before, after = (float(z @ z) / rows for z in (known.residual[k], residual[k]))
             bound = float(chi2.isf(FALSE_ALARM, max(own.rank, 1)))
@@ -218,7 +218,12 @@ def _trial_by_trial(suspect: Suspect, standing: Standing, bench: Bench) -> tuple
     white = whiteness(known), whiteness(replace(known, residual=tuple(residual)))
     changed = replace(known, experiment=replace(experiment, trials=tuple(trials)), residual=tuple(residual))
     verdict = Gate(
-        not reasons, tuple(folds), bool(experiment.held_out), float(np.sqrt(min(strengths))), white, reasons
+        not reasons,
+        tuple(folds),
+        bool(experiment.held_out),
+        float(np.sqrt(min(strengths, default=0.0))),
+        white,
+        reasons,
     )
     return replace(standing, known=changed), verdict
 
@@ -257,7 +262,7 @@ def _find(
     alternatives.sort(key=lambda other: (-other.probability, other.rho_delta))
     alike: tuple[str, ...] = ()
     if place is not None:
-        named = f"{own.port} {own.axis}".strip()
+        named = port_label(suspect)
         alike = next((port.alike for port in place.test.ports if port.name == named), ())
     return Find(
         identity=own,

@@ -8,6 +8,7 @@ from kbs_process.diagnosis.curves import CurveSuspect
 from kbs_process.diagnosis.families import family, port_word
 from kbs_process.diagnosis.hypothesis import Hypothesis
 from kbs_process.diagnosis.joint import Extra, Standing
+from kbs_process.diagnosis.localise import PortName
 from kbs_process.diagnosis.outcome import Identity
 from kbs_process.diagnosis.scene import Scene
 from kbs_process.diagnosis.screen import Bench, Catalogued, Found, Suspect
@@ -34,6 +35,19 @@ def identity(suspect: Suspect) -> Identity:
     channels = tuple(candidate.site.split(BY)) if of_channel else ()
     axis = "" if of_channel or candidate.port is Port.BASE_ACCELERATION else candidate.site
     return Identity(port, axis, channels, family(candidate.name), candidate.name)
+
+
+def port_label(suspect: Suspect) -> str:
+    """The port of the port test at which a suspect acts: more exact than the word for it."""
+    if isinstance(suspect, CurveSuspect):
+        return PortName(suspect.port.replace("_", " "), suspect.joint).label
+    assert isinstance(suspect, Catalogued)
+    candidate, own = suspect.candidate, identity(suspect)
+    if candidate.port is Port.GROUND_TORQUE:
+        return PortName("ground torque", candidate.site).label
+    if candidate.port is Port.BASE_ACCELERATION:
+        return PortName("base", candidate.site).label
+    return PortName(own.port, own.axis, own.channels[:1]).label
 
 
 def in_plant(suspect: Suspect) -> bool:
