@@ -13,7 +13,7 @@ from end_to_end.expected import expected
 
 CAMPAIGNS = Path(__file__).parents[2] / "campaigns"
 NAMES = sorted(path.parent.name for path in CAMPAIGNS.glob("*/recordings"))
-VERDICT = {"pass": "met", "fail": "not met", "undecided": "undecided"}
+VERDICT = {"pass": "met", "fail": "not met", "undecided": "undecided", "none": "none stated"}
 
 
 def rows() -> dict[str, tuple[str, str]]:

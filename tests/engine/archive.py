@@ -30,8 +30,9 @@ def make(campaign: Campaign, index: int, commands: Commands | None = None) -> Re
     """Simulate and record one run; `commands` other than its trajectory's make a shorter one."""
     run = campaign.runs[index]
     hardware = campaign.hardware()
+    cord = hardware.cord() if run.hung else run.bungee
     recording = record(
-        hardware.with_values({"bungee": run.bungee, "loop": run.loop or hardware.loop}),
+        hardware.with_values({"bungee": cord, "loop": run.loop or hardware.loop}),
         TRAJECTORIES[run.trajectory]() if commands is None else commands,
         seed=1000 * campaign.seed + index,
         epoch_ns=FIRST_DAY_NS + campaign.day * DAY_NS + index * RUN_NS,
@@ -63,7 +64,7 @@ def archive(name: str, index: int) -> dict[str, Any]:
         "drift": recording.drift.tolist(),
         "wrench_clock": recording.wrench_clock._asdict(),
         "encoder_clock": recording.encoder_clock._asdict(),
-        "bungee": None if run.bungee is None else run.bungee.as_dict(),
+        "bungee": None if (cord := recording.hardware.bungee) is None else cord.as_dict(),
     }
 
 

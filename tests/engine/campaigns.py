@@ -27,7 +27,8 @@ class Run:
     encoder_hz: float = 50.0
     form: Format = SMALL
     gaps: tuple[tuple[str, float, float], ...] = ()  # stream, start and end (s after its first message)
-    bungee: Bungee | None = None
+    bungee: Bungee | None = None  # one that no parameter file knows
+    hung: bool = False  # on the bungee of the campaign's parameter files
     loop: str | None = None  # "open" or "closed"; None: as the campaign's controller
 
 
@@ -152,6 +153,45 @@ _ALL = (
             Run("SWPEL000_1.mcap", "SWPEL000", encoder_hz=20.0, loop="closed"),
             Run("TRKL0000_1.mcap", "TRKL0000", encoder_hz=20.0, loop="open"),
             Run("TRKL0000_2.mcap", "TRKL0000", encoder_hz=20.0, loop="closed"),
+        ),
+    ),
+    Campaign(
+        "DUMMY3",
+        seed=109,
+        day=9,
+        runs=(
+            Run("SWPEL000_1.mcap", "SWPEL000", encoder_hz=20.0, loop="open"),
+            Run("TRKL0000_1.mcap", "TRKL0000", encoder_hz=20.0, loop="closed"),
+        ),
+    ),
+    Campaign(
+        "EL089_FM",
+        seed=110,
+        day=10,
+        runs=(
+            _CALIBRATION,
+            Run("EL089P00_1.mcap", "EL089P00", encoder_hz=20.0),
+            Run("EL089P00_2.mcap", "EL089P00", encoder_hz=20.0),
+        ),
+    ),
+    Campaign(
+        "EL089_CORD",
+        seed=111,
+        day=11,
+        runs=(
+            _CALIBRATION,
+            Run("EL089P00_1.mcap", "EL089P00", wrench_hz=50.0, hung=True),
+            Run("EL089P00_2.mcap", "EL089P00", wrench_hz=50.0, hung=True, loop="closed"),
+        ),
+    ),
+    Campaign(
+        "AL012_CORD",
+        seed=112,
+        day=12,
+        runs=(
+            _CALIBRATION,
+            Run("AL012M00_1.mcap", "AL012M00", hung=True),
+            Run("AL012M00_2.mcap", "AL012M00", hung=True),
         ),
     ),
 )
