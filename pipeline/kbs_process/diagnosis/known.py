@@ -25,6 +25,7 @@ from kbs_process.stages.output_error import Scalar
 
 _ROUNDS = 12
 _REPHASED = 2  # times that phases are looked for again at the end
+_TRIED = 5  # rounds by which another start is judged
 _AT_FLOOR = 1.1  # level from which no other start is followed
 MOVED = 3.0  # sigmas, from which a parameter is said to be off
 
@@ -120,13 +121,15 @@ def refit(
 
 
 def best(experiment: Experiment, starts: Sequence[Hypothesis], floor: Floor, simulate: Simulate) -> Known:
-    """Refit from each start until one leads to the floor; else the one of least cost."""
-    found: list[Known] = []
-    for start in starts:
-        found.append(refit(experiment, start, floor, simulate))
-        if found[-1].level < _AT_FLOOR:
+    """Refit from the first start and, where that does not lead to the floor, try whether others lead lower."""
+    found = refit(experiment, starts[0], floor, simulate)
+    for start in starts[1:]:
+        if found.level < _AT_FLOOR:
             break
-    return min(found, key=lambda known: known.cost)
+        tried = refit(experiment, start, floor, simulate, rounds=_TRIED, rephased=0)
+        if tried.cost < found.cost:
+            found = refit(experiment, tried.hypothesis, floor, simulate)
+    return found
 
 
 def _residuals(search: Search, found: Found) -> tuple[Array, ...]:

@@ -32,6 +32,9 @@ _LEAST_DIFFERENCE, _MOST_DIFFERENCE = 2e-3, 0.4  # prior sigmas
 _DAMPING = (0.0, 1e-2, 1e-1, 1.0, 10.0, 1e3)  # tried two at a time
 _AGREED = 0.9  # gained over promised, above which slopes are only updated
 GAIN = 2.0  # of -2 log likelihood: a step that promises less ends the search
+_NEGLIGIBLE = (
+    0.1  # of the whitened residual's length: what a number moves by one sigma and is not looked at again
+)
 _POOR = 0.5  # gained over promised, below which all slopes are taken anew, once
 _CALM = 1.3  # over the floor, below which phases are not looked for again before the end
 _REPHASED = 2  # every how many rounds
@@ -94,6 +97,7 @@ class Search:
         self.calibrations = {trial.drive for trial in trials if trial.role == "calibration"}
         self.floor = floor
         self.metric: tuple[Metric, ...] = ()
+        self.idle: dict[int, list[int]] = {}
 
     # what a point costs
 
@@ -139,7 +143,17 @@ class Search:
         theta = self.hypothesis.values(self.free)
         predicted = self.predict([theta], self.everything)[0]
         self.metric = metrics(self.experiment, self.floor, predicted)
-        return Found(theta, predicted, self.slopes(theta, {}))
+        found = Found(theta, predicted, self.slopes(theta, {}))
+        self.idle = {drive: self._idle(drive, found.gradients) for drive in self.references}
+        return found
+
+    def _idle(self, drive: int, gradients: Gradients) -> list[int]:
+        """Numbers that a drive shows nothing of, such as those of joints that it does not turn."""
+        length = np.zeros(len(self.free))
+        for k in self.experiment.fit:
+            if self.experiment.reference(self.experiment.trials[k].trajectory) == drive:
+                length += np.sum(self.jacobian(k, gradients) ** 2, axis=0)
+        return [int(i) for i in np.flatnonzero(np.sqrt(length) * self.spread < _NEGLIGIBLE)]
 
     def run(self, found: Found, rounds: int) -> Found:
         """Lower the cost until no step promises `GAIN`; while much is left, phases are looked for again and again."""
@@ -177,11 +191,10 @@ class Search:
 
         With `whole` all are, but in calibrations, which hardly shake anything.
         """
-        keep = {
-            drive: (self.slow, slope.columns)
-            for drive, slope in held.items()
-            if not whole or drive in self.calibrations
-        }
+        keep = {}
+        for drive, slope in held.items():
+            slow = [] if whole and drive not in self.calibrations else self.slow
+            keep[drive] = ([*slow, *self.idle.get(drive, ())], slope.columns)
         here = self.hypothesis.at(self.free, theta)
         return slopes(
             self.experiment, here, self.free, self.differences, self.references, self.simulate, keep=keep
