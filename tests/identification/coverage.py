@@ -1,6 +1,8 @@
 """Do the identification's intervals hold the truth as often as they say? Run from tests/:
 
-    python -m identification.coverage --seeds 40 [--processes 2] [--json FILE]
+    nice python -m identification.coverage --seeds 40 [--processes 2] [--json FILE]
+
+Seeds that FILE has already are not run again.
 
 Each seed draws hardware from the priors of campaigns/DUMMY1 (every uncertain number, phases from the whole circle),
 makes one recording of 36 s with the independent engine (its own equations, integrator, noise, clocks and codes),
@@ -16,7 +18,7 @@ import argparse
 import json
 import os
 from collections.abc import Iterable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -170,6 +172,14 @@ def trial(seed: int) -> Trial:
     return Trial(seed, checks, above(found, truth, recording.hardware), tuple(estimates))
 
 
+def read(path: Path) -> list[Trial]:
+    """Trials of an earlier call, which need not be run again."""
+    return [
+        Trial(**(one | {"estimates": tuple(Estimate(**each) for each in one["estimates"])}))
+        for one in json.loads(path.read_text())
+    ]
+
+
 def binomial(hits: int, n: int) -> tuple[float, float]:
     """95 % Clopper-Pearson interval of a rate."""
     low = float(beta.ppf(0.025, hits, n - hits + 1)) if hits else 0.0
@@ -215,10 +225,12 @@ def main() -> None:
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--json", type=Path)
     asked = parser.parse_args()
-    trials: list[Trial] = []
+    trials = read(asked.json) if asked.json and asked.json.exists() else []
+    seeds = sorted(set(range(asked.first, asked.first + asked.seeds)) - {one.seed for one in trials})
     with ProcessPoolExecutor(asked.processes, initializer=os.nice, initargs=(10,)) as pool:
-        for done in pool.map(trial, range(asked.first, asked.first + asked.seeds)):
-            trials.append(done)
+        for running in as_completed([pool.submit(trial, seed) for seed in seeds]):
+            done = running.result()
+            trials = sorted([*trials, done], key=lambda one: one.seed)
             furthest = max(done.estimates, key=lambda one: abs(one.error / one.bound))
             print(f"seed {done.seed}: {sum(one.covered for one in done.estimates)} of", end=" ")
             print(
@@ -228,7 +240,7 @@ def main() -> None:
             print(f"furthest {furthest.name} {furthest.error / furthest.bound:+.1f} sigma;", end=" ")
             print(f"truth {done.truth_above:+.0f}; checks {done.checks}", flush=True)
             if asked.json:
-                asked.json.write_text(json.dumps([asdict(one) for one in trials]))
+                asked.json.write_text(json.dumps([asdict(one) for one in trials], indent=0) + "\n")
     print("\n".join(table(trials)))
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kbs_process.estimation.descent import descend
-from kbs_process.estimation.fit import Check, Fit, Parameters, fit_map
+from kbs_process.estimation.fit import Check, Fit, Parameters, fit_map, triangle
 from kbs_process.estimation.profile import Profile, profiles
 from kbs_process.rig.model import Rig
 from kbs_process.signals.records import Array
@@ -40,6 +40,7 @@ __all__ = [
 
 _ROUGH = 10.0  # what ends a search, over what ends a refinement
 _STEPS = 6  # with the same slopes
+_PHASE = 0.25  # rad, the scale of a phase in differences: its sine is nearly straight
 _FINE_STEP = 5e-4  # s: the plant's own step moves estimates by up to one sigma, this one by less than a tenth
 
 Evaluators = Callable[[Experiment], Evaluate]  # makes what evaluates the residuals of an experiment
@@ -55,7 +56,7 @@ class Settings:
     lowest_Hz: float = 0.5  # below: masses, CoGs and drift; gears lose at most 3 % of what is known of them
     negligible: float = 0.1  # a number of the rig that moves all residuals by less, at one sigma, is fixed
     rounds: int = 12  # of a search: slopes taken
-    refinements: int = 4  # likewise
+    refinements: int = 3  # likewise
     gain: float = 1.0  # of -2 log likelihood: a step that promises less ends the refinement
 
 
@@ -114,7 +115,7 @@ def identify(
             modes.append(mode)
     with say("Refining the best"):
         best = min(modes, key=lambda mode: mode.cost)
-        return _refine(full, tuple(modes), best, sensor, evaluate_with, gears, settings)
+        return _refine(full, tuple(modes), best, sensor, evaluate_with, settings)
 
 
 def _with_others(
@@ -148,26 +149,27 @@ def _refine(
     best: Mode,
     sensor: Sequence[Spectra],
     evaluate_with: Evaluators,
-    gears: int,
     settings: Settings,
 ) -> Identification:
     """Descend with the noise that the residual shows, until a descent with new slopes gains next to nothing."""
     parameters = with_factors(prior(final), final, settings.run_to_run)
     evaluate, fine = evaluate_with(final), evaluate_with(replace(final, step_s=_FINE_STEP))
-    theta = best.values
-    objective = Objective(final, sensor, evaluate, best.differences, gears, central=True)
+    theta, p = best.values, len(final.free)
+    objective = Objective(final, sensor, evaluate, first_differences(prior(final)), p, central=True)
     spectra = [
         estimated_spectra(final, recording, unexplained(final, recording, values, noise))
         for recording, values, noise in zip(
             final.recordings, objective.in_recordings(theta), sensor, strict=True
         )
     ]
-    objective = Objective(final, spectra, evaluate, best.differences, gears, central=True)
-    descents, gained = 0, np.inf
+    objective = Objective(final, spectra, evaluate, objective.differences, p, central=True)
+    descents, gained, R = 0, np.inf, best.triangle
+    scale = np.where(np.isfinite(parameters.sigma), parameters.sigma, _PHASE)[:p]
     while gained >= settings.gain and descents < settings.refinements:
         tasks = objective.tasks([theta])
         objective.correct([a - b for a, b in zip(fine(tasks), evaluate(tasks), strict=True)])
-        J = objective.jacobian(theta)
+        J = objective.along_principal(theta, R, scale)
+        R = triangle(J[:, :p])
         down = descend(objective.residual, J, parameters, theta, gain=settings.gain, steps=_STEPS)
         theta, gained, descents = down.value, down.gained, descents + 1
     fit = fit_map(objective.residual, parameters, jacobian=lambda at: J, start=theta, iterations=0)

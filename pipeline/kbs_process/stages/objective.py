@@ -15,6 +15,7 @@ from kbs_process.stages.unknowns import frictions
 _DIFFERENCE = 0.05  # prior sigmas (phases: rad), first difference
 _SEEN = 5.0  # what a difference should move the whitened residual by: above its jumps where friction sticks
 _LEAST_DIFFERENCE, _MOST_DIFFERENCE = 5e-3, 0.4  # prior sigmas
+_FAR = 1.5  # prior sigmas, along a principal direction
 
 
 class Objective:
@@ -121,6 +122,32 @@ class Objective:
             back = [next(found) for _ in base] if self.central else here
             span = len(sides) * self.differences[i]
             self.columns[i] = [(a - b) / span for a, b in zip(forward, back, strict=True)]
+
+    def along_principal(self, theta: Array, R: Array, scale: Array) -> Array:
+        """(n, p + factors), by central differences along the principal directions of what earlier slopes know.
+
+        R (p, p): triangle of those. Numbers that recordings know little of but in combination have long columns that
+        nearly cancel. Differenced one by one, what events of sticking add to each does not cancel and makes information
+        out of noise; moved together, such numbers hardly move the events, and the difference may be great.
+        """
+        p = len(self.experiment.free)
+        _, length, V = np.linalg.svd(R * scale)
+        h = np.clip(_SEEN / np.maximum(length, 1e-30), _LEAST_DIFFERENCE, _FAR)
+        base = self.in_recordings(theta)
+        tasks = [
+            (r, values + side * h[k] * scale * V[k], self.spectra[r])
+            for k in range(p)
+            for side in (1.0, -1.0)
+            for r, values in enumerate(base)
+        ]
+        found, count = self.evaluate(tasks), len(base)
+        for r in range(count):
+            each = found[r::count]
+            D = np.column_stack([(each[2 * k] - each[2 * k + 1]) / (2.0 * h[k]) for k in range(p)])
+            slopes = D @ V / scale
+            for index in range(p):
+                self.columns.setdefault(index, [np.empty(0)] * count)[r] = slopes[:, index]
+        return self.assembled(theta)
 
     def assembled(self, theta: Array) -> Array:
         """Columns of the recordings in one matrix; a factor's column is that of its torque in its recording."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kbs_process.estimation.descent import descend
-from kbs_process.estimation.fit import Parameters
+from kbs_process.estimation.fit import Parameters, triangle
 from kbs_process.signals.records import Array
 from kbs_process.stages.contact import edge_minima
 from kbs_process.stages.objective import Objective, first_differences, settled
@@ -33,7 +33,7 @@ class Mode:
     start: Start
     values: Array
     cost: float  # -2 log posterior, less a constant
-    differences: Array  # (p,) by which slopes are best taken there
+    triangle: Array  # (p, p) R of the slopes of the residual by the free numbers there
     settled: bool  # no other phase or contact edge was better, and the last step gained next to nothing
 
 
@@ -88,7 +88,8 @@ def follow(
             break
     r = objective.residual(theta)
     excess = (theta - parameters.value) / parameters.sigma
-    return Mode(start, theta, float(r @ r + excess @ excess), objective.differences, arrived and searched)
+    R = triangle(objective.assembled(theta)[:, : len(experiment.free)])
+    return Mode(start, theta, float(r @ r + excess @ excess), R, arrived and searched)
 
 
 def _near(parameters: Parameters, u: Array) -> Parameters:
