@@ -12,6 +12,7 @@ from engine.hardware import Array, Hardware
 from engine.ports import Extra
 from engine.trajectories import Commands
 from proof.concealed import effects as catalogue
+from proof.concealed import paths
 from proof.concealed.observed import Motion
 from proof.concealed.physics import Effect
 from proof.concealed.ranges import BEYOND_SIGMAS, LEVELS, Split
@@ -20,6 +21,8 @@ from proof.concealed.strength import Setting, Strength, Whitening, own_columns, 
 
 _REPEATS = 2  # of each trajectory that models are fitted to
 _NEAR = 0.2  # a strength is close enough to its level: its logarithm
+_FAR = 0.5  # what does not come near, as friction that sticks or not, may be as far off
+_ABSORBED = 0.99  # kappa; beyond, an effect is a change of known parameters by another name
 _SEARCH = 7  # amplitudes tried
 
 # Not moved beyond: phases are unknown anyway, the others would not be physical or not be seen.
@@ -44,9 +47,8 @@ class Bench:
         return self.trajectories[:-1]
 
     def spans(self) -> Array:
-        """Least and greatest reading of each channel, (6, 2)."""
-        all_ = np.concatenate(self.readings)[:, :6]
-        return np.column_stack([all_.min(axis=0), all_.max(axis=0)])
+        """Least and greatest reading of each channel, (6, 2), in the trajectory that moves it farthest."""
+        return paths.farthest([readings[:, :6] for readings in self.readings])
 
     def extra(self, effects: Sequence[Effect], duration: float) -> Extra:
         """What the engine lets act."""
@@ -121,10 +123,12 @@ def _dotted(name: str) -> str:
 def scaled(bench: Bench, effect: Effect, level: float) -> tuple[Effect, Strength, float] | None:
     """Find the amplitude at which an effect has the strength asked for, or else a weaker one of LEVELS.
 
-    Returns effect, strength and level; None where the effect stays below the weakest level.
+    Returns effect, strength and level; None where the effect stays below the weakest level, or known parameters
+    absorb it.
     """
     most = effect.physics.most
     amplitude, low, high = effect.physics.first, 0.0, np.inf
+    nearest: tuple[Effect, Strength] | None = None
     power, tried = 1.0, (0.0, 0.0)  # rho_eff goes with this power of the amplitude
     for _ in range(_SEARCH):
         effect = effect.scaled(amplitude)
@@ -135,8 +139,12 @@ def scaled(bench: Bench, effect: Effect, level: float) -> tuple[Effect, Strength
                 return None
             level = max(reached)
         ratio = level / max(found.rho_eff, 1e-3)
+        if found.kappa > _ABSORBED:
+            return None
         if abs(np.log(ratio)) < _NEAR:
             return effect, found, level
+        if nearest is None or abs(np.log(level / found.rho_eff)) < abs(np.log(level / nearest[1].rho_eff)):
+            nearest = effect, found
         if ratio > 1:
             low = max(low, amplitude)
         else:
@@ -147,4 +155,6 @@ def scaled(bench: Bench, effect: Effect, level: float) -> tuple[Effect, Strength
         amplitude = min(float(amplitude * ratio ** (1 / np.clip(power, 0.4, 3.0))), most)
         if not low < amplitude < high:
             amplitude = most if np.isinf(high) else float(np.sqrt(max(low, 0.1 * high) * high))
-    return None
+    if nearest is None or abs(np.log(level / nearest[1].rho_eff)) > _FAR:
+        return None
+    return *nearest, level

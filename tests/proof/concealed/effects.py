@@ -51,7 +51,7 @@ PHYSICS: tuple[Physics, ...] = (
     ),
     Physics(
         "microsteps uneven", family="microstep", law=Law.MICROSTEP, port="motor torque", places=AXES, unit="rad",
-        first=0.02, most=0.6, shapes=(Shape("per electrical cycle", "1", Choice((4.0, 2.0), (1.0, 4.0))), _PHASE),
+        first=0.02, most=0.6, shapes=(Shape("per electrical cycle", "1", Choice((4.0,), (1.0, 8.0))), _PHASE),
     ),
     Physics(
         "lubricant warming up", family="warm-up", law=Law.WARM_UP, **_MOTOR,
@@ -83,7 +83,8 @@ PHYSICS: tuple[Physics, ...] = (
                 Shape("centre", "rad", 0.0)),
     ),
     Physics(
-        "exponential stiffening", family="stiffness", law=Law.STIFFENING, **_GEAR, unit="1", first=1.0, most=30.0,
+        "exponential stiffening", family="stiffness", law=Law.STIFFENING, port="transmission",
+        places=("el",), unit="1", first=1.0, most=30.0,
         shapes=(Shape("windup", "rad", Range(4e-4, 1.5e-3)),),
     ),
     Physics(
@@ -123,8 +124,8 @@ PHYSICS: tuple[Physics, ...] = (
     Physics(
         "rubber cord", family="bungee", port="external wrench", law=Law.CORD, places=("el",), unit="N", first=0.5,
         most=100.0,
-        shapes=(Shape("rest length", "m", Range(0.7, 1.3)), Shape("anchor x", "m", Range(-0.8, 0.8, log=False)),
-                Shape("anchor y", "m", Range(-0.8, 0.8, log=False)), Shape("anchor z", "m", Range(1.6, 3.2)),
+        shapes=(Shape("rest length", "m", Range(0.4, 0.9)), Shape("anchor x", "m", Range(-0.8, 0.8, log=False)),
+                Shape("anchor y", "m", Range(-0.8, 0.8, log=False)), Shape("anchor z", "m", Range(0.9, 1.6)),
                 Shape("point x", "m", Range(0.1, 0.5)), Shape("point y", "m", Range(-0.3, 0.3, log=False)),
                 Shape("point z", "m", Range(-0.2, 0.2, log=False))),
     ),

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from engine.hardware import Array
 from engine.trajectories import RANGE, Axis, Commands, commands
 from proof.concealed.ranges import PATHS, Split
 
@@ -113,7 +114,17 @@ def pass_over(rng: np.random.Generator, number: Draw) -> tuple[Axis, Axis]:
     return az, el
 
 
-def swept(paths: list[Commands]) -> dict[str, tuple[float, float]]:
-    """Least and greatest commanded angle of each joint, rad."""
-    angles = np.concatenate([path.position for path in paths])
-    return {name: (float(angles[:, k].min()), float(angles[:, k].max())) for k, name in enumerate(RANGE)}
+def swept(paths: Sequence[Commands]) -> dict[str, tuple[float, float]]:
+    """Least and greatest commanded angle of each joint, rad, in the trajectory that moves it farthest."""
+    low, high = farthest([path.position for path in paths]).T
+    return {name: (float(low[k]), float(high[k])) for k, name in enumerate(RANGE)}
+
+
+def farthest(runs: Sequence[Array]) -> Array:
+    """Least and greatest value (columns, 2) of each column in the run that moves it farthest.
+
+    Over all runs together, a place within the range could be one that no run passes.
+    """
+    ends = np.stack([np.column_stack([run.min(axis=0), run.max(axis=0)]) for run in runs])
+    widest = np.argmax(ends[:, :, 1] - ends[:, :, 0], axis=0)
+    return np.asarray(ends[widest, np.arange(ends.shape[1])])

@@ -127,7 +127,7 @@ def _hardware(nominal: Hardware, spec: Spec, rng: np.random.Generator) -> Hardwa
 def conceal(bench: Bench, spec: Spec, rng: np.random.Generator) -> list[tuple[Effect, Strength, float]]:
     """Draw the effects and scale each, alone, to its level."""
     concealed: list[tuple[Effect, Strength, float]] = []
-    swept = paths.swept(list(bench.fitted))
+    swept = paths.swept(bench.fitted)
     for name in spec.physics:
         if len(concealed) == spec.count:
             break
