@@ -27,13 +27,11 @@ def prepare(folder: Path) -> Case:
     """Do for a campaign what the diagnosis does before it looks for physics."""
     begin = monotonic()
     experiment = experiment_of(load_campaign(folder, checksums=False), SilentProgress())
-    explained = explain(experiment, SilentProgress())
-    found = explained.known
-    drives = sorted({trial.drive for trial in experiment.trials})
     with Simulators(experiment) as simulate:
-        predicted = dict(zip(drives, simulate([(d, found.hypothesis) for d in drives]), strict=True))
+        explained = explain(experiment, simulate, SilentProgress())
+    found, predicted = explained.known, explained.predicted
     signals = {
-        drive: _signals(experiment, found.hypothesis, drive, predicted[drive].wrench) for drive in drives
+        drive: _signals(experiment, found.hypothesis, drive, seen.wrench) for drive, seen in predicted.items()
     }
     left = [trial.measured - predicted[trial.drive].values for trial in experiment.trials]
     unit = _repeatability(experiment, left)
