@@ -21,6 +21,7 @@ from kbs_process.report.records import identify as records
 from kbs_process.report.records.common import Check, Conclusion, Notice, encode
 from kbs_process.rig.model import Quantity
 from kbs_process.signals.records import WRENCH_CHANNELS, WRENCH_UNITS, Array, Mask
+from kbs_process.stages.output_error import Measured
 from kbs_process.stages.screening import Phase, phases
 from kbs_process.stages.unknowns import CRITICAL
 
@@ -277,7 +278,7 @@ def _tables(folder: Path, outcomes: Outcomes, prediction: Prediction) -> None:
     experiment, recording = outcomes.found.experiment, prediction.recording
     units = [WRENCH_UNITS[WRENCH_CHANNELS.index(c)] for c in experiment.rig.transducer.channels]
     units += ["rad"] * len(experiment.rig.joints)
-    n = len(recording.valid)
+    n, lowest = len(recording.valid), experiment.lowest_Hz
     history: dict[str, Array | Mask] = {
         "t": recording.dt * np.arange(n, dtype=np.float64),
         "valid": recording.valid,
@@ -286,13 +287,28 @@ def _tables(folder: Path, outcomes: Outcomes, prediction: Prediction) -> None:
     named, powers = {"t": "s"}, {"f": "Hz"}
     for column, (channel, unit) in enumerate(zip(experiment.channels, units, strict=True)):
         for side, left in (("before", prediction.before), ("after", prediction.after)):
-            history[f"{channel}.{side}"], named[f"{channel}.{side}"] = left[:, column], unit
+            history[f"{channel}.{side}"], named[f"{channel}.{side}"] = (
+                _above(lowest, left[:, column], recording),
+                unit,
+            )
             f, power = periodogram(left[:, column], recording.valid, recording.dt)
-            spectrum["f"], spectrum[f"{channel}.{side}"] = f[1:], power[1:]
+            shown = f >= lowest
+            spectrum["f"], spectrum[f"{channel}.{side}"] = f[shown], power[shown]
             powers[f"{channel}.{side}"] = f"({unit})^2/Hz"
-        spectrum[f"{channel}.noise"] = prediction.spectra[column].at(f[1:])
+        spectrum[f"{channel}.noise"] = prediction.spectra[column].at(f[shown])
         powers[f"{channel}.noise"] = f"({unit})^2/Hz"
-    about = ("measured less simulated", "drift, cross-coupling and clock delay projected out")
+    about = (
+        "measured less simulated",
+        f"drift, cross-coupling and clock delay projected out; nothing below {lowest:g} Hz",
+    )
     for kind, columns, names in (("residual", history, named), ("residual_spectrum", spectrum, powers)):
         path = folder / "tables" / kind / f"{recording.name}.parquet"
         write_table(path, columns, names, frame="T", history=about, recording=recording.name)
+
+
+def _above(lowest: float, left: Array, recording: Measured) -> Array:
+    """What lies above the lowest frequency (Hz) that is compared: below it, drift is not told from gravity."""
+    n = len(left)
+    spectrum = np.fft.rfft(left)
+    spectrum[np.fft.rfftfreq(n, recording.dt) < lowest] = 0.0
+    return np.asarray(np.fft.irfft(spectrum, n), dtype=np.float64)
