@@ -105,7 +105,7 @@ def test_odrive(tmp_path: Path) -> None:
     source = _source("odrive_cogging")
     folder = importers.import_recordings("odrive", source, tmp_path / "odrive")
     t, counts, current = np.load(source / "slow2_nocomp_1.npy")
-    begun = t - t[0] >= 0.3 - 1e-9
+    begun = t - t[0] >= 0.5 - 1e-9
     stamp, effort = _read(folder, "slow_2", "effort")
     np.testing.assert_array_equal(stamp, np.rint(t[begun] * 1e9))
     np.testing.assert_array_equal(effort[:, 0], current[begun])

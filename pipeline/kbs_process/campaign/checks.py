@@ -16,6 +16,7 @@ from kbs_process.plant.effects import CATALOGUE, catalogue_with, find
 from kbs_process.rig.model import LAB, Joint, Quantity
 
 _KEPT = 0.4  # of the working rate: decimation changes nothing below (stages.resample)
+_DERIVED = 8.0  # times the widest band: angles are differentiated up to twice that, by filters that need as much again
 
 
 def check_campaign(
@@ -174,6 +175,9 @@ def _check_bands(campaign: Campaign, document: Document, problems: Problems) -> 
         kept = f"{_KEPT * bands.working_rate:g} Hz"
         what = f"{bands.low_pass[-1]:g} Hz is above {kept}, up to which the working rate keeps everything"
         problems.add(place, what, "raise working_rate_Hz (10 times the greatest edge is plenty)")
+    elif campaign.drive == "motion" and bands.working_rate < _DERIVED * bands.low_pass[-1]:
+        what = f"{bands.low_pass[-1]:g} Hz is too near to the working rate for accelerations from measured motion"
+        problems.add(place, what, f"raise working_rate_Hz to {_DERIVED * bands.low_pass[-1]:g} or more")
     for index, requirement in enumerate(campaign.requirements):
         low, high = requirement.band
         place = document.place(("requirement", index, "band_Hz"))
