@@ -118,9 +118,9 @@ def test_the_amplitude_found_has_the_strength_asked_for() -> None:
 
 def test_what_cannot_reach_its_level_gets_a_weaker_one_or_none() -> None:
     effect = effects.draw(BY_NAME["interpolation of the code"], np.random.default_rng(3), "development", {})
-    found = scaled(bench(), effect, 100.0)
+    found = scaled(bench(), effect, 300.0)
     assert found is not None
-    for share, expected in ((2.0, 100.0), (0.6, 40.0), (0.1, None)):
+    for share, expected in ((2.0, 300.0), (0.6, 100.0), (0.2, 40.0), (0.05, None)):
         bounded = replace(effect, physics=replace(effect.physics, most=share * found[0].amplitude))
-        bounded = scaled(bench(), bounded, 100.0)
-        assert (None if bounded is None else bounded[2]) == expected
+        weaker = scaled(bench(), bounded, 300.0)
+        assert (None if weaker is None else weaker[2]) == expected

@@ -3,29 +3,17 @@
 from __future__ import annotations
 
 import argparse
-import json
 import multiprocessing
 import os
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
-from typing import Any
-
-import numpy as np
 
 from proof.concealed import trials
 from proof.concealed.ranges import Split
-from proof.concealed.trials import Spec
+from proof.concealed.trials import Spec, UnreachableError
 
 _SPLITS: dict[str, Split] = {"dev": "development", "validation": "validation"}
-
-
-def one(spec: Spec, out: Path, truth: Path) -> dict[str, Any]:
-    """Make one trial under a name that says nothing, and put its truth aside."""
-    name = np.random.default_rng([spec.seed, spec.index, len(spec.split), 4]).bytes(4).hex()
-    made = trials.make(spec, out / name)
-    (truth / f"{name}.json").write_text(json.dumps(made, indent=1) + "\n")
-    return made
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -53,10 +41,18 @@ def main(arguments: Sequence[str] | None = None) -> None:
     truth.mkdir(parents=True, exist_ok=True)
     spawn = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(asked.jobs, mp_context=spawn, initializer=os.nice, initargs=(10,)) as pool:
-        jobs = [pool.submit(one, spec, asked.out, truth) for spec in specs]
-        for job in jobs:
-            made = job.result()
-            print(made["trial"], f"rho_eff {made['rho_eff']:.0f}", flush=True)
+        jobs = [pool.submit(trials.make_named, spec, asked.out, truth) for spec in specs]
+        failed = 0
+        for spec, job in zip(specs, jobs, strict=True):
+            try:
+                made = job.result()
+            except UnreachableError as error:
+                failed += 1
+                print(f"trial {spec.index}: {error}", flush=True)
+            else:
+                print(made["trial"], f"rho_eff {made['rho_eff']:.0f}", flush=True)
+    if failed:
+        raise SystemExit(f"{failed} of {len(specs)} trials could not be made")
 
 
 if __name__ == "__main__":

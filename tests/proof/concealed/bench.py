@@ -137,7 +137,7 @@ def scaled(bench: Bench, effect: Effect, level: float) -> tuple[Effect, Strength
             reached = [weaker for weaker in LEVELS if weaker < found.rho_eff]
             if not reached:
                 return None
-            level = max(reached)
+            level, low = max(reached), 0.0
         ratio = level / max(found.rho_eff, 1e-3)
         if found.kappa > _ABSORBED:
             return None

@@ -124,7 +124,7 @@ PHYSICS: tuple[Physics, ...] = (
     Physics(
         "rubber cord", family="bungee", port="external wrench", law=Law.CORD, places=("el",), unit="N", first=0.5,
         most=100.0,
-        shapes=(Shape("rest length", "m", Range(0.4, 0.9)), Shape("anchor x", "m", Range(-0.8, 0.8, log=False)),
+        shapes=(Shape("rest length", "m", Range(0.5, 1.2)), Shape("anchor x", "m", Range(-0.8, 0.8, log=False)),
                 Shape("anchor y", "m", Range(-0.8, 0.8, log=False)), Shape("anchor z", "m", Range(0.9, 1.6)),
                 Shape("point x", "m", Range(0.1, 0.5)), Shape("point y", "m", Range(-0.3, 0.3, log=False)),
                 Shape("point z", "m", Range(-0.2, 0.2, log=False))),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -42,6 +43,10 @@ class Spec:
     physics: tuple[str, ...] = ()  # in order of preference: those that this rig cannot show are passed over
     count: int = 0  # of them to conceal
     levels: tuple[float, ...] = ()  # one for each concealed
+
+
+class UnreachableError(Exception):
+    """On this rig, an effect stays below the weakest level, or known parameters absorb it."""
 
 
 class Run(NamedTuple):
@@ -141,9 +146,8 @@ def conceal(bench: Bench, spec: Spec, rng: np.random.Generator) -> list[tuple[Ef
                 concealed.append(found)
                 break
     if len(concealed) < spec.count:
-        raise ValueError(
-            f"trial {spec.index}: no physics of {spec.physics[:3]}... reaches its level on this rig"
-        )
+        wanted = ", ".join(spec.physics[:3])
+        raise UnreachableError(f"none of {wanted} can be concealed in this rig so that it can be seen")
     return concealed
 
 
@@ -165,6 +169,14 @@ def make(spec: Spec, folder: Path) -> dict[str, Any]:
         "beyond": moved,
         "rho_eff": total,
     }
+
+
+def make_named(spec: Spec, out: Path, truths: Path) -> dict[str, Any]:
+    """Make a trial in `out` under a name that says nothing, and write its truth into another folder."""
+    name = np.random.default_rng([spec.seed, len(spec.split), 4, spec.index]).bytes(4).hex()
+    made = make(spec, out / name)
+    (truths / f"{name}.json").write_text(json.dumps(made, indent=1) + "\n")
+    return made
 
 
 def _truth(bench: Bench, effect: Effect, found: Strength) -> dict[str, Any]:
