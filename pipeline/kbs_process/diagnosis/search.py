@@ -8,7 +8,7 @@ minima by the dozen: they are tried on grids, all other numbers following as the
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -40,6 +40,7 @@ _CALM = 1.3  # over the floor, below which phases are not looked for again befor
 _REPHASED = 2  # every how many rounds
 _LITTLE = 5.0  # of the same: what exact slopes gained, below which more rounds are not worth their time
 _BETTER = 10.0  # for which phases are moved
+_RISE = 1.5  # times the cost, that a move of phases may bring before the others have settled
 _SMOOTH, _RING = 8, 16  # phases tried all round
 _WIDTHS = (-1.0, 0.0, 1.0)  # prior sigmas
 _FINE = (-0.1, -0.05, 0.0, 0.05, 0.1)  # rad, then
@@ -256,6 +257,7 @@ class Search:
         amplitude as it is known; tooth contact, whose edges matter, all round at three widths, then finely there.
         """
         theta = found.theta
+        J = {k: self.jacobian(k, found.gradients) for k in self.experiment.fit}
         for pair in self.pairs:
             trials = next(
                 (used for used, joints in stages(self.experiment) if self._joint(pair) in joints), ()
@@ -266,13 +268,16 @@ class Search:
             middle, spread = self.parameters.value[partner], self.parameters.sigma[partner]
             count, widths = (_SMOOTH, (0.0,)) if pair.smooth else (_RING, _WIDTHS)
             ring = [(2.0 * np.pi * k / count, middle + w * spread) for k in range(count) for w in widths]
-            theta = self._best(found, theta, (pair.phase, partner), trials, ring)
+            theta = self._best(found, J, theta, (pair.phase, partner), trials, ring)
             if not pair.smooth:
                 fine = [(theta[pair.phase] + a, theta[partner] + b) for a in _FINE for b in _FINE]
-                theta = self._best(found, theta, (pair.phase, partner), trials, fine)
+                theta = self._best(found, J, theta, (pair.phase, partner), trials, fine)
         if theta is found.theta:
             return None
         predicted = self.predict([theta], self.everything)[0]
+        now, then = sum(self.cost(found.theta, found.predicted)), sum(self.cost(theta, predicted))
+        if then > _RISE * now:  # the slopes promised what is far from true
+            return None
         return replace(
             found,
             theta=theta,
@@ -292,6 +297,7 @@ class Search:
     def _best(
         self,
         found: Found,
+        J: Mapping[int, Array],
         theta: Array,
         moved: tuple[int, int],
         trials: Sequence[int],
@@ -300,10 +306,13 @@ class Search:
         """The best of some values of two numbers; `theta` itself where none is better by `_BETTER`."""
         rest = np.delete(np.arange(len(self.free)), moved)
         assert self.parameters.lower is not None and self.parameters.upper is not None
-        J = {k: self.jacobian(k, found.gradients)[:, rest] for k in trials}
-        factor = cho_factor(
-            sum((J[k].T @ J[k] for k in trials), np.diag((self.precision + self.ridge)[rest]))
-        )
+        prior = np.diag((self.precision + self.ridge)[rest])
+        factor = cho_factor(sum((j[:, rest].T @ j[:, rest] for j in J.values()), prior))
+        # Trials in which the moved numbers show little hold the others by what they already say.
+        held = np.zeros(len(rest))
+        for k in set(J) - set(trials):
+            left = self.residual(k, found.predicted) - J[k] @ (theta - found.theta)
+            held += J[k][:, rest].T @ left
         points = [theta]
         for value in values:
             point = theta.copy()
@@ -314,7 +323,7 @@ class Search:
         for point, predicted in zip(points, self.predict(points, drives), strict=True):
             z = {k: self.residual(k, predicted) for k in trials}
             excess = (point - self.parameters.value) * self.precision
-            g = sum((J[k].T @ z[k] for k in trials), -excess[rest])
+            g = sum((J[k][:, rest].T @ z[k] for k in trials), held - excess[rest])
             follow = cho_solve(factor, g)
             cost = sum(float(r @ r) for r in z.values()) + self.excess(point) - float(g @ follow)
             costs.append(cost if np.isfinite(cost) else np.inf)
