@@ -29,7 +29,7 @@ _KEPT = (
 _SPECIFICATIONS = {
     "T00000000A1": Spec("development", 7, 1, "within"),
     "T00000000B7": single("development", 7, 0, "rounded triangle of transmission error", 300.0),
-    "T00000000C4": single("development", 7, 6, "S-shaped channel", 300.0),
+    "T00000000C4": single("development", 7, 8, "interpolation of the code", 300.0),
 }
 
 

@@ -7,6 +7,7 @@ import math
 import pytest
 from scipy.stats import binom, norm
 
+from proof.__main__ import failed
 from proof.aims import AIMS, beaten, find, reached
 from proof.answer import Answer, Candidate, Claim, Estimate, HeldOut, Suspect, decode, encode
 from proof.match import covered, error_over_bound, match, superfluous
@@ -241,3 +242,11 @@ def test_better_rivals_are_named() -> None:
 def test_a_truth_that_contradicts_itself_is_refused() -> None:
     with pytest.raises(ValueError, match="0 effects"):
         Truth(trial="A", kind="concealed", split="development")
+
+
+def test_a_bench_fails_by_a_false_find_or_a_missing_answer() -> None:
+    null = Truth(trial="A", kind="nothing", split="development")
+    assert not failed(score([null], [answer("A")]))
+    assert failed(score([null], [answer("A", claim())]))
+    assert failed(score([null], [answer("A", failure="exit status 70", verdict="undecided")]))
+    assert not failed(score([null], [answer("A", claim(), method="sparse")]))  # a rival's is no fault of ours
