@@ -469,8 +469,8 @@ def diagnose(campaign: str, output: Path | None, pdf: bool | None, quiet: bool) 
     """Find out why recordings of CAMPAIGN differ from their prediction.
 
     Detects what exceeds the repeatability floor, refits the known parameters within their uncertainties, locates what
-    they leave, names its physics or measures its law, and proves it on recordings that were held out. Writes a
-    corrected model (corrected/) beside the report.
+    they leave, names its physics or measures its law, and tries it on recordings that were held out. Writes a
+    corrected model (corrected/) beside the report. Experimental: how often it is right is not measured yet.
     """
     from kbs_process.campaign.load import load_campaign
     from kbs_process.campaign.locate import find_campaign, results_folder
