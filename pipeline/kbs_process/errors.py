@@ -40,7 +40,7 @@ class SimulationError(KbsError):
 
 
 class DivergenceError(SimulationError):
-    """The plant's solution grew beyond all bounds."""
+    """The plant has no solution: it grew beyond all bounds, or there is no equilibrium to begin from."""
 
 
 class MissionError(KbsError):

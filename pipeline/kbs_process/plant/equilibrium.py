@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from kbs_process.errors import SimulationError
+from kbs_process.errors import DivergenceError
 from kbs_process.plant.compile import Compiled
 from kbs_process.plant.stepping import state_layout
 from kbs_process.plant.structure import JOINTS, MICROSTEP, RATIO, Structure
@@ -60,7 +60,7 @@ def at_rest(plant: Compiled, structure: Structure, p: Array, field: Array) -> tu
         if np.abs(residual).max() < STANDSTILL:
             break
     else:
-        raise SimulationError(
+        raise DivergenceError(
             "no static equilibrium at the first command: a motor cannot hold its load there",
             remedy="check Tmax and ratio of the drives, and mass and CoG of the bodies",
         )
