@@ -1,7 +1,8 @@
-"""A corrected model on disk: a folder that loads like a campaign without recordings, and predicts any."""
+"""A corrected model on disk: a folder that loads as a campaign of the same recordings, and predicts any other."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -14,8 +15,7 @@ from kbs_process.rig.model import Quantity, Rig
 
 FOUND = "found.toml"  # numbers that the campaign's parameter files do not have
 _OF_DRIVE = ("ratio", "rotor_inertia", "steps_per_turn")
-# What refers to files that stay with the campaign, or to its recordings.
-_LEFT = ("recording", "flight", "mission")
+_LEFT = ("flight", "mission")  # which refer to files that stay with the campaign
 
 
 def write_model(
@@ -39,7 +39,7 @@ def write_model(
         path.write_text(f"# Physics that was left out, {source}.\n" + text_of(added), encoding="utf-8")
         written = (*written, path)
     description = folder / CAMPAIGN_FILE
-    description.write_text(_description(campaign, effects, written, source), encoding="utf-8")
+    description.write_text(_description(campaign, effects, written, source, folder), encoding="utf-8")
     return (description, *written)
 
 
@@ -72,7 +72,9 @@ def _added(before: Rig, after: Rig) -> Tree:
     return tree
 
 
-def _description(campaign: Campaign, effects: Sequence[str], files: Sequence[Path], source: str) -> str:
+def _description(
+    campaign: Campaign, effects: Sequence[str], files: Sequence[Path], source: str, folder: Path
+) -> str:
     document = read(
         campaign.folder / CAMPAIGN_FILE,
         role="the campaign's description",
@@ -81,5 +83,9 @@ def _description(campaign: Campaign, effects: Sequence[str], files: Sequence[Pat
     tree: dict[str, Any] = {key: value for key, value in document.tree.items() if key not in _LEFT}
     model = {key: value for key, value in tree.get("model", {}).items() if key != "modal"}
     tree["model"] = model | {"effects": list(effects)}
+    tree["recording"] = [
+        recording | {"file": os.path.relpath(campaign.folder / recording["file"], folder)}
+        for recording in tree.get("recording", [])
+    ]
     tree["parameters"] = {"files": [f"parameters/{path.name}" for path in files]}
     return f"# {campaign.name}, its model corrected, {source}.\n" + text_of(tree)
