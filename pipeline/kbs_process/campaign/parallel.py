@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
@@ -21,7 +22,8 @@ class Crew(Generic[Held]):
     """Processes that stay from one piece of work to the next, and hold what all pieces need: it is sent to each once.
 
     Every piece is computed as it would be alone, so that the number of processes changes no bit of a result. They are
-    started afresh: compiled code and threads do not survive being copied. One process is this one.
+    started afresh: compiled code and threads do not survive being copied. One process is this one. However this process
+    ends, they end with it.
     """
 
     def __init__(self, held: Held, processes: int | None = None) -> None:
@@ -67,6 +69,15 @@ def ordered_map(
 
 def _receive(held: Any) -> None:
     _held.append(held)
+    threading.Thread(target=_end_with_parent, name="end with parent", daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    """End this process when the crew's owner is gone: one that a signal kills says no goodbye."""
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    parent.join()
+    os._exit(1)  # a pool's process waits for work for ever, and exit handlers would wait for it
 
 
 def _call(function: Callable[[Held, Work], Result], piece: Work) -> Result:
