@@ -4,10 +4,18 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+import pytest
+
+from kbs_process.campaign.config import SensingLaw
 from kbs_process.campaign.corrected_model import write_model
 from kbs_process.campaign.load import load_campaign
+from kbs_process.campaign.reading_laws import readings
+from kbs_process.errors import ConfigError
 from kbs_process.plant.attach import attach
 from kbs_process.plant.effects import select
+from kbs_process.rig.model import Quantity
+from kbs_process.signals.records import WRENCH_CHANNELS
 
 CAMPAIGN = Path(__file__).parents[2] / "campaigns" / "EL089"
 
@@ -28,3 +36,47 @@ def test_it_loads_with_the_effect_that_was_found(tmp_path: Path) -> None:
     assert set(found) == set(before)
     for name in found:
         assert found[name].value.tolist() == before[name].value.tolist(), name
+
+
+def gain(site: str, value: float) -> SensingLaw:
+    return SensingLaw(
+        "channel_gain",
+        site,
+        {"gain": Quantity("sensing", np.asarray(value), "1", np.asarray(1e-3), "a test")},
+    )
+
+
+def test_laws_of_sensors_are_written_and_read(tmp_path: Path) -> None:
+    campaign = load_campaign(CAMPAIGN, checksums=False)
+    write_model(campaign, campaign.rig, campaign.effects, {}, tmp_path, "by a test", [gain("Ty", 0.02)])
+    (law,) = load_campaign(tmp_path, checksums=False).sensing
+    assert (law.law, law.site, float(law.parameters["gain"])) == ("channel_gain", "Ty", 0.02)
+
+
+@pytest.mark.parametrize(
+    ("law", "message"),
+    [
+        (gain("Tq", 0.1), "'Tq' is no site of 'channel_gain'"),
+        (SensingLaw("drift_linear", "Ty", {}), "'drift_linear' is no law"),
+        (SensingLaw("channel_gain", "Ty", {}), "has no 'gain'"),
+    ],
+)
+def test_wrong_laws_of_sensors_are_told(tmp_path: Path, law: SensingLaw, message: str) -> None:
+    campaign = load_campaign(CAMPAIGN, checksums=False)
+    write_model(campaign, campaign.rig, campaign.effects, {}, tmp_path, "by a test", [law])
+    with pytest.raises(ConfigError, match=message):
+        load_campaign(tmp_path, checksums=False)
+
+
+def test_readings_are_what_the_laws_make_of_a_prediction() -> None:
+    rig = load_campaign(CAMPAIGN, checksums=False).rig
+    t = np.arange(400) / 20.0
+    wrench = np.outer(np.sin(t), np.arange(1.0, 7.0))
+    read = readings([gain("Ty", 0.02)], "wrench", WRENCH_CHANNELS, t, wrench, rig, None)
+    expected = wrench.copy()
+    expected[:, 4] *= 1.02
+    np.testing.assert_allclose(read, expected)
+    angle = wrench[:, :2]
+    np.testing.assert_array_equal(
+        readings([gain("Ty", 0.02)], "angle", rig.joint_names, t, angle, rig, None), angle
+    )

@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 from kbs_process.plant.effect import Port
-from kbs_process.plant.effects import CATALOGUE
+from kbs_process.plant.effects import CATALOGUE, MEASURED
 from kbs_process.plant.sensing import SENSING, SensingPort
 
 TEXT = (Path(__file__).parents[2] / "docs" / "catalogue.md").read_text(encoding="utf-8")
@@ -19,4 +19,4 @@ WORDS: dict[Port | SensingPort, str] = {
 def test_every_law_is_listed_at_its_port() -> None:
     rows = [line.split("|")[1:3] for line in TEXT.splitlines() if line.startswith("| `")]
     listed = {name: port.strip() for names, port in rows for name in re.findall(r"`(\w+)`", names)}
-    assert listed == {law.name: WORDS[law.port] for law in (*CATALOGUE, *SENSING)}
+    assert listed == {law.name: WORDS[law.port] for law in (*CATALOGUE, *MEASURED, *SENSING)}

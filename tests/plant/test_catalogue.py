@@ -11,11 +11,12 @@ import pytest
 from kbs_process.campaign.units import DIMENSIONS
 from kbs_process.plant.along import _module, along, signals_of
 from kbs_process.plant.effect import Effect, Port, instance, shared
-from kbs_process.plant.effects import CATALOGUE, find, select
+from kbs_process.plant.effects import CATALOGUE, MEASURED, find, select
 from kbs_process.signals.records import Array
 
 KNOWN_UNITS = {unit for units in DIMENSIONS.values() for unit in units}
-SUSPECTS = [e for e in CATALOGUE if any(p.role == "amplitude" for p in e.parameters)]
+LAWS = (*CATALOGUE, *MEASURED)
+SUSPECTS = [e for e in LAWS if any(p.role == "amplitude" for p in e.parameters)]
 RNG = np.random.default_rng(11)
 
 
@@ -100,8 +101,8 @@ class TestSuspects:
 
 
 def test_names_of_parameters_belong_to_one_effect() -> None:
-    own = [p.name for e in CATALOGUE for p in e.parameters if p.role != "shared"]
-    own += [state.name for e in CATALOGUE for state in e.states]
+    own = [p.name for e in LAWS for p in e.parameters if p.role != "shared"]
+    own += [state.name for e in LAWS for state in e.states]
     assert sorted(own) == sorted(set(own))
 
 

@@ -12,13 +12,13 @@ from hypothesis import strategies as st
 from kbs_process.campaign.units import DIMENSIONS
 from kbs_process.errors import ConfigError
 from kbs_process.plant.effect import Effect, LogNormal, Parameter, Port, State
-from kbs_process.plant.effects import CATALOGUE, select
+from kbs_process.plant.effects import CATALOGUE, MEASURED, select
 from kbs_process.plant.effects.tooth_stiction import limit as tooth_stiction
 
 UNITS = {unit for units in DIMENSIONS.values() for unit in units}
 
 
-@pytest.mark.parametrize("effect", CATALOGUE, ids=lambda effect: effect.name)
+@pytest.mark.parametrize("effect", (*CATALOGUE, *MEASURED), ids=lambda effect: effect.name)
 class TestCatalogue:
     def test_declaration(self, effect: Effect) -> None:
         assert effect.reference
@@ -55,7 +55,7 @@ class TestCatalogue:
 
 
 def test_names_are_unique_and_ordered_as_summed() -> None:
-    names = [effect.name for effect in CATALOGUE]
+    names = [effect.name for effect in (*CATALOGUE, *MEASURED)]
     assert len(set(names)) == len(names)
     assert [effect.name for effect in select(names[::-1])] == names
 

@@ -12,7 +12,7 @@ from kbs_process.campaign.problems import Problems
 from kbs_process.campaign.provenance import sha256
 from kbs_process.errors import did_you_mean
 from kbs_process.plant.effect import Effect, Port
-from kbs_process.plant.effects import CATALOGUE, catalogue_with, find
+from kbs_process.plant.effects import CATALOGUE, MEASURED, catalogue_with, find
 from kbs_process.rig.model import LAB, Joint, Quantity
 
 _KEPT = 0.4  # of the working rate: decimation changes nothing below (stages.resample)
@@ -37,7 +37,7 @@ def check_campaign(
 
 
 def _check_effects(document: Document, problems: Problems) -> None:
-    known = {effect.name for effect in CATALOGUE}
+    known = {effect.name for effect in (*CATALOGUE, *MEASURED)}
     for index, name in enumerate(document.tree.get("model", {}).get("effects", [])):
         if find(name) is None:
             place = document.place(("model", "effects", index))

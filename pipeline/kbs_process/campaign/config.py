@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from kbs_process.rig.model import Rig
+from kbs_process.rig.model import Quantity, Rig
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,6 +108,15 @@ class RecordingEntry:
     without: tuple[str, ...] = ()  # effects of the model that did not act in it
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class SensingLaw:
+    """What a sensor or its clock does to the prediction of one recording."""
+
+    law: str  # its name in the catalogue
+    site: str  # channel; two of them, READS<-ACTS; joint of an encoder; "wrench" or "encoder"
+    parameters: Mapping[str, Quantity]
+
+
 @dataclass(frozen=True, slots=True)
 class Campaign:
     """A campaign that passed every check."""
@@ -128,6 +137,7 @@ class Campaign:
     mission: Path | None = None  # orbit, relay satellites and limits of a reference day
     flight_pointing: tuple[PointingRequirement, ...] = ()  # of the flight model alone
     modal: Path | None = None  # modes of the article on its transducer; None: derived from the plant
+    sensing: tuple[SensingLaw, ...] = ()  # acting on predictions of one recording alone
 
     def acting(self, entry: RecordingEntry) -> tuple[str, ...]:
         """Return the effects of the nominal model that acted in a recording."""

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from kbs_process.campaign.config import Campaign
+import numpy as np
+
+from kbs_process.campaign.config import Campaign, SensingLaw
 from kbs_process.campaign.documents import Tree, read
 from kbs_process.campaign.locate import CAMPAIGN_FILE
 from kbs_process.campaign.parameter_files import corrected, entry, text_of, write_parameters
+from kbs_process.campaign.sensing_laws import table_of
 from kbs_process.rig.model import Quantity, Rig
 
 FOUND = "found.toml"  # numbers that the campaign's parameter files do not have
 _OF_DRIVE = ("ratio", "rotor_inertia", "steps_per_turn")
-_LEFT = ("flight", "mission")  # which refer to files that stay with the campaign
 
 
 def write_model(
@@ -25,40 +28,49 @@ def write_model(
     changed: Mapping[str, Quantity],
     folder: Path,
     source: str,
+    sensing: Sequence[SensingLaw] = (),
 ) -> tuple[Path, ...]:
     """Write campaign.toml and parameter files into `folder`; return their paths.
 
-    `rig` and `effects` are the corrected ones, `changed` has its quantities that differ from the campaign's, in SI.
+    `rig` and `effects` are the corrected ones, `changed` has its quantities that differ from the campaign's, in SI;
+    a number that the campaign has not, and that was not fitted, is exact: it was chosen, or nothing acts there.
+    `sensing` are laws that the sensors have beside the campaign's.
     """
     known = campaign.rig.quantities()
     old = {name: quantity for name, quantity in changed.items() if name in known}
     written = write_parameters(folder / "parameters", corrected(campaign, old, source))
-    added = _added(campaign.rig, rig)
+    added = _added(campaign.rig, rig, changed, source)
     if added:
         path = folder / "parameters" / FOUND
         path.write_text(f"# Physics that was left out, {source}.\n" + text_of(added), encoding="utf-8")
         written = (*written, path)
     description = folder / CAMPAIGN_FILE
-    description.write_text(_description(campaign, effects, written, source, folder), encoding="utf-8")
+    every = (*campaign.sensing, *sensing)
+    description.write_text(_description(campaign, effects, every, written, source, folder), encoding="utf-8")
     return (description, *written)
 
 
-def _added(before: Rig, after: Rig) -> Tree:
+def _added(before: Rig, after: Rig, changed: Mapping[str, Quantity], source: str) -> Tree:
     """Numbers of `after` that `before` has not, as tables of a parameter file."""
     known = before.quantities()
     tree: Tree = {}
+
+    def found(quantity: Quantity) -> dict[str, Any]:
+        chosen = replace(quantity, sigma=np.zeros_like(quantity.sigma), source=source)
+        return entry(changed.get(quantity.name, chosen))
+
     for external in after.external:
         if external.name not in {other.name for other in before.external}:
             own: Tree = {"on": external.on}
             if external.point is not None:
-                own["point"] = entry(external.point)
-            own["parameters"] = {name: entry(quantity) for name, quantity in external.parameters.items()}
+                own["point"] = found(external.point)
+            own["parameters"] = {name: found(quantity) for name, quantity in external.parameters.items()}
             tree.setdefault("external", {})[external.name] = own
     for joint in after.joints:
         if joint.drive is None:
             continue
         own = {
-            name: entry(quantity)
+            name: found(quantity)
             for name, quantity in joint.drive.parameters.items()
             if quantity.name not in known
         }
@@ -66,26 +78,40 @@ def _added(before: Rig, after: Rig) -> Tree:
         for name in _OF_DRIVE:
             quantity: Quantity = getattr(joint.drive, name)
             if quantity.name not in known:
-                whole[name] = entry(quantity)
+                whole[name] = found(quantity)
         if whole:
             tree.setdefault("joint", {})[joint.name] = {"drive": whole}
     return tree
 
 
 def _description(
-    campaign: Campaign, effects: Sequence[str], files: Sequence[Path], source: str, folder: Path
+    campaign: Campaign,
+    effects: Sequence[str],
+    sensing: Sequence[SensingLaw],
+    files: Sequence[Path],
+    source: str,
+    folder: Path,
 ) -> str:
     document = read(
         campaign.folder / CAMPAIGN_FILE,
         role="the campaign's description",
         remedy="keep the campaign as it is meanwhile",
     )
-    tree: dict[str, Any] = {key: value for key, value in document.tree.items() if key not in _LEFT}
+
+    def from_here(name: str) -> str:
+        return Path(os.path.relpath(campaign.folder / name, folder)).as_posix()
+
+    tree: dict[str, Any] = dict(document.tree)
     model = {key: value for key, value in tree.get("model", {}).items() if key != "modal"}
     tree["model"] = model | {"effects": list(effects)}
+    if sensing:
+        tree["model"]["sensing"] = [table_of(law) for law in sensing]
     tree["recording"] = [
-        recording | {"file": os.path.relpath(campaign.folder / recording["file"], folder)}
-        for recording in tree.get("recording", [])
+        recording | {"file": from_here(recording["file"])} for recording in tree.get("recording", [])
     ]
+    if "flight" in tree:
+        tree["flight"] = tree["flight"] | {"substitute": [*map(from_here, tree["flight"]["substitute"])]}
+    if "mission" in tree:
+        tree["mission"] = tree["mission"] | {"file": from_here(tree["mission"]["file"])}
     tree["parameters"] = {"files": [f"parameters/{path.name}" for path in files]}
     return f"# {campaign.name}, its model corrected, {source}.\n" + text_of(tree)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -9,9 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from kbs_process.campaign import provenance
-from kbs_process.campaign.config import Campaign
+from kbs_process.campaign.config import Campaign, SensingLaw
 from kbs_process.campaign.corrected_model import write_model
 from kbs_process.campaign.run import Outcome as Told
+from kbs_process.campaign.sensing_laws import belongs_to_model
 from kbs_process.campaign.store import writing
 from kbs_process.campaign.tables import write_table
 from kbs_process.diagnosis.experiment import Experiment
@@ -19,8 +21,11 @@ from kbs_process.diagnosis.floor import Floor
 from kbs_process.diagnosis.hypothesis import Prediction
 from kbs_process.diagnosis.joint import Standing
 from kbs_process.diagnosis.known import Known
+from kbs_process.diagnosis.measured import with_curves
 from kbs_process.diagnosis.outcome import Curve, Find, Identity, Outcome
+from kbs_process.diagnosis.suspects import BY
 from kbs_process.diagnosis.thresholds import RIVALS
+from kbs_process.plant.sensing import SENSING
 from kbs_process.report import build
 from kbs_process.report.records import diagnosis as records
 from kbs_process.report.records.common import Check, Conclusion, Notice, encode
@@ -29,7 +34,7 @@ from kbs_process.signals.records import Array
 
 CORRECTED = "corrected"
 _SHOWN = 25  # suspects in the table
-_READINGS = "its law changes readings, and not the plant: the corrected model is without it"
+_EACH_TIME = "it is each recording's own, or the controller's: the corrected model is without it"
 _NOTES = (
     "The floor is what repeats of one trajectory differ by. Constants and slopes of the transducer's channels and "
     "errors of the clocks, each recording's own, are taken out of every comparison.",
@@ -298,8 +303,9 @@ def _warnings(outcome: Outcome) -> Iterator[Notice]:
                 what=f"{find.identity.law} was judged by leaving out fit recordings in turn: none was held out",
                 remedy="give a recording the role held-out, better of another trajectory",
             )
-        if _on_readings(find, outcome.standing):
-            yield Notice(severity="info", what=f"{find.identity.law}: {_READINGS}", where=CORRECTED)
+        law = _SENSORS.get(find.identity.law)
+        if law is not None and not belongs_to_model(law):
+            yield Notice(severity="info", what=f"{find.identity.law}: {_EACH_TIME}", where=CORRECTED)
     if not outcome.standing.known.experiment.held_out:
         yield Notice(
             severity="warning",
@@ -308,25 +314,49 @@ def _warnings(outcome: Outcome) -> Iterator[Notice]:
         )
 
 
-def _on_readings(find: Find, standing: Standing) -> bool:
-    return find.identity.law not in standing.hypothesis.effects
-
-
 def _corrected(campaign: Campaign, outcome: Outcome, folder: Path) -> tuple[Path, ...]:
     known = outcome.standing.known
     source = "by diagnosis of " + ", ".join(known.experiment.trials[k].name for k in known.experiment.fit)
-    hypothesis = outcome.standing.hypothesis
+    hypothesis = with_curves(outcome.standing, outcome.finds)
     quantities = hypothesis.rig.quantities()
     # Matrices may lie in files of their own, which the corrected model would not find.
     changed: dict[str, Quantity] = {name: q for name, q in quantities.items() if q.value.ndim > 1}
+    within = outcome.standing.hypothesis.rig.quantities()
+    changed |= {name: replace(q, source=source) for name, q in quantities.items() if name not in within}
     for index, scalar in enumerate(known.free):
         if scalar.quantity in quantities:
             quantity = changed.get(scalar.quantity, quantities[scalar.quantity])
             sigma = quantity.sigma.copy()
             sigma[scalar.element] = known.sigma[index]
             changed[scalar.quantity] = replace(quantity, sigma=sigma, source=source)
-    rig = hypothesis.rig
-    return write_model(campaign, rig, hypothesis.effects, changed, folder, source)
+    sensing = tuple(_sensing(find, outcome.standing, source) for find in outcome.finds if _reads(find))
+    return write_model(campaign, hypothesis.rig, hypothesis.effects, changed, folder, source, sensing)
+
+
+_SENSORS = {law.name: law for law in SENSING}
+
+
+def _reads(find: Find) -> bool:
+    """Whether a find is a law of a sensor or its clock that is the same in every recording."""
+    law = _SENSORS.get(find.identity.law)
+    return law is not None and belongs_to_model(law)
+
+
+def _sensing(find: Find, standing: Standing, source: str) -> SensingLaw:
+    """A find as the model's sensors have it, its amplitudes as they stand after all finds."""
+    law, own = _SENSORS[find.identity.law], find.identity
+    site = BY.join(own.channels) or own.axis
+    known = standing.known
+    places = {scalar.name: index for index, scalar in enumerate(known.free)}
+    numbers = {}
+    for one in find.estimates:
+        # A second action of the same law has numbered amplitudes.
+        entry = next(entry for entry in law.parameters if re.fullmatch(rf"{entry.name}(_\d+)?", one.name))
+        index = places.get(f"law.{law.name}.{site}.{one.name}")
+        value, sigma = (one.value, one.sigma) if index is None else (known.value[index], known.sigma[index])
+        name = f"sensing.{site}.{law.name}.{entry.name}"
+        numbers[entry.name] = Quantity(name, np.asarray(value), entry.unit, np.asarray(sigma), source)
+    return SensingLaw(law.name, site, numbers)
 
 
 def _spectra(folder: Path, before: Known, after: Known, k: int) -> None:

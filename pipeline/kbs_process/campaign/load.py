@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from kbs_process.campaign.checks import check_campaign
-from kbs_process.campaign.config import Bands, Campaign, RecordingEntry, Topic, Topics
+from kbs_process.campaign.config import Bands, Campaign, RecordingEntry, SensingLaw, Topic, Topics
 from kbs_process.campaign.documents import Document, Merged, Tree, check_finite, merge, read, substituted
 from kbs_process.campaign.locate import CAMPAIGN_FILE
 from kbs_process.campaign.problems import Problems
@@ -55,7 +55,7 @@ def load_campaign(
     campaign = _campaign(folder, document, tables, rig, problems)
     if flight:
         article = document.tree["flight"].get("article", campaign.article)
-        flown = tuple(effect.name for effect in select(campaign.effects) if effect.port.of_drive)
+        flown = tuple(effect.name for effect in select(campaign.effects) if effect.flies)
         campaign = replace(campaign, article=article, effects=flown, rig=replace(rig, external=()))
     if recordings and not campaign.recordings:
         remedy = "add [[recording]], or simulate the campaign's mission: kbs-process reference-day"
@@ -144,7 +144,17 @@ def _campaign(folder: Path, document: Document, tables: Merged, rig: Rig, proble
             for index, table in enumerate(tree.get("flight", {}).get("pointing", []))
         ),
         modal=modal,
+        sensing=_sensing(document, rig, problems),
     )
+
+
+def _sensing(document: Document, rig: Rig, problems: Problems) -> tuple[SensingLaw, ...]:
+    if "sensing" not in document.tree.get("model", {}):
+        return ()
+    # Few campaigns have one, and the laws take their time to import.
+    from kbs_process.campaign.sensing_laws import read_sensing
+
+    return read_sensing(document, rig, problems)
 
 
 def _topics(tree: Tree, rig: Rig) -> Topics:

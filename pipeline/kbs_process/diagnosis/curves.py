@@ -1,7 +1,8 @@
 """Laws beyond the catalogue: any smooth function of one regressor at a port, its coefficients linear.
 
-Cubic B-splines over what the regressor sweeps. A curve has no name; where it passes and no law of the catalogue does,
-it is the measured law, which it shows with a band.
+Cubic B-splines over what the regressor sweeps, those of `plant.effects.measured_law`, so that the plant can contain
+what was found. A curve has no name; where it passes and no law of the catalogue does, it is the measured law, which it
+shows with a band.
 """
 
 from __future__ import annotations
@@ -10,14 +11,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import BSpline
 
 from kbs_process.diagnosis.inlets import Inlet
 from kbs_process.diagnosis.scene import Scene
+from kbs_process.plant.effects.measured_law import COEFFICIENTS, INTERVALS
 from kbs_process.signals.records import Array
 
-_COEFFICIENTS = 10
-_DEGREE = 3
 _RESTS = 1e-9
 # Regressor -> unit. A rate is the slope of the angle; both are the output's.
 REGRESSORS = {"joint_angle": "rad", "joint_rate": "rad/s"}
@@ -32,7 +31,7 @@ class CurveSuspect:
     port: str
     joint: str
     regressor: str
-    knots: Array  # clamped, of the splines
+    knots: Array  # (INTERVALS + 1,) equally apart
 
     @property
     def family(self) -> tuple[str, str]:
@@ -40,7 +39,7 @@ class CurveSuspect:
 
     @property
     def amplitudes(self) -> tuple[str, ...]:
-        return tuple(f"c{k}" for k in range(len(self.knots) - _DEGREE - 1))
+        return tuple(f"c{k}" for k in range(COEFFICIENTS))
 
     @property
     def each_trial(self) -> bool:
@@ -59,11 +58,16 @@ class CurveSuspect:
         raise NotImplementedError(f"a law at {self.port} goes through the plant")
 
     def basis(self, x: Array) -> Array:
-        """(m, coefficients) splines at x (m,), zero outside what was swept."""
-        low, high = self.knots[0], self.knots[-1]
-        return np.asarray(
-            BSpline.design_matrix(np.clip(x, low, high), self.knots, _DEGREE).toarray(), dtype=np.float64
-        )
+        """(m, coefficients) splines at x (m,), held beyond what was swept."""
+        return basis(x, float(self.knots[0]), float(self.knots[-1]))
+
+
+def basis(x: Array, low: float, high: float) -> Array:
+    """(m, COEFFICIENTS) cardinal cubic B-splines at x (m,): `measured_law.spline`, coefficient by coefficient."""
+    u = INTERVALS * np.clip((x - low) / (high - low), 0.0, 1.0)
+    away = np.abs(u[:, None] - np.arange(-1.0, COEFFICIENTS - 1.0))
+    weights: Array = (np.maximum(2.0 - away, 0.0) ** 3 - 4.0 * np.maximum(1.0 - away, 0.0) ** 3) / 6.0
+    return weights
 
 
 def series(scene: Scene, drive: int, joint: str, regressor: str) -> Array:
@@ -89,7 +93,6 @@ def curves(scene: Scene) -> tuple[CurveSuspect, ...]:
             low, high = min(x.min() for x in swept), max(x.max() for x in swept)
             if high - low < _RESTS:
                 continue
-            inner = np.linspace(low, high, _COEFFICIENTS - _DEGREE + 1)
-            knots = np.concatenate([np.full(_DEGREE, low), inner, np.full(_DEGREE, high)])
+            knots = np.linspace(low, high, INTERVALS + 1)
             found += [CurveSuspect(scene, port, joint.name, regressor, knots) for port in PORTS]
     return tuple(found)

@@ -85,7 +85,7 @@ def candidates(
         for law in left_out
         if any(entry.role == "amplitude" for entry in law.parameters)
         for site in _sites(law, rig, columns)
-        for effect in [_next_action(law, rig, site, accepted)]
+        for effect in [next_action(law, rig, site, accepted)]
         for shape in _grid(effect, site, ranges, own_values(rig, site))
     ]
     sensing = [
@@ -117,7 +117,7 @@ def _sites(effect: Effect, rig: Rig, columns: Sequence[str]) -> list[str]:
     return [joint.name for joint in rig.joints if fits(joint)]
 
 
-def _next_action(effect: Effect, rig: Rig, site: str, accepted: Sequence[str]) -> Effect:
+def next_action(effect: Effect, rig: Rig, site: str, accepted: Sequence[str]) -> Effect:
     """The effect itself, or its first instance that does not act at the site."""
     own = own_values(rig, site)
     for number in range(1, 10):

@@ -113,11 +113,12 @@ def along_text(effect: Effect) -> str:
     lines = [
         f'"""Generated: {effect.name} along signals."""',
         "from numba import njit",
+        "from kbs_process.plant.elementary import linked",
         f"from {effect.equation.__module__} import {effect.equation.__qualname__} as _equation",
         "",
         "# Neither entries from Python nor the plant's own sine: half the time to compile.",
         'compiled = njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)',
-        "equation = compiled(_equation)",
+        "equation = linked(_equation, compiled)",
         "",
         "",
         "@compiled",

@@ -174,6 +174,7 @@ class Effect:
 
     An effect with n states returns a tuple: its value, then the n time derivatives in their order. At a port of the
     rig, an equation returns three components.
+    What acts at the ground's port belongs to the test, unless it is part `of_article`.
     `passive` claims that it never does positive work; the conformance test holds it to that. What comes from outside
     has amplitudes of its own in `each_trial`. An effect can act several times: see `instance`.
     """
@@ -186,6 +187,7 @@ class Effect:
     states: tuple[State, ...] = ()
     passive: bool = False
     each_trial: bool = False
+    of_article: bool = False  # although the wrench feels it at a port of the ground: an appendage
     tag: str = ""  # what `instance` has added to the names of parameters and states
 
     def __post_init__(self) -> None:
@@ -220,6 +222,11 @@ class Effect:
         names = [entry.name for entry in self.parameters] + [state.name for state in self.states]
         own = {name.removesuffix(self.tag): name for name in names}
         return tuple(own.get(name, name) for name in _asked(self.equation))
+
+    @property
+    def flies(self) -> bool:
+        """Whether it acts in orbit too: what the laboratory does stays behind."""
+        return self.of_article or (self.port.of_drive and self.port is not Port.GROUND_TORQUE)
 
     def value(self, known: Mapping[str, float]) -> tuple[float, ...]:
         """Return the equation's components for numbers by name; its own states are at their initial values."""

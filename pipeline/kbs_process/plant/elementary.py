@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from math import atan, atan2, copysign, exp, expm1, fabs, hypot, log, log1p, pi, sqrt, tan, tanh, tau
+from types import FunctionType
 from typing import Any, TypeVar, cast
 
 import numpy as np
@@ -37,6 +38,19 @@ INVERSE_PI = 0.3183098861837907
 def compiled(function: F) -> F:
     """Compile `function` when generated code first calls it."""
     return cast(F, njit(**OPTIONS)(function))
+
+
+def linked(function: F, compiler: Callable[[F], F], **names: object) -> F:
+    """Compile a plain function together with those that it calls by name; `names` take the place of its file's.
+
+    What it calls stands in its own file: the cache of compiled plants knows that file's text.
+    """
+    assert isinstance(function, FunctionType)
+    known = {**function.__globals__, **names}
+    for name in function.__code__.co_names:
+        if isinstance(known.get(name), FunctionType):
+            known[name] = linked(known[name], compiler, **names)
+    return compiler(cast(F, FunctionType(function.__code__, known, function.__name__)))
 
 
 @compiled

@@ -9,11 +9,8 @@ the origin, force), and the inertia of a body is (m, h, I): mass, first moment m
 
 from __future__ import annotations
 
-from types import FunctionType
-from typing import cast
-
 from kbs_process.plant import elementary
-from kbs_process.plant.elementary import F, compiled, cos, floor, sin
+from kbs_process.plant.elementary import F, compiled, cos, floor, linked, sin
 from kbs_process.signals.records import Array
 
 Vector = tuple[float, float, float]
@@ -24,8 +21,7 @@ Inertia = tuple[float, float, float, float, float, float, float, float, float, f
 
 def compiled_effect(equation: F) -> F:
     """Compile an effect's equation, a plain function of floats, with the inlined sine and cosine."""
-    names = {**equation.__globals__, "math": elementary}
-    return compiled(cast(F, FunctionType(equation.__code__, names, equation.__name__)))
+    return linked(equation, compiled, math=elementary)
 
 
 @compiled

@@ -36,6 +36,12 @@ from kbs_process.plant.effects.kinematic_error import KINEMATIC_ERROR
 from kbs_process.plant.effects.load_friction import LOAD_FRICTION
 from kbs_process.plant.effects.local_torque import LOCAL_TORQUE
 from kbs_process.plant.effects.lugre import LUGRE
+from kbs_process.plant.effects.measured_law import (
+    GROUND_ANGLE_LAW,
+    GROUND_RATE_LAW,
+    JOINT_ANGLE_LAW,
+    JOINT_RATE_LAW,
+)
 from kbs_process.plant.effects.microstep_error import MICROSTEP_ERROR
 from kbs_process.plant.effects.motor_asymmetry import MOTOR_ASYMMETRY
 from kbs_process.plant.effects.motor_drag import MOTOR_DRAG
@@ -93,17 +99,21 @@ CATALOGUE: tuple[Effect, ...] = (
     FLOOR_VIBRATION,
 )
 
-_POSITION = {effect.name: index for index, effect in enumerate(CATALOGUE)}
+# Measured laws, which have no name: a model can contain them, and no search tries them as suspects.
+MEASURED: tuple[Effect, ...] = (JOINT_ANGLE_LAW, JOINT_RATE_LAW, GROUND_ANGLE_LAW, GROUND_RATE_LAW)
+
+_EVERY = (*CATALOGUE, *MEASURED)
+_POSITION = {effect.name: index for index, effect in enumerate(_EVERY)}
 
 
 def find(name: str) -> Effect | None:
     """Return the effect of that name; `NAME_2`, `NAME_3`, ... is one more action of the same."""
     if name in _POSITION:
-        return CATALOGUE[_POSITION[name]]
+        return _EVERY[_POSITION[name]]
     again = re.fullmatch(r"(.+)_([2-9])", name)
     if again is None or again[1] not in _POSITION:
         return None
-    return instance(CATALOGUE[_POSITION[again[1]]], int(again[2]))
+    return instance(_EVERY[_POSITION[again[1]]], int(again[2]))
 
 
 def catalogue_with(names: Sequence[str]) -> tuple[Effect, ...]:

@@ -55,4 +55,5 @@ APPENDAGE = Effect(
         State("sway", "rad", 0.0, "angle against the link"),
         State("sway_rate", "rad/s", 0.0, "rate"),
     ),
+    of_article=True,
 )

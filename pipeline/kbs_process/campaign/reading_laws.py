@@ -1,0 +1,86 @@
+"""What a model's sensors and clocks make of a prediction: readings instead of true values."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+
+import numpy as np
+
+from kbs_process.campaign.config import Campaign, SensingLaw
+from kbs_process.campaign.sensing_laws import LAWS
+from kbs_process.diagnosis.signature import sensed
+from kbs_process.diagnosis.suspects import BY, Candidate
+from kbs_process.plant.sensing import SensingPort
+from kbs_process.rig.model import Rig
+from kbs_process.signals.records import WRENCH_CHANNELS, Array, Block, Events
+
+_READ = ("wrench", "effort", "angle")  # streams that sensors make
+
+
+def read_through(
+    campaign: Campaign, streams: Iterable[tuple[str, Block]], temperature: Events | None
+) -> Iterator[tuple[str, Block]]:
+    """Yield predicted streams as the model's sensors would read them; without such laws block by block, as they come.
+
+    A law may remember what it has read: streams that laws change are kept until they are whole.
+    """
+    if not campaign.sensing:
+        yield from streams
+        return
+    kept: dict[str, list[Block]] = {}
+    for key, block in streams:
+        if key in _READ:
+            kept.setdefault(key, []).append(block)
+        else:
+            yield key, block
+    for key, blocks in kept.items():
+        values = np.concatenate([block.values for block in blocks])
+        stamp = np.concatenate([block.stamp for block in blocks])
+        log = np.concatenate([block.log for block in blocks])
+        names = channels(key, campaign.rig)
+        read = readings(campaign.sensing, key, names, stamp * 1e-9, values, campaign.rig, temperature)
+        yield key, Block(stamp, log, read)
+
+
+def channels(key: str, rig: Rig) -> tuple[str, ...]:
+    """Return the names of a predicted stream's columns."""
+    if key == "wrench":
+        return WRENCH_CHANNELS
+    return rig.channels[len(rig.transducer.channels) :] if key == "effort" else rig.joint_names
+
+
+def readings(
+    laws: Sequence[SensingLaw],
+    key: str,
+    names: Sequence[str],
+    t: Array,
+    values: Array,
+    rig: Rig,
+    temperature: Events | None,
+) -> Array:
+    """(n, c) values at t (n,) s with the changes by all laws that act on their stream.
+
+    Each law sees the values before any of them: they are small, as the diagnosis that found them had them.
+    """
+    warmth = None if temperature is None else np.interp(t, temperature.t, temperature.values[:, 0])
+    read = values.copy()
+    for entry in laws:
+        law = LAWS[entry.law]
+        amplitudes = [one.name for one in law.parameters if one.role == "amplitude"]
+        numbers = {name: float(quantity) for name, quantity in entry.parameters.items()}
+        shape = tuple((name, value) for name, value in numbers.items() if name not in amplitudes)
+        if not _acts(entry, key, names) or ("temperature" in law.arguments and warmth is None):
+            continue
+        units = sensed(Candidate(law, entry.site, shape), t, values, names, rig, warmth)
+        read += units @ np.array([numbers[name] for name in amplitudes])
+    return read
+
+
+def _acts(entry: SensingLaw, key: str, names: Sequence[str]) -> bool:
+    match LAWS[entry.law].port:
+        case SensingPort.STREAM:
+            return (key == "angle") == (entry.site == "encoder")
+        case SensingPort.ENCODER:
+            return key == "angle"
+        case _:
+            return key != "angle" and entry.site.split(BY)[0] in names

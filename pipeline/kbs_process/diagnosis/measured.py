@@ -1,0 +1,121 @@
+"""A measured law in the plant: the effect that a curve's coefficients are the parameters of."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from kbs_process.diagnosis.curves import CurveSuspect
+from kbs_process.diagnosis.gls import Score
+from kbs_process.diagnosis.hypothesis import Hypothesis
+from kbs_process.diagnosis.joint import Extra, Standing
+from kbs_process.diagnosis.outcome import Curve, Find
+from kbs_process.diagnosis.suspects import next_action
+from kbs_process.plant.attach import attach
+from kbs_process.plant.effect import Effect
+from kbs_process.plant.effects import select
+from kbs_process.plant.effects.measured_law import (
+    COEFFICIENTS,
+    GROUND_ANGLE_LAW,
+    GROUND_RATE_LAW,
+    JOINT_ANGLE_LAW,
+    JOINT_RATE_LAW,
+)
+from kbs_process.rig.model import Joint
+from kbs_process.signals.records import Array
+from kbs_process.stages.output_error import Scalar
+
+# By port and regressor of a curve.
+LAWS: Mapping[tuple[str, str], Effect] = {
+    ("joint_torque", "joint_angle"): JOINT_ANGLE_LAW,
+    ("joint_torque", "joint_rate"): JOINT_RATE_LAW,
+    ("ground_torque", "joint_angle"): GROUND_ANGLE_LAW,
+    ("ground_torque", "joint_rate"): GROUND_RATE_LAW,
+}
+
+
+def inserted(
+    hypothesis: Hypothesis,
+    law: tuple[str, str],
+    joint: str,
+    ends: tuple[float, float],
+    coefficients: Array,
+    sigma: Array,
+) -> tuple[Hypothesis, tuple[Scalar, ...]]:
+    """Return a hypothesis with a measured law in its plant, and the rig's numbers that its coefficients are.
+
+    `law` is a key of LAWS, `ends` the range of its regressor, `coefficients` those of `curves.basis` (COEFFICIENTS,),
+    `sigma` theirs. A joint that has such a law already gets one more action of it.
+    """
+    effect = next_action(LAWS[law], hypothesis.rig, joint, hypothesis.effects)
+    names = [entry.name for entry in effect.parameters]
+    values = dict(zip(names, (*map(float, coefficients), *ends), strict=True))
+    rig = attach(hypothesis.rig, effect, values, joints=[joint])
+    spread = dict(zip(names, (*map(float, sigma), 0.0, 0.0), strict=True))
+    rig = replace(rig, joints=tuple(_stated(one, spread, at=joint) for one in rig.joints))
+    effects = tuple(one.name for one in select([*dict.fromkeys([*hypothesis.effects, effect.name])]))
+    path = f"joint.{joint}.drive"
+    return Hypothesis(rig, effects), tuple(Scalar(f"{path}.{name}") for name in names[:COEFFICIENTS])
+
+
+def _stated(joint: Joint, spread: Mapping[str, float], at: str) -> Joint:
+    """A joint with the law's sigmas; where the law does not act, its coefficients are exactly zero."""
+    if joint.drive is None:
+        return joint
+    parameters = {
+        name: replace(
+            quantity, sigma=np.asarray(spread[name] if joint.name == at else 0.0), source="measured law"
+        )
+        if name in spread and (joint.name == at or not float(quantity))
+        else quantity
+        for name, quantity in joint.drive.parameters.items()
+    }
+    return replace(joint, drive=replace(joint.drive, parameters=parameters))
+
+
+def extra(suspect: CurveSuspect, score: Score, standing: Standing) -> Extra:
+    """A curve in the non-linear plant at the screen's coefficients, these without a prior."""
+    low, high = float(suspect.knots[0]), float(suspect.knots[-1])
+    size = np.sqrt(np.maximum(np.diag(score.covariance), 0.0))
+    hypothesis, scalars = inserted(
+        standing.hypothesis, (suspect.port, suspect.regressor), suspect.joint, (low, high), score.amplitude, size
+    )  # fmt: skip
+    return Extra(
+        hypothesis=hypothesis,
+        plant=scalars,
+        start=score.amplitude,
+        prior=0.0 * score.amplitude,
+        sigma=np.full(COEFFICIENTS, np.inf),
+        # One size for all: a coefficient that is zero by chance has a slope as well.
+        scale=np.full(COEFFICIENTS, max(float(np.abs(score.amplitude).max()), 5.0 * float(size.min()))),
+    )
+
+
+def with_curves(standing: Standing, finds: Sequence[Find]) -> Hypothesis:
+    """Return the hypothesis with every measured law that was found beside the plant now inside it."""
+    hypothesis, known = standing.hypothesis, standing.known
+    places = {scalar.name: index for index, scalar in enumerate(known.free)}
+    told: dict[str, int] = {}
+    for find in finds:
+        if find.curve is None:
+            continue
+        law = law_of(find.identity.port, find.curve)
+        tag = f"law.{law[0]} of {law[1]}.{find.identity.axis}.c"
+        own = [places[name] for name in standing.laws if name.startswith(tag)]
+        begin = told.get(tag, 0)
+        chosen = own[begin : begin + COEFFICIENTS]
+        if not chosen:  # it is in the plant already
+            continue
+        told[tag] = begin + COEFFICIENTS
+        ends = float(find.curve.x[0]), float(find.curve.x[-1])
+        hypothesis, _ = inserted(
+            hypothesis, law, find.identity.axis, ends, known.value[chosen], known.sigma[chosen]
+        )
+    return hypothesis
+
+
+def law_of(port: str, curve: Curve) -> tuple[str, str]:
+    """Key of LAWS of a curve that was found at a port, in the words of `tryout.identity`."""
+    return ("ground_torque" if port == "external wrench" else "joint_torque"), curve.regressor
