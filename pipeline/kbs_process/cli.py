@@ -194,27 +194,45 @@ def simulate(
 
 
 @cli.command(
-    epilog=examples("predict campaign/EL089 EL089P00_1", "predict campaign/EL089 other.mcap -o /tmp/other")
+    epilog=examples(
+        "predict campaign/EL089 EL089P00_1",
+        "predict campaign/EL089 other.mcap -o /tmp/other",
+        "predict --model reports/EL089-diagnosis/corrected other.mcap",
+    )
 )
-@campaign_argument
-@click.argument("recording")
+@click.argument("words", nargs=-1, required=True, metavar="[CAMPAIGN] RECORDING")
+@click.option(
+    "--model",
+    type=click.Path(path_type=Path, exists=True),
+    metavar="FOLDER",
+    help="A corrected model that 'diagnose' wrote, in the place of CAMPAIGN.",
+)
 @output_option
 @quiet_option
-def predict(campaign: str, recording: str, output: Path | None, quiet: bool) -> None:
+def predict(words: tuple[str, ...], model: Path | None, output: Path | None, quiet: bool) -> None:
     """Predict one RECORDING: a name from CAMPAIGN, or any MCAP file with the same topics.
 
     The plant follows what was recorded: field positions, encoders and commands, or, for a campaign that is
     driven by motion, the measured angles. The rig is the one of the parameter files, nothing is fitted.
+    With --model, RECORDING may also be a table of commands as 'simulate' takes it, CSV or Parquet.
     Writes the prediction as Parquet and as predicted.mcap.
     """
+    if len(words) != (2 if model is None else 1):
+        raise click.UsageError("Give CAMPAIGN and RECORDING, or --model FOLDER and RECORDING.")
     from kbs_process.campaign.load import load_campaign
     from kbs_process.campaign.locate import find_campaign, results_folder
-    from kbs_process.campaign.simulate import predict_recording
+    from kbs_process.campaign.simulate import predict_recording, predict_with
 
-    folder = find_campaign(campaign)
-    target = results_folder(folder, output, suffix="-predicted")
-    loaded = load_campaign(folder, checksums=False)
-    click.echo(f"Predicted: {predict_recording(loaded, recording, target, progress=_progress(quiet))}")
+    folder = find_campaign(words[0] if model is None else str(model))
+    # The recordings that a model came from may be elsewhere by now.
+    loaded = load_campaign(folder, checksums=False, recordings=model is None)
+    if model is None:
+        target = results_folder(folder, output, suffix="-predicted")
+        written = predict_recording(loaded, words[1], target, progress=_progress(quiet))
+    else:
+        named = output or Path("reports") / f"{loaded.name}-corrected-predicted"
+        written = predict_with(loaded, words[0], results_folder(folder, named), progress=_progress(quiet))
+    click.echo(f"Predicted: {written}")
 
 
 @cli.command(

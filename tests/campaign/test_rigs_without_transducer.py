@@ -8,8 +8,12 @@ from pathlib import Path
 import pytest
 from campaign_folder import CampaignFolder, make_folder
 
+from kbs_process.campaign.corrected_model import write_model
 from kbs_process.campaign.importers.mapping import PRESETS
 from kbs_process.campaign.load import load_campaign
+from kbs_process.errors import ConfigError
+from kbs_process.plant.attach import attach
+from kbs_process.plant.effects import select
 
 RECORDING = """
 [[recording]]
@@ -85,3 +89,21 @@ def test_what_only_a_measured_motion_can_drive_is_refused_under_commands(tmp_pat
     viscous = 'viscous = { value = 1.0, unit = "N m s/rad", sigma = 0.0, source = "test" }'
     folder.replace("parameters/rig.toml", "[joint.az]", f"[joint.az]\n{viscous}")
     assert "joint.az.viscous: goes with a rig that its measured motion drives" in str(folder.refusal())
+
+
+def test_a_corrected_model_of_a_slide_has_newtons_and_metres_and_loads(
+    axis: CampaignFolder, tmp_path: Path
+) -> None:
+    campaign = load_campaign(axis.path)
+    (dahl,) = select(["dahl"])
+    rig = attach(campaign.rig, dahl, {"dahl": 3.0, "dahl_displacement": 1e-3})
+    folder = tmp_path / "corrected"
+    write_model(campaign, rig, ("dahl",), {}, folder, "by a test")
+    found = load_campaign(folder, recordings=False).rig.quantities()
+    assert found["joint.axis.drive.dahl"].unit == "N"
+    assert found["joint.axis.drive.dahl_displacement"].unit == "m"
+    # One that turned by commands would need a rotor.
+    text = (folder / "campaign.toml").read_text().replace('drive = "motion"', 'drive = "command"')
+    (folder / "campaign.toml").write_text(text)
+    with pytest.raises(ConfigError, match="a rotor of its own"):
+        load_campaign(folder, recordings=False)

@@ -104,6 +104,9 @@ def _check_joint(joint: Joint, effects: tuple[str, ...], tables: Merged, problem
     if joint.drive is None:
         problems.add(tables.place(key), "is missing", 'describe the drive, or set drive = "motion"')
         return
+    if not float(joint.drive.rotor_inertia):
+        what = "0.0 is out of bounds: a drive that commands turn has a rotor of its own"
+        problems.add(tables.place((*key, "rotor_inertia", "value")), what, "give more than 0")
     for effect in catalogue_with(effects):
         if effect.port.of_drive:
             named = effect.name in effects

@@ -14,14 +14,18 @@ import pyarrow.parquet as pq
 from kbs_process.campaign import provenance
 from kbs_process.campaign.config import Campaign
 from kbs_process.campaign.documents import shown
+from kbs_process.campaign.reading_laws import columns, laws_on
 from kbs_process.campaign.store import writing
 from kbs_process.ingest.encoding import OutStream
 from kbs_process.ingest.writer import write_pieces
-from kbs_process.signals.records import WRENCH_CHANNELS, WRENCH_UNITS, Block
+from kbs_process.signals.records import WRENCH_UNITS, Block
 
 MARKER = "provenance.json"  # what makes a folder one of ours
 ROWS = 1 << 16  # of a row group
-HISTORY = "true wrench behind the amplifier, without cross-coupling, bias, noise and resolution"
+HISTORY = {
+    "wrench": "true wrench behind the amplifier, without cross-coupling, bias, noise and resolution",
+    "effort": "what the drives put into the joints, without noise and resolution",
+}
 
 
 def write_prediction(
@@ -45,7 +49,7 @@ def write_prediction(
             def pieces() -> Iterator[OutStream]:
                 for key, block in streams:
                     if key not in tables:
-                        table = _Table(folder / f"{key}.parquet", campaign, key, name)
+                        table = _Table(folder / f"{key}.parquet", campaign, key, kind, name)
                         tables[key] = open_tables.enter_context(table)
                     tables[key].add(block)
                     yield _out_stream(campaign, key, block, epoch_ns)
@@ -69,14 +73,14 @@ def write_prediction(
 class _Table:
     """A Parquet table of one stream, written as the blocks come, in row groups of `ROWS` or more."""
 
-    def __init__(self, path: Path, campaign: Campaign, key: str, name: str) -> None:
-        channels = WRENCH_CHANNELS if key == "wrench" else campaign.rig.joint_names
-        units = WRENCH_UNITS if key == "wrench" else ("rad",) * len(channels)
+    def __init__(self, path: Path, campaign: Campaign, key: str, kind: str, name: str) -> None:
+        channels, units = _columns(campaign, key)
+        read = [f"read through {law.law} at {law.site}" for law in laws_on(campaign.sensing, key, channels)]
         about = {
             "recording": name,
             "frame": "T" if key == "wrench" else "joint",
             "units": {"t": "s"} | dict(zip(channels, units, strict=True)),
-            "history": [HISTORY] if key == "wrench" else [],
+            "history": [*([HISTORY[key]] if key in HISTORY else []), *(read if kind == "predicted" else [])],
         }
         metadata = {"kbs": json.dumps(about, sort_keys=True)}
         self._schema = pa.schema([(column, pa.float64()) for column in ("t", *channels)], metadata=metadata)
@@ -103,6 +107,19 @@ class _Table:
             columns = [pa.array(t), *(pa.array(column) for column in values.T)]
             self._writer.write_table(pa.Table.from_arrays(columns, schema=self._schema))
             self._blocks = []
+
+
+def _columns(campaign: Campaign, key: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Names and units of a stream's columns."""
+    rig = campaign.rig
+    channels = columns(key, rig)
+    if key == "wrench":
+        return channels, WRENCH_UNITS
+    if key == "effort":
+        rates = (f"{joint.unit}/s" for joint in rig.joints)
+        efforts = (joint.effort.unit if joint.effort else joint.unit_of("N m") for joint in rig.joints)
+        return channels, (*(joint.unit for joint in rig.joints), *rates, *efforts)
+    return channels, tuple(joint.unit if key == "angle" else "rad" for joint in rig.joints)
 
 
 def _out_stream(campaign: Campaign, key: str, block: Block, epoch_ns: int) -> OutStream:

@@ -12,13 +12,13 @@ from kbs_process.diagnosis.signature import sensed
 from kbs_process.diagnosis.suspects import BY, Candidate
 from kbs_process.plant.sensing import SensingPort
 from kbs_process.rig.model import Rig
-from kbs_process.signals.records import WRENCH_CHANNELS, Array, Block, Events
+from kbs_process.signals.records import WRENCH_CHANNELS, Array, Block, Signal
 
 _READ = ("wrench", "effort", "angle")  # streams that sensors make
 
 
 def read_through(
-    campaign: Campaign, streams: Iterable[tuple[str, Block]], temperature: Events | None
+    campaign: Campaign, streams: Iterable[tuple[str, Block]], temperature: Signal | None
 ) -> Iterator[tuple[str, Block]]:
     """Yield predicted streams as the model's sensors would read them; without such laws block by block, as they come.
 
@@ -37,16 +37,19 @@ def read_through(
         values = np.concatenate([block.values for block in blocks])
         stamp = np.concatenate([block.stamp for block in blocks])
         log = np.concatenate([block.log for block in blocks])
-        names = channels(key, campaign.rig)
+        names = columns(key, campaign.rig)
         read = readings(campaign.sensing, key, names, stamp * 1e-9, values, campaign.rig, temperature)
         yield key, Block(stamp, log, read)
 
 
-def channels(key: str, rig: Rig) -> tuple[str, ...]:
+def columns(key: str, rig: Rig) -> tuple[str, ...]:
     """Return the names of a predicted stream's columns."""
     if key == "wrench":
         return WRENCH_CHANNELS
-    return rig.channels[len(rig.transducer.channels) :] if key == "effort" else rig.joint_names
+    names = rig.joint_names
+    if key == "effort":
+        return (*names, *(f"{name}.rate" for name in names), *(f"{name}.effort" for name in names))
+    return names
 
 
 def readings(
@@ -56,7 +59,7 @@ def readings(
     t: Array,
     values: Array,
     rig: Rig,
-    temperature: Events | None,
+    temperature: Signal | None,
 ) -> Array:
     """(n, c) values at t (n,) s with the changes by all laws that act on their stream.
 
@@ -64,23 +67,28 @@ def readings(
     """
     warmth = None if temperature is None else np.interp(t, temperature.t, temperature.values[:, 0])
     read = values.copy()
-    for entry in laws:
+    for entry in laws_on(laws, key, names):
         law = LAWS[entry.law]
         amplitudes = [one.name for one in law.parameters if one.role == "amplitude"]
         numbers = {name: float(quantity) for name, quantity in entry.parameters.items()}
         shape = tuple((name, value) for name, value in numbers.items() if name not in amplitudes)
-        if not _acts(entry, key, names) or ("temperature" in law.arguments and warmth is None):
+        if "temperature" in law.arguments and warmth is None:
             continue
         units = sensed(Candidate(law, entry.site, shape), t, values, names, rig, warmth)
         read += units @ np.array([numbers[name] for name in amplitudes])
     return read
 
 
+def laws_on(laws: Sequence[SensingLaw], key: str, names: Sequence[str]) -> list[SensingLaw]:
+    """Return the laws that act on a predicted stream, whose columns are `names`."""
+    return [entry for entry in laws if _acts(entry, key, names)]
+
+
 def _acts(entry: SensingLaw, key: str, names: Sequence[str]) -> bool:
     match LAWS[entry.law].port:
         case SensingPort.STREAM:
-            return (key == "angle") == (entry.site == "encoder")
+            return key in _READ and (key == "angle") == (entry.site == "encoder")
         case SensingPort.ENCODER:
             return key == "angle"
         case _:
-            return key != "angle" and entry.site.split(BY)[0] in names
+            return key in ("wrench", "effort") and entry.site.split(BY)[0] in names

@@ -32,6 +32,7 @@ from kbs_process.rig.model import (
     Spacecraft,
     Transducer,
     no_transducer,
+    unit_of,
 )
 
 # Units of a joint's viscous friction and effort, by the joint's type.
@@ -46,8 +47,8 @@ ANGLES = Kind("rad", (3,))
 class RigBuilder:
     """Builds a rig out of tables that satisfy the schema; what is wrong is noted in `problems`.
 
-    `drive_units` gives the SI unit of every drive parameter that an effect of the plant asks for, by name, and
-    `external_units` those of the parameters of each effect of the laboratory, by its name.
+    `drive_units` gives the SI unit of every drive parameter that an effect of the plant asks for, by name, at a joint
+    that turns, and `external_units` those of the parameters of each effect of the laboratory, by its name.
     """
 
     tables: Merged
@@ -152,7 +153,7 @@ class RigBuilder:
             origin=self._quantity(LENGTHS, "joint", name, "origin"),
             misalignment=self._quantity(ANGLES, "joint", name, "misalignment"),
             encoder=self._encoder(name, COORDINATE[kind]) if "encoder" in table else None,
-            drive=self._drive(name, table["drive"]) if "drive" in table else None,
+            drive=self._drive(name, kind, table["drive"]) if "drive" in table else None,
             type=kind,
             viscous=self._quantity(Kind(VISCOUS[kind], (), low=0.0), "joint", name, "viscous")
             if "viscous" in table
@@ -188,9 +189,9 @@ class RigBuilder:
             resolution=quantity("resolution", Kind(reading, (), low=0.0)),
         )
 
-    def _drive(self, joint: str, table: Tree) -> Drive:
-        def positive(name: str, unit: str) -> Quantity:
-            return self._quantity(Kind(unit, (), low=0.0, strict=True), "joint", joint, "drive", name)
+    def _drive(self, joint: str, kind: JointType, table: Tree) -> Drive:
+        def positive(name: str, unit: str, strict: bool = True) -> Quantity:
+            return self._quantity(Kind(unit, (), low=0.0, strict=strict), "joint", joint, "drive", name)
 
         parameters = {}
         for name in table.get("parameters", {}):
@@ -198,14 +199,15 @@ class RigBuilder:
             if name not in self.drive_units:
                 self._unknown(key, name, "parameter of an effect", self.drive_units)
                 continue
-            quantity = self._quantity(Kind(self.drive_units[name], ()), *key)
+            quantity = self._quantity(Kind(unit_of(kind, self.drive_units[name]), ()), *key)
             # One name for all who refer to it: "joint.el.drive.Ka", short of the table's name.
             parameters[name] = Quantity(
                 f"joint.{joint}.drive.{name}", quantity.value, quantity.unit, quantity.sigma, quantity.source
             )
         return Drive(
             ratio=positive("ratio", "1"),
-            rotor_inertia=positive("rotor_inertia", "kg m^2"),
+            # The rotor of a direct drive is part of the body that it moves.
+            rotor_inertia=positive("rotor_inertia", "kg m^2", strict=False),
             steps_per_turn=positive("steps_per_turn", "1"),
             parameters=parameters,
         )

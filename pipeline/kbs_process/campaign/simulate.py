@@ -10,16 +10,21 @@ import numpy as np
 
 from kbs_process.campaign.commands import read_commands
 from kbs_process.campaign.config import Campaign, RecordingEntry
-from kbs_process.campaign.predicting import schedule_of
+from kbs_process.campaign.predicting import approached, schedule_of
 from kbs_process.campaign.prediction_files import write_prediction
 from kbs_process.campaign.progress import Progress
 from kbs_process.campaign.reading import read_run
+from kbs_process.campaign.reading_laws import read_through
 from kbs_process.campaign.settings import motion_settings
 from kbs_process.errors import ConfigError, did_you_mean
+from kbs_process.plant.effects import select
+from kbs_process.plant.moved import added_loads
 from kbs_process.plant.predict import Schedule, predict
-from kbs_process.plant.rigid import inverse_dynamics
+from kbs_process.plant.rigid import loads
 from kbs_process.signals.records import Block, Run
 from kbs_process.stages.motion import estimate
+
+TABLES = (".csv", ".parquet")  # of commands, by the file's name
 
 
 def simulate_commands(
@@ -30,7 +35,9 @@ def simulate_commands(
     schedule = read_commands(commands, campaign.rig.joint_names)
     schedule = replace(schedule, t=schedule.t - schedule.t[0])
     with progress.task(f"Simulating {commands.name}") as task:
-        streams = _command_driven(campaign, schedule, rate_Hz, rate_Hz, float(schedule.t[-1]), task.update)
+        streams = _command_driven(
+            campaign, campaign.effects, schedule, rate_Hz, rate_Hz, float(schedule.t[-1]), task.update
+        )
         return write_prediction(campaign, streams, target, "simulated", commands.stem, (commands,))
 
 
@@ -50,40 +57,61 @@ def simulate_trajectory(
     schedule = replace(schedule_of(run, campaign.rig), field=None, encoder=None)
     with progress.task(f"Simulating {name}") as task:
         rates = rate_Hz or run.rates["wrench"], run.rates.get("angle", run.rates["wrench"])
-        streams = _command_driven(campaign, schedule, *rates, _duration(run), task.update)
+        streams = _command_driven(campaign, campaign.effects, schedule, *rates, _duration(run), task.update)
         return write_prediction(
             campaign, streams, target, "simulated", name, (first[name].path,), epoch_ns=run.epoch_ns
         )
 
 
 def predict_recording(campaign: Campaign, recording: str, target: Path, *, progress: Progress) -> Path:
-    """Predict one recording, driven by whatever was recorded of it; return `target`."""
+    """Predict one recording, driven by whatever was recorded of it; return `target`.
+
+    `recording` is a name of the campaign's, or any other file with its topics. The model's laws of sensors act on it.
+    """
     entry = _entry(campaign, recording)
     run = _read(campaign, entry, progress)
     with progress.task(f"Predicting {entry.name}") as task:
+        effects = campaign.acting(entry)
         if campaign.drive == "motion":
-            streams = _motion_driven(campaign, run)
+            streams = _motion_driven(campaign, effects, run)
         else:
+            schedule = approached(schedule_of(run, campaign.rig))
             rates = run.rates["wrench"], run.rates.get("angle", run.rates["wrench"])
-            streams = _command_driven(
-                campaign, schedule_of(run, campaign.rig), *rates, _duration(run), task.update
-            )
+            streams = _command_driven(campaign, effects, schedule, *rates, _duration(run), task.update)
+        read = read_through(campaign, streams, run.temperature)
         return write_prediction(
-            campaign, streams, target, "predicted", entry.name, (entry.path,), epoch_ns=run.epoch_ns
+            campaign, read, target, "predicted", entry.name, (entry.path,), epoch_ns=run.epoch_ns
         )
 
 
-def _motion_driven(campaign: Campaign, run: Run) -> Iterable[tuple[str, Block]]:
-    """Yield the rigid-body wrench of the measured motion, at the working rate."""
-    motion = estimate(run, campaign.rig, motion_settings(campaign))
+def predict_with(
+    model: Campaign, recording: str, target: Path, *, rate_Hz: float = 100.0, progress: Progress
+) -> Path:
+    """Predict a recording, or commands of a CSV or Parquet file, with a model; return `target`."""
+    path = Path(recording)
+    if path.suffix.lower() in TABLES and path.is_file():
+        return simulate_commands(model, path, target, rate_Hz=rate_Hz, progress=progress)
+    return predict_recording(model, recording, target, progress=progress)
+
+
+def _motion_driven(campaign: Campaign, effects: Sequence[str], run: Run) -> Iterable[tuple[str, Block]]:
+    """Yield what the measured motion asks of the instruments, at the working rate."""
+    rig = campaign.rig
+    motion = estimate(run, rig, motion_settings(campaign))
     stamp = np.rint((motion.t0 + motion.dt * np.arange(len(motion))) * 1e9).astype(np.int64)
-    wrench = inverse_dynamics(campaign.rig, motion.q, motion.qd, motion.qdd)
-    yield "wrench", Block(stamp, stamp, wrench)
+    values = loads(rig, motion.q, motion.qd, motion.qdd)
+    values = values + added_loads(rig, select(effects), motion.q, motion.dt)
+    if rig.transducer.channels:
+        yield "wrench", Block(stamp, stamp, values[:, :6])
+    if any(joint.effort is not None for joint in rig.joints):
+        # A message of joints has their angles and rates before their efforts.
+        yield "effort", Block(stamp, stamp, np.hstack([motion.q, motion.qd, values[:, 6:]]))
     yield "angle", Block(stamp, stamp, motion.q + motion.offset)
 
 
 def _command_driven(
     campaign: Campaign,
+    effects: Sequence[str],
     schedule: Schedule,
     rate_Hz: float,
     angle_rate_Hz: float,
@@ -92,7 +120,7 @@ def _command_driven(
 ) -> Iterable[tuple[str, Block]]:
     return predict(
         campaign.rig,
-        campaign.effects,
+        effects,
         schedule,
         rate_Hz=rate_Hz,
         angle_rate_Hz=angle_rate_Hz,

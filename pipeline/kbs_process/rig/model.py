@@ -25,6 +25,11 @@ JointType = Literal["revolute", "prismatic"]
 COORDINATE: dict[JointType, str] = {"revolute": "rad", "prismatic": "m"}  # unit of a joint's coordinate
 
 
+def unit_of(joint: JointType, turning: str) -> str:
+    """Return what the unit `turning` of a joint that turns is for a joint: N s/m of one that slides, for N m s/rad."""
+    return turning if joint == "revolute" else turning.replace("N m", "N").replace("rad", "m")
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Quantity:
     """A physical number or array in SI units, with its standard uncertainty and where it comes from."""
@@ -121,8 +126,8 @@ class Joint:
         return COORDINATE[self.type]
 
     def unit_of(self, turning: str) -> str:
-        """What is the unit `turning` of a joint that turns, for this one: N s/m of one that slides, for N m s/rad."""
-        return turning if self.type == "revolute" else turning.replace("N m", "N").replace("rad", "m")
+        """What is the unit `turning` of a joint that turns, for this one: see `unit_of`."""
+        return unit_of(self.type, turning)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
