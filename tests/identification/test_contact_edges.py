@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import cast
 
 import numpy as np
 import pytest
 
-from kbs_process.estimation.fit import Parameters
-from kbs_process.stages.contact import edge_minima
-from kbs_process.stages.objective import Objective
+from kbs_process.estimation.fit import Parameters, difference_jacobian
+from kbs_process.stages.contact import edge_minima, left_to_contact
 from kbs_process.stages.screening import Contact
 
 FINE = 512  # places around a turn
@@ -23,6 +21,7 @@ PARAMETERS = Parameters(
     np.array([1.0, np.pi, np.inf, 9.0]),
 )
 CONTACT = Contact(torque=0, width=1, phase=2)
+WITHIN = np.array([1e-3, 0.05, 0.05, 1.0])  # numbers have slopes
 TRUE = np.array([5e-3, 0.45, 2.9, 0.4])  # the contact lies across the end of the turn
 
 
@@ -53,7 +52,7 @@ class Turning:
 def test_true_edges_come_first_wherever_the_search_is(phase: float) -> None:
     plant = Turning()
     at = np.array([3e-3, 0.6, phase, 0.0])
-    first, *_ = edge_minima(cast(Objective, plant), at, plant.slopes(at), PARAMETERS, CONTACT, 4)
+    first, *_ = edge_minima(plant.residuals, at, plant.slopes(at), PARAMETERS, CONTACT, 4)
     step = 2.0 * np.pi / 128.0
     assert abs((first[2] - TRUE[2] + np.pi) % (2.0 * np.pi) - np.pi) < step
     assert abs(first[1] - TRUE[1]) < step
@@ -65,8 +64,26 @@ def test_true_edges_come_first_wherever_the_search_is(phase: float) -> None:
 def test_other_minima_follow_and_cost_more() -> None:
     plant = Turning()
     at = np.array([3e-3, 0.6, 0.0, 0.4])
-    found = edge_minima(cast(Objective, plant), at, plant.slopes(at), PARAMETERS, CONTACT, 4)
+    found = edge_minima(plant.residuals, at, plant.slopes(at), PARAMETERS, CONTACT, 4)
     costs = [float(np.sum((plant.measured - plant.model(theta)) ** 2)) for theta in found]
     assert len(found) > 1
     assert costs[0] == min(costs)
     assert costs[0] < 0.5 * float(np.sum((plant.measured - plant.model(at)) ** 2))
+
+
+def left(at: np.ndarray) -> tuple[float, int]:
+    plant = Turning()
+    J = difference_jacobian(lambda theta: plant.measured - plant.model(theta), at, 1e3 * WITHIN)
+    return left_to_contact(plant.residuals, at, J, PARAMETERS, CONTACT)
+
+
+def test_true_contact_leaves_nothing_that_friction_elsewhere_explains() -> None:
+    gained, count = left(TRUE)
+    assert 0 < count <= 32
+    assert gained == pytest.approx(count, abs=4.0 * np.sqrt(2.0 * count))
+
+
+@pytest.mark.parametrize("edges", [(0.15, 0.0), (0.0, 0.15), (0.1, -0.1)])
+def test_contact_in_a_wrong_place_is_noticed(edges: tuple[float, float]) -> None:
+    gained, count = left(TRUE + np.array([0.0, *edges, 0.0]))
+    assert gained > count + 6.0 * np.sqrt(2.0 * count)

@@ -14,6 +14,7 @@ from kbs_process.campaign.load import load_campaign
 from kbs_process.campaign.measured import measured
 from kbs_process.campaign.reading import read_run
 from kbs_process.estimation.fit import Check, Fit
+from kbs_process.estimation.linearise import Unpredicted
 from kbs_process.estimation.profile import Profile
 from kbs_process.report.records.common import load
 from kbs_process.report.records.identify import IdentifyResults
@@ -42,7 +43,9 @@ def test_folder(tmp_path: Path) -> None:
         names, value, sigma, np.diag(sigma**2), parameters.sigma, (Check("converged", True, "3"),), 1.0, 9, 3
     )
     noise = sensor_spectra(setting, recording)
-    found = Identification(setting, fit, np.zeros((9, len(names))), (noise,), (), (), parameters)
+    found = Identification(
+        setting, fit, np.zeros((9, len(names))), (noise,), (), Unpredicted(np.zeros((9, 2))), (), parameters
+    )
     x = value[at] + sigma[at] * np.array([-2.0, 0.0, 2.0])
     profile = Profile("joint.el.drive.Ka", x, np.array([4.0, 0.0, 4.0]), float(x[0]), float(x[2]))
     shape = (len(recording.valid), len(setting.channels))

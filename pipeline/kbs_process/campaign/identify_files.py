@@ -214,6 +214,8 @@ def _checks(outcomes: Outcomes, parameters: Sequence[records.Identified]) -> Ite
         if unsettled
         else "looked for around the whole turn",
     )
+    contact = outcomes.found.fit.checks[-1]
+    yield Check(name=contact.name, ok=contact.passed, detail=contact.detail)
     rough = [
         f"{misfit.channel} of {misfit.recording} ({misfit.after:.2f})"
         for prediction in outcomes.predictions

@@ -10,19 +10,24 @@ a descent takes the same steps in either.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+
 import numpy as np
+from numpy.typing import NDArray
 
 from kbs_process.estimation.fit import Parameters
 from kbs_process.signals.records import Array
-from kbs_process.stages.objective import Objective
 from kbs_process.stages.screening import Contact
+
+Residuals = Callable[[Sequence[Array]], list[Array]]  # whitened residual (n,) at each of some points (p,)
 
 _NARROW = 32  # contacts in a turn
 _FINE = 4  # places of an edge in a narrow contact
+_SEEN = 0.1  # of noise, by one prior sigma of torque: friction at a place that shows less is not judged
 
 
 def edge_minima(
-    objective: Objective, theta: Array, J: Array, parameters: Parameters, contact: Contact, most: int
+    residuals: Residuals, theta: Array, J: Array, parameters: Parameters, contact: Contact, most: int
 ) -> list[Array]:
     """Return up to `most` points like `theta` (p,) with the contact moved, best first: local minima over both edges.
 
@@ -30,14 +35,8 @@ def edge_minima(
     """
     own = [contact.torque, contact.width, contact.phase]
     rest = np.delete(np.arange(len(theta)), own)
-    responses, off = _responses(objective, theta, parameters, contact)
-    weight = parameters.sigma[rest] ** -2.0
-    excess = weight * (theta - parameters.value)[rest]
-    J = J[:, rest]
-    cross = J.T @ responses
-    solved = np.linalg.solve(J.T @ J + np.diag(weight), np.column_stack([cross, J.T @ off + excess]))
-    gram = responses.T @ responses - cross.T @ solved[:, :-1]
-    slope = responses.T @ off - cross.T @ solved[:, -1]
+    responses, off = _responses(residuals, theta, parameters, contact)
+    gram, slope = _others_following(responses, off, J, theta, parameters, rest)
     places = []
     for torque, begin, width in _minima(gram, slope, parameters, contact)[:most]:
         moved = theta.copy()
@@ -48,8 +47,38 @@ def edge_minima(
     return places
 
 
+def left_to_contact(
+    residuals: Residuals, theta: Array, J: Array, parameters: Parameters, contact: Contact
+) -> tuple[float, int]:
+    """Return what a friction that is free at every place of the turn would gain, and its degrees of freedom.
+
+    A score test (C. R. Rao, Proc. Cambridge Phil. Soc. 44:50, 1948) in the directions of the narrow contacts, all
+    numbers following by J (n, p): chi-square where `theta` is right and the residual's noise white, whatever the
+    directions; more where the contact is in a wrong place, or not of the shape that the model gives it.
+    """
+    responses, _ = _responses(residuals, theta, parameters, contact)
+    (r,) = residuals([theta])
+    gram, slope = _others_following(responses, r, J, theta, parameters, np.arange(len(theta)))
+    square, directions = np.linalg.eigh(gram)
+    shown = square > (_SEEN / parameters.sigma[contact.torque]) ** 2
+    along = directions[:, shown].T @ slope
+    return float(np.sum(along**2 / square[shown])), int(np.count_nonzero(shown))
+
+
+def _others_following(
+    responses: Array, r: Array, J: Array, theta: Array, parameters: Parameters, others: NDArray[np.intp]
+) -> tuple[Array, Array]:
+    """Information (k, k) on amplitudes of `responses` (n, k) in r (n,), and slope (k,); `others` follow."""
+    weight = parameters.sigma[others] ** -2.0
+    excess = weight * (theta - parameters.value)[others]
+    J = J[:, others]
+    cross = J.T @ responses
+    solved = np.linalg.solve(J.T @ J + np.diag(weight), np.column_stack([cross, J.T @ r + excess]))
+    return responses.T @ responses - cross.T @ solved[:, :-1], responses.T @ r - cross.T @ solved[:, -1]
+
+
 def _responses(
-    objective: Objective, theta: Array, parameters: Parameters, contact: Contact
+    residuals: Residuals, theta: Array, parameters: Parameters, contact: Contact
 ) -> tuple[Array, Array]:
     """Of narrow contacts side by side from -pi on, (n, narrow) per N m, and the residual without any (n,)."""
     points = [theta.copy()]
@@ -60,7 +89,7 @@ def _responses(
         one[contact.width] = np.pi / _NARROW
         one[contact.phase] = np.pi - (2 * k + 1) * np.pi / _NARROW
         points.append(one)
-    off, *found = objective.residuals(points)
+    off, *found = residuals(points)
     return (np.column_stack(found) - off[:, None]) / parameters.value[contact.torque], off
 
 

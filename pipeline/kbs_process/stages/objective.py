@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from kbs_process.estimation.fit import Parameters
+from kbs_process.estimation.linearise import Unpredicted
 from kbs_process.signals.records import Array
 from kbs_process.stages.output_error import Experiment, Spectra
 from kbs_process.stages.screening import Evaluate, Task
@@ -22,7 +23,8 @@ class Objective:
     """Whitened residual and its Jacobian over all recordings; theta is free numbers, then run-to-run factors less 1.
 
     Columns of numbers from `gears` on, which hardly move from their priors, are differenced once and kept; the others
-    at every point. To both sides if `central`. `correction` of each recording, constant, is added to its residual.
+    at every point. To both sides if `central`. `correction` of each recording, constant, is added to its residual;
+    with `unpredicted`, the residual is whitened by that too (slopes are not).
     """
 
     def __init__(
@@ -36,12 +38,14 @@ class Objective:
         central: bool,
         columns: Mapping[int, list[Array]] | None = None,
         correction: Sequence[Array] = (),
+        unpredicted: Unpredicted | None = None,
     ) -> None:
         self.experiment, self.spectra, self.gears, self.central = experiment, spectra, gears, central
         self.evaluate = evaluate
         self.differences = differences
         self.columns = dict(columns or {})
         self.correction = correction
+        self.unpredicted = unpredicted
         self.scaled = frictions(experiment)
         self._last: tuple[bytes, list[Array]] = (b"", [])
         self._sloped = b""  # where the columns were taken
@@ -89,11 +93,15 @@ class Objective:
 
     def residual(self, theta: Array) -> Array:
         """(n,) of all recordings."""
-        return np.concatenate(self.parts(theta))
+        return self._whole(self.parts(theta))
 
     def residuals(self, thetas: Sequence[Array]) -> list[Array]:
         """The same at many points, evaluated together."""
-        return [np.concatenate(parts) for parts in self._parts(thetas)]
+        return [self._whole(parts) for parts in self._parts(thetas)]
+
+    def _whole(self, parts: Sequence[Array]) -> Array:
+        whole = np.concatenate(parts)
+        return whole if self.unpredicted is None else self.unpredicted.whitened(whole)
 
     def jacobian(self, theta: Array) -> Array:
         """(n, p + factors)."""
