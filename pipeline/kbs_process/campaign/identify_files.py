@@ -37,6 +37,8 @@ _NOTES = (
     "spectrum of each channel. The plant follows the recorded field positions.",
     "Gravity is not taken off beforehand: it is in the plant, with masses, CoGs, inertias and tilt fitted within their "
     "priors beside the gearbox. Taring bias, drift, cross-coupling and clock delays are projected out of each channel.",
+    "Slopes are differences over several sigmas, and events of sticking that come and go within what is known of the "
+    "numbers count as noise (posterior linearisation): which of them happen in a run is not to be predicted that well.",
     "Intervals hold 95 %: +-1.96 sigma of the posterior, and where given those of the profile likelihood. They presume "
     "that the model's equations are right; the check of the residual says whether the recordings deny it.",
 )
