@@ -8,6 +8,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
+from kbs_process.campaign.tables import write_table
 from kbs_process.report.build import build
 from kbs_process.report.records import diagnosis as d
 from kbs_process.report.records.common import Check, Conclusion, encode
@@ -123,3 +124,42 @@ def test_a_find_is_told_with_its_law_its_gate_and_its_rivals(tmp_path: Path) -> 
 
 def test_nothing_found_is_said(tmp_path: Path) -> None:
     assert "No law passed the gate" in page(tmp_path, results())
+
+
+def next_test(**changed: object) -> d.NextTest:
+    given = {
+        "law": "harness (joint torque, el)",
+        "rivals": ("dahl (joint torque, el)",),
+        "trajectory": "el: scans of the whole range at 0.2 deg/s",
+        "seconds": 200.0,
+        "file": "next-test.csv",
+        "distance": 3.1,
+        "p_wrong": 0.06,
+        "recordings": 3,
+        "sigma": None,
+        "tried": ({"trajectory": "el: scans of the whole range at 0.2 deg/s", "worth": 3.4},),
+    }
+    return msgspec.convert(given | changed, d.NextTest)
+
+
+def test_the_next_test_is_told_with_its_power(tmp_path: Path) -> None:
+    told = page(tmp_path / "rivals", msgspec.structs.replace(results(find()), next_test=next_test()))
+    for said in ("next-test.csv", "3.1", "6.0 %", "3 recordings", "cannot tell harness"):
+        assert said in told.replace("\u00a0", " "), said
+    weak = next_test(rivals=(), distance=None, p_wrong=None, recordings=1, sigma=0.25)
+    told = page(tmp_path / "weak", msgspec.structs.replace(results(find()), next_test=weak))
+    assert "25 % of its present sigma" in told.replace("\u00a0", " ")
+
+
+def test_where_the_residual_lives_is_a_map_of_each_trajectory(tmp_path: Path) -> None:
+    t, f = (grid.ravel() for grid in np.meshgrid(np.arange(8.0, 80.0, 16.0), np.arange(0.1, 8.0, 0.125)))
+    size = np.ones(len(t))
+    columns = {"t": t, "f": f, "before": 1.0 + 9.0 * (f > 5.0), "after": size, "significant": f > 5.0}
+    columns = {name: np.asarray(values, dtype=float) for name, values in columns.items()}
+    units = dict.fromkeys(columns, "1")
+    write_table(
+        tmp_path / "tables" / "residual_map" / "SWEEP.parquet", columns, units, frame="T", recording="run_1"
+    )
+    told = page(tmp_path, results(find()))
+    assert "Where the residual lives" in told
+    assert "before at most 10" in told.replace("\u00a0", " ")

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from kbs_process.campaign.config import Campaign, RecordingEntry
 from kbs_process.campaign.diagnosis_files import write_diagnosis
+from kbs_process.campaign.next_test import proposed
 from kbs_process.campaign.predicting import approached, commanded_from, schedule_of
 from kbs_process.campaign.progress import Progress
 from kbs_process.campaign.reading import read_run
@@ -82,9 +83,11 @@ def diagnose(campaign: Campaign, target: Path, *, progress: Progress, pdf: bool 
             outcome = rounds.diagnose(
                 explained.known, explained.floor, explained.predicted, simulate, explained.after
             )
+    with progress.task("Next test"):
+        proposal = proposed(outcome, explained.floor)
     with progress.task("Writing the report"):
         return write_diagnosis(
-            campaign, explained.floor, explained.known, explained.predicted, outcome, target, pdf
+            campaign, explained.floor, explained.known, explained.predicted, outcome, target, pdf, proposal
         )
 
 

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from kbs_process.campaign import provenance
-from kbs_process.campaign.config import Campaign, SensingLaw
-from kbs_process.campaign.corrected_model import write_model
+from kbs_process.campaign.config import Campaign
+from kbs_process.campaign.corrected_diagnosis import left_out, write_corrected
+from kbs_process.campaign.next_test import commands_of, next_test
+from kbs_process.campaign.residual_maps import write_maps
 from kbs_process.campaign.run import Outcome as Told
-from kbs_process.campaign.sensing_laws import belongs_to_model
 from kbs_process.campaign.store import writing
 from kbs_process.campaign.tables import write_table
 from kbs_process.diagnosis.experiment import Experiment
@@ -21,18 +20,17 @@ from kbs_process.diagnosis.floor import Floor
 from kbs_process.diagnosis.hypothesis import Prediction
 from kbs_process.diagnosis.joint import Standing
 from kbs_process.diagnosis.known import Known
-from kbs_process.diagnosis.measured import with_curves
+from kbs_process.diagnosis.next_test import Proposal
 from kbs_process.diagnosis.outcome import Curve, Find, Identity, Outcome
-from kbs_process.diagnosis.suspects import BY
 from kbs_process.diagnosis.thresholds import RIVALS
-from kbs_process.plant.sensing import SENSING
 from kbs_process.report import build
 from kbs_process.report.records import diagnosis as records
 from kbs_process.report.records.common import Check, Conclusion, Notice, encode
-from kbs_process.rig.model import Quantity
+from kbs_process.rig.model import Joint, Rig
 from kbs_process.signals.records import Array
 
 CORRECTED = "corrected"
+COMMANDS = "next-test.csv"
 _SHOWN = 25  # suspects in the table
 _EACH_TIME = "it is each recording's own, or the controller's: the corrected model is without it"
 _NOTES = (
@@ -58,27 +56,38 @@ def write_diagnosis(
     outcome: Outcome,
     target: Path,
     pdf: bool | None,
+    proposal: Proposal | None = None,
 ) -> Told:
-    """Write results, tables, corrected model and report to `target`.
+    """Write results, tables, corrected model and report to `target`, and the commands of the next test.
 
     `known` is what stood before any find, and `predicted` what it predicts, by drive.
     """
     with writing(target) as folder:
-        files = _corrected(campaign, outcome, folder / CORRECTED)
+        files = write_corrected(campaign, outcome, folder / CORRECTED)
+        if proposal is not None:
+            (folder / COMMANDS).write_text(commands_of(proposal, campaign.rig), encoding="utf-8")
+        write_maps(folder, outcome)
         for k in range(len(known.experiment.trials)):
             _spectra(folder, known, outcome.standing.known, k)
             _histories(folder, known.experiment, predicted, outcome.standing, k)
         results = _results(
-            campaign, floor, known, outcome, [path.relative_to(folder).as_posix() for path in files]
+            campaign, floor, known, outcome, [path.relative_to(folder).as_posix() for path in files], proposal
         )
         (folder / "results.json").write_bytes(encode(results))
         page = build.build(folder, pdf)
-    lines = (results.verdict.sentence, f"Corrected model: {target / CORRECTED}")
-    return Told(lines, None, target / page.name)
+    lines = [results.verdict.sentence, f"Corrected model: {target / CORRECTED}"]
+    if proposal is not None:
+        lines.append(f"Next test: {target / COMMANDS}")
+    return Told(tuple(lines), None, target / page.name)
 
 
 def _results(
-    campaign: Campaign, floor: Floor, known: Known, outcome: Outcome, files: Sequence[str]
+    campaign: Campaign,
+    floor: Floor,
+    known: Known,
+    outcome: Outcome,
+    files: Sequence[str],
+    proposal: Proposal | None,
 ) -> records.DiagnosisResults:
     sentence = _sentence(outcome)
     finds = tuple(_find(find, known.experiment) for find in outcome.finds)
@@ -100,6 +109,7 @@ def _results(
         suspects=tuple(_suspects(outcome))[:_SHOWN],
         checks=tuple(Check(name=c.name, ok=c.passed, detail=c.detail) for c in known.checks),
         files=tuple(files),
+        next_test=None if proposal is None else next_test(proposal, COMMANDS),
         warnings=tuple(_warnings(outcome)),
         notes=_NOTES,
     )
@@ -158,6 +168,7 @@ def _paragraph(outcome: Outcome, finds: Sequence[records.Find], trials: Sequence
 
 def _find(find: Find, experiment: Experiment) -> records.Find:
     roles = {trial.name: trial.role for trial in experiment.trials}
+    joint = _joint(find, experiment.rig)
     return records.Find(
         name=find.identity.law,
         family=find.identity.family,
@@ -167,7 +178,12 @@ def _find(find: Find, experiment: Experiment) -> records.Find:
         reference=find.reference,
         parameters=tuple(
             records.Fitted(
-                name=one.name, unit=one.unit, value=one.value, sigma=one.sigma, low=one.low, high=one.high
+                name=one.name,
+                unit=_unit(one.unit, joint),
+                value=one.value,
+                sigma=one.sigma,
+                low=one.low,
+                high=one.high,
             )
             for one in find.estimates
         ),
@@ -196,16 +212,25 @@ def _find(find: Find, experiment: Experiment) -> records.Find:
             for fold in find.gate.folds
         ),
         same_ports=find.ports_alike,
-        curve=None if find.curve is None else _curve(find.curve),
+        curve=None if find.curve is None else _curve(find.curve, joint),
         held_out_variance=find.held_out_variance,
     )
 
 
-def _curve(curve: Curve) -> records.Curve:
+def _joint(find: Find, rig: Rig) -> Joint | None:
+    """The joint whose numbers a find has: units are those of one that turns, or slides."""
+    return next((joint for joint in rig.joints if joint.name == find.identity.axis), None)
+
+
+def _unit(turning: str, joint: Joint | None) -> str:
+    return turning if joint is None else joint.unit_of(turning)
+
+
+def _curve(curve: Curve, joint: Joint | None) -> records.Curve:
     return records.Curve(
         regressor=curve.regressor.replace("_", " "),
-        x_unit=curve.unit,
-        y_unit="N m",
+        x_unit=_unit(curve.unit, joint),
+        y_unit=_unit("N m", joint),
         x=tuple(curve.x.tolist()),
         y=tuple(curve.value.tolist()),
         sigma=tuple(curve.sigma.tolist()),
@@ -303,8 +328,7 @@ def _warnings(outcome: Outcome) -> Iterator[Notice]:
                 what=f"{find.identity.law} was judged by leaving out fit recordings in turn: none was held out",
                 remedy="give a recording the role held-out, better of another trajectory",
             )
-        law = _SENSORS.get(find.identity.law)
-        if law is not None and not belongs_to_model(law):
+        if left_out(find):
             yield Notice(severity="info", what=f"{find.identity.law}: {_EACH_TIME}", where=CORRECTED)
     if not outcome.standing.known.experiment.held_out:
         yield Notice(
@@ -312,51 +336,6 @@ def _warnings(outcome: Outcome) -> Iterator[Notice]:
             what="no recording is held out: nothing is shown on recordings that were not used",
             remedy='set role = "held-out" for a repeat or another trajectory',
         )
-
-
-def _corrected(campaign: Campaign, outcome: Outcome, folder: Path) -> tuple[Path, ...]:
-    known = outcome.standing.known
-    source = "by diagnosis of " + ", ".join(known.experiment.trials[k].name for k in known.experiment.fit)
-    hypothesis = with_curves(outcome.standing, outcome.finds)
-    quantities = hypothesis.rig.quantities()
-    # Matrices may lie in files of their own, which the corrected model would not find.
-    changed: dict[str, Quantity] = {name: q for name, q in quantities.items() if q.value.ndim > 1}
-    within = outcome.standing.hypothesis.rig.quantities()
-    changed |= {name: replace(q, source=source) for name, q in quantities.items() if name not in within}
-    for index, scalar in enumerate(known.free):
-        if scalar.quantity in quantities:
-            quantity = changed.get(scalar.quantity, quantities[scalar.quantity])
-            sigma = quantity.sigma.copy()
-            sigma[scalar.element] = known.sigma[index]
-            changed[scalar.quantity] = replace(quantity, sigma=sigma, source=source)
-    sensing = tuple(_sensing(find, outcome.standing, source) for find in outcome.finds if _reads(find))
-    return write_model(campaign, hypothesis.rig, hypothesis.effects, changed, folder, source, sensing)
-
-
-_SENSORS = {law.name: law for law in SENSING}
-
-
-def _reads(find: Find) -> bool:
-    """Whether a find is a law of a sensor or its clock that is the same in every recording."""
-    law = _SENSORS.get(find.identity.law)
-    return law is not None and belongs_to_model(law)
-
-
-def _sensing(find: Find, standing: Standing, source: str) -> SensingLaw:
-    """A find as the model's sensors have it, its amplitudes as they stand after all finds."""
-    law, own = _SENSORS[find.identity.law], find.identity
-    site = BY.join(own.channels) or own.axis
-    known = standing.known
-    places = {scalar.name: index for index, scalar in enumerate(known.free)}
-    numbers = {}
-    for one in find.estimates:
-        # A second action of the same law has numbered amplitudes.
-        entry = next(entry for entry in law.parameters if re.fullmatch(rf"{entry.name}(_\d+)?", one.name))
-        index = places.get(f"law.{law.name}.{site}.{one.name}")
-        value, sigma = (one.value, one.sigma) if index is None else (known.value[index], known.sigma[index])
-        name = f"sensing.{site}.{law.name}.{entry.name}"
-        numbers[entry.name] = Quantity(name, np.asarray(value), entry.unit, np.asarray(sigma), source)
-    return SensingLaw(law.name, site, numbers)
 
 
 def _spectra(folder: Path, before: Known, after: Known, k: int) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from kbs_process.report.document import Document
 from kbs_process.report.panel import Head, Panel
 from kbs_process.report.panels import provenance
-from kbs_process.report.panels.diagnosis import answer, finds, remaining, search
+from kbs_process.report.panels.diagnosis import answer, finds, next_test, remaining, search
 from kbs_process.report.records.diagnosis import DiagnosisResults
 from kbs_process.report.tables import Tables
 
@@ -30,5 +30,5 @@ DOCUMENT = Document(
     title="Results of a diagnosis",
     record=DiagnosisResults,
     head=head,
-    panels=(answer.panel, finds.panel, search.panel, remaining.panel, _provenance),
+    panels=(answer.panel, finds.panel, search.panel, remaining.panel, next_test.panel, _provenance),
 )

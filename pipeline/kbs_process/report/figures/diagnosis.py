@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
+from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
 from kbs_process.report.figures import draw
 from kbs_process.report.panel import Picture
 from kbs_process.report.records.diagnosis import Curve, Find, Trial
+from kbs_process.report.tables import Table
 from kbs_process.report.text import label, number, unit
+from kbs_process.signals.records import Array
 
 STEPS = {"nominal": draw.SERIES[4], "known": draw.PREDICTED, "corrected": draw.MEASURED}
 _WIDTH = 0.26
@@ -73,3 +76,42 @@ def channels(entries: tuple[Trial, ...]) -> Picture:
         return draw.picture(
             figure, f"Residual over floor by channel, at most {number(float(np.nanmax(values)))}"
         )
+
+
+def where(table: Table, title: str) -> Picture:
+    """Draw rms over the floor in windows of time by frequencies, before and after; dots: more than chance."""
+    t, f, found = (table.columns[name] for name in ("t", "f", "significant"))
+    times, tones = np.unique(t), np.unique(f)
+    rows, columns = np.searchsorted(tones, f), np.searchsorted(times, t)
+    grids = {}
+    for side in ("before", "after"):
+        grids[side] = np.full((len(tones), len(times)), np.nan)
+        grids[side][rows, columns] = table.columns[side]
+    most = max(3.0, float(np.nanquantile(grids["before"], 0.99)))
+    with draw.style():
+        figure = Figure(figsize=(draw.WIDTH, 2.4), layout="constrained")
+        axes = figure.subplots(1, 2, sharey=True)
+        for axis, (side, grid) in zip(axes, grids.items(), strict=True):
+            image = axis.pcolormesh(
+                _edges(times), _edges(tones), grid, cmap="Blues", norm=LogNorm(1.0, most), rasterized=True
+            )
+            axis.set_title(side)
+            axis.set_xlabel("time / s")
+            axis.grid(visible=False)
+        seen = found > 0.5
+        axes[0].plot(t[seen], f[seen], ".", color=draw.LIMIT, markersize=1.5)
+        draw.logarithmic(axes[0], "y", float(tones[0]) * 0.8, float(tones[-1]) * 1.1)
+        axes[0].set_ylabel("frequency / Hz")
+        figure.colorbar(image, ax=axes, label="over floor")
+        worst = number(float(np.nanmax(grids["before"])))
+        alt = f"{title}: residual over floor by time and frequency, before at most {worst}"
+        return draw.picture(figure, alt, title)
+
+
+def _edges(middles: Array) -> Array:
+    """Borders between neighbours, and as far beyond the first and the last one."""
+    if len(middles) < 2:
+        return np.asarray(np.concatenate([middles - 0.5, middles + 0.5]))
+    between = 0.5 * (middles[1:] + middles[:-1])
+    first, last = 2.0 * middles[0] - between[0], 2.0 * middles[-1] - between[-1]
+    return np.asarray(np.concatenate([[max(first, 0.5 * middles[0])], between, [last]]))

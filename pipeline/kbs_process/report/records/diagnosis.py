@@ -130,6 +130,30 @@ class Suspect(Record, frozen=True, kw_only=True):
     outcome: str  # "accepted", "refused: ...", "absorbed by ..."
 
 
+class Planned(Record, frozen=True, kw_only=True):
+    """A trajectory that could be run next."""
+
+    trajectory: str
+    worth: (
+        float  # distance of the nearest rival; without rivals, root of the information's smallest eigenvalue
+    )
+
+
+class NextTest(Record, frozen=True, kw_only=True):
+    """The test that would tell what these recordings leave open."""
+
+    law: str
+    rivals: tuple[str, ...]  # that it is told from; empty: its numbers are measured better
+    trajectory: str
+    seconds: float
+    file: str  # of its commands, relative to the results folder
+    distance: float | None  # of the nearest rival in one recording, known parameters refitted, sigma
+    p_wrong: float | None  # with one recording
+    recordings: int  # for a wrong choice in 1 of 100
+    sigma: float | None  # of the least known combination of its numbers with one recording, over that of now
+    tried: tuple[Planned, ...]  # best first, known parameters as they stand
+
+
 class DiagnosisResults(Record, frozen=True, kw_only=True):
     """results.json of a diagnosis."""
 
@@ -151,5 +175,6 @@ class DiagnosisResults(Record, frozen=True, kw_only=True):
     suspects: tuple[Suspect, ...] = ()
     checks: tuple[Check, ...] = ()
     files: tuple[str, ...] = ()  # of the corrected model, relative to the results folder
+    next_test: NextTest | None = None  # where nothing is open, none
     warnings: tuple[Notice, ...] = ()
     notes: tuple[str, ...] = ()

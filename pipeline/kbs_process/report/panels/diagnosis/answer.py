@@ -42,7 +42,7 @@ def panel(results: DiagnosisResults, tables: Tables) -> Panel:
     if results.files:
         blocks.append(
             Text(
-                "Corrected model, for `kbs-process predict` and for any campaign's parameter files:",
+                "Corrected model, for `kbs-process predict --model` and for any campaign's parameter files:",
                 results.files,
             )
         )
@@ -69,7 +69,7 @@ def _finds(finds: tuple[Find, ...]) -> Grid:
         "Seen in",
         "Probability",
         "Distance / sigma",
-        "In the requirement's band",
+        "Of the held-out excess",
     )
     return Grid("Physics that was left out", head, rows, "klllrrr")
 

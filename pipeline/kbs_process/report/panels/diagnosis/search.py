@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
-from kbs_process.report.panel import Block, Cell, Fold, Grid, Panel
+from kbs_process.report.figures import diagnosis as figures
+from kbs_process.report.panel import Block, Caption, Cell, Figure, Fold, Grid, Panel, Picture
 from kbs_process.report.panels.diagnosis.answer import where
 from kbs_process.report.records.diagnosis import DiagnosisResults, Moved, PortTest, Suspect
 from kbs_process.report.tables import Tables
 from kbs_process.report.text import MISSING, chance, count, measure, number, percent, unit
 
 _FAR = 3.0  # sigma
+_MAPS = Caption(
+    shown="Mean residual of each trajectory's repeats, over the floor, in windows of time by frequencies: known "
+    "parameters refitted (before), with the finds (after). Dots: cells that chance does not explain.",
+    good="White after, everywhere.",
+    bad="A line along time: a resonance or a tone. One that follows the rate: a motor order. A column: a place or "
+    "an event.",
+    do="Compare a column's time with the commands, a line's frequency with the motors' rates.",
+)
 
 
 def panel(results: DiagnosisResults, tables: Tables) -> Panel:
@@ -17,6 +26,8 @@ def panel(results: DiagnosisResults, tables: Tables) -> Panel:
     far = tuple(entry for entry in results.moved if entry.sigmas is not None and abs(entry.sigmas) > _FAR)
     if far:
         blocks.append(_moved(f"Known parameters that moved by more than {_FAR:g} sigma", far))
+    if maps := _maps(results, tables):
+        blocks.append(Figure("Where the residual lives", maps, _MAPS))
     if results.ports:
         blocks.append(_ports(results.ports))
     if results.suspects:
@@ -31,6 +42,16 @@ def panel(results: DiagnosisResults, tables: Tables) -> Panel:
         title = f"All known parameters ({count(len(results.moved), 'number')})"
         blocks.append(Fold(title, (_moved("Known parameters", results.moved),)))
     return Panel("search", "Search", "Where does it enter, and what was tried?", tuple(blocks))
+
+
+def _maps(results: DiagnosisResults, tables: Tables) -> tuple[Picture, ...]:
+    """One of each trajectory, named by its recordings."""
+    members: dict[str, list[str]] = {}
+    for trial in results.trials:
+        if trial.role != "held-out":
+            members.setdefault(trial.trajectory, []).append(trial.recording)
+    found = ((tables.read("residual_map", number), names) for number, names in members.items())
+    return tuple(figures.where(table, ", ".join(names)) for table, names in found if table is not None)
 
 
 def _ports(entries: tuple[PortTest, ...]) -> Grid:

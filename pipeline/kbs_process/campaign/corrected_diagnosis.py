@@ -1,0 +1,70 @@
+"""The corrected model of a diagnosis: known parameters as refitted, and every law that was found where it belongs."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from kbs_process.campaign.config import Campaign, SensingLaw
+from kbs_process.campaign.corrected_model import write_model
+from kbs_process.campaign.sensing_laws import belongs_to_model
+from kbs_process.diagnosis.joint import Standing
+from kbs_process.diagnosis.measured import with_curves
+from kbs_process.diagnosis.outcome import Find, Outcome
+from kbs_process.diagnosis.suspects import BY
+from kbs_process.plant.sensing import SENSING
+from kbs_process.rig.model import Quantity
+
+_SENSORS = {law.name: law for law in SENSING}
+
+
+def left_out(find: Find) -> bool:
+    """Whether a find is in no model: each recording's own, or the controller's."""
+    law = _SENSORS.get(find.identity.law)
+    return law is not None and not belongs_to_model(law)
+
+
+def write_corrected(campaign: Campaign, outcome: Outcome, folder: Path) -> tuple[Path, ...]:
+    """Write the model into `folder`; return its files."""
+    known = outcome.standing.known
+    source = "by diagnosis of " + ", ".join(known.experiment.trials[k].name for k in known.experiment.fit)
+    hypothesis = with_curves(outcome.standing, outcome.finds)
+    quantities = hypothesis.rig.quantities()
+    # Matrices may lie in files of their own, which the corrected model would not find.
+    changed: dict[str, Quantity] = {name: q for name, q in quantities.items() if q.value.ndim > 1}
+    within = outcome.standing.hypothesis.rig.quantities()
+    changed |= {name: replace(q, source=source) for name, q in quantities.items() if name not in within}
+    for index, scalar in enumerate(known.free):
+        if scalar.quantity in quantities:
+            quantity = changed.get(scalar.quantity, quantities[scalar.quantity])
+            sigma = quantity.sigma.copy()
+            sigma[scalar.element] = known.sigma[index]
+            changed[scalar.quantity] = replace(quantity, sigma=sigma, source=source)
+    sensing = tuple(_sensing(find, outcome.standing, source) for find in outcome.finds if _reads(find))
+    return write_model(campaign, hypothesis.rig, hypothesis.effects, changed, folder, source, sensing)
+
+
+def _reads(find: Find) -> bool:
+    """Whether a find is a law of a sensor or its clock that is the same in every recording."""
+    law = _SENSORS.get(find.identity.law)
+    return law is not None and belongs_to_model(law)
+
+
+def _sensing(find: Find, standing: Standing, source: str) -> SensingLaw:
+    """A find as the model's sensors have it, its amplitudes as they stand after all finds."""
+    law, own = _SENSORS[find.identity.law], find.identity
+    site = BY.join(own.channels) or own.axis
+    known = standing.known
+    places = {scalar.name: index for index, scalar in enumerate(known.free)}
+    numbers = {}
+    for one in find.estimates:
+        # A second action of the same law has numbered amplitudes.
+        entry = next(entry for entry in law.parameters if re.fullmatch(rf"{entry.name}(_\d+)?", one.name))
+        index = places.get(f"law.{law.name}.{site}.{one.name}")
+        value, sigma = (one.value, one.sigma) if index is None else (known.value[index], known.sigma[index])
+        name = f"sensing.{site}.{law.name}.{entry.name}"
+        numbers[entry.name] = Quantity(name, np.asarray(value), entry.unit, np.asarray(sigma), source)
+    return SensingLaw(law.name, site, numbers)

@@ -1,0 +1,317 @@
+r"""The test that tells apart what these recordings cannot: the trajectory with the greatest distance of the rivals.
+
+On a trajectory that nobody has run, what the law that was found would add is
+
+    r = S_A a_A,   rho_delta^2 = min_{b, theta} |r - S_B b - J theta|^2 + theta^T C^{-1} theta
+
+in the metric of the floor: what a rival B with any amplitudes b, at any of its shapes, and the known parameters within
+what the recordings left of their uncertainty C cannot take up. The least over the rivals counts. Where a find has no
+rival, its least known combination of numbers does: the smallest eigenvalue of the information S_A^T S_A, known
+parameters refitted, in units of the present standard deviations. Everything goes through the plant linearised along
+each trajectory's own simulation.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.stats import norm
+
+from kbs_process.diagnosis.curves import CurveSuspect, basis
+from kbs_process.diagnosis.experiment import Drive, Experiment, Trial
+from kbs_process.diagnosis.floor import Floor
+from kbs_process.diagnosis.gls import Background
+from kbs_process.diagnosis.hypothesis import Simulate
+from kbs_process.diagnosis.joint import Standing
+from kbs_process.diagnosis.measured import law_of
+from kbs_process.diagnosis.metric import metrics
+from kbs_process.diagnosis.outcome import Estimate, Find, Identity
+from kbs_process.diagnosis.parameters import slopes
+from kbs_process.diagnosis.rounds import suspects_of
+from kbs_process.diagnosis.scene import Scene
+from kbs_process.diagnosis.screen import Bench, Catalogued, Suspect
+from kbs_process.diagnosis.suspects import BY, Candidate
+from kbs_process.diagnosis.thresholds import RIVALS
+from kbs_process.diagnosis.trajectories import Trajectory, family, limits_of
+from kbs_process.diagnosis.tryout import identity
+from kbs_process.plant.effect import Effect
+from kbs_process.plant.effects import CATALOGUE
+from kbs_process.plant.effects.measured_law import INTERVALS
+from kbs_process.plant.sensing import SENSING, Sensing
+from kbs_process.signals.records import Array
+
+_SECONDS = 200.0  # of a proposed test, or as long as the longest recording
+_CLEAR_S = 3.0  # at either end of a recording that are not compared
+_WEAK = 0.1  # of a number, as its standard deviation: less is known well enough
+_FEW = 3  # rivals that are told from
+_BATCH = 16  # suspects whose signatures are made together
+_DEPENDENT = 1e-10
+_EVERY: tuple[Effect | Sensing, ...] = (*CATALOGUE, *SENSING)
+_LAWS = {law.name: law for law in _EVERY}
+
+# What simulates an experiment, for as long as the context lasts.
+Simulating = Callable[[Experiment], AbstractContextManager[Simulate]]
+
+
+@dataclass(frozen=True, slots=True)
+class Tried:
+    """A trajectory of the family and what it is worth: rho_delta, or the root of the information's eigenvalue."""
+
+    words: str
+    worth: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Proposal:
+    """The next test, with what it will show."""
+
+    law: Identity
+    rivals: tuple[Identity, ...]  # that it is told from; empty: its numbers are measured better
+    trajectory: Trajectory
+    distance: float  # of the nearest rival in one recording, known parameters refitted; nan without rivals
+    p_wrong: float  # with one recording
+    recordings: int  # that are needed for P(wrong) < 1 %, or 1
+    sigma: float  # of the least known combination of numbers over that of now, with one recording; nan with rivals
+    tried: tuple[Tried, ...]  # best first
+
+
+def propose(
+    standing: Standing, finds: Sequence[Find], floor: Floor, simulating: Simulating
+) -> Proposal | None:
+    """Return the next test for what is open after a diagnosis; None where nothing is, or commands drive nothing."""
+    asked = _question(finds)
+    if asked is None or any(drive.schedule is None for drive in standing.known.experiment.drives):
+        return None
+    find, rivals = asked
+    experiment = standing.known.experiment
+    limits = limits_of(experiment.drives, experiment.dt)
+    trajectories = family(
+        limits, experiment.rig.joint_names, min(_SECONDS, limits.seconds), find.identity.axis
+    )
+    if not trajectories:
+        return None
+    planned = _planned(experiment, trajectories)
+    with simulating(planned) as simulate:
+        stage = _Stage.of(standing, planned, floor, find, simulate)
+        if stage is None:
+            return None
+        worth = stage.worth(rivals)
+        order = np.argsort(-worth, kind="stable")
+        best = int(order[0])
+        if not worth[best] > 0.0:
+            return None
+        least, sigma = stage.judged(best, rivals, simulate)
+    tried = tuple(Tried(trajectories[k].words, float(worth[k])) for k in order)
+    needed = int(np.ceil((RIVALS / least) ** 2)) if rivals and least > 0.0 else 1
+    return Proposal(
+        law=find.identity,
+        rivals=tuple(rivals),
+        trajectory=trajectories[best],
+        distance=least,
+        p_wrong=float(norm.sf(0.5 * least)) if rivals else float("nan"),
+        recordings=max(1, needed),
+        sigma=sigma,
+        tried=tried,
+    )
+
+
+def _question(finds: Sequence[Find]) -> tuple[Find, list[Identity]] | None:
+    """The first find that has rivals; else the one whose numbers are known worst, if they are known badly."""
+    for find in finds:
+        if find.indistinguishable_from:
+            return find, list(find.indistinguishable_from[:_FEW])
+    weak = [(max(_unknown(find), default=0.0), find) for find in finds]
+    weak = [entry for entry in weak if entry[0] > _WEAK]
+    return (max(weak, key=lambda entry: entry[0])[1], []) if weak else None
+
+
+def _unknown(find: Find) -> list[float]:
+    """Standard deviations of a law's numbers, each over the largest of its unit."""
+    largest: dict[str, float] = {}
+    for one in find.estimates:
+        if one.sigma > 0.0:
+            largest[one.unit] = max(largest.get(one.unit, 0.0), abs(one.value))
+    return [
+        one.sigma / largest[one.unit] for one in find.estimates if one.sigma > 0.0 and largest[one.unit] > 0.0
+    ]
+
+
+def _planned(experiment: Experiment, trajectories: Sequence[Trajectory]) -> Experiment:
+    """The experiment that consists of the family, one recording each, through the controller."""
+    like = next(trial for trial in experiment.trials if trial.role != "held-out")
+    drives, trials = [], []
+    for number, one in enumerate(trajectories):
+        n = int(one.seconds / experiment.dt)
+        clear = round(_CLEAR_S / experiment.dt)
+        valid = np.zeros(n, dtype=np.bool_)
+        valid[clear : n - clear] = True
+        drives.append(Drive(number, n, one.schedule, None, like.wrench_rate, like.angle_rate))
+        trials.append(
+            Trial(
+                name=f"planned {number}",
+                role="fit",
+                trajectory=number,
+                drive=number,
+                measured=np.zeros((n, len(experiment.channels))),
+                valid=valid,
+                wrench_rate=like.wrench_rate,
+                angle_rate=like.angle_rate,
+                wrench_clock_sigma=like.wrench_clock_sigma,
+                angle_clock_sigma=like.angle_clock_sigma,
+                temperature=None,
+            )
+        )
+    return replace(experiment, drives=tuple(drives), trials=tuple(trials))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Stage:
+    """The family of trajectories with the found law on it."""
+
+    standing: Standing  # of the planned recordings, which show the law
+    bench: Bench
+    columns: dict[int, Array]  # by trajectory, whitened signature of each of the law's amplitudes
+    amplitude: Array
+    sigma: Array  # of the amplitudes at present
+    prior: Array  # (p, p), square root of the precision of the known parameters as the recordings left them
+    free: tuple[int, ...]  # places of these among all free numbers
+
+    @classmethod
+    def of(
+        cls, standing: Standing, planned: Experiment, floor: Floor, find: Find, simulate: Simulate
+    ) -> _Stage | None:
+        known, hypothesis = standing.known, standing.hypothesis
+        drives = range(len(planned.drives))
+        predicted = dict(zip(drives, simulate([(drive, hypothesis) for drive in drives]), strict=True))
+        if not all(np.isfinite(one.values).all() for one in predicted.values()):
+            return None
+        metric = metrics(planned, replace(floor, experiment=planned), predicted)
+        scene = Scene.of(planned, hypothesis, predicted)
+        found = _suspect(find, scene)
+        if found is None:
+            return None
+        suspect, amplitude = found
+        empty = {k: np.zeros(0) for k in drives}
+        background = Background.of(empty, {k: np.zeros((0, 0)) for k in drives}, np.zeros(0))
+        bare = replace(known, experiment=planned, metric=metric, slopes={}, residual=tuple(empty.values()))
+        bench = Bench(bare, scene, background, ())
+        columns = {k: metric[k](bench.signatures([suspect], k)) for k in drives}
+        # The planned recordings show the law: what proposes shapes of rivals looks at that.
+        shown = replace(bare, residual=tuple(columns[k] @ amplitude for k in drives))
+        own = set(hypothesis.rig.quantities())
+        laws = {f"{one.name}" for one in find.estimates}
+        free = tuple(
+            k
+            for k, scalar in enumerate(known.free)
+            if scalar.quantity in own and scalar.quantity.rpartition(".")[2] not in laws
+        )
+        values, vectors = np.linalg.eigh(np.linalg.pinv(known.covariance[np.ix_(free, free)], hermitian=True))
+        prior = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T
+        return cls(
+            Standing(shown, predicted, {}),
+            replace(bench, known=shown),
+            columns,
+            amplitude,
+            _sigma(find, suspect, amplitude),
+            prior,
+            free,
+        )
+
+    def worth(self, rivals: Sequence[Identity]) -> Array:
+        """(trajectories,) distance of the nearest rival, or what is learnt, the known parameters as they stand."""
+        shapes = self._shapes(rivals)
+        none = {k: np.zeros((len(x), 0)) for k, x in self.columns.items()}
+        if not rivals:
+            return np.array([self._learnt(k, none[k]) for k in sorted(self.columns)])
+        return np.array([self._nearest(k, shapes, none[k]) for k in sorted(self.columns)])
+
+    def judged(self, k: int, rivals: Sequence[Identity], simulate: Simulate) -> tuple[float, float]:
+        """Distance, and standard deviation over that of now, on a trajectory with the known parameters refitted."""
+        known = self.bench.known
+        chosen = [known.free[index] for index in self.free]
+        spread = known.sigma[list(self.free)]
+        made = slopes(known.experiment, self.standing.hypothesis, chosen, spread, [k], simulate)[k]
+        J = known.metric[k](np.moveaxis(made.columns, 0, 2))
+        if rivals:
+            return self._nearest(k, self._shapes(rivals), J), float("nan")
+        return float("nan"), float(1.0 / np.sqrt(1.0 + self._learnt(k, J) ** 2))
+
+    def _shapes(self, rivals: Sequence[Identity]) -> list[Suspect]:
+        """The rivals at every shape that the trajectories give them."""
+        if not rivals:
+            return []
+        every = suspects_of(self.standing, self.bench.scene)
+        return [one for one in every if identity(one) in rivals and not one.each_trial]
+
+    def _nearest(self, k: int, shapes: Sequence[Suspect], J: Array) -> float:
+        """Distance of the nearest rival; one that has no shape here is told by all that the law shows."""
+        shown = self.columns[k] @ self.amplitude
+        found = [float(np.linalg.norm(shown))]
+        for first in range(0, len(shapes), _BATCH):
+            batch = shapes[first : first + _BATCH]
+            columns = self.bench.known.metric[k](self.bench.signatures(batch, k))
+            ends = np.cumsum([len(one.amplitudes) for one in batch])
+            found += [self._apart(shown, own, J) for own in np.split(columns, ends[:-1], axis=1)]
+        return min(found)
+
+    def _apart(self, shown: Array, other: Array, J: Array) -> float:
+        """Length of what neither a rival nor known parameters within their covariance take up."""
+        tail = np.zeros((J.shape[1], other.shape[1] + J.shape[1]))
+        if J.shape[1]:
+            tail[:, other.shape[1] :] = self.prior
+        A = np.vstack([np.hstack([other, J]), tail])
+        length = np.linalg.norm(A, axis=0)
+        A = A[:, length > 0.0] / length[length > 0.0]
+        y = np.concatenate([shown, np.zeros(len(tail))])
+        return float(np.linalg.norm(y - A @ np.linalg.lstsq(A, y, rcond=_DEPENDENT)[0]))
+
+    def _learnt(self, k: int, J: Array) -> float:
+        """Root of the smallest eigenvalue of the law's information in units of its present standard deviations."""
+        x = self.columns[k]
+        H = x.T @ x
+        if J.shape[1]:
+            H = H - x.T @ J @ np.linalg.solve(J.T @ J + self.prior.T @ self.prior, J.T @ x)
+        known = self.sigma > 0.0
+        scaled = (H * np.outer(self.sigma, self.sigma))[np.ix_(known, known)]
+        return float(np.sqrt(max(0.0, np.linalg.eigvalsh(scaled)[0]))) if known.any() else 0.0
+
+
+def _suspect(find: Find, scene: Scene) -> tuple[Suspect, Array] | None:
+    """A find as a suspect on other trajectories, with its amplitudes."""
+    own = find.identity
+    if find.curve is not None:
+        port, regressor = law_of(own.port, find.curve)
+        x = find.curve.x
+        knots = np.linspace(x[0], x[-1], INTERVALS + 1)
+        coefficients = np.linalg.lstsq(basis(x, float(x[0]), float(x[-1])), find.curve.value, rcond=None)[0]
+        return CurveSuspect(scene, port, own.axis, regressor, knots), np.asarray(coefficients)
+    law = _LAWS.get(own.law)
+    site = BY.join(own.channels) or own.axis
+    if law is None or law.each_trial or not site:
+        return None
+    numbers = _numbers(find)
+    if not all(entry.name in numbers for entry in law.parameters if entry.role != "shared"):
+        return None
+    shape = tuple((e.name, numbers[e.name].value) for e in law.parameters if e.role == "shape")
+    candidate = Candidate(law, site, shape)
+    return Catalogued(candidate, scene), np.array([numbers[e.name].value for e in candidate.amplitudes])
+
+
+def _numbers(find: Find) -> dict[str, Estimate]:
+    """Estimates by the names of the law's first action, whichever this is."""
+    return {re.sub(r"_[2-9]$", "", one.name): one for one in find.estimates} | {
+        one.name: one for one in find.estimates
+    }
+
+
+def _sigma(find: Find, suspect: Suspect, amplitude: Array) -> Array:
+    """(amplitudes,) present standard deviations; of a curve its band, at the coefficients' nodes."""
+    if find.curve is not None:
+        nodes = np.linspace(0.0, len(find.curve.x) - 1.0, len(amplitude)).round().astype(int)
+        return np.asarray(find.curve.sigma[nodes])
+    numbers = _numbers(find)
+    return np.array([numbers[name].sigma for name in suspect.amplitudes])
