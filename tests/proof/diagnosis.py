@@ -13,7 +13,7 @@ from kbs_process.report.records.diagnosis import DiagnosisResults, Find, Fitted,
 from proof.answer import Answer, Candidate, Claim, Estimate, HeldOut, Moved, Suspect
 from proof.words import OURS
 
-_OFF = 3.0  # sigmas by which a known parameter has to move to be called off
+_OFF = 4.0  # sigmas by which a known parameter has to move to be called off
 _DISTANCE = 4.65  # of two laws' predictions, below which one in a hundred decisions would be wrong
 _WITHOUT_AXIS = ("transducer", "base")
 

@@ -15,9 +15,10 @@ from kbs_process.campaign.reading import read_run
 from kbs_process.campaign.run import Outcome
 from kbs_process.campaign.settings import motion_settings
 from kbs_process.campaign.simulators import Simulators
-from kbs_process.diagnosis import detection, floor, known, phasing, rounds
+from kbs_process.diagnosis import detection, floor, phasing, rounds
 from kbs_process.diagnosis.detection import Detection
 from kbs_process.diagnosis.experiment import Experiment, Recorded, assemble
+from kbs_process.diagnosis.explain import explained
 from kbs_process.diagnosis.floor import Floor
 from kbs_process.diagnosis.hypothesis import Hypothesis, Prediction, Simulate
 from kbs_process.diagnosis.known import Known
@@ -26,8 +27,7 @@ from kbs_process.signals.records import Run
 from kbs_process.stages import decouple, motion
 from kbs_process.stages.motion import Motion
 
-_STARTS = 2  # that are followed, the second where the first leads to no floor
-_REFITS = 2  # of the floor, where repeats were not driven alike
+_REFITS = 1  # of the floor, where repeats were not driven alike
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -74,9 +74,16 @@ def _recorded(campaign: Campaign, entry: RecordingEntry, run: Run, moved: Motion
     return Recorded(entry.role, entry.trajectory, run, schedule, None, commanded_from(run), absent)
 
 
-def diagnose(campaign: Campaign, target: Path, *, progress: Progress, pdf: bool | None = None) -> Outcome:
-    """Diagnose a campaign and write the answers to `target`."""
-    experiment = experiment_of(campaign, progress)
+def diagnose(
+    campaign: Campaign,
+    target: Path,
+    *,
+    progress: Progress,
+    pdf: bool | None = None,
+    experiment: Experiment | None = None,
+) -> Outcome:
+    """Diagnose a campaign and write the answers to `target`; `experiment` is that of its recordings, if it is there."""
+    experiment = experiment or experiment_of(campaign, progress)
     with Simulators(experiment) as simulate:
         explained = explain(experiment, simulate, progress)
         with progress.task("Suspects: what the known parameters leave"):
@@ -99,15 +106,15 @@ def explain(experiment: Experiment, simulate: Simulate, progress: Progress) -> E
         noise = _floor(experiment, predicted)
         before = detection.detect(experiment, noise, predicted, experiment.fit)
     with progress.task("Phases of cogging, friction and tooth contact"):
-        starts = phasing.begin(experiment, nominal, noise, simulate, most=_STARTS)
+        (start,) = phasing.begin(experiment, nominal, noise, simulate)
     with progress.task("Refitting the known parameters"):
-        found = known.best(experiment, starts, noise, simulate)
+        found, predicted, after = explained(experiment, start, noise, simulate)
         for _ in range(0 if _driven_alike(experiment) else _REFITS):
-            noise = _floor(experiment, _predicted(experiment, found.hypothesis, simulate))
-            found = known.refit(experiment, found.hypothesis, noise, simulate, rephased=0)
+            noise = _floor(experiment, predicted)
+            found, predicted, after = explained(
+                experiment, found.hypothesis, noise, simulate, slopes=found.slopes
+            )
     with progress.task("What the known parameters leave"):
-        predicted = _predicted(experiment, found.hypothesis, simulate)
-        after = detection.detect(experiment, noise, predicted, experiment.fit, known=found)
         held_out = (
             detection.detect(experiment, noise, predicted, experiment.held_out, known=found)
             if experiment.held_out

@@ -22,7 +22,7 @@ from scipy.stats import f as fisher_f
 
 from kbs_process.diagnosis.experiment import Experiment
 from kbs_process.diagnosis.floor import Floor
-from kbs_process.diagnosis.hypothesis import Prediction
+from kbs_process.diagnosis.hypothesis import Hypothesis, Prediction
 from kbs_process.diagnosis.known import Known
 from kbs_process.diagnosis.nuisance import nuisances
 from kbs_process.diagnosis.whiten import Projector, Whitener
@@ -69,8 +69,9 @@ def detect(
     Of trials that `known` numbers were fitted to, these have taken up part; to what was held out, they add what they
     are uncertain by.
     """
+    present = Hypothesis(experiment.rig, experiment.effects) if known is None else known.hypothesis
     whitened = [
-        _mean(experiment, floor, predicted, members)
+        _mean(experiment, floor, predicted, members, present)
         for own in experiment.repeats
         if (members := [k for k in own if k in trials])
     ]
@@ -106,14 +107,18 @@ class _Mean:
 
 
 def _mean(
-    experiment: Experiment, floor: Floor, predicted: Mapping[int, Prediction], members: Sequence[int]
+    experiment: Experiment,
+    floor: Floor,
+    predicted: Mapping[int, Prediction],
+    members: Sequence[int],
+    hypothesis: Hypothesis,
 ) -> _Mean:
     trials = [experiment.trials[k] for k in members]
     valid = np.logical_and.reduce([trial.valid for trial in trials])
     near = predicted[trials[0].drive]
     whiten = floor.whitener(trials[0], near.values, valid=valid, repeats=len(trials))
     left = np.mean([trial.measured - predicted[trial.drive].values for trial in trials], axis=0)
-    N, precision = nuisances(experiment, trials[0], near)
+    N, precision = nuisances(experiment, trials[0], near, hypothesis)
     project = Projector.of(whiten(N), precision * np.sqrt(len(trials)))
     windows = whiten.window
     seen = windows.any(axis=0)

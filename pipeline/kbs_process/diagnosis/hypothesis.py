@@ -10,7 +10,7 @@ from functools import lru_cache
 import numpy as np
 
 from kbs_process.diagnosis.experiment import Drive, Experiment
-from kbs_process.errors import DivergenceError
+from kbs_process.errors import ConfigError, DivergenceError
 from kbs_process.plant.effects import select
 from kbs_process.plant.moved import added_loads
 from kbs_process.plant.predict import predict as simulate_plant
@@ -80,7 +80,7 @@ def predict(hypothesis: Hypothesis, experiment: Experiment, drive: int) -> Predi
 
     Commands drive the plant, whose wrench and angles are sampled at the recorder's rates and brought to the working
     rate by the same filters as the recording. Measured motion drives the rigid bodies alone. A hypothesis whose
-    plant diverges predicts nan.
+    plant diverges, or is none, predicts nan.
     """
     driven = experiment.drives[drive]
     if driven.schedule is None:
@@ -88,7 +88,7 @@ def predict(hypothesis: Hypothesis, experiment: Experiment, drive: int) -> Predi
     else:
         try:
             wrench, angle = _driven(hypothesis, experiment, driven)
-        except DivergenceError:
+        except (DivergenceError, ConfigError):
             wrench, angle = (
                 np.full((driven.n, 6), np.nan),
                 np.full((driven.n, len(experiment.rig.joints)), np.nan),

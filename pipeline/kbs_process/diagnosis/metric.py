@@ -9,7 +9,7 @@ import numpy as np
 
 from kbs_process.diagnosis.experiment import Experiment
 from kbs_process.diagnosis.floor import Floor
-from kbs_process.diagnosis.hypothesis import Prediction
+from kbs_process.diagnosis.hypothesis import Hypothesis, Prediction
 from kbs_process.diagnosis.nuisance import nuisances
 from kbs_process.diagnosis.whiten import Projector, Whitener
 from kbs_process.signals.records import Array
@@ -40,13 +40,20 @@ class Metric:
 
 
 def metrics(
-    experiment: Experiment, floor: Floor, predicted: Mapping[int, Prediction], lowest_Hz: float = 0.0
+    experiment: Experiment,
+    floor: Floor,
+    predicted: Mapping[int, Prediction],
+    hypothesis: Hypothesis | None = None,
 ) -> tuple[Metric, ...]:
-    """Those of all trials, by predictions of all drives (whose path is where encoders round)."""
+    """Those of all trials, by predictions of all drives (whose path is where encoders round).
+
+    `hypothesis` is what predicts them; without it, the files' rig.
+    """
+    present = hypothesis or Hypothesis(experiment.rig, experiment.effects)
     found = []
     for trial in experiment.trials:
         near = predicted[trial.drive]
-        whiten = floor.whitener(trial, near.values, lowest_Hz)
-        N, precision = nuisances(experiment, trial, near)
+        whiten = floor.whitener(trial, near.values)
+        N, precision = nuisances(experiment, trial, near, present)
         found.append(Metric(whiten, Projector.of(whiten(N), precision)))
     return tuple(found)

@@ -1,19 +1,22 @@
-"""What differs from trial to trial and is no one's mismatch: zeros, their drift, the clocks."""
+"""What differs from trial to trial and is no one's mismatch: zeros, their drift, the clocks, what rang before."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from kbs_process.diagnosis.experiment import Experiment, Trial
-from kbs_process.diagnosis.hypothesis import Prediction
+from kbs_process.diagnosis.hypothesis import Hypothesis, Prediction
+from kbs_process.diagnosis.ringing import decays
 from kbs_process.signals.records import Array
 
 
-def nuisances(experiment: Experiment, trial: Trial, prediction: Prediction) -> tuple[Array, Array]:
+def nuisances(
+    experiment: Experiment, trial: Trial, prediction: Prediction, hypothesis: Hypothesis
+) -> tuple[Array, Array]:
     """Columns (n, c, k) and one over their standard deviations (k,), 0 where nothing is known of them.
 
-    A constant and a slope of each load channel with a bias (taring and drift), a constant of each angle, and the
-    residual error of the wrench's and the encoders' clocks, one s each, first order in it.
+    A constant and a slope of each load channel with a bias (taring and drift), a constant of each angle, the residual
+    error of the wrench's and the encoders' clocks, one s each, first order in it, and what rings at the beginning.
     """
     n, c = prediction.values.shape
     wrench = experiment.loads
@@ -38,4 +41,7 @@ def nuisances(experiment: Experiment, trial: Trial, prediction: Prediction) -> t
             column[:, channels] = late[:, channels]
             columns.append(column)
             precision.append(1.0 / sigma)
-    return np.stack(columns, axis=2), np.array(precision)
+    begin = int(np.argmax(trial.valid))
+    ringing = decays(experiment, hypothesis, trial.drive, begin, n)
+    whole = np.concatenate([np.stack(columns, axis=2), ringing], axis=2)
+    return whole, np.array([*precision, *[0.0] * ringing.shape[2]])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -39,6 +39,17 @@ def prior(rig: Rig, nominal: Rig, effects: Sequence[str], free: Sequence[Scalar]
         rig, {name: known[name].value for name in own}, {name: known[name].sigma for name in own}
     )
     return identification.prior(output_error.Experiment(mixed, tuple(effects), tuple(free), (), 0.0))
+
+
+def within(parameters: Parameters, reach: float) -> Parameters:
+    """Bounds no farther than `reach` sigmas from the means."""
+    assert parameters.lower is not None and parameters.upper is not None
+    apart = np.where(np.isfinite(parameters.sigma), reach * parameters.sigma, np.inf)
+    return replace(
+        parameters,
+        lower=np.maximum(parameters.lower, parameters.value - apart),
+        upper=np.minimum(parameters.upper, parameters.value + apart),
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,6 +94,11 @@ def slopes(
     }
     for (drive, index), moved_prediction in zip(places, found[len(drives) :], strict=True):
         columns[drive][index] = (moved_prediction.values - bases[drive].values) / differences[index]
+    for drive, index in places:
+        if not np.isfinite(columns[drive][index]).all():
+            columns[drive][index] = _inward(
+                hypothesis, free[index], -differences[index], bases[drive], simulate, drive
+            )
     M, wrench = decoupling(experiment), experiment.wrench_channels
     rows = [WRENCH_CHANNELS.index(channel) for channel in experiment.rig.transducer.channels]
     for index, scalar in enumerate(free):
@@ -92,3 +108,18 @@ def slopes(
                 acting = bases[drive].wrench[:, j]
                 columns[drive][index][:, :wrench] = acting[:, None] * M[:, rows.index(i)]
     return {drive: Slopes(bases[drive], columns[drive]) for drive in drives}
+
+
+def _inward(
+    hypothesis: Hypothesis,
+    scalar: Scalar,
+    difference: float,
+    base: Prediction,
+    simulate: Simulate,
+    drive: int,
+) -> Array:
+    """A slope to the other side, where the plant cannot run on the first; none, where it cannot run on either."""
+    value = hypothesis.values([scalar]) + difference
+    moved = simulate([(drive, hypothesis.at([scalar], value))])[0].values
+    slope: Array = (moved - base.values) / difference
+    return slope if np.isfinite(slope).all() else np.zeros_like(slope)

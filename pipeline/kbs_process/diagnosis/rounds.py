@@ -83,12 +83,12 @@ def diagnose(
         if rounds[-1].find is None:
             break
         finds.append(rounds[-1].find)
+        if _detected(standing, floor, known.experiment.fit).log_p > np.log(DETECTED):
+            break
     last = rounds[-1]
-    left = (
-        last.place
-        if last.find is None
-        else _place(standing, floor, Scene.of(known.experiment, standing.hypothesis, standing.predicted))
-    )
+    left = last.place
+    if last.find is not None:
+        left = _place(standing, floor, Scene.of(known.experiment, standing.hypothesis, standing.predicted))
     after = _detected(standing, floor, known.experiment.fit) if finds else before
     held_out = None
     if known.experiment.held_out:
@@ -100,9 +100,9 @@ def diagnose(
         before=before,
         after=after,
         held_out=held_out,
-        log_p=_mismatch(before, rounds[0].screening),
+        log_p=_mismatch(before, rounds[0]),
         moved=moved,
-        finds=tuple(finds),
+        finds=_merged(finds),
         refused=last.refused,
         absorbed=_absorbed(last.screening),
         place=rounds[0].place,
@@ -113,10 +113,18 @@ def diagnose(
     )
 
 
-def _mismatch(before: Detection, screening: Screening) -> float:
-    """The lesser of two p-values, of any mismatch and of the best suspect, times two (Bonferroni)."""
-    best = min((found.log_p for found in screening.candidates), default=0.0)
-    return float(min(0.0, np.log(2.0) + min(before.log_p, best)))
+def _mismatch(before: Detection, first: _Round) -> float:
+    """The lesser of two p-values, of any mismatch and of the first find, times two (Bonferroni).
+
+    A suspect that did not pass the gate does not count: small gains are more frequent than chance has them, as the
+    plant is not exact.
+    """
+    if first.find is None:
+        return before.log_p
+    found = min(
+        one.log_p for one in first.screening.candidates if identity(one.suspect) == first.find.identity
+    )
+    return float(min(0.0, np.log(2.0) + min(before.log_p, found)))
 
 
 def suspects_of(standing: Standing, scene: Scene) -> list[Suspect]:
@@ -168,8 +176,15 @@ def _round(standing: Standing, floor: Floor, simulate: Simulate) -> _Round:
 
 
 def _leaders(screening: Screening) -> list[Found]:
-    """The most probable suspects, as many as the linear plant may have in the wrong order."""
+    """The most probable suspects, as many as the linear plant may have in the wrong order.
+
+    A law that repeats predicts what was not recorded; one whose size and phase are each recording's own does not. It
+    leads only where none that repeats does half of what it does.
+    """
     able = [found for found in screening.candidates if found.significant and not found.absorbed]
+    repeating = [found for found in able if not found.suspect.each_trial]
+    if repeating and 2.0 * repeating[0].score.gain >= able[0].score.gain:
+        able = repeating
     if not able:
         return []
     bound = (1.0 - LEAD) * able[0].score.gain
@@ -372,6 +387,30 @@ def _detected(standing: Standing, floor: Floor, trials: Sequence[int]) -> Detect
         )
         experiment = replace(experiment, trials=corrected)
     return detect(experiment, floor, standing.predicted, trials, known=known)
+
+
+def _merged(finds: Sequence[Find]) -> tuple[Find, ...]:
+    """Finds of one law at one place are one: harmonics of an order, or a law and what its formula lacks."""
+    merged: list[Find] = []
+    for find in finds:
+        place = next((k for k, other in enumerate(merged) if other.identity == find.identity), None)
+        if place is None:
+            merged.append(find)
+            continue
+        first = merged[place]
+        folds = tuple(
+            replace(one, after=other.after, gain=one.gain + other.gain)
+            for one, other in zip(first.gate.folds, find.gate.folds, strict=True)
+        )
+        white = first.gate.whiteness[0], find.gate.whiteness[1]
+        merged[place] = replace(
+            first,
+            estimates=(*first.estimates, *find.estimates),
+            gate=replace(first.gate, folds=folds, whiteness=white),
+            rho=float(np.hypot(first.rho, find.rho)),
+            rho_eff=float(np.hypot(first.rho_eff, find.rho_eff)),
+        )
+    return tuple(merged)
 
 
 def _moved(known: Known) -> tuple[Moved, ...]:

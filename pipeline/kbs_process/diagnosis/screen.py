@@ -28,6 +28,8 @@ from kbs_process.diagnosis.transfer import BATCH, respond
 from kbs_process.plant.sensing import Sensing, SensingPort
 from kbs_process.signals.records import WRENCH_CHANNELS, Array
 
+_RUNAWAY = 1e30  # of a unit amplitude's signature
+
 
 class Suspect(Protocol):
     """A candidate at one point of its shape's grid."""
@@ -185,7 +187,10 @@ class Bench:
                 parts.append(suspect.outputs(drive))
             else:
                 parts.append(np.stack([next(moved) for _ in columns], axis=2))
-        return np.concatenate(parts, axis=2)
+        shown = np.concatenate(parts, axis=2)
+        # What runs away along the linear plant, or has no value on this motion, says nothing.
+        bounded = np.max(np.abs(shown), axis=(0, 1), initial=0.0) < _RUNAWAY
+        return np.where(bounded, shown, 0.0)
 
 
 def screen(bench: Bench, suspects: Sequence[Suspect]) -> Screening:

@@ -2,13 +2,13 @@
 
 Slopes are differences of the plant. They are taken anew where a step went otherwise than they promised; else they are
 updated by what the step gave (Broyden, Math. Comp. 19:577, 1965). Phases, and where tooth contact begins and ends, have
-minima by the dozen: they are tried on grids, all other numbers following as the slopes say.
+minima by the dozen: see `leaps`.
 """
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,33 +17,29 @@ from scipy.linalg import cho_factor, cho_solve
 from kbs_process.diagnosis.experiment import Experiment
 from kbs_process.diagnosis.floor import Floor
 from kbs_process.diagnosis.hypothesis import Hypothesis, Prediction, Simulate
+from kbs_process.diagnosis.leaps import leap
 from kbs_process.diagnosis.metric import Metric, metrics
-from kbs_process.diagnosis.parameters import Slopes, prior, slopes
-from kbs_process.diagnosis.phasing import stages
+from kbs_process.diagnosis.parameters import Slopes, prior, slopes, within
 from kbs_process.signals.records import Array
 from kbs_process.stages.identification import gearbox
 from kbs_process.stages.output_error import Scalar
 from kbs_process.stages.polar import Polar
-from kbs_process.stages.screening import Phase, phases
+from kbs_process.stages.screening import phases
 
 _DIFFERENCE = 0.05  # prior sigmas (phases: rad), first difference
 _SEEN = 5.0  # what a difference should move the whitened residual by
 _LEAST_DIFFERENCE, _MOST_DIFFERENCE = 2e-3, 0.4  # prior sigmas
 _DAMPING = (0.0, 1e-2, 1e-1, 1.0, 10.0, 1e3)  # tried two at a time
 _AGREED = 0.9  # gained over promised, above which slopes are only updated
-GAIN = 2.0  # of -2 log likelihood: a step that promises less ends the search
+_STALLED = 0.1  # of the same, below which a descent goes nowhere
+GAIN = 2.0  # of -2 log likelihood: a step that promises less ends a descent
+_LITTLE = 25.0  # of the same: what exact slopes gained, below which more rounds are not worth their time
+LEAPS = 3  # in one search
+_EARLY = 2  # steps before the first leap: masses and centres of gravity are right then
+_ROUNDS = 8  # steps of a descent at most
 _NEGLIGIBLE = (
     0.1  # of the whitened residual's length: what a number moves by one sigma and is not looked at again
 )
-_POOR = 0.5  # gained over promised, below which all slopes are taken anew, once
-_CALM = 1.3  # over the floor, below which phases are not looked for again before the end
-_REPHASED = 2  # every how many rounds
-_LITTLE = 5.0  # of the same: what exact slopes gained, below which more rounds are not worth their time
-_BETTER = 10.0  # for which phases are moved
-_RISE = 1.5  # times the cost, that a move of phases may bring before the others have settled
-_SMOOTH, _RING = 8, 16  # phases tried all round
-_WIDTHS = (-1.0, 0.0, 1.0)  # prior sigmas
-_FINE = (-0.1, -0.05, 0.0, 0.05, 0.1)  # rad, then
 
 Predictions = dict[int, Prediction]  # by drive
 Gradients = dict[int, Slopes]  # by drive
@@ -78,9 +74,10 @@ class Search:
         simulate: Simulate,
         hypothesis: Hypothesis,
         free: tuple[Scalar, ...],
+        reach: float = np.inf,
     ) -> None:
         self.experiment, self.simulate, self.hypothesis, self.free = experiment, simulate, hypothesis, free
-        self.parameters = prior(hypothesis.rig, experiment.rig, hypothesis.effects, free)
+        self.parameters = within(prior(hypothesis.rig, experiment.rig, hypothesis.effects, free), reach)
         self.pairs = phases(hypothesis.rig, hypothesis.effects, free)
         self.polar = Polar.of(self.pairs, self.parameters)
         self.precision = self.parameters.sigma**-2.0
@@ -139,12 +136,12 @@ class Search:
 
     # how it is lowered
 
-    def begin(self) -> Found:
+    def begin(self, gradients: Gradients | None = None) -> Found:
         """The hypothesis as it is, with slopes; its nuisances and its encoders' rounding are the metric's."""
         theta = self.hypothesis.values(self.free)
         predicted = self.predict([theta], self.everything)[0]
-        self.metric = metrics(self.experiment, self.floor, predicted)
-        found = Found(theta, predicted, self.slopes(theta, {}))
+        self.metric = metrics(self.experiment, self.floor, predicted, self.hypothesis)
+        found = Found(theta, predicted, gradients or self.slopes(theta, {}))
         self.idle = {drive: self._idle(drive, found.gradients) for drive in self.references}
         return found
 
@@ -156,31 +153,48 @@ class Search:
                 length += np.sum(self.jacobian(k, gradients) ** 2, axis=0)
         return [int(i) for i in np.flatnonzero(np.sqrt(length) * self.spread < _NEGLIGIBLE)]
 
-    def run(self, found: Found, rounds: int) -> Found:
-        """Lower the cost until no step promises `GAIN`; while much is left, phases are looked for again and again."""
-        exact, refreshed = True, False
-        for number in range(1, rounds + 1):
+    def run(self, found: Found, *, leaps: int = LEAPS) -> Found:
+        """Descend; leap to better phases and edges while there are any, and descend again. Without leaps descend alone.
+
+        The first leap is made early: what is left out, or a wrong phase, has not yet pulled the others far then.
+        """
+        if not leaps:
+            return self.descend(found, _ROUNDS)
+        for number in range(leaps):
+            found = self.descend(found, _EARLY if number == 0 else _ROUNDS)
+            moved = leap(self, found, smooth=number == 0)
+            if moved is not None:
+                found = self.moved(moved, found)
+            elif number > 0:
+                break
+        found = self.descend(found, _ROUNDS)
+        # Those of bodies hardly change, but for what resonances do to them once these are where they belong.
+        renewed = replace(found, gradients=self.slopes(found.theta, found.gradients, whole=True))
+        return self.descend(renewed, _ROUNDS)
+
+    def descend(self, found: Found, rounds: int) -> Found:
+        """Steps until slopes that are exact promise nothing, or do not keep what they promise."""
+        exact = True
+        for number in range(found.rounds + 1, found.rounds + rounds + 1):
             H, g = self.normal(found.gradients, found.predicted)
             self.settle(H)
             step = self.step(found.theta, found.predicted, H, g)
-            if step.promised < GAIN or (exact and refreshed and step.gained < _LITTLE):
-                return replace(found, converged=True, rounds=number)
-            ratio = step.gained / step.promised
+            arrived = step.promised < GAIN or step.gained < max(_LITTLE, _STALLED * step.promised)
             if step.gained > 0.0:
                 gradients = self.updated(found.gradients, found.theta, step)
                 found = replace(found, theta=step.theta, predicted=step.predicted, gradients=gradients)
-            rough = self.level(found) > _CALM and number % _REPHASED == 0
-            moved = self.rephased(found) if rough else None
-            exact = moved is not None or ratio < _AGREED
-            if moved is not None:
-                found = moved
-            elif exact:
-                # Those of bodies hardly change, but for what resonances do to them once these are where they belong.
-                whole = not refreshed and ratio < _POOR and self.level(found) < _CALM
-                refreshed = refreshed or whole
-                slopes = self.slopes(found.theta, found.gradients, whole=whole)
-                found = replace(found, gradients=slopes)
-        return replace(found, rounds=rounds)
+            found = replace(found, rounds=number, converged=arrived and exact)
+            if found.converged:
+                break
+            exact = step.gained < _AGREED * step.promised
+            if exact:
+                found = replace(found, gradients=self.slopes(found.theta, found.gradients))
+        return found
+
+    def moved(self, theta: Array, found: Found) -> Found:
+        """Where a leap has led, with slopes."""
+        predicted = self.predict([theta], self.everything)[0]
+        return Found(theta, predicted, self.slopes(theta, found.gradients), rounds=found.rounds)
 
     def level(self, found: Found) -> float:
         """What is left of the trials that are fitted, over the floor."""
@@ -190,16 +204,23 @@ class Search:
     def slopes(self, theta: Array, held: Gradients, *, whole: bool = False) -> Gradients:
         """Slopes at theta; where some are held, only those of drives' and transducer's numbers are taken again.
 
-        With `whole` all are, but in calibrations, which hardly shake anything.
+        With `whole` all are. Calibrations, slow and at rest for the most part, keep what others show better.
         """
         keep = {}
         for drive, slope in held.items():
-            slow = [] if whole and drive not in self.calibrations else self.slow
-            keep[drive] = ([*slow, *self.idle.get(drive, ())], slope.columns)
+            same = [] if whole else self.slow
+            if drive in self.calibrations:
+                same = [i for i in range(len(self.free)) if i in self.slow or self._shown_beside(i, drive)]
+            keep[drive] = ([*same, *self.idle.get(drive, ())], slope.columns)
         here = self.hypothesis.at(self.free, theta)
         return slopes(
             self.experiment, here, self.free, self.differences, self.references, self.simulate, keep=keep
         )
+
+    def _shown_beside(self, index: int, drive: int) -> bool:
+        """Whether a drive other than a calibration shows something of a number."""
+        others = set(self.idle) - self.calibrations - {drive}
+        return any(index not in self.idle[other] for other in others)
 
     def updated(self, gradients: Gradients, theta: Array, step: _Step) -> Gradients:
         """Broyden's update, lengths in prior sigmas."""
@@ -247,90 +268,3 @@ class Search:
             if costs[best] < now:
                 return _Step(pair[best], {**predicted, **tried[best]}, promised, (now - costs[best]) / weight)
         return _Step(theta, predicted, promised, 0.0)
-
-    # phases, by trial
-
-    def rephased(self, found: Found) -> Found | None:
-        """Move phases to better minima, where there are any, the other numbers following as the slopes say.
-
-        What a weak effect does shows only once the strong ones are right. A smooth phase is tried all round with its
-        amplitude as it is known; tooth contact, whose edges matter, all round at three widths, then finely there.
-        """
-        theta = found.theta
-        J = {k: self.jacobian(k, found.gradients) for k in self.experiment.fit}
-        for pair in self.pairs:
-            trials = next(
-                (used for used, joints in stages(self.experiment) if self._joint(pair) in joints), ()
-            )
-            partner = pair.amplitude if pair.smooth else self._width(pair)
-            if not trials or partner is None:
-                continue
-            middle, spread = self.parameters.value[partner], self.parameters.sigma[partner]
-            count, widths = (_SMOOTH, (0.0,)) if pair.smooth else (_RING, _WIDTHS)
-            ring = [(2.0 * np.pi * k / count, middle + w * spread) for k in range(count) for w in widths]
-            theta = self._best(found, J, theta, (pair.phase, partner), trials, ring)
-            if not pair.smooth:
-                fine = [(theta[pair.phase] + a, theta[partner] + b) for a in _FINE for b in _FINE]
-                theta = self._best(found, J, theta, (pair.phase, partner), trials, fine)
-        if theta is found.theta:
-            return None
-        predicted = self.predict([theta], self.everything)[0]
-        now, then = sum(self.cost(found.theta, found.predicted)), sum(self.cost(theta, predicted))
-        if then > _RISE * now:  # the slopes promised what is far from true
-            return None
-        return replace(
-            found,
-            theta=theta,
-            predicted=predicted,
-            gradients=self.slopes(theta, found.gradients),
-            converged=False,
-        )
-
-    def _joint(self, pair: Phase) -> str:
-        return self.free[pair.phase].name.split(".")[1]
-
-    def _width(self, pair: Phase) -> int | None:
-        """The number of the same joint that says how wide a contact is."""
-        width = self.free[pair.phase].quantity.rpartition(".")[0] + ".delta"
-        return next((i for i, scalar in enumerate(self.free) if scalar.quantity == width), None)
-
-    def _best(
-        self,
-        found: Found,
-        J: Mapping[int, Array],
-        theta: Array,
-        moved: tuple[int, int],
-        trials: Sequence[int],
-        values: Sequence[tuple[float, float]],
-    ) -> Array:
-        """The best of some values of two numbers; `theta` itself where none is better by `_BETTER`."""
-        rest = np.delete(np.arange(len(self.free)), moved)
-        assert self.parameters.lower is not None and self.parameters.upper is not None
-        prior = np.diag((self.precision + self.ridge)[rest])
-        factor = cho_factor(sum((j[:, rest].T @ j[:, rest] for j in J.values()), prior))
-        # Trials in which the moved numbers show little hold the others by what they already say.
-        held = np.zeros(len(rest))
-        for k in set(J) - set(trials):
-            left = self.residual(k, found.predicted) - J[k] @ (theta - found.theta)
-            held += J[k][:, rest].T @ left
-        points = [theta]
-        for value in values:
-            point = theta.copy()
-            point[list(moved)] = value
-            points.append(np.clip(point, self.parameters.lower, self.parameters.upper))
-        drives = sorted({self.experiment.trials[k].drive for k in trials})
-        costs, follows = [], []
-        for point, predicted in zip(points, self.predict(points, drives), strict=True):
-            z = {k: self.residual(k, predicted) for k in trials}
-            excess = (point - self.parameters.value) * self.precision
-            g = sum((J[k][:, rest].T @ z[k] for k in trials), held - excess[rest])
-            follow = cho_solve(factor, g)
-            cost = sum(float(r @ r) for r in z.values()) + self.excess(point) - float(g @ follow)
-            costs.append(cost if np.isfinite(cost) else np.inf)
-            follows.append(follow)
-        chosen = int(np.argmin(costs))
-        if costs[chosen] > costs[0] - _BETTER:
-            return theta
-        better = points[chosen].copy()
-        better[rest] += follows[chosen] - follows[0]
-        return np.clip(better, self.parameters.lower, self.parameters.upper)

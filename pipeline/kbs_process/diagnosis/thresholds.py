@@ -33,6 +33,10 @@ LEADERS: Final = 4  # candidates that are simulated; beyond it the linear plant'
 # are not yet ordered.
 LEAD: Final = 3.0 * TRANSFER_ERROR
 
+# -- known parameters -------------------------------------------------------------------------------------------------
+# Share of what numbers held near their priors leave, below which numbers set free are said to explain it.
+EXPLAINED: Final = 0.05
+
 # -- gate ----------------------------------------------------------------------------------------------------------
 GATE_SIGMA: Final = 3.0  # by which a coefficient's interval has to exclude zero
 GATE_GAIN: Final = (

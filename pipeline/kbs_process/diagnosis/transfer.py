@@ -21,8 +21,8 @@ from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 from scipy.linalg import expm
 
 from kbs_process.diagnosis.inlets import Inlet, generalised
-from kbs_process.plant.effect import Effect, Port
-from kbs_process.plant.linear import Linear, drive_slopes, linearise
+from kbs_process.plant.effect import SIGNALS, Effect, Port
+from kbs_process.plant.linear import Linear, drive_damping, drive_stiffness, linearise
 from kbs_process.rig.model import Amplifier, Joint, Rig
 from kbs_process.signals.records import WRENCH_CHANNELS, Array
 
@@ -87,9 +87,11 @@ def follow(rig: Rig, effects: Sequence[Effect], taps: Mapping[str, Array], rate:
             moves = np.ptp(signals["rotor_angle"][around]) > _STANDS
             points = around if moves else around[:1]
             for sample in points:
-                at = {name: float(values[sample]) for name, values in signals.items()}
-                K[pair] += drive_slopes(joint.drive, steady, at)[0] / len(points)
-                C[pair] += drive_slopes(joint.drive, effects, at)[1] / len(points)
+                at = dict.fromkeys(SIGNALS, 0.0) | {
+                    name: float(values[sample]) for name, values in signals.items()
+                }
+                K[pair] += drive_stiffness(joint.drive, steady, at) / len(points)
+                C[pair] += drive_damping(joint.drive, effects, at) / len(points)
         systems.append(replace(bare, C=C, K=K))
     step, push = _discretised(systems, 1.0 / rate)
     return Path(

@@ -14,6 +14,7 @@ from kbs_process.signals.records import Array
 
 ITERATIONS = 60
 STANDSTILL = 1e-6  # rad/s^2, of base, outputs and rotors
+ROUNDING = 1e-8  # of the same, below which a step finds no less
 # rad, by which gears are wound up to begin with: one with play has no stiffness unloaded
 WOUND = (0.0, 3e-4, 2.1e-3, 1.1e-2)
 UNHELD = (
@@ -73,6 +74,8 @@ def _settled(acceleration: Callable[[Array], Array], values: Array) -> tuple[Arr
     """Position to which Newton's method leads from `values`, and the accelerations left there."""
     residual = acceleration(values)
     for _ in range(ITERATIONS):
+        if np.abs(residual).max() < ROUNDING:
+            break
         jacobian = np.stack([_slope(acceleration, values, i) for i in range(len(values))], axis=1)
         change = -_solved(jacobian, residual)
         share = 1.0

@@ -7,7 +7,7 @@ gear ratio. So everything is in rad, of the plate or of the output.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -119,26 +119,46 @@ def drive_slopes(
     Rotor and field count as angles at the output, their torques `ratio` times those at the motor: N m/rad, N m s/rad.
     The slopes are those at the signals `at`, without which all are zero: at rest, unloaded.
     """
-    around = dict(at or {})
     ratio = float(drive.ratio)
-    parameters = {name: float(quantity) for name, quantity in drive.parameters.items()}
+    torques = _torques(drive, effects)
+    around = dict.fromkeys(SIGNALS, 0.0) | dict(at or {})
+    field = ratio * _slope(torques, around, "field")
+    return drive_stiffness(drive, effects, around), drive_damping(drive, effects, around), field
 
-    def torques(**signals: float) -> Array:
-        known = dict.fromkeys(SIGNALS, 0.0) | {"ratio": ratio} | parameters | around | signals
+
+def drive_stiffness(drive: Drive, effects: Sequence[Effect], at: Mapping[str, float]) -> Array:
+    """Return the stiffness (2, 2) of `drive_slopes` at all signals of the plant."""
+    torques, ratio = _torques(drive, effects), float(drive.ratio)
+    slopes = [_slope(torques, at, "joint_angle"), ratio * _slope(torques, at, "rotor_angle")]
+    return -np.stack(slopes, axis=1)
+
+
+def drive_damping(drive: Drive, effects: Sequence[Effect], at: Mapping[str, float]) -> Array:
+    """Return the damping (2, 2) of `drive_slopes` at all signals of the plant."""
+    torques, ratio = _torques(drive, effects), float(drive.ratio)
+    return -np.stack([_slope(torques, at, "joint_rate"), ratio * _slope(torques, at, "rotor_rate")], axis=1)
+
+
+def _torques(drive: Drive, effects: Sequence[Effect]) -> Callable[[Mapping[str, float]], Array]:
+    """Torques (2,) on output and rotor, as angles at the output count, for signals of the plant."""
+    ratio = float(drive.ratio)
+    constants = {name: float(quantity) for name, quantity in drive.parameters.items()} | {"ratio": ratio}
+    acting = [e for e in effects if e.port.of_drive and e.port is not Port.MOTOR_FRICTION]
+
+    def torques(signals: Mapping[str, float]) -> Array:
+        known = dict(signals) | constants
         totals = dict.fromkeys(Port, 0.0)
-        for effect in effects:
-            if effect.port.of_drive and effect.port is not Port.MOTOR_FRICTION:
-                totals[effect.port] += effect.value(known)[0]
+        for effect in acting:
+            totals[effect.port] += effect.value(known)[0]
         gear = totals[Port.TRANSMISSION]
         return np.array([gear + totals[Port.JOINT_TORQUE], ratio * totals[Port.MOTOR_TORQUE] - gear])
 
-    def slope(signal: str, scale: float) -> Array:
-        here = around.get(signal, 0.0)
-        return scale * (torques(**{signal: here + _STEP}) - torques(**{signal: here - _STEP})) / (2.0 * _STEP)
+    return torques
 
-    stiffness = -np.stack([slope("joint_angle", 1.0), slope("rotor_angle", ratio)], axis=1)
-    damping = -np.stack([slope("joint_rate", 1.0), slope("rotor_rate", ratio)], axis=1)
-    return stiffness, damping, slope("field", ratio)
+
+def _slope(torques: Callable[[Mapping[str, float]], Array], at: Mapping[str, float], signal: str) -> Array:
+    ends = [torques({**at, signal: at[signal] + step}) for step in (_STEP, -_STEP)]
+    return np.asarray((ends[0] - ends[1]) / (2.0 * _STEP), dtype=np.float64)
 
 
 def ground_slopes(

@@ -198,6 +198,8 @@ def starts(
     found = evaluate([(index, point, spectra[index]) for point in points for index in indices])
     rows = [np.concatenate(found[k : k + len(indices)]) for k in range(0, len(found), len(indices))]
     A = np.column_stack(rows[1:]) - rows[0][:, None]
+    # What no plant can run with is no place to start at.
+    A[:, ~np.isfinite(A).all(axis=0)] = 0.0
     gram, rhs, left = A.T @ A, -A.T @ rows[0], float(rows[0] @ rows[0])
     return _minima(known, values, gram, rhs, left)[:most]
 

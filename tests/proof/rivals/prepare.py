@@ -20,7 +20,7 @@ from proof.answer import Moved
 from proof.rivals.case import Array, Case, Recording
 
 _SIGNALS = ("rotor_angle", "rotor_rate", "joint_angle", "joint_rate")
-_MOVED = 3.0  # sigmas
+_MOVED = 4.0  # sigmas
 
 
 def prepare(folder: Path) -> Case:

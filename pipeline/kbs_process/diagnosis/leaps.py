@@ -1,0 +1,159 @@
+"""Phases of cogging and friction, and the edges of tooth contact, moved to better minima than a descent finds.
+
+What a weak effect does shows only once the strong ones are right. A phase that enters smoothly is tried all round;
+tooth contact at the best pairs of edges (`stages.contact`), each followed by a step in its own numbers before it is
+judged. All other numbers follow as the slopes say.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+
+from kbs_process.diagnosis.phasing import stages
+from kbs_process.signals.records import Array
+from kbs_process.stages.contact import edge_minima
+from kbs_process.stages.screening import Contact, contacts
+
+if TYPE_CHECKING:
+    from kbs_process.diagnosis.search import Found, Search
+
+_SMOOTH = 8  # phases tried all round
+_EDGES = 4  # pairs of edges tried of a contact
+_DIFFERENCE = 0.01  # rad, of an edge, and 5 % of a torque, for a candidate's own step
+_REACH = 0.06  # rad: an edge's own step goes no farther than half the grid that proposed it
+_BETTER = 10.0  # of -2 log likelihood, for which something is moved
+_RISE = 1.5  # times the cost, that a leap may bring before the others have settled
+
+
+def leap(search: Search, found: Found, *, smooth: bool) -> Array | None:
+    """Return better values (p,), or None where there are none; phases that enter smoothly are tried if `smooth`."""
+    theta = found.theta
+    J = {k: search.jacobian(k, found.gradients) for k in search.experiment.fit}
+    for trials, joints in stages(search.experiment):
+        prefixes = tuple(f"joint.{name}.drive." for name in joints)
+        for pair in search.pairs:
+            if smooth and pair.smooth and search.free[pair.phase].name.startswith(prefixes):
+                view = _View(search, found, J, trials, (pair.amplitude, pair.phase))
+                turns = np.arange(_SMOOTH) * (2.0 * np.pi / _SMOOTH)
+                middle = search.parameters.value[pair.amplitude]
+                theta = view.best(theta, [view.at(theta, (middle, turn)) for turn in turns])
+        for contact in contacts(search.hypothesis.rig, search.hypothesis.effects, search.free):
+            if search.free[contact.phase].name.startswith(prefixes):
+                view = _View(search, found, J, trials, (contact.torque, contact.width, contact.phase))
+                theta = view.best(theta, view.edges(theta, contact))
+    if theta is found.theta:
+        return None
+    predicted = search.predict([theta], search.drives)[0]
+    now, then = sum(search.cost(found.theta, found.predicted)), sum(search.cost(theta, predicted))
+    # Else the slopes promised what is far from true.
+    return theta if then < _RISE * now else None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Followed:
+    """A point whose `own` numbers were simulated: the cost once the rest has followed, and by how much that moves."""
+
+    point: Array
+    cost: float
+    follow: Array  # (rest,)
+
+
+class _View:
+    """Some trials in which some numbers, `own`, are moved; the other trials hold the rest by what they already say."""
+
+    def __init__(
+        self,
+        search: Search,
+        found: Found,
+        J: Mapping[int, Array],
+        trials: Sequence[int],
+        own: tuple[int, ...],
+    ) -> None:
+        self.search, self.trials, self.own, self.J = search, trials, list(own), J
+        self.rest = np.delete(np.arange(len(search.free)), self.own)
+        self.drives = sorted({search.experiment.trials[k].drive for k in trials})
+        self.weights = (search.precision + search.ridge)[self.rest]
+        self.normal = sum((j[:, self.rest].T @ j[:, self.rest] for j in J.values()), np.diag(self.weights))
+        self.factor = cho_factor(self.normal)
+        self.held = np.zeros(len(self.rest))
+        for k in set(J) - set(trials):
+            self.held += J[k][:, self.rest].T @ search.residual(k, found.predicted)
+
+    def at(self, theta: Array, values: Sequence[float] | Array) -> Array:
+        """`theta` with the own numbers at `values`, within bounds."""
+        point = theta.copy()
+        point[self.own] = values
+        limits = self.search.parameters
+        assert limits.lower is not None and limits.upper is not None
+        clipped: Array = np.clip(point, limits.lower, limits.upper)
+        return clipped
+
+    def residuals(self, points: Sequence[Array]) -> list[Array]:
+        """Whitened residuals of the trials, end to end, at each point; those that no plant has are not finite."""
+        search = self.search
+        return [
+            np.concatenate([search.residual(k, predicted) for k in self.trials])
+            for predicted in search.predict(points, self.drives)
+        ]
+
+    def best(self, theta: Array, points: Sequence[Array]) -> Array:
+        """The best of some points, the rest having followed; `theta` itself where none is better by `_BETTER`."""
+        here, *others = self.followed([theta, *points])
+        chosen = min(others, key=lambda one: one.cost, default=here)
+        if chosen.cost > here.cost - _BETTER:
+            return theta
+        better = self.at(theta, chosen.point[self.own])
+        better[self.rest] += chosen.follow - here.follow
+        return self.at(better, better[self.own])
+
+    def followed(self, points: Sequence[Array]) -> list[_Followed]:
+        """Judge points by their residuals and the priors."""
+        J = np.concatenate([self.J[k][:, self.rest] for k in self.trials])
+        found = []
+        for point, z in zip(points, self.residuals(points), strict=True):
+            if not np.isfinite(z).all():
+                found.append(_Followed(point, np.inf, np.zeros(len(self.rest))))
+                continue
+            g = J.T @ z + self.held - (self.weights * (point - self.search.parameters.value)[self.rest])
+            follow = cho_solve(self.factor, g)
+            cost = float(z @ z) + self.search.excess(point) - float(g @ follow)
+            found.append(_Followed(point, cost, follow))
+        return found
+
+    def edges(self, theta: Array, contact: Contact) -> list[Array]:
+        """Points with the contact's edges where they might be, each after a step of its own."""
+        J = -np.concatenate([self.J[k] for k in self.trials])
+        prior = self.search.parameters
+        # A phase that these trials show nothing of would leave the equations singular.
+        bounded = replace(prior, sigma=np.where(np.isfinite(prior.sigma), prior.sigma, np.pi))
+        points = edge_minima(self.residuals, theta, J, bounded, contact, _EDGES)
+        return [*points, *(self.stepped(point) for point in points)]
+
+    def stepped(self, point: Array) -> Array:
+        """A Gauss-Newton step in the own numbers and the rest together, of which only the own are taken."""
+        size = np.array([0.05 * max(abs(point[self.own[0]]), 1e-9), _DIFFERENCE, _DIFFERENCE])
+        moved = []
+        for index, d in zip(self.own, size, strict=True):
+            one = point.copy()
+            one[index] += d
+            moved.append(one)
+        z, *others = self.residuals([point, *moved])
+        own = np.column_stack([(z - other) / d for other, d in zip(others, size, strict=True)])
+        if not (np.isfinite(own).all() and np.isfinite(z).all()):
+            return point
+        J = np.concatenate([self.J[k][:, self.rest] for k in self.trials])
+        prior = self.search.parameters
+        cross = J.T @ own
+        excess = (self.search.precision + self.search.ridge) * (point - prior.value)
+        g = J.T @ z + self.held - excess[self.rest]
+        A = own.T @ own + np.diag(self.search.precision[self.own]) - cross.T @ cho_solve(self.factor, cross)
+        b = own.T @ z - self.search.precision[self.own] * (point - prior.value)[self.own]
+        b = b - cross.T @ cho_solve(self.factor, g)
+        reach = np.array([0.5 * abs(point[self.own[0]]), _REACH, _REACH])
+        step = np.clip(np.linalg.lstsq(A, b, rcond=1e-12)[0], -reach, reach)
+        return self.at(point, point[self.own] + step)
