@@ -79,8 +79,16 @@ pdf_option = click.option(
 @output_option
 @pdf_option
 @click.option("--check", is_flag=True, help="Exit with 1 when a requirement is not met.")
+@click.option(
+    "--diagnose",
+    "why",
+    is_flag=True,
+    help="Where recordings differ from the prediction by more than repeats do, find out why: takes minutes.",
+)
 @quiet_option
-def process(campaign: str, output: Path | None, pdf: bool | None, check: bool, quiet: bool) -> None:
+def process(
+    campaign: str, output: Path | None, pdf: bool | None, check: bool, why: bool, quiet: bool
+) -> None:
     """Process CAMPAIGN: fit, compare with the prediction, and write the report."""
     from kbs_process.campaign.load import load_campaign
     from kbs_process.campaign.locate import find_campaign, results_folder
@@ -95,6 +103,11 @@ def process(campaign: str, output: Path | None, pdf: bool | None, check: bool, q
     for line in outcome.verdict_lines:
         click.echo(line)
     click.echo(f"Report: {outcome.report}")
+    if why:
+        from kbs_process.campaign.diagnosing import diagnose_results
+
+        for line in diagnose_results(loaded, target, progress=_progress(quiet), pdf=pdf):
+            click.echo(line)
     if check and outcome.requirement_met is False:
         sys.exit(NOT_MET)
 

@@ -125,7 +125,16 @@ class Fold:
     kind: Literal["fold"] = "fold"
 
 
-Block = Figure | Grid | Text | Notices | Fold
+@dataclass(frozen=True, slots=True)
+class Link:
+    """A way to another page of the same results."""
+
+    text: str
+    to: str  # relative to the page
+    kind: Literal["link"] = "link"
+
+
+Block = Figure | Grid | Text | Notices | Fold | Link
 
 
 @dataclass(frozen=True, slots=True)
