@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from kbs_process.campaign.config import SensingLaw
+from kbs_process.campaign.corrected_diagnosis import write_corrected
 from kbs_process.campaign.corrected_model import write_model
 from kbs_process.campaign.load import load_campaign
 from kbs_process.campaign.reading_laws import readings
+from kbs_process.diagnosis.hypothesis import Hypothesis
+from kbs_process.diagnosis.outcome import Estimate, Identity
 from kbs_process.errors import ConfigError
 from kbs_process.plant.attach import attach
 from kbs_process.plant.effects import select
-from kbs_process.rig.model import Quantity
+from kbs_process.rig.model import Quantity, substitute
 from kbs_process.signals.records import WRENCH_CHANNELS
+from kbs_process.stages.output_error import Scalar
 
 CAMPAIGN = Path(__file__).parents[2] / "campaigns" / "EL089"
 
@@ -80,3 +85,34 @@ def test_readings_are_what_the_laws_make_of_a_prediction() -> None:
     np.testing.assert_array_equal(
         readings([gain("Ty", 0.02)], "angle", rig.joint_names, t, angle, rig, None), angle
     )
+
+
+def test_a_diagnosis_that_went_round_a_phase_and_found_a_gain_leaves_a_model_that_loads(
+    tmp_path: Path,
+) -> None:
+    campaign = load_campaign(CAMPAIGN, checksums=False)
+    phase, name = "joint.el.drive.phi_stat", "law.channel_gain.Ty.gain"
+    rig = substitute(campaign.rig, {phase: 7.0})
+    known = SimpleNamespace(
+        experiment=SimpleNamespace(trials=(SimpleNamespace(name="a"),), fit=(0,)),
+        hypothesis=Hypothesis(rig, campaign.effects),
+        free=(Scalar(phase), Scalar(name)),
+        value=np.array([7.0, 0.03]),
+        sigma=np.array([0.1, 0.002]),
+    )
+    standing = SimpleNamespace(known=known, hypothesis=known.hypothesis, laws={name: {}})
+    found = SimpleNamespace(
+        identity=Identity("transducer", "", ("Ty",), "gain", "channel_gain"),
+        estimates=(Estimate("gain", "1", 0.02, 0.01),),
+        curve=None,
+    )
+    outcome = SimpleNamespace(standing=standing, finds=(found,))
+    write_corrected(campaign, outcome, tmp_path / "corrected")  # type: ignore[arg-type]
+    corrected = load_campaign(tmp_path / "corrected", checksums=False)
+    quantity = corrected.rig.quantities()[phase]
+    assert float(quantity) == pytest.approx(7.0 - 2.0 * np.pi)
+    assert float(quantity.sigma) == 0.1
+    # The gain is that after all finds, not that when it was found.
+    (law,) = corrected.sensing
+    assert float(law.parameters["gain"]) == 0.03
+    assert float(law.parameters["gain"].sigma) == 0.002

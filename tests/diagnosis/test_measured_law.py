@@ -105,6 +105,7 @@ def test_written_it_loads_and_acts_where_it_was_found(scene: Scene, tmp_path: Pa
     assert float(found["joint.el.drive.ground_rate_law_4"].sigma) == pytest.approx(0.1 * BUMP[4])
     assert float(found["joint.az.drive.ground_rate_law_4"]) == 0.0
     assert float(found["joint.az.drive.ground_rate_law_4"].sigma) == 0.0
+    assert float(found["joint.az.drive.ground_rate_law_low"].sigma) == 0.0
     flown = load_campaign(tmp_path, checksums=False, flight=True)
     assert {"joint_angle_law", "joint_rate_law"} <= set(flown.effects)
     assert not {"ground_angle_law", "ground_rate_law"} & set(flown.effects)

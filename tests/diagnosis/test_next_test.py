@@ -53,6 +53,7 @@ def standing() -> Standing:
 
 
 def found(sigma: float, *rivals: Identity) -> Find:
+    """Friction whose number is known to a standard deviation."""
     others = tuple(Alternative(rival, 0.4, 1.0, 0.3, True, True) for rival in rivals)
     return Find(
         identity=VISCOUS,
@@ -61,8 +62,8 @@ def found(sigma: float, *rivals: Identity) -> Find:
         reference="",
         estimates=(Estimate("joint_viscous", "N m s/rad", 1.0, sigma),),
         probability=0.6,
-        rho=20.0,
-        rho_eff=20.0,
+        rho=1.0 / sigma,
+        rho_eff=1.0 / sigma,
         kappa=0.0,
         gate=Gate(True, (), True, 20.0, (1.0, 1.0), ()),
         alternatives=others,
@@ -140,6 +141,9 @@ def test_nothing_is_proposed_where_nothing_is_open(standing: Standing) -> None:
     floor = declared(standing.known.experiment)
     assert propose(standing, [found(0.01)], floor, simulating) is None
     assert propose(standing, [], floor, simulating) is None
+    # Both were found: none of them stands for the other.
+    both = [found(0.01, COULOMB), replace(found(0.01), identity=COULOMB)]
+    assert propose(standing, both, floor, simulating) is None
     driven = standing.known.experiment
     still = replace(driven, drives=tuple(replace(one, schedule=None) for one in driven.drives))
     known = replace(standing.known, experiment=still)

@@ -11,12 +11,16 @@ import numpy as np
 from kbs_process.campaign.config import Campaign, SensingLaw
 from kbs_process.campaign.corrected_model import write_model
 from kbs_process.campaign.sensing_laws import belongs_to_model
+from kbs_process.diagnosis.hypothesis import Hypothesis
 from kbs_process.diagnosis.joint import Standing
 from kbs_process.diagnosis.measured import with_curves
 from kbs_process.diagnosis.outcome import Find, Outcome
 from kbs_process.diagnosis.suspects import BY
+from kbs_process.plant.effect import Uniform
+from kbs_process.plant.effects import select
 from kbs_process.plant.sensing import SENSING
-from kbs_process.rig.model import Quantity
+from kbs_process.rig.model import Quantity, substitute
+from kbs_process.signals.records import Array
 
 _SENSORS = {law.name: law for law in SENSING}
 
@@ -31,7 +35,7 @@ def write_corrected(campaign: Campaign, outcome: Outcome, folder: Path) -> tuple
     """Write the model into `folder`; return its files."""
     known = outcome.standing.known
     source = "by diagnosis of " + ", ".join(known.experiment.trials[k].name for k in known.experiment.fit)
-    hypothesis = with_curves(outcome.standing, outcome.finds)
+    hypothesis = _within_a_turn(with_curves(outcome.standing, outcome.finds))
     quantities = hypothesis.rig.quantities()
     # Matrices may lie in files of their own, which the corrected model would not find.
     changed: dict[str, Quantity] = {name: q for name, q in quantities.items() if q.value.ndim > 1}
@@ -45,6 +49,22 @@ def write_corrected(campaign: Campaign, outcome: Outcome, folder: Path) -> tuple
             changed[scalar.quantity] = replace(quantity, sigma=sigma, source=source)
     sensing = tuple(_sensing(find, outcome.standing, source) for find in outcome.finds if _reads(find))
     return write_model(campaign, hypothesis.rig, hypothesis.effects, changed, folder, source, sensing)
+
+
+def _within_a_turn(hypothesis: Hypothesis) -> Hypothesis:
+    """The same with every phase in the turn that its effect declares: a search may go round."""
+    turns = {
+        entry.name: entry.prior.low
+        for effect in select(hypothesis.effects)
+        for entry in effect.parameters
+        if isinstance(entry.prior, Uniform) and np.isclose(entry.prior.high - entry.prior.low, 2.0 * np.pi)
+    }
+    phases: dict[str, Array | float] = {}
+    for name, quantity in hypothesis.rig.quantities().items():
+        low = turns.get(name.rpartition(".")[2])
+        if low is not None and not quantity.shape:
+            phases[name] = low + (float(quantity) - low) % (2.0 * np.pi)
+    return replace(hypothesis, rig=substitute(hypothesis.rig, phases))
 
 
 def _reads(find: Find) -> bool:

@@ -179,7 +179,7 @@ def _find(find: Find, experiment: Experiment) -> records.Find:
         parameters=tuple(
             records.Fitted(
                 name=one.name,
-                unit=_unit(one.unit, joint),
+                unit=_unit(one.unit or ("" if find.curve is None else "N m"), joint),
                 value=one.value,
                 sigma=one.sigma,
                 low=one.low,

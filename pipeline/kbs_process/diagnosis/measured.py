@@ -54,21 +54,29 @@ def inserted(
     values = dict(zip(names, (*map(float, coefficients), *ends), strict=True))
     rig = attach(hypothesis.rig, effect, values, joints=[joint])
     spread = dict(zip(names, (*map(float, sigma), 0.0, 0.0), strict=True))
-    rig = replace(rig, joints=tuple(_stated(one, spread, at=joint) for one in rig.joints))
+    new = {
+        one.name for one in hypothesis.rig.joints if one.drive is None or names[0] not in one.drive.parameters
+    }
+    rig = replace(
+        rig,
+        joints=tuple(
+            _stated(one, spread if one.name == joint else dict.fromkeys(names, 0.0))
+            if one.name in {joint, *new}
+            else one
+            for one in rig.joints
+        ),
+    )
     effects = tuple(one.name for one in select([*dict.fromkeys([*hypothesis.effects, effect.name])]))
     path = f"joint.{joint}.drive"
     return Hypothesis(rig, effects), tuple(Scalar(f"{path}.{name}") for name in names[:COEFFICIENTS])
 
 
-def _stated(joint: Joint, spread: Mapping[str, float], at: str) -> Joint:
-    """A joint with the law's sigmas; where the law does not act, its coefficients are exactly zero."""
-    if joint.drive is None:
-        return joint
+def _stated(joint: Joint, spread: Mapping[str, float]) -> Joint:
+    """A joint with the law's sigmas; where the law does not act, its numbers are exact."""
+    assert joint.drive is not None  # that of the law
     parameters = {
-        name: replace(
-            quantity, sigma=np.asarray(spread[name] if joint.name == at else 0.0), source="measured law"
-        )
-        if name in spread and (joint.name == at or not float(quantity))
+        name: replace(quantity, sigma=np.asarray(spread[name]), source="measured law")
+        if name in spread
         else quantity
         for name, quantity in joint.drive.parameters.items()
     }

@@ -46,7 +46,7 @@ from kbs_process.signals.records import Array
 
 _SECONDS = 200.0  # of a proposed test, or as long as the longest recording
 _CLEAR_S = 3.0  # at either end of a recording that are not compared
-_WEAK = 0.1  # of a number, as its standard deviation: less is known well enough
+_WEAK = 0.1  # error of a law over the law: what is less is known well enough
 _FEW = 3  # rivals that are told from
 _BATCH = 16  # suspects whose signatures are made together
 _DEPENDENT = 1e-10
@@ -120,24 +120,20 @@ def propose(
 
 
 def _question(finds: Sequence[Find]) -> tuple[Find, list[Identity]] | None:
-    """The first find that has rivals; else the one whose numbers are known worst, if they are known badly."""
+    """The first find that has rivals, of which none was found as well; else the one that is known worst, if badly."""
+    found = {find.identity for find in finds}
     for find in finds:
-        if find.indistinguishable_from:
-            return find, list(find.indistinguishable_from[:_FEW])
-    weak = [(max(_unknown(find), default=0.0), find) for find in finds]
-    weak = [entry for entry in weak if entry[0] > _WEAK]
-    return (max(weak, key=lambda entry: entry[0])[1], []) if weak else None
+        rivals = [one for one in find.indistinguishable_from if one not in found]
+        if rivals:
+            return find, rivals[:_FEW]
+    weak = [find for find in finds if _unknown(find) > _WEAK]
+    return (max(weak, key=_unknown), []) if weak else None
 
 
-def _unknown(find: Find) -> list[float]:
-    """Standard deviations of a law's numbers, each over the largest of its unit."""
-    largest: dict[str, float] = {}
-    for one in find.estimates:
-        if one.sigma > 0.0:
-            largest[one.unit] = max(largest.get(one.unit, 0.0), abs(one.value))
-    return [
-        one.sigma / largest[one.unit] for one in find.estimates if one.sigma > 0.0 and largest[one.unit] > 0.0
-    ]
+def _unknown(find: Find) -> float:
+    """Error of a law as a whole over the law, rms along the recordings: each number adds one to rho^2 by chance."""
+    count = sum(one.sigma > 0.0 for one in find.estimates)
+    return float(np.sqrt(count) / find.rho_eff) if find.rho_eff > 0.0 else 0.0
 
 
 def _planned(experiment: Experiment, trajectories: Sequence[Trajectory]) -> Experiment:

@@ -7,7 +7,7 @@ from kbs_process.report.records.diagnosis import DiagnosisResults, NextTest
 from kbs_process.report.tables import Tables
 from kbs_process.report.text import count, number, percent
 
-_NOTHING = "No find has a rival that is left, and no number of one is known worse than to 10 %."
+_NOTHING = "No find has a rival that is left, and none is known worse than to 10 %."
 
 
 def panel(results: DiagnosisResults, tables: Tables) -> Panel:
@@ -29,7 +29,7 @@ def _blocks(test: NextTest) -> tuple[Block, ...]:
         )
         worth = "Distance / sigma"
     else:
-        question = f"The numbers of {test.law} are weakly known."
+        question = f"{test.law} is known worse than to 10 %."
         share = percent(1.0 if test.sigma is None else test.sigma, 2)
         power = f"One recording of it brings the least known of them to {share} of its present sigma."
         worth = "Information, root"
