@@ -81,12 +81,14 @@ def channels(entries: tuple[Trial, ...]) -> Picture:
 def where(table: Table, title: str) -> Picture:
     """Draw rms over the floor in windows of time by frequencies, before and after; dots: more than chance."""
     t, f, found = (table.columns[name] for name in ("t", "f", "significant"))
-    times, tones = np.unique(t), np.unique(f)
-    rows, columns = np.searchsorted(tones, f), np.searchsorted(times, t)
-    grids = {}
-    for side in ("before", "after"):
-        grids[side] = np.full((len(tones), len(times)), np.nan)
-        grids[side][rows, columns] = table.columns[side]
+    times, tones = _windows(t, f), np.unique(f)
+    grids = {side: np.full((len(tones), len(times)), np.nan) for side in ("before", "after")}
+    for row, tone in enumerate(tones):
+        own = np.flatnonzero(f == tone)
+        # A window that holds the slowest changes is as long as several others.
+        nearest = own[np.abs(t[own][:, None] - times).argmin(axis=0)]
+        for side, grid in grids.items():
+            grid[row] = table.columns[side][nearest]
     most = max(3.0, float(np.nanquantile(grids["before"], 0.99)))
     with draw.style():
         figure = Figure(figsize=(draw.WIDTH, 2.4), layout="constrained")
@@ -102,10 +104,17 @@ def where(table: Table, title: str) -> Picture:
         axes[0].plot(t[seen], f[seen], ".", color=draw.LIMIT, markersize=1.5)
         draw.logarithmic(axes[0], "y", float(tones[0]) * 0.8, float(tones[-1]) * 1.1)
         axes[0].set_ylabel("frequency / Hz")
-        figure.colorbar(image, ax=axes, label="over floor")
+        scale = figure.colorbar(image, ax=axes, label="over floor")
+        draw.logarithmic(scale.ax, "y", 1.0, most)
         worst = number(float(np.nanmax(grids["before"])))
         alt = f"{title}: residual over floor by time and frequency, before at most {worst}"
         return draw.picture(figure, alt, title)
+
+
+def _windows(t: Array, f: Array) -> Array:
+    """Middles of the shortest windows: those of the frequency that is looked at most often."""
+    tones, counts = np.unique(f, return_counts=True)
+    return np.unique(t[f == tones[counts.argmax()]])
 
 
 def _edges(middles: Array) -> Array:
