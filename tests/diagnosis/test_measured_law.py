@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import bench
 import numpy as np
 import pytest
+from test_rounds import standing
 
 from kbs_process.campaign.corrected_model import write_model
 from kbs_process.campaign.load import load_campaign
 from kbs_process.diagnosis.curves import CurveSuspect, basis, curves
+from kbs_process.diagnosis.gls import Sums, score
 from kbs_process.diagnosis.hypothesis import Hypothesis, predict
+from kbs_process.diagnosis.joint import with_extra
 from kbs_process.diagnosis.known import Known
-from kbs_process.diagnosis.measured import LAWS, inserted
+from kbs_process.diagnosis.measured import LAWS, extra, inserted
 from kbs_process.diagnosis.scene import Scene
 from kbs_process.diagnosis.screen import Bench
 from kbs_process.plant.effects.measured_law import COEFFICIENTS, spline
@@ -109,3 +113,34 @@ def test_written_it_loads_and_acts_where_it_was_found(scene: Scene, tmp_path: Pa
     flown = load_campaign(tmp_path, checksums=False, flight=True)
     assert {"joint_angle_law", "joint_rate_law"} <= set(flown.effects)
     assert not {"ground_angle_law", "ground_rate_law"} & set(flown.effects)
+
+
+def test_a_curve_is_refitted_inside_the_plant() -> None:
+    """Recordings of a rig with a bump; the screen's coefficients, then those of the non-linear plant."""
+    made = bench.experiment(bench.rig(), ("fit", "held-out"), 2)
+    law, ends = ("ground_torque", "joint_angle"), (1.25, 1.30)
+    nominal = Hypothesis(made.rig, made.effects)
+    truth, _ = inserted(nominal, law, "el", ends, BUMP, 0.0 * BUMP)
+    added = predict(truth, made, 0).values - predict(nominal, made, 0).values
+    made = replace(
+        made,
+        trials=tuple(
+            replace(trial, measured=trial.measured + added * trial.valid[:, None]) for trial in made.trials
+        ),
+    )
+    before = standing(made)
+    along = Bench.of(before.known, Scene.of(made, before.hypothesis, before.predicted))
+    curve = suspect(along.scene, law)
+    found = score(along.background, Sums.over(along.background, along.columns([curve])))
+    after = with_extra(before, extra(curve, found, before), bench.serial(made), steps=2)
+    begin = len(before.known.value)
+    assert [scalar.name for scalar in after.known.free[begin:]] == [
+        f"joint.el.drive.ground_angle_law_{k}" for k in range(COEFFICIENTS)
+    ]
+    level = [float(one.chi2[1] / one.rows[1]) for one in (before.known, after.known)]
+    assert level[0] > 10.0  # of the recording that was held out
+    assert level[1] < 1.2
+    x = np.linspace(1.26, 1.29, 20)
+    # Any constant is a bias of the transducer.
+    meant, shown = basis(x, *ends) @ BUMP, curve.basis(x) @ after.known.value[begin:]
+    np.testing.assert_allclose(shown - shown.mean(), meant - meant.mean(), atol=0.02)
