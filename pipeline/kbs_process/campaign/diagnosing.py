@@ -35,17 +35,18 @@ def diagnose_results(
     told = [f"Floor: {noise.statement}."] if noise.source == "declared" else []
     ratio = f"{np.sqrt(max(found.ratio, 0.0)):.3g} times the repeatability floor (rms)"
     if found.log_p > np.log(DETECTED):
-        return (
-            *told,
-            f"No mismatch: prediction and recordings differ by {ratio}; there is nothing to diagnose.",
-        )
+        return (*told, f"Prediction and recordings differ by {ratio}: there is nothing to diagnose.")
     with revising(results, without=(FOLDER, "index.html", "report.pdf")) as folder:
         outcome = diagnose(campaign, folder / FOLDER, progress=progress, pdf=pdf, experiment=experiment)
         # The lock of a folder that nobody else can see.
         (folder / f".{FOLDER}.lock").unlink(missing_ok=True)
         build.build(folder, pdf)
-    begin = f"Prediction and recordings differ by {ratio}. "
-    return (*told, begin + outcome.verdict_lines[0], f"Diagnosis: {results / FOLDER / outcome.report.name}")
+    return (
+        *told,
+        f"With the parameter files' numbers, prediction and recordings differ by {ratio}.",
+        f"These refitted within their uncertainties: {outcome.verdict_lines[0]}",
+        f"Diagnosis: {results / FOLDER / outcome.report.name}",
+    )
 
 
 def _detected(experiment: Experiment) -> tuple[Floor, Detection]:
