@@ -27,7 +27,7 @@ def found() -> Known:
     left = {k: trial.measured for k, trial in enumerate(experiment.trials)}
     noise = floor.estimate(experiment, left)
     start = Hypothesis(experiment.rig, experiment.effects)
-    return refit(experiment, start, noise, bench.serial(experiment), leaps=False)
+    return refit(experiment, start, noise, bench.serial(experiment), leaps=0)
 
 
 def test_refit_finds_what_was_moved_and_leaves_noise(found: Known) -> None:

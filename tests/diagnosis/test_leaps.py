@@ -7,8 +7,8 @@ import numpy as np
 from diagnosis import bench
 from kbs_process.diagnosis.floor import declared
 from kbs_process.diagnosis.hypothesis import Hypothesis
-from kbs_process.diagnosis.known import known_parameters
 from kbs_process.diagnosis.leaps import leap
+from kbs_process.diagnosis.parameters import known_parameters, prior
 from kbs_process.diagnosis.search import Search
 from kbs_process.rig.model import substitute
 
@@ -21,7 +21,9 @@ def test_a_leap_finds_the_edges_of_a_contact() -> None:
     own = {name: float(truth.quantities()[name]) for name in (PHASE, WIDTH)}
     wrong = substitute(made.rig, {PHASE: own[PHASE] + 1.0, WIDTH: own[WIDTH] * 1.3})
     free = tuple(s for s in known_parameters(made.rig, made.effects) if s.name.startswith("joint."))
-    search = Search(made, declared(made), bench.serial(made), Hypothesis(wrong, made.effects), free)
+    begin = Hypothesis(wrong, made.effects)
+    parameters = prior(wrong, made.rig, made.effects, free)
+    search = Search(made, declared(made), bench.serial(made), begin, free, parameters)
     found = search.begin()
     theta = leap(search, found, smooth=False)
     assert theta is not None

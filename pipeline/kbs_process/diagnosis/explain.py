@@ -3,50 +3,93 @@
 Physics that was left out pulls numbers away from where they are, and a search that follows it ends where neither they
 nor what is left are right. So all numbers stay within a few sigmas of their priors at first. If something is left, and
 numbers set free explain it, then parameters are off; else what is left is looked at beside the numbers that stayed.
+
+Repeats that were not driven alike, as in a closed loop, differ by what the model makes of their drives too: their floor
+is estimated again as soon as the model is about right.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+
 import numpy as np
 
+from kbs_process.diagnosis import phasing
 from kbs_process.diagnosis.detection import Detection, detect
 from kbs_process.diagnosis.experiment import Experiment
-from kbs_process.diagnosis.floor import Floor
+from kbs_process.diagnosis.floor import Floor, estimate
 from kbs_process.diagnosis.hypothesis import Hypothesis, Prediction, Simulate
 from kbs_process.diagnosis.known import MOVED, Known, refit
-from kbs_process.diagnosis.parameters import Slopes
 from kbs_process.diagnosis.thresholds import DETECTED, EXPLAINED
 
+Task = Callable[[str], AbstractContextManager[object]]  # shows that something of some length is done
 
-def explained(
-    experiment: Experiment,
-    start: Hypothesis,
-    floor: Floor,
-    simulate: Simulate,
-    *,
-    slopes: dict[int, Slopes] | None = None,
-) -> tuple[Known, dict[int, Prediction], Detection]:
-    """Return the refitted numbers, what they predict (by drive), and what is left of the fit trials.
 
-    With `slopes` at `start`, that is a minimum under another floor, and phases are not looked for.
-    """
-    first = refit(experiment, start, floor, simulate, reach=MOVED, slopes=slopes, leaps=slopes is None)
-    near = _judged(first, floor, simulate)
-    known, _, left = near
-    at_bound = np.abs(np.nan_to_num(known.moved)) > 0.99 * MOVED
-    if left.log_p > np.log(DETECTED) or not at_bound.any():
-        return near
-    free = _judged(
-        refit(experiment, known.hypothesis, floor, simulate, slopes=known.slopes, leaps=False),
-        floor,
-        simulate,
-    )
-    settled = free[2].log_p > np.log(DETECTED) or free[2].ratio - 1.0 < EXPLAINED * (left.ratio - 1.0)
-    return free if settled else near
+@dataclass(frozen=True, slots=True, eq=False)
+class Explained:
+    """How far the known parameters get, and what they leave."""
+
+    experiment: Experiment
+    floor: Floor
+    known: Known
+    predicted: dict[int, Prediction]  # by drive, with the refitted numbers
+    before: Detection  # with the parameter files' numbers
+    after: Detection  # with the refitted ones, over the recordings that these were fitted to
+    held_out: Detection | None  # likewise over the others
+
+
+def explain(experiment: Experiment, simulate: Simulate, task: Task) -> Explained:
+    """Floor, detection, refit of the known parameters, detection of what they leave."""
+    nominal = Hypothesis(experiment.rig, experiment.effects)
+    with task("Repeatability floor, and what exceeds it"):
+        predicted = _predicted(experiment, nominal, simulate)
+        floor = _floor(experiment, predicted)
+        before = detect(experiment, floor, predicted, experiment.fit)
+    with task("Phases of cogging, friction and tooth contact"):
+        (start,) = phasing.begin(experiment, nominal, floor, simulate)
+    slopes = None
+    if not _driven_alike(experiment):
+        with task("The floor, with a model that is about right"):
+            rough = refit(experiment, start, floor, simulate, reach=MOVED, leaps=1)
+            start, slopes = rough.hypothesis, rough.slopes
+            floor = _floor(experiment, _predicted(experiment, start, simulate))
+    with task("Refitting the known parameters, near what is known of them"):
+        near = refit(experiment, start, floor, simulate, reach=MOVED, slopes=slopes)
+        known, predicted, after = _judged(near, floor, simulate)
+    if _may_be_off(known) and after.log_p < np.log(DETECTED):
+        with task("Refitting the known parameters, free"):
+            free = refit(experiment, known.hypothesis, floor, simulate, slopes=known.slopes, leaps=1)
+            judged = _judged(free, floor, simulate)
+        settled = judged[2].log_p > np.log(DETECTED)
+        if settled or judged[2].ratio - 1.0 < EXPLAINED * (after.ratio - 1.0):
+            known, predicted, after = judged
+    held_out = None
+    if experiment.held_out:
+        held_out = detect(experiment, floor, predicted, experiment.held_out, known=known)
+    return Explained(experiment, floor, known, predicted, before, after, held_out)
+
+
+def _may_be_off(known: Known) -> bool:
+    """Whether a number was kept from going farther."""
+    return bool((np.abs(np.nan_to_num(known.moved)) > 0.99 * MOVED).any())
 
 
 def _judged(known: Known, floor: Floor, simulate: Simulate) -> tuple[Known, dict[int, Prediction], Detection]:
     experiment = known.experiment
-    drives = range(len(experiment.drives))
-    predicted = dict(enumerate(simulate([(drive, known.hypothesis) for drive in drives])))
+    predicted = _predicted(experiment, known.hypothesis, simulate)
     return known, predicted, detect(experiment, floor, predicted, experiment.fit, known=known)
+
+
+def _driven_alike(experiment: Experiment) -> bool:
+    return all(len({experiment.trials[k].drive for k in members}) == 1 for members in experiment.repeats)
+
+
+def _predicted(experiment: Experiment, hypothesis: Hypothesis, simulate: Simulate) -> dict[int, Prediction]:
+    return dict(enumerate(simulate([(drive, hypothesis) for drive in range(len(experiment.drives))])))
+
+
+def _floor(experiment: Experiment, predicted: dict[int, Prediction]) -> Floor:
+    left = {k: t.measured - predicted[t.drive].values for k, t in enumerate(experiment.trials)}
+    return estimate(experiment, left)

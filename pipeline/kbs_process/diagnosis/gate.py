@@ -15,7 +15,7 @@ from scipy.stats import norm
 from kbs_process.diagnosis.gls import Background
 from kbs_process.diagnosis.known import Known
 from kbs_process.diagnosis.tails import log_tail
-from kbs_process.diagnosis.thresholds import GATE_GAIN, GATE_SIGMA
+from kbs_process.diagnosis.thresholds import GATE_GAIN, GATE_SHARE, GATE_SIGMA
 from kbs_process.signals.records import Array
 
 
@@ -58,13 +58,23 @@ def gate(before: Known, after: Known, coefficients: Sequence[int]) -> Gate:
     # Written so that what is no number, of a plant that diverged, is refused.
     if worse := [fold.trial for fold in folds if not fold.gain > 0.0]:
         reasons.append(f"{', '.join(worse)} predicted no better")
-    if not sum(fold.gain for fold in folds) >= GATE_GAIN:
+    gained = sum(fold.gain for fold in folds)
+    if not gained >= GATE_GAIN:
         reasons.append("recordings that were not used gain less than chance could give")
+    elif held_out and not gained >= GATE_SHARE * _promised(before, after):
+        reasons.append("recordings that were not used gain much less than those that it was fitted to")
     if not sigmas >= GATE_SIGMA:
         reasons.append(f"its coefficients are {sigmas:.1f} sigma off zero")
     if not white[1] <= white[0] + _spread(after):
         reasons.append("the residual is less white with it")
     return Gate(not reasons, folds, held_out, sigmas, white, tuple(reasons))
+
+
+def _promised(before: Known, after: Known) -> float:
+    """What held-out recordings would gain if they did as those that were fitted, row by row."""
+    fit, other = list(after.experiment.fit), list(after.experiment.held_out)
+    gained = float(np.sum(before.chi2[fit] - after.chi2[fit]))
+    return gained * float(after.rows[other].sum() / after.rows[fit].sum())
 
 
 def whiteness(known: Known) -> float:

@@ -17,7 +17,7 @@ from kbs_process.diagnosis.experiment import Experiment
 from kbs_process.diagnosis.floor import Floor
 from kbs_process.diagnosis.hypothesis import Hypothesis, Simulate
 from kbs_process.diagnosis.metric import Metric
-from kbs_process.diagnosis.parameters import Slopes, known_parameters
+from kbs_process.diagnosis.parameters import Slopes, known_parameters, prior, within
 from kbs_process.diagnosis.search import LEAPS, Found, Search
 from kbs_process.estimation.fit import Check, Parameters
 from kbs_process.signals.records import Array
@@ -99,18 +99,28 @@ def refit(
     extra: Sequence[Scalar] = (),
     reach: float = np.inf,
     slopes: dict[int, Slopes] | None = None,
-    leaps: bool = True,
+    leaps: int = LEAPS,
 ) -> Known:
     """Refit all known parameters from `hypothesis` on, whose phases are near their right values (see `phasing`).
 
     `extra` are numbers of suspects in the hypothesis that are fitted beside them, with the priors of its rig. No number
-    goes farther than `reach` sigmas from its prior. With `leaps`, phases and edges are looked for all round.
+    goes farther than `reach` sigmas from its prior. Phases and edges are looked for all round up to `leaps` times;
+    `slopes` at the hypothesis need not be taken again.
     """
     free = (*known_parameters(experiment.rig, experiment.effects), *extra)
-    search = Search(experiment, floor, simulate, hypothesis, free, reach)
+    parameters = within(prior(hypothesis.rig, experiment.rig, hypothesis.effects, free), reach)
+    search = Search(experiment, floor, simulate, hypothesis, free, parameters)
     begun = search.begin(slopes)
     before = np.array([float(z @ z) for z in _residuals(search, begun)])
-    return _known(search, search.run(begun, leaps=LEAPS if leaps else 0), before)
+    return _known(search, search.run(begun, leaps=leaps), before)
+
+
+def settled(known: Known, floor: Floor, simulate: Simulate, *, leaps: int) -> Known:
+    """Refit all numbers of `known`, those of suspects too, along slopes of the plant that has these in it."""
+    search = Search(known.experiment, floor, simulate, known.hypothesis, known.free, known.parameters)
+    begun = search.begin(known.slopes, known.metric)
+    renewed = replace(begun, gradients=search.slopes(begun.theta, begun.gradients))
+    return _known(search, search.run(renewed, leaps=leaps), known.chi2_before)
 
 
 def _residuals(search: Search, found: Found) -> tuple[Array, ...]:

@@ -8,20 +8,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import chi2
 
-from kbs_process.diagnosis.curves import REGRESSORS, CurveSuspect, curves
+from kbs_process.diagnosis.curves import CurveSuspect, curves
 from kbs_process.diagnosis.detection import Detection, detect
+from kbs_process.diagnosis.finding import Tried, explained_share, find_of, merged
 from kbs_process.diagnosis.floor import Floor
 from kbs_process.diagnosis.gate import Fold, Gate, gate, whiteness
 from kbs_process.diagnosis.gls import Background, Sums, score
 from kbs_process.diagnosis.hypothesis import Prediction, Simulate
 from kbs_process.diagnosis.joint import Standing, with_extra
-from kbs_process.diagnosis.known import MOVED, Known
+from kbs_process.diagnosis.known import MOVED, Known, settled
 from kbs_process.diagnosis.localise import cells_and_ports
 from kbs_process.diagnosis.outcome import (
     Absorbed,
-    Alternative,
-    Curve,
-    Estimate,
     Find,
     Moved,
     Outcome,
@@ -32,7 +30,7 @@ from kbs_process.diagnosis.outcome import (
 from kbs_process.diagnosis.ports import port_test
 from kbs_process.diagnosis.proposals import proposed
 from kbs_process.diagnosis.ranges import ranges_of
-from kbs_process.diagnosis.rivals import probabilities, rivalry
+from kbs_process.diagnosis.rivals import probabilities
 from kbs_process.diagnosis.scene import Scene
 from kbs_process.diagnosis.screen import Bench, Catalogued, Found, Screening, Suspect, screen
 from kbs_process.diagnosis.suspects import candidates
@@ -42,20 +40,9 @@ from kbs_process.diagnosis.thresholds import (
     LAW_VARIANCE,
     LEAD,
     LEADERS,
-    RIVALS,
     ROUNDS,
 )
-from kbs_process.diagnosis.tryout import UNNAMED, extra_of, identity, in_plant, port_label
-from kbs_process.signals.records import Array
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Tried:
-    """A leader after its refit."""
-
-    found: Found
-    standing: Standing
-    gate: Gate
+from kbs_process.diagnosis.tryout import extra_of, identity
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -102,7 +89,7 @@ def diagnose(
         held_out=held_out,
         log_p=_mismatch(before, rounds[0]),
         moved=moved,
-        finds=_merged(finds),
+        finds=merged(finds),
         refused=last.refused,
         absorbed=_absorbed(last.screening),
         place=rounds[0].place,
@@ -160,19 +147,40 @@ def _round(standing: Standing, floor: Floor, simulate: Simulate) -> _Round:
     screening = screen(bench, suspects_of(standing, scene))
     place = _place(standing, floor, scene)
     refused: list[Refused] = []
-    tried: list[_Tried] = []
+    tried: list[Tried] = []
     for found in _leaders(screening):
         new, verdict = _try(found, standing, bench, scene, simulate)
         if verdict.passed:
-            tried.append(_Tried(found, new, verdict))
+            tried.append(Tried(found, new, verdict))
         else:
             refused.append(Refused(identity(found.suspect), found.score.rho_eff, verdict.reasons))
     if not tried:
         return _Round(None, standing, screening, tuple(refused), place)
     chances = probabilities([one.standing.known for one in tried], bench.background.rows)
     best = int(np.argmax(chances))
-    find = _find(tried, best, chances, standing, screening, place)
+    tried[best] = replace(tried[best], standing=_settled(tried[best].standing, floor, simulate))
+    find = find_of(tried, best, chances, standing, screening, place)
     return _Round(find, tried[best].standing, screening, tuple(refused), place)
+
+
+def _settled(standing: Standing, floor: Floor, simulate: Simulate) -> Standing:
+    """All numbers refitted with the accepted law in the plant; phases are looked for again where much is left.
+
+    Laws that are columns of the prediction leave the plant as it is.
+    """
+    known = standing.known
+    if standing.laws or known.experiment.drives[0].schedule is None:
+        return standing
+    for leaps in (0, 1):
+        tried = settled(known, floor, simulate, leaps=leaps)
+        if tried.cost >= known.cost:
+            break
+        known = tried
+        predicted = simulate([(drive, known.hypothesis) for drive in range(len(known.experiment.drives))])
+        standing = Standing(known, dict(enumerate(predicted)), {})
+        if _detected(standing, floor, known.experiment.fit).log_p > np.log(DETECTED):
+            break
+    return standing
 
 
 def _leaders(screening: Screening) -> list[Found]:
@@ -199,7 +207,7 @@ def _try(
     new = with_extra(standing, extra_of(found, standing, bench, scene), simulate)
     begin = len(standing.known.value)
     verdict = gate(standing.known, new.known, range(begin, begin + len(found.suspect.amplitudes)))
-    share = _explained(standing.known, new.known)
+    share = explained_share(standing.known, new.known)
     if isinstance(found.suspect, CurveSuspect) and share is not None and not share >= LAW_VARIANCE:
         reason = f"a curve that explains {100.0 * share:.0f} % of the held-out excess is no law"
         verdict = replace(verdict, passed=False, reasons=(*verdict.reasons, reason))
@@ -243,128 +251,6 @@ def _trial_by_trial(suspect: Suspect, standing: Standing, bench: Bench) -> tuple
     return replace(standing, known=changed), verdict
 
 
-def _find(
-    tried: Sequence[_Tried],
-    best: int,
-    chances: Array,
-    before: Standing,
-    screening: Screening,
-    place: Place | None,
-) -> Find:
-    taken = tried[best]
-    suspect, own = taken.found.suspect, identity(taken.found.suspect)
-    alternatives = []
-    for index, other in enumerate(tried):
-        if index != best and not other.found.suspect.each_trial and not suspect.each_trial:
-            apart = rivalry(taken.standing.known, other.standing.known)
-            alternatives.append(
-                Alternative(
-                    identity(other.found.suspect), float(chances[index]), apart.rho_delta, apart.p_wrong,
-                    apart.indistinguishable, True,
-                )
-            )  # fmt: skip
-    simulated = {one.found.suspect.family for one in tried}
-    for found in screening.candidates:
-        if found.suspect.family in simulated or found.absorbed or len(alternatives) >= 5:
-            continue
-        # Along the linear plant the distance is what the best leaves of the other's lack of gain.
-        rho = float(np.sqrt(max(taken.found.score.gain - found.score.gain, 0.0)))
-        alternatives.append(
-            Alternative(
-                identity(found.suspect), 0.0, rho, float(chi2.sf(0.25 * rho**2, 1) / 2.0), rho < RIVALS, False
-            )
-        )
-    alternatives.sort(key=lambda other: (-other.probability, other.rho_delta))
-    alike: tuple[str, ...] = ()
-    if place is not None:
-        named = port_label(suspect)
-        alike = next((port.alike for port in place.test.ports if port.name == named), ())
-    return Find(
-        identity=own,
-        named=own.family != UNNAMED,
-        equation=_equation(suspect),
-        reference=suspect.candidate.effect.reference if isinstance(suspect, Catalogued) else "measured",
-        estimates=_estimates(taken, before),
-        probability=float(chances[best]),
-        rho=taken.found.score.rho,
-        rho_eff=taken.found.score.rho_eff,
-        kappa=taken.found.score.kappa,
-        gate=taken.gate,
-        alternatives=tuple(alternatives),
-        ports_alike=alike,
-        held_out_variance=_explained(before.known, taken.standing.known),
-        curve=_curve(suspect, taken, before) if isinstance(suspect, CurveSuspect) else None,
-    )
-
-
-def _equation(suspect: Suspect) -> str:
-    if not isinstance(suspect, Catalogued):
-        return "cubic spline"
-    text = suspect.candidate.effect.equation.__doc__ or ""
-    lines = [line.strip() for line in text.splitlines()]
-    begin = next((k for k, line in enumerate(lines) if line.startswith("Equation:")), None)
-    if begin is None:
-        return lines[0] if lines else ""
-    end = next(
-        (k for k in range(begin + 1, len(lines)) if lines[k].startswith(("Units:", "Validity:", "Source:"))),
-        len(lines),
-    )
-    return " ".join(lines[begin:end]).removeprefix("Equation:").strip()
-
-
-def _estimates(taken: _Tried, before: Standing) -> tuple[Estimate, ...]:
-    suspect, known = taken.found.suspect, taken.standing.known
-    begin = len(before.known.value)
-    units: dict[str, str] = {}
-    fixed: dict[str, float] = {}
-    if isinstance(suspect, Catalogued):
-        units = {entry.name: entry.unit for entry in suspect.candidate.effect.parameters}
-        fixed = dict(suspect.candidate.shape)
-    if suspect.each_trial:
-        spread = np.sqrt(np.diag(taken.found.score.covariance))
-        names = suspect.amplitudes
-        fitted = [
-            Estimate(name, units.get(name, ""), float(value), float(sigma))
-            for name, value, sigma in zip(names, taken.found.score.amplitude, spread, strict=False)
-        ]
-    else:
-        fitted = [
-            Estimate(
-                _short(known.free[k].name, in_plant(suspect)),
-                units.get(_short(known.free[k].name, True), ""),
-                float(known.value[k]),
-                float(known.sigma[k]),
-            )
-            for k in range(begin, len(known.value))
-        ]
-    done = {one.name for one in fitted}
-    return (*fitted, *(Estimate(n, units.get(n, ""), v, 0.0) for n, v in fixed.items() if n not in done))
-
-
-def _short(name: str, plant: bool) -> str:
-    return name.rpartition(".")[2] if plant or "." in name else name
-
-
-def _explained(before: Known, after: Known) -> float | None:
-    """Share of the held-out residual's excess over the floor that a law takes away."""
-    chosen = before.experiment.held_out
-    if not chosen:
-        return None
-    excess = sum(float(before.chi2[k] - before.rows[k]) for k in chosen)
-    gained = sum(float(before.chi2[k] - after.chi2[k]) for k in chosen)
-    return float(min(1.0, gained / excess)) if excess > 0.0 else None
-
-
-def _curve(suspect: CurveSuspect, taken: _Tried, before: Standing) -> Curve:
-    begin = len(before.known.value)
-    known = taken.standing.known
-    x = np.linspace(suspect.knots[0], suspect.knots[-1], 101)
-    basis = suspect.basis(x)
-    C = known.covariance[begin:, begin:]
-    spread = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", basis, C, basis), 0.0))
-    return Curve(suspect.regressor, REGRESSORS[suspect.regressor], x, basis @ known.value[begin:], spread)
-
-
 def _place(standing: Standing, floor: Floor, scene: Scene) -> Place | None:
     if not scene.paths:
         return None
@@ -387,30 +273,6 @@ def _detected(standing: Standing, floor: Floor, trials: Sequence[int]) -> Detect
         )
         experiment = replace(experiment, trials=corrected)
     return detect(experiment, floor, standing.predicted, trials, known=known)
-
-
-def _merged(finds: Sequence[Find]) -> tuple[Find, ...]:
-    """Finds of one law at one place are one: harmonics of an order, or a law and what its formula lacks."""
-    merged: list[Find] = []
-    for find in finds:
-        place = next((k for k, other in enumerate(merged) if other.identity == find.identity), None)
-        if place is None:
-            merged.append(find)
-            continue
-        first = merged[place]
-        folds = tuple(
-            replace(one, after=other.after, gain=one.gain + other.gain)
-            for one, other in zip(first.gate.folds, find.gate.folds, strict=True)
-        )
-        white = first.gate.whiteness[0], find.gate.whiteness[1]
-        merged[place] = replace(
-            first,
-            estimates=(*first.estimates, *find.estimates),
-            gate=replace(first.gate, folds=folds, whiteness=white),
-            rho=float(np.hypot(first.rho, find.rho)),
-            rho_eff=float(np.hypot(first.rho_eff, find.rho_eff)),
-        )
-    return tuple(merged)
 
 
 def _moved(known: Known) -> tuple[Moved, ...]:

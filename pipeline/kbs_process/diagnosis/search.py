@@ -19,7 +19,8 @@ from kbs_process.diagnosis.floor import Floor
 from kbs_process.diagnosis.hypothesis import Hypothesis, Prediction, Simulate
 from kbs_process.diagnosis.leaps import leap
 from kbs_process.diagnosis.metric import Metric, metrics
-from kbs_process.diagnosis.parameters import Slopes, prior, slopes, within
+from kbs_process.diagnosis.parameters import Slopes, known_parameters, slopes
+from kbs_process.estimation.fit import Parameters
 from kbs_process.signals.records import Array
 from kbs_process.stages.identification import gearbox
 from kbs_process.stages.output_error import Scalar
@@ -36,7 +37,7 @@ GAIN = 2.0  # of -2 log likelihood: a step that promises less ends a descent
 _LITTLE = 25.0  # of the same: what exact slopes gained, below which more rounds are not worth their time
 LEAPS = 3  # in one search
 _EARLY = 2  # steps before the first leap: masses and centres of gravity are right then
-_ROUNDS = 8  # steps of a descent at most
+_ROUNDS = 10  # steps of a descent at most
 _NEGLIGIBLE = (
     0.1  # of the whitened residual's length: what a number moves by one sigma and is not looked at again
 )
@@ -74,20 +75,22 @@ class Search:
         simulate: Simulate,
         hypothesis: Hypothesis,
         free: tuple[Scalar, ...],
-        reach: float = np.inf,
+        parameters: Parameters,
     ) -> None:
         self.experiment, self.simulate, self.hypothesis, self.free = experiment, simulate, hypothesis, free
-        self.parameters = within(prior(hypothesis.rig, experiment.rig, hypothesis.effects, free), reach)
+        self.parameters = parameters
         self.pairs = phases(hypothesis.rig, hypothesis.effects, free)
         self.polar = Polar.of(self.pairs, self.parameters)
         self.precision = self.parameters.sigma**-2.0
-        known = np.isfinite(self.parameters.sigma)
-        self.spread = np.where(known, self.parameters.sigma, 1.0)
+        phase = np.isin(np.arange(len(free)), [pair.phase for pair in self.pairs])
+        size = np.where(phase, 1.0, np.maximum(np.abs(hypothesis.values(free)), 1e-12))
+        self.spread = np.where(np.isfinite(self.parameters.sigma), self.parameters.sigma, size)
         # A phase that nothing shows would leave the equations singular.
-        self.ridge = np.where(known, 0.0, np.pi**-2.0)
+        self.ridge = np.where(phase, np.pi**-2.0, 0.0)
         self.differences = _DIFFERENCE * self.spread
-        gears = {scalar.name for scalar in gearbox(hypothesis.rig, hypothesis.effects)}
-        self.slow = [i for i, scalar in enumerate(free) if scalar.name not in gears]
+        gears = gearbox(experiment.rig, experiment.effects)
+        slow = set(known_parameters(experiment.rig, experiment.effects)) - set(gears)
+        self.slow = [i for i, scalar in enumerate(free) if scalar in slow]
         trials = experiment.trials
         self.everything = sorted({trial.drive for trial in trials})
         self.drives = sorted({trials[k].drive for k in experiment.fit})
@@ -136,11 +139,11 @@ class Search:
 
     # how it is lowered
 
-    def begin(self, gradients: Gradients | None = None) -> Found:
-        """The hypothesis as it is, with slopes; its nuisances and its encoders' rounding are the metric's."""
+    def begin(self, gradients: Gradients | None = None, metric: tuple[Metric, ...] = ()) -> Found:
+        """The hypothesis as it is, with slopes; nuisances and encoders' rounding make its metric, if none is given."""
         theta = self.hypothesis.values(self.free)
         predicted = self.predict([theta], self.everything)[0]
-        self.metric = metrics(self.experiment, self.floor, predicted, self.hypothesis)
+        self.metric = metric or metrics(self.experiment, self.floor, predicted, self.hypothesis)
         found = Found(theta, predicted, gradients or self.slopes(theta, {}))
         self.idle = {drive: self._idle(drive, found.gradients) for drive in self.references}
         return found
@@ -154,9 +157,10 @@ class Search:
         return [int(i) for i in np.flatnonzero(np.sqrt(length) * self.spread < _NEGLIGIBLE)]
 
     def run(self, found: Found, *, leaps: int = LEAPS) -> Found:
-        """Descend; leap to better phases and edges while there are any, and descend again. Without leaps descend alone.
+        """Descend; leap to better phases and edges while there are any, at most `leaps` times, and descend again.
 
-        The first leap is made early: what is left out, or a wrong phase, has not yet pulled the others far then.
+        The first leap is made early: what is left out, or a wrong phase, has not yet pulled the others far then. All
+        slopes are taken again at the end, unless the search is cut short by fewer leaps.
         """
         if not leaps:
             return self.descend(found, _ROUNDS)
@@ -168,6 +172,8 @@ class Search:
             elif number > 0:
                 break
         found = self.descend(found, _ROUNDS)
+        if leaps < LEAPS:
+            return found
         # Those of bodies hardly change, but for what resonances do to them once these are where they belong.
         renewed = replace(found, gradients=self.slopes(found.theta, found.gradients, whole=True))
         return self.descend(renewed, _ROUNDS)

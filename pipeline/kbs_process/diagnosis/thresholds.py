@@ -42,6 +42,8 @@ GATE_SIGMA: Final = 3.0  # by which a coefficient's interval has to exclude zero
 GATE_GAIN: Final = (
     12.0  # of -2 log likelihood on each held-out trial's share: p = 5e-4 for one degree of freedom
 )
+# Of what recordings that were fitted gain, row by row: what was fitted to one motion alone does less for another.
+GATE_SHARE: Final = 0.2
 ROUNDS: Final = 5  # finds in one campaign at most
 
 # -- two laws ------------------------------------------------------------------------------------------------------

@@ -8,11 +8,12 @@ from time import monotonic
 
 import numpy as np
 
-from kbs_process.campaign.diagnose import experiment_of, explain
+from kbs_process.campaign.diagnose import experiment_of
 from kbs_process.campaign.load import load_campaign
 from kbs_process.campaign.progress import SilentProgress
 from kbs_process.campaign.simulators import Simulators
 from kbs_process.diagnosis.experiment import Experiment, Trial
+from kbs_process.diagnosis.explain import explain
 from kbs_process.diagnosis.hypothesis import Hypothesis, Tapped, tapped
 from kbs_process.diagnosis.known import Known
 from kbs_process.signals.records import WRENCH_CHANNELS
@@ -28,7 +29,7 @@ def prepare(folder: Path) -> Case:
     begin = monotonic()
     experiment = experiment_of(load_campaign(folder, checksums=False), SilentProgress())
     with Simulators(experiment) as simulate:
-        explained = explain(experiment, simulate, SilentProgress())
+        explained = explain(experiment, simulate, SilentProgress().task)
     found, predicted = explained.known, explained.predicted
     signals = {
         drive: _signals(experiment, found.hypothesis, drive, seen.wrench) for drive, seen in predicted.items()

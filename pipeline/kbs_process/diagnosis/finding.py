@@ -1,0 +1,176 @@
+"""From a law that passed the gate to the find that is told: its numbers, its rivals, what it explains."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.stats import chi2
+
+from kbs_process.diagnosis.curves import REGRESSORS, CurveSuspect
+from kbs_process.diagnosis.gate import Gate
+from kbs_process.diagnosis.joint import Standing
+from kbs_process.diagnosis.known import Known
+from kbs_process.diagnosis.outcome import Alternative, Curve, Estimate, Find, Place
+from kbs_process.diagnosis.rivals import rivalry
+from kbs_process.diagnosis.screen import Catalogued, Found, Screening, Suspect
+from kbs_process.diagnosis.thresholds import RIVALS
+from kbs_process.diagnosis.tryout import UNNAMED, identity, in_plant, port_label
+from kbs_process.signals.records import Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tried:
+    """A leader after its refit."""
+
+    found: Found
+    standing: Standing
+    gate: Gate
+
+
+def find_of(
+    tried: Sequence[Tried],
+    best: int,
+    chances: Array,
+    before: Standing,
+    screening: Screening,
+    place: Place | None,
+) -> Find:
+    """The find of the `best` of some laws that passed, each right with a chance; `before` stood without it."""
+    taken = tried[best]
+    suspect, own = taken.found.suspect, identity(taken.found.suspect)
+    alternatives = []
+    for index, other in enumerate(tried):
+        if index != best and not other.found.suspect.each_trial and not suspect.each_trial:
+            apart = rivalry(taken.standing.known, other.standing.known)
+            alternatives.append(
+                Alternative(
+                    identity(other.found.suspect), float(chances[index]), apart.rho_delta, apart.p_wrong,
+                    apart.indistinguishable, True,
+                )
+            )  # fmt: skip
+    simulated = {one.found.suspect.family for one in tried}
+    for found in screening.candidates:
+        if found.suspect.family in simulated or found.absorbed or len(alternatives) >= 5:
+            continue
+        # Along the linear plant the distance is what the best leaves of the other's lack of gain.
+        rho = float(np.sqrt(max(taken.found.score.gain - found.score.gain, 0.0)))
+        alternatives.append(
+            Alternative(
+                identity(found.suspect), 0.0, rho, float(chi2.sf(0.25 * rho**2, 1) / 2.0), rho < RIVALS, False
+            )
+        )
+    alternatives.sort(key=lambda other: (-other.probability, other.rho_delta))
+    alike: tuple[str, ...] = ()
+    if place is not None:
+        named = port_label(suspect)
+        alike = next((port.alike for port in place.test.ports if port.name == named), ())
+    return Find(
+        identity=own,
+        named=own.family != UNNAMED,
+        equation=_equation(suspect),
+        reference=suspect.candidate.effect.reference if isinstance(suspect, Catalogued) else "measured",
+        estimates=_estimates(taken, before),
+        probability=float(chances[best]),
+        rho=taken.found.score.rho,
+        rho_eff=taken.found.score.rho_eff,
+        kappa=taken.found.score.kappa,
+        gate=taken.gate,
+        alternatives=tuple(alternatives),
+        ports_alike=alike,
+        held_out_variance=explained_share(before.known, taken.standing.known),
+        curve=_curve(suspect, taken, before) if isinstance(suspect, CurveSuspect) else None,
+    )
+
+
+def _equation(suspect: Suspect) -> str:
+    if not isinstance(suspect, Catalogued):
+        return "cubic spline"
+    text = suspect.candidate.effect.equation.__doc__ or ""
+    lines = [line.strip() for line in text.splitlines()]
+    begin = next((k for k, line in enumerate(lines) if line.startswith("Equation:")), None)
+    if begin is None:
+        return lines[0] if lines else ""
+    end = next(
+        (k for k in range(begin + 1, len(lines)) if lines[k].startswith(("Units:", "Validity:", "Source:"))),
+        len(lines),
+    )
+    return " ".join(lines[begin:end]).removeprefix("Equation:").strip()
+
+
+def _estimates(taken: Tried, before: Standing) -> tuple[Estimate, ...]:
+    suspect, known = taken.found.suspect, taken.standing.known
+    begin = len(before.known.value)
+    units: dict[str, str] = {}
+    fixed: dict[str, float] = {}
+    if isinstance(suspect, Catalogued):
+        units = {entry.name: entry.unit for entry in suspect.candidate.effect.parameters}
+        fixed = dict(suspect.candidate.shape)
+    if suspect.each_trial:
+        spread = np.sqrt(np.diag(taken.found.score.covariance))
+        names = suspect.amplitudes
+        fitted = [
+            Estimate(name, units.get(name, ""), float(value), float(sigma))
+            for name, value, sigma in zip(names, taken.found.score.amplitude, spread, strict=False)
+        ]
+    else:
+        fitted = [
+            Estimate(
+                _short(known.free[k].name, in_plant(suspect)),
+                units.get(_short(known.free[k].name, True), ""),
+                float(known.value[k]),
+                float(known.sigma[k]),
+            )
+            for k in range(begin, len(known.value))
+        ]
+    done = {one.name for one in fitted}
+    return (*fitted, *(Estimate(n, units.get(n, ""), v, 0.0) for n, v in fixed.items() if n not in done))
+
+
+def _short(name: str, plant: bool) -> str:
+    return name.rpartition(".")[2] if plant or "." in name else name
+
+
+def explained_share(before: Known, after: Known) -> float | None:
+    """Share of the held-out residual's excess over the floor that a law takes away."""
+    chosen = before.experiment.held_out
+    if not chosen:
+        return None
+    excess = sum(float(before.chi2[k] - before.rows[k]) for k in chosen)
+    gained = sum(float(before.chi2[k] - after.chi2[k]) for k in chosen)
+    return float(min(1.0, gained / excess)) if excess > 0.0 else None
+
+
+def _curve(suspect: CurveSuspect, taken: Tried, before: Standing) -> Curve:
+    begin = len(before.known.value)
+    known = taken.standing.known
+    x = np.linspace(suspect.knots[0], suspect.knots[-1], 101)
+    basis = suspect.basis(x)
+    C = known.covariance[begin:, begin:]
+    spread = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", basis, C, basis), 0.0))
+    return Curve(suspect.regressor, REGRESSORS[suspect.regressor], x, basis @ known.value[begin:], spread)
+
+
+def merged(finds: Sequence[Find]) -> tuple[Find, ...]:
+    """Finds of one law at one place are one: harmonics of an order, or a law and what its formula lacks."""
+    merged: list[Find] = []
+    for find in finds:
+        place = next((k for k, other in enumerate(merged) if other.identity == find.identity), None)
+        if place is None:
+            merged.append(find)
+            continue
+        first = merged[place]
+        folds = tuple(
+            replace(one, after=other.after, gain=one.gain + other.gain)
+            for one, other in zip(first.gate.folds, find.gate.folds, strict=True)
+        )
+        white = first.gate.whiteness[0], find.gate.whiteness[1]
+        merged[place] = replace(
+            first,
+            estimates=(*first.estimates, *find.estimates),
+            gate=replace(first.gate, folds=folds, whiteness=white),
+            rho=float(np.hypot(first.rho, find.rho)),
+            rho_eff=float(np.hypot(first.rho_eff, find.rho_eff)),
+        )
+    return tuple(merged)
