@@ -80,9 +80,10 @@ pdf_option = click.option(
 @pdf_option
 @click.option("--check", is_flag=True, help="Exit with 1 when a requirement is not met.")
 @click.option(
-    "--diagnose",
+    "--diagnose/--no-diagnose",
     "why",
-    is_flag=True,
+    default=False,
+    show_default=True,
     help="Where recordings differ from the prediction by more than repeats do, find out why: takes minutes.",
 )
 @quiet_option

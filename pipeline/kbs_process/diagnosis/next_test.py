@@ -47,6 +47,9 @@ from kbs_process.signals.records import Array
 _SECONDS = 200.0  # of a proposed test, or as long as the longest recording
 _CLEAR_S = 3.0  # at either end of a recording that are not compared
 _WEAK = 0.1  # error of a law over the law: what is less is known well enough
+_JUDGED = (
+    2  # trajectories on which the known parameters are refitted: each costs a simulation of every number
+)
 _FEW = 3  # rivals that are told from
 _BATCH = 16  # suspects whose signatures are made together
 _DEPENDENT = 1e-10
@@ -101,10 +104,11 @@ def propose(
             return None
         worth = stage.worth(rivals)
         order = np.argsort(-worth, kind="stable")
-        best = int(order[0])
-        if not worth[best] > 0.0:
+        if not worth[order[0]] > 0.0:
             return None
-        least, sigma = stage.judged(best, rivals, simulate)
+        judged = {int(k): stage.judged(int(k), rivals, simulate) for k in order[:_JUDGED]}
+        best = min(judged, key=lambda k: -judged[k][0] if rivals else judged[k][1])
+        least, sigma = judged[best]
     tried = tuple(Tried(trajectories[k].words, float(worth[k])) for k in order)
     needed = int(np.ceil((RIVALS / least) ** 2)) if rivals and least > 0.0 else 1
     return Proposal(

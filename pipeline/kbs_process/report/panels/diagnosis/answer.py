@@ -9,8 +9,9 @@ from kbs_process.report.tables import Tables
 from kbs_process.report.text import MISSING, chance, number, percent
 
 _TRIALS = Caption(
-    shown="Whitened residual over the floor, rms, of every recording: with the parameter files' numbers, with known "
-    "parameters refitted under their priors, and with what was found. Held-out recordings were used by neither.",
+    shown="Whitened residual over the floor, rms, of every recording: with the parameter files' numbers (phases, of "
+    "which these say nothing, as found), with known parameters refitted under their priors, and with what was found. "
+    "Held-out recordings were used by neither.",
     good="Corrected bars end at the floor (dashed), those of held-out recordings as well.",
     bad="A held-out bar far above those of the fit: what was found does not carry over. All above: something is left.",
     do="See what remains, and record the trajectory where it is strongest.",
