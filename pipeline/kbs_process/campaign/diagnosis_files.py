@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
-from kbs_process.campaign import provenance
 from kbs_process.campaign.config import Campaign
-from kbs_process.campaign.corrected_diagnosis import left_out, write_corrected
-from kbs_process.campaign.next_test import commands_of, next_test
+from kbs_process.campaign.corrected_diagnosis import write_corrected
+from kbs_process.campaign.diagnosis_records import COMMANDS, CORRECTED, results_of, seen_channels
+from kbs_process.campaign.next_test import commands_of
 from kbs_process.campaign.residual_maps import write_maps
 from kbs_process.campaign.run import Outcome as Told
 from kbs_process.campaign.store import writing
@@ -21,31 +21,10 @@ from kbs_process.diagnosis.hypothesis import Prediction
 from kbs_process.diagnosis.joint import Standing
 from kbs_process.diagnosis.known import Known
 from kbs_process.diagnosis.next_test import Proposal
-from kbs_process.diagnosis.outcome import Curve, Find, Identity, Outcome
-from kbs_process.diagnosis.thresholds import RIVALS
+from kbs_process.diagnosis.outcome import Outcome
 from kbs_process.report import build
-from kbs_process.report.records import diagnosis as records
-from kbs_process.report.records.common import Check, Conclusion, Notice, encode
-from kbs_process.rig.model import Joint, Rig
+from kbs_process.report.records.common import encode
 from kbs_process.signals.records import Array
-
-CORRECTED = "corrected"
-COMMANDS = "next-test.csv"
-_SHOWN = 25  # suspects in the table
-_EACH_TIME = "it is each recording's own, or the controller's: the corrected model is without it"
-_NOTES = (
-    "The floor is what repeats of one trajectory differ by. Constants and slopes of the transducer's channels and "
-    "errors of the clocks, each recording's own, are taken out of every comparison.",
-    "Known parameters are refitted within their priors before anything is looked for, and again beside each suspect.",
-    "A find has passed the gate: inside the non-linear plant, with all known parameters refitted, it improves the "
-    "prediction of every recording that was held out.",
-    "Channels are whitened in their order: each is judged given those before it.",
-)
-_WORDS = {
-    "none": "No mismatch beyond what repeats differ by.",
-    "parameters off": "Known parameters are off; no physics was left out that these recordings show.",
-    "undecided": "There is a mismatch, and no law passed the gate.",
-}
 
 
 def write_diagnosis(
@@ -70,7 +49,7 @@ def write_diagnosis(
         for k in range(len(known.experiment.trials)):
             _spectra(folder, known, outcome.standing.known, k)
             _histories(folder, known.experiment, predicted, outcome.standing, k)
-        results = _results(
+        results = results_of(
             campaign, floor, known, outcome, [path.relative_to(folder).as_posix() for path in files], proposal
         )
         (folder / "results.json").write_bytes(encode(results))
@@ -81,268 +60,11 @@ def write_diagnosis(
     return Told(tuple(lines), None, target / page.name)
 
 
-def _results(
-    campaign: Campaign,
-    floor: Floor,
-    known: Known,
-    outcome: Outcome,
-    files: Sequence[str],
-    proposal: Proposal | None,
-) -> records.DiagnosisResults:
-    sentence = _sentence(outcome)
-    finds = tuple(_find(find, known.experiment) for find in outcome.finds)
-    trials = tuple(_trials(known, outcome.standing.known))
-    return records.DiagnosisResults(
-        name=campaign.name,
-        title=campaign.title,
-        article=campaign.article,
-        verdict=Conclusion(status="none", sentence=sentence),
-        provenance=provenance.made(f"kbs-process diagnose {campaign.name}", campaign),
-        answer=outcome.verdict,
-        paragraph=_paragraph(outcome, finds, trials),
-        floor=floor.statement,
-        log10_p=outcome.log_p / float(np.log(10.0)),
-        moved=tuple(_moved(outcome.standing.known)),
-        finds=finds,
-        trials=trials,
-        ports=tuple(_ports(outcome)),
-        suspects=tuple(_suspects(outcome))[:_SHOWN],
-        checks=tuple(Check(name=c.name, ok=c.passed, detail=c.detail) for c in known.checks),
-        files=tuple(files),
-        next_test=None if proposal is None else next_test(proposal, COMMANDS),
-        warnings=tuple(_warnings(outcome)),
-        notes=_NOTES,
-    )
-
-
-def place_of(identity: Identity) -> records.Place:
-    """A port and its site, in a record."""
-    return records.Place(port=identity.port, site=identity.axis, channels=identity.channels)
-
-
-def _words(name: str) -> str:
-    return name.replace("_", " ")
-
-
-def _where(place: records.Place) -> str:
-    return ", ".join(part for part in (place.port, place.site or "/".join(place.channels)) if part)
-
-
-def _sentence(outcome: Outcome) -> str:
-    if not outcome.finds:
-        return _WORDS[outcome.verdict]
-    told = [f"{_words(find.identity.law)} ({_where(place_of(find.identity))})" for find in outcome.finds]
-    return f"Left out of the model: {'; '.join(told)}."
-
-
-def _paragraph(outcome: Outcome, finds: Sequence[records.Find], trials: Sequence[records.Trial]) -> str:
-    """Plain words, to be pasted into a test report."""
-    held_out = [trial for trial in trials if trial.role == "held-out"]
-    judged = held_out or list(trials)
-    which = "recordings that were not used to find it" if held_out else "recordings (none was held out)"
-    known, corrected = (max(getattr(trial, step) for trial in judged) for step in ("known", "corrected"))
-    parts = [
-        f"With all known parameters refitted within their uncertainties, prediction and measurement differ by up to "
-        f"{known:.3g} times (rms) what repeats of one trajectory differ by, among {which}."
-    ]
-    for find in finds:
-        numbers = ", ".join(
-            f"{one.name} = {one.value:.4g} ({one.low:.4g} to {one.high:.4g}) {one.unit}"
-            for one in find.parameters[:4]
-        )
-        apart = [_words(rival.name) for rival in find.rivals if rival.distance < RIVALS]
-        begin = "Left out was" if find.named else "No law of the catalogue passes; measured was a"
-        parts.append(
-            f"{begin} {_words(find.name)} ({_where(find.place)}): {numbers}; probability {find.probability:.2f} among "
-            f"the laws simulated"
-            + (f", not to be told from {', '.join(apart)} by these recordings." if apart else ".")
-        )
-    if finds:
-        parts.append(f"With it in the plant the difference is {corrected:.3g} times the floor.")
-    else:
-        parts.append(_WORDS[outcome.verdict])
-    for moved in outcome.moved[:5]:
-        parts.append(f"{moved.name} is off by {moved.sigmas:+.1f} sigma.")
-    return " ".join(parts)
-
-
-def _find(find: Find, experiment: Experiment) -> records.Find:
-    roles = {trial.name: trial.role for trial in experiment.trials}
-    joint = _joint(find, experiment.rig)
-    return records.Find(
-        name=find.identity.law,
-        family=find.identity.family,
-        named=find.named,
-        place=place_of(find.identity),
-        equation=find.equation,
-        reference=find.reference,
-        parameters=tuple(
-            records.Fitted(
-                name=one.name,
-                unit=_unit(one.unit or ("" if find.curve is None else "N m"), joint),
-                value=one.value,
-                sigma=one.sigma,
-                low=one.low,
-                high=one.high,
-            )
-            for one in find.estimates
-        ),
-        probability=find.probability,
-        distance=find.rho_eff,
-        absorbed=find.kappa,
-        rivals=tuple(
-            records.Rival(
-                name=other.identity.law,
-                family=other.identity.family,
-                place=place_of(other.identity),
-                distance=other.rho_delta,
-                probability=other.probability,
-                simulated=other.refitted,
-            )
-            for other in find.alternatives
-        ),
-        gate=tuple(
-            records.Gated(
-                recording=fold.trial,
-                role=roles[fold.trial],
-                before=_rms(fold.before),
-                after=_rms(fold.after),
-                gain=fold.gain,
-            )
-            for fold in find.gate.folds
-        ),
-        same_ports=find.ports_alike,
-        curve=None if find.curve is None else _curve(find.curve, joint),
-        held_out_variance=find.held_out_variance,
-    )
-
-
-def _joint(find: Find, rig: Rig) -> Joint | None:
-    """The joint whose numbers a find has: units are those of one that turns, or slides."""
-    return next((joint for joint in rig.joints if joint.name == find.identity.axis), None)
-
-
-def _unit(turning: str, joint: Joint | None) -> str:
-    return turning if joint is None else joint.unit_of(turning)
-
-
-def _curve(curve: Curve, joint: Joint | None) -> records.Curve:
-    return records.Curve(
-        regressor=curve.regressor.replace("_", " "),
-        x_unit=_unit(curve.unit, joint),
-        y_unit=_unit("N m", joint),
-        x=tuple(curve.x.tolist()),
-        y=tuple(curve.value.tolist()),
-        sigma=tuple(curve.sigma.tolist()),
-    )
-
-
-def _rms(ratio: float) -> float:
-    return float(np.sqrt(max(ratio, 0.0)))
-
-
-def _trials(known: Known, corrected: Known) -> Iterator[records.Trial]:
-    rows = known.rows
-    for k, trial in enumerate(known.experiment.trials):
-        z = corrected.metric[k].layout(corrected.residual[k])
-        seen = _seen(corrected, k)
-        each = np.sqrt(np.mean(z**2, axis=(0, 1)))
-        yield records.Trial(
-            recording=trial.name,
-            trajectory=str(trial.trajectory),
-            role=trial.role,
-            nominal=_rms(float(known.chi2_before[k] / rows[k])),
-            known=_rms(float(known.chi2[k] / rows[k])),
-            corrected=_rms(float(corrected.chi2[k] / rows[k])),
-            channels={known.experiment.channels[c]: float(each[c]) for c in seen},
-        )
-
-
-def _moved(known: Known) -> Iterator[records.Moved]:
-    units = {name: quantity.unit for name, quantity in known.hypothesis.rig.quantities().items()}
-    entries = zip(
-        known.free, known.value, known.sigma, known.parameters.value, known.parameters.sigma, strict=True
-    )
-    for scalar, value, sigma, prior, spread in entries:
-        if scalar.quantity not in units:
-            continue
-        bounded = bool(np.isfinite(spread) and spread > 0.0)
-        yield records.Moved(
-            name=scalar.name,
-            unit=units[scalar.quantity],
-            prior=float(prior),
-            prior_sigma=float(spread) if bounded else None,
-            value=float(value),
-            sigma=float(sigma),
-            sigmas=float((value - prior) / spread) if bounded else None,
-        )
-
-
-def _ports(outcome: Outcome) -> Iterator[records.PortTest]:
-    if outcome.place is None:
-        return
-    for port in outcome.place.test.ports:
-        yield records.PortTest(
-            port=port.name,
-            log10_p=port.log_p / float(np.log(10.0)),
-            sufficient=port.sufficient,
-            share=port.explained,
-            same_as=port.alike,
-        )
-
-
-def _suspects(outcome: Outcome) -> Iterator[records.Suspect]:
-    for find in outcome.finds:
-        yield records.Suspect(
-            name=find.identity.law,
-            family=find.identity.family,
-            place=place_of(find.identity),
-            distance=find.rho_eff,
-            absorbed=find.kappa,
-            outcome="accepted",
-        )
-    for refused in outcome.refused:
-        yield records.Suspect(
-            name=refused.identity.law,
-            family=refused.identity.family,
-            place=place_of(refused.identity),
-            distance=refused.rho_eff,
-            outcome=f"refused: {'; '.join(refused.reasons)}",
-        )
-    for taken in outcome.absorbed:
-        yield records.Suspect(
-            name=taken.identity.law,
-            family=taken.identity.family,
-            place=place_of(taken.identity),
-            distance=taken.rho,
-            absorbed=taken.kappa,
-            outcome=f"absorbed by {', '.join(taken.by)}",
-        )
-
-
-def _warnings(outcome: Outcome) -> Iterator[Notice]:
-    for find in outcome.finds:
-        if not find.gate.held_out:
-            yield Notice(
-                severity="warning",
-                what=f"{find.identity.law} was judged by leaving out fit recordings in turn: none was held out",
-                remedy="give a recording the role held-out, better of another trajectory",
-            )
-        if left_out(find):
-            yield Notice(severity="info", what=f"{find.identity.law}: {_EACH_TIME}", where=CORRECTED)
-    if not outcome.standing.known.experiment.held_out:
-        yield Notice(
-            severity="warning",
-            what="no recording is held out: nothing is shown on recordings that were not used",
-            remedy='set role = "held-out" for a repeat or another trajectory',
-        )
-
-
 def _spectra(folder: Path, before: Known, after: Known, k: int) -> None:
     """Power over the floor, before and after."""
     experiment, name = before.experiment, before.experiment.trials[k].name
     f = after.metric[k].whiten.f
-    seen = _seen(after, k)
+    seen = seen_channels(after, k)
     columns: dict[str, Array] = {"f": f}
     for side, known in (("before", before), ("after", after)):
         power = np.mean(known.metric[k].layout(known.residual[k]) ** 2, axis=0)
@@ -365,14 +87,8 @@ def _histories(
     for side, model in (("before", predicted[trial.drive].values), ("after", standing.shown(k))):
         left = (trial.measured - model)[trial.valid]
         left = left - A @ np.linalg.lstsq(A, left, rcond=None)[0]
-        for c in _seen(standing.known, k):
+        for c in seen_channels(standing.known, k):
             columns[f"{experiment.channels[c]}.{side}"] = left[:, c]
             units[f"{experiment.channels[c]}.{side}"] = experiment.units[c]
     path = folder / "tables" / "residual" / f"{trial.name}.parquet"
     write_table(path, columns, units, frame="T", recording=trial.name)
-
-
-def _seen(known: Known, k: int) -> list[int]:
-    """Channels of a trial that show something."""
-    window = known.metric[k].whiten.window
-    return [c for c in range(window.shape[1]) if window[:, c].any()]

@@ -1,0 +1,125 @@
+"""What a diagnosis leaves on disk: results that read back, a page, tables, a model that loads, the next test."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import bench
+import numpy as np
+import pytest
+from test_rounds import standing
+
+from kbs_process.campaign.commands import read_commands
+from kbs_process.campaign.diagnosis_files import write_diagnosis
+from kbs_process.campaign.load import load_campaign
+from kbs_process.diagnosis.detection import Detection
+from kbs_process.diagnosis.floor import declared
+from kbs_process.diagnosis.gate import Fold, Gate
+from kbs_process.diagnosis.next_test import Proposal, Tried
+from kbs_process.diagnosis.outcome import Alternative, Curve, Estimate, Find, Identity, Outcome, Refused
+from kbs_process.diagnosis.trajectories import family, limits_of
+from kbs_process.report.records.common import load
+from kbs_process.report.records.diagnosis import DiagnosisResults
+from kbs_process.stages.output_error import Scalar
+
+LAW = Identity("external wrench", "el", (), "unnamed", "curve over joint angle")
+CABLE = Identity("external wrench", "el", (), "cable", "ground_cable")
+NOTHING = Detection((), -1.0, 1.0)
+NUMBERS = tuple(f"c{k}" for k in range(10))
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A curve beside the plant was found; a cable was not refused by these recordings."""
+    before = standing(bench.experiment(bench.rig(), ("fit", "held-out"), 4))
+    known, experiment = before.known, before.known.experiment
+    scalars = tuple(Scalar(f"law.ground_torque of joint_angle.el.{name}") for name in NUMBERS)
+    spread = np.diag(np.concatenate([np.diag(known.covariance), np.full(10, 0.01**2)]))
+    found = replace(
+        known,
+        free=(*known.free, *scalars),
+        value=np.concatenate([known.value, np.full(10, 0.5)]),
+        covariance=spread,
+        parameters=replace(
+            known.parameters,
+            names=(*known.parameters.names, *(one.name for one in scalars)),
+            value=np.concatenate([known.parameters.value, np.zeros(10)]),
+            sigma=np.concatenate([known.parameters.sigma, np.full(10, np.inf)]),
+        ),
+    )
+    columns = {one.name: {0: np.zeros((240, 8))} for one in scalars}
+    x = np.linspace(1.25, 1.30, 101)
+    find = Find(
+        identity=LAW,
+        named=False,
+        equation="cubic spline",
+        reference="measured",
+        estimates=tuple(Estimate(name, "", 0.5, 0.01) for name in NUMBERS),
+        probability=0.9,
+        rho=40.0,
+        rho_eff=30.0,
+        kappa=0.1,
+        gate=Gate(True, (Fold("r1", 9.0, 1.0, 100.0),), True, 30.0, (2.0, 1.0), ()),
+        alternatives=(Alternative(CABLE, 0.1, 2.0, 0.16, True, True),),
+        ports_alike=(),
+        held_out_variance=0.95,
+        curve=Curve("joint_angle", "rad", x, np.full(101, 0.5), np.full(101, 0.01)),
+    )
+    outcome = Outcome(
+        verdict="physics",
+        before=NOTHING,
+        after=NOTHING,
+        held_out=None,
+        log_p=-80.0,
+        moved=(),
+        finds=(find,),
+        refused=(Refused(CABLE, 28.0, ("r1 predicted no better",)),),
+        absorbed=(),
+        place=None,
+        left=None,
+        whiteness=(1.0, 1.0),
+        looked_at=10,
+        standing=replace(before, known=found, laws=columns),
+    )
+    trajectory = family(limits_of(experiment.drives, experiment.dt), ("az", "el"), 60.0, "el")[0]
+    proposal = Proposal(
+        LAW, (CABLE,), trajectory, 3.0, 0.067, 3, float("nan"), (Tried(trajectory.words, 3.2),)
+    )
+    target = tmp_path_factory.mktemp("diagnosis") / "out"
+    campaign = load_campaign(bench.CAMPAIGN, checksums=False)
+    told = write_diagnosis(
+        campaign, declared(experiment), known, before.predicted, outcome, target, False, proposal
+    )
+    assert told.verdict_lines[0] == "Left out of the model: curve over joint angle (external wrench, el)."
+    assert told.verdict_lines[-1] == f"Next test: {target / 'next-test.csv'}"
+    return target
+
+
+def test_results_read_back_and_the_page_tells_them(written: Path) -> None:
+    results = load(written, DiagnosisResults)
+    (find,) = results.finds
+    assert not find.named
+    assert {one.unit for one in find.parameters} == {"N m"}
+    assert find.rivals[0].name == "ground_cable"
+    assert results.next_test is not None
+    assert results.next_test.recordings == 3
+    assert results.next_test.sigma is None
+    page = (written / "index.html").read_text()
+    assert "cannot tell curve over joint angle" in page.replace("\u00a0", " ")
+    for kind in ("residual", "residual_spectrum"):
+        assert {path.stem for path in (written / "tables" / kind).iterdir()} == {"r0", "r1"}
+
+
+def test_the_corrected_model_has_the_curve_in_its_plant(written: Path) -> None:
+    corrected = load_campaign(written / "corrected", checksums=False)
+    assert "ground_angle_law" in corrected.effects
+    quantities = corrected.rig.quantities()
+    assert float(quantities["joint.el.drive.ground_angle_law_3"]) == 0.5
+    assert float(quantities["joint.el.drive.ground_angle_law_3"].sigma) == pytest.approx(0.01)
+    assert float(quantities["joint.el.drive.ground_angle_law_high"]) == pytest.approx(1.30)
+    assert quantities["joint.el.drive.Ka"].source.startswith("by diagnosis of r0")
+
+
+def test_the_next_test_can_be_simulated(written: Path) -> None:
+    assert read_commands(written / "next-test.csv", ("az", "el")).t[-1] == pytest.approx(60.0)
