@@ -139,7 +139,7 @@ def _sweep(t: Array, limits: Limits, k: int) -> Array:
         half, np.minimum(0.5 * limits.rate[k] / omega, 0.5 * limits.acceleration[k] / omega**2)
     )
     fade = np.minimum(1.0, np.minimum(since, span - since) / 5.0)
-    way: Array = width * fade**2 * (3.0 - 2.0 * fade) * np.sin(phase)
+    way = width * fade**2 * (3.0 - 2.0 * fade) * np.sin(phase)
     rate = np.gradient(way, t)
     over = np.abs(rate).max() / limits.rate[k], np.abs(np.gradient(rate, t)).max() / limits.acceleration[k]
-    return way / max(1.0, *over)
+    return np.asarray(way / max(1.0, *over), dtype=np.float64)
