@@ -13,7 +13,6 @@ each trajectory's own simulation.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
@@ -21,27 +20,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import norm
 
-from kbs_process.diagnosis.curves import CurveSuspect, basis
+from kbs_process.diagnosis.as_suspect import sigma_of, suspect_of
 from kbs_process.diagnosis.experiment import Drive, Experiment, Trial
 from kbs_process.diagnosis.floor import Floor
 from kbs_process.diagnosis.gls import Background
 from kbs_process.diagnosis.hypothesis import Simulate
 from kbs_process.diagnosis.joint import Standing
-from kbs_process.diagnosis.measured import law_of
 from kbs_process.diagnosis.metric import metrics
-from kbs_process.diagnosis.outcome import Estimate, Find, Identity
+from kbs_process.diagnosis.outcome import Find, Identity
 from kbs_process.diagnosis.parameters import slopes
 from kbs_process.diagnosis.rounds import suspects_of
 from kbs_process.diagnosis.scene import Scene
-from kbs_process.diagnosis.screen import Bench, Catalogued, Suspect
-from kbs_process.diagnosis.suspects import BY, Candidate
+from kbs_process.diagnosis.screen import Bench, Suspect
 from kbs_process.diagnosis.thresholds import RIVALS
 from kbs_process.diagnosis.trajectories import Trajectory, family, limits_of
 from kbs_process.diagnosis.tryout import identity
-from kbs_process.plant.effect import Effect
-from kbs_process.plant.effects import CATALOGUE
-from kbs_process.plant.effects.measured_law import INTERVALS
-from kbs_process.plant.sensing import SENSING, Sensing
 from kbs_process.signals.records import Array
 
 _SECONDS = 200.0  # of a proposed test, or as long as the longest recording
@@ -53,8 +46,6 @@ _JUDGED = (
 _FEW = 3  # rivals that are told from
 _BATCH = 16  # suspects whose signatures are made together
 _DEPENDENT = 1e-10
-_EVERY: tuple[Effect | Sensing, ...] = (*CATALOGUE, *SENSING)
-_LAWS = {law.name: law for law in _EVERY}
 
 # What simulates an experiment, for as long as the context lasts.
 Simulating = Callable[[Experiment], AbstractContextManager[Simulate]]
@@ -191,7 +182,7 @@ class _Stage:
             return None
         metric = metrics(planned, replace(floor, experiment=planned), predicted)
         scene = Scene.of(planned, hypothesis, predicted)
-        found = _suspect(find, scene)
+        found = suspect_of(find, scene)
         if found is None:
             return None
         suspect, amplitude = found
@@ -209,14 +200,17 @@ class _Stage:
             for k, scalar in enumerate(known.free)
             if scalar.quantity in own and scalar.quantity.rpartition(".")[2] not in laws
         )
-        values, vectors = np.linalg.eigh(np.linalg.pinv(known.covariance[np.ix_(free, free)], hermitian=True))
+        C = known.covariance[np.ix_(free, free)]
+        if not np.isfinite(C).all():
+            return None
+        values, vectors = np.linalg.eigh(np.linalg.pinv(C, hermitian=True))
         prior = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T
         return cls(
             Standing(shown, predicted, {}),
             replace(bench, known=shown),
             columns,
             amplitude,
-            _sigma(find, suspect, amplitude),
+            sigma_of(find, suspect, amplitude),
             prior,
             free,
         )
@@ -235,7 +229,8 @@ class _Stage:
         chosen = [known.free[index] for index in self.free]
         spread = known.sigma[list(self.free)]
         made = slopes(known.experiment, self.standing.hypothesis, chosen, spread, [k], simulate)[k]
-        J = known.metric[k](np.moveaxis(made.columns, 0, 2))
+        # A number by whose error the plant would not run is held.
+        J = np.nan_to_num(known.metric[k](np.moveaxis(made.columns, 0, 2)))
         if rivals:
             return self._nearest(k, self._shapes(rivals), J), float("nan")
         return float("nan"), float(1.0 / np.sqrt(1.0 + self._learnt(k, J) ** 2))
@@ -264,6 +259,8 @@ class _Stage:
         if J.shape[1]:
             tail[:, other.shape[1] :] = self.prior
         A = np.vstack([np.hstack([other, J]), tail])
+        if not np.isfinite(A).all():  # a shape that no linear plant bears
+            return float("inf")
         length = np.linalg.norm(A, axis=0)
         A = A[:, length > 0.0] / length[length > 0.0]
         y = np.concatenate([shown, np.zeros(len(tail))])
@@ -278,40 +275,3 @@ class _Stage:
         known = self.sigma > 0.0
         scaled = (H * np.outer(self.sigma, self.sigma))[np.ix_(known, known)]
         return float(np.sqrt(max(0.0, np.linalg.eigvalsh(scaled)[0]))) if known.any() else 0.0
-
-
-def _suspect(find: Find, scene: Scene) -> tuple[Suspect, Array] | None:
-    """A find as a suspect on other trajectories, with its amplitudes."""
-    own = find.identity
-    if find.curve is not None:
-        port, regressor = law_of(own.port, find.curve)
-        x = find.curve.x
-        knots = np.linspace(x[0], x[-1], INTERVALS + 1)
-        coefficients = np.linalg.lstsq(basis(x, float(x[0]), float(x[-1])), find.curve.value, rcond=None)[0]
-        return CurveSuspect(scene, port, own.axis, regressor, knots), np.asarray(coefficients)
-    law = _LAWS.get(own.law)
-    site = BY.join(own.channels) or own.axis
-    if law is None or law.each_trial or not site:
-        return None
-    numbers = _numbers(find)
-    if not all(entry.name in numbers for entry in law.parameters if entry.role != "shared"):
-        return None
-    shape = tuple((e.name, numbers[e.name].value) for e in law.parameters if e.role == "shape")
-    candidate = Candidate(law, site, shape)
-    return Catalogued(candidate, scene), np.array([numbers[e.name].value for e in candidate.amplitudes])
-
-
-def _numbers(find: Find) -> dict[str, Estimate]:
-    """Estimates by the names of the law's first action, whichever this is."""
-    return {re.sub(r"_[2-9]$", "", one.name): one for one in find.estimates} | {
-        one.name: one for one in find.estimates
-    }
-
-
-def _sigma(find: Find, suspect: Suspect, amplitude: Array) -> Array:
-    """(amplitudes,) present standard deviations; of a curve its band, at the coefficients' nodes."""
-    if find.curve is not None:
-        nodes = np.linspace(0.0, len(find.curve.x) - 1.0, len(amplitude)).round().astype(int)
-        return np.asarray(find.curve.sigma[nodes])
-    numbers = _numbers(find)
-    return np.array([numbers[name].sigma for name in suspect.amplitudes])

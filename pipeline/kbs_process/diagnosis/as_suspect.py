@@ -1,0 +1,59 @@
+"""A find as a suspect again: on other trajectories than those that showed it."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+
+from kbs_process.diagnosis.curves import CurveSuspect, basis
+from kbs_process.diagnosis.measured import law_of
+from kbs_process.diagnosis.outcome import Estimate, Find
+from kbs_process.diagnosis.scene import Scene
+from kbs_process.diagnosis.screen import Catalogued, Suspect
+from kbs_process.diagnosis.suspects import BY, Candidate
+from kbs_process.plant.effect import Effect
+from kbs_process.plant.effects import CATALOGUE
+from kbs_process.plant.effects.measured_law import INTERVALS
+from kbs_process.plant.sensing import SENSING, Sensing
+from kbs_process.signals.records import Array
+
+_EVERY: tuple[Effect | Sensing, ...] = (*CATALOGUE, *SENSING)
+_LAWS = {law.name: law for law in _EVERY}
+
+
+def suspect_of(find: Find, scene: Scene) -> tuple[Suspect, Array] | None:
+    """Return a find as a suspect of a scene, with its amplitudes; None for what is each recording's own."""
+    own = find.identity
+    if find.curve is not None:
+        port, regressor = law_of(own.port, find.curve)
+        x = find.curve.x
+        knots = np.linspace(x[0], x[-1], INTERVALS + 1)
+        coefficients = np.linalg.lstsq(basis(x, float(x[0]), float(x[-1])), find.curve.value, rcond=None)[0]
+        return CurveSuspect(scene, port, own.axis, regressor, knots), np.asarray(coefficients)
+    law = _LAWS.get(own.law)
+    site = BY.join(own.channels) or own.axis
+    if law is None or law.each_trial or not site:
+        return None
+    numbers = _numbers(find)
+    if not all(entry.name in numbers for entry in law.parameters if entry.role != "shared"):
+        return None
+    shape = tuple((e.name, numbers[e.name].value) for e in law.parameters if e.role == "shape")
+    candidate = Candidate(law, site, shape)
+    return Catalogued(candidate, scene), np.array([numbers[e.name].value for e in candidate.amplitudes])
+
+
+def _numbers(find: Find) -> dict[str, Estimate]:
+    """Estimates by the names of the law's first action, whichever this is."""
+    return {re.sub(r"_[2-9]$", "", one.name): one for one in find.estimates} | {
+        one.name: one for one in find.estimates
+    }
+
+
+def sigma_of(find: Find, suspect: Suspect, amplitude: Array) -> Array:
+    """Return the amplitudes' present standard deviations (m,); of a curve its band, at the coefficients' nodes."""
+    if find.curve is not None:
+        nodes = np.linspace(0.0, len(find.curve.x) - 1.0, len(amplitude)).round().astype(int)
+        return np.asarray(find.curve.sigma[nodes])
+    numbers = _numbers(find)
+    return np.array([numbers[name].sigma for name in suspect.amplitudes])
