@@ -24,6 +24,7 @@ from kbs_process.diagnosis.hypothesis import Hypothesis, Prediction, Simulate
 from kbs_process.diagnosis.known import MOVED, Known, refit
 from kbs_process.diagnosis.thresholds import DETECTED, EXPLAINED
 
+NEAR = 0.99 * MOVED  # sigmas
 Task = Callable[[str], AbstractContextManager[object]]  # shows that something of some length is done
 
 
@@ -52,11 +53,11 @@ def explain(experiment: Experiment, simulate: Simulate, task: Task) -> Explained
     slopes = None
     if not _driven_alike(experiment):
         with task("The floor, with a model that is about right"):
-            rough = refit(experiment, start, floor, simulate, reach=MOVED, leaps=1)
+            rough = refit(experiment, start, floor, simulate, reach=NEAR, leaps=1)
             start, slopes = rough.hypothesis, rough.slopes
             floor = _floor(experiment, _predicted(experiment, start, simulate))
     with task("Refitting the known parameters, near what is known of them"):
-        near = refit(experiment, start, floor, simulate, reach=MOVED, slopes=slopes)
+        near = refit(experiment, start, floor, simulate, reach=NEAR, slopes=slopes)
         known, predicted, after = _judged(near, floor, simulate)
     if _may_be_off(known) and after.log_p < np.log(DETECTED):
         with task("Refitting the known parameters, free"):
@@ -73,7 +74,7 @@ def explain(experiment: Experiment, simulate: Simulate, task: Task) -> Explained
 
 def _may_be_off(known: Known) -> bool:
     """Whether a number was kept from going farther."""
-    return bool((np.abs(np.nan_to_num(known.moved)) > 0.99 * MOVED).any())
+    return bool((np.abs(np.nan_to_num(known.moved)) > 0.99 * NEAR).any())
 
 
 def _judged(known: Known, floor: Floor, simulate: Simulate) -> tuple[Known, dict[int, Prediction], Detection]:

@@ -1,7 +1,8 @@
 """The gate: a law is accepted only inside the plant, refitted, and if it predicts recordings that were not used.
 
-Every held-out trial's whitened residual has to improve, the interval of the law's coefficients has to exclude zero, and
-the residual has to be no less white. Where nothing was held out, each fit trial is left out in turn, to first order.
+No held-out trial's whitened residual may become worse and all together have to improve, by as much as chance does not
+and as what was fitted lets expect; the interval of the law's coefficients has to exclude zero, and the residual has to
+be no less white. Where nothing was held out, each fit trial is left out in turn, to first order.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from scipy.stats import norm
 from kbs_process.diagnosis.gls import Background
 from kbs_process.diagnosis.known import Known
 from kbs_process.diagnosis.tails import log_tail
-from kbs_process.diagnosis.thresholds import GATE_GAIN, GATE_SHARE, GATE_SIGMA
+from kbs_process.diagnosis.thresholds import GATE_GAIN, GATE_SHARE, GATE_SIGMA, GATE_WORSE
 from kbs_process.signals.records import Array
 
 
@@ -56,9 +57,9 @@ def gate(before: Known, after: Known, coefficients: Sequence[int]) -> Gate:
     white = whiteness(before), whiteness(after)
     reasons = []
     # Written so that what is no number, of a plant that diverged, is refused.
-    if worse := [fold.trial for fold in folds if not fold.gain > 0.0]:
-        reasons.append(f"{', '.join(worse)} predicted no better")
     gained = sum(fold.gain for fold in folds)
+    if worse := [fold.trial for fold in folds if not fold.gain > -GATE_WORSE * abs(gained)]:
+        reasons.append(f"{', '.join(worse)} predicted worse")
     if not gained >= GATE_GAIN:
         reasons.append("recordings that were not used gain less than chance could give")
     elif held_out and not gained >= GATE_SHARE * _promised(before, after):

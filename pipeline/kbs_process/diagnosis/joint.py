@@ -16,15 +16,17 @@ from kbs_process.diagnosis.experiment import Experiment
 from kbs_process.diagnosis.hypothesis import Hypothesis, Prediction, Simulate
 from kbs_process.diagnosis.known import Known
 from kbs_process.diagnosis.parameters import Slopes, slopes
+from kbs_process.estimation.bounded import bounded_minimum
 from kbs_process.estimation.fit import Parameters
 from kbs_process.signals.records import Array
 from kbs_process.stages.output_error import Scalar
 
-_STEPS = 8
+_STEPS = 12
 _DIFFERENCE = 0.1  # of a suspect's number, by which the plant's slope is taken
 _GAIN = 1.0  # of -2 log likelihood: a step that promises less ends the search
 _TRIES, _LESS = 3, 0.2
 _FARTHEST = 30.0  # times, up or down, that a shape goes from where the grid had it
+_RIDGE = 1e-10  # of unit columns: numbers that nothing shows would leave the equations singular
 _SHORTER = (1.0, 0.5, 0.2, 0.05)
 
 
@@ -99,7 +101,11 @@ def with_extra(standing: Standing, extra: Extra, simulate: Simulate, steps: int 
             break
         H, g = state.normal(values, predicted, gradients)
         size = 1.0 / np.sqrt(np.maximum(np.diag(H), 1e-300))
-        du = size * np.linalg.lstsq(H * np.outer(size, size), size * g, rcond=1e-13)[0]
+        scaled = H * np.outer(size, size) + _RIDGE * np.eye(len(size))
+        low, high = (
+            np.where(np.isfinite(end), (end - values) / size, end) for end in (state.lower, state.upper)
+        )
+        du = size * bounded_minimum(scaled, size * g, np.minimum(low, 0.0), np.maximum(high, 0.0))
         if float(g @ du) < _GAIN:
             break
         moved = _shortened(state, values, du, predicted, cost, everything, simulate)

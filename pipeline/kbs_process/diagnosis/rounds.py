@@ -41,6 +41,7 @@ from kbs_process.diagnosis.thresholds import (
     LEAD,
     LEADERS,
     ROUNDS,
+    SECOND,
 )
 from kbs_process.diagnosis.tryout import extra_of, identity
 
@@ -148,7 +149,10 @@ def _round(standing: Standing, floor: Floor, simulate: Simulate) -> _Round:
     place = _place(standing, floor, scene)
     refused: list[Refused] = []
     tried: list[Tried] = []
-    for found in _leaders(screening):
+    first, others = _leaders(screening)
+    for found in (*first, *others):
+        if tried and found in others:
+            break
         new, verdict = _try(found, standing, bench, scene, simulate)
         if verdict.passed:
             tried.append(Tried(found, new, verdict))
@@ -183,8 +187,8 @@ def _settled(standing: Standing, floor: Floor, simulate: Simulate) -> Standing:
     return standing
 
 
-def _leaders(screening: Screening) -> list[Found]:
-    """The most probable suspects, as many as the linear plant may have in the wrong order.
+def _leaders(screening: Screening) -> tuple[list[Found], list[Found]]:
+    """The most probable suspects, as many as the linear plant may have in the wrong order, and a few that come next.
 
     A law that repeats predicts what was not recorded; one whose size and phase are each recording's own does not. It
     leads only where none that repeats does half of what it does.
@@ -194,9 +198,10 @@ def _leaders(screening: Screening) -> list[Found]:
     if repeating and 2.0 * repeating[0].score.gain >= able[0].score.gain:
         able = repeating
     if not able:
-        return []
+        return [], []
     bound = (1.0 - LEAD) * able[0].score.gain
-    return [found for found in able if found.score.gain >= bound or found is able[0]][:LEADERS]
+    first = [found for found in able if found.score.gain >= bound or found is able[0]][:LEADERS]
+    return first, [found for found in able if found not in first][:SECOND]
 
 
 def _try(

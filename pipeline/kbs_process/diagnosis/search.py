@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
 
 from kbs_process.diagnosis.experiment import Experiment
 from kbs_process.diagnosis.floor import Floor
@@ -20,6 +19,7 @@ from kbs_process.diagnosis.hypothesis import Hypothesis, Prediction, Simulate
 from kbs_process.diagnosis.leaps import leap
 from kbs_process.diagnosis.metric import Metric, metrics
 from kbs_process.diagnosis.parameters import Slopes, known_parameters, slopes
+from kbs_process.estimation.bounded import bounded_minimum
 from kbs_process.estimation.fit import Parameters
 from kbs_process.signals.records import Array
 from kbs_process.stages.identification import gearbox
@@ -35,6 +35,7 @@ _AGREED = 0.9  # gained over promised, above which slopes are only updated
 _STALLED = 0.1  # of the same, below which a descent goes nowhere
 GAIN = 2.0  # of -2 log likelihood: a step that promises less ends a descent
 _LITTLE = 25.0  # of the same: what exact slopes gained, below which more rounds are not worth their time
+_SLIGHT = 1e-3  # of all that is left: likewise
 LEAPS = 3  # in one search
 _EARLY = 2  # steps before the first leap: masses and centres of gravity are right then
 _ROUNDS = 10  # steps of a descent at most
@@ -185,7 +186,8 @@ class Search:
             H, g = self.normal(found.gradients, found.predicted)
             self.settle(H)
             step = self.step(found.theta, found.predicted, H, g)
-            arrived = step.promised < GAIN or step.gained < max(_LITTLE, _STALLED * step.promised)
+            little = max(_LITTLE, _SLIGHT * self.left(found))
+            arrived = step.promised < GAIN or step.gained < max(little, _STALLED * step.promised)
             if step.gained > 0.0:
                 gradients = self.updated(found.gradients, found.theta, step)
                 found = replace(found, theta=step.theta, predicted=step.predicted, gradients=gradients)
@@ -202,10 +204,10 @@ class Search:
         predicted = self.predict([theta], self.everything)[0]
         return Found(theta, predicted, self.slopes(theta, found.gradients), rounds=found.rounds)
 
-    def level(self, found: Found) -> float:
-        """What is left of the trials that are fitted, over the floor."""
+    def left(self, found: Found) -> float:
+        """-2 log likelihood beyond that of noise."""
         rows = sum(self.metric[k].rows for k in self.experiment.fit)
-        return self.cost(found.theta, found.predicted)[0] / rows
+        return self.cost(found.theta, found.predicted)[0] - rows
 
     def slopes(self, theta: Array, held: Gradients, *, whole: bool = False) -> Gradients:
         """Slopes at theta; where some are held, only those of drives' and transducer's numbers are taken again.
@@ -222,6 +224,17 @@ class Search:
         return slopes(
             self.experiment, here, self.free, self.differences, self.references, self.simulate, keep=keep
         )
+
+    def _room(self, theta: Array) -> tuple[Array, Array]:
+        """How far each number may go down and up, in the chart of cosines and sines: these have no bounds."""
+        limits = self.polar.flat_parameters
+        assert limits.lower is not None and limits.upper is not None
+        u = self.polar.flat(theta)
+        return np.minimum(limits.lower - u, 0.0), np.maximum(limits.upper - u, 0.0)
+
+    def _clipped(self, theta: Array) -> Array:
+        assert self.parameters.lower is not None and self.parameters.upper is not None
+        return np.asarray(np.clip(theta, self.parameters.lower, self.parameters.upper), dtype=np.float64)
 
     def _shown_beside(self, index: int, drive: int) -> bool:
         """Whether a drive other than a calibration shows something of a number."""
@@ -256,14 +269,13 @@ class Search:
         A = T.T @ (weight * H + np.diag(self.precision + self.ridge)) @ T
         b = T.T @ (weight * g - self.precision * (theta - self.parameters.value))
         scale = 1.0 / np.sqrt(np.diag(A))
-        A = A * np.outer(scale, scale)
-        assert self.parameters.lower is not None and self.parameters.upper is not None
+        A, b = A * np.outer(scale, scale), scale * b
+        low, high = self._room(theta)
         candidates, promised = [], 0.0
         for damping in _DAMPING:
-            du = cho_solve(cho_factor(A + damping * np.eye(len(b))), scale * b)
-            promised = promised or float(2.0 * (scale * b) @ du - du @ A @ du) / weight
-            moved = self.polar.back(self.polar.flat(theta) + scale * du)
-            candidates.append(np.clip(moved, self.parameters.lower, self.parameters.upper))
+            du = bounded_minimum(A + damping * np.eye(len(b)), b, low / scale, high / scale)
+            promised = promised or float(2.0 * b @ du - du @ A @ du) / weight
+            candidates.append(self._clipped(self.polar.back(self.polar.flat(theta) + scale * du)))
         if promised < GAIN:
             return _Step(theta, predicted, promised, 0.0)
         now = weight * data + excess

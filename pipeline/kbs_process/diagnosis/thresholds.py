@@ -44,6 +44,10 @@ GATE_GAIN: Final = (
 )
 # Of what recordings that were fitted gain, row by row: what was fitted to one motion alone does less for another.
 GATE_SHARE: Final = 0.2
+# Of what all gain together: by that one that shows little of a law may be worse, for its formula is not nature's.
+GATE_WORSE: Final = 0.02
+# Leaders that are tried beyond those that the linear plant cannot order, where none of these passes.
+SECOND: Final = 2
 ROUNDS: Final = 5  # finds in one campaign at most
 
 # -- two laws ------------------------------------------------------------------------------------------------------
