@@ -33,10 +33,11 @@ from engine.sensors import FRICTION_SPREAD, Recording, Stream, record
 from engine.trajectories import Axis, Commands, commands
 from kbs_process.campaign.load import load_campaign
 from kbs_process.campaign.measured import measured
+from kbs_process.estimation.whittle import periodogram
 from kbs_process.signals.records import Array, Block
 from kbs_process.stages.condense import CondenseSettings, condense
 from kbs_process.stages.identification import Identification, Settings, identify, intervals
-from kbs_process.stages.output_error import Experiment, residual
+from kbs_process.stages.output_error import Experiment, residual, sensor_spectra, unexplained
 from kbs_process.stages.screening import Evaluate, Task
 from kbs_process.stages.unknowns import frictions, gearbox
 
@@ -60,7 +61,7 @@ class Trial:
     """One seed."""
 
     seed: int
-    checks: bool  # converged, no better phase or contact edge known, contact explains what there is
+    checks: bool  # converged, no better phase or contact edge known, contact explains what there is, residual is noise
     truth_above: float  # -2 log posterior of the truth over the estimate's
     estimates: tuple[Estimate, ...]
 
@@ -145,6 +146,18 @@ def above(found: Identification, truth: Array, run: Hardware) -> float:
     return costs[1] - costs[0]
 
 
+def over_noise(found: Identification) -> Iterator[float]:
+    """Rms of the residual over the sensors' noise in each channel: what a report's check of the residual looks at."""
+    setting = found.experiment
+    (recording,) = setting.recordings
+    noise = sensor_spectra(setting, recording)
+    left = unexplained(setting, recording, found.values, noise)
+    for column, (spectrum, band) in enumerate(zip(noise, setting.bands(recording), strict=True)):
+        f, power = periodogram(left[:, column], recording.valid, recording.dt)
+        inside = (f >= band[0]) & (f <= band[1])
+        yield float(np.sqrt(np.mean(power[inside] / spectrum.at(f[inside]))))
+
+
 def trial(seed: int) -> Trial:
     """One seed: each gearbox parameter's error, sigma, bound, and whether its intervals hold the truth."""
     hardware, recording = make(seed, short_sweeps())
@@ -161,6 +174,7 @@ def trial(seed: int) -> Trial:
             held = bool(ends.low <= at <= ends.high)
         estimates.append(Estimate(scalar.name, float(wrong[index]), float(found.fit.sigma[index]), held))
     checks = found.fit.checks[0].passed and found.modes[0].settled and found.fit.checks[-1].passed
+    checks = checks and max(over_noise(found)) < 1.05
     return Trial(seed, checks, above(found, truth, recording.hardware), tuple(estimates))
 
 
@@ -230,7 +244,7 @@ def table(trials: Sequence[Trial]) -> Iterator[str]:
     missed = [str(one.seed) for one in trials if one.truth_above < -10.0]
     yield f"seeds where the truth costs less by more than 10: {', '.join(missed) or 'none'}"
     failed = [str(one.seed) for one in trials if not one.checks]
-    yield f"seeds whose checks (converged, phases and edges, contact) did not pass: {', '.join(failed) or 'none'}"
+    yield f"seeds whose checks (converged, edges, contact, residual) did not pass: {', '.join(failed) or 'none'}"
 
 
 def main() -> None:
