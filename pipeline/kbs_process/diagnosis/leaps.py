@@ -26,32 +26,43 @@ _SMOOTH = 8  # phases tried all round
 _EDGES = 4  # pairs of edges tried of a contact
 _DIFFERENCE = 0.01  # rad, of an edge, and 5 % of a torque, for a candidate's own step
 _REACH = 0.06  # rad: an edge's own step goes no farther than half the grid that proposed it
+_WALK = (-0.3, -0.16, -0.08, -0.03, 0.03, 0.08, 0.16, 0.3)  # rad, outwards: an edge's places that are tried
+_NARROWEST = 0.02  # rad, half a contact
 _BETTER = 10.0  # of -2 log likelihood, for which something is moved
+_FOLLOWED = (1.0, 0.3, 0.0)  # shares of how the others follow
 _RISE = 1.5  # times the cost, that a leap may bring before the others have settled
 
 
 def leap(search: Search, found: Found, *, smooth: bool) -> Array | None:
     """Return better values (p,), or None where there are none; phases that enter smoothly are tried if `smooth`."""
-    theta = found.theta
+    theta, moved = found.theta, list[int]()
     J = {k: search.jacobian(k, found.gradients) for k in search.experiment.fit}
     for trials, joints in stages(search.experiment):
         prefixes = tuple(f"joint.{name}.drive." for name in joints)
         for pair in search.pairs:
             if smooth and pair.smooth and search.free[pair.phase].name.startswith(prefixes):
                 view = _View(search, found, J, trials, (pair.amplitude, pair.phase))
+                moved += view.own
                 turns = np.arange(_SMOOTH) * (2.0 * np.pi / _SMOOTH)
                 middle = search.parameters.value[pair.amplitude]
                 theta = view.best(theta, [view.at(theta, (middle, turn)) for turn in turns])
         for contact in contacts(search.hypothesis.rig, search.hypothesis.effects, search.free):
             if search.free[contact.phase].name.startswith(prefixes):
                 view = _View(search, found, J, trials, (contact.torque, contact.width, contact.phase))
+                moved += view.own
                 theta = view.best(theta, view.edges(theta, contact))
+                theta = view.best(theta, view.walked(theta))
     if theta is found.theta:
         return None
-    predicted = search.predict([theta], search.drives)[0]
-    now, then = sum(search.cost(found.theta, found.predicted)), sum(search.cost(theta, predicted))
-    # Else the slopes promised what is far from true.
-    return theta if then < _RISE * now else None
+    # What the others are to follow by is linear, and may be far from true: less of it then.
+    own = np.isin(np.arange(len(theta)), sorted(set(moved)))
+    points = [np.where(own, theta, found.theta + share * (theta - found.theta)) for share in _FOLLOWED]
+    costs = [
+        sum(search.cost(point, predicted))
+        for point, predicted in zip(points, search.predict(points, search.drives), strict=True)
+    ]
+    best = int(np.argmin(costs))
+    return points[best] if costs[best] < _RISE * sum(search.cost(found.theta, found.predicted)) else None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -133,6 +144,24 @@ class _View:
         bounded = replace(prior, sigma=np.where(np.isfinite(prior.sigma), prior.sigma, np.pi))
         points = edge_minima(self.residuals, theta, J, bounded, contact, _EDGES)
         return [*points, *(self.stepped(point) for point in points)]
+
+    def walked(self, theta: Array) -> list[Array]:
+        """The best place of either edge in turn, the other standing: each meets events of its own.
+
+        Where friction sticks, narrow contacts do not add up, and their sum proposes wrong edges. The torque goes with
+        the inverse of the width, which leaves the loss in a turn as it is.
+        """
+        point = theta
+        for side in (-1.0, 1.0, -1.0, 1.0):
+            torque, width, phase = point[self.own]
+            moves = [(offset, width + 0.5 * offset) for offset in _WALK if width + 0.5 * offset > _NARROWEST]
+            # The contact is centred at minus its phase.
+            points = [
+                self.at(point, (torque * width / wide, wide, phase - 0.5 * side * offset))
+                for offset, wide in moves
+            ]
+            point = min(self.followed([point, *points]), key=lambda one: one.cost).point
+        return [point, self.stepped(point)] if point is not theta else []
 
     def stepped(self, point: Array) -> Array:
         """A Gauss-Newton step in the own numbers and the rest together, of which only the own are taken."""

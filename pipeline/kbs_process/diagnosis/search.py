@@ -33,6 +33,7 @@ _LEAST_DIFFERENCE, _MOST_DIFFERENCE = 2e-3, 0.4  # prior sigmas
 _DAMPING = (0.0, 1e-2, 1e-1, 1.0, 10.0, 1e3)  # tried two at a time
 _AGREED = 0.9  # gained over promised, above which slopes are only updated
 _STALLED = 0.1  # of the same, below which a descent goes nowhere
+_OLD, _GEARS, _ALL = range(3)  # which slopes are taken where the search stands
 GAIN = 2.0  # of -2 log likelihood: a step that promises less ends a descent
 _LITTLE = 25.0  # of the same: what exact slopes gained, below which more rounds are not worth their time
 _SLIGHT = 1e-3  # of all that is left: likewise
@@ -160,8 +161,7 @@ class Search:
     def run(self, found: Found, *, leaps: int = LEAPS) -> Found:
         """Descend; leap to better phases and edges while there are any, at most `leaps` times, and descend again.
 
-        The first leap is made early: what is left out, or a wrong phase, has not yet pulled the others far then. All
-        slopes are taken again at the end, unless the search is cut short by fewer leaps.
+        The first leap is made early: what is left out, or a wrong phase, has not yet pulled the others far then.
         """
         if not leaps:
             return self.descend(found, _ROUNDS)
@@ -172,31 +172,30 @@ class Search:
                 found = self.moved(moved, found)
             elif number > 0:
                 break
-        found = self.descend(found, _ROUNDS)
-        if leaps < LEAPS:
-            return found
-        # Those of bodies hardly change, but for what resonances do to them once these are where they belong.
-        renewed = replace(found, gradients=self.slopes(found.theta, found.gradients, whole=True))
-        return self.descend(renewed, _ROUNDS)
+        return self.descend(found, _ROUNDS)
 
     def descend(self, found: Found, rounds: int) -> Found:
-        """Steps until slopes that are exact promise nothing, or do not keep what they promise."""
-        exact = True
+        """Steps until slopes that are all taken anew promise little, or do not keep what they promise."""
+        fresh = _GEARS
         for number in range(found.rounds + 1, found.rounds + rounds + 1):
             H, g = self.normal(found.gradients, found.predicted)
             self.settle(H)
             step = self.step(found.theta, found.predicted, H, g)
             little = max(_LITTLE, _SLIGHT * self.left(found))
-            arrived = step.promised < GAIN or step.gained < max(little, _STALLED * step.promised)
+            arrived = step.gained < max(little, _STALLED * step.promised)
+            kept = step.gained > _AGREED * step.promised
             if step.gained > 0.0:
                 gradients = self.updated(found.gradients, found.theta, step)
                 found = replace(found, theta=step.theta, predicted=step.predicted, gradients=gradients)
-            found = replace(found, rounds=number, converged=arrived and exact)
+            found = replace(
+                found, rounds=number, converged=arrived and (fresh == _ALL or step.promised < little)
+            )
             if found.converged:
                 break
-            exact = step.gained < _AGREED * step.promised
-            if exact:
-                found = replace(found, gradients=self.slopes(found.theta, found.gradients))
+            fresh = _OLD if kept else _ALL if arrived and fresh == _GEARS else _GEARS
+            if fresh != _OLD:
+                slopes = self.slopes(found.theta, found.gradients, whole=fresh == _ALL)
+                found = replace(found, gradients=slopes)
         return found
 
     def moved(self, theta: Array, found: Found) -> Found:
@@ -212,12 +211,13 @@ class Search:
     def slopes(self, theta: Array, held: Gradients, *, whole: bool = False) -> Gradients:
         """Slopes at theta; where some are held, only those of drives' and transducer's numbers are taken again.
 
-        With `whole` all are. Calibrations, slow and at rest for the most part, keep what others show better.
+        With `whole` all are: those of bodies change with the resonances. Else calibrations, slow and at rest for the
+        most part, keep what others show better.
         """
         keep = {}
         for drive, slope in held.items():
             same = [] if whole else self.slow
-            if drive in self.calibrations:
+            if drive in self.calibrations and not whole:
                 same = [i for i in range(len(self.free)) if i in self.slow or self._shown_beside(i, drive)]
             keep[drive] = ([*same, *self.idle.get(drive, ())], slope.columns)
         here = self.hypothesis.at(self.free, theta)
