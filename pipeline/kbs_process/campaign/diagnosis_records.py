@@ -88,9 +88,19 @@ def _where(place: records.Place) -> str:
 
 def _sentence(outcome: Outcome) -> str:
     if not outcome.finds:
-        return _WORDS[outcome.verdict]
+        return _WORDS[outcome.verdict] + _located(outcome)
     told = [f"{_words(find.identity.law)} ({_where(place_of(find.identity))})" for find in outcome.finds]
     return f"Left out of the model: {'; '.join(told)}."
+
+
+def _located(outcome: Outcome) -> str:
+    """Which ports can explain what no law did, where some cannot."""
+    if outcome.verdict != "undecided" or outcome.left is None:
+        return ""
+    able = [port.name for port in outcome.left.test.ports if port.sufficient]
+    if not able or len(able) == len(outcome.left.test.ports):
+        return ""
+    return f" An input free to be anything could explain it at {', '.join(able[:4])}{' and others' * (len(able) > 4)}."
 
 
 def _paragraph(outcome: Outcome, finds: Sequence[records.Find], trials: Sequence[records.Trial]) -> str:

@@ -23,7 +23,7 @@ from kbs_process.diagnosis.scene import Scene
 from kbs_process.diagnosis.signature import inputs, sensed
 from kbs_process.diagnosis.suspects import Candidate
 from kbs_process.diagnosis.tails import log_tail
-from kbs_process.diagnosis.thresholds import ABSORBED, FALSE_ALARM
+from kbs_process.diagnosis.thresholds import ABSORBED, FALSE_ALARM, LEAST_RHO
 from kbs_process.diagnosis.transfer import BATCH, respond
 from kbs_process.plant.sensing import Sensing, SensingPort
 from kbs_process.signals.records import WRENCH_CHANNELS, Array
@@ -109,7 +109,7 @@ class Found:
 
     @property
     def significant(self) -> bool:
-        return bool(self.log_p < np.log(FALSE_ALARM))
+        return bool(self.log_p < np.log(FALSE_ALARM) and self.score.rho_eff > LEAST_RHO)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

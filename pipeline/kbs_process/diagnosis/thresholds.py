@@ -24,6 +24,9 @@ LINE_ALPHA: Final = 0.05  # of a line by chance; the screen judges what is propo
 FALSE_ALARM: Final = (
     1e-3  # of the best candidate of a screen under the null, after Bonferroni; the gate follows
 )
+# rho_eff that a suspect needs to be looked at: neither plant nor floor is exact, and what they lack (rounding of
+# encoders along repeated paths most) gave the best suspect of campaigns without any effect up to 8.7.
+LEAST_RHO: Final = 12.0
 ABSORBED: Final = 0.99  # kappa: what a known parameter takes up of a signature (diagnosis.md)
 DEPENDENT: Final = 1e-8  # relative eigenvalue below which amplitudes of a candidate are one and the same
 # P-value below which what is left counts as there (diagnosis.md: 1 % of null campaigns at most claim a find).

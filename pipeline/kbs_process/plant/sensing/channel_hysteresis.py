@@ -38,7 +38,7 @@ CHANNEL_HYSTERESIS = Sensing(
             LogNormal(1.0, 1.0),
             "change of load that closes it, in the channel's unit",
             (1e-9, 1e6),
-            grid=(0.03, 0.1, 0.3),
+            grid=(0.003, 0.01, 0.03, 0.1, 0.3),
             over="reading.span",
         ),
     ),
