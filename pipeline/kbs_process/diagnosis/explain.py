@@ -10,9 +10,9 @@ is estimated again as soon as the model is about right.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from kbs_process.diagnosis.floor import Floor, estimate
 from kbs_process.diagnosis.hypothesis import Hypothesis, Prediction, Simulate
 from kbs_process.diagnosis.known import MOVED, Known, refit
 from kbs_process.diagnosis.thresholds import DETECTED, EXPLAINED
+from kbs_process.signals.records import Array
 
 NEAR = 0.99 * MOVED  # sigmas
 Task = Callable[[str], AbstractContextManager[object]]  # shows that something of some length is done
@@ -45,9 +46,9 @@ def explain(experiment: Experiment, simulate: Simulate, task: Task) -> Explained
     """Floor, detection, refit of the known parameters, detection of what they leave."""
     nominal = Hypothesis(experiment.rig, experiment.effects)
     with task("Repeatability floor, and what exceeds it"):
-        predicted = _predicted(experiment, nominal, simulate)
-        floor = _floor(experiment, predicted)
-        before = detect(experiment, floor, predicted, experiment.fit)
+        begun = _predicted(experiment, nominal, simulate)
+        floor = _floor(experiment, begun)
+        before = detect(experiment, floor, begun, experiment.fit)
     with task("Phases of cogging, friction and tooth contact"):
         (start,) = phasing.begin(experiment, nominal, floor, simulate)
     slopes = None
@@ -66,10 +67,21 @@ def explain(experiment: Experiment, simulate: Simulate, task: Task) -> Explained
         settled = judged[2].log_p > np.log(DETECTED)
         if settled or judged[2].ratio - 1.0 < EXPLAINED * (after.ratio - 1.0):
             known, predicted, after = judged
+    known = replace(known, chi2_before=_squares(known, begun))
     held_out = None
     if experiment.held_out:
         held_out = detect(experiment, floor, predicted, experiment.held_out, known=known)
     return Explained(experiment, floor, known, predicted, before, after, held_out)
+
+
+def _squares(known: Known, predicted: Mapping[int, Prediction]) -> Array:
+    """(trials,) squared lengths of what predictions leave, in the metric of the refit."""
+    trials = known.experiment.trials
+    left = [
+        metric(trial.measured - predicted[trial.drive].values)
+        for metric, trial in zip(known.metric, trials, strict=True)
+    ]
+    return np.array([float(z @ z) for z in left])
 
 
 def _may_be_off(known: Known) -> bool:
