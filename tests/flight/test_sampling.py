@@ -1,5 +1,6 @@
 """Units drawn from the uncertainties of a rig, and what is concluded from a sample of outcomes."""
 
+import itertools
 from pathlib import Path
 
 import numpy as np
@@ -108,3 +109,9 @@ def test_importance_finds_what_matters_and_chance_is_bounded():
         for _ in range(300)
     ]
     assert np.mean(false) < 0.09
+
+
+def test_any_share_may_be_chance_for_three_units_and_less_for_more() -> None:
+    assert by_chance(2, 31) == by_chance(3, 31) == 1.0
+    shares = [by_chance(n, 31) for n in (4, 10, 100, 1000)]
+    assert all(0.0 < later < earlier <= 1.0 for earlier, later in itertools.pairwise(shares))

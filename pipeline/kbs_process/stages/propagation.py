@@ -67,6 +67,8 @@ def by_chance(samples: int, numbers: int) -> float:
     """Return the share that one of `numbers` parameters without effect exceeds with 5 % probability.
 
     A squared correlation of a phase with noise is Beta(1, (n - 3) / 2), of an ordered number less; the greatest of p is
-    bounded by Bonferroni's inequality.
+    bounded by Bonferroni's inequality. Three samples or fewer lie on some phase's curve, whatever they are.
     """
+    if samples <= 3:
+        return 1.0
     return float(beta.isf(0.05 / numbers, 1.0, 0.5 * (samples - 3)))
