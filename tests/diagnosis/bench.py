@@ -9,10 +9,16 @@ import numpy as np
 
 from kbs_process.campaign.load import load_campaign
 from kbs_process.diagnosis.experiment import Drive, Experiment, Trial
+from kbs_process.diagnosis.floor import declared
 from kbs_process.diagnosis.hypothesis import Hypothesis, predict
+from kbs_process.diagnosis.joint import Standing
+from kbs_process.diagnosis.known import Known
+from kbs_process.diagnosis.metric import metrics
+from kbs_process.diagnosis.parameters import prior, slopes
 from kbs_process.plant.predict import Schedule
 from kbs_process.rig.model import Rig
 from kbs_process.signals.records import Array
+from kbs_process.stages.output_error import Scalar
 
 CAMPAIGN = Path(__file__).parents[2] / "campaigns" / "EL089"
 DT = 0.05
@@ -73,3 +79,25 @@ def experiment(
 
 def serial(made: Experiment):  # type: ignore[no-untyped-def]
     return lambda tasks: [predict(hypothesis, made, drive) for drive, hypothesis in tasks]
+
+
+def standing(made: Experiment, free: tuple[Scalar, ...]) -> Standing:
+    """The files' numbers, with the slopes of a few."""
+    hypothesis, simulate = Hypothesis(made.rig, made.effects), serial(made)
+    predicted = {0: predict(hypothesis, made, 0)}
+    parameters = prior(made.rig, made.rig, made.effects, free)
+    metric = metrics(made, declared(made), predicted)
+    known = Known(
+        experiment=made,
+        hypothesis=hypothesis,
+        free=free,
+        parameters=parameters,
+        value=hypothesis.values(free),
+        covariance=np.diag(parameters.sigma**2),
+        metric=metric,
+        slopes=slopes(made, hypothesis, free, 0.1 * parameters.sigma, [0], simulate),
+        residual=tuple(m(t.measured - predicted[0].values) for m, t in zip(metric, made.trials, strict=True)),
+        chi2_before=np.zeros(len(made.trials)),
+        checks=(),
+    )
+    return Standing(known, predicted, {})

@@ -14,13 +14,9 @@ from kbs_process.campaign.commands import read_commands
 from kbs_process.campaign.next_test import commands_of, next_test
 from kbs_process.diagnosis.floor import declared
 from kbs_process.diagnosis.gate import Gate
-from kbs_process.diagnosis.hypothesis import Hypothesis, predict
 from kbs_process.diagnosis.joint import Standing
-from kbs_process.diagnosis.known import Known
-from kbs_process.diagnosis.metric import metrics
 from kbs_process.diagnosis.next_test import Proposal, propose
 from kbs_process.diagnosis.outcome import Alternative, Estimate, Find, Identity
-from kbs_process.diagnosis.parameters import prior, slopes
 from kbs_process.diagnosis.trajectories import family, limits_of
 from kbs_process.stages.output_error import Scalar
 
@@ -31,25 +27,7 @@ COULOMB = Identity("joint torque", "el", (), "friction", "coulomb")
 
 @pytest.fixture(scope="module")
 def standing() -> Standing:
-    made = bench.experiment(bench.rig(), ("fit", "held-out"), 1)
-    hypothesis = Hypothesis(made.rig, made.effects)
-    predicted = {0: predict(hypothesis, made, 0)}
-    parameters = prior(made.rig, made.rig, made.effects, FREE)
-    metric = metrics(made, declared(made), predicted)
-    known = Known(
-        experiment=made,
-        hypothesis=hypothesis,
-        free=FREE,
-        parameters=parameters,
-        value=hypothesis.values(FREE),
-        covariance=np.diag(parameters.sigma**2),
-        metric=metric,
-        slopes=slopes(made, hypothesis, FREE, 0.1 * parameters.sigma, [0], bench.serial(made)),
-        residual=tuple(m(t.measured - predicted[0].values) for m, t in zip(metric, made.trials, strict=True)),
-        chi2_before=np.zeros(len(made.trials)),
-        checks=(),
-    )
-    return Standing(known, predicted, {})
+    return bench.standing(bench.experiment(bench.rig(), ("fit", "held-out"), 1), FREE)
 
 
 def found(sigma: float, *rivals: Identity) -> Find:

@@ -9,13 +9,9 @@ import numpy as np
 import pytest
 
 from kbs_process.diagnosis.experiment import Experiment
-from kbs_process.diagnosis.floor import declared
 from kbs_process.diagnosis.gate import gate
 from kbs_process.diagnosis.hypothesis import Hypothesis, predict
 from kbs_process.diagnosis.joint import Standing, with_extra
-from kbs_process.diagnosis.known import Known
-from kbs_process.diagnosis.metric import metrics
-from kbs_process.diagnosis.parameters import prior, slopes
 from kbs_process.diagnosis.rivals import rivalry
 from kbs_process.diagnosis.scene import Scene
 from kbs_process.diagnosis.screen import Bench, Catalogued, Found, Screening, screen
@@ -59,26 +55,7 @@ def with_cable(made: Experiment, trials: tuple[int, ...]) -> Experiment:
 
 
 def standing(made: Experiment) -> Standing:
-    """The files' numbers, with the slopes of a few."""
-    hypothesis, simulate = Hypothesis(made.rig, made.effects), bench.serial(made)
-    predicted = {0: predict(hypothesis, made, 0)}
-    parameters = prior(made.rig, made.rig, made.effects, FREE)
-    metric = metrics(made, declared(made), predicted)
-    differences = 0.1 * parameters.sigma
-    known = Known(
-        experiment=made,
-        hypothesis=hypothesis,
-        free=FREE,
-        parameters=parameters,
-        value=hypothesis.values(FREE),
-        covariance=np.diag(parameters.sigma**2),
-        metric=metric,
-        slopes=slopes(made, hypothesis, FREE, differences, [0], simulate),
-        residual=tuple(m(t.measured - predicted[0].values) for m, t in zip(metric, made.trials, strict=True)),
-        chi2_before=np.zeros(len(made.trials)),
-        checks=(),
-    )
-    return Standing(known, predicted, {})
+    return bench.standing(made, FREE)
 
 
 def screened(here: Standing) -> tuple[Bench, Scene, Screening]:

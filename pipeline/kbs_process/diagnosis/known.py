@@ -8,7 +8,6 @@ and sine amplitudes.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -96,18 +95,16 @@ def refit(
     floor: Floor,
     simulate: Simulate,
     *,
-    extra: Sequence[Scalar] = (),
     reach: float = np.inf,
     slopes: dict[int, Slopes] | None = None,
     leaps: int = LEAPS,
 ) -> Known:
     """Refit all known parameters from `hypothesis` on, whose phases are near their right values (see `phasing`).
 
-    `extra` are numbers of suspects in the hypothesis that are fitted beside them, with the priors of its rig. No number
-    goes farther than `reach` sigmas from its prior. Phases and edges are looked for all round up to `leaps` times;
-    `slopes` at the hypothesis need not be taken again.
+    No number goes farther than `reach` sigmas from its prior. Phases and edges are looked for all round up to `leaps`
+    times; `slopes` at the hypothesis need not be taken again.
     """
-    free = (*known_parameters(experiment.rig, experiment.effects), *extra)
+    free = known_parameters(experiment.rig, experiment.effects)
     parameters = within(prior(hypothesis.rig, experiment.rig, hypothesis.effects, free), reach)
     search = Search(experiment, floor, simulate, hypothesis, free, parameters)
     begun = search.begin(slopes)

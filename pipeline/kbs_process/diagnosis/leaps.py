@@ -85,12 +85,13 @@ class _View:
         trials: Sequence[int],
         own: tuple[int, ...],
     ) -> None:
-        self.search, self.trials, self.own, self.J = search, trials, list(own), J
+        self.search, self.trials, self.own = search, trials, list(own)
+        self.J = np.concatenate([J[k] for k in trials])
         self.rest = np.delete(np.arange(len(search.free)), self.own)
         self.drives = sorted({search.experiment.trials[k].drive for k in trials})
         self.weights = (search.precision + search.ridge)[self.rest]
-        self.normal = sum((j[:, self.rest].T @ j[:, self.rest] for j in J.values()), np.diag(self.weights))
-        self.factor = cho_factor(self.normal)
+        normal = sum((j[:, self.rest].T @ j[:, self.rest] for j in J.values()), np.diag(self.weights))
+        self.factor = cho_factor(normal)
         self.held = np.zeros(len(self.rest))
         for k in set(J) - set(trials):
             self.held += J[k][:, self.rest].T @ search.residual(k, found.predicted)
@@ -99,10 +100,7 @@ class _View:
         """`theta` with the own numbers at `values`, within bounds."""
         point = theta.copy()
         point[self.own] = values
-        limits = self.search.parameters
-        assert limits.lower is not None and limits.upper is not None
-        clipped: Array = np.clip(point, limits.lower, limits.upper)
-        return clipped
+        return self.search.clipped(point)
 
     def residuals(self, points: Sequence[Array]) -> list[Array]:
         """Whitened residuals of the trials, end to end, at each point; those that no plant has are not finite."""
@@ -124,7 +122,7 @@ class _View:
 
     def followed(self, points: Sequence[Array]) -> list[_Followed]:
         """Judge points by their residuals and the priors."""
-        J = np.concatenate([self.J[k][:, self.rest] for k in self.trials])
+        J = self.J[:, self.rest]
         found = []
         for point, z in zip(points, self.residuals(points), strict=True):
             if not np.isfinite(z).all():
@@ -138,11 +136,10 @@ class _View:
 
     def edges(self, theta: Array, contact: Contact) -> list[Array]:
         """Points with the contact's edges where they might be, each after a step of its own."""
-        J = -np.concatenate([self.J[k] for k in self.trials])
         prior = self.search.parameters
         # A phase that these trials show nothing of would leave the equations singular.
         bounded = replace(prior, sigma=np.where(np.isfinite(prior.sigma), prior.sigma, np.pi))
-        points = edge_minima(self.residuals, theta, J, bounded, contact, _EDGES)
+        points = edge_minima(self.residuals, theta, -self.J, bounded, contact, _EDGES)
         return [*points, *(self.stepped(point) for point in points)]
 
     def walked(self, theta: Array) -> list[Array]:
@@ -175,7 +172,7 @@ class _View:
         own = np.column_stack([(z - other) / d for other, d in zip(others, size, strict=True)])
         if not (np.isfinite(own).all() and np.isfinite(z).all()):
             return point
-        J = np.concatenate([self.J[k][:, self.rest] for k in self.trials])
+        J = self.J[:, self.rest]
         prior = self.search.parameters
         cross = J.T @ own
         excess = (self.search.precision + self.search.ridge) * (point - prior.value)

@@ -104,6 +104,11 @@ class Search:
 
     # what a point costs
 
+    @property
+    def rows(self) -> int:
+        """Numbers of noise in the trials that are fitted."""
+        return sum(self.metric[k].rows for k in self.experiment.fit)
+
     def predict(self, thetas: Sequence[Array], drives: Sequence[int]) -> list[Predictions]:
         """Predictions of drives at some points, all at once."""
         tasks = [(drive, self.hypothesis.at(self.free, theta)) for theta in thetas for drive in drives]
@@ -163,8 +168,6 @@ class Search:
 
         The first leap is made early: what is left out, or a wrong phase, has not yet pulled the others far then.
         """
-        if not leaps:
-            return self.descend(found, _ROUNDS)
         for number in range(leaps):
             found = self.descend(found, _EARLY if number == 0 else _ROUNDS)
             moved = leap(self, found, smooth=number == 0)
@@ -205,8 +208,7 @@ class Search:
 
     def left(self, found: Found) -> float:
         """-2 log likelihood beyond that of noise."""
-        rows = sum(self.metric[k].rows for k in self.experiment.fit)
-        return self.cost(found.theta, found.predicted)[0] - rows
+        return self.cost(found.theta, found.predicted)[0] - self.rows
 
     def slopes(self, theta: Array, held: Gradients, *, whole: bool = False) -> Gradients:
         """Slopes at theta; where some are held, only those of drives' and transducer's numbers are taken again.
@@ -216,10 +218,12 @@ class Search:
         """
         keep = {}
         for drive, slope in held.items():
-            same = [] if whole else self.slow
-            if drive in self.calibrations and not whole:
-                same = [i for i in range(len(self.free)) if i in self.slow or self._shown_beside(i, drive)]
-            keep[drive] = ([*same, *self.idle.get(drive, ())], slope.columns)
+            same = set(self.idle.get(drive, ()))
+            if not whole:
+                same |= set(self.slow)
+                if drive in self.calibrations:
+                    same |= {i for i in range(len(self.free)) if self._shown_beside(i, drive)}
+            keep[drive] = (sorted(same), slope.columns)
         here = self.hypothesis.at(self.free, theta)
         return slopes(
             self.experiment, here, self.free, self.differences, self.references, self.simulate, keep=keep
@@ -232,7 +236,8 @@ class Search:
         u = self.polar.flat(theta)
         return np.minimum(limits.lower - u, 0.0), np.maximum(limits.upper - u, 0.0)
 
-    def _clipped(self, theta: Array) -> Array:
+    def clipped(self, theta: Array) -> Array:
+        """The nearest numbers within bounds."""
         assert self.parameters.lower is not None and self.parameters.upper is not None
         return np.asarray(np.clip(theta, self.parameters.lower, self.parameters.upper), dtype=np.float64)
 
@@ -263,8 +268,7 @@ class Search:
         """One step in the chart of cosines and sines, as long as lowers the cost."""
         data, excess = self.cost(theta, predicted)
         # While much is unexplained, residuals count for less, so that no step is rash.
-        rows = sum(self.metric[k].rows for k in self.experiment.fit)
-        weight = 1.0 / max(1.0, data / rows)
+        weight = 1.0 / max(1.0, data / self.rows)
         T = self.polar.jacobian(np.eye(len(theta)), theta)[: len(theta)]
         A = T.T @ (weight * H + np.diag(self.precision + self.ridge)) @ T
         b = T.T @ (weight * g - self.precision * (theta - self.parameters.value))
@@ -275,7 +279,7 @@ class Search:
         for damping in _DAMPING:
             du = bounded_minimum(A + damping * np.eye(len(b)), b, low / scale, high / scale)
             promised = promised or float(2.0 * b @ du - du @ A @ du) / weight
-            candidates.append(self._clipped(self.polar.back(self.polar.flat(theta) + scale * du)))
+            candidates.append(self.clipped(self.polar.back(self.polar.flat(theta) + scale * du)))
         if promised < GAIN:
             return _Step(theta, predicted, promised, 0.0)
         now = weight * data + excess
