@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from kbs_process.campaign.config import Campaign, RecordingEntry
+from kbs_process.campaign.diagnosable import check_length, check_noise, check_signs
 from kbs_process.campaign.diagnosis_files import write_diagnosis
+from kbs_process.campaign.held import Alive
 from kbs_process.campaign.next_test import proposed
-from kbs_process.campaign.predicting import approached, commanded_from, schedule_of
+from kbs_process.campaign.predicting import AT_REST, approached, commanded_from, schedule_of
 from kbs_process.campaign.progress import Progress
 from kbs_process.campaign.reading import read_run
 from kbs_process.campaign.run import Outcome
@@ -18,6 +23,7 @@ from kbs_process.diagnosis import rounds
 from kbs_process.diagnosis.experiment import Experiment, Recorded, assemble
 from kbs_process.diagnosis.explain import explain
 from kbs_process.errors import ConfigError, RecordingError
+from kbs_process.plant.predict import Schedule
 from kbs_process.signals.records import Run
 from kbs_process.stages import decouple, motion
 from kbs_process.stages.motion import Motion
@@ -25,16 +31,24 @@ from kbs_process.stages.motion import Motion
 
 def experiment_of(campaign: Campaign, progress: Progress) -> Experiment:
     """Read all recordings of a campaign and lay repeats on one grid."""
+    check_noise(campaign.rig, campaign.name)
     decoupling = decouple.fit(campaign.rig)
     runs = []
     for entry in campaign.recordings:
         with progress.task(f"Reading {entry.name}"):
-            run = decouple.apply(read_run(campaign, entry), decoupling)
+            alive = Alive(campaign.rig, entry)
+            run = decouple.apply(read_run(campaign, entry, alive), decoupling)
             if run.loads is None:
                 raise RecordingError("there is neither wrench nor effort", where=str(entry.path))
-            runs.append((entry, run, motion.estimate(run, campaign.rig, motion_settings(campaign))))
+            run = replace(run, losses=(*run.losses, *alive.losses))
+            moved = motion.estimate(run, campaign.rig, motion_settings(campaign))
+            check_signs(run, moved, campaign, entry)
+            runs.append((entry, run, moved))
     with progress.task("Laying repeats on one grid"):
-        return assembled(campaign, runs)
+        experiment = assembled(campaign, runs)
+        for entry, trial in zip(campaign.recordings, experiment.trials, strict=True):
+            check_length(trial.name, trial.valid, experiment.dt, str(entry.path))
+    return experiment
 
 
 def assembled(campaign: Campaign, runs: Sequence[tuple[RecordingEntry, Run, Motion]]) -> Experiment:
@@ -50,8 +64,16 @@ def _recorded(campaign: Campaign, entry: RecordingEntry, run: Run, moved: Motion
     absent = tuple(name for name in campaign.effects if name not in campaign.acting(entry))
     if campaign.drive == "motion":
         return Recorded(entry.role, entry.trajectory, run, None, moved, absent=absent)
-    schedule = approached(schedule_of(run, campaign.rig))
-    return Recorded(entry.role, entry.trajectory, run, schedule, None, commanded_from(run), absent)
+    schedule = schedule_of(run, campaign.rig)
+    span = commanded_from(run), _commanded_until(schedule)
+    return Recorded(entry.role, entry.trajectory, run, approached(schedule), None, *span, absent)
+
+
+def _commanded_until(schedule: Schedule) -> float:
+    """Return the time, s, after which nobody recorded what moved the joints: of the last command, if they moved."""
+    steps, cycles = np.diff(schedule.position[-2:], axis=0), np.diff(schedule.t[-2:])
+    moves = len(cycles) > 0 and np.abs(steps).max() > AT_REST * cycles[0]
+    return float(schedule.t[-1]) if moves else float("inf")
 
 
 def diagnose(

@@ -10,6 +10,7 @@ from kbs_process.campaign import provenance
 from kbs_process.campaign.config import Campaign
 from kbs_process.campaign.corrected_diagnosis import left_out
 from kbs_process.campaign.next_test import next_test
+from kbs_process.campaign.notices import lost
 from kbs_process.diagnosis.experiment import Experiment
 from kbs_process.diagnosis.floor import Floor
 from kbs_process.diagnosis.known import Known
@@ -68,7 +69,7 @@ def results_of(
         checks=tuple(Check(name=c.name, ok=c.passed, detail=c.detail) for c in known.checks),
         files=tuple(files),
         next_test=None if proposal is None else next_test(proposal, COMMANDS),
-        warnings=tuple(_warnings(outcome)),
+        warnings=tuple(_warnings(campaign, floor, outcome)),
         notes=_NOTES,
     )
 
@@ -288,7 +289,8 @@ def _suspects(outcome: Outcome) -> Iterator[records.Suspect]:
         )
 
 
-def _warnings(outcome: Outcome) -> Iterator[Notice]:
+def _warnings(campaign: Campaign, floor: Floor, outcome: Outcome) -> Iterator[Notice]:
+    experiment = outcome.standing.known.experiment
     for find in outcome.finds:
         if not find.gate.held_out:
             yield Notice(
@@ -298,12 +300,35 @@ def _warnings(outcome: Outcome) -> Iterator[Notice]:
             )
         if left_out(find):
             yield Notice(severity="info", what=f"{find.identity.law}: {_EACH_TIME}", where=CORRECTED)
-    if not outcome.standing.known.experiment.held_out:
+    if not experiment.held_out:
         yield Notice(
             severity="warning",
             what="no recording is held out: nothing is shown on recordings that were not used",
             remedy='set role = "held-out" for a repeat or another trajectory',
         )
+    elif outcome.finds and not _other_motions(experiment):
+        yield Notice(
+            severity="warning",
+            what="recordings that were held out repeat motions that were fitted: a law that holds for these alone, or "
+            "known parameters that were not found, would pass too",
+            remedy="hold out a recording of another trajectory",
+        )
+    if floor.source == "declared":
+        yield Notice(
+            severity="warning",
+            what=f"{floor.statement}: other noise would be taken for a mismatch",
+            remedy="repeat a trajectory",
+        )
+    for entry in campaign.recordings:
+        for trial in experiment.trials:
+            if trial.name == entry.name:
+                yield from lost(entry, trial.losses)
+
+
+def _other_motions(experiment: Experiment) -> bool:
+    """Whether a trajectory was held out of which nothing was fitted."""
+    fitted = {experiment.trials[k].trajectory for k in experiment.fit}
+    return any(experiment.trials[k].trajectory not in fitted for k in experiment.held_out)
 
 
 def seen_channels(known: Known, k: int) -> list[int]:

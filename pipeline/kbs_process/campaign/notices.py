@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from kbs_process.campaign.analysis import Analysis, bands_of
-from kbs_process.campaign.config import Campaign
+from kbs_process.campaign.config import Campaign, RecordingEntry
 from kbs_process.campaign.findings import Findings
 from kbs_process.campaign.judging import band_of, coverage_below
 from kbs_process.report import results
@@ -69,18 +69,21 @@ def _conventions(conventions: Sequence[results.Convention]) -> Iterable[results.
 def _losses(analyses: Sequence[Analysis]) -> Iterable[results.Notice]:
     """One notice a recording: of each kind how much, and between which times."""
     for analysis in analyses:
-        kinds: dict[str, list[Loss]] = defaultdict(list)
-        for loss in analysis.run.losses:
-            kinds[loss.kind].append(loss)
-        if kinds:
-            yield results.Notice(
-                severity="warning",
-                what="; ".join(
-                    f"{kind}: {_extent(losses, analysis.entry.path.name)}" for kind, losses in kinds.items()
-                ),
-                where=analysis.entry.name,
-                remedy=f"kbs-process inspect recordings/{analysis.entry.path.name} lists each with its time",
-            )
+        yield from lost(analysis.entry, analysis.run.losses)
+
+
+def lost(entry: RecordingEntry, losses: Sequence[Loss]) -> Iterable[results.Notice]:
+    """Yield one notice of what a recording lacks, if that is anything."""
+    kinds: dict[str, list[Loss]] = defaultdict(list)
+    for loss in losses:
+        kinds[loss.kind].append(loss)
+    if kinds:
+        yield results.Notice(
+            severity="warning",
+            what="; ".join(f"{kind}: {_extent(own, entry.path.name)}" for kind, own in kinds.items()),
+            where=entry.name,
+            remedy=f"kbs-process inspect recordings/{entry.path.name} lists each with its time",
+        )
 
 
 def _unjudged(analyses: Sequence[Analysis]) -> Iterable[results.Notice]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 from kbs_process.campaign.config import Campaign, RecordingEntry
@@ -14,8 +14,14 @@ from kbs_process.stages.condense import CondenseSettings, condense
 OPTIONAL_STREAMS = frozenset({"field", "temperature", "pointing"})
 
 
-def read_run(campaign: Campaign, entry: RecordingEntry) -> Run:
-    """Read one recording chunk by chunk and reduce it; what it lost is listed in the run's losses."""
+Blocks = Iterator[tuple[str, Block]]
+
+
+def read_run(campaign: Campaign, entry: RecordingEntry, through: Callable[[Blocks], Blocks] = iter) -> Run:
+    """Read one recording chunk by chunk and reduce it; what it lost is listed in the run's losses.
+
+    What is read goes `through` whatever may leave some of it out.
+    """
     source = open_recording(entry.path)
     there = {summary.topic for summary in source.topics}
     topics = [
@@ -26,7 +32,7 @@ def read_run(campaign: Campaign, entry: RecordingEntry) -> Run:
     blocks = source.read([Stream(topic.key, topic.topic, topic.fields) for topic in topics])
     run = condense(
         entry.name,
-        _within(blocks, entry.start, entry.end),
+        through(_within(blocks, entry.start, entry.end)),
         {topic.key: topic.channels for topic in topics},
         CondenseSettings(working_rate_Hz=campaign.bands.working_rate),
         units={topic.key: topic.units for topic in topics},
@@ -44,16 +50,15 @@ def _later(loss: Loss, by: float) -> Loss:
     )
 
 
-def _within(
-    blocks: Iterator[tuple[str, Block]], start: float | None, end: float | None
-) -> Iterator[tuple[str, Block]]:
+def _within(blocks: Blocks, start: float | None, end: float | None) -> Blocks:
     """Leave out what the recorder wrote before `start` or after `end`, s from its first message."""
     first: int | None = None
     for key, block in blocks:
         if first is None and len(block):
             first = int(block.log[0])
         since = (block.log - (first or 0)) * 1e-9
-        inside = (since >= (start or 0.0)) & (since < (end or float("inf")))
+        # Another topic's first message may be older than that of the topic that is read first.
+        inside = (since >= (float("-inf") if start is None else start)) & (since < (end or float("inf")))
         yield (
             key,
             block if inside.all() else Block(block.stamp[inside], block.log[inside], block.values[inside]),

@@ -14,7 +14,7 @@ import numpy as np
 
 from kbs_process.plant.predict import Schedule
 from kbs_process.rig.model import Rig
-from kbs_process.signals.records import Array, Mask, Run, Signal
+from kbs_process.signals.records import Array, Loss, Mask, Run, Signal
 from kbs_process.stages.clocks import offset_sigma
 from kbs_process.stages.condense import DOUBT
 from kbs_process.stages.motion import Motion
@@ -24,6 +24,8 @@ from kbs_process.stages.resample import PASS, Reducer, design
 Role = Literal["calibration", "fit", "held-out"]
 _SAME_FIELD = 0.5  # microsteps, and _SAME_COMMAND rad: two drives that differ by less move the article alike
 _SAME_COMMAND = 1e-6
+_SAME_RATE = 0.02  # relative, of two recorders of one kind
+_IN_COMMON = 0.4  # of a recording: that much has to be there in all its repeats
 _ALIKE = 1e-9  # s, shift below which nothing is interpolated
 
 
@@ -36,7 +38,8 @@ class Recorded:
     run: Run
     schedule: Schedule | None
     motion: Motion | None
-    known_from: float = 0.0  # s, from which on it is known what drove the joints
+    known_from: float = 0.0  # s, from which on it is known what drove the joints, and
+    known_until: float = np.inf  # s, until which
     absent: tuple[str, ...] = ()  # effects of the model that did not act in this recording
 
 
@@ -68,6 +71,7 @@ class Trial:
     wrench_clock_sigma: float  # s, of the wrench's clock against what drove the rig
     angle_clock_sigma: float
     temperature: Array | None  # (n,) degC
+    losses: tuple[Loss, ...] = ()  # what the recording lacks
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -175,24 +179,44 @@ def _loads(run: Run) -> Signal:
 
 
 def _trajectories(recorded: Sequence[Recorded]) -> list[list[tuple[Recorded, float]]]:
-    """Recordings that repeat each other with the time (s) by which each is later than the first, the longest."""
+    """Recordings that repeat each other with the time (s) by which each is later than the first, the longest.
+
+    Those of which gaps leave too little at the same time stay apart, whatever they repeat, and so do those that were
+    sampled at other rates: their noise is another one.
+    """
     groups: list[list[tuple[Recorded, float]]] = []
+    common: list[Mask] = []  # of each group, where all its members are valid
     for one in sorted(recorded, key=lambda r: -_length(r.run)):
         moved = motion_of(one.run)
         assert moved is not None
-        for group in groups:
+        for number, group in enumerate(groups):
             reference = group[0][0]
-            if reference.trajectory != one.trajectory:
+            if reference.trajectory != one.trajectory or not _sampled_alike(reference.run, one.run):
                 continue
             target = motion_of(reference.run)
             assert target is not None
             shift = lag(target, moved)
-            if shift is not None:
+            if shift is None:
+                continue
+            both = common[number] & _valid_at(_loads(reference.run).t + shift, _loads(one.run))
+            if np.count_nonzero(both) >= _IN_COMMON * np.count_nonzero(_loads(reference.run).valid):
                 group.append((one, shift))
+                common[number] = both
                 break
         else:
             groups.append([(one, 0.0)])
+            common.append(_loads(one.run).valid)
     return groups
+
+
+def _sampled_alike(one: Run, other: Run) -> bool:
+    """Whether loads and angles were sampled at the same rates, but for what clocks differ by."""
+    first, second = ((run.rates.get("angle", _rate(run)), _rate(run)) for run in (one, other))
+    return bool(np.allclose(first, second, rtol=_SAME_RATE))
+
+
+def _valid_at(t: Array, signal: Signal) -> Mask:
+    return np.asarray(np.interp(t, signal.t, signal.valid, left=0.0, right=0.0) > 0.99, dtype=np.bool_)
 
 
 def _length(run: Run) -> int:
@@ -262,7 +286,7 @@ def _trial(
     one: Recorded, shift: float, trajectory: int, drive: int, n: int, channels: Sequence[str]
 ) -> Trial:
     run, loads = one.run, _loads(one.run)
-    columns, valid = [], loads.valid & (loads.t >= one.known_from)
+    columns, valid = [], loads.valid & (loads.t >= one.known_from) & (loads.t <= one.known_until)
     for channel in channels:
         source = loads
         if channel not in source.channels:
@@ -290,6 +314,7 @@ def _trial(
         wrench_clock_sigma=late,
         angle_clock_sigma=0.0 if angle is None else float(np.hypot(late, offset_sigma(angle))),
         temperature=temperature,
+        losses=run.losses,
     )
 
 

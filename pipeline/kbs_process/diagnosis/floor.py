@@ -7,7 +7,8 @@ comes again each time. With M repeats and L neighbouring frequencies in a cell,
 
 pooled over trajectories, after each channel was divided by a smooth level that falls with frequency (white, 1/f and
 1/f^2, fitted to the same differences), so that a cell is flat. What repeats share although it is noise, the rounding
-of encoders along one and the same path, is added from the predicted motion.
+of encoders along one and the same path, is added from the predicted motion. Repeats that differ by less than a plant
+is exact to, as simulated ones may, have that for a floor.
 """
 
 from __future__ import annotations
@@ -31,6 +32,9 @@ _CELLS_A_DECADE = 8.0
 _KNEE = 0.05  # Hz: where 1/f noise equals white noise, taken of a transducer whose runs are not repeated
 _PHASES = 8  # of an encoder code, over which rounding is averaged
 _LEAST_ROUNDING = 0.05  # of the density of white rounding: less is not believed
+_EXACT = (
+    1e-2  # of the density of stated noise: to a tenth of its amplitude an integrator's step is good enough
+)
 _MOVING = 2.0  # codes a second below which an encoder says no more than which code it shows
 _SETTLE = 0.5  # s around
 _UNKNOWN_ANGLE = 1e-6  # rad rms a sample, of an encoder whose code is not stated
@@ -72,13 +76,15 @@ class Floor:
         )
 
     def shared(self, trial: Trial, path: Array, windows: Array, f: Array) -> Array:
-        """Density (b, c) of what repeats share although no model explains it: encoders' rounding beyond `repeats`."""
+        """Density (b, c) of what repeats share although no model explains it, beyond `repeats`.
+
+        That is the encoders' rounding, and by how much the plant's solution may be wrong.
+        """
         differing = np.asarray(np.einsum("bcc->bc", self.repeats(trial, f)).real, dtype=np.float64)
         wrench = self.experiment.loads
-        found = np.zeros_like(differing)
-        alike = rounding(self.experiment, trial, path, windows, f)
-        found[:, wrench:] = np.maximum(alike - differing[:, wrench:], 0.0)
-        return found
+        alike = np.tile(_EXACT * _white(self.experiment, trial), (len(f), 1))
+        alike[:, wrench:] = rounding(self.experiment, trial, path, windows, f)
+        return np.maximum(alike - differing, 0.0)
 
     def whitener(
         self,

@@ -49,11 +49,7 @@ def gate(before: Known, after: Known, coefficients: Sequence[int]) -> Gate:
     folds = _held_out(before, after) if held_out else _left_out(before, after)
     index = np.asarray(coefficients)
     a, C = after.value[index], after.covariance[np.ix_(index, index)]
-    size = 1.0 / np.sqrt(np.diag(C))
-    wald = float(size * a @ np.linalg.lstsq(C * np.outer(size, size), size * a, rcond=1e-10)[0])
-    far = log_tail(wald, len(index))
-    # As far out as a normal number of that two-sided chance; beyond its range the chi-square's own root.
-    sigmas = float(norm.isf(np.exp(far) / 2.0)) if far > -600.0 else float(np.sqrt(wald))
+    sigmas = _sigmas(a, C)
     white = whiteness(before), whiteness(after)
     reasons = []
     # Written so that what is no number, of a plant that diverged, is refused.
@@ -65,10 +61,23 @@ def gate(before: Known, after: Known, coefficients: Sequence[int]) -> Gate:
     elif held_out and not gained >= GATE_SHARE * _promised(before, after):
         reasons.append("recordings that were not used gain much less than those that it was fitted to")
     if not sigmas >= GATE_SIGMA:
-        reasons.append(f"its coefficients are {sigmas:.1f} sigma off zero")
+        size = f"{sigmas:.1f} sigma off zero" if np.isfinite(sigmas) else "not determined"
+        reasons.append(f"its coefficients are {size}")
     if not white[1] <= white[0] + _spread(after):
         reasons.append("the residual is less white with it")
     return Gate(not reasons, folds, held_out, sigmas, white, tuple(reasons))
+
+
+def _sigmas(a: Array, C: Array) -> float:
+    """By how many sigmas of one normal number amplitudes with covariance C are off zero; nan where C is none."""
+    variance = np.diag(C)
+    if not (np.isfinite(C).all() and (variance > 0.0).all()):
+        return float("nan")
+    size = 1.0 / np.sqrt(variance)
+    wald = float(size * a @ np.linalg.lstsq(C * np.outer(size, size), size * a, rcond=1e-10)[0])
+    far = log_tail(wald, len(a))
+    # As far out as a normal number of that two-sided chance; beyond its range the chi-square's own root.
+    return float(norm.isf(np.exp(far) / 2.0)) if far > -600.0 else float(np.sqrt(wald))
 
 
 def _promised(before: Known, after: Known) -> float:

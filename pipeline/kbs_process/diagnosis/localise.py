@@ -61,7 +61,10 @@ class _Window:
 def cells_and_ports(
     standing: Standing, floor: Floor, paths: Mapping[int, Path]
 ) -> tuple[Cells, tuple[PortModel, ...], dict[str, PortName]]:
-    """Residuals and ports over all trajectories that may be fitted; `paths` (by drive) of each one's reference."""
+    """Residuals and ports over all trajectories that may be fitted; `paths` (by drive) of each one's reference.
+
+    Recordings that have no window without a gap have no cells, and nothing is said of ports.
+    """
     known, predicted = standing.known, standing.predicted
     experiment = known.experiment
     names = _ports(experiment.rig, experiment.channels, experiment.loads)
@@ -93,6 +96,8 @@ def cells_and_ports(
             place.append(np.full(len(window.f), trajectory))
             for label, vectors in _all_shown(names, known, window, paths[reference], late).items():
                 shown[label].append(vectors)
+    if not z:
+        return _no_cells(len(experiment.channels), len(precision)), (), {name.label: name for name in names}
     weights = np.concatenate(z)
     cells = Cells(
         z=weights,
@@ -109,6 +114,12 @@ def cells_and_ports(
         for label, parts in shown.items()
     )
     return cells, models, {name.label: name for name in names}
+
+
+def _no_cells(c: int, p: int) -> Cells:
+    none, index = np.zeros(0), np.zeros(0, dtype=np.intp)
+    z = np.zeros((0, c), dtype=np.complex128)
+    return Cells(z, np.zeros((0, c, p), dtype=np.complex128), index, np.zeros(p), none, none, none, index)
 
 
 def _ports(rig: Rig, channels: Sequence[str], wrench: int) -> tuple[PortName, ...]:
@@ -207,18 +218,21 @@ def _windows(
     path, seen = shown
     experiment = known.experiment
     trial = experiment.trials[[t.trajectory for t in experiment.trials].index(trajectory)]
-    n, dt = len(valid), experiment.dt
+    dt = experiment.dt
     short = round(WINDOW_S / dt)
+    stretches = _stretches(valid)
+    spans = [
+        (start, short, experiment.highest_Hz)
+        for first, length in stretches
+        for start in range(first, first + length - short + 1, short)
+    ]
     # What is slower than a window shows is looked at over all of the trial, where the plant is stiff.
-    stretch = _longest(valid)
-    spans = [(start, short, experiment.highest_Hz) for start in range(0, n - short + 1, short)]
-    if stretch[1] > 2 * short:
-        spans.insert(0, (*stretch, 2.0 / (short * dt) * (1.0 - 1e-9)))
+    longest = max(stretches, key=lambda stretch: stretch[1], default=(0, 0))
+    if longest[1] > 2 * short:
+        spans.insert(0, (*longest, 2.0 / (short * dt) * (1.0 - 1e-9)))
     found = []
     for start, width, highest in spans:
         part = slice(start, start + width)
-        if not valid[part].all():
-            continue
         # The first frequency is the second that a window holds: below, its own trend is what it sees.
         bins = np.arange(2, int(highest * width * dt) + 1, 2)
         f = bins / (width * dt)
@@ -234,14 +248,10 @@ def _windows(
     return found
 
 
-def _longest(valid: Mask) -> tuple[int, int]:
-    """Start and length of the longest stretch without a gap."""
+def _stretches(valid: Mask) -> list[tuple[int, int]]:
+    """Start and length of every stretch without a gap."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], valid.astype(np.int8), [0]])))
-    starts, ends = edges[::2], edges[1::2]
-    if not len(starts):
-        return 0, 0
-    best = int(np.argmax(ends - starts))
-    return int(starts[best]), int(ends[best] - starts[best])
+    return [(int(start), int(end - start)) for start, end in edges.reshape(-1, 2)]
 
 
 def _level(x: Array, valid: Mask) -> Array:

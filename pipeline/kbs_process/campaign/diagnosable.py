@@ -1,0 +1,73 @@
+"""What recordings have to be for a diagnosis to mean anything: long enough, of the right signs, with a stated noise."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from kbs_process.campaign.config import Campaign, RecordingEntry
+from kbs_process.errors import ConfigError, RecordingError
+from kbs_process.plant.rigid import loads
+from kbs_process.rig.model import Rig
+from kbs_process.signals.records import Mask, Run
+from kbs_process.stages.conventions import SignCheck, check_encoder_sense, check_gravity_sign
+from kbs_process.stages.motion import Motion
+from kbs_process.stages.repeats import commanded
+
+LEAST_S = 5.0  # of a recording that can be compared: less has fewer frequencies than a floor has channels
+_REVERSED = 0.5  # a slope of what is read against what is computed is one of the other sign below minus this
+
+
+def check_noise(rig: Rig, where: str) -> None:
+    """Raise ConfigError for channels without noise and resolution: nothing says what may be expected of them."""
+    index = rig.loads.index(rig.channels)
+    wrench = rig.loads.index(rig.transducer.channels)
+    efforts = [float(joint.effort.resolution) for joint in rig.joints if joint.effort is not None]
+    resolution = np.concatenate([rig.transducer.resolution.value[wrench], efforts])
+    stated = rig.loads.noise[index] + resolution
+    silent = [name for name, size in zip(rig.channels, stated, strict=True) if size == 0.0]
+    if silent:
+        raise ConfigError(
+            f"neither noise nor resolution of {', '.join(silent)} is stated: no mismatch could be told from noise",
+            where=where,
+            remedy="give the rms noise of a sample in the parameter files ([transducer] noise, [joint.NAME] effort)",
+        )
+
+
+def check_signs(run: Run, moved: Motion, campaign: Campaign, entry: RecordingEntry) -> None:
+    """Raise RecordingError where gravity or an encoder shows with the other sign, or an encoder does not move.
+
+    `run` is decoupled. No physics that was left out turns a channel round; a wrong sign would be taken for some.
+    """
+    for check in _signs(run, moved, campaign.rig):
+        slope = float(check.found)
+        if slope < -_REVERSED or (check.check.startswith("slope of encoder") and slope < _REVERSED):
+            raise RecordingError(
+                f"{check.check} is {check.found}, expected {check.expected}",
+                where=str(entry.path),
+                remedy="check signs, order and wiring of the channels, and the fields under [topics] in campaign.toml",
+            )
+
+
+def check_length(name: str, valid: Mask, dt: float, where: str) -> None:
+    """Raise RecordingError for a recording of which next to nothing can be compared."""
+    seconds = dt * np.count_nonzero(valid)
+    if seconds < LEAST_S:
+        raise RecordingError(
+            f"{seconds:.1f} s of {dt * len(valid):.1f} s can be compared with a prediction, and {LEAST_S:g} s are the "
+            "least: wrench, angles or commands are missing in the others",
+            where=where,
+            remedy=f"kbs-process inspect shows what {name} lacks; record longer, or leave it out of campaign.toml",
+        )
+
+
+def _signs(run: Run, moved: Motion, rig: Rig) -> Iterator[SignCheck]:
+    measured, rest = run.loads, np.zeros_like(moved.q)
+    assert measured is not None
+    index = rig.loads.index(measured.channels)
+    static = measured.derive(loads(rig, moved.q, rest, rest)[:, index], "nominal static loads")
+    yield from check_gravity_sign(measured, static, rig.loads.noise[index])
+    command = commanded(run)
+    if command is not None and run.angle is not None:
+        yield from check_encoder_sense(run.angle, command)

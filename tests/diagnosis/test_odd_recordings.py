@@ -1,0 +1,225 @@
+"""Recordings that are damaged, too short or of another kind: said clearly, or left out, and never taken for physics."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import bench
+import numpy as np
+import pytest
+from test_experiment import N, made, recording
+
+from kbs_process.campaign.config import Campaign, RecordingEntry
+from kbs_process.campaign.diagnosable import LEAST_S, check_length, check_noise, check_signs
+from kbs_process.campaign.held import Alive
+from kbs_process.campaign.load import load_campaign
+from kbs_process.campaign.reading import read_run
+from kbs_process.diagnosis import floor
+from kbs_process.diagnosis.experiment import Experiment, Recorded
+from kbs_process.diagnosis.gate import gate
+from kbs_process.diagnosis.localise import cells_and_ports
+from kbs_process.diagnosis.scene import Scene
+from kbs_process.errors import ConfigError, RecordingError
+from kbs_process.ingest.encoding import OutStream
+from kbs_process.ingest.writer import write_mcap
+from kbs_process.plant.rigid import loads
+from kbs_process.rig.model import Rig
+from kbs_process.signals.records import Array, Block, Loss, Mask, Run
+from kbs_process.stages.motion import Motion
+from kbs_process.stages.output_error import Scalar
+
+RIG = bench.rig()
+ENTRY = RecordingEntry("a", Path("recordings/a.mcap"), "SWING", "fit", 1, None, None, None)
+
+
+def campaign() -> Campaign:
+    return load_campaign(bench.CAMPAIGN, recordings=False)
+
+
+def wrench() -> Array:
+    """Twenty seconds at 100 Hz, as the transducer's data sheet has it."""
+    rng = np.random.default_rng(3)
+    sizes = np.array([0.02] * 3 + [0.002] * 3)
+    return np.asarray(sizes * np.round(2.0 * rng.standard_normal((2000, 6))), dtype=np.float64)
+
+
+def passed(values: Array, rig: Rig = RIG, chunk: int = 37) -> tuple[Array, tuple[Loss, ...]]:
+    """What is left of readings that come in small pieces, and what is told of them."""
+    alive, stamp = Alive(rig, ENTRY), np.arange(len(values)) * 10_000_000
+    pieces = (slice(start, start + chunk) for start in range(0, len(values), chunk))
+    blocks = alive(("wrench", Block(stamp[own], stamp[own], values[own])) for own in pieces)
+    return np.concatenate([block.stamp for _, block in blocks]), alive.losses
+
+
+def test_the_first_message_of_every_topic_is_read_whichever_was_logged_first(tmp_path: Path) -> None:
+    rng = np.random.default_rng(1)
+    t = np.arange(0, 3_000_000_000, 10_000_000)
+    cycles = t[::10]
+    swing = np.zeros((len(t), 2))
+    path = tmp_path / "a.mcap"
+    # The command's first message is logged before that of the wrench, the encoder's after it.
+    write_mcap(
+        path,
+        [
+            OutStream("/transducer/wrench", "wrench", t, t + 500, rng.standard_normal((len(t), 6))),
+            OutStream("/encoder", "joints", t, t + 900, swing, ("az", "el")),
+            OutStream("/command", "joints", cycles, cycles + 100, np.tile(swing[::10], 2), ("az", "el")),
+        ],
+    )
+    run = read_run(campaign(), replace(ENTRY, path=path))
+    assert run.command is not None
+    assert run.command.t[0] == pytest.approx(0.0, abs=1e-6)
+    assert len(run.command.t) == len(cycles)
+
+
+def test_a_channel_that_is_dead_is_told() -> None:
+    values = wrench()
+    values[:, 2] = 12.5
+    with pytest.raises(RecordingError, match=r"a\.mcap: Fz reads 12\.5 without any noise for 100 %"):
+        passed(values)
+
+
+@pytest.mark.parametrize("chunk", [37, 300, 2000])
+def test_stretches_in_which_a_channel_is_saturated_are_left_out_and_told(chunk: int) -> None:
+    values = wrench()
+    stamps, losses = passed(values, chunk=chunk)
+    assert len(stamps) == 2000 and losses == ()
+    values[600:740, 4] = 0.1
+    values[1000:1040, 1] = 0.1  # shorter than anything that is told from chance
+    stamps, (loss,) = passed(values, chunk=chunk)
+    assert set(np.arange(2000)) - set(stamps // 10_000_000) == set(range(600, 740))
+    assert (loss.kind, loss.where, loss.count) == ("held", "Ty", 140)
+    assert (loss.start_s, loss.end_s) == pytest.approx((6.0, 7.39))
+
+
+def test_a_channel_whose_resolution_hides_its_noise_may_stand_still() -> None:
+    coarse = replace(RIG.transducer, resolution=replace(RIG.transducer.resolution, value=np.full(6, 1.0)))
+    values = wrench()
+    values[:, 2] = 12.0
+    assert len(passed(values, replace(RIG, transducer=coarse))[0]) == 2000
+
+
+def test_sensors_without_stated_noise_are_told() -> None:
+    silent = replace(
+        RIG.transducer,
+        noise=replace(RIG.transducer.noise, value=np.zeros(6)),
+        resolution=replace(RIG.transducer.resolution, value=np.zeros(6)),
+    )
+    check_noise(RIG, "EL089")
+    with pytest.raises(ConfigError, match="noise nor resolution of Fx, Fy, Fz, Tx, Ty, Tz"):
+        check_noise(replace(RIG, transducer=silent), "EL089")
+
+
+def swinging() -> tuple[Run, Motion]:
+    """A recording of the weight of an antenna that is raised and lowered by 11 degrees."""
+    run = recording("a", 0.0).run
+    assert run.wrench is not None and run.angle is not None
+    q = np.stack([np.zeros(N), 1.2 + 0.2 * np.sin(0.3 * (run.wrench.t - 0.013))], axis=1)
+    rest = np.zeros_like(q)
+    wrench = run.wrench.derive(loads(RIG, q, rest, rest)[:, :6], "weight")
+    moved = Motion(0.0, bench.DT, q, rest, rest, rest, rest[None], np.zeros(2), np.zeros(2), wrench.valid)
+    return replace(run, wrench=wrench, angle=run.angle.derive(q, "angle")), moved
+
+
+def test_what_is_read_with_the_other_sign_is_told() -> None:
+    run, moved = swinging()
+    assert run.wrench is not None and run.angle is not None
+    check_signs(run, moved, campaign(), ENTRY)
+    reaction = run.with_wrench(run.wrench.derive(-run.wrench.values, "reaction"))
+    with pytest.raises(
+        RecordingError, match=r"slope of measured T. against computed gravity is -1\.000, expected \+1"
+    ):
+        check_signs(reaction, moved, campaign(), ENTRY)
+    dead = replace(run, angle=run.angle.derive(np.ones((N, 2)), "dead"))
+    with pytest.raises(
+        RecordingError, match=r"slope of encoder el against its command is \+0\.0000, expected \+1"
+    ):
+        check_signs(dead, moved, campaign(), ENTRY)
+
+
+def test_next_to_nothing_that_is_left_of_a_recording_is_told() -> None:
+    valid = np.arange(1000) < LEAST_S / bench.DT
+    check_length("a", valid, bench.DT, "a.mcap")
+    with pytest.raises(RecordingError, match=r"4\.9 s of 50\.0 s can be compared"):
+        check_length("a", np.roll(valid, 2) & valid, bench.DT, "a.mcap")
+
+
+def slower(one: Recorded) -> Recorded:
+    return replace(one, run=replace(one.run, rates={"wrench": 50.0, "angle": 100.0}))
+
+
+def gappy(one: Recorded, gone: Mask) -> Recorded:
+    assert one.run.wrench is not None
+    wrench = one.run.wrench
+    return replace(
+        one, run=one.run.with_wrench(wrench.derive(wrench.values, "gap", valid=wrench.valid & ~gone))
+    )
+
+
+def test_recordings_at_other_rates_are_no_repeats_for_their_noise_is_another() -> None:
+    experiment = made(recording("a", 0.0), recording("b", 0.1), slower(recording("c", 0.2)))
+    assert sorted(map(len, experiment.repeats)) == [1, 2]
+
+
+def test_recordings_without_anything_in_common_are_no_repeats() -> None:
+    first = np.arange(N) < N // 2
+    experiment = made(gappy(recording("a", 0.0), first), gappy(recording("b", 0.0), ~first))
+    assert sorted(map(len, experiment.repeats)) == [1, 1]
+
+
+def test_nothing_is_compared_after_the_last_command_of_a_motion() -> None:
+    experiment = made(replace(recording("a", 0.0), known_until=30.0))
+    t = bench.DT * np.arange(N)
+    assert not experiment.trials[0].valid[t > 30.0].any()
+    assert experiment.trials[0].valid[(t > 1.0) & (t < 29.0)].all()
+
+
+def alike() -> Experiment:
+    """Two repeats without noise, as nothing but a simulation makes them."""
+    experiment = bench.experiment(RIG, ("fit", "fit"), 1)
+    first, second = experiment.trials
+    return replace(experiment, trials=(first, replace(second, measured=first.measured)))
+
+
+def test_repeats_that_are_the_same_have_what_the_plant_is_exact_to_for_a_floor() -> None:
+    experiment = alike()
+    predicted = bench.standing(experiment, (Scalar("joint.el.drive.Ka"),)).predicted[0].values
+    found = floor.estimate(
+        experiment, {k: trial.measured - predicted for k, trial in enumerate(experiment.trials)}
+    )
+    whiten = found.whitener(experiment.trials[0], predicted)
+    # A tenth of the stated noise is one sigma of this floor.
+    noise = np.concatenate([[0.02] * 3, [0.002] * 3, [0.0] * 2]) * np.sqrt(20.0 / 100.0)
+    x = 0.1 * noise * np.random.default_rng(5).standard_normal(predicted.shape)
+    z = whiten(x).reshape(whiten.shape)[:, :, :6]
+    assert np.mean(z**2) == pytest.approx(1.0, abs=0.3)
+
+
+def test_a_recording_without_a_window_has_no_cells_and_one_with_a_gap_has_those_around_it() -> None:
+    free = (Scalar("joint.el.drive.Ka"),)
+    short = bench.standing(bench.experiment(RIG, ("fit", "fit"), 2), free)
+    cells, ports, _ = cells_and_ports(short, floor.declared(short.known.experiment), _paths(short))
+    assert len(cells.z) == 0 and cells.J.shape == (0, 8, 1) and ports == ()
+    experiment = bench.experiment(RIG, ("fit",), 2, seconds=36.0)
+    valid = experiment.trials[0].valid.copy()
+    valid[350] = False
+    broken = replace(experiment, trials=(replace(experiment.trials[0], valid=valid),))
+    long = bench.standing(broken, free)
+    cells, ports, _ = cells_and_ports(long, floor.declared(broken), _paths(long))
+    assert np.unique(cells.t) == pytest.approx([0.5 + 8.0, 17.55 + 8.0])
+    assert len(ports) > 10
+
+
+def _paths(standing):  # type: ignore[no-untyped-def]
+    return Scene.of(standing.known.experiment, standing.hypothesis, standing.predicted).paths
+
+
+def test_a_law_whose_coefficients_have_no_covariance_does_not_pass() -> None:
+    known = bench.standing(
+        bench.experiment(RIG, ("fit", "held-out"), 4), (Scalar("joint.el.drive.Ka"),)
+    ).known
+    for covariance in (np.zeros((1, 1)), np.full((1, 1), np.nan)):
+        verdict = gate(known, replace(known, covariance=covariance), [0])
+        assert not verdict.passed
+        assert "its coefficients are not determined" in verdict.reasons
