@@ -8,6 +8,7 @@ from diagnosis import bench
 from kbs_process.diagnosis.floor import declared
 from kbs_process.diagnosis.hypothesis import Hypothesis
 from kbs_process.diagnosis.leaps import leap
+from kbs_process.diagnosis.metric import metrics
 from kbs_process.diagnosis.parameters import known_parameters, prior
 from kbs_process.diagnosis.search import Search
 from kbs_process.rig.model import substitute
@@ -23,8 +24,10 @@ def test_a_leap_finds_the_edges_of_a_contact() -> None:
     free = tuple(s for s in known_parameters(made.rig, made.effects) if s.name.startswith("joint."))
     begin = Hypothesis(wrong, made.effects)
     parameters = prior(wrong, made.rig, made.effects, free)
-    search = Search(made, declared(made), bench.serial(made), begin, free, parameters)
-    found = search.begin()
+    simulate = bench.serial(made)
+    metric = metrics(made, declared(made), dict(enumerate(simulate([(0, begin)]))), begin)
+    search = Search(made, metric, simulate, begin, free, parameters)
+    found = search.begin(begin.values(free))
     theta = leap(search, found, smooth=False)
     assert theta is not None
     moved = dict(zip((scalar.name for scalar in free), theta, strict=True))

@@ -132,7 +132,7 @@ def test_a_curve_is_refitted_inside_the_plant() -> None:
     along = Bench.of(before.known, Scene.of(made, before.hypothesis, before.predicted))
     curve = suspect(along.scene, law)
     found = score(along.background, Sums.over(along.background, along.columns([curve])))
-    after = with_extra(before, extra(curve, found, before), bench.serial(made), steps=2)
+    after = with_extra(before, extra(curve, found, before), bench.serial(made))
     begin = len(before.known.value)
     assert [scalar.name for scalar in after.known.free[begin:]] == [
         f"joint.el.drive.ground_angle_law_{k}" for k in range(COEFFICIENTS)

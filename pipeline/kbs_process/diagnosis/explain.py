@@ -21,11 +21,13 @@ from kbs_process.diagnosis.detection import Detection, detect
 from kbs_process.diagnosis.experiment import Experiment
 from kbs_process.diagnosis.floor import Floor, estimate
 from kbs_process.diagnosis.hypothesis import Hypothesis, Prediction, Simulate
-from kbs_process.diagnosis.known import MOVED, Known, refit
+from kbs_process.diagnosis.known import MOVED, Known, leapt, refit
+from kbs_process.diagnosis.search import LITTLE, SLIGHT
 from kbs_process.diagnosis.thresholds import DETECTED, EXPLAINED
 from kbs_process.signals.records import Array
 
 NEAR = 0.99 * MOVED  # sigmas
+LEAPS = 3  # after a descent
 Task = Callable[[str], AbstractContextManager[object]]  # shows that something of some length is done
 
 
@@ -51,22 +53,24 @@ def explain(experiment: Experiment, simulate: Simulate, task: Task) -> Explained
         before = detect(experiment, floor, begun, experiment.fit)
     with task("Phases of cogging, friction and tooth contact"):
         (start,) = phasing.begin(experiment, nominal, floor, simulate)
-    slopes = None
+    slopes, leaps = None, 1
     if not _driven_alike(experiment):
         with task("The floor, with a model that is about right"):
             rough = refit(experiment, start, floor, simulate, reach=NEAR, leaps=1)
-            start, slopes = rough.hypothesis, rough.slopes
+            start, slopes, leaps = rough.hypothesis, rough.slopes, 0
             floor = _floor(experiment, _predicted(experiment, start, simulate))
     with task("Refitting the known parameters, near what is known of them"):
-        near = refit(experiment, start, floor, simulate, reach=NEAR, slopes=slopes)
-        known, predicted, after = _judged(near, floor, simulate)
-    if _may_be_off(known) and after.log_p < np.log(DETECTED):
+        near = refit(experiment, start, floor, simulate, reach=NEAR, slopes=slopes, leaps=leaps)
+        stood = _moved_on(_stood(near, floor, simulate), floor, simulate)
+    if _may_be_off(stood.known) and stood.after.log_p < np.log(DETECTED):
         with task("Refitting the known parameters, free"):
+            known = stood.known
             free = refit(experiment, known.hypothesis, floor, simulate, slopes=known.slopes, leaps=1)
-            judged = _judged(free, floor, simulate)
-        settled = judged[2].log_p > np.log(DETECTED)
-        if settled or judged[2].ratio - 1.0 < EXPLAINED * (after.ratio - 1.0):
-            known, predicted, after = judged
+            freed = _stood(free, floor, simulate)
+        settled = freed.after.log_p > np.log(DETECTED)
+        if settled or freed.after.ratio - 1.0 < EXPLAINED * (stood.after.ratio - 1.0):
+            stood = freed
+    known, predicted, after = stood.known, stood.predicted, stood.after
     known = replace(known, chi2_before=_squares(known, begun))
     held_out = None
     if experiment.held_out:
@@ -89,10 +93,34 @@ def _may_be_off(known: Known) -> bool:
     return bool((np.abs(np.nan_to_num(known.moved)) > 0.99 * NEAR).any())
 
 
-def _judged(known: Known, floor: Floor, simulate: Simulate) -> tuple[Known, dict[int, Prediction], Detection]:
+@dataclass(frozen=True, slots=True, eq=False)
+class _Stood:
+    """A refit, and what it leaves of the recordings that it was made of."""
+
+    known: Known
+    predicted: dict[int, Prediction]
+    after: Detection
+
+
+def _stood(known: Known, floor: Floor, simulate: Simulate) -> _Stood:
     experiment = known.experiment
     predicted = _predicted(experiment, known.hypothesis, simulate)
-    return known, predicted, detect(experiment, floor, predicted, experiment.fit, known=known)
+    return _Stood(known, predicted, detect(experiment, floor, predicted, experiment.fit, known=known))
+
+
+def _moved_on(stood: _Stood, floor: Floor, simulate: Simulate) -> _Stood:
+    """Leap from minimum to minimum, while something is left and a leap takes some of it."""
+    for number in range(LEAPS):
+        if stood.after.log_p > np.log(DETECTED):
+            break
+        known = stood.known
+        moved = leapt(known, simulate, smooth=number == 0)
+        gained = known.cost - moved.cost
+        if gained > 0.0:
+            stood = _stood(moved, floor, simulate)
+        if gained < max(LITTLE, SLIGHT * known.excess):
+            break
+    return stood
 
 
 def _driven_alike(experiment: Experiment) -> bool:

@@ -15,9 +15,9 @@ import numpy as np
 from kbs_process.diagnosis.experiment import Experiment
 from kbs_process.diagnosis.floor import Floor
 from kbs_process.diagnosis.hypothesis import Hypothesis, Simulate
-from kbs_process.diagnosis.metric import Metric
+from kbs_process.diagnosis.metric import Metric, metrics
 from kbs_process.diagnosis.parameters import Slopes, known_parameters, prior, within
-from kbs_process.diagnosis.search import LEAPS, Found, Search
+from kbs_process.diagnosis.search import Found, Laws, Search
 from kbs_process.estimation.fit import Check, Parameters
 from kbs_process.signals.records import Array
 from kbs_process.stages.output_error import Scalar
@@ -80,6 +80,12 @@ class Known:
         return float(self.chi2[list(self.experiment.fit)].sum()) + self.prior_chi2
 
     @property
+    def excess(self) -> float:
+        """-2 log likelihood beyond that of noise, of the trials that were fitted."""
+        fit = list(self.experiment.fit)
+        return float((self.chi2 - self.rows)[fit].sum())
+
+    @property
     def prior_chi2(self) -> float:
         return float(np.nansum(self.moved**2))
 
@@ -97,7 +103,7 @@ def refit(
     *,
     reach: float = np.inf,
     slopes: dict[int, Slopes] | None = None,
-    leaps: int = LEAPS,
+    leaps: int,
 ) -> Known:
     """Refit all known parameters from `hypothesis` on, whose phases are near their right values (see `phasing`).
 
@@ -106,41 +112,64 @@ def refit(
     """
     free = known_parameters(experiment.rig, experiment.effects)
     parameters = within(prior(hypothesis.rig, experiment.rig, hypothesis.effects, free), reach)
-    search = Search(experiment, floor, simulate, hypothesis, free, parameters)
-    begun = search.begin(slopes)
-    before = np.array([float(z @ z) for z in _residuals(search, begun)])
-    return _known(search, search.run(begun, leaps=leaps), before)
+    drives = sorted({trial.drive for trial in experiment.trials})
+    predicted = dict(zip(drives, simulate([(drive, hypothesis) for drive in drives]), strict=True))
+    metric = metrics(experiment, floor, predicted, hypothesis)
+    search = Search(experiment, metric, simulate, hypothesis, free, parameters)
+    begun = search.begin(hypothesis.values(free), slopes, predicted)
+    before = np.array([float(z @ z) for z in residuals(search, begun)])
+    return known_of(search, search.run(begun, leaps=leaps), before)
 
 
-def settled(known: Known, floor: Floor, simulate: Simulate, *, leaps: int) -> Known:
+def settled(known: Known, simulate: Simulate, *, leaps: int, laws: Laws | None = None) -> Known:
     """Refit all numbers of `known`, those of suspects too, along slopes of the plant that has these in it."""
-    search = Search(known.experiment, floor, simulate, known.hypothesis, known.free, known.parameters)
-    begun = search.begin(known.slopes, known.metric)
+    search, begun = _again(known, simulate, laws)
     renewed = replace(begun, gradients=search.slopes(begun.theta, begun.gradients))
-    return _known(search, search.run(renewed, leaps=leaps), known.chi2_before)
+    return known_of(search, search.run(renewed, leaps=leaps), known.chi2_before)
 
 
-def _residuals(search: Search, found: Found) -> tuple[Array, ...]:
+def leapt(known: Known, simulate: Simulate, *, smooth: bool) -> Known:
+    """Look for better phases (those that enter smoothly too if `smooth`) and edges all round, and refit from there."""
+    search, begun = _again(known, simulate)
+    moved = search.leapt(begun, smooth=smooth)
+    return known if moved is None else known_of(search, search.descend(moved), known.chi2_before)
+
+
+def _again(known: Known, simulate: Simulate, laws: Laws | None = None) -> tuple[Search, Found]:
+    """A search that begins where another ended."""
+    search = Search(
+        known.experiment, known.metric, simulate, known.hypothesis, known.free, known.parameters, laws
+    )
+    return search, search.begin(known.value, known.slopes)
+
+
+def residuals(search: Search, found: Found) -> tuple[Array, ...]:
+    """Whitened residuals of all trials."""
     return tuple(search.residual(k, found.predicted) for k in range(len(search.experiment.trials)))
 
 
-def _known(search: Search, found: Found, before: Array) -> Known:
+def known_of(search: Search, found: Found, before: Array) -> Known:
+    """What a search has found, with its covariance and checks."""
     predicted = search.predict([found.theta], search.everything)[0]
     found = replace(found, predicted=predicted)
     H, _ = search.normal(found.gradients, predicted)
     precision = search.precision + search.ridge
-    size = 1.0 / np.sqrt(np.diag(H) + precision)
-    inverse = np.linalg.inv((H + np.diag(precision)) * np.outer(size, size))
+    size = 1.0 / np.sqrt(np.maximum(np.diag(H) + precision, 1e-300))
+    scaled = (H + np.diag(precision)) * np.outer(size, size)
+    # Combinations of a law's numbers that nothing shows have no inverse.
+    inverse: Array = np.full_like(H, np.inf)
+    if np.isfinite(scaled).all():
+        inverse = np.asarray(np.linalg.pinv(scaled, rcond=1e-13, hermitian=True), dtype=np.float64)
     known = Known(
         experiment=search.experiment,
-        hypothesis=search.hypothesis.at(search.free, found.theta),
+        hypothesis=search.at(found.theta),
         free=search.free,
         parameters=search.parameters,
         value=found.theta,
         covariance=np.asarray(inverse * np.outer(size, size), dtype=np.float64),
         metric=search.metric,
         slopes=found.gradients,
-        residual=_residuals(search, found),
+        residual=residuals(search, found),
         chi2_before=before,
         checks=(),
     )

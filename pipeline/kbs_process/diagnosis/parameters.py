@@ -74,7 +74,6 @@ def slopes(
 
     `keep` holds, for some drives, which numbers' columns (indices) need not be taken again, and all columns.
     """
-    base_values = hypothesis.values(free)
     tasks: list[Task] = [(drive, hypothesis) for drive in drives]
     places: list[tuple[int, int]] = []
     kept = keep or {}
@@ -84,7 +83,7 @@ def slopes(
             if scalar.quantity == COUPLING or index in known:
                 continue
             places.append((drive, index))
-            moved = hypothesis.at([scalar], base_values[[index]] + differences[index])
+            moved = hypothesis.at([scalar], hypothesis.values([scalar]) + differences[index])
             tasks.append((drive, moved))
     found = simulate(tasks)
     bases = dict(zip(drives, found, strict=False))

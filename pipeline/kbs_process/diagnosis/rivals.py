@@ -10,7 +10,6 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.special import logsumexp
 from scipy.stats import norm
 
-from kbs_process.diagnosis.joint import cost_of
 from kbs_process.diagnosis.known import Known
 from kbs_process.diagnosis.thresholds import RIVALS
 from kbs_process.signals.records import Array
@@ -49,7 +48,7 @@ def rivalry(accepted: Known, rival: Known) -> Rivalry:
 
 def probabilities(models: Sequence[Known], rows: int) -> Array:
     """(models,) that each is right, one of them being so: Schwarz's criterion of the refitted non-linear models."""
-    logs = np.array([-0.5 * cost_of(model) - 0.5 * len(model.free) * np.log(rows) for model in models])
+    logs = np.array([-0.5 * model.cost - 0.5 * len(model.free) * np.log(rows) for model in models])
     found: Array = np.exp(logs - logsumexp(logs))
     return found
 

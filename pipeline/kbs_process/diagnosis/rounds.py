@@ -15,7 +15,7 @@ from kbs_process.diagnosis.floor import Floor
 from kbs_process.diagnosis.gate import Fold, Gate, gate, whiteness
 from kbs_process.diagnosis.gls import Background, Sums, score
 from kbs_process.diagnosis.hypothesis import Prediction, Simulate
-from kbs_process.diagnosis.joint import Standing, with_extra
+from kbs_process.diagnosis.joint import Standing, standing_of, with_extra
 from kbs_process.diagnosis.known import MOVED, Known, settled
 from kbs_process.diagnosis.localise import cells_and_ports
 from kbs_process.diagnosis.outcome import (
@@ -40,8 +40,11 @@ from kbs_process.diagnosis.thresholds import (
     LAW_VARIANCE,
     LEAD,
     LEADERS,
+    ORDERED,
     ROUNDS,
     SECOND,
+    SETTLED,
+    SETTLED_SHARE,
 )
 from kbs_process.diagnosis.tryout import extra_of, identity
 
@@ -147,47 +150,33 @@ def _round(standing: Standing, floor: Floor, simulate: Simulate) -> _Round:
     bench = Bench.of(known, scene)
     screening = screen(bench, suspects_of(standing, scene))
     place = _place(standing, floor, scene)
-    refused: list[Refused] = []
-    tried: list[Tried] = []
-    first, others = _leaders(screening)
-    for found in (*first, *others):
-        if tried and found in others:
+    first, others = _leaders(screening, known.excess)
+    tried, refused = _tried(first, standing, bench, scene, floor, simulate)
+    for found in others:
+        if tried:
             break
-        new, verdict = _try(found, standing, bench, scene, simulate)
-        if verdict.passed:
-            tried.append(Tried(found, new, verdict))
-        else:
-            refused.append(Refused(identity(found.suspect), found.score.rho_eff, verdict.reasons))
+        tried, more = _tried([found], standing, bench, scene, floor, simulate)
+        refused += more
     if not tried:
         return _Round(None, standing, screening, tuple(refused), place)
     chances = probabilities([one.standing.known for one in tried], bench.background.rows)
     best = int(np.argmax(chances))
-    tried[best] = replace(tried[best], standing=_settled(tried[best].standing, floor, simulate))
+    tried[best] = replace(tried[best], standing=_settled(tried[best].standing, floor, simulate, leaps=1))
     find = find_of(tried, best, chances, standing, screening, place)
     return _Round(find, tried[best].standing, screening, tuple(refused), place)
 
 
-def _settled(standing: Standing, floor: Floor, simulate: Simulate) -> Standing:
-    """All numbers refitted with the accepted law in the plant; phases are looked for again where much is left.
-
-    Laws that are columns of the prediction leave the plant as it is.
-    """
+def _settled(standing: Standing, floor: Floor, simulate: Simulate, *, leaps: int) -> Standing:
+    """All numbers refitted with the law in the plant, or on its prediction, if that takes away more."""
     known = standing.known
-    if standing.laws or known.experiment.drives[0].schedule is None:
+    at_floor = _detected(standing, floor, known.experiment.fit).log_p > np.log(DETECTED)
+    if known.experiment.drives[0].schedule is None or (leaps and at_floor):
         return standing
-    for leaps in (0, 1):
-        tried = settled(known, floor, simulate, leaps=leaps)
-        if tried.cost >= known.cost:
-            break
-        known = tried
-        predicted = simulate([(drive, known.hypothesis) for drive in range(len(known.experiment.drives))])
-        standing = Standing(known, dict(enumerate(predicted)), {})
-        if _detected(standing, floor, known.experiment.fit).log_p > np.log(DETECTED):
-            break
-    return standing
+    moved = settled(known, simulate, leaps=leaps, laws=standing.laws)
+    return standing_of(moved, standing.laws, simulate) if moved.cost < known.cost else standing
 
 
-def _leaders(screening: Screening) -> tuple[list[Found], list[Found]]:
+def _leaders(screening: Screening, excess: float) -> tuple[list[Found], list[Found]]:
     """The most probable suspects, as many as the linear plant may have in the wrong order, and a few that come next.
 
     A law that repeats predicts what was not recorded; one whose size and phase are each recording's own does not. It
@@ -200,23 +189,47 @@ def _leaders(screening: Screening) -> tuple[list[Found], list[Found]]:
     if not able:
         return [], []
     bound = (1.0 - LEAD) * able[0].score.gain
+    # Where even the best does little of what there is to do, the plant is far from linear, and so is their order.
+    if able[0].score.gain < ORDERED * excess:
+        bound = 0.0
     first = [found for found in able if found.score.gain >= bound or found is able[0]][:LEADERS]
     return first, [found for found in able if found not in first][:SECOND]
 
 
-def _try(
-    found: Found, standing: Standing, bench: Bench, scene: Scene, simulate: Simulate
-) -> tuple[Standing, Gate]:
-    if found.suspect.each_trial:
-        return _trial_by_trial(found.suspect, standing, bench)
-    new = with_extra(standing, extra_of(found, standing, bench, scene), simulate)
-    begin = len(standing.known.value)
-    verdict = gate(standing.known, new.known, range(begin, begin + len(found.suspect.amplitudes)))
-    share = explained_share(standing.known, new.known)
+def _tried(
+    leaders: Sequence[Found], standing: Standing, bench: Bench, scene: Scene, floor: Floor, simulate: Simulate
+) -> tuple[list[Tried], list[Refused]]:
+    """Leaders refitted and gated: those that passed, and those that did not."""
+    judged: list[tuple[Found, Standing, Gate]] = []
+    joined = []
+    for found in leaders:
+        if found.suspect.each_trial:
+            judged.append((found, *_trial_by_trial(found.suspect, standing, bench)))
+        else:
+            joined.append((found, with_extra(standing, extra_of(found, standing, bench, scene), simulate)))
+    joined.sort(key=lambda one: float(np.nan_to_num(one[1].known.cost, nan=np.inf)))
+    most = standing.known.cost - joined[0][1].known.cost if joined else 0.0
+    for place, (found, new) in enumerate(joined):
+        enough = standing.known.cost - new.known.cost >= SETTLED_SHARE * most
+        end = _settled(new, floor, simulate, leaps=0) if place < SETTLED and enough else new
+        judged.append((found, end, _gated(found, standing, end)))
+    passed = [Tried(*one) for one in judged if one[2].passed]
+    refused = [
+        Refused(identity(found.suspect), found.score.rho_eff, verdict.reasons)
+        for found, _, verdict in judged
+        if not verdict.passed
+    ]
+    return passed, refused
+
+
+def _gated(found: Found, before: Standing, after: Standing) -> Gate:
+    begin = len(before.known.value)
+    verdict = gate(before.known, after.known, range(begin, begin + len(found.suspect.amplitudes)))
+    share = explained_share(before.known, after.known)
     if isinstance(found.suspect, CurveSuspect) and share is not None and not share >= LAW_VARIANCE:
         reason = f"a curve that explains {100.0 * share:.0f} % of the held-out excess is no law"
         verdict = replace(verdict, passed=False, reasons=(*verdict.reasons, reason))
-    return new, verdict
+    return verdict
 
 
 def _trial_by_trial(suspect: Suspect, standing: Standing, bench: Bench) -> tuple[Standing, Gate]:

@@ -8,16 +8,15 @@ minima by the dozen: see `leaps`.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from kbs_process.diagnosis.experiment import Experiment
-from kbs_process.diagnosis.floor import Floor
 from kbs_process.diagnosis.hypothesis import Hypothesis, Prediction, Simulate
 from kbs_process.diagnosis.leaps import leap
-from kbs_process.diagnosis.metric import Metric, metrics
+from kbs_process.diagnosis.metric import Metric
 from kbs_process.diagnosis.parameters import Slopes, known_parameters, slopes
 from kbs_process.estimation.bounded import bounded_minimum
 from kbs_process.estimation.fit import Parameters
@@ -29,23 +28,29 @@ from kbs_process.stages.screening import phases
 
 _DIFFERENCE = 0.05  # prior sigmas (phases: rad), first difference
 _SEEN = 5.0  # what a difference should move the whitened residual by
+_SPAN = 1.0  # of a step
 _LEAST_DIFFERENCE, _MOST_DIFFERENCE = 2e-3, 0.4  # prior sigmas
 _DAMPING = (0.0, 1e-2, 1e-1, 1.0, 10.0, 1e3)  # tried two at a time
 _AGREED = 0.9  # gained over promised, above which slopes are only updated
+_HALF = 0.5  # of the same, below which slopes of drives alone do not do
 _STALLED = 0.1  # of the same, below which a descent goes nowhere
-_OLD, _GEARS, _ALL = range(3)  # which slopes are taken where the search stands
+# Which slopes are taken where the search stands: none, those of suspects alone, of drives too, all.
+_OLD, OWN, _GEARS, ALL = range(4)
 GAIN = 2.0  # of -2 log likelihood: a step that promises less ends a descent
-_LITTLE = 25.0  # of the same: what exact slopes gained, below which more rounds are not worth their time
-_SLIGHT = 1e-3  # of all that is left: likewise
-LEAPS = 3  # in one search
+LITTLE = 25.0  # of the same: what exact slopes gained, below which more rounds are not worth their time
+SLIGHT = 1e-2  # of all that is left: likewise
 _EARLY = 2  # steps before the first leap: masses and centres of gravity are right then
+_RIDGE = 1e-10  # of unit columns: numbers that nothing shows would leave the equations singular
 _ROUNDS = 10  # steps of a descent at most
 _NEGLIGIBLE = (
-    0.1  # of the whitened residual's length: what a number moves by one sigma and is not looked at again
+    1.0  # of the whitened residual's length: what a number moves by one sigma and is not looked at again
 )
 
 Predictions = dict[int, Prediction]  # by drive
 Gradients = dict[int, Slopes]  # by drive
+Laws = Mapping[
+    str, Mapping[int, Array]
+]  # columns (n, c) by the number that multiplies them, and reference drive
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,33 +78,42 @@ class Search:
     def __init__(
         self,
         experiment: Experiment,
-        floor: Floor,
+        metric: tuple[Metric, ...],
         simulate: Simulate,
         hypothesis: Hypothesis,
         free: tuple[Scalar, ...],
         parameters: Parameters,
+        laws: Laws | None = None,
+        scale: Array | None = None,
     ) -> None:
-        self.experiment, self.simulate, self.hypothesis, self.free = experiment, simulate, hypothesis, free
-        self.parameters = parameters
+        """`laws` are columns of the prediction by the names of free numbers that no rig has; `scale` says in what
+        steps free numbers go that have no prior (p,), if not their own size.
+        """
+        self.experiment, self.metric, self.simulate = experiment, metric, simulate
+        self.hypothesis, self.free, self.parameters = hypothesis, free, parameters
+        self.laws = laws or {}
+        self.inside = [i for i, scalar in enumerate(free) if scalar.name not in self.laws]
         self.pairs = phases(hypothesis.rig, hypothesis.effects, free)
         self.polar = Polar.of(self.pairs, self.parameters)
         self.precision = self.parameters.sigma**-2.0
         phase = np.isin(np.arange(len(free)), [pair.phase for pair in self.pairs])
-        size = np.where(phase, 1.0, np.maximum(np.abs(hypothesis.values(free)), 1e-12))
+        size = np.ones(len(free))
+        size[self.inside] = np.abs(hypothesis.values([free[i] for i in self.inside]))
+        size = np.where(phase, 1.0, np.maximum(size if scale is None else scale, 1e-12))
         self.spread = np.where(np.isfinite(self.parameters.sigma), self.parameters.sigma, size)
         # A phase that nothing shows would leave the equations singular.
         self.ridge = np.where(phase, np.pi**-2.0, 0.0)
         self.differences = _DIFFERENCE * self.spread
-        gears = gearbox(experiment.rig, experiment.effects)
-        slow = set(known_parameters(experiment.rig, experiment.effects)) - set(gears)
-        self.slow = [i for i, scalar in enumerate(free) if scalar in slow]
+        gears = set(gearbox(experiment.rig, experiment.effects))
+        others = set(known_parameters(experiment.rig, experiment.effects)) - gears
+        self.slow = [i for i, scalar in enumerate(free) if scalar in others]
+        self.geared = [i for i, scalar in enumerate(free) if scalar in gears]
         trials = experiment.trials
         self.everything = sorted({trial.drive for trial in trials})
         self.drives = sorted({trials[k].drive for k in experiment.fit})
         self.references = sorted({experiment.reference(trials[k].trajectory) for k in experiment.fit})
         self.calibrations = {trial.drive for trial in trials if trial.role == "calibration"}
-        self.floor = floor
-        self.metric: tuple[Metric, ...] = ()
+        self.alike = {trial.drive: experiment.reference(trial.trajectory) for trial in trials}
         self.idle: dict[int, list[int]] = {}
 
     # what a point costs
@@ -111,9 +125,19 @@ class Search:
 
     def predict(self, thetas: Sequence[Array], drives: Sequence[int]) -> list[Predictions]:
         """Predictions of drives at some points, all at once."""
-        tasks = [(drive, self.hypothesis.at(self.free, theta)) for theta in thetas for drive in drives]
-        found = iter(self.simulate(tasks))
-        return [{drive: next(found) for drive in drives} for _ in thetas]
+        here = [self.at(theta) for theta in thetas]
+        found = iter(self.simulate([(drive, hypothesis) for hypothesis in here for drive in drives]))
+        return [{drive: self._shown(theta, drive, next(found)) for drive in drives} for theta in thetas]
+
+    def at(self, theta: Array) -> Hypothesis:
+        """The plant with all numbers that are its own."""
+        return self.hypothesis.at([self.free[i] for i in self.inside], theta[self.inside])
+
+    def _shown(self, theta: Array, drive: int, plant: Prediction) -> Prediction:
+        """A prediction with the laws that are columns of it."""
+        if not self.laws:
+            return plant
+        return replace(plant, values=plant.values + added(self.laws, self.free, theta, self.alike[drive]))
 
     def residual(self, k: int, predicted: Predictions) -> Array:
         """Whitened residual of a trial."""
@@ -146,12 +170,20 @@ class Search:
 
     # how it is lowered
 
-    def begin(self, gradients: Gradients | None = None, metric: tuple[Metric, ...] = ()) -> Found:
-        """The hypothesis as it is, with slopes; nuisances and encoders' rounding make its metric, if none is given."""
-        theta = self.hypothesis.values(self.free)
-        predicted = self.predict([theta], self.everything)[0]
-        self.metric = metric or metrics(self.experiment, self.floor, predicted, self.hypothesis)
-        found = Found(theta, predicted, gradients or self.slopes(theta, {}))
+    def begin(
+        self, theta: Array, gradients: Gradients | None = None, predicted: Predictions | None = None
+    ) -> Found:
+        """Numbers to begin with, and their slopes; some `gradients` may be of the first numbers alone."""
+        predicted = predicted or self.predict([theta], self.everything)[0]
+        if gradients is None:
+            gradients = self.slopes(theta, {}, ALL)
+        elif missing := len(self.free) - len(gradients[self.references[0]].columns):
+            wider = {
+                drive: Slopes(predicted[drive], np.pad(slope.columns, ((0, missing), (0, 0), (0, 0))))
+                for drive, slope in gradients.items()
+            }
+            gradients = self.slopes(theta, wider, OWN)
+        found = Found(theta, predicted, gradients)
         self.idle = {drive: self._idle(drive, found.gradients) for drive in self.references}
         return found
 
@@ -163,46 +195,52 @@ class Search:
                 length += np.sum(self.jacobian(k, gradients) ** 2, axis=0)
         return [int(i) for i in np.flatnonzero(np.sqrt(length) * self.spread < _NEGLIGIBLE)]
 
-    def run(self, found: Found, *, leaps: int = LEAPS) -> Found:
+    def run(self, found: Found, *, leaps: int) -> Found:
         """Descend; leap to better phases and edges while there are any, at most `leaps` times, and descend again.
 
         The first leap is made early: what is left out, or a wrong phase, has not yet pulled the others far then.
         """
         for number in range(leaps):
             found = self.descend(found, _EARLY if number == 0 else _ROUNDS)
-            moved = leap(self, found, smooth=number == 0)
+            moved = self.leapt(found, smooth=number == 0)
             if moved is not None:
-                found = self.moved(moved, found)
+                found = moved
             elif number > 0:
                 break
-        return self.descend(found, _ROUNDS)
+        return self.descend(found)
 
-    def descend(self, found: Found, rounds: int) -> Found:
-        """Steps until slopes that are all taken anew promise little, or do not keep what they promise."""
-        fresh = _GEARS
+    def descend(self, found: Found, rounds: int = _ROUNDS, *, most: int = ALL) -> Found:
+        """Steps until slopes that are all taken anew promise little, or do not keep what they promise.
+
+        All of them, or only those of suspects' own numbers, as `most` says.
+        """
+        fresh = min(_GEARS, most)
         for number in range(found.rounds + 1, found.rounds + rounds + 1):
             H, g = self.normal(found.gradients, found.predicted)
-            self.settle(H)
             step = self.step(found.theta, found.predicted, H, g)
-            little = max(_LITTLE, _SLIGHT * self.left(found))
+            self.settle(H, np.abs(step.theta - found.theta))
+            little = max(LITTLE, SLIGHT * self.left(found))
             arrived = step.gained < max(little, _STALLED * step.promised)
             kept = step.gained > _AGREED * step.promised
             if step.gained > 0.0:
                 gradients = self.updated(found.gradients, found.theta, step)
                 found = replace(found, theta=step.theta, predicted=step.predicted, gradients=gradients)
             found = replace(
-                found, rounds=number, converged=arrived and (fresh == _ALL or step.promised < little)
+                found, rounds=number, converged=arrived and (fresh == most or step.promised < little)
             )
             if found.converged:
                 break
-            fresh = _OLD if kept else _ALL if arrived and fresh == _GEARS else _GEARS
+            stale = step.gained < max(little, _HALF * step.promised)
+            fresh = _OLD if kept else min(most, ALL if stale and fresh == _GEARS else _GEARS)
             if fresh != _OLD:
-                slopes = self.slopes(found.theta, found.gradients, whole=fresh == _ALL)
-                found = replace(found, gradients=slopes)
+                found = replace(found, gradients=self.slopes(found.theta, found.gradients, fresh))
         return found
 
-    def moved(self, theta: Array, found: Found) -> Found:
-        """Where a leap has led, with slopes."""
+    def leapt(self, found: Found, *, smooth: bool) -> Found | None:
+        """Where a leap leads, with slopes; None where it leads nowhere."""
+        theta = leap(self, found, smooth=smooth)
+        if theta is None:
+            return None
         predicted = self.predict([theta], self.everything)[0]
         return Found(theta, predicted, self.slopes(theta, found.gradients), rounds=found.rounds)
 
@@ -210,23 +248,38 @@ class Search:
         """-2 log likelihood beyond that of noise."""
         return self.cost(found.theta, found.predicted)[0] - self.rows
 
-    def slopes(self, theta: Array, held: Gradients, *, whole: bool = False) -> Gradients:
-        """Slopes at theta; where some are held, only those of drives' and transducer's numbers are taken again.
+    def slopes(self, theta: Array, held: Gradients, fresh: int = _GEARS) -> Gradients:
+        """Slopes at theta; where some are held, only those that `fresh` names are taken again.
 
-        With `whole` all are: those of bodies change with the resonances. Else calibrations, slow and at rest for the
-        most part, keep what others show better.
+        Those of bodies change with the resonances, slowly. Calibrations, slow and at rest for the most part, keep what
+        others show better. A law's column is its slope.
         """
         keep = {}
-        for drive, slope in held.items():
-            same = set(self.idle.get(drive, ()))
-            if not whole:
-                same |= set(self.slow)
-                if drive in self.calibrations:
-                    same |= {i for i in range(len(self.free)) if self._shown_beside(i, drive)}
-            keep[drive] = (sorted(same), slope.columns)
-        here = self.hypothesis.at(self.free, theta)
+        for drive in self.references:
+            same = set(self.idle.get(drive, ())) if drive in held else set()
+            if drive in held and fresh < ALL:
+                same |= set(self.slow) | (set(self.geared) if fresh == OWN else set())
+                if drive in self.calibrations and fresh > OWN:
+                    same |= {i for i in self.geared if self._shown_beside(i, drive)}
+            columns = held[drive].columns.copy() if drive in held else None
+            if self.laws:
+                if columns is None:
+                    grid = self.experiment.drives[drive].n, len(self.experiment.channels)
+                    columns = np.zeros((len(self.free), *grid))
+                for i, scalar in enumerate(self.free):
+                    if scalar.name in self.laws:
+                        columns[i] = self.laws[scalar.name][drive]
+                        same.add(i)
+            if columns is not None:
+                keep[drive] = (sorted(same), columns)
         return slopes(
-            self.experiment, here, self.free, self.differences, self.references, self.simulate, keep=keep
+            self.experiment,
+            self.at(theta),
+            self.free,
+            self.differences,
+            self.references,
+            self.simulate,
+            keep=keep,
         )
 
     def _room(self, theta: Array) -> tuple[Array, Array]:
@@ -257,11 +310,16 @@ class Search:
             new[drive] = Slopes(step.predicted[drive], slope.columns + along[:, None, None] * missed)
         return new
 
-    def settle(self, H: Array) -> None:
-        """Differences that move the whitened residual by about `_SEEN`."""
+    def settle(self, H: Array, moved: Array) -> None:
+        """Differences that move the whitened residual by about `_SEEN`, and span some of what a step has moved.
+
+        Where friction sticks or slips by a hair, slopes over less than the next step say nothing of it.
+        """
         length = np.sqrt(np.maximum(np.diag(H), 1e-300))
         self.differences = np.clip(
-            _SEEN / length, _LEAST_DIFFERENCE * self.spread, _MOST_DIFFERENCE * self.spread
+            np.maximum(_SEEN / length, _SPAN * moved),
+            _LEAST_DIFFERENCE * self.spread,
+            _MOST_DIFFERENCE * self.spread,
         )
 
     def step(self, theta: Array, predicted: Predictions, H: Array, g: Array) -> _Step:
@@ -272,12 +330,12 @@ class Search:
         T = self.polar.jacobian(np.eye(len(theta)), theta)[: len(theta)]
         A = T.T @ (weight * H + np.diag(self.precision + self.ridge)) @ T
         b = T.T @ (weight * g - self.precision * (theta - self.parameters.value))
-        scale = 1.0 / np.sqrt(np.diag(A))
+        scale = 1.0 / np.sqrt(np.maximum(np.diag(A), 1e-300))
         A, b = A * np.outer(scale, scale), scale * b
         low, high = self._room(theta)
         candidates, promised = [], 0.0
         for damping in _DAMPING:
-            du = bounded_minimum(A + damping * np.eye(len(b)), b, low / scale, high / scale)
+            du = bounded_minimum(A + (_RIDGE + damping) * np.eye(len(b)), b, low / scale, high / scale)
             promised = promised or float(2.0 * b @ du - du @ A @ du) / weight
             candidates.append(self.clipped(self.polar.back(self.polar.flat(theta) + scale * du)))
         if promised < GAIN:
@@ -290,3 +348,15 @@ class Search:
             if costs[best] < now:
                 return _Step(pair[best], {**predicted, **tried[best]}, promised, (now - costs[best]) / weight)
         return _Step(theta, predicted, promised, 0.0)
+
+
+def added(laws: Laws, free: Sequence[Scalar], values: Array, reference: int) -> Array | float:
+    """(n, c) what laws that are columns of the prediction add to it along a reference drive's path."""
+    return sum(
+        (
+            value * laws[scalar.name][reference]
+            for scalar, value in zip(free, values, strict=True)
+            if scalar.name in laws
+        ),
+        0.0,
+    )

@@ -31,6 +31,7 @@ ABSORBED: Final = 0.99  # kappa: what a known parameter takes up of a signature 
 DEPENDENT: Final = 1e-8  # relative eigenvalue below which amplitudes of a candidate are one and the same
 # P-value below which what is left counts as there (diagnosis.md: 1 % of null campaigns at most claim a find).
 DETECTED: Final = 1e-3
+ORDERED: Final = 0.5  # share of the residual's excess that the best has to do for the screen's order to count
 LEADERS: Final = 4  # candidates that are simulated; beyond it the linear plant's order has not been wrong
 # A leader's gain is wrong by about twice, at worst three times, the transfer's error of itself; candidates within that
 # are not yet ordered.
@@ -41,7 +42,9 @@ LEAD: Final = 3.0 * TRANSFER_ERROR
 EXPLAINED: Final = 0.05
 
 # -- gate ----------------------------------------------------------------------------------------------------------
-GATE_SIGMA: Final = 3.0  # by which a coefficient's interval has to exclude zero
+# By which a coefficient's interval has to exclude zero once all numbers are refitted beside it: near LEAST_RHO, as what
+# a longer search gains for the known numbers must not be taken for the law's.
+GATE_SIGMA: Final = 8.0
 GATE_GAIN: Final = (
     12.0  # of -2 log likelihood on each held-out trial's share: p = 5e-4 for one degree of freedom
 )
@@ -51,6 +54,10 @@ GATE_SHARE: Final = 0.2
 GATE_WORSE: Final = 0.02
 # Leaders that are tried beyond those that the linear plant cannot order, where none of these passes.
 SECOND: Final = 2
+# Of the leaders, those that gain most are refitted with all slopes taken anew before they are compared, if they gain at
+# least this share of what the best gains.
+SETTLED: Final = 2
+SETTLED_SHARE: Final = 0.5
 ROUNDS: Final = 5  # finds in one campaign at most
 
 # -- two laws ------------------------------------------------------------------------------------------------------

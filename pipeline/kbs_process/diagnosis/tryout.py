@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from kbs_process.diagnosis import measured
 from kbs_process.diagnosis.curves import CurveSuspect
 from kbs_process.diagnosis.families import family, port_word
 from kbs_process.diagnosis.hypothesis import Hypothesis
@@ -52,6 +53,8 @@ def port_label(suspect: Suspect) -> str:
 
 def in_plant(suspect: Suspect) -> bool:
     """Whether it is simulated in the non-linear plant."""
+    if isinstance(suspect, CurveSuspect):
+        return True
     return (
         isinstance(suspect, Catalogued)
         and isinstance(suspect.candidate.effect, Effect)
@@ -73,6 +76,8 @@ def extra_of(found: Found, standing: Standing, bench: Bench, scene: Scene) -> Ex
         free = np.full(len(amplitude), np.inf)
         linear = tuple(Scalar(name) for name in names)
         return Extra(standing.hypothesis, (), amplitude, 0.0 * amplitude, free, np.zeros(0), linear, columns)
+    if isinstance(suspect, CurveSuspect):
+        return measured.extra(suspect, found.score, standing)
     assert isinstance(suspect, Catalogued) and isinstance(suspect.candidate.effect, Effect)
     candidate, effect = suspect.candidate, suspect.candidate.effect
     shape = dict(candidate.shape)
