@@ -144,6 +144,9 @@ def test_a_law_of_the_readings_needs_no_plant_and_its_rival_is_told_apart(made: 
         for family in (("channel_lag", "Ty"), ("channel_gain", "Fz"))
     )
     assert right.known.value[-1] == pytest.approx(size, abs=4.0 * right.known.sigma[-1])
+    # What the search learns of the known numbers' slopes on its way is not the law's doing.
+    alone = by_family["channel_lag", "Ty"].score.covariance[0, 0]
+    assert right.known.sigma[-1] == pytest.approx(np.sqrt(alone), rel=0.05)
     assert np.allclose(right.shown(0) - right.predicted[0].values, right.known.value[-1] * moves)
     apart = rivalry(right.known, wrong.known)
     assert apart.rho_delta > 20.0 and not apart.indistinguishable and apart.p_wrong < 1e-20

@@ -134,11 +134,23 @@ def test_wrong_wiring_is_an_error_at_import(equation, parameters, message) -> No
         Sensing("trial", SensingPort.CHANNEL, equation, parameters, "test")
 
 
-def test_a_power_about_any_reading_is_in_the_span_of_the_curved_characteristic() -> None:
-    effect, given = law("channel_nonlinearity"), {"bend_power": 3.0, "bend_middle": 10.0, "bend_range": 8.0}
-    zero = dict.fromkeys(("bend_slope", "bend_even", "bend_odd"), 0.0)
+def test_a_power_of_any_reading_is_in_the_span_of_the_curved_characteristic() -> None:
+    middle, half = 0.5 * (READING.max() + READING.min()), 0.5 * (READING.max() - READING.min())
+    effect, given = law("channel_nonlinearity"), {"bend_middle": float(middle), "bend_range": float(half)}
+    zero = {f"bend_{n}": 0.0 for n in range(1, 7)}
     columns = [changed(effect, **given | zero | {name: 1.0}) for name in zero]
     basis = np.stack([*columns, np.ones_like(T)], axis=1)
-    cubic = READING**3
-    left = cubic - basis @ np.linalg.lstsq(basis, cubic)[0]
-    assert np.abs(left).max() < 1e-9 * np.abs(cubic).max()
+    for power in (2, 3, 5):
+        curved = READING**power
+        left = curved - basis @ np.linalg.lstsq(basis, curved)[0]
+        assert np.abs(left).max() < 1e-9 * np.abs(curved).max()
+
+
+def test_a_curved_characteristic_is_held_beyond_its_range() -> None:
+    effect = law("channel_nonlinearity")
+    numbers = {f"bend_{n}": 0.1 * n for n in range(1, 7)} | {
+        "bend_middle": float(READING.mean()),
+        "bend_range": 1e-3,
+    }
+    held = changed(effect, **numbers)
+    assert set(np.round(held[np.abs(READING - READING.mean()) > 1e-3], 9)) <= {2.1, 0.3}

@@ -81,8 +81,13 @@ def _sigmas(a: Array, C: Array) -> float:
 
 
 def _promised(before: Known, after: Known) -> float:
-    """What held-out recordings would gain if they did as those that were fitted, row by row."""
+    """What held-out recordings would gain if they did as those that were fitted, row by row.
+
+    Calibrations aside: they are of other motions.
+    """
+    trials = after.experiment.trials
     fit, other = list(after.experiment.fit), list(after.experiment.held_out)
+    fit = [k for k in fit if trials[k].role != "calibration"] or fit
     gained = float(np.sum(before.chi2[fit] - after.chi2[fit]))
     return gained * float(after.rows[other].sum() / after.rows[fit].sum())
 

@@ -259,7 +259,7 @@ class Search:
             same = set(self.idle.get(drive, ())) if drive in held else set()
             if drive in held and fresh < ALL:
                 same |= set(self.slow) | (set(self.geared) if fresh == OWN else set())
-                if drive in self.calibrations and fresh > OWN:
+                if drive in self.calibrations:
                     same |= {i for i in self.geared if self._shown_beside(i, drive)}
             columns = held[drive].columns.copy() if drive in held else None
             if self.laws:
@@ -272,15 +272,11 @@ class Search:
                         same.add(i)
             if columns is not None:
                 keep[drive] = (sorted(same), columns)
-        return slopes(
-            self.experiment,
-            self.at(theta),
-            self.free,
-            self.differences,
-            self.references,
-            self.simulate,
-            keep=keep,
+        here, free = self.at(theta), self.free
+        taken = slopes(
+            self.experiment, here, free, self.differences, self.references, self.simulate, keep=keep
         )
+        return {drive: replace(one, base=self._shown(theta, drive, one.base)) for drive, one in taken.items()}
 
     def _room(self, theta: Array) -> tuple[Array, Array]:
         """How far each number may go down and up, in the chart of cosines and sines: these have no bounds."""
@@ -300,8 +296,11 @@ class Search:
         return any(index not in self.idle[other] for other in others)
 
     def updated(self, gradients: Gradients, theta: Array, step: _Step) -> Gradients:
-        """Broyden's update, lengths in prior sigmas."""
-        moved = (step.theta - theta) / self.spread
+        """Broyden's update, lengths in prior sigmas; what laws add is exact."""
+        moved = np.zeros(len(theta))
+        moved[self.inside] = ((step.theta - theta) / self.spread)[self.inside]
+        if not moved.any():
+            return {drive: Slopes(step.predicted[drive], slope.columns) for drive, slope in gradients.items()}
         along = moved / (moved @ moved) / self.spread
         new = {}
         for drive, slope in gradients.items():

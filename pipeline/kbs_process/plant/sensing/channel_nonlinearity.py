@@ -8,27 +8,35 @@ from kbs_process.plant.effect import LogNormal, Normal, Parameter
 from kbs_process.plant.sensing.sensing import Sensing, SensingPort
 from kbs_process.signals.records import Array
 
+_ORDERS = 6
+
 
 def change(
     reading: Array,
-    bend_slope: float,
-    bend_even: float,
-    bend_odd: float,
-    bend_power: float,
+    bend_1: float,
+    bend_2: float,
+    bend_3: float,
+    bend_4: float,
+    bend_5: float,
+    bend_6: float,
     bend_middle: float,
     bend_range: float,
 ) -> Array:
     r"""Change of a channel by a curved characteristic over the range that it has seen.
 
-    Equation: with $u = (y - y_m) / y_0$, $\Delta y = a_1 u + a_2 u^2 + a_n u |u|^{n-1}$.
-    Units: the channel's, the channel's (three), 1, the channel's, the channel's -> the channel's.
-    Validity: of the loads that are predicted: what was tared before is not in them. A power about another reading than
-        the middle is in the span of the three where n = 3.
+    Equation: with $u = (y - y_m) / y_0$, $\Delta y = \sum_{n=1}^{6} a_n T_n(u)$, $T_n$ Chebyshev's polynomials.
+    Units: the channel's, the channel's (six), the channel's (two) -> the channel's.
+    Validity: of the loads that are predicted: what was tared before is not in them. Beyond the range, |u| > 1, the
+        change is held: a polynomial says nothing of what it has not seen.
     Source: VDI/VDE 2638, Characteristics of force transducers: terms and definitions (2008).
     """
-    u = (reading - bend_middle) / bend_range
-    odd: Array = u * np.abs(u) ** (bend_power - 1.0)
-    return bend_slope * u + bend_even * u**2 + bend_odd * odd
+    u = np.clip((reading - bend_middle) / bend_range, -1.0, 1.0)
+    changed: Array = np.polynomial.chebyshev.chebval(u, [0.0, bend_1, bend_2, bend_3, bend_4, bend_5, bend_6])
+    return changed
+
+
+def _of_order(n: int) -> Parameter:
+    return Parameter(f"bend_{n}", "1", Normal(0.0, 0.5), f"of T_{n}", (-1e3, 1e3), role="amplitude")
 
 
 CHANNEL_NONLINEARITY = Sensing(
@@ -36,10 +44,7 @@ CHANNEL_NONLINEARITY = Sensing(
     port=SensingPort.CHANNEL,
     equation=change,
     parameters=(
-        Parameter("bend_slope", "1", Normal(0.0, 0.5), "at the range's end", (-1e3, 1e3), role="amplitude"),
-        Parameter("bend_even", "1", Normal(0.0, 0.5), "at the range's end", (-1e3, 1e3), role="amplitude"),
-        Parameter("bend_odd", "1", Normal(0.0, 0.5), "at the range's end", (-1e3, 1e3), role="amplitude"),
-        Parameter("bend_power", "1", Normal(3.0, 1.0), "power of the odd part", (1.5, 12.0), grid=(3.0, 5.0)),
+        *(_of_order(n) for n in range(1, _ORDERS + 1)),
         Parameter(
             "bend_middle",
             "1",
