@@ -102,8 +102,8 @@ def test_the_report_stays_when_a_diagnosis_fails(finished: Path, monkeypatch: py
 def test_a_wrench_that_no_plant_makes_exceeds_the_floor(tmp_path: Path) -> None:
     """Recordings whose wrench is noise about a constant whatever the arm does."""
     folder = make_folder(tmp_path / "campaigns" / "EL089")
-    for path in (folder.path / "recordings").iterdir():
-        record(path, noise=1e-3)
+    for number, path in enumerate(sorted((folder.path / "recordings").iterdir())):
+        record(path, noise=1e-3, seed=number)
     experiment = diagnosing.experiment_of(load_campaign(folder.path), SilentProgress())
     noise, found = diagnosing._detected(experiment)
     assert noise.source == "repeats"

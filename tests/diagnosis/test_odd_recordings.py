@@ -11,21 +11,26 @@ import pytest
 from test_experiment import N, made, recording
 
 from kbs_process.campaign.config import Campaign, RecordingEntry
-from kbs_process.campaign.diagnosable import LEAST_S, check_length, check_noise, check_signs
+from kbs_process.campaign.diagnosable import LEAST_S, check_copies, check_length, check_noise, check_signs
 from kbs_process.campaign.held import Alive
 from kbs_process.campaign.load import load_campaign
 from kbs_process.campaign.reading import read_run
+from kbs_process.campaign.stretch import LONGEST_S, busiest
 from kbs_process.diagnosis import floor
 from kbs_process.diagnosis.experiment import Experiment, Recorded
 from kbs_process.diagnosis.gate import gate
+from kbs_process.diagnosis.gls import Background, Sums, score
 from kbs_process.diagnosis.localise import cells_and_ports
+from kbs_process.diagnosis.plausible import implausible
 from kbs_process.diagnosis.scene import Scene
 from kbs_process.errors import ConfigError, RecordingError
 from kbs_process.ingest.encoding import OutStream
 from kbs_process.ingest.writer import write_mcap
+from kbs_process.plant.effects import CATALOGUE
 from kbs_process.plant.rigid import loads
+from kbs_process.plant.sensing import SENSING
 from kbs_process.rig.model import Rig
-from kbs_process.signals.records import Array, Block, Loss, Mask, Run
+from kbs_process.signals.records import Array, Block, Events, Loss, Mask, Run
 from kbs_process.stages.motion import Motion
 from kbs_process.stages.output_error import Scalar
 
@@ -213,6 +218,57 @@ def test_a_recording_without_a_window_has_no_cells_and_one_with_a_gap_has_those_
 
 def _paths(standing):  # type: ignore[no-untyped-def]
     return Scene.of(standing.known.experiment, standing.hypothesis, standing.predicted).paths
+
+
+def test_a_law_of_a_size_that_none_has_is_refused() -> None:
+    eccentric = next(law for law in SENSING if law.name == "encoder_eccentricity")
+    usual = {"eccentric_sin": (3e-4, 1e-5), "eccentric_cos": (-0.5, 0.4)}
+    assert implausible(eccentric, usual) == ()
+    (reason,) = implausible(eccentric, usual | {"eccentric_sin": (0.87, 0.002)})
+    assert reason == "eccentric_sin = 0.87 rad, and 0.02 rad is the most that it may be"
+    assert implausible(eccentric, usual | {"eccentric_sin": (np.nan, 0.002)})
+    coulomb = next(law for law in CATALOGUE if law.name == "coulomb")
+    assert implausible(coulomb, {"coulomb": (90.0, 1.0)}) == ()
+    assert implausible(coulomb, {"coulomb": (190.0, 1.0)})
+
+
+def test_a_signature_of_next_to_no_length_does_nothing() -> None:
+    background = Background.of({0: np.ones(50)}, {0: np.zeros((50, 0))}, np.zeros(0))
+    with np.errstate(over="raise", invalid="raise"):
+        found = score(background, Sums.over(background, {0: np.full((50, 2), 1e-170)}))
+    assert found.rank == 0 and found.gain == 0.0
+
+
+def test_a_recording_whose_commands_have_a_gap_is_left_out_until_what_was_guessed_has_rung_out() -> None:
+    experiment = made(replace(recording("a", 0.0), unknown=((10.0, 20.0),)))
+    t = bench.DT * np.arange(N)
+    inside = (t > 10.0) & (t < 20.0)
+    assert not experiment.trials[0].valid[inside].any()
+    assert experiment.trials[0].valid[(t > 21.0) & (t < 29.0)].all()
+
+
+def test_of_a_long_recording_that_stretch_is_looked_at_in_which_most_moves_from_rest_on() -> None:
+    assert busiest(recording("a", 0.0).run) is None
+    dt, n = 1.0, 3000
+    t = dt * np.arange(n)
+    moving = (t > 1000.0) & (t < 1550.0) | (t > 2000.0) & (t < 2100.0)
+    position = np.stack([np.cumsum(1e-3 * moving * np.sin(0.05 * t)), np.ones(n)], axis=1)
+    run = recording("a", 0.0, n=N).run
+    assert run.wrench is not None
+    wrench = replace(run.wrench, dt=dt, values=np.zeros((n, 6)), valid=np.ones(n, dtype=np.bool_))
+    command = Events(t, np.hstack([position, 0.0 * position]), ("az", "el", "az.rate", "el.rate"))
+    span = busiest(replace(run, wrench=wrench, command=command))
+    assert span is not None
+    assert 940.0 <= span[0] <= 1000.0
+    assert span[1] == span[0] + LONGEST_S
+
+
+def test_a_copy_is_no_repeat() -> None:
+    first, second = recording("a", 0.0).run, recording("b", 0.3).run
+    copied = replace(ENTRY, path=Path("recordings/b.mcap"))
+    check_copies([(ENTRY, first), (copied, second)])
+    with pytest.raises(RecordingError, match=r"b\.mcap: it has the same readings as a\.mcap"):
+        check_copies([(ENTRY, first), (copied, replace(first, name="b"))])
 
 
 def test_a_law_whose_coefficients_have_no_covariance_does_not_pass() -> None:

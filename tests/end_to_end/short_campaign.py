@@ -21,7 +21,7 @@ def short_campaign(target: Path) -> CampaignFolder:
     return folder
 
 
-def record(path: Path, *, moving: bool = True, noise: float = 0.0) -> None:
+def record(path: Path, *, moving: bool = True, noise: float = 0.0, seed: int = 1) -> None:
     """Write twenty seconds: elevation at rest, or swinging; a wrench that is constant, but for noise (N, N m)."""
     stamp = np.arange(2000) * 10_000_000
     cycle = stamp[::10]
@@ -29,7 +29,7 @@ def record(path: Path, *, moving: bool = True, noise: float = 0.0) -> None:
     angle = np.stack([np.zeros(len(stamp)), 1.3 + swing], axis=1)
     command = np.concatenate([angle[::10], np.gradient(angle[::10], 0.1, axis=0)], axis=1)
     wrench = np.tile([0.0, 0.0, -274.0, -6.0, 5.0, 0.0], (len(stamp), 1))
-    wrench += noise * np.random.default_rng(1).standard_normal(wrench.shape)
+    wrench += noise * np.random.default_rng(seed).standard_normal(wrench.shape)
     write_mcap(
         path,
         [

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import itertools
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -47,6 +48,18 @@ def check_signs(run: Run, moved: Motion, campaign: Campaign, entry: RecordingEnt
                 f"{check.check} is {check.found}, expected {check.expected}",
                 where=str(entry.path),
                 remedy="check signs, order and wiring of the channels, and the fields under [topics] in campaign.toml",
+            )
+
+
+def check_copies(runs: Sequence[tuple[RecordingEntry, Run]]) -> None:
+    """Raise RecordingError for a recording that holds the readings of another: it would be a repeat without noise."""
+    for (first, one), (second, other) in itertools.combinations(runs, 2):
+        a, b = one.loads, other.loads
+        if a is not None and b is not None and np.array_equal(a.values, b.values):
+            raise RecordingError(
+                f"it has the same readings as {first.path.name}: a copy is no repeat",
+                where=str(second.path),
+                remedy="leave one of them out of campaign.toml",
             )
 
 

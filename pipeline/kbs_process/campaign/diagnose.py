@@ -2,31 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from kbs_process.campaign.config import Campaign, RecordingEntry
-from kbs_process.campaign.diagnosable import check_length, check_noise, check_signs
+from kbs_process.campaign.diagnosable import check_copies, check_length, check_noise, check_signs
 from kbs_process.campaign.diagnosis_files import write_diagnosis
-from kbs_process.campaign.held import Alive
 from kbs_process.campaign.next_test import proposed
-from kbs_process.campaign.predicting import AT_REST, approached, commanded_from, schedule_of
+from kbs_process.campaign.predicting import AT_REST, LEAD, approached, commanded_from, schedule_of
 from kbs_process.campaign.progress import Progress
-from kbs_process.campaign.reading import read_run
 from kbs_process.campaign.run import Outcome
 from kbs_process.campaign.settings import motion_settings
 from kbs_process.campaign.simulators import Simulators
+from kbs_process.campaign.stretch import read_stretch
 from kbs_process.diagnosis import rounds
 from kbs_process.diagnosis.experiment import Experiment, Recorded, assemble
 from kbs_process.diagnosis.explain import explain
 from kbs_process.errors import ConfigError, RecordingError
 from kbs_process.plant.predict import Schedule
-from kbs_process.signals.records import Run
+from kbs_process.signals.records import Events, Run
 from kbs_process.stages import decouple, motion
 from kbs_process.stages.motion import Motion
+
+_CYCLES = 1.5  # between two commands, from which on one is missing
 
 
 def experiment_of(campaign: Campaign, progress: Progress) -> Experiment:
@@ -35,15 +35,13 @@ def experiment_of(campaign: Campaign, progress: Progress) -> Experiment:
     decoupling = decouple.fit(campaign.rig)
     runs = []
     for entry in campaign.recordings:
-        with progress.task(f"Reading {entry.name}"):
-            alive = Alive(campaign.rig, entry)
-            run = decouple.apply(read_run(campaign, entry, alive), decoupling)
-            if run.loads is None:
-                raise RecordingError("there is neither wrench nor effort", where=str(entry.path))
-            run = replace(run, losses=(*run.losses, *alive.losses))
-            moved = motion.estimate(run, campaign.rig, motion_settings(campaign))
-            check_signs(run, moved, campaign, entry)
-            runs.append((entry, run, moved))
+        run = decouple.apply(read_stretch(campaign, entry, progress), decoupling)
+        if run.loads is None:
+            raise RecordingError("there is neither wrench nor effort", where=str(entry.path))
+        moved = motion.estimate(run, campaign.rig, motion_settings(campaign))
+        check_signs(run, moved, campaign, entry)
+        runs.append((entry, run, moved))
+    check_copies([(entry, run) for entry, run, _ in runs])
     with progress.task("Laying repeats on one grid"):
         experiment = assembled(campaign, runs)
         for entry, trial in zip(campaign.recordings, experiment.trials, strict=True):
@@ -66,7 +64,16 @@ def _recorded(campaign: Campaign, entry: RecordingEntry, run: Run, moved: Motion
         return Recorded(entry.role, entry.trajectory, run, None, moved, absent=absent)
     schedule = schedule_of(run, campaign.rig)
     span = commanded_from(run), _commanded_until(schedule)
-    return Recorded(entry.role, entry.trajectory, run, approached(schedule), None, *span, absent)
+    return Recorded(
+        entry.role,
+        entry.trajectory,
+        run,
+        approached(schedule),
+        None,
+        *span,
+        unknown=(*_gaps(run.command), *_gaps(run.field)),
+        absent=absent,
+    )
 
 
 def _commanded_until(schedule: Schedule) -> float:
@@ -74,6 +81,16 @@ def _commanded_until(schedule: Schedule) -> float:
     steps, cycles = np.diff(schedule.position[-2:], axis=0), np.diff(schedule.t[-2:])
     moves = len(cycles) > 0 and np.abs(steps).max() > AT_REST * cycles[0]
     return float(schedule.t[-1]) if moves else float("inf")
+
+
+def _gaps(events: Events | None) -> Iterator[tuple[float, float]]:
+    """Yield spans in which nobody recorded what moved the joints, and in which the article rings from a guess of it."""
+    if events is None or len(events.t) < 2:
+        return
+    steps = np.diff(events.t)
+    moved = np.abs(np.diff(events.values, axis=0)).max(axis=1)
+    for index in np.flatnonzero((steps > _CYCLES * np.median(steps)) & (moved > AT_REST * steps)):
+        yield float(events.t[index]), float(events.t[index + 1]) + LEAD
 
 
 def diagnose(

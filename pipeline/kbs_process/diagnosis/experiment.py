@@ -40,6 +40,7 @@ class Recorded:
     motion: Motion | None
     known_from: float = 0.0  # s, from which on it is known what drove the joints, and
     known_until: float = np.inf  # s, until which
+    unknown: tuple[tuple[float, float], ...] = ()  # s, spans between these in which it is not
     absent: tuple[str, ...] = ()  # effects of the model that did not act in this recording
 
 
@@ -287,6 +288,8 @@ def _trial(
 ) -> Trial:
     run, loads = one.run, _loads(one.run)
     columns, valid = [], loads.valid & (loads.t >= one.known_from) & (loads.t <= one.known_until)
+    for start, end in one.unknown:
+        valid = valid & ~((loads.t > start) & (loads.t < end))
     for channel in channels:
         source = loads
         if channel not in source.channels:

@@ -24,6 +24,8 @@ from kbs_process.diagnosis.tails import log_tail
 from kbs_process.diagnosis.thresholds import ABSORBED, DEPENDENT
 from kbs_process.signals.records import Array
 
+_NOTHING = 1e-100  # whitened length of a signature that is nothing: squares of its inverse are still numbers
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Background:
@@ -108,7 +110,8 @@ class Score:
 def score(background: Background, sums: Sums) -> Score:
     """Fit a candidate's amplitudes; combinations that the known parameters span, or that do nothing, have none."""
     length = np.sqrt(np.diag(sums.SS))
-    unit = np.where(length > 0.0, 1.0 / np.where(length > 0.0, length, 1.0), 0.0)
+    shows = length > _NOTHING
+    unit = np.where(shows, 1.0 / np.where(shows, length, 1.0), 0.0)
     SJ = sums.SJ * background.scale * unit[:, None]
     A = sums.SS * np.outer(unit, unit)
     whole = A

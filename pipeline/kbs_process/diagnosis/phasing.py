@@ -38,7 +38,12 @@ def begin(
 
 
 def stages(experiment: Experiment) -> list[tuple[tuple[int, ...], tuple[str, ...]]]:
-    """Trials, one a trajectory, and the joints that they turn; calibrations for joints that nothing else turns."""
+    """Trials, one a trajectory, and the joints that they turn; calibrations for joints that nothing else turns.
+
+    None where a measured motion takes the place of motors.
+    """
+    if experiment.drives[0].schedule is None:
+        return []
     left = np.array([joint.drive is not None for joint in experiment.rig.joints])
     stages = []
     for calibration in (False, True):
