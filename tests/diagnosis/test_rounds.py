@@ -97,7 +97,7 @@ def test_a_cable_is_found_refitted_in_the_plant_and_accepted(made: Experiment, c
     after = with_extra(cable, extra_of(best, cable, tried, scene), bench.serial(made))
     spring, sigma = after.known.value[begin], after.known.sigma[begin]  # wide: a CoG does nearly the same
     assert spring == pytest.approx(CABLE, abs=4.0 * sigma)
-    verdict = gate(cable.known, after.known, range(begin, begin + 3))
+    verdict = gate(cable.known, after.known, range(begin, begin + len(best.suspect.amplitudes)))
     assert verdict.passed and verdict.held_out, verdict.reasons
     fold = verdict.folds[0]
     assert fold.after < 1.3 < fold.before
@@ -108,7 +108,9 @@ def test_a_law_that_held_out_recordings_do_not_show_is_refused(made: Experiment)
     here = standing(with_cable(made, (0, 1)))
     tried, scene, found = screened(here)
     after = with_extra(here, extra_of(found.candidates[0], here, tried, scene), bench.serial(made))
-    verdict = gate(here.known, after.known, range(len(FREE), len(FREE) + 3))
+    verdict = gate(
+        here.known, after.known, range(len(FREE), len(FREE) + len(found.candidates[0].suspect.amplitudes))
+    )
     assert not verdict.passed and "r2 predicted worse" in verdict.reasons
 
 
@@ -117,7 +119,9 @@ def test_without_held_out_recordings_each_is_left_out_in_turn(made: Experiment, 
     here = standing(fit_only)
     tried, scene, found = screened(here)
     after = with_extra(here, extra_of(found.candidates[0], here, tried, scene), bench.serial(made))
-    verdict = gate(here.known, after.known, range(len(FREE), len(FREE) + 3))
+    verdict = gate(
+        here.known, after.known, range(len(FREE), len(FREE) + len(found.candidates[0].suspect.amplitudes))
+    )
     assert not verdict.held_out and [fold.trial for fold in verdict.folds] == ["r0", "r1"]
     assert verdict.passed, verdict.reasons
 

@@ -156,10 +156,10 @@ def test_hysteresis_gives_a_loop_and_takes_energy() -> None:
     for name, tag in (("harness", "harness"), ("ground_cable", "cable")):
         effect = find(name)
         assert effect is not None
-        given = {f"{tag}_memory": 0.02, f"{tag}_middle": 0.05}
+        given = {f"{tag}_memory": 0.02, f"{tag}_middle": 0.05, f"{tag}_reach": 0.1}
         *elastic, friction = along(effect, {"joint_angle": ANGLE}, given, DT)[:, :, 0].T
         moved = np.diff(ANGLE, append=ANGLE[-1])
-        for spring in elastic:  # offset, slope, curve
+        for spring in elastic:  # offset, slope, curves
             assert spring @ moved == pytest.approx(0.0, abs=1e-4)
         assert friction @ moved < -0.5 * 2.0 * np.ptp(ANGLE)
 

@@ -25,7 +25,8 @@ from kbs_process.diagnosis.floor import Floor
 from kbs_process.diagnosis.hypothesis import Hypothesis, Prediction
 from kbs_process.diagnosis.known import Known
 from kbs_process.diagnosis.nuisance import nuisances
-from kbs_process.diagnosis.whiten import Projector, Whitener
+from kbs_process.diagnosis.thresholds import DETECTED, TOLERATED
+from kbs_process.diagnosis.whiten import Projector, Whitener, independent
 from kbs_process.signals.records import Array
 
 _LEAST_LOG = -1e5
@@ -50,6 +51,11 @@ class Detection:
     cells: tuple[Cell, ...]
     log_p: float  # natural logarithm, of all cells
     ratio: float  # power over the floor's, all cells
+
+    @property
+    def left(self) -> bool:
+        """Whether what is left is more than chance, and more than floor and search are good for."""
+        return bool(self.log_p < np.log(DETECTED) and self.ratio > 1.0 + TOLERATED)
 
     @property
     def log10_p(self) -> float:
@@ -101,7 +107,7 @@ class _Mean:
     z: Array  # (rows,)
     leverage: Array  # (rows,) of the nuisances
     channels: int  # that show something
-    spread: float  # by how much tapers correlate neighbours, mean over channels
+    spread: float  # by how much windows correlate neighbours, mean over channels
     project: Projector
     whiten: Whitener
 
@@ -122,9 +128,7 @@ def _mean(
     project = Projector.of(whiten(N), precision * np.sqrt(len(trials)))
     windows = whiten.window
     seen = windows.any(axis=0)
-    power = np.sum(windows[:, seen] ** 2, axis=0)
-    span = valid.sum()
-    spread = float(np.mean(span * np.sum(windows[:, seen] ** 4, axis=0) / power**2))
+    spread = float(np.mean(1.0 / independent(windows[:, seen])))
     size = 2 * len(whiten.f) * windows.shape[1]
     return _Mean(
         trials[0].trajectory,

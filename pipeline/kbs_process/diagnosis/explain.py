@@ -19,15 +19,15 @@ import numpy as np
 from kbs_process.diagnosis import phasing
 from kbs_process.diagnosis.detection import Detection, detect
 from kbs_process.diagnosis.experiment import Experiment
-from kbs_process.diagnosis.floor import Floor, estimate
+from kbs_process.diagnosis.floor import Floor, estimate, smaller
 from kbs_process.diagnosis.hypothesis import Hypothesis, Prediction, Simulate
 from kbs_process.diagnosis.known import MOVED, Known, leapt, refit
 from kbs_process.diagnosis.search import LITTLE, SLIGHT
-from kbs_process.diagnosis.thresholds import DETECTED, EXPLAINED
+from kbs_process.diagnosis.thresholds import EXPLAINED
 from kbs_process.signals.records import Array
 
 NEAR = 0.99 * MOVED  # sigmas
-LEAPS = 3  # after a descent
+LEAPS = 4  # after a descent
 Task = Callable[[str], AbstractContextManager[object]]  # shows that something of some length is done
 
 
@@ -57,17 +57,18 @@ def explain(experiment: Experiment, simulate: Simulate, task: Task) -> Explained
     if not _driven_alike(experiment):
         with task("The floor, with a model that is about right"):
             rough = refit(experiment, start, floor, simulate, reach=NEAR, leaps=1)
+            rough = _moved_on(_stood(rough, floor, simulate), floor, simulate, LEAPS // 2).known
             start, slopes, leaps = rough.hypothesis, rough.slopes, 0
-            floor = _floor(experiment, _predicted(experiment, start, simulate))
+            floor = smaller(floor, _floor(experiment, _predicted(experiment, start, simulate)))
     with task("Refitting the known parameters, near what is known of them"):
         near = refit(experiment, start, floor, simulate, reach=NEAR, slopes=slopes, leaps=leaps)
-        stood = _moved_on(_stood(near, floor, simulate), floor, simulate)
-    if _may_be_off(stood.known) and stood.after.log_p < np.log(DETECTED):
+        stood = _moved_on(_stood(near, floor, simulate), floor, simulate, LEAPS)
+    if _may_be_off(stood.known) and stood.after.left:
         with task("Refitting the known parameters, free"):
             known = stood.known
             free = refit(experiment, known.hypothesis, floor, simulate, slopes=known.slopes, leaps=1)
             freed = _stood(free, floor, simulate)
-        settled = freed.after.log_p > np.log(DETECTED)
+        settled = not freed.after.left
         if settled or freed.after.ratio - 1.0 < EXPLAINED * (stood.after.ratio - 1.0):
             stood = freed
     known, predicted, after = stood.known, stood.predicted, stood.after
@@ -108,18 +109,20 @@ def _stood(known: Known, floor: Floor, simulate: Simulate) -> _Stood:
     return _Stood(known, predicted, detect(experiment, floor, predicted, experiment.fit, known=known))
 
 
-def _moved_on(stood: _Stood, floor: Floor, simulate: Simulate) -> _Stood:
-    """Leap from minimum to minimum, while something is left and a leap takes some of it."""
-    for number in range(LEAPS):
-        if stood.after.log_p > np.log(DETECTED):
+def _moved_on(stood: _Stood, floor: Floor, simulate: Simulate, leaps: int) -> _Stood:
+    """Leap from minimum to minimum, while something is left and leaps take some of it."""
+    idle = 0
+    for number in range(leaps):
+        if not stood.after.left or idle > 1:
             break
         known = stood.known
         moved = leapt(known, simulate, smooth=number == 0)
+        if moved is known:
+            break
         gained = known.cost - moved.cost
+        idle = 0 if gained > max(LITTLE, SLIGHT * known.excess) else idle + 1
         if gained > 0.0:
             stood = _stood(moved, floor, simulate)
-        if gained < max(LITTLE, SLIGHT * known.excess):
-            break
     return stood
 
 

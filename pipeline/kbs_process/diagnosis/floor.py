@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kbs_process.diagnosis.experiment import Experiment, Trial
-from kbs_process.diagnosis.whiten import Whitener, frequencies, whitener, window_of
+from kbs_process.diagnosis.whiten import Whitener, frequencies, independent, whitener, window_of
 from kbs_process.signals.records import WRENCH_CHANNELS, Array, Mask
 from kbs_process.stages.resample import resample
 
@@ -127,16 +127,17 @@ def estimate(experiment: Experiment, residuals: Mapping[int, Array]) -> Floor:
     order = np.argsort(f, kind="stable")
     f = f[order]
     x = np.concatenate([group.contrasts for group in groups])[order]
-    nu = np.concatenate([np.tile(group.freedom, (len(group.f), 1)) for group in groups])[order]
+    nu = np.concatenate([np.tile(group.count, (len(group.f), 1)) for group in groups])[order]
+    freedom = np.concatenate([np.full(len(group.f), group.freedom.max()) for group in groups])[order]
     level = np.stack([_level(f, _power(x[:, :, k], nu[:, k]), nu[:, k]) for k in range(c)], axis=1)
     x = x / np.sqrt(_shapes(f) @ level)[:, None, :]
-    cells = _cells(f, nu.max(axis=1), _LEAST * c)
+    cells = _cells(f, freedom, _LEAST * c)
     C, dof, centres, edges = [], [], [], [0.0]
     for first, end in itertools.pairwise(cells):
         own = x[first:end].reshape(-1, c)
         gram = np.asarray(own.T @ own.conj(), dtype=np.complex128)
         C.append(_normalised(gram, nu[first:end].sum(axis=0)))
-        dof.append(float(nu[first:end].max(axis=1).sum()))
+        dof.append(float(freedom[first:end].sum()))
         centres.append(float(np.exp(np.mean(np.log(f[first:end])))))
         edges.append(float(f[end - 1]))
     runs = sum(len(members) for members in repeated)
@@ -144,6 +145,20 @@ def estimate(experiment: Experiment, residuals: Mapping[int, Array]) -> Floor:
         experiment, np.array(edges), np.array(centres), np.array(C), np.array(dof), level, "repeats",
         f"from what {runs} recordings of {len(groups)} repeated trajectories differ by",
     )  # fmt: skip
+
+
+def smaller(one: Floor, other: Floor) -> Floor:
+    """The smaller of two floors of the same recordings, estimated with two models.
+
+    Repeats that were not driven alike differ by the noise and by what a model makes wrongly of their drives.
+    """
+    return min(one, other, key=_size)
+
+
+def _size(floor: Floor) -> float:
+    """Mean logarithm of the density of all channels."""
+    f = np.geomspace(floor.centres[0], floor.experiment.highest_Hz, 64)
+    return float(np.mean(np.linalg.slogdet(floor.repeats(floor.experiment.trials[0], f))[1]))
 
 
 def declared(experiment: Experiment) -> Floor:
@@ -193,7 +208,8 @@ class _Differences:
 
     f: Array  # (b,) Hz
     contrasts: Complex  # (b, rows, c), zero where there is none
-    freedom: Array  # (c,) complex degrees of freedom a frequency; 0 of a channel that shows nothing
+    count: Array  # (c,) contrasts a frequency; 0 of a channel that shows nothing
+    freedom: Array  # (c,) complex degrees of freedom a frequency: fewer, as windows correlate neighbours
 
 
 def _differences(
@@ -212,7 +228,8 @@ def _differences(
         spectra.append(np.fft.rfft(left * windows, axis=0)[inside] * gain)
     contrasts = np.zeros((int(inside.sum()), rows, len(seen)), dtype=np.complex128)
     contrasts[:, : len(members) - 1] = _helmert(len(members)) @ np.stack(spectra, axis=1)
-    return _Differences(f[inside], contrasts, np.where(seen, len(members) - 1.0, 0.0))
+    count = np.where(seen, len(members) - 1.0, 0.0)
+    return _Differences(f[inside], contrasts, count, count * np.minimum(independent(windows), 1.0))
 
 
 def _power(x: Complex, nu: Array) -> Array:

@@ -1,4 +1,8 @@
-"""How trials are compared: whitened by the floor, each trial's own nuisances taken out."""
+"""How trials are compared: whitened by the floor, each trial's own nuisances taken out.
+
+A channel that shows something in part of a trial only, as an encoder whose joint rests, has as many numbers as all
+others, alike from one frequency to the next: they count for as many as are independent.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +15,7 @@ from kbs_process.diagnosis.experiment import Experiment
 from kbs_process.diagnosis.floor import Floor
 from kbs_process.diagnosis.hypothesis import Hypothesis, Prediction
 from kbs_process.diagnosis.nuisance import nuisances
-from kbs_process.diagnosis.whiten import Projector, Whitener
+from kbs_process.diagnosis.whiten import Projector, Whitener, independent
 from kbs_process.signals.records import Array
 
 
@@ -20,23 +24,34 @@ class Metric:
     """The map of one trial: linear, the same for residuals, slopes and signatures."""
 
     whiten: Whitener
+    share: Array  # (c,) of each channel's numbers that are independent
     project: Projector
 
     def __call__(self, x: Array) -> Array:
         """(rows,) of x (n, c), (rows, k) of x (n, c, k)."""
-        return self.project(self.whiten(x))
+        return self.project(counted(self.whiten, self.share, x))
 
     @property
     def rows(self) -> int:
-        """Numbers of a residual that are noise of their own: those of channels that are seen, less free nuisances'."""
-        channels = int(np.count_nonzero(self.whiten.window.any(axis=0)))
-        free = self.project.basis.shape[1] - self.project.tail.shape[0]
-        return int(2 * len(self.whiten.f) * channels - free)
+        """Numbers of a residual that are noise of their own: the independent ones, less free nuisances'."""
+        free = int(self.project.basis.shape[1] - self.project.tail.shape[0])
+        return max(1, round(2.0 * len(self.whiten.f) * float(self.share.sum())) - free)
 
     def layout(self, z: Array) -> Array:
-        """(2, b, c) of a residual: real and imaginary parts, frequencies, channels; the nuisances' priors left out."""
+        """(2, b, c) of a residual: real and imaginary parts, frequencies, channels; the nuisances' priors left out.
+
+        Of unit variance each, whatever they count for.
+        """
         shape = self.whiten.shape
-        return z[: int(np.prod(shape))].reshape(shape)
+        root = np.sqrt(np.where(self.share > 0.0, self.share, 1.0))
+        return np.asarray(z[: int(np.prod(shape))].reshape(shape) / root, dtype=np.float64)
+
+
+def counted(whiten: Whitener, share: Array, x: Array) -> Array:
+    """Whitened numbers that count for as many as are independent."""
+    root = np.tile(np.sqrt(share), 2 * len(whiten.f))
+    z = whiten(x)
+    return np.asarray(z * (root if z.ndim == 1 else root[:, None]), dtype=np.float64)
 
 
 def metrics(
@@ -55,5 +70,6 @@ def metrics(
         near = predicted[trial.drive]
         whiten = floor.whitener(trial, near.values)
         N, precision = nuisances(experiment, trial, near, present)
-        found.append(Metric(whiten, Projector.of(whiten(N), precision)))
+        share = independent(whiten.window)
+        found.append(Metric(whiten, share, Projector.of(counted(whiten, share, N), precision)))
     return tuple(found)

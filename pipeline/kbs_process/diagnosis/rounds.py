@@ -35,7 +35,6 @@ from kbs_process.diagnosis.scene import Scene
 from kbs_process.diagnosis.screen import Bench, Catalogued, Found, Screening, Suspect, screen
 from kbs_process.diagnosis.suspects import candidates
 from kbs_process.diagnosis.thresholds import (
-    DETECTED,
     FALSE_ALARM,
     LAW_VARIANCE,
     LEAD,
@@ -74,7 +73,7 @@ def diagnose(
         if rounds[-1].find is None:
             break
         finds.append(rounds[-1].find)
-        if _detected(standing, floor, known.experiment.fit).log_p > np.log(DETECTED):
+        if not _detected(standing, floor, known.experiment.fit).left:
             break
     last = rounds[-1]
     left = last.place
@@ -169,7 +168,7 @@ def _round(standing: Standing, floor: Floor, simulate: Simulate) -> _Round:
 def _settled(standing: Standing, floor: Floor, simulate: Simulate, *, leaps: int) -> Standing:
     """All numbers refitted with the law in the plant, or on its prediction, if that takes away more."""
     known = standing.known
-    at_floor = _detected(standing, floor, known.experiment.fit).log_p > np.log(DETECTED)
+    at_floor = not _detected(standing, floor, known.experiment.fit).left
     if known.experiment.drives[0].schedule is None or (leaps and at_floor):
         return standing
     moved = settled(known, simulate, leaps=leaps, laws=standing.laws)
@@ -312,6 +311,6 @@ def _absorbed(screening: Screening) -> tuple[Absorbed, ...]:
 def _verdict(finds: Sequence[Find], moved: Sequence[Moved], after: Detection) -> Verdict:
     if finds:
         return "physics"
-    if after.log_p < np.log(DETECTED):
+    if after.left:
         return "undecided"
     return "parameters off" if moved else "none"

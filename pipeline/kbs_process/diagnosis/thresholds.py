@@ -31,6 +31,9 @@ ABSORBED: Final = 0.99  # kappa: what a known parameter takes up of a signature 
 DEPENDENT: Final = 1e-8  # relative eigenvalue below which amplitudes of a candidate are one and the same
 # P-value below which what is left counts as there (diagnosis.md: 1 % of null campaigns at most claim a find).
 DETECTED: Final = 1e-3
+# Share of the floor's power by which what is left has to exceed it, too: the best of many minima of phases and tooth
+# contact leave up to 0.02 more than each other on campaigns without any effect.
+TOLERATED: Final = 0.03
 ORDERED: Final = 0.5  # share of the residual's excess that the best has to do for the screen's order to count
 LEADERS: Final = 4  # candidates that are simulated; beyond it the linear plant's order has not been wrong
 # A leader's gain is wrong by about twice, at worst three times, the transfer's error of itself; candidates within that

@@ -57,6 +57,16 @@ def window_of(valid: Mask) -> Array:
     return np.asarray(window * valid, dtype=np.float64)
 
 
+def independent(windows: Array) -> Array:
+    """(c,) share of the numbers at all frequencies that are independent, of channels with windows (n, c).
+
+    What a window leaves out correlates neighbours: of white noise the sum of B squared moduli varies as that of
+    B (sum w^2)^2 / (n sum w^4) independent ones. 0 of a channel that shows nothing.
+    """
+    square, fourth = np.sum(windows**2, axis=0), np.sum(windows**4, axis=0)
+    return np.asarray(square**2 / (len(windows) * np.where(fourth > 0.0, fourth, 1.0)), dtype=np.float64)
+
+
 def frequencies(n: int, dt: float, band: tuple[float, float]) -> tuple[Array, Mask]:
     """Frequencies (n // 2 + 1,) and which lie in a band; the mean of a trial, its taring, never does."""
     f = np.asarray(np.fft.rfftfreq(n, dt), dtype=np.float64)

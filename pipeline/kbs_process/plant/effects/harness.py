@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from kbs_process.plant.effect import Effect, LogNormal, Normal, Parameter, Port, State
 
 
@@ -13,15 +15,17 @@ def torque(
     harness_spring: float,
     harness_curve: float,
     harness_cubic: float,
+    harness_taut: float,
     harness_friction: float,
     harness_middle: float,
+    harness_reach: float,
     harness_memory: float,
 ) -> tuple[float, float]:
     r"""Torque on the output, reacted by the body that carries the motor.
 
-    Equation: with $u = \theta_l - \theta_m$, $T = T_0 - k u - k_2 u^2 - k_3 u^3 - T_h z$,
+    Equation: with $u = \theta_l - \theta_m$, $T = T_0 - k u - k_2 u^2 - k_3 u^3 - T_s \tanh(u / u_s) - T_h z$,
         $\dot z = (\omega_l - |\omega_l| z) / x_0$.
-    Units: rad, rad/s, 1, N m, N m/rad, N m/rad^2, N m/rad^3, N m, rad, rad -> N m, 1/s.
+    Units: rad, rad/s, 1, N m, N m/rad, N m/rad^2, N m/rad^3, N m (two), rad (three) -> N m, 1/s.
     Validity: internal, so it shows in the windup and leaves no wrench of its own. The series holds where the joint has
         been.
     Source: Y. K. Wen, Method for random vibration of hysteretic systems, J. Engineering Mechanics Division ASCE 102
@@ -29,6 +33,7 @@ def torque(
     """
     bent = joint_angle - harness_middle
     spring = harness_offset - bent * (harness_spring + bent * (harness_curve + bent * harness_cubic))
+    spring = spring - harness_taut * math.tanh(bent / harness_reach)
     rate = (joint_rate - abs(joint_rate) * harness_bend) / harness_memory
     return spring - harness_friction * harness_bend, rate
 
@@ -52,6 +57,9 @@ HARNESS = Effect(
             "harness_cubic", "N m/rad^3", Normal(0.0, 10.0), "its curvature", (-1e5, 1e5), role="amplitude"
         ),
         Parameter(
+            "harness_taut", "N m", Normal(0.0, 1.0), "at which it yields", (-100.0, 100.0), role="amplitude"
+        ),
+        Parameter(
             "harness_friction",
             "N m",
             Normal(0.0, 0.5),
@@ -67,6 +75,15 @@ HARNESS = Effect(
             (-1e2, 1e2),
             grid=(0.5,),
             over="joint_angle",
+        ),
+        Parameter(
+            "harness_reach",
+            "rad",
+            LogNormal(0.3, 1.0),
+            "angle over which it yields",
+            (1e-4, 30.0),
+            grid=(0.05, 0.2),
+            over="joint_angle.span",
         ),
         Parameter(
             "harness_memory",
