@@ -31,8 +31,8 @@ def change(
     Source: VDI/VDE 2638, Characteristics of force transducers: terms and definitions (2008).
     """
     u = np.clip((reading - bend_middle) / bend_range, -1.0, 1.0)
-    changed: Array = np.polynomial.chebyshev.chebval(u, [0.0, bend_1, bend_2, bend_3, bend_4, bend_5, bend_6])
-    return changed
+    series = np.polynomial.chebyshev.chebval(u, [0.0, bend_1, bend_2, bend_3, bend_4, bend_5, bend_6])
+    return np.asarray(series, dtype=np.float64)
 
 
 def _of_order(n: int) -> Parameter:
