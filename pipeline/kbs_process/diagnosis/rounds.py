@@ -6,17 +6,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2
 
-from kbs_process.diagnosis.curves import CurveSuspect, curves
-from kbs_process.diagnosis.detection import Detection, detect
-from kbs_process.diagnosis.finding import Tried, explained_share, find_of, merged
+from kbs_process.diagnosis.curves import curves
+from kbs_process.diagnosis.detection import Detection
+from kbs_process.diagnosis.finding import find_of, merged
 from kbs_process.diagnosis.floor import Floor
-from kbs_process.diagnosis.gate import Fold, Gate, gate, whiteness
-from kbs_process.diagnosis.gls import Background, Sums, score
+from kbs_process.diagnosis.gate import whiteness
 from kbs_process.diagnosis.hypothesis import Prediction, Simulate
-from kbs_process.diagnosis.joint import Standing, standing_of, with_extra
-from kbs_process.diagnosis.known import MOVED, Known, settled
+from kbs_process.diagnosis.joint import Standing
+from kbs_process.diagnosis.known import MOVED, Known
+from kbs_process.diagnosis.leaders import detected, leaders, resettled, tried
 from kbs_process.diagnosis.localise import cells_and_ports
 from kbs_process.diagnosis.outcome import (
     Absorbed,
@@ -32,20 +31,10 @@ from kbs_process.diagnosis.proposals import proposed
 from kbs_process.diagnosis.ranges import ranges_of
 from kbs_process.diagnosis.rivals import probabilities
 from kbs_process.diagnosis.scene import Scene
-from kbs_process.diagnosis.screen import Bench, Catalogued, Found, Screening, Suspect, screen
+from kbs_process.diagnosis.screen import Bench, Catalogued, Screening, Suspect, screen
 from kbs_process.diagnosis.suspects import candidates
-from kbs_process.diagnosis.thresholds import (
-    FALSE_ALARM,
-    LAW_VARIANCE,
-    LEAD,
-    LEADERS,
-    ORDERED,
-    ROUNDS,
-    SECOND,
-    SETTLED,
-    SETTLED_SHARE,
-)
-from kbs_process.diagnosis.tryout import extra_of, identity
+from kbs_process.diagnosis.thresholds import ROUNDS, TAKEN
+from kbs_process.diagnosis.tryout import identity
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,17 +62,17 @@ def diagnose(
         if rounds[-1].find is None:
             break
         finds.append(rounds[-1].find)
-        if not _detected(standing, floor, known.experiment.fit).left:
+        if not detected(standing, floor, known.experiment.fit).left:
             break
     last = rounds[-1]
     left = last.place
     if last.find is not None:
         left = _place(standing, floor, Scene.of(known.experiment, standing.hypothesis, standing.predicted))
-    after = _detected(standing, floor, known.experiment.fit) if finds else before
+    after = detected(standing, floor, known.experiment.fit) if finds else before
     held_out = None
     if known.experiment.held_out:
-        begun = _detected(Standing(known, predicted, {}), floor, known.experiment.held_out)
-        held_out = begun, _detected(standing, floor, known.experiment.held_out) if finds else begun
+        begun = detected(Standing(known, predicted, {}), floor, known.experiment.held_out)
+        held_out = begun, detected(standing, floor, known.experiment.held_out) if finds else begun
     moved = _moved(standing.known)
     return Outcome(
         verdict=_verdict(finds, moved, after),
@@ -127,7 +116,7 @@ def suspects_of(standing: Standing, scene: Scene) -> list[Suspect]:
         experiment.channels,
         experiment.dt,
         proposed=proposed(standing.known, scene),
-        temperature=any(trial.temperature is not None for trial in experiment.trials),
+        temperature=all(trial.temperature is not None for trial in experiment.trials),
     )
     columns = next((signals.columns for signals in scene.signals.values()), ())
     recorded = all(one.schedule is None or one.schedule.field is not None for one in experiment.drives)
@@ -149,123 +138,35 @@ def _round(standing: Standing, floor: Floor, simulate: Simulate) -> _Round:
     bench = Bench.of(known, scene)
     screening = screen(bench, suspects_of(standing, scene))
     place = _place(standing, floor, scene)
-    first, others = _leaders(screening, known.excess)
-    tried, refused = _tried(first, standing, bench, scene, floor, simulate)
+    first, others = leaders(screening, known.excess)
+    passed, refused = tried(first, standing, bench, scene, floor, simulate)
     for found in others:
-        if tried:
+        if passed:
             break
-        tried, more = _tried([found], standing, bench, scene, floor, simulate)
+        passed, more = tried([found], standing, bench, scene, floor, simulate)
         refused += more
-    if not tried:
+    if not passed:
         return _Round(None, standing, screening, tuple(refused), place)
-    chances = probabilities([one.standing.known for one in tried], bench.background.rows)
+    chances = probabilities([one.standing.known for one in passed], bench.background.rows)
     best = int(np.argmax(chances))
-    tried[best] = replace(tried[best], standing=_settled(tried[best].standing, floor, simulate, leaps=1))
-    find = find_of(tried, best, chances, standing, screening, place)
-    return _Round(find, tried[best].standing, screening, tuple(refused), place)
+    passed[best] = replace(passed[best], standing=resettled(passed[best].standing, floor, simulate, leaps=1))
+    share = _taken(standing, passed[best].standing, floor)
+    if share < TAKEN:
+        found = passed[best].found
+        reason = f"takes {100.0 * share:.0f} % of what is there, the best of all, and that explains nothing"
+        refused.append(Refused(identity(found.suspect), found.score.rho_eff, (reason,)))
+        return _Round(None, standing, screening, tuple(refused), place)
+    find = find_of(passed, best, chances, standing, screening, place)
+    return _Round(find, passed[best].standing, screening, tuple(refused), place)
 
 
-def _settled(standing: Standing, floor: Floor, simulate: Simulate, *, leaps: int) -> Standing:
-    """All numbers refitted with the law in the plant, or on its prediction, if that takes away more."""
-    known = standing.known
-    at_floor = not _detected(standing, floor, known.experiment.fit).left
-    if known.experiment.drives[0].schedule is None or (leaps and at_floor):
-        return standing
-    moved = settled(known, simulate, leaps=leaps, laws=standing.laws)
-    return standing_of(moved, standing.laws, simulate) if moved.cost < known.cost else standing
-
-
-def _leaders(screening: Screening, excess: float) -> tuple[list[Found], list[Found]]:
-    """The most probable suspects, as many as the linear plant may have in the wrong order, and a few that come next.
-
-    A law that repeats predicts what was not recorded; one whose size and phase are each recording's own does not. It
-    leads only where none that repeats does half of what it does.
-    """
-    able = [found for found in screening.candidates if found.significant and not found.absorbed]
-    repeating = [found for found in able if not found.suspect.each_trial]
-    if repeating and 2.0 * repeating[0].score.gain >= able[0].score.gain:
-        able = repeating
-    if not able:
-        return [], []
-    bound = (1.0 - LEAD) * able[0].score.gain
-    # Where even the best does little of what there is to do, the plant is far from linear, and so is their order.
-    if able[0].score.gain < ORDERED * excess:
-        bound = 0.0
-    first = [found for found in able if found.score.gain >= bound or found is able[0]][:LEADERS]
-    return first, [found for found in able if found not in first][:SECOND]
-
-
-def _tried(
-    leaders: Sequence[Found], standing: Standing, bench: Bench, scene: Scene, floor: Floor, simulate: Simulate
-) -> tuple[list[Tried], list[Refused]]:
-    """Leaders refitted and gated: those that passed, and those that did not."""
-    judged: list[tuple[Found, Standing, Gate]] = []
-    joined = []
-    for found in leaders:
-        if found.suspect.each_trial:
-            judged.append((found, *_trial_by_trial(found.suspect, standing, bench)))
-        else:
-            joined.append((found, with_extra(standing, extra_of(found, standing, bench, scene), simulate)))
-    joined.sort(key=lambda one: float(np.nan_to_num(one[1].known.cost, nan=np.inf)))
-    most = standing.known.cost - joined[0][1].known.cost if joined else 0.0
-    for place, (found, new) in enumerate(joined):
-        enough = standing.known.cost - new.known.cost >= SETTLED_SHARE * most
-        end = _settled(new, floor, simulate, leaps=0) if place < SETTLED and enough else new
-        judged.append((found, end, _gated(found, standing, end)))
-    passed = [Tried(*one) for one in judged if one[2].passed]
-    refused = [
-        Refused(identity(found.suspect), found.score.rho_eff, verdict.reasons)
-        for found, _, verdict in judged
-        if not verdict.passed
-    ]
-    return passed, refused
-
-
-def _gated(found: Found, before: Standing, after: Standing) -> Gate:
-    begin = len(before.known.value)
-    verdict = gate(before.known, after.known, range(begin, begin + len(found.suspect.amplitudes)))
-    share = explained_share(before.known, after.known)
-    if isinstance(found.suspect, CurveSuspect) and share is not None and not share >= LAW_VARIANCE:
-        reason = f"a curve that explains {100.0 * share:.0f} % of the held-out excess is no law"
-        verdict = replace(verdict, passed=False, reasons=(*verdict.reasons, reason))
-    return verdict
-
-
-def _trial_by_trial(suspect: Suspect, standing: Standing, bench: Bench) -> tuple[Standing, Gate]:
-    """A law whose size and phase are each recording's own is taken off each; every one set apart has to show it."""
-    known, experiment = standing.known, standing.known.experiment
-    precision = np.where(np.isfinite(known.parameters.sigma), known.sigma, np.inf) ** -2.0
-    plain = {experiment.reference(k): np.zeros(0) for k in range(len(experiment.repeats))}
-    plain = {drive: bench.signatures([suspect], drive) for drive in plain}
-    trials, residual, folds, strengths = list(experiment.trials), list(known.residual), [], []
-    for k, trial in enumerate(experiment.trials):
-        columns = plain[experiment.reference(trial.trajectory)]
-        whitened = known.metric[k](columns)
-        fitted = known.experiment.reference(trial.trajectory) in known.slopes
-        J = known.jacobian(k) if fitted else np.zeros((len(whitened), len(precision)))
-        background = Background.of({k: known.residual[k]}, {k: J}, precision)
-        own = score(background, Sums.over(background, {k: whitened}))
-        trials[k] = replace(trial, measured=trial.measured - (columns @ own.amplitude) * trial.valid[:, None])
-        residual[k] = known.residual[k] - whitened @ own.amplitude
-        if trial.role != "calibration":
-            strengths.append(own.gain)
-            rows = float(known.rows[k])
-            before, after = (float(z @ z) / rows for z in (known.residual[k], residual[k]))
-            bound = float(chi2.isf(FALSE_ALARM, max(own.rank, 1)))
-            folds.append(Fold(trial.name, before, after, own.gain - bound))
-    worse = tuple(fold.trial for fold in folds if fold.gain <= 0.0)
-    reasons = (f"{', '.join(worse)} do not show it",) if worse else ()
-    white = whiteness(known), whiteness(replace(known, residual=tuple(residual)))
-    changed = replace(known, experiment=replace(experiment, trials=tuple(trials)), residual=tuple(residual))
-    verdict = Gate(
-        not reasons,
-        tuple(folds),
-        bool(experiment.held_out),
-        float(np.sqrt(min(strengths, default=0.0))),
-        white,
-        reasons,
-    )
-    return replace(standing, known=changed), verdict
+def _taken(before: Standing, after: Standing, floor: Floor) -> float:
+    """Share that a law takes of what exceeds the floor; all, where nothing does."""
+    fit = before.known.experiment.fit
+    there = detected(before, floor, fit)
+    if not there.left:
+        return 1.0
+    return 1.0 - max(detected(after, floor, fit).ratio - 1.0, 0.0) / (there.ratio - 1.0)
 
 
 def _place(standing: Standing, floor: Floor, scene: Scene) -> Place | None:
@@ -273,23 +174,6 @@ def _place(standing: Standing, floor: Floor, scene: Scene) -> Place | None:
         return None
     cells, models, _ = cells_and_ports(standing, floor, scene.paths)
     return Place(port_test(cells, models), cells) if len(cells.z) else None
-
-
-def _detected(standing: Standing, floor: Floor, trials: Sequence[int]) -> Detection:
-    """Detection on readings from which laws that are columns of the prediction are taken off."""
-    known = standing.known
-    experiment = known.experiment
-    if standing.laws:
-        corrected = tuple(
-            replace(
-                trial,
-                measured=trial.measured
-                - (standing.shown(k) - standing.predicted[trial.drive].values) * trial.valid[:, None],
-            )
-            for k, trial in enumerate(experiment.trials)
-        )
-        experiment = replace(experiment, trials=corrected)
-    return detect(experiment, floor, standing.predicted, trials, known=known)
 
 
 def _moved(known: Known) -> tuple[Moved, ...]:

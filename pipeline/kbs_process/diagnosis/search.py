@@ -96,7 +96,8 @@ class Search:
         self.pairs = phases(hypothesis.rig, hypothesis.effects, free)
         self.polar = Polar.of(self.pairs, self.parameters)
         self.precision = self.parameters.sigma**-2.0
-        phase = np.isin(np.arange(len(free)), [pair.phase for pair in self.pairs])
+        gears = set(gearbox(experiment.rig, experiment.effects))
+        phase = np.array([one in gears for one in free], dtype=np.bool_) & ~np.isfinite(parameters.sigma)
         size = np.ones(len(free))
         size[self.inside] = np.abs(hypothesis.values([free[i] for i in self.inside]))
         size = np.where(phase, 1.0, np.maximum(size if scale is None else scale, 1e-12))
@@ -104,7 +105,6 @@ class Search:
         # A phase that nothing shows would leave the equations singular.
         self.ridge = np.where(phase, np.pi**-2.0, 0.0)
         self.differences = _DIFFERENCE * self.spread
-        gears = set(gearbox(experiment.rig, experiment.effects))
         others = set(known_parameters(experiment.rig, experiment.effects)) - gears
         self.slow = [i for i, scalar in enumerate(free) if scalar in others]
         self.geared = [i for i, scalar in enumerate(free) if scalar in gears]

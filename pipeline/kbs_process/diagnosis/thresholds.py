@@ -61,6 +61,9 @@ SECOND: Final = 2
 # least this share of what the best gains.
 SETTLED: Final = 2
 SETTLED_SHARE: Final = 0.5
+# Share that a law has to take of what exceeds the floor, after all numbers were refitted with it: one that takes little
+# and leaves the rest follows what something else does.
+TAKEN: Final = 0.25
 ROUNDS: Final = 5  # finds in one campaign at most
 
 # -- two laws ------------------------------------------------------------------------------------------------------

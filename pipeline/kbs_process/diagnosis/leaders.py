@@ -1,0 +1,172 @@
+"""Leaders of a screen, one after the other put into the plant, refitted and gated."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.stats import chi2
+
+from kbs_process.diagnosis.curves import CurveSuspect
+from kbs_process.diagnosis.detection import Detection, detect
+from kbs_process.diagnosis.finding import Tried, explained_share
+from kbs_process.diagnosis.floor import Floor
+from kbs_process.diagnosis.gate import Fold, Gate, gate, whiteness
+from kbs_process.diagnosis.gls import Background, Sums, score
+from kbs_process.diagnosis.hypothesis import Simulate
+from kbs_process.diagnosis.joint import Standing, standing_of, with_extra
+from kbs_process.diagnosis.known import settled
+from kbs_process.diagnosis.outcome import Refused
+from kbs_process.diagnosis.plausible import implausible
+from kbs_process.diagnosis.scene import Scene
+from kbs_process.diagnosis.screen import Bench, Catalogued, Found, Screening, Suspect
+from kbs_process.diagnosis.thresholds import (
+    FALSE_ALARM,
+    LAW_VARIANCE,
+    LEAD,
+    LEADERS,
+    ORDERED,
+    SECOND,
+    SETTLED,
+    SETTLED_SHARE,
+)
+from kbs_process.diagnosis.tryout import extra_of, identity
+
+
+def leaders(screening: Screening, excess: float) -> tuple[list[Found], list[Found]]:
+    """The most probable suspects, as many as the linear plant may have in the wrong order, and a few that come next.
+
+    A law that repeats predicts what was not recorded; one whose size and phase are each recording's own does not. It
+    leads only where none that repeats does half of what it does.
+    """
+    able = [found for found in screening.candidates if found.significant and not found.absorbed]
+    repeating = [found for found in able if not found.suspect.each_trial]
+    if repeating and 2.0 * repeating[0].score.gain >= able[0].score.gain:
+        able = repeating
+    if not able:
+        return [], []
+    bound = (1.0 - LEAD) * able[0].score.gain
+    # Where even the best does little of what there is to do, the plant is far from linear, and so is their order.
+    if able[0].score.gain < ORDERED * excess:
+        bound = 0.0
+    first = [found for found in able if found.score.gain >= bound or found is able[0]][:LEADERS]
+    return first, [found for found in able if found not in first][:SECOND]
+
+
+def tried(
+    chosen: Sequence[Found], standing: Standing, bench: Bench, scene: Scene, floor: Floor, simulate: Simulate
+) -> tuple[list[Tried], list[Refused]]:
+    """Leaders refitted and gated: those that passed, and those that did not."""
+    judged: list[tuple[Found, Standing, Gate]] = []
+    joined = []
+    for found in chosen:
+        if found.suspect.each_trial:
+            judged.append((found, *_trial_by_trial(found.suspect, standing, bench)))
+        else:
+            joined.append((found, with_extra(standing, extra_of(found, standing, bench, scene), simulate)))
+    joined.sort(key=lambda one: float(np.nan_to_num(one[1].known.cost, nan=np.inf)))
+    most = standing.known.cost - joined[0][1].known.cost if joined else 0.0
+    for place, (found, new) in enumerate(joined):
+        enough = standing.known.cost - new.known.cost >= SETTLED_SHARE * most
+        end = resettled(new, floor, simulate, leaps=0) if place < SETTLED and enough else new
+        judged.append((found, end, _gated(found, standing, end)))
+    passed = [Tried(*one) for one in judged if one[2].passed]
+    refused = [
+        Refused(identity(found.suspect), found.score.rho_eff, verdict.reasons)
+        for found, _, verdict in judged
+        if not verdict.passed
+    ]
+    return passed, refused
+
+
+def _gated(found: Found, before: Standing, after: Standing) -> Gate:
+    begin = len(before.known.value)
+    verdict = gate(before.known, after.known, range(begin, begin + len(found.suspect.amplitudes)))
+    share = explained_share(before.known, after.known)
+    if isinstance(found.suspect, CurveSuspect) and share is not None and not share >= LAW_VARIANCE:
+        reason = f"a curve that explains {100.0 * share:.0f} % of the held-out excess is no law"
+        verdict = replace(verdict, passed=False, reasons=(*verdict.reasons, reason))
+    numbers = zip(after.known.value[begin:], after.known.sigma[begin:], strict=True)
+    return _plausible(verdict, found.suspect, list(numbers))
+
+
+def _plausible(verdict: Gate, suspect: Suspect, numbers: Sequence[tuple[float, float]]) -> Gate:
+    """The verdict on a law of the catalogue whose amplitudes have such values and sigmas."""
+    if not isinstance(suspect, Catalogued):
+        return verdict
+    sizes = {name: (float(a), float(b)) for name, (a, b) in zip(suspect.amplitudes, numbers, strict=False)}
+    reasons = (*verdict.reasons, *implausible(suspect.candidate.effect, sizes))
+    return replace(verdict, passed=not reasons, reasons=reasons)
+
+
+def _trial_by_trial(suspect: Suspect, standing: Standing, bench: Bench) -> tuple[Standing, Gate]:
+    """A law whose size and phase are each recording's own is taken off each; every one set apart has to show it."""
+    known, experiment = standing.known, standing.known.experiment
+    precision = np.where(np.isfinite(known.parameters.sigma), known.sigma, np.inf) ** -2.0
+    plain = {experiment.reference(k): np.zeros(0) for k in range(len(experiment.repeats))}
+    plain = {drive: bench.signatures([suspect], drive) for drive in plain}
+    trials, residual, folds, strengths = list(experiment.trials), list(known.residual), [], []
+    greatest: list[tuple[float, float]] = [(0.0, 0.0)] * len(suspect.amplitudes)
+    for k, trial in enumerate(experiment.trials):
+        columns = plain[experiment.reference(trial.trajectory)]
+        whitened = known.metric[k](columns)
+        fitted = known.experiment.reference(trial.trajectory) in known.slopes
+        J = known.jacobian(k) if fitted else np.zeros((len(whitened), len(precision)))
+        background = Background.of({k: known.residual[k]}, {k: J}, precision)
+        own = score(background, Sums.over(background, {k: whitened}))
+        trials[k] = replace(trial, measured=trial.measured - (columns @ own.amplitude) * trial.valid[:, None])
+        residual[k] = known.residual[k] - whitened @ own.amplitude
+        sigma = np.sqrt(np.diag(own.covariance))
+        greatest = [
+            max(one, other, key=lambda number: abs(number[0]))
+            for one, other in zip(greatest, zip(own.amplitude, sigma, strict=True), strict=True)
+        ]
+        if trial.role != "calibration":
+            strengths.append(own.gain)
+            rows = float(known.rows[k])
+            before, after = (float(z @ z) / rows for z in (known.residual[k], residual[k]))
+            bound = float(chi2.isf(FALSE_ALARM, max(own.rank, 1)))
+            folds.append(Fold(trial.name, before, after, own.gain - bound))
+    worse = tuple(fold.trial for fold in folds if fold.gain <= 0.0)
+    reasons = (f"{', '.join(worse)} do not show it",) if worse else ()
+    if len(folds) < 2:
+        reasons = (*reasons, "one recording alone cannot show that it comes again")
+    white = whiteness(known), whiteness(replace(known, residual=tuple(residual)))
+    changed = replace(known, experiment=replace(experiment, trials=tuple(trials)), residual=tuple(residual))
+    verdict = Gate(
+        not reasons,
+        tuple(folds),
+        bool(experiment.held_out),
+        float(np.sqrt(min(strengths, default=0.0))),
+        white,
+        reasons,
+    )
+    return replace(standing, known=changed), _plausible(verdict, suspect, greatest)
+
+
+def resettled(standing: Standing, floor: Floor, simulate: Simulate, *, leaps: int) -> Standing:
+    """All numbers refitted with the law in the plant, or on its prediction, if that takes away more."""
+    known = standing.known
+    at_floor = not detected(standing, floor, known.experiment.fit).left
+    if known.experiment.drives[0].schedule is None or (leaps and at_floor):
+        return standing
+    moved = settled(known, simulate, leaps=leaps, laws=standing.laws)
+    return standing_of(moved, standing.laws, simulate) if moved.cost < known.cost else standing
+
+
+def detected(standing: Standing, floor: Floor, trials: Sequence[int]) -> Detection:
+    """Detection on readings from which laws that are columns of the prediction are taken off."""
+    known = standing.known
+    experiment = known.experiment
+    if standing.laws:
+        corrected = tuple(
+            replace(
+                trial,
+                measured=trial.measured
+                - (standing.shown(k) - standing.predicted[trial.drive].values) * trial.valid[:, None],
+            )
+            for k, trial in enumerate(experiment.trials)
+        )
+        experiment = replace(experiment, trials=corrected)
+    return detect(experiment, floor, standing.predicted, trials, known=known)
