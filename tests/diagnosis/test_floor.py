@@ -136,3 +136,13 @@ def test_projector_takes_free_nuisances_out_and_bounded_ones_within_their_prior(
     b = np.concatenate([z, np.zeros(3)])
     left = b - A @ np.linalg.lstsq(A, b, rcond=None)[0]
     assert float(np.sum(project(z) ** 2)) == pytest.approx(float(left @ left), rel=1e-9)
+
+
+def test_of_two_floors_the_smaller_is_taken_whichever_comes_first() -> None:
+    """A model that is wrong about what differs from run to run adds that to what repeats differ by."""
+    one = made(5, 3, np.zeros((N, CHANNELS)))
+    right = {k: trial.measured for k, trial in enumerate(one.trials)}
+    wrong = {k: x + 3.0 * k * coloured(np.random.default_rng(90 + k), N) for k, x in right.items()}
+    floors = floor.estimate(one, right), floor.estimate(one, wrong)
+    assert floor.smaller(*floors) is floors[0]
+    assert floor.smaller(*reversed(floors)) is floors[0]

@@ -153,7 +153,7 @@ def _round(standing: Standing, floor: Floor, simulate: Simulate) -> _Round:
     share = _taken(standing, passed[best].standing, floor)
     if share < TAKEN:
         found = passed[best].found
-        reason = f"takes {100.0 * share:.0f} % of what is there, the best of all, and that explains nothing"
+        reason = f"takes {100.0 * share:.0f} % of what exceeds the floor: it follows what something else does"
         refused.append(Refused(identity(found.suspect), found.score.rho_eff, (reason,)))
         return _Round(None, standing, screening, tuple(refused), place)
     find = find_of(passed, best, chances, standing, screening, place)
