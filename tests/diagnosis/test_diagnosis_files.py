@@ -16,46 +16,49 @@ from kbs_process.campaign.load import load_campaign
 from kbs_process.diagnosis.detection import Detection
 from kbs_process.diagnosis.floor import declared
 from kbs_process.diagnosis.gate import Fold, Gate
+from kbs_process.diagnosis.joint import standing_of
+from kbs_process.diagnosis.measured import inserted
 from kbs_process.diagnosis.next_test import Proposal, Tried
 from kbs_process.diagnosis.outcome import Alternative, Curve, Estimate, Find, Identity, Outcome, Refused
 from kbs_process.diagnosis.trajectories import family, limits_of
+from kbs_process.plant.effects.measured_law import COEFFICIENTS
 from kbs_process.report.records.common import load
 from kbs_process.report.records.diagnosis import DiagnosisResults
-from kbs_process.stages.output_error import Scalar
 
 LAW = Identity("external wrench", "el", (), "unnamed", "curve over joint angle")
 CABLE = Identity("external wrench", "el", (), "cable", "ground_cable")
 NOTHING = Detection((), -1.0, 1.0)
-NUMBERS = tuple(f"c{k}" for k in range(10))
+NODES, SIGMA = np.full(COEFFICIENTS, 0.5), np.full(COEFFICIENTS, 0.01)
 
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A curve beside the plant was found; a cable was not refused by these recordings."""
+    """A curve was found, inside the plant; a cable was not refused by these recordings."""
     before = standing(bench.experiment(bench.rig(), ("fit", "held-out"), 4))
     known, experiment = before.known, before.known.experiment
-    scalars = tuple(Scalar(f"law.ground_torque of joint_angle.el.{name}") for name in NUMBERS)
-    spread = np.diag(np.concatenate([np.diag(known.covariance), np.full(10, 0.01**2)]))
+    law, ends = ("ground_torque", "joint_angle"), (1.25, 1.30)
+    hypothesis, scalars = inserted(before.hypothesis, law, "el", ends, NODES, SIGMA)
+    spread = np.diag(np.concatenate([np.diag(known.covariance), SIGMA**2]))
     found = replace(
         known,
+        hypothesis=hypothesis,
         free=(*known.free, *scalars),
-        value=np.concatenate([known.value, np.full(10, 0.5)]),
+        value=np.concatenate([known.value, NODES]),
         covariance=spread,
         parameters=replace(
             known.parameters,
             names=(*known.parameters.names, *(one.name for one in scalars)),
-            value=np.concatenate([known.parameters.value, np.zeros(10)]),
-            sigma=np.concatenate([known.parameters.sigma, np.full(10, np.inf)]),
+            value=np.concatenate([known.parameters.value, np.zeros(COEFFICIENTS)]),
+            sigma=np.concatenate([known.parameters.sigma, np.full(COEFFICIENTS, np.inf)]),
         ),
     )
-    columns = {one.name: {0: np.zeros((240, 8))} for one in scalars}
-    x = np.linspace(1.25, 1.30, 101)
+    x = np.linspace(*ends, 101)
     find = Find(
         identity=LAW,
         named=False,
         equation="cubic spline",
         reference="measured",
-        estimates=tuple(Estimate(name, "", 0.5, 0.01) for name in NUMBERS),
+        estimates=tuple(Estimate(one.name.rpartition(".")[2], "", 0.5, 0.01) for one in scalars),
         probability=0.9,
         rho=40.0,
         rho_eff=30.0,
@@ -80,7 +83,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
         left=None,
         whiteness=(1.0, 1.0),
         looked_at=10,
-        standing=replace(before, known=found, laws=columns),
+        standing=standing_of(found, before.laws, bench.serial(experiment)),
     )
     trajectory = family(limits_of(experiment.drives, experiment.dt), ("az", "el"), 60.0, "el")[0]
     proposal = Proposal(
@@ -118,7 +121,14 @@ def test_the_corrected_model_has_the_curve_in_its_plant(written: Path) -> None:
     assert float(quantities["joint.el.drive.ground_angle_law_3"]) == 0.5
     assert float(quantities["joint.el.drive.ground_angle_law_3"].sigma) == pytest.approx(0.01)
     assert float(quantities["joint.el.drive.ground_angle_law_high"]) == pytest.approx(1.30)
-    assert quantities["joint.el.drive.Ka"].source.startswith("by diagnosis of r0")
+    assert float(quantities["joint.az.drive.ground_angle_law_3"]) == 0.0  # it does not act there
+    for name in (
+        "el.drive.Ka",
+        "el.drive.ground_angle_law_3",
+        "el.drive.ground_angle_law_high",
+        "az.drive.ground_angle_law_3",
+    ):
+        assert quantities[f"joint.{name}"].source.startswith("by diagnosis of r0"), name
 
 
 def test_the_next_test_can_be_simulated(written: Path) -> None:

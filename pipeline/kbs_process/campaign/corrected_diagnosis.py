@@ -13,7 +13,6 @@ from kbs_process.campaign.corrected_model import write_model
 from kbs_process.campaign.sensing_laws import belongs_to_model
 from kbs_process.diagnosis.hypothesis import Hypothesis
 from kbs_process.diagnosis.joint import Standing
-from kbs_process.diagnosis.measured import with_curves
 from kbs_process.diagnosis.outcome import Find, Outcome
 from kbs_process.diagnosis.suspects import BY
 from kbs_process.plant.effect import Uniform
@@ -35,12 +34,10 @@ def write_corrected(campaign: Campaign, outcome: Outcome, folder: Path) -> tuple
     """Write the model into `folder`; return its files."""
     known = outcome.standing.known
     source = "by diagnosis of " + ", ".join(known.experiment.trials[k].name for k in known.experiment.fit)
-    hypothesis = _within_a_turn(with_curves(outcome.standing, outcome.finds))
+    hypothesis = _within_a_turn(outcome.standing.hypothesis)
     quantities = hypothesis.rig.quantities()
     # Matrices may lie in files of their own, which the corrected model would not find.
     changed: dict[str, Quantity] = {name: q for name, q in quantities.items() if q.value.ndim > 1}
-    within = outcome.standing.hypothesis.rig.quantities()
-    changed |= {name: replace(q, source=source) for name, q in quantities.items() if name not in within}
     for index, scalar in enumerate(known.free):
         if scalar.quantity in quantities:
             quantity = changed.get(scalar.quantity, quantities[scalar.quantity])

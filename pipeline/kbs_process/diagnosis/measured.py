@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +11,7 @@ from kbs_process.diagnosis.curves import CurveSuspect
 from kbs_process.diagnosis.gls import Score
 from kbs_process.diagnosis.hypothesis import Hypothesis
 from kbs_process.diagnosis.joint import Extra, Standing
-from kbs_process.diagnosis.outcome import Curve, Find
+from kbs_process.diagnosis.outcome import Curve
 from kbs_process.diagnosis.suspects import next_action
 from kbs_process.plant.attach import attach
 from kbs_process.plant.effect import Effect
@@ -99,29 +99,6 @@ def extra(suspect: CurveSuspect, score: Score, standing: Standing) -> Extra:
         # One size for all: a coefficient that is zero by chance has a slope as well.
         scale=np.full(COEFFICIENTS, max(float(np.abs(score.amplitude).max()), 5.0 * float(size.min()))),
     )
-
-
-def with_curves(standing: Standing, finds: Sequence[Find]) -> Hypothesis:
-    """Return the hypothesis with every measured law that was found beside the plant now inside it."""
-    hypothesis, known = standing.hypothesis, standing.known
-    places = {scalar.name: index for index, scalar in enumerate(known.free)}
-    told: dict[str, int] = {}
-    for find in finds:
-        if find.curve is None:
-            continue
-        law = law_of(find.identity.port, find.curve)
-        tag = f"law.{law[0]} of {law[1]}.{find.identity.axis}.c"
-        own = [places[name] for name in standing.laws if name.startswith(tag)]
-        begin = told.get(tag, 0)
-        chosen = own[begin : begin + COEFFICIENTS]
-        if not chosen:  # it is in the plant already
-            continue
-        told[tag] = begin + COEFFICIENTS
-        ends = float(find.curve.x[0]), float(find.curve.x[-1])
-        hypothesis, _ = inserted(
-            hypothesis, law, find.identity.axis, ends, known.value[chosen], known.sigma[chosen]
-        )
-    return hypothesis
 
 
 def law_of(port: str, curve: Curve) -> tuple[str, str]:
