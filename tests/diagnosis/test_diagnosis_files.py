@@ -94,7 +94,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     told = write_diagnosis(
         campaign, declared(experiment), known, before.predicted, outcome, target, False, proposal
     )
-    assert told.verdict_lines[0] == "Left out of the model: curve over joint angle (external wrench, el)."
+    assert told.verdict_lines[0] == "The model lacks: curve over joint angle (external wrench, el)."
     assert told.verdict_lines[-1] == f"Next test: {target / 'next-test.csv'}"
     return target
 
@@ -109,6 +109,7 @@ def test_results_read_back_and_the_page_tells_them(written: Path) -> None:
     assert results.next_test.recordings == 3
     assert results.next_test.sigma is None
     page = (written / "index.html").read_text()
+    assert "<strong>Physics left out</strong>" in page
     assert "cannot tell curve over joint angle" in page.replace("\u00a0", " ")
     for kind in ("residual", "residual_spectrum"):
         assert {path.stem for path in (written / "tables" / kind).iterdir()} == {"r0", "r1"}

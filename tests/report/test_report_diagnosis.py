@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import get_args
 
 import msgspec
 import numpy as np
@@ -124,6 +125,19 @@ def test_a_find_is_told_with_its_law_its_gate_and_its_rivals(tmp_path: Path) -> 
 
 def test_nothing_found_is_said(tmp_path: Path) -> None:
     assert "No law passed the gate" in page(tmp_path, results())
+
+
+def test_it_is_headed_by_its_answer(tmp_path: Path) -> None:
+    headings = {
+        "none": "No mismatch",
+        "parameters off": "Parameters off",
+        "physics": "Physics left out",
+        "undecided": "Undecided",
+    }
+    assert set(headings) == set(get_args(d.Answer))
+    for answer, heading in headings.items():
+        text = page(tmp_path / heading, msgspec.structs.replace(results(), answer=answer))
+        assert re.findall("<strong>(.*?)</strong>", text)[:1] == [heading]
 
 
 def next_test(**changed: object) -> d.NextTest:

@@ -34,7 +34,7 @@ _NOTES = (
     "Channels are whitened in their order: each is judged given those before it.",
 )
 _WORDS = {
-    "none": "No mismatch beyond what repeats differ by.",
+    "none": "Nothing exceeds what repeats of one trajectory differ by.",
     "parameters off": "Known parameters are off; no physics was left out that these recordings show.",
     "undecided": "There is a mismatch, and no law passed the gate.",
 }
@@ -48,14 +48,15 @@ def results_of(
     files: Sequence[str],
     proposal: Proposal | None,
 ) -> records.DiagnosisResults:
-    sentence = _sentence(outcome)
     finds = tuple(_find(find, known.experiment) for find in outcome.finds)
     trials = tuple(_trials(known, outcome.standing.known))
     return records.DiagnosisResults(
         name=campaign.name,
         title=campaign.title,
         article=campaign.article,
-        verdict=Conclusion(status="none", sentence=sentence),
+        verdict=Conclusion(
+            status="undecided" if outcome.verdict == "undecided" else "none", sentence=_sentence(outcome)
+        ),
         provenance=provenance.made(f"kbs-process diagnose {campaign.name}", campaign),
         answer=outcome.verdict,
         paragraph=_paragraph(outcome, finds, trials),
@@ -91,7 +92,7 @@ def _sentence(outcome: Outcome) -> str:
     if not outcome.finds:
         return _WORDS[outcome.verdict] + _located(outcome)
     told = [f"{_words(find.identity.law)} ({_where(place_of(find.identity))})" for find in outcome.finds]
-    return f"Left out of the model: {'; '.join(told)}."
+    return f"The model lacks: {'; '.join(told)}."
 
 
 def _located(outcome: Outcome) -> str:

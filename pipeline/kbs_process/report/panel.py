@@ -157,3 +157,4 @@ class Head:
     about: str
     conclusion: Conclusion
     version: str  # of what made the results
+    headline: str = ""  # in place of the conclusion's status, where a report does not judge requirements

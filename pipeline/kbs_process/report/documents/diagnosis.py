@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from kbs_process.report.document import Document
 from kbs_process.report.panel import Head, Panel
 from kbs_process.report.panels import provenance
 from kbs_process.report.panels.diagnosis import answer, finds, next_test, remaining, search
-from kbs_process.report.records.diagnosis import DiagnosisResults
+from kbs_process.report.records.diagnosis import Answer, DiagnosisResults
 from kbs_process.report.tables import Tables
+
+_HEADLINES: Mapping[Answer, str] = {
+    "none": "No mismatch",
+    "parameters off": "Parameters off",
+    "physics": "Physics left out",
+    "undecided": "Undecided",
+}
 
 
 def head(results: DiagnosisResults) -> Head:
@@ -19,6 +28,7 @@ def head(results: DiagnosisResults) -> Head:
         results.article,
         results.verdict,
         results.provenance.version,
+        _HEADLINES[results.answer],
     )
 
 
