@@ -39,7 +39,7 @@ def find() -> d.Find:
         family="harness",
         named=True,
         place=place,
-        equation="T = -k (q - q0)",
+        equation=r"$T = -k (\theta_l - \theta_0)$ at the joint.",
         reference="harness handbook",
         parameters=(d.Fitted(name="k_harness", unit="N m/rad", value=0.8, sigma=0.05, low=0.7, high=0.9),),
         probability=0.93,
@@ -111,7 +111,9 @@ def page(folder: Path, found: d.DiagnosisResults) -> str:
 def test_a_find_is_told_with_its_law_its_gate_and_its_rivals(tmp_path: Path) -> None:
     text = page(tmp_path, results(find()))
     for said in (
-        "T = -k (q - q0)",
+        r'aria-label="T = -k (\theta_l - \theta_0)"',
+        " at the joint.",
+        "Source: harness handbook.",
         "k_harness",
         "0.7000 to 0.9000",
         "dahl",
@@ -120,6 +122,7 @@ def test_a_find_is_told_with_its_law_its_gate_and_its_rivals(tmp_path: Path) -> 
         "joint.el.drive.Ka",
     ):
         assert said in text.replace("\u00a0", " "), said
+    assert "$" not in re.sub(r"<(script|style)>.*?</\1>", "", text, flags=re.DOTALL)
     assert "RIG&lt;7&gt;" in text
 
 

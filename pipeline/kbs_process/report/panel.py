@@ -109,6 +109,23 @@ class Text:
 
 
 @dataclass(frozen=True, slots=True)
+class Formula:
+    """Mathematics as an outline, an SVG path in hundredths of an em."""
+
+    tex: str
+    outline: str
+    box: tuple[float, float, float, float]  # left, top, width, height
+
+
+@dataclass(frozen=True, slots=True)
+class Equation:
+    """A sentence with formulas in it."""
+
+    parts: tuple[str | Formula, ...]
+    kind: Literal["equation"] = "equation"
+
+
+@dataclass(frozen=True, slots=True)
 class Notices:
     """Warnings, each with its severity, place and remedy."""
 
@@ -134,7 +151,7 @@ class Link:
     kind: Literal["link"] = "link"
 
 
-Block = Figure | Grid | Text | Notices | Fold | Link
+Block = Figure | Grid | Text | Equation | Notices | Fold | Link
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from kbs_process.report.figures import diagnosis as figures
+from kbs_process.report.figures.formula import equation
 from kbs_process.report.panel import Block, Caption, Cell, Figure, Grid, Panel, Text
 from kbs_process.report.panels.diagnosis.answer import where
 from kbs_process.report.records.diagnosis import DiagnosisResults, Find
@@ -39,7 +40,9 @@ def _find(find: Find) -> Iterator[Block]:
         f"{percent(find.absorbed, 2)} of its signature.{alike}"
     )
     if find.equation:
-        yield Text(find.equation, (f"Source: {find.reference}",) if find.reference else ())
+        yield equation(find.equation)
+    if find.reference:
+        yield Text(f"Source: {find.reference}.", tone="muted")
     rows = tuple(
         (
             entry.name,
