@@ -36,8 +36,9 @@ class Bench:
 
     hardware: Hardware
     trajectories: tuple[Commands, ...]  # the last one is held out
+    calibration: Commands | None
     rates: tuple[float, float]  # Hz, of wrench and encoders
-    settings: tuple[Setting, ...]  # of the trajectories that models are fitted to
+    settings: tuple[Setting, ...]  # of all that models are fitted to, the calibration last
     readings: tuple[Array, ...]
     columns: tuple[dict[Named, Array], ...]
 
@@ -48,7 +49,8 @@ class Bench:
 
     def spans(self) -> Array:
         """Least and greatest reading of each channel, (6, 2), in the trajectory that moves it farthest."""
-        return paths.farthest([readings[:, :6] for readings in self.readings])
+        readings = self.readings[: len(self.fitted)]
+        return paths.farthest([one[:, :6] for one in readings])
 
     def extra(self, effects: Sequence[Effect], duration: float) -> Extra:
         """What the engine lets act."""
@@ -65,19 +67,29 @@ class Bench:
         return strength(self.settings, changes)
 
 
-def measure(hardware: Hardware, trajectories: Sequence[Commands], rates: tuple[float, float]) -> Bench:
-    """Work out the metric of a rig along all trajectories but the last, each driven twice."""
+def measure(
+    hardware: Hardware,
+    trajectories: Sequence[Commands],
+    rates: tuple[float, float],
+    calibration: Commands | None = None,
+) -> Bench:
+    """Work out the metric of a rig along all trajectories but the last, each driven twice, and a calibration."""
     settings, readings, sensitivities = [], [], []
-    for path in trajectories[:-1]:
+    driven = [(path, _REPEATS) for path in trajectories[:-1]]
+    if calibration is not None:
+        driven.append((calibration, 1))
+    for path, repeats in driven:
         motion = Motion.of(hardware, path)
         seen = motion.observed()
         common, varying = columns(motion)
         whiten = Whitening.of(hardware, seen, *rates)
         stacked = whiten(np.stack(list(common.values()), axis=2))
-        settings.append(Setting(motion, whiten, _REPEATS, stacked, own_columns(whiten, seen, varying)))
+        settings.append(Setting(motion, whiten, repeats, stacked, own_columns(whiten, seen, varying)))
         readings.append(seen)
         sensitivities.append(common)
-    return Bench(hardware, tuple(trajectories), rates, tuple(settings), tuple(readings), tuple(sensitivities))
+    return Bench(
+        hardware, tuple(trajectories), calibration, rates, tuple(settings), tuple(readings), tuple(sensitivities)
+    )  # fmt: skip
 
 
 def beyond(

@@ -100,7 +100,7 @@ def _generators(spec: Spec) -> list[np.random.SeedSequence]:
 
 def prepare(spec: Spec, folder: Path) -> tuple[Bench, list[dict[str, Any]]]:
     """Write the parameter files; draw hardware and trajectories; work out the metric."""
-    article, drawn, motions, _, _, off = _generators(spec)
+    article, drawn, motions, _, runs, off = _generators(spec)
     rng = np.random.default_rng(article)
     loop = str(rng.choice(["open", "closed"]))
     articles.write(folder, rng, spec.split, loop)
@@ -110,7 +110,8 @@ def prepare(spec: Spec, folder: Path) -> tuple[Bench, list[dict[str, Any]]]:
     nominal = Hardware.from_campaign(folder)
     hardware = _hardware(nominal, spec, np.random.default_rng(drawn))
     trajectories = paths.draw(np.random.default_rng(motions), spec.split, 3)
-    bench = measure(hardware, trajectories, (wrench_hz, encoder_hz))
+    calibration = paths.calibration(np.random.default_rng(runs.spawn(2)[1]))
+    bench = measure(hardware, trajectories, (wrench_hz, encoder_hz), calibration)
     if spec.kind != "beyond":
         return bench, []
     hardware, moved = beyond(bench, nominal, np.random.default_rng(off), spec.split)
@@ -214,11 +215,11 @@ def _record(
     names, starts, *streams = seed.spawn(10)
     runs = _runs(np.random.default_rng(names), len(bench.trajectories))
     start = int(np.random.default_rng(starts).integers(_EPOCH_FIRST, _EPOCH_LAST))
-    calibration = paths.calibration(np.random.default_rng(starts))
     (folder / "recordings").mkdir(exist_ok=True)
     checked: list[dict[str, Any]] = []
     for k, run in enumerate(runs):
-        path = calibration if run.path < 0 else bench.trajectories[run.path]
+        path = bench.calibration if run.path < 0 else bench.trajectories[run.path]
+        assert path is not None
         recording = record(
             bench.hardware,
             path,
