@@ -19,7 +19,16 @@ from kbs_process.diagnosis.gate import Fold, Gate
 from kbs_process.diagnosis.joint import standing_of
 from kbs_process.diagnosis.measured import inserted
 from kbs_process.diagnosis.next_test import Proposal, Tried
-from kbs_process.diagnosis.outcome import Alternative, Curve, Estimate, Find, Identity, Outcome, Refused
+from kbs_process.diagnosis.outcome import (
+    Absorbed,
+    Alternative,
+    Curve,
+    Estimate,
+    Find,
+    Identity,
+    Outcome,
+    Refused,
+)
 from kbs_process.diagnosis.trajectories import family, limits_of
 from kbs_process.plant.effects.measured_law import COEFFICIENTS
 from kbs_process.report.records.common import load
@@ -27,6 +36,7 @@ from kbs_process.report.records.diagnosis import DiagnosisResults
 
 LAW = Identity("external wrench", "el", (), "unnamed", "curve over joint angle")
 CABLE = Identity("external wrench", "el", (), "cable", "ground_cable")
+DRAG = Identity("joint torque", "el", (), "friction", "joint_viscous")
 NOTHING = Detection((), -1.0, 1.0)
 NODES, SIGMA = np.full(COEFFICIENTS, 0.5), np.full(COEFFICIENTS, 0.01)
 
@@ -78,7 +88,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
         moved=(),
         finds=(find,),
         refused=(Refused(CABLE, 28.0, ("r1 predicted no better",)),),
-        absorbed=(),
+        absorbed=(Absorbed(DRAG, 0.999, 12.0, ("joint.el.drive.b_m",)),),
         place=None,
         left=None,
         whiteness=(1.0, 1.0),
@@ -105,6 +115,11 @@ def test_results_read_back_and_the_page_tells_them(written: Path) -> None:
     assert not find.named
     assert {one.unit for one in find.parameters} == {"N m"}
     assert find.rivals[0].name == "ground_cable"
+    assert [(one.name, one.distance, one.absorbed, one.outcome) for one in results.suspects] == [
+        ("curve over joint angle", 30.0, 0.1, "accepted"),
+        ("ground_cable", 28.0, None, "refused: r1 predicted no better"),
+        ("joint_viscous", 12.0, 0.999, "absorbed by joint.el.drive.b_m"),
+    ]
     assert results.next_test is not None
     assert results.next_test.recordings == 3
     assert results.next_test.sigma is None

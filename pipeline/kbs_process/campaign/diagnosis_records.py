@@ -262,31 +262,19 @@ def _ports(outcome: Outcome) -> Iterator[records.PortTest]:
 
 
 def _suspects(outcome: Outcome) -> Iterator[records.Suspect]:
-    for find in outcome.finds:
+    entries = (
+        *((one.identity, one.rho_eff, one.kappa, "accepted") for one in outcome.finds),
+        *((one.identity, one.rho_eff, None, f"refused: {'; '.join(one.reasons)}") for one in outcome.refused),
+        *((one.identity, one.rho, one.kappa, f"absorbed by {', '.join(one.by)}") for one in outcome.absorbed),
+    )
+    for identity, distance, absorbed, said in entries:
         yield records.Suspect(
-            name=find.identity.law,
-            family=find.identity.family,
-            place=place_of(find.identity),
-            distance=find.rho_eff,
-            absorbed=find.kappa,
-            outcome="accepted",
-        )
-    for refused in outcome.refused:
-        yield records.Suspect(
-            name=refused.identity.law,
-            family=refused.identity.family,
-            place=place_of(refused.identity),
-            distance=refused.rho_eff,
-            outcome=f"refused: {'; '.join(refused.reasons)}",
-        )
-    for taken in outcome.absorbed:
-        yield records.Suspect(
-            name=taken.identity.law,
-            family=taken.identity.family,
-            place=place_of(taken.identity),
-            distance=taken.rho,
-            absorbed=taken.kappa,
-            outcome=f"absorbed by {', '.join(taken.by)}",
+            name=identity.law,
+            family=identity.family,
+            place=place_of(identity),
+            distance=distance,
+            absorbed=absorbed,
+            outcome=said,
         )
 
 
