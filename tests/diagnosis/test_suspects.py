@@ -13,8 +13,9 @@ from kbs_process.campaign.load import load_campaign
 from kbs_process.diagnosis.families import FAMILIES, PORTS, family, port_word
 from kbs_process.diagnosis.hypothesis import Tapped
 from kbs_process.diagnosis.inlets import Inlet
+from kbs_process.diagnosis.places import half_lengths, point_of
 from kbs_process.diagnosis.ranges import Ranges, ranges_of
-from kbs_process.diagnosis.signature import field_change, inputs, point_of, port_inputs, sensed
+from kbs_process.diagnosis.signature import field_change, inputs, port_inputs, sensed
 from kbs_process.diagnosis.suspects import Candidate, candidates
 from kbs_process.diagnosis.transfer import follow, respond
 from kbs_process.plant.attach import attach
@@ -152,6 +153,30 @@ def test_a_force_on_a_link_is_a_wrench_about_the_transducer() -> None:
     lever = np.array([x * np.cos(q) - z * np.sin(q), y, height])
     M0 = np.array([column[Inlet("external_wrench", "el", axis)][0] for axis in ("Tx", "Ty", "Tz")])
     np.testing.assert_allclose(M0, np.cross(lever, F0), atol=1e-9)
+
+
+def test_an_area_in_the_air_is_looked_for_around_the_link() -> None:
+    """Where the homogeneous box of the antenna's mass and inertia has its faces, whichever joint moves them."""
+    drags = [s for s in suspects() if (s.name, s.site) == ("air_drag", "el")]
+    (antenna,) = (body for body in rig().bodies if body.on == "el")
+    reach = half_lengths(rig(), "el")
+    mass = float(antenna.mass)
+    box = mass / 3.0 * (np.sum(reach**2) - reach**2)  # inertia of a box with such half sides
+    np.testing.assert_allclose(box, antenna.inertia.value[:3])
+    places = np.array([drag.point for drag in drags]) - antenna.cog.value
+    expected = np.vstack([np.zeros(3), *(np.outer([-a, a], np.eye(3)[k]) for k, a in enumerate(reach))])
+    np.testing.assert_allclose(places, expected, atol=1e-12)
+    assert {s.point for s in suspects() if s.name == "tether" and s.site == "el"} == {
+        tuple(antenna.cog.value)
+    }
+    # Azimuth alone: sideways, in proportion to the square of the distance from its axis.
+    turned = Tapped(RATE, tapped().columns, np.zeros((2000, len(tapped().columns))))
+    turned.values[:, turned.columns.index("joint_angle.az")] = 0.03 * np.arange(2000) / RATE
+    for drag in drags:
+        assert drag.point is not None
+        force = port_inputs(drag, turned, rig())[:, 0]
+        speed = 0.03 * np.hypot(*drag.point[:2])
+        np.testing.assert_allclose(np.linalg.norm(force, axis=1), (speed / 0.01) ** 2, rtol=1e-6)
 
 
 def test_a_floor_shakes_along_one_axis_at_a_time() -> None:

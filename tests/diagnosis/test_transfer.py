@@ -10,8 +10,9 @@ import pytest
 
 from kbs_process.diagnosis.hypothesis import Hypothesis, predict
 from kbs_process.diagnosis.inlets import Inlet
+from kbs_process.diagnosis.places import points_of
 from kbs_process.diagnosis.scene import Scene, rebinned
-from kbs_process.diagnosis.signature import inputs, point_of
+from kbs_process.diagnosis.signature import inputs
 from kbs_process.diagnosis.suspects import Candidate
 from kbs_process.diagnosis.transfer import amplified, respond
 from kbs_process.plant.attach import attach
@@ -29,13 +30,14 @@ CASES = [
     ("joint_order", "el", {"joint_order": 150.0}, "joint_sin", 0.2, 0.08),
     ("ground_cable", "el", {}, "cable_spring", 0.5, 0.06),
     ("bungee", "el", {"anchor_x": 0.1, "anchor_y": 0.0, "anchor_z": 2.0, "free_length": 1.2}, "stiffness", 0.5, 0.03),
+    ("air_drag", "el", {}, "air_drag", 0.5, 0.15),
 ]  # fmt: skip
 
 
 def suspect(name: str, site: str, shape: dict[str, float]) -> Candidate:
     effect = next(one for one in CATALOGUE if one.name == name)
     middle = {p.name: p.prior.middle for p in effect.parameters if p.role == "shape"} | shape
-    return Candidate(effect, site, tuple(middle.items()))
+    return Candidate(effect, site, tuple(middle.items()), points_of(effect, bench.rig(), site)[-1])
 
 
 @pytest.fixture(scope="module")
@@ -58,7 +60,7 @@ def acting(rig: Rig, candidate: Candidate, amplitudes: dict[str, float]) -> Rig:
     if effect.port.of_drive:
         return attach(rig, effect, values, joints=[candidate.site])
     values |= {p.name: 0.0 for p in effect.parameters if p.role == "amplitude" and p.name not in values}
-    return attach(rig, effect, values, on=candidate.site, point=point_of(rig, candidate.site))
+    return attach(rig, effect, values, on=candidate.site, point=np.array(candidate.point))
 
 
 def whitened(x: Array) -> Array:

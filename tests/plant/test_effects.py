@@ -49,6 +49,8 @@ class TestCatalogue:
         assert np.isfinite(result).all()
         if effect.port is Port.MOTOR_FRICTION:
             assert torque >= 0.0  # the plant opposes motion with it
+        elif effect.passive and effect.port is Port.EXTERNAL_FORCE:
+            assert result @ np.array([values[name] for name in ("vx", "vy", "vz")]) <= 0.0
         elif effect.passive:
             rate = "rotor_rate" if effect.port is Port.MOTOR_TORQUE else "joint_rate"
             assert torque * values[rate] <= 0.0

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from kbs_process.campaign.config import Campaign, RecordingEntry
-from kbs_process.plant.effect import Effect, Port
+from kbs_process.plant.effect import Effect
 from kbs_process.plant.effects import select
-from kbs_process.plant.external import external_wrench
+from kbs_process.plant.external import external_wrench, pulls_at_rest
 from kbs_process.rig.model import Rig, substitute
 from kbs_process.signals.records import WRENCH_CHANNELS, Array, Run, Signal
 from kbs_process.stages.motion import Motion
@@ -25,8 +25,8 @@ _SHARED = (
 
 
 def forces_in(campaign: Campaign, entry: RecordingEntry) -> tuple[Effect, ...]:
-    """Return the forces of the laboratory that acted in a recording."""
-    return tuple(effect for effect in select(campaign.acting(entry)) if effect.port is Port.EXTERNAL_FORCE)
+    """Return the forces of the laboratory that acted in a recording, at rest too."""
+    return tuple(effect for effect in select(campaign.acting(entry)) if pulls_at_rest(effect))
 
 
 def relieved(campaign: Campaign, entry: RecordingEntry, run: Run, motion: Motion) -> Run:

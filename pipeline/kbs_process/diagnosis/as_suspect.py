@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 
 import numpy as np
 
 from kbs_process.diagnosis.curves import CurveSuspect, basis
 from kbs_process.diagnosis.measured import law_of
 from kbs_process.diagnosis.outcome import Estimate, Find
+from kbs_process.diagnosis.places import POINT, Place
 from kbs_process.diagnosis.scene import Scene
 from kbs_process.diagnosis.screen import Catalogued, Suspect
 from kbs_process.diagnosis.suspects import BY, Candidate
@@ -39,7 +41,7 @@ def suspect_of(find: Find, scene: Scene) -> tuple[Suspect, Array] | None:
     if not all(entry.name in numbers for entry in law.parameters if entry.role != "shared"):
         return None
     shape = tuple((e.name, numbers[e.name].value) for e in law.parameters if e.role == "shape")
-    candidate = Candidate(law, site, shape)
+    candidate = Candidate(law, site, shape, _point(numbers))
     return Catalogued(candidate, scene), np.array([numbers[e.name].value for e in candidate.amplitudes])
 
 
@@ -48,6 +50,14 @@ def _numbers(find: Find) -> dict[str, Estimate]:
     return {re.sub(r"_[2-9]$", "", one.name): one for one in find.estimates} | {
         one.name: one for one in find.estimates
     }
+
+
+def _point(numbers: Mapping[str, Estimate]) -> Place | None:
+    """Where a force acts, if that was fitted."""
+    if not all(name in numbers for name in POINT):
+        return None
+    x, y, z = (numbers[name].value for name in POINT)
+    return x, y, z
 
 
 def sigma_of(find: Find, suspect: Suspect, amplitude: Array) -> Array:

@@ -13,11 +13,14 @@ from kbs_process.diagnosis.gate import Gate
 from kbs_process.diagnosis.joint import Standing
 from kbs_process.diagnosis.known import Known
 from kbs_process.diagnosis.outcome import Alternative, Curve, Estimate, Find, Place
+from kbs_process.diagnosis.places import POINT
 from kbs_process.diagnosis.rivals import rivalry
 from kbs_process.diagnosis.screen import Catalogued, Found, Screening, Suspect
 from kbs_process.diagnosis.thresholds import RIVALS
 from kbs_process.diagnosis.tryout import UNNAMED, identity, in_plant, port_label
 from kbs_process.signals.records import Array
+
+_ELEMENTS = {f"point[{k}]": name for k, name in enumerate(POINT)}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -102,10 +105,10 @@ def _equation(suspect: Suspect) -> str:
 def _estimates(taken: Tried, before: Standing) -> tuple[Estimate, ...]:
     suspect, known = taken.found.suspect, taken.standing.known
     begin = len(before.known.value)
-    units: dict[str, str] = {}
+    units = dict.fromkeys(POINT, "m")
     fixed: dict[str, float] = {}
     if isinstance(suspect, Catalogued):
-        units = {entry.name: entry.unit for entry in suspect.candidate.effect.parameters}
+        units |= {entry.name: entry.unit for entry in suspect.candidate.effect.parameters}
         fixed = dict(suspect.candidate.shape)
     if suspect.each_trial:
         spread = np.sqrt(np.diag(taken.found.score.covariance))
@@ -129,7 +132,8 @@ def _estimates(taken: Tried, before: Standing) -> tuple[Estimate, ...]:
 
 
 def _short(name: str, plant: bool) -> str:
-    return name.rpartition(".")[2] if plant or "." in name else name
+    short = name.rpartition(".")[2] if plant or "." in name else name
+    return _ELEMENTS.get(short, short)
 
 
 def explained_share(before: Known, after: Known) -> float | None:

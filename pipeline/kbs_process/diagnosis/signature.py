@@ -14,6 +14,7 @@ from scipy.interpolate import CubicSpline
 
 from kbs_process.diagnosis.hypothesis import Tapped
 from kbs_process.diagnosis.inlets import BASE_PORT, WRENCH_PORT, Inlet
+from kbs_process.diagnosis.places import point_of
 from kbs_process.diagnosis.suspects import AXES, BY, Candidate, own_values
 from kbs_process.plant.along import along, signals_of
 from kbs_process.plant.effect import Effect, Port
@@ -25,7 +26,7 @@ from kbs_process.rig.model import TRANSDUCER, Rig
 from kbs_process.signals.frames import rotate
 from kbs_process.signals.records import WRENCH_CHANNELS, Array
 
-_POSITION = ("x", "y", "z")  # signals of an effect at a point
+_POSITION = ("x", "y", "z")  # signals of an effect at a point; its velocity is their slopes
 
 
 def port_inputs(candidate: Candidate, tapped: Tapped, rig: Rig) -> Array:
@@ -39,7 +40,7 @@ def port_inputs(candidate: Candidate, tapped: Tapped, rig: Rig) -> Array:
     columns = {name: k for k, name in enumerate(tapped.columns)}
     signals: dict[str, Array] = {"time": np.arange(len(tapped.values)) / tapped.rate}
     if effect.port is Port.EXTERNAL_FORCE:
-        signals |= dict(zip(_POSITION, _way(rig, candidate.site, tapped).T, strict=True))
+        signals |= dict(zip(_POSITION, _way(rig, candidate, tapped).T, strict=True))
     elif effect.port.of_drive:
         needed = [name for name in signals_of(effect) if name != "time"]
         signals |= {name: tapped.values[:, columns[f"{name}.{candidate.site}"]] for name in needed}
@@ -52,24 +53,15 @@ def port_inputs(candidate: Candidate, tapped: Tapped, rig: Rig) -> Array:
     return whole[:, [every.index(entry.name) for entry in candidate.amplitudes]]
 
 
-def point_of(rig: Rig, link: str) -> Array:
-    """Where a force of the laboratory is taken to act on a link: at the CoG of its bodies, (3,) m in its axes."""
-    bodies = [body for body in rig.bodies if body.on == link]
-    mass = sum(float(body.mass) for body in bodies)
-    if mass == 0.0:
-        return np.zeros(3)
-    moment = np.sum([float(body.mass) * body.cog.value for body in bodies], axis=0)
-    return np.asarray(moment / mass, dtype=np.float64)
-
-
-def _way(rig: Rig, link: str, tapped: Tapped) -> Array:
-    """Position (m, 3) of `point_of` a link from T's origin, in the undeflected T's axes."""
+def _way(rig: Rig, candidate: Candidate, tapped: Tapped) -> Array:
+    """Position (m, 3) of a candidate's point from T's origin, in the undeflected T's axes."""
     columns = {name: k for k, name in enumerate(tapped.columns)}
     q = tapped.values[:, [columns[f"joint_angle.{name}"] for name in rig.joint_names]]
     still = np.zeros_like(q)
     links = kinematics(rig, q, still, still)
-    T, moved = links[TRANSDUCER], links[link]
-    from_T = moved.r + rotate(moved.R, point_of(rig, link)) - T.r
+    T, moved = links[TRANSDUCER], links[candidate.site]
+    point = point_of(rig, candidate.site) if candidate.point is None else np.array(candidate.point)
+    from_T = moved.r + rotate(moved.R, point) - T.r
     way: Array = np.einsum("nji,nj->ni", T.R, from_T)
     return way
 
@@ -95,7 +87,7 @@ def inputs(
     if candidate.port is Port.BASE_ACCELERATION:
         return [{Inlet(BASE_PORT, "", site): values[:, a, AXES.index(site)]} for a in range(values.shape[1])]
     if candidate.port is Port.EXTERNAL_FORCE:
-        way = _way(rig, site, tapped)
+        way = _way(rig, candidate, tapped)
         middle = 0.5 * (way + np.vstack([way[1:], way[-1:]]))
         wrenches = [np.hstack([values[:, a], np.cross(middle, values[:, a])]) for a in range(values.shape[1])]
         return [

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 
+from kbs_process.diagnosis.places import Place, points_of
 from kbs_process.diagnosis.ranges import Ranges
 from kbs_process.plant.along import signals_of
 from kbs_process.plant.effect import Effect, Parameter, Port, instance
@@ -30,6 +31,7 @@ class Candidate:
     effect: Effect | Sensing
     site: str
     shape: tuple[tuple[str, float], ...]  # every parameter that is neither an amplitude nor shared
+    point: Place | None = None  # of a force: where it acts on the link; None is the CoG
 
     @property
     def name(self) -> str:
@@ -81,11 +83,12 @@ def candidates(
     """
     left_out = [effect for effect in CATALOGUE if effect.name not in nominal]
     plant = [
-        Candidate(effect, site, shape)
+        Candidate(effect, site, shape, point)
         for law in left_out
         if any(entry.role == "amplitude" for entry in law.parameters)
         for site in _sites(law, rig, columns)
         for effect in [next_action(law, rig, site, accepted)]
+        for point in points_of(effect, rig, site)
         for shape in _grid(effect, site, ranges, own_values(rig, site))
     ]
     sensing = [

@@ -11,9 +11,9 @@ from kbs_process.diagnosis.hypothesis import Hypothesis
 from kbs_process.diagnosis.joint import Extra, Standing
 from kbs_process.diagnosis.localise import PortName
 from kbs_process.diagnosis.outcome import Identity
+from kbs_process.diagnosis.places import half_lengths, point_of
 from kbs_process.diagnosis.scene import Scene
 from kbs_process.diagnosis.screen import Bench, Catalogued, Found, Suspect
-from kbs_process.diagnosis.signature import point_of
 from kbs_process.diagnosis.suspects import BY
 from kbs_process.plant.attach import attach
 from kbs_process.plant.effect import Effect, LogNormal, Port
@@ -22,6 +22,7 @@ from kbs_process.plant.sensing import SensingPort
 from kbs_process.stages.output_error import Scalar
 
 UNNAMED = "unnamed"
+_NEAR = 0.05  # m: steps of a search for a point are no less
 
 
 def identity(suspect: Suspect) -> Identity:
@@ -63,7 +64,7 @@ def in_plant(suspect: Suspect) -> bool:
 
 
 def extra_of(found: Found, standing: Standing, bench: Bench, scene: Scene) -> Extra:
-    """The suspect at the screen's amplitudes, its amplitudes without a prior."""
+    """The suspect at the screen's amplitudes; they have no prior, nor has the point of a force `anywhere`."""
     suspect, amplitude = found.suspect, found.score.amplitude
     if not in_plant(suspect):
         tag = ".".join(suspect.family)
@@ -89,7 +90,9 @@ def extra_of(found: Found, standing: Standing, bench: Bench, scene: Scene) -> Ex
             f"joint.{candidate.site}.drive",
         )
     else:
-        point = point_of(present.rig, candidate.site)
+        point = (
+            point_of(present.rig, candidate.site) if candidate.point is None else np.array(candidate.point)
+        )
         rig = attach(present.rig, effect, values, on=candidate.site, point=point)
         path = f"external.{effect.name}"
     effects = tuple(one.name for one in select([*dict.fromkeys([*present.effects, effect.name])]))
@@ -98,7 +101,10 @@ def extra_of(found: Found, standing: Standing, bench: Bench, scene: Scene) -> Ex
         if entry.role == "shape" and isinstance(entry.prior, LogNormal) and not _counted(entry.name)
     ]  # fmt: skip
     size = np.sqrt(np.maximum(np.diag(found.score.covariance), 0.0))
-    start = np.array([*amplitude, *(shape[name] for name in bends)])
+    place, reach = np.zeros(0), np.zeros(0)
+    if effect.anywhere:
+        place, reach = point, np.maximum(half_lengths(present.rig, candidate.site), _NEAR)
+    begin = np.array([shape[name] for name in bends])
     widths = [
         shape[entry.name] * entry.prior.sigma
         for entry in effect.parameters
@@ -106,11 +112,14 @@ def extra_of(found: Found, standing: Standing, bench: Bench, scene: Scene) -> Ex
     ]
     return Extra(
         hypothesis=Hypothesis(rig, effects),
-        plant=tuple(Scalar(f"{path}.{name}") for name in (*suspect.amplitudes, *bends)),
-        start=start,
-        prior=np.array([*(0.0 * amplitude), *(shape[name] for name in bends)]),
-        sigma=np.array([*np.full(len(amplitude), np.inf), *widths]),
-        scale=np.array([*np.maximum(np.abs(amplitude), 5.0 * size), *widths]),
+        plant=(
+            *(Scalar(f"{path}.{name}") for name in (*suspect.amplitudes, *bends)),
+            *(Scalar(f"{path}.point", (k,)) for k in range(len(place))),
+        ),
+        start=np.concatenate([amplitude, begin, place]),
+        prior=np.concatenate([0.0 * amplitude, begin, place]),
+        sigma=np.concatenate([np.full(len(amplitude), np.inf), widths, np.full(len(place), np.inf)]),
+        scale=np.concatenate([np.maximum(np.abs(amplitude), 5.0 * size), widths, reach]),
     )
 
 

@@ -176,7 +176,8 @@ class Effect:
     rig, an equation returns three components.
     What acts at the ground's port belongs to the test, unless it is part `of_article`.
     `passive` claims that it never does positive work; the conformance test holds it to that. What comes from outside
-    has amplitudes of its own in `each_trial`. An effect can act several times: see `instance`.
+    has amplitudes of its own in `each_trial`. A force `anywhere` is tied to no place of its link that a drawing shows:
+    a search looks for its point, too. An effect can act several times: see `instance`.
     """
 
     name: str
@@ -188,6 +189,7 @@ class Effect:
     passive: bool = False
     each_trial: bool = False
     of_article: bool = False  # although the wrench feels it at a port of the ground: an appendage
+    anywhere: bool = False  # a force whose point on its link is not known
     tag: str = ""  # what `instance` has added to the names of parameters and states
 
     def __post_init__(self) -> None:

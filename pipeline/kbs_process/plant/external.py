@@ -1,4 +1,4 @@
-"""What the laboratory's forces do to the wrench of an article at rest: it is the rig's, not the article's."""
+"""What the laboratory's forces do to the wrench and to the drives' efforts: it is the rig's, not the article's."""
 
 from __future__ import annotations
 
@@ -7,31 +7,70 @@ from collections.abc import Sequence
 import numpy as np
 
 from kbs_process.plant.effect import POINT_SIGNALS, Effect, Port
-from kbs_process.plant.rigid import LinkMotion, kinematics, links_beyond
+from kbs_process.plant.rigid import LinkMotion, axis_of, kinematics, links_beyond
 from kbs_process.plant.structure import external_of
 from kbs_process.rig.model import TRANSDUCER, Rig
 from kbs_process.signals.frames import cross, from_xyz, rotate
 from kbs_process.signals.records import Array
 
+_MOTION = ("x", "y", "z", "vx", "vy", "vz")
 _SAG_ROUNDS = 4  # each takes the error down by weight * height / stiffness, 1 % on the paper's rig
 
 
-def external_wrench(rig: Rig, effects: Sequence[Effect], q: Array) -> Array:
+def external_wrench(rig: Rig, effects: Sequence[Effect], q: Array, rates: Array | None = None) -> Array:
     r"""Change (n, 6) of the wrench on the transducer, about T's origin, in T, by the forces among `effects`.
 
-    Equation: $W(f) - W(0)$ at joint angles q (n, joints), where T's plate gives way by $\alpha = K^{-1} M$, about x,
-        then y, then z: $F = Q^T (m g + f(Q r))$, $M = h \times Q^T m g + r \times Q^T f(Q r)$, with r the
-        force's point and h the first moment of mass over m, in the plate's axes that Q($\alpha$) turns.
-    Units: rad -> N, N m.
-    Validity: at rest and at time 0; gears do not yield. In motion, what is left out is the force's damping.
+    Equation: $W(f) - W(0)$ at joint angles q and rates (n, joints; at rest without), where T's plate gives way by
+        $\alpha = K^{-1} M$, about x, then y, then z: $F = Q^T (m g + f(Q r, v))$,
+        $M = h \times Q^T m g + r \times Q^T f(Q r, v)$, with r the force's point, v its velocity, and h the first
+        moment of mass over m, in the plate's axes that Q($\alpha$) turns.
+    Units: rad, rad/s -> N, N m.
+    Validity: at time 0; gears do not yield, and the plate's own rates add nothing to v. Without rates, what is left out
+        in motion is the force's damping.
     """
-    forces = [effect for effect in effects if effect.port is Port.EXTERNAL_FORCE]
+    beyond = links_beyond(rig)
+    forces = [effect for effect in _forces(effects) if external_of(rig, effect).on in beyond]
     if not forces:
         return np.zeros((len(q), 6))
-    links = kinematics(rig, q, np.zeros_like(q), np.zeros_like(q))
+    links = kinematics(rig, q, np.zeros_like(q) if rates is None else rates, np.zeros_like(q))
     loaded = _wrench(rig, links, forces)
     change: Array = loaded - _wrench(rig, links, ())
     return change
+
+
+def pulls_at_rest(effect: Effect) -> bool:
+    """Whether an effect is a force that may act on a point at rest: one that only brakes its motion is none there."""
+    asked = POINT_SIGNALS.keys() & set(effect.arguments)
+    brakes = effect.passive and asked <= set(_MOTION[3:])
+    return effect.port is Port.EXTERNAL_FORCE and not brakes
+
+
+def external_efforts(rig: Rig, effects: Sequence[Effect], q: Array, rates: Array) -> Array:
+    r"""What the drives put in against the forces among `effects` to move as they do, (n, joints), N m or N.
+
+    Equation: $\Delta \tau_j = -e_j \cdot (r - p_j) \times f$ of a joint that turns about $e_j$ through $p_j$,
+        $-e_j \cdot f$ of one that slides, for each force on a link that the joint carries.
+    Validity: as `external_wrench`, of a transducer that does not give way.
+    """
+    efforts = np.zeros(q.shape)
+    links = kinematics(rig, q, rates, np.zeros_like(q))
+    R_LT = links[TRANSDUCER].R
+    for effect in _forces(effects):
+        external = external_of(rig, effect)
+        assert external.point is not None
+        link = links[external.on]
+        place = link.r + rotate(link.R, external.point.value)
+        f = rotate(R_LT, _force(rig, effect, links, _point(links, external.on, external.point.value)))
+        for index, joint in enumerate(rig.joints):
+            if external.on in links_beyond(rig, joint.name):
+                turn, slide = joint.screw
+                along = turn * cross(place - links[joint.name].r, f) + slide * f
+                efforts[:, index] -= np.sum(axis_of(joint, links[joint.parent]) * along, axis=1)
+    return efforts
+
+
+def _forces(effects: Sequence[Effect]) -> list[Effect]:
+    return [effect for effect in effects if effect.port is Port.EXTERNAL_FORCE]
 
 
 def _wrench(rig: Rig, links: dict[str, LinkMotion], forces: Sequence[Effect]) -> Array:
@@ -56,9 +95,7 @@ def _wrench(rig: Rig, links: dict[str, LinkMotion], forces: Sequence[Effect]) ->
             external = external_of(rig, effect)
             assert external.point is not None
             r = _point(links, external.on, external.point.value)
-            f = rotate(
-                Q_t, _force(effect, {n: float(v) for n, v in external.parameters.items()}, rotate(Q, r))
-            )
+            f = rotate(Q_t, _force(rig, effect, links, rotate(Q, r)))
             force, moment = force + f, moment + cross(r, f)
         wrench = np.concatenate([force, moment], axis=1)
     return wrench
@@ -70,7 +107,17 @@ def _point(links: dict[str, LinkMotion], on: str, place: Array) -> Array:
     return rotate(np.swapaxes(T.R, 1, 2), link.r + rotate(link.R, place) - T.r)
 
 
-def _force(effect: Effect, parameters: dict[str, float], r: Array) -> Array:
-    """The force (n, 3) on a point at rest at r (n, 3)."""
-    rest = dict.fromkeys(POINT_SIGNALS, 0.0) | parameters
-    return np.array([effect.value(rest | {"x": x, "y": y, "z": z}) for x, y, z in r.tolist()])
+def _velocity(links: dict[str, LinkMotion], on: str, place: Array) -> Array:
+    """Velocity (n, 3) of a link's point in the laboratory, along T's axes."""
+    link = links[on]
+    return rotate(np.swapaxes(links[TRANSDUCER].R, 1, 2), link.v + cross(link.omega, rotate(link.R, place)))
+
+
+def _force(rig: Rig, effect: Effect, links: dict[str, LinkMotion], r: Array) -> Array:
+    """The force (n, 3) at r (n, 3), its velocity that of its place on its link, along the undeflected T's axes."""
+    external = external_of(rig, effect)
+    assert external.point is not None
+    known = dict.fromkeys(POINT_SIGNALS, 0.0)
+    known |= {name: float(quantity) for name, quantity in external.parameters.items()}
+    moved = np.hstack([r, _velocity(links, external.on, external.point.value)]).tolist()
+    return np.array([effect.value(known | dict(zip(_MOTION, row, strict=True))) for row in moved])

@@ -1,7 +1,7 @@
 """Effects along a measured motion: what they add to the loads of a rig that its motion drives.
 
 The motion is what it is, whatever acts: an effect shows only in what the drives have to put in against it. What acts
-between a joint's two links leaves no trace in the wrench beneath them.
+between a joint's two links leaves no trace in the wrench beneath them; a force of the laboratory does.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import numpy as np
 
 from kbs_process.plant.along import along, signals_of
 from kbs_process.plant.effect import Effect, Port
+from kbs_process.plant.external import external_efforts, external_wrench
 from kbs_process.rig.model import Joint, Rig
 from kbs_process.signals.averages import instants
 from kbs_process.signals.records import Array
@@ -27,13 +28,22 @@ RIGID = {
 def added_loads(rig: Rig, effects: Sequence[Effect], q: Array, dt: float) -> Array:
     r"""What effects add to `rigid.loads` along a motion q (n, joints), (n, 6 + joints) in its order and units.
 
-    Equation: $\Delta \tau_j = -T_j$ of an effect on the output, $-R_j T_j$ of one on the rotor, over the effort's gain.
+    Equation: $\Delta \tau_j = -T_j$ of an effect on the output, $-R_j T_j$ of one on the rotor, over the effort's gain;
+        of a force on a link, `external_wrench` and `external_efforts`.
     Validity: stiff transmission, angles good to the rates that an effect asks for. Effects of other ports, and of
         drives that have not their parameters, add nothing.
     """
     added = np.zeros((len(q), 6 + len(rig.joints)))
+    efforts = np.zeros((len(q), len(rig.joints)))
+    if any(effect.port is Port.EXTERNAL_FORCE for effect in effects):
+        rates = np.gradient(q, dt, axis=0)
+        added[:, :6] = external_wrench(rig, effects, q, rates)
+        efforts = external_efforts(rig, effects, q, rates)
     for index, joint in enumerate(rig.joints):
-        if joint.effort is None or joint.drive is None:
+        if joint.effort is None:
+            continue
+        added[:, 6 + index] = efforts[:, index] / float(joint.effort.gain)
+        if joint.drive is None:
             continue
         known = {name: float(quantity) for name, quantity in joint.drive.parameters.items()}
         for effect in effects:

@@ -32,6 +32,7 @@ class LinkMotion:
 
     R: Array  # (n, 3, 3) R_L,link
     r: Array  # (n, 3) origin, m
+    v: Array  # (n, 3) of the origin, m/s
     omega: Array  # (n, 3) rad/s
     alpha: Array  # (n, 3) rad/s^2
     accel: Array  # (n, 3) of the origin, gravity taken off, m/s^2
@@ -82,7 +83,7 @@ def joint_efforts(rig: Rig, q: Array, qd: Array, qdd: Array) -> Array:
     for index, joint in enumerate(rig.joints):
         link, carrier = links[joint.name], links[joint.parent]
         force, moment = _reaction(rig, links, links_beyond(rig, joint.name), link.r)
-        e = _axis(joint, carrier)
+        e = axis_of(joint, carrier)
         turn, slide = joint.screw
         efforts[:, index] = -np.sum(e * (turn * moment + slide * force), axis=1)
         if joint.viscous is not None:
@@ -149,24 +150,25 @@ def kinematics(rig: Rig, q: Array, qd: Array, qdd: Array) -> dict[str, LinkMotio
     n = len(q)
     upward = np.broadcast_to([0.0, 0.0, float(rig.gravity)], (n, 3))
     still = np.zeros((n, 3))
-    links = {LAB: LinkMotion(np.broadcast_to(np.eye(3), (n, 3, 3)), still, still, still, upward)}
+    links = {LAB: LinkMotion(np.broadcast_to(np.eye(3), (n, 3, 3)), still, still, still, still, upward)}
 
     def place_transducer(carrier: str) -> None:
         base = links[carrier]
         R = base.R @ from_tilt(rig.transducer.tilt.value)
-        links[TRANSDUCER] = LinkMotion(R, base.r, base.omega, base.alpha, base.accel)
+        links[TRANSDUCER] = LinkMotion(R, base.r, base.v, base.omega, base.alpha, base.accel)
 
     if rig.transducer.on == LAB:
         place_transducer(LAB)
     for index, joint in enumerate(rig.joints):
         parent, (turn, slide) = links[joint.parent], joint.screw
         R_J = from_rotation_vector(joint.misalignment.value)
-        e = _axis(joint, parent)
+        e = axis_of(joint, parent)
         rate, acceleration = e * qd[:, index, None], e * qdd[:, index, None]
         d = rotate(parent.R, joint.origin.value) + slide * e * q[:, index, None]
         links[joint.name] = LinkMotion(
             R=parent.R @ R_J @ about_axis(np.asarray(joint.axis, dtype=float), turn * q[:, index]),
             r=parent.r + d,
+            v=parent.v + cross(parent.omega, d) + slide * rate,
             omega=parent.omega + turn * rate,
             alpha=parent.alpha + turn * (acceleration + cross(parent.omega, rate)),
             accel=_accel_at(parent, d) + slide * (acceleration + 2.0 * cross(parent.omega, rate)),
@@ -176,7 +178,7 @@ def kinematics(rig: Rig, q: Array, qd: Array, qdd: Array) -> dict[str, LinkMotio
     return links
 
 
-def _axis(joint: Joint, carrier: LinkMotion) -> Array:
+def axis_of(joint: Joint, carrier: LinkMotion) -> Array:
     """The joint's axis (n, 3) in the laboratory's axes."""
     return rotate(carrier.R, from_rotation_vector(joint.misalignment.value) @ np.asarray(joint.axis))
 
@@ -245,7 +247,7 @@ def _rotors(rig: Rig, links: dict[str, LinkMotion], beyond: frozenset[str]) -> A
             continue
         carrier, link = links[joint.parent], links[joint.name]
         Jr, ratio = float(joint.drive.rotor_inertia), float(joint.drive.ratio)
-        e = _axis(joint, carrier)
+        e = axis_of(joint, carrier)
         rate = _along(link.omega - carrier.omega, e)
         acceleration = _along(link.alpha - carrier.alpha, e)
         spin = _along(carrier.omega, e) + ratio * rate

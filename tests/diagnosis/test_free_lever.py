@@ -1,0 +1,56 @@
+"""A force whose point nobody knows: the screen tries a few, and the fit in the plant finds it from the wrench."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import bench
+import numpy as np
+import pytest
+
+from kbs_process.diagnosis.families import port_word
+from kbs_process.diagnosis.hypothesis import Hypothesis, predict
+from kbs_process.diagnosis.joint import with_extra
+from kbs_process.diagnosis.places import points_of
+from kbs_process.diagnosis.scene import Scene
+from kbs_process.diagnosis.screen import Bench, Catalogued, screen
+from kbs_process.diagnosis.suspects import Candidate
+from kbs_process.diagnosis.tryout import extra_of, identity
+from kbs_process.plant.attach import attach
+from kbs_process.plant.effects import select
+from kbs_process.plant.effects.air_drag import AIR_DRAG
+from kbs_process.stages.output_error import Scalar
+
+DRAG, POWER, POINT = 0.8, 1.75, np.array([0.3, -0.1, 0.12])  # N at 0.01 m/s, 1, m
+FREE = (Scalar("body.antenna.cog", (0,)), Scalar("joint.el.drive.Ka"))
+
+
+def test_the_point_of_a_drag_is_found_beside_its_size_and_power() -> None:
+    made = bench.experiment(bench.rig(), ("fit", "fit"), 5)
+    names = tuple(one.name for one in select([*made.effects, AIR_DRAG.name]))
+    truth = attach(made.rig, AIR_DRAG, {"air_drag": DRAG, "air_drag_power": POWER}, on="el", point=POINT)
+    bare = predict(Hypothesis(made.rig, made.effects), made, 0).values
+    added = predict(Hypothesis(truth, names), made, 0).values - bare
+    trials = tuple(replace(t, measured=t.measured + added * t.valid[:, None]) for t in made.trials)
+    here = bench.standing(replace(made, trials=trials), FREE)
+    scene = Scene.of(here.known.experiment, here.hypothesis, here.predicted)
+    tried = Bench.of(here.known, scene)
+    every = [
+        Candidate(AIR_DRAG, site, (("air_drag_power", 2.0),), point)
+        for site in ("az", "el")
+        for point in points_of(AIR_DRAG, made.rig, site)
+    ]
+    best = screen(tried, [Catalogued(one, scene) for one in every]).candidates[0]
+    own = identity(best.suspect)
+    assert (own.port, own.axis, own.family) == ("external wrench", "el", "air drag")
+    assert port_word(AIR_DRAG.name, AIR_DRAG.port) == "external wrench"
+    after = with_extra(here, extra_of(best, here, tried, scene), bench.serial(made)).known
+    found = {s.name.removeprefix("external.air_drag."): k for k, s in enumerate(after.free)}
+    # A short swing tells size from distance by a few percent: the search ends where little more is to be gained.
+    expected = {"air_drag": (DRAG, 0.25), "air_drag_power": (POWER, 0.05)}
+    expected |= {f"point[{k}]": (POINT[k], 0.04) for k in range(3)}
+    for name, (value, near) in expected.items():
+        number = after.value[found[name]]
+        print(f"{name}: {number:.4f} +- {after.sigma[found[name]]:.4f}, true {value}")
+        assert number == pytest.approx(value, abs=near)
+    assert after.level < 1.1 < 100.0 < here.known.level
