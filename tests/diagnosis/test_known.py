@@ -8,7 +8,7 @@ import pytest
 from diagnosis import bench
 from kbs_process.diagnosis import floor
 from kbs_process.diagnosis.hypothesis import Hypothesis, predict
-from kbs_process.diagnosis.known import Known, refit
+from kbs_process.diagnosis.known import Known, confined, refit
 from kbs_process.diagnosis.parameters import COUPLING, known_parameters, prior, slopes
 from kbs_process.rig.model import substitute
 from kbs_process.signals.records import Array
@@ -73,3 +73,13 @@ def test_priors_are_those_of_the_files_wherever_a_search_begins(found: Known) ->
     elsewhere = substitute(found.hypothesis.rig, {"body.antenna.mass": 14.5})
     free = [scalar for scalar in found.free if scalar.quantity == "body.antenna.mass"]
     assert prior(elsewhere, found.experiment.rig, found.hypothesis.effects, free).value == [14.0]
+
+
+def test_numbers_confined_stay_nearer_to_what_is_known_and_leave_more(found: Known) -> None:
+    reach = 0.5
+    assert np.nanmax(np.abs(found.moved)) > 1.2 * reach
+    held = confined(found, bench.serial(found.experiment), reach)
+    assert np.nanmax(np.abs(held.moved)) <= reach * (1.0 + 1e-9)
+    assert held.cost > found.cost + 25.0
+    # what it hands on may go where it could before
+    assert held.parameters.upper == pytest.approx(found.parameters.upper)

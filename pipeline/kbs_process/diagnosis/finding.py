@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import chi2
 
-from kbs_process.diagnosis.curves import REGRESSORS, CurveSuspect
+from kbs_process.diagnosis.curves import REGRESSORS, CurveSuspect, basis
 from kbs_process.diagnosis.gate import Gate
 from kbs_process.diagnosis.joint import Standing
 from kbs_process.diagnosis.known import Known
@@ -147,13 +147,29 @@ def explained_share(before: Known, after: Known) -> float | None:
 
 
 def _curve(suspect: CurveSuspect, taken: Tried, before: Standing) -> Curve:
-    begin = len(before.known.value)
     known = taken.standing.known
     x = np.linspace(suspect.knots[0], suspect.knots[-1], 101)
-    basis = suspect.basis(x)
-    C = known.covariance[begin:, begin:]
-    spread = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", basis, C, basis), 0.0))
-    return Curve(suspect.regressor, REGRESSORS[suspect.regressor], x, basis @ known.value[begin:], spread)
+    return _drawn(suspect.regressor, x, known, range(len(before.known.value), len(known.value)))
+
+
+def _drawn(regressor: str, x: Array, known: Known, own: Sequence[int]) -> Curve:
+    """The curve whose coefficients are some numbers, `own`, over x that spans its knots."""
+    columns = basis(x, float(x[0]), float(x[-1]))
+    index = np.asarray(own)
+    C = known.covariance[np.ix_(index, index)]
+    spread = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", columns, C, columns), 0.0))
+    return Curve(regressor, REGRESSORS[regressor], x, columns @ known.value[index], spread)
+
+
+def as_it_stands(find: Find, names: Sequence[str], known: Known) -> Find:
+    """A find with its numbers, `names`, as they are after all others were found."""
+    own = [known.names.index(name) for name in names]
+    fitted = [
+        replace(one, value=float(known.value[k]), sigma=float(known.sigma[k]))
+        for one, k in zip(find.estimates, own, strict=False)
+    ]
+    curve = find.curve and _drawn(find.curve.regressor, find.curve.x, known, own)
+    return replace(find, estimates=(*fitted, *find.estimates[len(own) :]), curve=curve)
 
 
 def merged(finds: Sequence[Find]) -> tuple[Find, ...]:

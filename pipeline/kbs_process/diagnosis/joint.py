@@ -6,13 +6,13 @@ anew. What acts on the readings alone, or is a measured law, has a column of the
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from kbs_process.diagnosis.hypothesis import Hypothesis, Prediction, Simulate
-from kbs_process.diagnosis.known import Known, known_of
+from kbs_process.diagnosis.known import Known, known_of, settled
 from kbs_process.diagnosis.search import OWN, Laws, Search, added
 from kbs_process.estimation.fit import Parameters
 from kbs_process.signals.records import Array
@@ -89,6 +89,25 @@ def with_extra(standing: Standing, extra: Extra, simulate: Simulate) -> Standing
     return standing_of(known_of(search, found, known.chi2_before), laws, simulate)
 
 
+def without(standing: Standing, names: Sequence[str], simulate: Simulate) -> Standing:
+    """Refit all other numbers of `standing` with a law's own, `names`, taken out: its amplitudes are zero then."""
+    known = standing.known
+    own = np.isin(known.names, names)
+    amplitudes = own & ~np.isfinite(known.parameters.sigma)
+    inside = [known.free[i] for i in np.flatnonzero(amplitudes) if known.names[i] not in standing.laws]
+    others = [int(i) for i in np.flatnonzero(~own)]
+    rest = replace(
+        known,
+        hypothesis=known.hypothesis.at(inside, np.zeros(len(inside))),
+        free=tuple(known.free[i] for i in others),
+        parameters=_chosen(known.parameters, others),
+        value=known.value[others],
+        slopes={drive: replace(one, columns=one.columns[others]) for drive, one in known.slopes.items()},
+    )
+    laws = {name: columns for name, columns in standing.laws.items() if name not in names}
+    return standing_of(settled(rest, simulate, leaps=1, laws=laws), laws, simulate)
+
+
 def standing_of(known: Known, laws: Laws, simulate: Simulate) -> Standing:
     """What is believed, with the plant's own predictions."""
     drives = range(len(known.experiment.drives))
@@ -110,4 +129,15 @@ def _extended(parameters: Parameters, extra: Extra) -> Parameters:
         sigma=np.concatenate([parameters.sigma, extra.sigma]),
         lower=np.concatenate([parameters.lower, lower]),
         upper=np.concatenate([parameters.upper, upper]),
+    )
+
+
+def _chosen(parameters: Parameters, index: Sequence[int]) -> Parameters:
+    assert parameters.lower is not None and parameters.upper is not None
+    return Parameters(
+        tuple(parameters.names[i] for i in index),
+        parameters.value[index],
+        parameters.sigma[index],
+        parameters.lower[index],
+        parameters.upper[index],
     )

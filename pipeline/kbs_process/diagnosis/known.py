@@ -11,19 +11,23 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.stats import chi2
 
 from kbs_process.diagnosis.experiment import Experiment
 from kbs_process.diagnosis.floor import Floor
 from kbs_process.diagnosis.hypothesis import Hypothesis, Simulate
 from kbs_process.diagnosis.metric import Metric, metrics
 from kbs_process.diagnosis.parameters import Slopes, known_parameters, prior, within
-from kbs_process.diagnosis.search import Found, Laws, Search
+from kbs_process.diagnosis.search import ALL, Found, Laws, Search
 from kbs_process.estimation.fit import Check, Parameters
 from kbs_process.signals.records import Array
 from kbs_process.stages.output_error import Scalar
 
 # Sigmas, from which a parameter is said to be off: of a hundred that are not, one in 160 campaigns has one.
 MOVED = 4.0
+# Chance below which all together are said to be off: no single one need be, where many make up for what was left out.
+STRAINED = 1e-3
+CONFINED = 6  # steps of a refit that is to be looked at, not kept
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -89,6 +93,16 @@ class Known:
     def prior_chi2(self) -> float:
         return float(np.nansum(self.moved**2))
 
+    @property
+    def stated(self) -> int:
+        """How many numbers have a prior."""
+        return int(np.isfinite(self.parameters.sigma).sum())
+
+    @property
+    def strained(self) -> bool:
+        """Whether all numbers together are farther from their priors than chance has them."""
+        return self.stated > 0 and bool(chi2.sf(self.prior_chi2, self.stated) < STRAINED)
+
     def jacobian(self, trial: int) -> Array:
         """(rows, p) by which a trial's prediction answers to the parameters, whitened as its residual is."""
         reference = self.experiment.reference(self.experiment.trials[trial].trajectory)
@@ -126,6 +140,19 @@ def settled(known: Known, simulate: Simulate, *, leaps: int, laws: Laws | None =
     search, begun = _again(known, simulate, laws)
     renewed = replace(begun, gradients=search.slopes(begun.theta, begun.gradients))
     return known_of(search, search.run(renewed, leaps=leaps), known.chi2_before)
+
+
+def confined(known: Known, simulate: Simulate, reach: float, *, laws: Laws | None = None) -> Known:
+    """Refit all numbers of `known` no farther than `reach` sigmas from their priors, along slopes taken anew.
+
+    What is left out shows there, before they take it up. The bounds of what is returned are those of `known`.
+    """
+    limits = within(known.parameters, reach)
+    search = Search(known.experiment, known.metric, simulate, known.hypothesis, known.free, limits, laws)
+    theta = search.clipped(known.value)
+    begun = search.begin(theta, search.slopes(theta, known.slopes, ALL))
+    found = search.descend(begun, CONFINED)
+    return replace(known_of(search, found, known.chi2_before), parameters=known.parameters)
 
 
 def leapt(known: Known, simulate: Simulate, *, smooth: bool) -> Known:
@@ -194,4 +221,9 @@ def _checks(known: Known, found: Found) -> tuple[Check, ...]:
         Check("converged", found.converged, f"{found.rounds} rounds"),
         Check("within bounds", not stuck, ", ".join(stuck) or "none at a bound"),
         Check("within uncertainties", not far, "sigmas: " + ", ".join(far) if far else within),
+        Check(
+            "together within uncertainties",
+            not known.strained,
+            f"squared sigmas {known.prior_chi2:.0f} for {known.stated} numbers",
+        ),
     )

@@ -19,58 +19,56 @@ from kbs_process.diagnosis.joint import Standing, standing_of, with_extra
 from kbs_process.diagnosis.known import settled
 from kbs_process.diagnosis.outcome import Refused
 from kbs_process.diagnosis.plausible import implausible
-from kbs_process.diagnosis.scene import Scene
-from kbs_process.diagnosis.screen import Bench, Catalogued, Found, Screening, Suspect
+from kbs_process.diagnosis.screen import Bench, Catalogued, Found, Suspect
 from kbs_process.diagnosis.thresholds import (
     FALSE_ALARM,
     LAW_VARIANCE,
     LEAD,
     LEADERS,
-    ORDERED,
     SECOND,
     SETTLED,
-    SETTLED_SHARE,
+    SETTLED_TIMES,
+    TOLERATED,
 )
 from kbs_process.diagnosis.tryout import extra_of, identity
+from kbs_process.diagnosis.view import View
 
 
-def leaders(screening: Screening, excess: float) -> tuple[list[Found], list[Found]]:
-    """The most probable suspects, as many as the linear plant may have in the wrong order, and a few that come next.
-
-    A law that repeats predicts what was not recorded; one whose size and phase are each recording's own does not. It
-    leads only where none that repeats does half of what it does.
-    """
-    able = [found for found in screening.candidates if found.significant and not found.absorbed]
-    repeating = [found for found in able if not found.suspect.each_trial]
-    if repeating and 2.0 * repeating[0].score.gain >= able[0].score.gain:
-        able = repeating
+def leaders(view: View) -> tuple[list[Found], list[Found]]:
+    """The most probable suspects, as many as the linear plant may have in the wrong order, and a few that come next."""
+    able = view.able
     if not able:
         return [], []
-    bound = (1.0 - LEAD) * able[0].score.gain
-    # Where even the best does little of what there is to do, the plant is far from linear, and so is their order.
-    if able[0].score.gain < ORDERED * excess:
-        bound = 0.0
+    bound = (1.0 - LEAD) * able[0].score.gain if view.ordered else 0.0
     first = [found for found in able if found.score.gain >= bound or found is able[0]][:LEADERS]
     return first, [found for found in able if found not in first][:SECOND]
 
 
 def tried(
-    chosen: Sequence[Found], standing: Standing, bench: Bench, scene: Scene, floor: Floor, simulate: Simulate
+    chosen: Sequence[Found], view: View, before: Standing, floor: Floor, simulate: Simulate
 ) -> tuple[list[Tried], list[Refused]]:
-    """Leaders refitted and gated: those that passed, and those that did not."""
+    """Leaders of a view refitted and gated against what was believed `before`: those that passed, and those that did
+    not.
+    """
     judged: list[tuple[Found, Standing, Gate]] = []
     joined = []
     for found in chosen:
         if found.suspect.each_trial:
-            judged.append((found, *_trial_by_trial(found.suspect, standing, bench)))
+            judged.append((found, *_trial_by_trial(found.suspect, view.standing, view.bench)))
         else:
-            joined.append((found, with_extra(standing, extra_of(found, standing, bench, scene), simulate)))
+            extra = extra_of(found, view.standing, view.bench, view.scene)
+            joined.append((found, with_extra(view.standing, extra, simulate)))
     joined.sort(key=lambda one: float(np.nan_to_num(one[1].known.cost, nan=np.inf)))
-    most = standing.known.cost - joined[0][1].known.cost if joined else 0.0
     for place, (found, new) in enumerate(joined):
-        enough = standing.known.cost - new.known.cost >= SETTLED_SHARE * most
-        end = resettled(new, floor, simulate, leaps=0) if place < SETTLED and enough else new
-        judged.append((found, end, _gated(found, standing, end)))
+        best = joined[0][1].known
+        near = new.known.excess <= SETTLED_TIMES * max(best.excess, TOLERATED * float(best.rows.sum()))
+        end = resettled(new, floor, simulate, leaps=0) if place < SETTLED and near else new
+        verdict = _gated(found, before, end)
+        if place == 0 and not verdict.passed and end.known.excess < 0.5 * before.known.excess:
+            # So much is hardly chance: phases may still be those that made up for what was left out.
+            end = resettled(end, floor, simulate, leaps=1)
+            verdict = _gated(found, before, end)
+        judged.append((found, end, verdict))
     passed = [Tried(*one) for one in judged if one[2].passed]
     refused = [
         Refused(identity(found.suspect), found.score.rho_eff, verdict.reasons)

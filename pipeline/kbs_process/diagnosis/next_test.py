@@ -29,12 +29,12 @@ from kbs_process.diagnosis.joint import Standing
 from kbs_process.diagnosis.metric import metrics
 from kbs_process.diagnosis.outcome import Find, Identity
 from kbs_process.diagnosis.parameters import slopes
-from kbs_process.diagnosis.rounds import suspects_of
 from kbs_process.diagnosis.scene import Scene
 from kbs_process.diagnosis.screen import Bench, Suspect
 from kbs_process.diagnosis.thresholds import RIVALS
 from kbs_process.diagnosis.trajectories import Trajectory, family, limits_of
 from kbs_process.diagnosis.tryout import identity
+from kbs_process.diagnosis.view import suspects_of
 from kbs_process.signals.records import Array
 
 _SECONDS = 200.0  # of a proposed test, or as long as the longest recording

@@ -7,13 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kbs_process.diagnosis.curves import curves
 from kbs_process.diagnosis.detection import Detection
-from kbs_process.diagnosis.finding import find_of, merged
+from kbs_process.diagnosis.finding import Tried, as_it_stands, find_of, merged
 from kbs_process.diagnosis.floor import Floor
-from kbs_process.diagnosis.gate import whiteness
+from kbs_process.diagnosis.gate import gate, whiteness
 from kbs_process.diagnosis.hypothesis import Prediction, Simulate
-from kbs_process.diagnosis.joint import Standing
+from kbs_process.diagnosis.joint import Standing, without
 from kbs_process.diagnosis.known import MOVED, Known
 from kbs_process.diagnosis.leaders import detected, leaders, resettled, tried
 from kbs_process.diagnosis.localise import cells_and_ports
@@ -27,14 +26,12 @@ from kbs_process.diagnosis.outcome import (
     Verdict,
 )
 from kbs_process.diagnosis.ports import port_test
-from kbs_process.diagnosis.proposals import proposed
-from kbs_process.diagnosis.ranges import ranges_of
 from kbs_process.diagnosis.rivals import probabilities
 from kbs_process.diagnosis.scene import Scene
-from kbs_process.diagnosis.screen import Bench, Catalogued, Screening, Suspect, screen
-from kbs_process.diagnosis.suspects import candidates
-from kbs_process.diagnosis.thresholds import ROUNDS, TAKEN
+from kbs_process.diagnosis.screen import Screening
+from kbs_process.diagnosis.thresholds import CLOSE_LEADERS, ORDERED, ROUNDS, TAKEN
 from kbs_process.diagnosis.tryout import identity
+from kbs_process.diagnosis.view import View, closer
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,6 +43,12 @@ class _Round:
     place: Place | None
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Accepted:
+    find: Find
+    names: tuple[str, ...]  # of its numbers; none of a law that was taken off each recording
+
+
 def diagnose(
     known: Known, floor: Floor, predicted: Mapping[int, Prediction], simulate: Simulate, before: Detection
 ) -> Outcome:
@@ -54,17 +57,20 @@ def diagnose(
     `predicted` are the predictions of `known.hypothesis` by drive, `before` is what detection says of them.
     """
     standing = Standing(known, predicted, {})
-    finds: list[Find] = []
+    accepted: list[_Accepted] = []
     rounds: list[_Round] = []
     for _ in range(ROUNDS):
         rounds.append(_round(standing, floor, simulate))
-        standing = rounds[-1].standing
+        had, standing = len(standing.known.names), rounds[-1].standing
         if rounds[-1].find is None:
             break
-        finds.append(rounds[-1].find)
+        own = standing.known.names[had:]
+        accepted.append(_Accepted(rounds[-1].find, own))
         if not detected(standing, floor, known.experiment.fit).left:
             break
     last = rounds[-1]
+    accepted, standing = _needed(accepted, standing, floor, simulate)
+    finds = [as_it_stands(one.find, one.names, standing.known) for one in accepted]
     left = last.place
     if last.find is not None:
         left = _place(standing, floor, Scene.of(known.experiment, standing.hypothesis, standing.predicted))
@@ -106,48 +112,13 @@ def _mismatch(before: Detection, first: _Round) -> float:
     return float(min(0.0, np.log(2.0) + min(before.log_p, found)))
 
 
-def suspects_of(standing: Standing, scene: Scene) -> list[Suspect]:
-    """The catalogue at every site with every shape, then curves that no law of it has."""
-    experiment, rig = scene.experiment, standing.hypothesis.rig
-    references = sorted({experiment.reference(k) for k in range(len(experiment.repeats))})
-    ranges = ranges_of(
-        [scene.signals[drive] for drive in references if drive in scene.signals],
-        [standing.predicted[drive].values for drive in references],
-        experiment.channels,
-        experiment.dt,
-        proposed=proposed(standing.known, scene),
-        temperature=all(trial.temperature is not None for trial in experiment.trials),
-    )
-    columns = next((signals.columns for signals in scene.signals.values()), ())
-    recorded = all(one.schedule is None or one.schedule.field is not None for one in experiment.drives)
-    chosen = candidates(
-        rig,
-        experiment.effects,
-        ranges,
-        columns,
-        experiment.channels,
-        accepted=standing.hypothesis.effects,
-        field_recorded=recorded,
-    )
-    return [*(Catalogued(candidate, scene) for candidate in chosen), *curves(scene)]
-
-
 def _round(standing: Standing, floor: Floor, simulate: Simulate) -> _Round:
-    known = standing.known
-    scene = Scene.of(known.experiment, standing.hypothesis, standing.predicted)
-    bench = Bench.of(known, scene)
-    screening = screen(bench, suspects_of(standing, scene))
-    place = _place(standing, floor, scene)
-    first, others = leaders(screening, known.excess)
-    passed, refused = tried(first, standing, bench, scene, floor, simulate)
-    for found in others:
-        if passed:
-            break
-        passed, more = tried([found], standing, bench, scene, floor, simulate)
-        refused += more
+    view = View.of(standing)
+    place = _place(standing, floor, view.scene)
+    passed, refused = _passed(view, floor, simulate)
     if not passed:
-        return _Round(None, standing, screening, tuple(refused), place)
-    chances = probabilities([one.standing.known for one in passed], bench.background.rows)
+        return _Round(None, standing, view.screening, tuple(refused), place)
+    chances = probabilities([one.standing.known for one in passed], view.bench.background.rows)
     best = int(np.argmax(chances))
     passed[best] = replace(passed[best], standing=resettled(passed[best].standing, floor, simulate, leaps=1))
     share = _taken(standing, passed[best].standing, floor)
@@ -155,9 +126,49 @@ def _round(standing: Standing, floor: Floor, simulate: Simulate) -> _Round:
         found = passed[best].found
         reason = f"takes {100.0 * share:.0f} % of what exceeds the floor: it follows what something else does"
         refused.append(Refused(identity(found.suspect), found.score.rho_eff, (reason,)))
-        return _Round(None, standing, screening, tuple(refused), place)
-    find = find_of(passed, best, chances, standing, screening, place)
-    return _Round(find, passed[best].standing, screening, tuple(refused), place)
+        return _Round(None, standing, view.screening, tuple(refused), place)
+    find = find_of(passed, best, chances, standing, view.screening, place)
+    return _Round(find, passed[best].standing, view.screening, tuple(refused), place)
+
+
+def _passed(view: View, floor: Floor, simulate: Simulate) -> tuple[list[Tried], list[Refused]]:
+    """Suspects that passed the gate, and those that did not; from closer by first, where known numbers were pulled."""
+    passed: list[Tried] = []
+    refused: list[Refused] = []
+    known = view.standing.known
+    if known.strained and not view.ordered and detected(view.standing, floor, known.experiment.fit).left:
+        close = closer(view.standing, simulate)
+        lead = [found for found in close.able if not found.suspect.each_trial][:CLOSE_LEADERS]
+        passed, refused = tried(lead, close, view.standing, floor, simulate)
+        if any(_taken(view.standing, one.standing, floor) > ORDERED for one in passed):
+            return passed, refused
+    first, others = leaders(view)
+    for chosen in (first, *([found] for found in others)):
+        more, less = tried(chosen, view, view.standing, floor, simulate)
+        passed, refused = [*passed, *more], [*refused, *less]
+        if passed:
+            break
+    return passed, refused
+
+
+def _needed(
+    accepted: list[_Accepted], standing: Standing, floor: Floor, simulate: Simulate
+) -> tuple[list[_Accepted], Standing]:
+    """Leave out what later finds made needless: it has to pass the gate once more, as the last of all.
+
+    What was found first may have stood in for what was found later, or for phases that had not been found yet.
+    """
+    for one in accepted[:-1]:
+        if not one.names:
+            continue
+        rest = without(standing, one.names, simulate)
+        known = standing.known
+        free = ~np.isfinite(known.parameters.sigma)
+        amplitudes = [k for k, name in enumerate(known.names) if name in one.names and free[k]]
+        if gate(rest.known, known, amplitudes).passed and _taken(rest, standing, floor) >= TAKEN:
+            continue
+        accepted, standing = [other for other in accepted if other is not one], rest
+    return accepted, standing
 
 
 def _taken(before: Standing, after: Standing, floor: Floor) -> float:

@@ -35,6 +35,10 @@ DETECTED: Final = 1e-3
 # contact leave up to 0.02 more than each other on campaigns without any effect.
 TOLERATED: Final = 0.03
 ORDERED: Final = 0.5  # share of the residual's excess that the best has to do for the screen's order to count
+# Sigmas of their priors within which numbers are held for a second look, where the first is not ordered: one number in
+# twenty is beyond, and what it does there is little beside what is looked for.
+CLOSE: Final = 2.0
+CLOSE_LEADERS: Final = 3  # that are simulated from there
 LEADERS: Final = 4  # candidates that are simulated; beyond it the linear plant's order has not been wrong
 # A leader's gain is wrong by about twice, at worst three times, the transfer's error of itself; candidates within that
 # are not yet ordered.
@@ -57,10 +61,10 @@ GATE_SHARE: Final = 0.2
 GATE_WORSE: Final = 0.02
 # Leaders that are tried beyond those that the linear plant cannot order, where none of these passes.
 SECOND: Final = 2
-# Of the leaders, those that gain most are refitted with all slopes taken anew before they are compared, if they gain at
-# least this share of what the best gains.
+# Of the leaders, those that leave least are refitted with all slopes taken anew before they are compared, if they leave
+# no more than some times what the best leaves.
 SETTLED: Final = 2
-SETTLED_SHARE: Final = 0.5
+SETTLED_TIMES: Final = 3.0
 # Share that a law has to take of what exceeds the floor, after all numbers were refitted with it: one that takes little
 # and leaves the rest follows what something else does.
 TAKEN: Final = 0.25

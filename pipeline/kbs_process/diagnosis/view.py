@@ -1,0 +1,90 @@
+"""Every suspect, seen from what is believed at a time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from kbs_process.diagnosis.curves import curves
+from kbs_process.diagnosis.hypothesis import Simulate
+from kbs_process.diagnosis.joint import Standing, standing_of
+from kbs_process.diagnosis.known import confined
+from kbs_process.diagnosis.proposals import proposed
+from kbs_process.diagnosis.ranges import ranges_of
+from kbs_process.diagnosis.scene import Scene
+from kbs_process.diagnosis.screen import Bench, Catalogued, Found, Screening, Suspect, screen
+from kbs_process.diagnosis.suspects import candidates
+from kbs_process.diagnosis.thresholds import CLOSE, ORDERED
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class View:
+    """Where a screen looks from: what is believed, and every suspect along it."""
+
+    standing: Standing
+    bench: Bench
+    scene: Scene
+    screening: Screening
+
+    @classmethod
+    def of(cls, standing: Standing) -> View:
+        known = standing.known
+        scene = Scene.of(known.experiment, standing.hypothesis, standing.predicted)
+        bench = Bench.of(known, scene)
+        return cls(standing, bench, scene, screen(bench, suspects_of(standing, scene)))
+
+    @property
+    def able(self) -> list[Found]:
+        """Suspects that may lead, best first.
+
+        A law that repeats predicts what was not recorded; one whose size and phase are each recording's own does not.
+        It leads only where none that repeats does half of what it does.
+        """
+        able = [found for found in self.screening.candidates if found.significant and not found.absorbed]
+        repeating = [found for found in able if not found.suspect.each_trial]
+        if repeating and 2.0 * repeating[0].score.gain >= able[0].score.gain:
+            return repeating
+        return able
+
+    @property
+    def ordered(self) -> bool:
+        """Whether the best does enough of what there is to do for the order of the others to count.
+
+        Where it does not, the plant is far from linear, or known numbers have taken up what was left out.
+        """
+        able = self.able
+        return bool(able and able[0].score.gain >= ORDERED * self.standing.known.excess)
+
+
+def suspects_of(standing: Standing, scene: Scene) -> list[Suspect]:
+    """The catalogue at every site with every shape, then curves that no law of it has."""
+    experiment, rig = scene.experiment, standing.hypothesis.rig
+    references = sorted({experiment.reference(k) for k in range(len(experiment.repeats))})
+    ranges = ranges_of(
+        [scene.signals[drive] for drive in references if drive in scene.signals],
+        [standing.predicted[drive].values for drive in references],
+        experiment.channels,
+        experiment.dt,
+        proposed=proposed(standing.known, scene),
+        temperature=all(trial.temperature is not None for trial in experiment.trials),
+    )
+    columns = next((signals.columns for signals in scene.signals.values()), ())
+    recorded = all(one.schedule is None or one.schedule.field is not None for one in experiment.drives)
+    chosen = candidates(
+        rig,
+        experiment.effects,
+        ranges,
+        columns,
+        experiment.channels,
+        accepted=standing.hypothesis.effects,
+        field_recorded=recorded,
+    )
+    return [*(Catalogued(candidate, scene) for candidate in chosen), *curves(scene)]
+
+
+def closer(standing: Standing, simulate: Simulate) -> View:
+    """The view from where all numbers are kept closer to what is known of them.
+
+    Known numbers pulled far by what was left out have taken most of it up, and the rest looks like something else.
+    """
+    held = confined(standing.known, simulate, CLOSE, laws=standing.laws)
+    return View.of(standing_of(held, standing.laws, simulate))
