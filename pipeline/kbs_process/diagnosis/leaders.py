@@ -16,11 +16,12 @@ from kbs_process.diagnosis.gate import Fold, Gate, gate, whiteness
 from kbs_process.diagnosis.gls import Background, Sums, score
 from kbs_process.diagnosis.hypothesis import Simulate
 from kbs_process.diagnosis.joint import Standing, standing_of, with_extra
-from kbs_process.diagnosis.known import settled
+from kbs_process.diagnosis.known import confined, settled
 from kbs_process.diagnosis.outcome import Refused
 from kbs_process.diagnosis.plausible import implausible
 from kbs_process.diagnosis.screen import Bench, Catalogued, Found, Suspect
 from kbs_process.diagnosis.thresholds import (
+    CLOSE,
     FALSE_ALARM,
     LAW_VARIANCE,
     LEAD,
@@ -151,6 +152,16 @@ def resettled(standing: Standing, floor: Floor, simulate: Simulate, *, leaps: in
         return standing
     moved = settled(known, simulate, leaps=leaps, laws=standing.laws)
     return standing_of(moved, standing.laws, simulate) if moved.cost < known.cost else standing
+
+
+def released(standing: Standing, floor: Floor, simulate: Simulate) -> Standing:
+    """Known numbers that were pulled before the law was in the plant, drawn back to their priors and let go again."""
+    known = standing.known
+    if not known.strained or not detected(standing, floor, known.experiment.fit).left:
+        return standing
+    held = confined(known, simulate, CLOSE, laws=standing.laws)
+    again = resettled(standing_of(held, standing.laws, simulate), floor, simulate, leaps=1)
+    return again if again.known.cost < known.cost else standing
 
 
 def detected(standing: Standing, floor: Floor, trials: Sequence[int]) -> Detection:

@@ -14,7 +14,7 @@ from kbs_process.diagnosis.gate import gate, whiteness
 from kbs_process.diagnosis.hypothesis import Prediction, Simulate
 from kbs_process.diagnosis.joint import Standing, without
 from kbs_process.diagnosis.known import MOVED, Known
-from kbs_process.diagnosis.leaders import detected, leaders, resettled, tried
+from kbs_process.diagnosis.leaders import detected, leaders, released, resettled, tried
 from kbs_process.diagnosis.localise import cells_and_ports
 from kbs_process.diagnosis.outcome import (
     Absorbed,
@@ -120,7 +120,8 @@ def _round(standing: Standing, floor: Floor, simulate: Simulate) -> _Round:
         return _Round(None, standing, view.screening, tuple(refused), place)
     chances = probabilities([one.standing.known for one in passed], view.bench.background.rows)
     best = int(np.argmax(chances))
-    passed[best] = replace(passed[best], standing=resettled(passed[best].standing, floor, simulate, leaps=1))
+    settled = resettled(passed[best].standing, floor, simulate, leaps=1)
+    passed[best] = replace(passed[best], standing=released(settled, floor, simulate))
     share = _taken(standing, passed[best].standing, floor)
     if share < TAKEN:
         found = passed[best].found
