@@ -11,7 +11,7 @@ import pytest
 from kbs_process.diagnosis.experiment import Experiment
 from kbs_process.diagnosis.gate import gate
 from kbs_process.diagnosis.hypothesis import Hypothesis, predict
-from kbs_process.diagnosis.joint import Standing, with_extra, without
+from kbs_process.diagnosis.joint import Standing, with_extra
 from kbs_process.diagnosis.rivals import rivalry
 from kbs_process.diagnosis.scene import Scene
 from kbs_process.diagnosis.screen import Bench, Catalogued, Found, Screening, screen
@@ -102,31 +102,6 @@ def test_a_cable_is_found_refitted_in_the_plant_and_accepted(made: Experiment, c
     fold = verdict.folds[0]
     assert fold.after < 1.3 < fold.before
     assert verdict.whiteness[1] < verdict.whiteness[0]
-
-
-def test_a_law_is_taken_out_again_where_a_later_one_makes_it_needless(
-    made: Experiment, cable: Standing
-) -> None:
-    simulate = bench.serial(made)
-
-    def joined(standing: Standing, family: tuple[str, str]) -> Standing:
-        tried, scene, found = screened(standing)
-        chosen = next(one for one in found.candidates if one.suspect.family == family)
-        return with_extra(standing, extra_of(chosen, standing, tried, scene), simulate)
-
-    first = joined(cable, ("channel_lag", "Tx"))
-    both = joined(first, ("ground_cable", "el"))
-    begin, middle = len(FREE), len(first.known.value)
-    lag, springs = both.known.names[begin:middle], both.known.names[middle:]
-    rest = without(both, lag, simulate)
-    assert rest.known.names == (*cable.known.names, *springs) and not rest.laws
-    assert not gate(rest.known, both.known, range(begin, middle)).passed
-    assert rest.known.cost == pytest.approx(both.known.cost, abs=20.0)
-    bare = without(both, springs, simulate)
-    assert set(bare.laws) == set(lag)
-    assert bare.known.cost > both.known.cost + 1000.0
-    amplitudes = range(middle, middle + 6)
-    assert gate(bare.known, both.known, amplitudes).passed
 
 
 def test_a_law_that_held_out_recordings_do_not_show_is_refused(made: Experiment) -> None:

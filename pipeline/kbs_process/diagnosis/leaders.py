@@ -179,3 +179,12 @@ def detected(standing: Standing, floor: Floor, trials: Sequence[int]) -> Detecti
         )
         experiment = replace(experiment, trials=corrected)
     return detect(experiment, floor, standing.predicted, trials, known=known)
+
+
+def taken(before: Standing, after: Standing, floor: Floor) -> float:
+    """Share that a law takes of what exceeds the floor; all, where nothing does."""
+    fit = before.known.experiment.fit
+    there = detected(before, floor, fit)
+    if not there.left:
+        return 1.0
+    return 1.0 - max(detected(after, floor, fit).ratio - 1.0, 0.0) / (there.ratio - 1.0)

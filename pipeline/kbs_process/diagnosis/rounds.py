@@ -10,12 +10,13 @@ import numpy as np
 from kbs_process.diagnosis.detection import Detection
 from kbs_process.diagnosis.finding import Tried, as_it_stands, find_of, merged
 from kbs_process.diagnosis.floor import Floor
-from kbs_process.diagnosis.gate import gate, whiteness
+from kbs_process.diagnosis.gate import whiteness
 from kbs_process.diagnosis.hypothesis import Prediction, Simulate
-from kbs_process.diagnosis.joint import Standing, without
+from kbs_process.diagnosis.joint import Standing
 from kbs_process.diagnosis.known import MOVED, Known
-from kbs_process.diagnosis.leaders import detected, leaders, released, resettled, tried
+from kbs_process.diagnosis.leaders import detected, leaders, released, resettled, taken, tried
 from kbs_process.diagnosis.localise import cells_and_ports
+from kbs_process.diagnosis.needed import Accepted, needed
 from kbs_process.diagnosis.outcome import (
     Absorbed,
     Find,
@@ -43,12 +44,6 @@ class _Round:
     place: Place | None
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Accepted:
-    find: Find
-    names: tuple[str, ...]  # of its numbers; none of a law that was taken off each recording
-
-
 def diagnose(
     known: Known, floor: Floor, predicted: Mapping[int, Prediction], simulate: Simulate, before: Detection
 ) -> Outcome:
@@ -57,7 +52,7 @@ def diagnose(
     `predicted` are the predictions of `known.hypothesis` by drive, `before` is what detection says of them.
     """
     standing = Standing(known, predicted, {})
-    accepted: list[_Accepted] = []
+    accepted: list[Accepted] = []
     rounds: list[_Round] = []
     for _ in range(ROUNDS):
         rounds.append(_round(standing, floor, simulate))
@@ -65,11 +60,11 @@ def diagnose(
         if rounds[-1].find is None:
             break
         own = standing.known.names[had:]
-        accepted.append(_Accepted(rounds[-1].find, own))
+        accepted.append(Accepted(rounds[-1].find, own))
         if not detected(standing, floor, known.experiment.fit).left:
             break
     last = rounds[-1]
-    accepted, standing = _needed(accepted, standing, floor, simulate)
+    accepted, standing = needed(accepted, standing, floor, simulate)
     finds = [as_it_stands(one.find, one.names, standing.known) for one in accepted]
     left = last.place
     if last.find is not None:
@@ -122,7 +117,7 @@ def _round(standing: Standing, floor: Floor, simulate: Simulate) -> _Round:
     best = int(np.argmax(chances))
     settled = resettled(passed[best].standing, floor, simulate, leaps=1)
     passed[best] = replace(passed[best], standing=released(settled, floor, simulate))
-    share = _taken(standing, passed[best].standing, floor)
+    share = taken(standing, passed[best].standing, floor)
     if share < TAKEN:
         found = passed[best].found
         reason = f"takes {100.0 * share:.0f} % of what exceeds the floor: it follows what something else does"
@@ -141,7 +136,7 @@ def _passed(view: View, floor: Floor, simulate: Simulate) -> tuple[list[Tried], 
         close = closer(view.standing, simulate)
         lead = [found for found in close.able if not found.suspect.each_trial][:CLOSE_LEADERS]
         passed, refused = tried(lead, close, view.standing, floor, simulate)
-        if any(_taken(view.standing, one.standing, floor) > ORDERED for one in passed):
+        if any(taken(view.standing, one.standing, floor) > ORDERED for one in passed):
             return passed, refused
     first, others = leaders(view)
     for chosen in (first, *([found] for found in others)):
@@ -150,35 +145,6 @@ def _passed(view: View, floor: Floor, simulate: Simulate) -> tuple[list[Tried], 
         if passed:
             break
     return passed, refused
-
-
-def _needed(
-    accepted: list[_Accepted], standing: Standing, floor: Floor, simulate: Simulate
-) -> tuple[list[_Accepted], Standing]:
-    """Leave out what later finds made needless: it has to pass the gate once more, as the last of all.
-
-    What was found first may have stood in for what was found later, or for phases that had not been found yet.
-    """
-    for one in accepted[:-1]:
-        if not one.names:
-            continue
-        rest = without(standing, one.names, simulate)
-        known = standing.known
-        free = ~np.isfinite(known.parameters.sigma)
-        amplitudes = [k for k, name in enumerate(known.names) if name in one.names and free[k]]
-        if gate(rest.known, known, amplitudes).passed and _taken(rest, standing, floor) >= TAKEN:
-            continue
-        accepted, standing = [other for other in accepted if other is not one], rest
-    return accepted, standing
-
-
-def _taken(before: Standing, after: Standing, floor: Floor) -> float:
-    """Share that a law takes of what exceeds the floor; all, where nothing does."""
-    fit = before.known.experiment.fit
-    there = detected(before, floor, fit)
-    if not there.left:
-        return 1.0
-    return 1.0 - max(detected(after, floor, fit).ratio - 1.0, 0.0) / (there.ratio - 1.0)
 
 
 def _place(standing: Standing, floor: Floor, scene: Scene) -> Place | None:
