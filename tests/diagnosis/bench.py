@@ -92,6 +92,7 @@ def standing(made: Experiment, free: tuple[Scalar, ...]) -> Standing:
         hypothesis=hypothesis,
         free=free,
         parameters=parameters,
+        scale=np.abs(hypothesis.values(free)),
         value=hypothesis.values(free),
         covariance=np.diag(parameters.sigma**2),
         metric=metric,

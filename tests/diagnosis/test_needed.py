@@ -4,23 +4,28 @@ from __future__ import annotations
 
 import bench
 import pytest
-from test_rounds import FREE, ROLES, screened, standing, with_cable
+from test_rounds import ROLES, screened, standing, with_cable
 
 from kbs_process.diagnosis.experiment import Experiment
+from kbs_process.diagnosis.finding import Tried
 from kbs_process.diagnosis.floor import declared
 from kbs_process.diagnosis.gate import Gate
 from kbs_process.diagnosis.joint import Standing, with_extra, without
+from kbs_process.diagnosis.leaders import own_of
 from kbs_process.diagnosis.needed import Accepted, needed
 from kbs_process.diagnosis.outcome import Find
 from kbs_process.diagnosis.tryout import extra_of, identity
+from kbs_process.plant.effects import CATALOGUE
 
-LAG, CABLE = ("channel_lag", "Tx"), ("ground_cable", "el")
+LAG, CABLE, HARNESS = ("channel_lag", "Tx"), ("ground_cable", "el"), ("harness", "el")
+HARNESS_EFFECT = next(one for one in CATALOGUE if one.name == "harness")
 
 
 def joined(made: Experiment, before: Standing, family: tuple[str, str]) -> tuple[Standing, Accepted]:
-    tried, scene, found = screened(before)
+    bench_, scene, found = screened(before)
     chosen = next(one for one in found.candidates if one.suspect.family == family)
-    after = with_extra(before, extra_of(chosen, before, tried, scene), bench.serial(made))
+    after = with_extra(before, extra_of(chosen, before, bench_, scene), bench.serial(made))
+    passed = Gate(True, (), True, 0.0, (1.0, 1.0), ())
     find = Find(
         identity=identity(chosen.suspect),
         named=True,
@@ -31,13 +36,13 @@ def joined(made: Experiment, before: Standing, family: tuple[str, str]) -> tuple
         rho=0.0,
         rho_eff=0.0,
         kappa=0.0,
-        gate=Gate(True, (), True, 0.0, (1.0, 1.0), ()),
+        gate=passed,
         alternatives=(),
         ports_alike=(),
         held_out_variance=None,
         curve=None,
     )
-    return after, Accepted(find, after.known.names[len(before.known.names) :])
+    return after, Accepted(Tried(chosen, after, passed, found, own_of(chosen, before, after)), find)
 
 
 @pytest.fixture(scope="module")
@@ -50,25 +55,42 @@ def test_without_a_needless_law_nothing_is_lost_and_without_the_right_one_much_i
     begun = standing(made)
     first, lag = joined(made, begun, LAG)
     both, cable = joined(made, first, CABLE)
-    rest = without(both, lag.names, simulate)
-    assert rest.known.names == (*begun.known.names, *cable.names) and not rest.laws
+    rest = without(both, lag.tried.own, simulate)
+    assert rest.known.names == (*begun.known.names, *cable.tried.own.names) and not rest.laws
     assert rest.known.cost == pytest.approx(both.known.cost, abs=20.0)
-    bare = without(both, cable.names, simulate)
-    assert set(bare.laws) == set(lag.names)
+    bare = without(both, cable.tried.own, simulate)
+    assert set(bare.laws) == set(lag.tried.own.names)
     assert bare.known.cost > both.known.cost + 1000.0
 
 
-def test_the_needless_law_goes_and_the_other_is_judged_without_it(made: Experiment) -> None:
-    first, lag = joined(made, standing(made), LAG)
+@pytest.mark.parametrize("family", [LAG, HARNESS])
+def test_the_needless_law_goes_and_the_other_is_judged_without_it(
+    made: Experiment, family: tuple[str, str]
+) -> None:
+    begun = standing(made)
+    first, needless = joined(made, begun, family)
     both, cable = joined(made, first, CABLE)
-    kept, left = needed([lag, cable], both, declared(made), bench.serial(made))
+    kept, left = needed([needless, cable], both, declared(made), bench.serial(made))
     assert [one.find.identity.law for one in kept] == ["ground_cable"]
-    assert left.known.names == (*(scalar.name for scalar in FREE), *cable.names)
+    assert left.known.names == (*begun.known.names, *cable.tried.own.names)
     assert kept[0].find.gate.folds[0].gain > 500.0
     assert kept[0].find.held_out_variance == pytest.approx(1.0, abs=0.2)
+    # nothing of it stays in the plant, of which the corrected model is made
+    assert set(left.hypothesis.effects) == {*made.effects, "ground_cable"}
+    of_harness = {entry.name for entry in HARNESS_EFFECT.parameters}
+    assert not any(name.rpartition(".")[2] in of_harness for name in left.hypothesis.rig.quantities())
 
 
 def test_what_was_found_alone_stays_as_it_is(made: Experiment) -> None:
     after, cable = joined(made, standing(made), CABLE)
     kept, left = needed([cable], after, declared(made), bench.serial(made))
     assert kept == [cable] and left is after
+
+
+def test_finds_of_one_law_at_one_place_stand_or_fall_together(made: Experiment) -> None:
+    first, lag = joined(made, standing(made), LAG)
+    second, again = joined(made, first, LAG)
+    both, cable = joined(made, second, CABLE)
+    kept, left = needed([lag, again, cable], both, declared(made), bench.serial(made))
+    assert [one.find.identity.law for one in kept] == ["ground_cable"]
+    assert not left.laws

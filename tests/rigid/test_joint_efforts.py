@@ -126,7 +126,7 @@ def test_effects_along_a_motion_are_read_with_the_drives_sign():
     dt = 0.01
     t = dt * np.arange(1000)
     angle = 2.0 * np.sin(0.5 * t)
-    added = added_loads(rig, [JOINT_ORDER, COULOMB], angle[:, None], dt)
+    added = added_loads(rig, [JOINT_ORDER, COULOMB], angle[:, None], np.gradient(angle, dt)[:, None], dt)
     expected = -(0.2 * np.sin(3.0 * angle) - 0.1 * np.sign(np.cos(0.5 * t))) / 0.5
     moving = np.abs(np.cos(0.5 * t)) > 0.2
     moving[:20] = moving[-20:] = False

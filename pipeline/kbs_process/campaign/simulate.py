@@ -100,7 +100,7 @@ def _motion_driven(campaign: Campaign, effects: Sequence[str], run: Run) -> Iter
     motion = estimate(run, rig, motion_settings(campaign))
     stamp = np.rint((motion.t0 + motion.dt * np.arange(len(motion))) * 1e9).astype(np.int64)
     values = loads(rig, motion.q, motion.qd, motion.qdd)
-    values = values + added_loads(rig, select(effects), motion.q, motion.dt)
+    values = values + added_loads(rig, select(effects), motion.q, motion.qd, motion.dt)
     if rig.transducer.channels:
         yield "wrench", Block(stamp, stamp, values[:, :6])
     if any(joint.effort is not None for joint in rig.joints):

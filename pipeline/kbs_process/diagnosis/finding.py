@@ -10,14 +10,17 @@ from scipy.stats import chi2
 
 from kbs_process.diagnosis.curves import REGRESSORS, CurveSuspect, basis
 from kbs_process.diagnosis.gate import Gate
-from kbs_process.diagnosis.joint import Standing
+from kbs_process.diagnosis.joint import Own, Standing
 from kbs_process.diagnosis.known import Known
+from kbs_process.diagnosis.measured import LAWS
 from kbs_process.diagnosis.outcome import Alternative, Curve, Estimate, Find, Place
 from kbs_process.diagnosis.places import POINT
 from kbs_process.diagnosis.rivals import rivalry
 from kbs_process.diagnosis.screen import Catalogued, Found, Screening, Suspect
 from kbs_process.diagnosis.thresholds import RIVALS
 from kbs_process.diagnosis.tryout import UNNAMED, identity, in_plant, port_label
+from kbs_process.plant.effect import Effect
+from kbs_process.plant.sensing import Sensing
 from kbs_process.signals.records import Array
 
 _ELEMENTS = {f"point[{k}]": name for k, name in enumerate(POINT)}
@@ -30,6 +33,8 @@ class Tried:
     found: Found
     standing: Standing
     gate: Gate
+    screening: Screening  # that it led
+    own: Own  # none, of a law that was taken off each recording
 
 
 def find_of(
@@ -37,7 +42,6 @@ def find_of(
     best: int,
     chances: Array,
     before: Standing,
-    screening: Screening,
     place: Place | None,
 ) -> Find:
     """The find of the `best` of some laws that passed, each right with a chance; `before` stood without it."""
@@ -54,7 +58,7 @@ def find_of(
                 )
             )  # fmt: skip
     simulated = {one.found.suspect.family for one in tried}
-    for found in screening.candidates:
+    for found in taken.screening.candidates:
         if found.suspect.family in simulated or found.absorbed or len(alternatives) >= 5:
             continue
         # Along the linear plant the distance is what the best leaves of the other's lack of gain.
@@ -72,8 +76,8 @@ def find_of(
     return Find(
         identity=own,
         named=own.family != UNNAMED,
-        equation=_equation(suspect),
-        reference=suspect.candidate.effect.reference if isinstance(suspect, Catalogued) else "measured",
+        equation=_equation(_law(suspect)),
+        reference=_law(suspect).reference,
         estimates=_estimates(taken, before),
         probability=float(chances[best]),
         rho=taken.found.score.rho,
@@ -87,10 +91,15 @@ def find_of(
     )
 
 
-def _equation(suspect: Suspect) -> str:
-    if not isinstance(suspect, Catalogued):
-        return "cubic spline"
-    text = suspect.candidate.effect.equation.__doc__ or ""
+def _law(suspect: Suspect) -> Effect | Sensing:
+    if isinstance(suspect, CurveSuspect):
+        return LAWS[suspect.port, suspect.regressor]
+    assert isinstance(suspect, Catalogued)
+    return suspect.candidate.effect
+
+
+def _equation(law: Effect | Sensing) -> str:
+    text = law.equation.__doc__ or ""
     lines = [line.strip() for line in text.splitlines()]
     begin = next((k for k, line in enumerate(lines) if line.startswith("Equation:")), None)
     if begin is None:
@@ -161,9 +170,9 @@ def _drawn(regressor: str, x: Array, known: Known, own: Sequence[int]) -> Curve:
     return Curve(regressor, REGRESSORS[regressor], x, columns @ known.value[index], spread)
 
 
-def as_it_stands(find: Find, names: Sequence[str], known: Known) -> Find:
-    """A find with its numbers, `names`, as they are after all others were found."""
-    own = [known.names.index(name) for name in names]
+def as_it_stands(find: Find, law: Own, known: Known) -> Find:
+    """A find with its law's numbers as they are after all others were found."""
+    own = [known.names.index(name) for name in law.names]
     fitted = [
         replace(one, value=float(known.value[k]), sigma=float(known.sigma[k]))
         for one, k in zip(find.estimates, own, strict=False)

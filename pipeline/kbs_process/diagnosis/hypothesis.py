@@ -185,11 +185,12 @@ def _step(rig: Rig, effects: tuple[str, ...], q: tuple[float, ...], rate: float)
     return step_for(rig, select(effects), np.array(q), rate)
 
 
-def _moved(hypothesis: Hypothesis, experiment: Experiment, drive: Drive) -> tuple[Array, Array]:
+def _moved(hypothesis: Hypothesis, experiment: Experiment, driven: Drive) -> tuple[Array, Array]:
     """Wrench (n, 6) and the recorded efforts."""
-    assert drive.motion is not None
-    motion, rig = drive.motion, experiment.rig
+    assert driven.motion is not None
+    motion, rig = driven.motion, experiment.rig
     values = rigid_loads(hypothesis.rig, motion.q, motion.qd, motion.qdd)
-    values = values + added_loads(hypothesis.rig, select(hypothesis.effects), motion.q, motion.dt)
+    acting = select([effect for effect in hypothesis.effects if effect not in driven.absent])
+    values = values + added_loads(hypothesis.rig, acting, motion.q, motion.qd, motion.dt)
     efforts = rig.loads.index(rig.channels[experiment.wrench_channels :])
     return values[:, :6], values[:, efforts]

@@ -1,7 +1,7 @@
 """A suspect in the non-linear plant, refitted together with all known parameters.
 
 The known parameters keep the slopes that they were fitted with, as the steps correct them; the suspect's own are taken
-anew. What acts on the readings alone, or is a measured law, has a column of the prediction for each of its numbers.
+anew. What acts on the readings alone has a column of the prediction for each of its numbers.
 """
 
 from __future__ import annotations
@@ -12,15 +12,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kbs_process.diagnosis.hypothesis import Hypothesis, Prediction, Simulate
-from kbs_process.diagnosis.known import Known, known_of, settled
+from kbs_process.diagnosis.known import Known, as_it_is, known_of, settled
 from kbs_process.diagnosis.search import OWN, Laws, Search, added
 from kbs_process.estimation.fit import Parameters
+from kbs_process.plant.attach import detach, idle
+from kbs_process.plant.effects import select
 from kbs_process.signals.records import Array
 from kbs_process.stages.output_error import Scalar
 
 _STEPS = 12
 _TRIES, _LESS = 3, 0.2
-_FARTHEST = 30.0  # times, up or down, that a shape goes from where the grid had it
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,6 +34,8 @@ class Extra:
     prior: Array  # (plant + linear,) means, and
     sigma: Array  # their standard deviations; inf where nothing is known
     scale: Array  # (plant,) sizes of steps for slopes
+    lower: Array  # (plant + linear,) bounds
+    upper: Array
     linear: tuple[Scalar, ...] = ()
     columns: Mapping[int, Array] | None = None  # by reference drive, (linear, n, c)
 
@@ -72,7 +75,7 @@ def with_extra(standing: Standing, extra: Extra, simulate: Simulate) -> Standing
         (*known.free, *extra.plant, *extra.linear),
         parameters,
         laws,
-        np.concatenate([np.abs(known.value), extra.scale, np.abs(extra.start[len(extra.scale) :])]),
+        np.concatenate([known.scale, extra.scale, np.abs(extra.start[len(extra.scale) :])]),
     )
     start = extra.start
     for _ in range(_TRIES):
@@ -89,23 +92,54 @@ def with_extra(standing: Standing, extra: Extra, simulate: Simulate) -> Standing
     return standing_of(known_of(search, found, known.chi2_before), laws, simulate)
 
 
-def without(standing: Standing, names: Sequence[str], simulate: Simulate) -> Standing:
-    """Refit all other numbers of `standing` with a law's own, `names`, taken out: its amplitudes are zero then."""
+@dataclass(frozen=True, slots=True)
+class Own:
+    """Names of a law's numbers among all that are fitted."""
+
+    names: tuple[str, ...]
+    amplitudes: tuple[str, ...]  # those of them without which the law does nothing
+
+    def __add__(self, other: Own) -> Own:
+        return Own((*self.names, *other.names), (*self.amplitudes, *other.amplitudes))
+
+
+def without(standing: Standing, own: Own, simulate: Simulate) -> Standing:
+    """Refit all other numbers of `standing` with a law taken out."""
+    rest, laws = _stripped(standing, own)
+    return standing_of(settled(rest, simulate, leaps=1, laws=laws), laws, simulate)
+
+
+def bare(standing: Standing, own: Own, simulate: Simulate) -> Standing:
+    """All other numbers of `standing` where they are, with a law taken out, and what that leaves."""
+    rest, laws = _stripped(standing, own)
+    return standing_of(as_it_is(rest, simulate, laws=laws), laws, simulate)
+
+
+def _stripped(standing: Standing, own: Own) -> tuple[Known, Laws]:
     known = standing.known
-    own = np.isin(known.names, names)
-    amplitudes = own & ~np.isfinite(known.parameters.sigma)
-    inside = [known.free[i] for i in np.flatnonzero(amplitudes) if known.names[i] not in standing.laws]
-    others = [int(i) for i in np.flatnonzero(~own)]
+    inside = [one for one in known.free if one.name in own.amplitudes and one.name not in standing.laws]
+    still = known.hypothesis.at(inside, np.zeros(len(inside)))
+    others = [i for i, name in enumerate(known.names) if name not in own.names]
     rest = replace(
         known,
-        hypothesis=known.hypothesis.at(inside, np.zeros(len(inside))),
+        hypothesis=_less(still, known.experiment.effects),
         free=tuple(known.free[i] for i in others),
         parameters=_chosen(known.parameters, others),
+        scale=known.scale[others],
         value=known.value[others],
         slopes={drive: replace(one, columns=one.columns[others]) for drive, one in known.slopes.items()},
     )
-    laws = {name: columns for name, columns in standing.laws.items() if name not in names}
-    return standing_of(settled(rest, simulate, leaps=1, laws=laws), laws, simulate)
+    return rest, {name: columns for name, columns in standing.laws.items() if name not in own.names}
+
+
+def _less(hypothesis: Hypothesis, given: Sequence[str]) -> Hypothesis:
+    """A hypothesis without those effects that are not `given` and do nothing."""
+    rig, effects = hypothesis.rig, hypothesis.effects
+    for effect in select(effects):
+        if effect.name not in given and idle(rig, effect):
+            effects = tuple(name for name in effects if name != effect.name)
+            rig = detach(rig, effect, select(effects))
+    return Hypothesis(rig, effects)
 
 
 def standing_of(known: Known, laws: Laws, simulate: Simulate) -> Standing:
@@ -116,10 +150,6 @@ def standing_of(known: Known, laws: Laws, simulate: Simulate) -> Standing:
 
 
 def _extended(parameters: Parameters, extra: Extra) -> Parameters:
-    # A shape stays within what a search by slopes can be trusted over; amplitudes are free.
-    shape = np.isfinite(extra.sigma)
-    lower = np.where(shape, extra.prior / _FARTHEST, -np.inf)
-    upper = np.where(shape, extra.prior * _FARTHEST, np.inf)
     assert parameters.lower is not None and parameters.upper is not None
     names = tuple(scalar.name for scalar in (*extra.plant, *extra.linear))
     return replace(
@@ -127,8 +157,8 @@ def _extended(parameters: Parameters, extra: Extra) -> Parameters:
         names=(*parameters.names, *names),
         value=np.concatenate([parameters.value, extra.prior]),
         sigma=np.concatenate([parameters.sigma, extra.sigma]),
-        lower=np.concatenate([parameters.lower, lower]),
-        upper=np.concatenate([parameters.upper, upper]),
+        lower=np.concatenate([parameters.lower, extra.lower]),
+        upper=np.concatenate([parameters.upper, extra.upper]),
     )
 
 

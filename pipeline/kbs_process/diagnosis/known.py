@@ -20,14 +20,14 @@ from kbs_process.diagnosis.metric import Metric, metrics
 from kbs_process.diagnosis.parameters import Slopes, known_parameters, prior, within
 from kbs_process.diagnosis.search import ALL, Found, Laws, Search
 from kbs_process.estimation.fit import Check, Parameters
-from kbs_process.signals.records import Array
+from kbs_process.signals.records import Array, Mask
 from kbs_process.stages.output_error import Scalar
 
 # Sigmas, from which a parameter is said to be off: of a hundred that are not, one in 160 campaigns has one.
 MOVED = 4.0
 # Chance below which all together are said to be off: no single one need be, where many make up for what was left out.
 STRAINED = 1e-3
-CONFINED = 6  # steps of a refit that is to be looked at, not kept
+CONFINED = 6  # steps of a refit that is looked at, or gone on from
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,6 +38,7 @@ class Known:
     hypothesis: Hypothesis
     free: tuple[Scalar, ...]
     parameters: Parameters  # priors
+    scale: Array  # (p,) sizes of steps of numbers that have no prior
     value: Array  # (p,)
     covariance: Array  # (p, p)
     metric: tuple[Metric, ...]  # of each trial
@@ -94,14 +95,21 @@ class Known:
         return float(np.nansum(self.moved**2))
 
     @property
-    def stated(self) -> int:
-        """How many numbers have a prior."""
-        return int(np.isfinite(self.parameters.sigma).sum())
+    def stated(self) -> Mask:
+        """(p,) numbers whose prior the files state: of a law's shapes it is a choice of ours."""
+        files = set(known_parameters(self.experiment.rig, self.experiment.effects))
+        return np.array([one in files for one in self.free], dtype=np.bool_) & np.isfinite(self.moved)
+
+    @property
+    def strain(self) -> float:
+        """Sum of the squared sigmas by which numbers are off that have a stated prior."""
+        return float(np.sum(self.moved[self.stated] ** 2))
 
     @property
     def strained(self) -> bool:
-        """Whether all numbers together are farther from their priors than chance has them."""
-        return self.stated > 0 and bool(chi2.sf(self.prior_chi2, self.stated) < STRAINED)
+        """Whether these numbers are together farther from their priors than chance has them."""
+        count = int(self.stated.sum())
+        return count > 0 and bool(chi2.sf(self.strain, count) < STRAINED)
 
     def jacobian(self, trial: int) -> Array:
         """(rows, p) by which a trial's prediction answers to the parameters, whitened as its residual is."""
@@ -142,17 +150,26 @@ def settled(known: Known, simulate: Simulate, *, leaps: int, laws: Laws | None =
     return known_of(search, search.run(renewed, leaps=leaps), known.chi2_before)
 
 
+def as_it_is(known: Known, simulate: Simulate, *, laws: Laws | None = None) -> Known:
+    """The numbers of `known` where they are, with what they leave and how well they are known."""
+    return known_of(*_again(known, simulate, laws), known.chi2_before)
+
+
 def confined(known: Known, simulate: Simulate, reach: float, *, laws: Laws | None = None) -> Known:
-    """Refit all numbers of `known` no farther than `reach` sigmas from their priors, along slopes taken anew.
+    """Refit all numbers of `known`, those with a stated prior no farther than `reach` sigmas from it, along new slopes.
 
     What is left out shows there, before they take it up. The bounds of what is returned are those of `known`.
     """
-    limits = within(known.parameters, reach)
-    search = Search(known.experiment, known.metric, simulate, known.hypothesis, known.free, limits, laws)
+    parameters = known.parameters
+    limits = within(parameters, reach, known.stated)
+    search = Search(
+        known.experiment, known.metric, simulate, known.hypothesis, known.free, limits, laws, known.scale
+    )
     theta = search.clipped(known.value)
     begun = search.begin(theta, search.slopes(theta, known.slopes, ALL))
     found = search.descend(begun, CONFINED)
-    return replace(known_of(search, found, known.chi2_before), parameters=known.parameters)
+    freed = replace(known_of(search, found, known.chi2_before), parameters=parameters)
+    return replace(freed, checks=_checks(freed, found))
 
 
 def leapt(known: Known, simulate: Simulate, *, smooth: bool) -> Known:
@@ -165,7 +182,14 @@ def leapt(known: Known, simulate: Simulate, *, smooth: bool) -> Known:
 def _again(known: Known, simulate: Simulate, laws: Laws | None = None) -> tuple[Search, Found]:
     """A search that begins where another ended."""
     search = Search(
-        known.experiment, known.metric, simulate, known.hypothesis, known.free, known.parameters, laws
+        known.experiment,
+        known.metric,
+        simulate,
+        known.hypothesis,
+        known.free,
+        known.parameters,
+        laws,
+        known.scale,
     )
     return search, search.begin(known.value, known.slopes)
 
@@ -192,6 +216,7 @@ def known_of(search: Search, found: Found, before: Array) -> Known:
         hypothesis=search.at(found.theta),
         free=search.free,
         parameters=search.parameters,
+        scale=search.scale,
         value=found.theta,
         covariance=np.asarray(inverse * np.outer(size, size), dtype=np.float64),
         metric=search.metric,
@@ -224,6 +249,6 @@ def _checks(known: Known, found: Found) -> tuple[Check, ...]:
         Check(
             "together within uncertainties",
             not known.strained,
-            f"squared sigmas {known.prior_chi2:.0f} for {known.stated} numbers",
+            f"squared sigmas {known.strain:.0f} for {int(known.stated.sum())} numbers",
         ),
     )

@@ -15,10 +15,11 @@ from kbs_process.diagnosis.floor import Floor
 from kbs_process.diagnosis.gate import Fold, Gate, gate, whiteness
 from kbs_process.diagnosis.gls import Background, Sums, score
 from kbs_process.diagnosis.hypothesis import Simulate
-from kbs_process.diagnosis.joint import Standing, standing_of, with_extra
+from kbs_process.diagnosis.joint import Own, Standing, bare, standing_of, with_extra
 from kbs_process.diagnosis.known import confined, settled
 from kbs_process.diagnosis.outcome import Refused
 from kbs_process.diagnosis.plausible import implausible
+from kbs_process.diagnosis.rivals import probabilities
 from kbs_process.diagnosis.screen import Bench, Catalogued, Found, Suspect
 from kbs_process.diagnosis.thresholds import (
     CLOSE,
@@ -31,7 +32,7 @@ from kbs_process.diagnosis.thresholds import (
     SETTLED_TIMES,
     TOLERATED,
 )
-from kbs_process.diagnosis.tryout import extra_of, identity
+from kbs_process.diagnosis.tryout import extra_of, identity, in_plant
 from kbs_process.diagnosis.view import View
 
 
@@ -51,11 +52,12 @@ def tried(
     """Leaders of a view refitted and gated against what was believed `before`: those that passed, and those that did
     not.
     """
-    judged: list[tuple[Found, Standing, Gate]] = []
+    judged: list[Tried] = []
     joined = []
     for found in chosen:
         if found.suspect.each_trial:
-            judged.append((found, *_trial_by_trial(found.suspect, view.standing, view.bench)))
+            shown = _trial_by_trial(found.suspect, view.standing, view.bench)
+            judged.append(Tried(found, *shown, view.screening, Own((), ())))
         else:
             extra = extra_of(found, view.standing, view.bench, view.scene)
             joined.append((found, with_extra(view.standing, extra, simulate)))
@@ -63,31 +65,39 @@ def tried(
     for place, (found, new) in enumerate(joined):
         best = joined[0][1].known
         near = new.known.excess <= SETTLED_TIMES * max(best.excess, TOLERATED * float(best.rows.sum()))
+        own = own_of(found, before, new)
         end = resettled(new, floor, simulate, leaps=0) if place < SETTLED and near else new
-        verdict = _gated(found, before, end)
+        verdict = gated(found, before, end, own)
         if place == 0 and not verdict.passed and end.known.excess < 0.5 * before.known.excess:
             # So much is hardly chance: phases may still be those that made up for what was left out.
             end = resettled(end, floor, simulate, leaps=1)
-            verdict = _gated(found, before, end)
-        judged.append((found, end, verdict))
-    passed = [Tried(*one) for one in judged if one[2].passed]
+            verdict = gated(found, before, end, own)
+        judged.append(Tried(found, end, verdict, view.screening, own))
+    passed = [one for one in judged if one.gate.passed]
     refused = [
-        Refused(identity(found.suspect), found.score.rho_eff, verdict.reasons)
-        for found, _, verdict in judged
-        if not verdict.passed
+        Refused(identity(one.found.suspect), one.found.score.rho_eff, one.gate.reasons)
+        for one in judged
+        if not one.gate.passed
     ]
     return passed, refused
 
 
-def _gated(found: Found, before: Standing, after: Standing) -> Gate:
-    begin = len(before.known.value)
-    verdict = gate(before.known, after.known, range(begin, begin + len(found.suspect.amplitudes)))
-    share = explained_share(before.known, after.known)
+def own_of(found: Found, before: Standing, after: Standing) -> Own:
+    """The numbers that a law has brought: its amplitudes, then its shapes."""
+    names = after.known.names[len(before.known.names) :]
+    return Own(names, names[: len(found.suspect.amplitudes)])
+
+
+def gated(found: Found, before: Standing, after: Standing, own: Own) -> Gate:
+    """The gate's verdict on a law that `after` has and `before` is without; sizes have to be such as it may have."""
+    known = after.known
+    places = [known.names.index(name) for name in own.amplitudes]
+    verdict = gate(before.known, known, places)
+    share = explained_share(before.known, known)
     if isinstance(found.suspect, CurveSuspect) and share is not None and not share >= LAW_VARIANCE:
         reason = f"a curve that explains {100.0 * share:.0f} % of the held-out excess is no law"
         verdict = replace(verdict, passed=False, reasons=(*verdict.reasons, reason))
-    numbers = zip(after.known.value[begin:], after.known.sigma[begin:], strict=True)
-    return _plausible(verdict, found.suspect, list(numbers))
+    return _plausible(verdict, found.suspect, [(known.value[k], known.sigma[k]) for k in places])
 
 
 def _plausible(verdict: Gate, suspect: Suspect, numbers: Sequence[tuple[float, float]]) -> Gate:
@@ -152,6 +162,37 @@ def resettled(standing: Standing, floor: Floor, simulate: Simulate, *, leaps: in
         return standing
     moved = settled(known, simulate, leaps=leaps, laws=standing.laws)
     return standing_of(moved, standing.laws, simulate) if moved.cost < known.cost else standing
+
+
+def reread(chosen: Tried, before: Standing, floor: Floor, simulate: Simulate) -> Tried:
+    """A law of the readings told anew among all of its channel, now that the known numbers have settled beside it.
+
+    In the plant shapes are fitted; such a law has the one that the screen gave it while numbers were still pulled.
+    """
+    suspect, standing = chosen.found.suspect, chosen.standing
+    if in_plant(suspect) or not chosen.own.names:
+        return chosen
+    site = suspect.family[1]
+    view = View.of(
+        bare(standing, chosen.own, simulate),
+        lambda one: one.family[1] == site and not in_plant(one) and not one.each_trial,
+    )
+    if not view.able or _alike(view.able[0].suspect, suspect):
+        return chosen
+    found = view.able[0]
+    new = with_extra(view.standing, extra_of(found, view.standing, view.bench, view.scene), simulate)
+    new = resettled(new, floor, simulate, leaps=0)
+    own = own_of(found, before, new)
+    told = Tried(found, new, gated(found, before, new, own), view.screening, own)
+    chances = probabilities([standing.known, new.known], view.bench.background.rows)
+    return told if told.gate.passed and chances[1] > chances[0] else chosen
+
+
+def _alike(one: Suspect, other: Suspect) -> bool:
+    """Whether two suspects are one law of one shape."""
+    if not (isinstance(one, Catalogued) and isinstance(other, Catalogued)):
+        return one.family == other.family
+    return one.family == other.family and one.candidate.shape == other.candidate.shape
 
 
 def released(standing: Standing, floor: Floor, simulate: Simulate) -> Standing:

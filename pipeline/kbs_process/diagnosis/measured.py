@@ -98,6 +98,8 @@ def extra(suspect: CurveSuspect, score: Score, standing: Standing) -> Extra:
         sigma=np.full(COEFFICIENTS, np.inf),
         # One size for all: a coefficient that is zero by chance has a slope as well.
         scale=np.full(COEFFICIENTS, max(float(np.abs(score.amplitude).max()), 5.0 * float(size.min()))),
+        lower=np.full(COEFFICIENTS, -np.inf),
+        upper=np.full(COEFFICIENTS, np.inf),
     )
 
 

@@ -8,22 +8,21 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
-from kbs_process.diagnosis.finding import explained_share
+from kbs_process.diagnosis.finding import Tried, explained_share
 from kbs_process.diagnosis.floor import Floor
-from kbs_process.diagnosis.gate import gate
 from kbs_process.diagnosis.hypothesis import Simulate
-from kbs_process.diagnosis.joint import Standing, without
-from kbs_process.diagnosis.leaders import taken
+from kbs_process.diagnosis.joint import Own, Standing, without
+from kbs_process.diagnosis.leaders import detected, gated, taken
 from kbs_process.diagnosis.outcome import Find
 from kbs_process.diagnosis.thresholds import TAKEN
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Accepted:
+    """A law that was accepted, and how it is told."""
+
+    tried: Tried
     find: Find
-    names: tuple[str, ...]  # of its numbers; none of a law that was taken off each recording
 
 
 def needed(
@@ -31,24 +30,39 @@ def needed(
 ) -> tuple[list[Accepted], Standing]:
     """Leave out what later finds made needless: each has to pass the gate once more, as the last of all.
 
-    Finds of one law at one place are one.
+    Finds of one law at one place are one. When one falls, the others are judged again without it.
     """
-    kept: list[Accepted] = []
-    for k, one in enumerate(accepted):
-        others = [*kept, *accepted[k + 1 :]]
-        alone = len(kept) == k and k + 1 == len(accepted)  # nothing has changed since it was found
-        alike = any(other.find.identity == one.find.identity for other in others)
-        if alone or alike or not one.names:
-            kept.append(one)
-            continue
-        rest = without(standing, one.names, simulate)
-        known = standing.known
-        free = ~np.isfinite(known.parameters.sigma)
-        amplitudes = [i for i, name in enumerate(known.names) if name in one.names and free[i]]
-        verdict = gate(rest.known, known, amplitudes)
-        if verdict.passed and taken(rest, standing, floor) >= TAKEN:
-            share = explained_share(rest.known, known)
-            kept.append(replace(one, find=replace(one.find, gate=verdict, held_out_variance=share)))
+    kept, fallen = list(accepted), False
+    while True:
+        judged: list[Accepted] = []
+        for group in _alike(kept):
+            own = sum((one.tried.own for one in group), Own((), ()))
+            as_found = not fallen and group[-1] is kept[-1]  # nothing has changed since
+            if as_found or not own.names:
+                judged += group
+                continue
+            rest = without(standing, own, simulate)
+            verdict = gated(group[0].tried.found, rest, standing, own)
+            left = detected(rest, floor, standing.known.experiment.fit).left
+            if not (verdict.passed and left and taken(rest, standing, floor) >= TAKEN):
+                kept, standing, fallen = [one for one in kept if one not in group], rest, True
+                break
+            if len(group) == 1:
+                share = explained_share(rest.known, standing.known)
+                told = replace(group[0].find, gate=verdict, held_out_variance=share)
+                group = [replace(group[0], find=told)]
+            judged += group
         else:
-            standing = rest
-    return kept, standing
+            return sorted(judged, key=lambda one: _place(one, accepted)), standing
+
+
+def _alike(accepted: Sequence[Accepted]) -> list[list[Accepted]]:
+    """Finds of one law at one place together."""
+    groups: dict[object, list[Accepted]] = {}
+    for one in accepted:
+        groups.setdefault(one.find.identity, []).append(one)
+    return list(groups.values())
+
+
+def _place(one: Accepted, accepted: Sequence[Accepted]) -> int:
+    return next(k for k, other in enumerate(accepted) if other.tried is one.tried)

@@ -11,7 +11,7 @@ from kbs_process.diagnosis.experiment import Experiment
 from kbs_process.diagnosis.hypothesis import Hypothesis, Prediction, Simulate, Task, decoupling
 from kbs_process.estimation.fit import Parameters
 from kbs_process.rig.model import Rig, substitute
-from kbs_process.signals.records import WRENCH_CHANNELS, Array
+from kbs_process.signals.records import WRENCH_CHANNELS, Array, Mask
 from kbs_process.stages import identification, output_error
 from kbs_process.stages.output_error import Scalar
 
@@ -41,10 +41,11 @@ def prior(rig: Rig, nominal: Rig, effects: Sequence[str], free: Sequence[Scalar]
     return identification.prior(output_error.Experiment(mixed, tuple(effects), tuple(free), (), 0.0))
 
 
-def within(parameters: Parameters, reach: float) -> Parameters:
-    """Bounds no farther than `reach` sigmas from the means."""
+def within(parameters: Parameters, reach: float, among: Mask | None = None) -> Parameters:
+    """Bounds no farther than `reach` sigmas from the means, of all that have a sigma or of those `among` them."""
     assert parameters.lower is not None and parameters.upper is not None
-    apart = np.where(np.isfinite(parameters.sigma), reach * parameters.sigma, np.inf)
+    chosen = np.isfinite(parameters.sigma) & (True if among is None else among)
+    apart = np.where(chosen, reach * parameters.sigma, np.inf)
     return replace(
         parameters,
         lower=np.maximum(parameters.lower, parameters.value - apart),

@@ -14,12 +14,13 @@ from kbs_process.diagnosis.gate import whiteness
 from kbs_process.diagnosis.hypothesis import Prediction, Simulate
 from kbs_process.diagnosis.joint import Standing
 from kbs_process.diagnosis.known import MOVED, Known
-from kbs_process.diagnosis.leaders import detected, leaders, released, resettled, taken, tried
+from kbs_process.diagnosis.leaders import detected, leaders, released, reread, resettled, taken, tried
 from kbs_process.diagnosis.localise import cells_and_ports
 from kbs_process.diagnosis.needed import Accepted, needed
 from kbs_process.diagnosis.outcome import (
     Absorbed,
     Find,
+    Identity,
     Moved,
     Outcome,
     Place,
@@ -37,7 +38,7 @@ from kbs_process.diagnosis.view import View, closer
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Round:
-    find: Find | None
+    accepted: Accepted | None
     standing: Standing
     screening: Screening
     refused: tuple[Refused, ...]
@@ -56,31 +57,30 @@ def diagnose(
     rounds: list[_Round] = []
     for _ in range(ROUNDS):
         rounds.append(_round(standing, floor, simulate))
-        had, standing = len(standing.known.names), rounds[-1].standing
-        if rounds[-1].find is None:
+        standing, found = rounds[-1].standing, rounds[-1].accepted
+        if found is None:
             break
-        own = standing.known.names[had:]
-        accepted.append(Accepted(rounds[-1].find, own))
+        accepted.append(found)
         if not detected(standing, floor, known.experiment.fit).left:
             break
     last = rounds[-1]
-    accepted, standing = needed(accepted, standing, floor, simulate)
-    finds = [as_it_stands(one.find, one.names, standing.known) for one in accepted]
+    kept, standing = needed(accepted, standing, floor, simulate)
+    finds = [as_it_stands(one.find, one.tried.own, standing.known) for one in kept]
     left = last.place
-    if last.find is not None:
+    if last.accepted is not None or len(kept) < len(accepted):
         left = _place(standing, floor, Scene.of(known.experiment, standing.hypothesis, standing.predicted))
-    after = detected(standing, floor, known.experiment.fit) if finds else before
+    after = detected(standing, floor, known.experiment.fit) if accepted else before
     held_out = None
     if known.experiment.held_out:
         begun = detected(Standing(known, predicted, {}), floor, known.experiment.held_out)
-        held_out = begun, detected(standing, floor, known.experiment.held_out) if finds else begun
+        held_out = begun, detected(standing, floor, known.experiment.held_out) if accepted else begun
     moved = _moved(standing.known)
     return Outcome(
         verdict=_verdict(finds, moved, after),
         before=before,
         after=after,
         held_out=held_out,
-        log_p=_mismatch(before, rounds[0]),
+        log_p=_mismatch(before, rounds[0].screening, kept),
         moved=moved,
         finds=merged(finds),
         refused=last.refused,
@@ -93,18 +93,16 @@ def diagnose(
     )
 
 
-def _mismatch(before: Detection, first: _Round) -> float:
+def _mismatch(before: Detection, first: Screening, kept: Sequence[Accepted]) -> float:
     """The lesser of two p-values, of any mismatch and of the first find, times two (Bonferroni).
 
     A suspect that did not pass the gate does not count: small gains are more frequent than chance has them, as the
     plant is not exact.
     """
-    if first.find is None:
+    if not kept:
         return before.log_p
-    found = min(
-        one.log_p for one in first.screening.candidates if identity(one.suspect) == first.find.identity
-    )
-    return float(min(0.0, np.log(2.0) + min(before.log_p, found)))
+    found = (one.log_p for one in first.candidates if identity(one.suspect) == kept[0].find.identity)
+    return float(min(0.0, np.log(2.0) + min([before.log_p, *found])))
 
 
 def _round(standing: Standing, floor: Floor, simulate: Simulate) -> _Round:
@@ -115,16 +113,22 @@ def _round(standing: Standing, floor: Floor, simulate: Simulate) -> _Round:
         return _Round(None, standing, view.screening, tuple(refused), place)
     chances = probabilities([one.standing.known for one in passed], view.bench.background.rows)
     best = int(np.argmax(chances))
-    settled = resettled(passed[best].standing, floor, simulate, leaps=1)
-    passed[best] = replace(passed[best], standing=released(settled, floor, simulate))
-    share = taken(standing, passed[best].standing, floor)
+    settled = released(resettled(passed[best].standing, floor, simulate, leaps=1), floor, simulate)
+    told = reread(replace(passed[best], standing=settled), standing, floor, simulate)
+    share = taken(standing, told.standing, floor)
     if share < TAKEN:
-        found = passed[best].found
         reason = f"takes {100.0 * share:.0f} % of what exceeds the floor: it follows what something else does"
-        refused.append(Refused(identity(found.suspect), found.score.rho_eff, (reason,)))
+        refused.append(Refused(identity(told.found.suspect), told.found.score.rho_eff, (reason,)))
         return _Round(None, standing, view.screening, tuple(refused), place)
-    find = find_of(passed, best, chances, standing, view.screening, place)
-    return _Round(find, passed[best].standing, view.screening, tuple(refused), place)
+    # Told anew, it may be what another was: their chances are one then.
+    others = [k for k, one in enumerate(passed) if k != best and _law(one) != _law(told)]
+    chance = [1.0 - float(chances[others].sum()), *chances[others]]
+    find = find_of([told, *(passed[k] for k in others)], 0, np.array(chance), standing, place)
+    return _Round(Accepted(told, find), told.standing, view.screening, tuple(refused), place)
+
+
+def _law(one: Tried) -> Identity:
+    return identity(one.found.suspect)
 
 
 def _passed(view: View, floor: Floor, simulate: Simulate) -> tuple[list[Tried], list[Refused]]:
@@ -144,7 +148,10 @@ def _passed(view: View, floor: Floor, simulate: Simulate) -> tuple[list[Tried], 
         passed, refused = [*passed, *more], [*refused, *less]
         if passed:
             break
-    return passed, refused
+    # One law may have led both views: the better of the two counts.
+    passed.sort(key=lambda one: one.standing.known.cost)
+    best = {_law(one): one for one in reversed(passed)}
+    return list(best.values()), [one for one in refused if one.identity not in best]
 
 
 def _place(standing: Standing, floor: Floor, scene: Scene) -> Place | None:
@@ -157,8 +164,10 @@ def _place(standing: Standing, floor: Floor, scene: Scene) -> Place | None:
 def _moved(known: Known) -> tuple[Moved, ...]:
     return tuple(
         Moved(name, float(value), float(sigma), float(sigmas))
-        for name, value, sigma, sigmas in zip(known.names, known.value, known.sigma, known.moved, strict=True)
-        if abs(sigmas) > MOVED
+        for name, value, sigma, sigmas, stated in zip(
+            known.names, known.value, known.sigma, known.moved, known.stated, strict=True
+        )
+        if stated and abs(sigmas) > MOVED
     )
 
 

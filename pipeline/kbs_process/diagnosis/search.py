@@ -100,8 +100,8 @@ class Search:
         phase = np.array([one in gears for one in free], dtype=np.bool_) & ~np.isfinite(parameters.sigma)
         size = np.ones(len(free))
         size[self.inside] = np.abs(hypothesis.values([free[i] for i in self.inside]))
-        size = np.where(phase, 1.0, np.maximum(size if scale is None else scale, 1e-12))
-        self.spread = np.where(np.isfinite(self.parameters.sigma), self.parameters.sigma, size)
+        self.scale = np.where(phase, 1.0, np.maximum(size if scale is None else scale, 1e-12))
+        self.spread = np.where(np.isfinite(self.parameters.sigma), self.parameters.sigma, self.scale)
         # A phase that nothing shows would leave the equations singular.
         self.ridge = np.where(phase, np.pi**-2.0, 0.0)
         self.differences = _DIFFERENCE * self.spread

@@ -22,6 +22,7 @@ from kbs_process.plant.sensing import SensingPort
 from kbs_process.stages.output_error import Scalar
 
 UNNAMED = "unnamed"
+_FARTHEST = 30.0  # times, up or down, that a shape goes from where the grid had it
 _NEAR = 0.05  # m: steps of a search for a point are no less
 
 
@@ -76,7 +77,9 @@ def extra_of(found: Found, standing: Standing, bench: Bench, scene: Scene) -> Ex
         }
         free = np.full(len(amplitude), np.inf)
         linear = tuple(Scalar(name) for name in names)
-        return Extra(standing.hypothesis, (), amplitude, 0.0 * amplitude, free, np.zeros(0), linear, columns)
+        return Extra(
+            standing.hypothesis, (), amplitude, 0.0 * amplitude, free, np.zeros(0), -free, free, linear, columns
+        )  # fmt: skip
     if isinstance(suspect, CurveSuspect):
         return measured.extra(suspect, found.score, standing)
     assert isinstance(suspect, Catalogued) and isinstance(suspect.candidate.effect, Effect)
@@ -105,11 +108,13 @@ def extra_of(found: Found, standing: Standing, bench: Bench, scene: Scene) -> Ex
     if effect.anywhere:
         place, reach = point, np.maximum(half_lengths(present.rig, candidate.site), _NEAR)
     begin = np.array([shape[name] for name in bends])
-    widths = [
-        shape[entry.name] * entry.prior.sigma
-        for entry in effect.parameters
-        if entry.name in bends and isinstance(entry.prior, LogNormal)
-    ]
+    entries = [entry for entry in effect.parameters if entry.name in bends]
+    widths = [shape[e.name] * e.prior.sigma for e in entries if isinstance(e.prior, LogNormal)]
+    # A shape stays within its bounds, and within what a search by slopes can be trusted over.
+    low = [max(shape[entry.name] / _FARTHEST, entry.bounds[0]) for entry in entries]
+    high = [min(shape[entry.name] * _FARTHEST, entry.bounds[1]) for entry in entries]
+    free = np.full(len(amplitude), np.inf)
+    anywhere = np.full(len(place), np.inf)
     return Extra(
         hypothesis=Hypothesis(rig, effects),
         plant=(
@@ -118,8 +123,10 @@ def extra_of(found: Found, standing: Standing, bench: Bench, scene: Scene) -> Ex
         ),
         start=np.concatenate([amplitude, begin, place]),
         prior=np.concatenate([0.0 * amplitude, begin, place]),
-        sigma=np.concatenate([np.full(len(amplitude), np.inf), widths, np.full(len(place), np.inf)]),
+        sigma=np.concatenate([free, widths, anywhere]),
         scale=np.concatenate([np.maximum(np.abs(amplitude), 5.0 * size), widths, reach]),
+        lower=np.concatenate([-free, low, -anywhere]),
+        upper=np.concatenate([free, high, anywhere]),
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from kbs_process.diagnosis.curves import curves
@@ -26,11 +27,13 @@ class View:
     screening: Screening
 
     @classmethod
-    def of(cls, standing: Standing) -> View:
+    def of(cls, standing: Standing, among: Callable[[Suspect], bool] = lambda _: True) -> View:
+        """Of all suspects, or of those for which `among` is true."""
         known = standing.known
         scene = Scene.of(known.experiment, standing.hypothesis, standing.predicted)
         bench = Bench.of(known, scene)
-        return cls(standing, bench, scene, screen(bench, suspects_of(standing, scene)))
+        chosen = [suspect for suspect in suspects_of(standing, scene) if among(suspect)]
+        return cls(standing, bench, scene, screen(bench, chosen))
 
     @property
     def able(self) -> list[Found]:

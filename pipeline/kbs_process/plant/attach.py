@@ -47,6 +47,38 @@ def attach(
     return replace(rig, external=(*others, External(effect.name, on, at, parameters)))
 
 
+def idle(rig: Rig, effect: Effect) -> bool:
+    """Whether an effect that the rig has the numbers of does nothing: no amplitude of it is other than zero."""
+    holders = [joint.drive.parameters for joint in rig.joints if joint.drive is not None]
+    if not effect.port.of_drive:
+        holders = [entry.parameters for entry in rig.external if entry.name == effect.name]
+    names = [entry.name for entry in effect.parameters if entry.role == "amplitude"]
+    return not any(float(holder[name]) for holder in holders for name in names if name in holder)
+
+
+def detach(rig: Rig, effect: Effect, others: Sequence[Effect]) -> Rig:
+    """Return `rig` without the parameters of `effect` that none of the `others` has: what `attach` gave it."""
+    shared = {entry.name for other in others for entry in other.parameters}
+    own = {entry.name for entry in effect.parameters if entry.role != "shared"} - shared
+    if not effect.port.of_drive:
+        return replace(rig, external=tuple(entry for entry in rig.external if entry.name != effect.name))
+    return replace(
+        rig,
+        joints=tuple(
+            joint
+            if joint.drive is None
+            else replace(
+                joint,
+                drive=replace(
+                    joint.drive,
+                    parameters={n: q for n, q in joint.drive.parameters.items() if n not in own},
+                ),
+            )
+            for joint in rig.joints
+        ),
+    )
+
+
 def _joint(joint: Joint, effect: Effect, given: Mapping[str, float]) -> Joint:
     drive = joint.drive or _direct(joint)
     parameters = dict(drive.parameters)

@@ -25,8 +25,8 @@ RIGID = {
 }  # times the gear's ratio?
 
 
-def added_loads(rig: Rig, effects: Sequence[Effect], q: Array, dt: float) -> Array:
-    r"""What effects add to `rigid.loads` along a motion q (n, joints), (n, 6 + joints) in its order and units.
+def added_loads(rig: Rig, effects: Sequence[Effect], q: Array, qd: Array, dt: float) -> Array:
+    r"""What effects add to `rigid.loads` along a motion q, qd (n, joints): (n, 6 + joints) in its order and units.
 
     Equation: $\Delta \tau_j = -T_j$ of an effect on the output, $-R_j T_j$ of one on the rotor, over the effort's gain;
         of a force on a link, `external_wrench` and `external_efforts`.
@@ -36,9 +36,8 @@ def added_loads(rig: Rig, effects: Sequence[Effect], q: Array, dt: float) -> Arr
     added = np.zeros((len(q), 6 + len(rig.joints)))
     efforts = np.zeros((len(q), len(rig.joints)))
     if any(effect.port is Port.EXTERNAL_FORCE for effect in effects):
-        rates = np.gradient(q, dt, axis=0)
-        added[:, :6] = external_wrench(rig, effects, q, rates)
-        efforts = external_efforts(rig, effects, q, rates)
+        added[:, :6] = external_wrench(rig, effects, q, qd)
+        efforts = external_efforts(rig, effects, q, qd)
     for index, joint in enumerate(rig.joints):
         if joint.effort is None:
             continue

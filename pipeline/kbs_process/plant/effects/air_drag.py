@@ -15,7 +15,7 @@ def force(
 ) -> tuple[float, float, float]:
     r"""Force on the centre of the area, against its velocity, along the undeflected T's axes.
 
-    Equation: $F = -D (|v| / v_0)^{n-1}\, v / v_0$, with v_0 = 0.01 m/s.
+    Equation: $F = -D (|v| / v_0)^{n-1}\, v / v_0$, $v_0$ = 0.01 m/s.
     Units: m/s, N, 1 -> N.
     Validity: still air, an area small beside its distance from the axes, n >= 1. Drag of form has n = 2 and
         $D = \rho/2\, c_d A v_0^2$, 7e-5 N of a plate of 1 m^2; of skin n = 1.5 (laminar) to 1.8.

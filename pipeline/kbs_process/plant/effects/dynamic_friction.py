@@ -12,7 +12,8 @@ def torque(
 ) -> float:
     r"""Torque on the rotor by the resistance of the elliptical bearing.
 
-    Equation: $T = -(d_0 + d_1 \sin(2 \theta_r + \phi_{dyn})) \min(|\omega_r|/w_{dyn}, 1)\, sign(\omega_r)$.
+    Equation: $T = -(d_0 + d_1 \sin(2 \theta_r + \phi_{dyn})) \min(|\omega_r|/w_{dyn}, 1)
+        \operatorname{sign}(\omega_r)$.
     Units: rad, rad/s, N m, N m, rad, rad/s -> N m.
     Validity: passive only while d1 <= d0.
     Source: ENVISAT Ka-band subsystem (1996), section 5, dynamic friction.

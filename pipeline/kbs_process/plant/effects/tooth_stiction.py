@@ -12,7 +12,8 @@ _INSTANT = 1e-6  # rad of tooth phase
 def limit(rotor_angle: float, rotor_travel: float, Ts0: float, delta: float, phi_stat: float) -> float:
     r"""Greatest Coulomb friction torque on the rotor, mean over what it turns in a step.
 
-    Equation: $T_s = T_{s0}$ where $|wrap(200 \theta_r + \phi_{stat})| < \delta$, else 0; wrap to (-pi, pi].
+    Equation: $T_s = T_{s0}$ where $|\operatorname{wrap}(200 \theta_r + \phi_{stat})| < \delta$, else 0; wrap to
+        (-pi, pi].
         Over a travel, $T_{s0}$ times the share of it within the teeth's contact.
     Units: rad, rad, N m, rad, rad -> N m.
     Validity: 0 <= delta <= pi; the plant holds the rotor exactly, without a regularised sign.
