@@ -22,7 +22,7 @@ from pytest_benchmark.fixture import BenchmarkFixture
 from engine import TRAJECTORIES, Hardware, simulate
 from kbs_process.campaign.load import load_campaign
 from kbs_process.plant.effects import select
-from kbs_process.plant.predict import DEFAULT_STEP, predict
+from kbs_process.plant.predict import DEFAULT_STEP, LANES, predict, predict_together, simulation_of
 from kbs_process.plant.schedule import Schedule
 from kbs_process.plant.simulation import Simulation
 from kbs_process.plant.structure import link_inertia
@@ -60,14 +60,21 @@ def test_speed(benchmark: BenchmarkFixture, tmp_path: Path) -> None:
         )
         return np.concatenate([block.values for key, block in blocks if key == "wrench"])
 
+    def side_by_side() -> Array:
+        rates = {"rate_Hz": 100.0, "angle_rate_Hz": 100.0, "duration_s": SECONDS}
+        begun = [simulation_of(loops["open"], effects, schedule, **rates) for _ in range(LANES)]
+        return predict_together(begun, 100.0, SECONDS)[0][0]
+
     in_c, in_numba = rk4(tmp_path, rig, effects, schedule)
     wrench = plant()
+    np.testing.assert_allclose(side_by_side(), wrench, atol=1e-6)
     by_hand, generated = in_c(), in_numba()
     np.testing.assert_allclose(by_hand.mean(axis=0), wrench.mean(axis=0), atol=0.01)  # the same plant
     np.testing.assert_allclose(by_hand[:1000], generated[:1000], atol=1e-4)
     ways: dict[str, Callable[[], object]] = {
         "plant, 2 ms, open loop": plant,
         "plant, 2 ms, closed loop": lambda: plant("closed"),
+        f"{LANES} plants side by side": side_by_side,
         "plant, 1 ms": lambda: plant(step=DEFAULT_STEP / 2),
         "RK4 0.1 ms, generated plant": in_numba,
         "RK4 0.1 ms, C by hand": in_c,
@@ -84,10 +91,13 @@ def test_speed(benchmark: BenchmarkFixture, tmp_path: Path) -> None:
         )
     ratio = times["RK4 0.1 ms, C by hand"] / times["RK4 0.1 ms, generated plant"]
     print(f"RK4, generated plant against C: {ratio:.2f}")
+    gain = LANES * reference / times[f"{LANES} plants side by side"]
+    print(f"{LANES} plants side by side against one after the other: {gain:.2f} times as fast")
     benchmark.extra_info.update({name: SECONDS / taken for name, taken in times.items()})
     benchmark.pedantic(plant, rounds=1)
     assert times["RK4 0.1 ms, C by hand"] > 8.0 * reference
     assert ratio > 0.8
+    assert gain > 2.0
 
 
 def least_times(ways: dict[str, Callable[[], object]], rounds: int = 5) -> dict[str, float]:

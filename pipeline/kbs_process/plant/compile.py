@@ -13,12 +13,13 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, cast
 
 import numba
 
 from kbs_process.plant import elementary, kernels
 from kbs_process.plant.generate import module_text
+from kbs_process.plant.lanes import lanes_text
 from kbs_process.plant.structure import Structure
 
 
@@ -35,10 +36,20 @@ class Compiled:
 @cache
 def compiled_plant(structure: Structure) -> Compiled:
     """Return the compiled plant of `structure`, from this process, from the cache, or made now."""
-    effects = [*structure.effects, *(load.effect for load in structure.loads)]
-    modules = [inspect.getmodule(effect.equation) for effect in effects]
-    module = compiled_module("plant", module_text(structure), modules)
+    module = compiled_module("plant", module_text(structure), _modules(structure))
     return Compiled(Path(str(module.__file__)), module.balance, module.advance, module.tap)
+
+
+@cache
+def compiled_lanes(structure: Structure) -> Callable[..., Any]:
+    """Return the time loop of several plants of `structure` side by side, likewise."""
+    text = f"{module_text(structure)}\n\n{lanes_text(structure)}"
+    return cast(Callable[..., Any], compiled_module("lanes", text, _modules(structure)).advance_lanes)
+
+
+def _modules(structure: Structure) -> list[ModuleType | None]:
+    effects = [*structure.effects, *(load.effect for load in structure.loads)]
+    return [inspect.getmodule(effect.equation) for effect in effects]
 
 
 def compiled_module(kind: str, text: str, modules: Iterable[ModuleType | None]) -> ModuleType:

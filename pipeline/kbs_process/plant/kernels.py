@@ -9,6 +9,11 @@ the origin, force), and the inertia of a body is (m, h, I): mass, first moment m
 
 from __future__ import annotations
 
+from typing import Any
+
+from numba import types
+from numba.extending import intrinsic
+
 from kbs_process.plant import elementary
 from kbs_process.plant.elementary import F, compiled, cos, floor, linked, sin
 from kbs_process.signals.records import Array
@@ -333,3 +338,14 @@ def mean_rounded(a: float, b: float, inverse: float) -> float:
     ra = a - floor(a + 0.5)
     rb = b - floor(b + 0.5)
     return 0.5 * (a + b) - 0.5 * (rb * rb - ra * ra) * inverse
+
+
+@intrinsic
+def address(typing: Any, array: Any) -> Any:
+    """Pointer to the first number of an array."""
+
+    def code(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+        return context.make_array(signature.args[0])(context, builder, given[0]).data
+
+    signature: Any = types.CPointer(array.dtype)(array)  # type: ignore[no-untyped-call]
+    return signature, code

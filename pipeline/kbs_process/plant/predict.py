@@ -10,15 +10,17 @@ from scipy.linalg import eigh
 from kbs_process.errors import SimulationError
 from kbs_process.plant.effect import Effect
 from kbs_process.plant.effects import select
+from kbs_process.plant.lanes import LANES
 from kbs_process.plant.linear import linearise
 from kbs_process.plant.schedule import Schedule
 from kbs_process.plant.simulation import Simulation
 from kbs_process.plant.structure import parameters, structure_of
 from kbs_process.plant.taps import tap_columns
+from kbs_process.plant.together import Together
 from kbs_process.rig.model import Rig
 from kbs_process.signals.records import Array, Block
 
-__all__ = ["DEFAULT_STEP", "Schedule", "predict", "tap_columns"]
+__all__ = ["DEFAULT_STEP", "LANES", "Schedule", "predict", "predict_together", "simulation_of", "tap_columns"]
 
 DEFAULT_STEP = 2e-3  # s; tests/plant/test_convergence.py shows what it costs in units of the sensors' noise
 FINEST_STEP = 2.5e-4  # s; nothing in the plant asks for less
@@ -57,12 +59,37 @@ def predict(
     simulated too. `step_s` bounds the step, which divides the wrench's sampling interval; without it, `step_for`
     does. `progress` gets the share done.
     """
+    simulation = simulation_of(
+        rig,
+        effects,
+        schedule,
+        rate_Hz=rate_Hz,
+        angle_rate_Hz=angle_rate_Hz,
+        duration_s=duration_s,
+        step_s=step_s,
+        taps=taps,
+    )
+    return _blocks(simulation, rate_Hz, duration_s, quantise, progress)
+
+
+def simulation_of(
+    rig: Rig,
+    effects: Sequence[str],
+    schedule: Schedule,
+    *,
+    rate_Hz: float,
+    angle_rate_Hz: float,
+    duration_s: float,
+    step_s: float | None = None,
+    taps: bool = False,
+) -> Simulation:
+    """Return the plant at rest before a prediction; arguments as those of `predict`."""
     if not (min(rate_Hz, angle_rate_Hz, duration_s) > 0.0 and (step_s is None or step_s > 0.0)):
         raise SimulationError("rates, duration and step have to be positive", where="predict")
     chosen = select(effects)
     step = step_s or step_for(rig, chosen, schedule.position[0], rate_Hz)
     per_sample = max(1, int(np.ceil(1.0 / (rate_Hz * step) - 1e-9)))
-    simulation = Simulation(
+    return Simulation(
         rig,
         chosen,
         schedule,
@@ -72,7 +99,24 @@ def predict(
         end=duration_s,
         taps=taps,
     )
-    return _blocks(simulation, rate_Hz, duration_s, quantise, progress)
+
+
+def predict_together(
+    simulations: Sequence[Simulation], rate_Hz: float, duration_s: float
+) -> list[tuple[Array, Array]]:
+    """Return wrench (n, 6) and angles (m, joints), offset included and not rounded, of each of some simulations.
+
+    As `predict` does of each alone, to rounding, and several times faster; a plant that diverges has samples that are
+    not finite. They have to be alike in structure, schedule, step and rates.
+    """
+    samples = int(np.ceil(duration_s * rate_Hz - 1e-9))
+    found = []
+    for begin in range(0, len(simulations), LANES):
+        group = simulations[begin : begin + LANES]
+        angles = int(np.ceil(duration_s * group[0].angle_rate - 1e-9))
+        wrench, angle = Together(group).run(samples, angles)
+        found += [(w, _encoded(a, s.encoder, False)) for w, a, s in zip(wrench, angle, group, strict=True)]
+    return found
 
 
 def step_for(rig: Rig, effects: Sequence[Effect], q: Array, rate_Hz: float) -> float:

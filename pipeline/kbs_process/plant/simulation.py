@@ -48,29 +48,29 @@ class Simulation:
         self.knots = cycles.t
         self.fields = cycles.position * per_output if cycles.field is None else cycles.field * self.microsteps
         self.first = int(np.ceil(self.knots[0] / step / per_sample - 1e-9)) * per_sample
-        self._cycles = cycles
-        self._closed = cycles.field is None and controller is not None and controller.loop == "closed"
-        self._recorded = cycles.encoder is not None
-        self._latency = controller.latency if controller else 0
+        self.cycles = cycles
+        self.closed = cycles.field is None and controller is not None and controller.loop == "closed"
+        self.recorded = cycles.encoder is not None
+        self.latency = controller.latency if controller else 0
         gains = (controller.Kp.value, controller.Ki.value) if controller else (0.0, 0.0)
-        self._gains = np.stack([np.broadcast_to(gains[0], n), np.broadcast_to(gains[1], n), per_output])
+        self.gains = np.stack([np.broadcast_to(gains[0], n), np.broadcast_to(gains[1], n), per_output])
         self.encoder = np.array(
             [
                 [float(joint.encoder.step) if joint.encoder else 0.0 for joint in rig.joints],
                 [float(joint.encoder.offset) if joint.encoder else 0.0 for joint in rig.joints],
             ]
         )
-        self._readings = np.zeros_like(self.fields) if cycles.encoder is None else cycles.encoder
-        self._sums = np.zeros(n)
-        self._cursor = np.zeros(2, dtype=np.int64)
+        self.readings = np.zeros_like(self.fields) if cycles.encoder is None else cycles.encoder
+        self.sums = np.zeros(n)
+        self.cursor = np.zeros(2, dtype=np.int64)
         self.state, self.wrench = at_rest(self.plant, self.structure, self.p, self.fields[0])
-        self._low_pass, self._drive_in = discretised(rig.transducer.amplifier, step)
-        self._amplified = steady(len(self._drive_in), self.wrench)
+        self.low_pass, self.drive_in = discretised(rig.transducer.amplifier, step)
+        self.amplified = steady(len(self.drive_in), self.wrench)
 
     @property
     def controlled(self) -> int:
         """Cycles whose field motion is settled; `fields` holds one row more."""
-        return int(self._cursor[1])
+        return int(self.cursor[1])
 
     def part(self, name: str) -> Array:
         """Return a view of one part of the state vector: see `generate.state_layout`."""
@@ -91,10 +91,10 @@ class Simulation:
         angle = np.empty((int(span * self.angle_rate) + 2, n))
         states = np.empty((len(wrench) if self.taps else 0, len(self.state) + n))
         taken = self.plant.advance(
-            self.first, steps, self.step, self.p, self.state, self._cursor, self._closed, self._recorded,
-            self._latency, self._cycles.position, self._cycles.rate, self.encoder, self._readings,
-            self._gains, self._sums, self.knots, self.fields, self.per_sample, self.wrench, self._low_pass,
-            self._drive_in, self._amplified, wrench, self.angle_rate, angle_first, angle, states,
+            self.first, steps, self.step, self.p, self.state, self.cursor, self.closed, self.recorded,
+            self.latency, self.cycles.position, self.cycles.rate, self.encoder, self.readings,
+            self.gains, self.sums, self.knots, self.fields, self.per_sample, self.wrench, self.low_pass,
+            self.drive_in, self.amplified, wrench, self.angle_rate, angle_first, angle, states,
         )  # fmt: skip
         self.first += steps
         angle = angle[:taken]

@@ -44,6 +44,25 @@ def state_layout(structure: Structure) -> dict[str, slice]:
     return layout
 
 
+class InVector:
+    """How a step's text names the numbers of the state: x[i]."""
+
+    def __init__(self, structure: Structure) -> None:
+        self.layout = state_layout(structure)
+
+    def at(self, name: str, i: int = 0) -> str:
+        """One number of a part."""
+        return self.place(self.layout[name].start + i)
+
+    def vector(self, name: str) -> str:
+        """Three numbers of a part."""
+        return tuple_of([self.at(name, i) for i in range(3)])
+
+    def place(self, i: int) -> str:
+        """Number `i` of all."""
+        return f"x[{i}]"
+
+
 def tuple_of(names: list[str]) -> str:
     """Return a tuple of some expressions; the compiler wants one that is not empty."""
     return "(" + ", ".join(names or ["0.0"]) + ",)"
@@ -110,35 +129,31 @@ def _rotor(structure: Structure) -> list[str]:
 
 
 def _step(structure: Structure) -> list[str]:
+    state = InVector(structure)
     return [
         "@compiled",
         "def step(x, field_0, field_1, time, H, p):",
         '    """Advance the state `x` by H; return the mean wrench over the step, force first."""',
-        *_drifted(structure),
-        *_turned(structure),
-        *_kicked(structure),
+        *drifted(structure, state),
+        *prepared(structure, state),
+        f"    for i in range({ROTOR_STEPS}):",
+        *(f"    {line}" for line in turned(structure, state)),
+        *handed_over(structure, state),
+        *kicked(structure, state),
         "    return wrench",
     ]
 
 
-def _at(structure: Structure, name: str, i: int = 0) -> str:
-    return f"x[{state_layout(structure)[name].start + i}]"
-
-
-def _vector(structure: Structure, name: str) -> str:
-    return f"triple(x, int({state_layout(structure)[name].start}))"
-
-
-def _drifted(structure: Structure) -> list[str]:
+def drifted(structure: Structure, state: InVector) -> list[str]:
     """Emit positions, rates and geometry in the middle of the step."""
     n = structure.joints
-    qdd = [_at(structure, "qdd", j) for j in range(n)]
+    qdd = [state.at("qdd", j) for j in range(n)]
     lines = [
         "    half = 0.5 * H",
         "    ahead = H * H / 12.0",
-        f"    alpha_0 = {_vector(structure, 'alpha')}",
-        f"    omega_0 = {_vector(structure, 'omega')}",
-        f"    omegad_T = {_vector(structure, 'omegad')}",
+        f"    alpha_0 = {state.vector('alpha')}",
+        f"    omega_0 = {state.vector('omega')}",
+        f"    omegad_T = {state.vector('omegad')}",
         f"    guess = (omegad_T[0], omegad_T[1], omegad_T[2], {', '.join(qdd)})",
         "    drifted = drift(alpha_0, plate_rates(alpha_0, omega_0), half)",
         "    alpha = drift(drifted, omegad_T, ahead)",
@@ -147,21 +162,19 @@ def _drifted(structure: Structure) -> list[str]:
     for j in range(n):
         # The middle of the parabola through which the output passes is below its mean, which is `ahead`.
         lines += [
-            f"    drifted_{j} = {_at(structure, 'q', j)} + half * {_at(structure, 'qd', j)}",
+            f"    drifted_{j} = {state.at('q', j)} + half * {state.at('qd', j)}",
             f"    q_{j} = drifted_{j} + 0.5 * ahead * {qdd[j]}",
-            f"    qd_{j} = {_at(structure, 'qd', j)} + half * {qdd[j]}",
+            f"    qd_{j} = {state.at('qd', j)} + half * {qdd[j]}",
         ]
     return [*lines, f"    {placing(structure)} = place({unrolled('q_#', n)}, p)"]
 
 
-def _turned(structure: Structure) -> list[str]:
-    """Emit the rotors' motion: side by side, so that the processor need not wait for one of them."""
-    n, z = structure.joints, len(structure.states)
+def prepared(structure: Structure, state: InVector) -> list[str]:
+    """Emit what the rotors begin the step with."""
+    z = len(structure.states)
     lines = [f"    h = H / {ROTOR_STEPS}"]
-    loop = [f"    for i in range({ROTOR_STEPS}):", "        off = (i + 0.5) * h - half"]
-    after = []
-    for j in range(n):
-        c, k, qdd = carrier(structure, j), joint_offset(structure, j), _at(structure, "qdd", j)
+    for j in range(structure.joints):
+        c, k, qdd = carrier(structure, j), joint_offset(structure, j), state.at("qdd", j)
         own = range(j * z, (j + 1) * z)
         if j in structure.parents:
             lines += [
@@ -172,41 +185,58 @@ def _turned(structure: Structure) -> list[str]:
         lines += [
             f"    carrier_{j} = dot3(a_{j}, omega_{c})",
             f"    turning_{j} = dot3(a_{j}, omegad_{c})",
-            f"    spin_{j} = {_at(structure, 'spin', j)}",
-            f"    theta_{j} = {_at(structure, 'theta', j)}",
+            f"    spin_{j} = {state.at('spin', j)}",
+            f"    theta_{j} = {state.at('theta', j)}",
             f"    w_{j} = spin_{j} - (carrier_{j} - half * turning_{j})",
-            f"    z_{j} = {tuple_of([_at(structure, 'z', i) for i in own])}",
-            f"    zd_{j} = {tuple_of([_at(structure, 'zd', i) for i in own])}",
+            f"    z_{j} = {tuple_of([state.at('z', i) for i in own])}",
+            f"    zd_{j} = {tuple_of([state.at('zd', i) for i in own])}",
             f"    share_{j} = (field_1[{j}] - field_0[{j}]) / {ROTOR_STEPS}",
             f"    inverse_{j} = 1.0 / share_{j}",
             f"    pitch_{j} = 1.0 / p[{k + MICROSTEP}]",
             f"    out_{j} = 0.0",
             *[f"    ground_{j} = 0.0"] * structure.grounded,
         ]
-        loop += [
-            f"        from_ = field_0[{j}] + i * share_{j}",
-            f"        field = mean_rounded(from_, from_ + share_{j}, inverse_{j}) * pitch_{j}",
-            f"        angle = q_{j} + off * (qd_{j} + 0.5 * off * {qdd})",
-            f"        rate = qd_{j} + off * {qdd}",
-            f"        theta_{j}, w_{j}, out, z_{j}, zd_{j}{', earth' * structure.grounded} = turn_rotor(",
-            f"            theta_{j}, w_{j}, turning_{j}, field, angle, rate, time + half + off, h,",
-            f"            z_{j}, zd_{j}, p, int({k}),",
-            "        )",
-            f"        out_{j} += out / {ROTOR_STEPS}",
-            *[f"        ground_{j} += earth / {ROTOR_STEPS}"] * structure.grounded,
-        ]
-        after += [
-            f"    {_at(structure, 'spin', j)} = w_{j} + (carrier_{j} + half * turning_{j})",
-            f"    {_at(structure, 'theta', j)} = theta_{j}",
-            f"    drag_{j} = p[{k + ROTOR}] * ({_at(structure, 'spin', j)} - spin_{j}) / H",
-            f"    momentum_{j} = p[{k + ROTOR}] * 0.5 * ({_at(structure, 'spin', j)} + spin_{j})",
-            *[f"    {_at(structure, 'z', i)} = z_{j}[{m}]" for m, i in enumerate(own)],
-            *[f"    {_at(structure, 'zd', i)} = zd_{j}[{m}]" for m, i in enumerate(own)],
-        ]
-    return [*lines, *loop, *after]
+    return lines
 
 
-def _kicked(structure: Structure) -> list[str]:
+def turned(structure: Structure, state: InVector) -> list[str]:
+    """Emit one of the rotors' steps: side by side, so that the processor need not wait for one of them."""
+    lines = ["    off = (i + 0.5) * h - half"]
+    for j in range(structure.joints):
+        k, qdd = joint_offset(structure, j), state.at("qdd", j)
+        lines += [
+            f"    from_ = field_0[{j}] + i * share_{j}",
+            f"    field = mean_rounded(from_, from_ + share_{j}, inverse_{j}) * pitch_{j}",
+            f"    angle = q_{j} + off * (qd_{j} + 0.5 * off * {qdd})",
+            f"    rate = qd_{j} + off * {qdd}",
+            f"    theta_{j}, w_{j}, out, z_{j}, zd_{j}{', earth' * structure.grounded} = turn_rotor(",
+            f"        theta_{j}, w_{j}, turning_{j}, field, angle, rate, time + half + off, h,",
+            f"        z_{j}, zd_{j}, p, int({k}),",
+            "    )",
+            f"    out_{j} += out / {ROTOR_STEPS}",
+            *[f"    ground_{j} += earth / {ROTOR_STEPS}"] * structure.grounded,
+        ]
+    return lines
+
+
+def handed_over(structure: Structure, state: InVector) -> list[str]:
+    """Emit the rotors' states after the step, and the change of their momenta, which their carriers get."""
+    z = len(structure.states)
+    lines = []
+    for j in range(structure.joints):
+        k, own = joint_offset(structure, j), range(j * z, (j + 1) * z)
+        lines += [
+            f"    {state.at('spin', j)} = w_{j} + (carrier_{j} + half * turning_{j})",
+            f"    {state.at('theta', j)} = theta_{j}",
+            f"    drag_{j} = p[{k + ROTOR}] * ({state.at('spin', j)} - spin_{j}) / H",
+            f"    momentum_{j} = p[{k + ROTOR}] * 0.5 * ({state.at('spin', j)} + spin_{j})",
+            *[f"    {state.at('z', i)} = z_{j}[{m}]" for m, i in enumerate(own)],
+            *[f"    {state.at('zd', i)} = zd_{j}[{m}]" for m, i in enumerate(own)],
+        ]
+    return lines
+
+
+def kicked(structure: Structure, state: InVector) -> list[str]:
     """Emit the multibody part's accelerations, and the end of its step."""
     n, z = structure.joints, len(structure.states)
     lines = []
@@ -234,15 +264,15 @@ def _kicked(structure: Structure) -> list[str]:
     if structure.elastic:
         for i in range(3):
             lines += [
-                f"    {_at(structure, 'omegad', i)} = omegad[{i}]",
-                f"    {_at(structure, 'omega', i)} += H * omegad[{i}]",
+                f"    {state.at('omegad', i)} = omegad[{i}]",
+                f"    {state.at('omega', i)} += H * omegad[{i}]",
             ]
-        lines.append(f"    drifted = drift(drifted, plate_rates(alpha, {_vector(structure, 'omega')}), half)")
-        lines += [f"    {_at(structure, 'alpha', i)} = drifted[{i}]" for i in range(3)]
+        lines.append(f"    drifted = drift(drifted, plate_rates(alpha, {state.vector('omega')}), half)")
+        lines += [f"    {state.at('alpha', i)} = drifted[{i}]" for i in range(3)]
     for j in range(n):
         lines += [
-            f"    {_at(structure, 'qdd', j)} = qdd_{j}",
-            f"    {_at(structure, 'qd', j)} += H * qdd_{j}",
-            f"    {_at(structure, 'q', j)} = drifted_{j} + half * {_at(structure, 'qd', j)}",
+            f"    {state.at('qdd', j)} = qdd_{j}",
+            f"    {state.at('qd', j)} += H * qdd_{j}",
+            f"    {state.at('q', j)} = drifted_{j} + half * {state.at('qd', j)}",
         ]
     return lines

@@ -45,6 +45,12 @@ class Structure:
         return DRIVE + sum(len(effect.parameters) for effect in self.effects)
 
     @property
+    def size(self) -> int:
+        """Numbers in the parameter vector."""
+        loads = sum(3 + len(load.effect.parameters) for load in self.loads)
+        return JOINTS + self.joints * self.stride + loads
+
+    @property
     def unknowns(self) -> int:
         """Accelerations that the mass matrix couples; rotors follow from their own torques."""
         return 3 * self.elastic + self.joints
