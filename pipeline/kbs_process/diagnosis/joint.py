@@ -1,7 +1,8 @@
 """A suspect in the non-linear plant, refitted together with all known parameters.
 
-The known parameters keep the slopes that they were fitted with, as the steps correct them; the suspect's own are taken
-anew. What acts on the readings alone has a column of the prediction for each of its numbers.
+The bodies keep the slopes that they were fitted with, as the steps correct them; those of the drives and the suspect's
+own are taken anew where the steps want it. What acts on the readings alone has a column of the prediction for each of
+its numbers.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import numpy as np
 
 from kbs_process.diagnosis.hypothesis import Hypothesis, Prediction, Simulate
 from kbs_process.diagnosis.known import Known, as_it_is, known_of, settled
-from kbs_process.diagnosis.search import OWN, Laws, Search, added
+from kbs_process.diagnosis.search import GEARS, Laws, Search, added
 from kbs_process.estimation.fit import Parameters
 from kbs_process.plant.attach import detach, idle
 from kbs_process.plant.effects import select
@@ -88,7 +89,7 @@ def with_extra(standing: Standing, extra: Extra, simulate: Simulate) -> Standing
     begun = search.begin(theta, dict(known.slopes), predicted)
     found = begun
     if np.isfinite(search.cost(theta, predicted)[0]):
-        found = search.descend(begun, _STEPS, most=OWN)
+        found = search.descend(begun, _STEPS, most=GEARS)
     return standing_of(known_of(search, found, known.chi2_before), laws, simulate)
 
 

@@ -30,12 +30,12 @@ _DIFFERENCE = 0.05  # prior sigmas (phases: rad), first difference
 _SEEN = 5.0  # what a difference should move the whitened residual by
 _SPAN = 1.0  # of a step
 _LEAST_DIFFERENCE, _MOST_DIFFERENCE = 2e-3, 0.4  # prior sigmas
-_DAMPING = (0.0, 1e-2, 1e-1, 1.0, 10.0, 1e3)  # tried two at a time
+_DAMPING = (0.0, 1e-2, 1e-1, 1.0, 10.0, 1e3)  # tried side by side
 _AGREED = 0.9  # gained over promised, above which slopes are only updated
 _HALF = 0.5  # of the same, below which slopes of drives alone do not do
 _STALLED = 0.1  # of the same, below which a descent goes nowhere
 # Which slopes are taken where the search stands: none, those of suspects alone, of drives too, all.
-_OLD, OWN, _GEARS, ALL = range(4)
+_OLD, _OWN, GEARS, ALL = range(4)
 GAIN = 2.0  # of -2 log likelihood: a step that promises less ends a descent
 LITTLE = 25.0  # of the same: what exact slopes gained, below which more rounds are not worth their time
 SLIGHT = 1e-2  # of all that is left: likewise
@@ -182,7 +182,7 @@ class Search:
                 drive: Slopes(predicted[drive], np.pad(slope.columns, ((0, missing), (0, 0), (0, 0))))
                 for drive, slope in gradients.items()
             }
-            gradients = self.slopes(theta, wider, OWN)
+            gradients = self.slopes(theta, wider, _OWN)
         found = Found(theta, predicted, gradients)
         self.idle = {drive: self._idle(drive, found.gradients) for drive in self.references}
         return found
@@ -214,7 +214,7 @@ class Search:
 
         All of them, or only those of suspects' own numbers, as `most` says.
         """
-        fresh = min(_GEARS, most)
+        fresh = min(GEARS, most)
         for number in range(found.rounds + 1, found.rounds + rounds + 1):
             H, g = self.normal(found.gradients, found.predicted)
             step = self.step(found.theta, found.predicted, H, g)
@@ -231,7 +231,7 @@ class Search:
             if found.converged:
                 break
             stale = step.gained < max(little, _HALF * step.promised)
-            fresh = _OLD if kept else min(most, ALL if stale and fresh == _GEARS else _GEARS)
+            fresh = _OLD if kept else min(most, ALL if stale and fresh == GEARS else GEARS)
             if fresh != _OLD:
                 found = replace(found, gradients=self.slopes(found.theta, found.gradients, fresh))
         return found
@@ -248,7 +248,7 @@ class Search:
         """-2 log likelihood beyond that of noise."""
         return self.cost(found.theta, found.predicted)[0] - self.rows
 
-    def slopes(self, theta: Array, held: Gradients, fresh: int = _GEARS) -> Gradients:
+    def slopes(self, theta: Array, held: Gradients, fresh: int = GEARS) -> Gradients:
         """Slopes at theta; where some are held, only those that `fresh` names are taken again.
 
         Those of bodies change with the resonances, slowly. Calibrations, slow and at rest for the most part, keep what
@@ -258,7 +258,7 @@ class Search:
         for drive in self.references:
             same = set(self.idle.get(drive, ())) if drive in held else set()
             if drive in held and fresh < ALL:
-                same |= set(self.slow) | (set(self.geared) if fresh == OWN else set())
+                same |= set(self.slow) | (set(self.geared) if fresh == _OWN else set())
                 if drive in self.calibrations:
                     same |= {i for i in self.geared if self._shown_beside(i, drive)}
             columns = held[drive].columns.copy() if drive in held else None
@@ -322,7 +322,7 @@ class Search:
         )
 
     def step(self, theta: Array, predicted: Predictions, H: Array, g: Array) -> _Step:
-        """One step in the chart of cosines and sines, as long as lowers the cost."""
+        """One step in the chart of cosines and sines, as damped as lowers the cost most."""
         data, excess = self.cost(theta, predicted)
         # While much is unexplained, residuals count for less, so that no step is rash.
         weight = 1.0 / max(1.0, data / self.rows)
@@ -340,13 +340,12 @@ class Search:
         if promised < GAIN:
             return _Step(theta, predicted, promised, 0.0)
         now = weight * data + excess
-        for pair in zip(candidates[::2], candidates[1::2], strict=True):
-            tried = self.predict(pair, self.drives)
-            costs = [weight * d + e for d, e in itertools.starmap(self.cost, zip(pair, tried, strict=True))]
-            best = int(np.argmin(costs))
-            if costs[best] < now:
-                return _Step(pair[best], {**predicted, **tried[best]}, promised, (now - costs[best]) / weight)
-        return _Step(theta, predicted, promised, 0.0)
+        tried = self.predict(candidates, self.drives)
+        costs = [weight * d + e for d, e in itertools.starmap(self.cost, zip(candidates, tried, strict=True))]
+        best = int(np.argmin(costs))
+        if not costs[best] < now:
+            return _Step(theta, predicted, promised, 0.0)
+        return _Step(candidates[best], {**predicted, **tried[best]}, promised, (now - costs[best]) / weight)
 
 
 def added(laws: Laws, free: Sequence[Scalar], values: Array, reference: int) -> Array | float:
