@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -114,7 +115,7 @@ def _equation(law: Effect | Sensing) -> str:
 def _estimates(taken: Tried, before: Standing) -> tuple[Estimate, ...]:
     suspect, known = taken.found.suspect, taken.standing.known
     begin = len(before.known.value)
-    units = dict.fromkeys(POINT, "m")
+    units = {f"{name}{action}": "m" for name in POINT for action in ("", *(f"_{k}" for k in range(2, 10)))}
     fixed: dict[str, float] = {}
     if isinstance(suspect, Catalogued):
         units |= {entry.name: entry.unit for entry in suspect.candidate.effect.parameters}
@@ -141,8 +142,12 @@ def _estimates(taken: Tried, before: Standing) -> tuple[Estimate, ...]:
 
 
 def _short(name: str, plant: bool) -> str:
-    short = name.rpartition(".")[2] if plant or "." in name else name
-    return _ELEMENTS.get(short, short)
+    path, _, short = name.rpartition(".") if plant or "." in name else ("", "", name)
+    if short not in _ELEMENTS:
+        return short
+    # A second action of a force has numbered amplitudes; its point is told likewise.
+    action = re.search(r"_[2-9]$", path)
+    return _ELEMENTS[short] + (action[0] if action else "")
 
 
 def explained_share(before: Known, after: Known) -> float | None:

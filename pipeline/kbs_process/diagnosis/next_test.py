@@ -198,7 +198,9 @@ class _Stage:
         free = tuple(
             k
             for k, scalar in enumerate(known.free)
-            if scalar.quantity in own and scalar.quantity.rpartition(".")[2] not in laws
+            if scalar.quantity in own
+            and scalar.quantity.rpartition(".")[2] not in laws
+            and not scalar.quantity.startswith(f"external.{find.identity.law}")
         )
         C = known.covariance[np.ix_(free, free)]
         if not np.isfinite(C).all():
