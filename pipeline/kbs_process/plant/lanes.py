@@ -197,11 +197,7 @@ def advance_lanes(
                     sums[l], knots, fields[l],
                 )
             cursor[1] += 1
-        while cursor[0] < cursor[1] - 1 and knots[cursor[0] + 1] <= time:
-            cursor[0] += 1
-        ahead = cursor[0]
-        while ahead < cursor[1] - 1 and knots[ahead + 1] <= end:
-            ahead += 1
+        ahead = follow(time, end, cursor, knots)
         share_0 = (time - knots[cursor[0]]) / (knots[cursor[0] + 1] - knots[cursor[0]])
         share_1 = (end - knots[ahead]) / (knots[ahead + 1] - knots[ahead])
         for l in range(<LANES>):

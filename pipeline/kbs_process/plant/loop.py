@@ -8,6 +8,17 @@ def field_at(time, cycle, knots, fields, joint):
 
 
 @compiled
+def follow(time, end, cursor, knots):
+    """Move the cursor to the cycle of a step's beginning; return the cycle of its end."""
+    while cursor[0] < cursor[1] - 1 and knots[cursor[0] + 1] <= time:
+        cursor[0] += 1
+    ahead = cursor[0]
+    while ahead < cursor[1] - 1 and knots[ahead + 1] <= end:
+        ahead += 1
+    return ahead
+
+
+@compiled
 def control(
     cycle, angle, closed, recorded, latency, command, rate, encoder, readings, gains, sums, knots, fields
 ):
@@ -61,11 +72,7 @@ def advance(
                 knots, fields,
             )
             cursor[1] += 1
-        while cursor[0] < cursor[1] - 1 and knots[cursor[0] + 1] <= time:
-            cursor[0] += 1
-        ahead = cursor[0]
-        while ahead < cursor[1] - 1 and knots[ahead + 1] <= end:
-            ahead += 1
+        ahead = follow(time, end, cursor, knots)
         for j in range(n):
             field_0[j] = field_at(time, cursor[0], knots, fields, j)
             field_1[j] = field_at(end, ahead, knots, fields, j)
