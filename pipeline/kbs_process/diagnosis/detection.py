@@ -51,6 +51,7 @@ class Detection:
     cells: tuple[Cell, ...]
     log_p: float  # natural logarithm, of all cells
     ratio: float  # power over the floor's, all cells
+    rows: float  # numbers of noise that the mean residuals hold
 
     @property
     def left(self) -> bool:
@@ -95,7 +96,7 @@ def detect(
             power, expected = power + u, expected + mean
     total = sum(cell.log_p for cell in cells)
     log_p = float(chi_square.logsf(-2.0 * total, 2 * len(cells)))
-    return Detection(tuple(cells), max(log_p, _LEAST_LOG), power / expected)
+    return Detection(tuple(cells), max(log_p, _LEAST_LOG), power / expected, 2.0 * expected)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -9,7 +9,6 @@ import numpy as np
 from scipy.stats import chi2
 
 from kbs_process.diagnosis.curves import CurveSuspect
-from kbs_process.diagnosis.detection import Detection, detect
 from kbs_process.diagnosis.finding import Tried, explained_share
 from kbs_process.diagnosis.floor import Floor
 from kbs_process.diagnosis.gate import Fold, Gate, gate, whiteness
@@ -19,6 +18,7 @@ from kbs_process.diagnosis.joint import Own, Standing, bare, standing_of, with_e
 from kbs_process.diagnosis.known import confined, settled
 from kbs_process.diagnosis.outcome import Refused
 from kbs_process.diagnosis.plausible import implausible
+from kbs_process.diagnosis.remains import detected
 from kbs_process.diagnosis.rivals import probabilities
 from kbs_process.diagnosis.screen import Bench, Catalogued, Found, Suspect
 from kbs_process.diagnosis.thresholds import (
@@ -203,29 +203,3 @@ def released(standing: Standing, floor: Floor, simulate: Simulate) -> Standing:
     held = confined(known, simulate, CLOSE, laws=standing.laws)
     again = resettled(standing_of(held, standing.laws, simulate), floor, simulate, leaps=1)
     return again if again.known.cost < known.cost else standing
-
-
-def detected(standing: Standing, floor: Floor, trials: Sequence[int]) -> Detection:
-    """Detection on readings from which laws that are columns of the prediction are taken off."""
-    known = standing.known
-    experiment = known.experiment
-    if standing.laws:
-        corrected = tuple(
-            replace(
-                trial,
-                measured=trial.measured
-                - (standing.shown(k) - standing.predicted[trial.drive].values) * trial.valid[:, None],
-            )
-            for k, trial in enumerate(experiment.trials)
-        )
-        experiment = replace(experiment, trials=corrected)
-    return detect(experiment, floor, standing.predicted, trials, known=known)
-
-
-def taken(before: Standing, after: Standing, floor: Floor) -> float:
-    """Share that a law takes of what exceeds the floor; all, where nothing does."""
-    fit = before.known.experiment.fit
-    there = detected(before, floor, fit)
-    if not there.left:
-        return 1.0
-    return 1.0 - max(detected(after, floor, fit).ratio - 1.0, 0.0) / (there.ratio - 1.0)

@@ -12,9 +12,9 @@ from kbs_process.diagnosis.finding import Tried, explained_share
 from kbs_process.diagnosis.floor import Floor
 from kbs_process.diagnosis.hypothesis import Simulate
 from kbs_process.diagnosis.joint import Own, Standing, without
-from kbs_process.diagnosis.leaders import detected, gated, taken
+from kbs_process.diagnosis.leaders import gated
 from kbs_process.diagnosis.outcome import Find
-from kbs_process.diagnosis.thresholds import TAKEN
+from kbs_process.diagnosis.remains import detected, too_little
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,7 +44,7 @@ def needed(
             rest = without(standing, own, simulate)
             verdict = gated(group[0].tried.found, rest, standing, own)
             left = detected(rest, floor, standing.known.experiment.fit).left
-            if not (verdict.passed and left and taken(rest, standing, floor) >= TAKEN):
+            if not (verdict.passed and left) or too_little(rest, standing, floor):
                 kept, standing, fallen = [one for one in kept if one not in group], rest, True
                 break
             if len(group) == 1:

@@ -14,7 +14,7 @@ from kbs_process.diagnosis.gate import whiteness
 from kbs_process.diagnosis.hypothesis import Prediction, Simulate
 from kbs_process.diagnosis.joint import Standing
 from kbs_process.diagnosis.known import MOVED, Known
-from kbs_process.diagnosis.leaders import detected, leaders, released, reread, resettled, taken, tried
+from kbs_process.diagnosis.leaders import leaders, released, reread, resettled, tried
 from kbs_process.diagnosis.localise import cells_and_ports
 from kbs_process.diagnosis.needed import Accepted, needed
 from kbs_process.diagnosis.outcome import (
@@ -28,10 +28,11 @@ from kbs_process.diagnosis.outcome import (
     Verdict,
 )
 from kbs_process.diagnosis.ports import port_test
+from kbs_process.diagnosis.remains import detected, promises_little, taken, too_little
 from kbs_process.diagnosis.rivals import probabilities
 from kbs_process.diagnosis.scene import Scene
 from kbs_process.diagnosis.screen import Screening
-from kbs_process.diagnosis.thresholds import CLOSE_LEADERS, ORDERED, ROUNDS, TAKEN
+from kbs_process.diagnosis.thresholds import CLOSE_LEADERS, ORDERED, ROUNDS
 from kbs_process.diagnosis.tryout import identity
 from kbs_process.diagnosis.view import View, closer
 
@@ -115,10 +116,8 @@ def _round(standing: Standing, floor: Floor, simulate: Simulate) -> _Round:
     best = int(np.argmax(chances))
     settled = released(resettled(passed[best].standing, floor, simulate, leaps=1), floor, simulate)
     told = reread(replace(passed[best], standing=settled), standing, floor, simulate)
-    share = taken(standing, told.standing, floor)
-    if share < TAKEN:
-        reason = f"takes {100.0 * share:.0f} % of what exceeds the floor: it follows what something else does"
-        refused.append(Refused(identity(told.found.suspect), told.found.score.rho_eff, (reason,)))
+    if reasons := too_little(standing, told.standing, floor):
+        refused.append(Refused(_law(told), told.found.score.rho_eff, reasons))
         return _Round(None, standing, view.screening, tuple(refused), place)
     # Told anew, it may be what another was: their chances are one then.
     others = [k for k, one in enumerate(passed) if k != best and _law(one) != _law(told)]
@@ -136,7 +135,11 @@ def _passed(view: View, floor: Floor, simulate: Simulate) -> tuple[list[Tried], 
     passed: list[Tried] = []
     refused: list[Refused] = []
     known = view.standing.known
-    if known.strained and not view.ordered and detected(view.standing, floor, known.experiment.fit).left:
+    there = detected(view.standing, floor, known.experiment.fit)
+    if reason := promises_little(view, there):
+        found = view.able[0]
+        return [], [Refused(identity(found.suspect), found.score.rho_eff, (reason,))]
+    if known.strained and not view.ordered and there.left:
         close = closer(view.standing, simulate)
         lead = [found for found in close.able if not found.suspect.each_trial][:CLOSE_LEADERS]
         passed, refused = tried(lead, close, view.standing, floor, simulate)

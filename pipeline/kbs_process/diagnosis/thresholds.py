@@ -32,7 +32,7 @@ DEPENDENT: Final = 1e-8  # relative eigenvalue below which amplitudes of a candi
 # P-value below which what is left counts as there (diagnosis.md: 1 % of null campaigns at most claim a find).
 DETECTED: Final = 1e-3
 # Share of the floor's power by which what is left has to exceed it, too: the best of many minima of phases and tooth
-# contact leave up to 0.02 more than each other on campaigns without any effect.
+# contact leave up to 0.02 more than each other on campaigns without any effect. A law has to take as much.
 TOLERATED: Final = 0.03
 ORDERED: Final = 0.5  # share of the residual's excess that the best has to do for the screen's order to count
 # Sigmas of their priors within which numbers are held for a second look, where the first is not ordered: one number in

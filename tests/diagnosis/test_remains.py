@@ -1,0 +1,86 @@
+"""A law has to take more of the recordings than two searches of the known numbers differ by."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import bench
+import numpy as np
+import pytest
+from test_rounds import ROLES, screened, standing, with_cable
+
+from kbs_process.diagnosis.experiment import Experiment
+from kbs_process.diagnosis.floor import declared
+from kbs_process.diagnosis.joint import Standing, with_extra
+from kbs_process.diagnosis.remains import detected, promises_little, taken, too_little
+from kbs_process.diagnosis.thresholds import TAKEN, TOLERATED
+from kbs_process.diagnosis.tryout import extra_of
+from kbs_process.diagnosis.view import View
+
+
+@pytest.fixture(scope="module")
+def made() -> Experiment:
+    return bench.experiment(bench.rig(), ROLES, 3)
+
+
+@pytest.fixture(scope="module")
+def cabled(made: Experiment) -> Experiment:
+    return with_cable(made, (0, 1, 2))
+
+
+def seen(before: Standing) -> tuple[View, Standing]:
+    """The screen, and what is believed with its best suspect."""
+    tried, scene, found = screened(before)
+    after = with_extra(
+        before, extra_of(found.candidates[0], before, tried, scene), bench.serial(before.known.experiment)
+    )
+    return View(before, tried, scene, found), after
+
+
+def weaker(made: Experiment, cabled: Experiment, share: float) -> Experiment:
+    """The experiment with a share of what the cable does."""
+    trials = tuple(
+        replace(bare, measured=bare.measured + share * (full.measured - bare.measured))
+        for bare, full in zip(made.trials, cabled.trials, strict=True)
+    )
+    return replace(made, trials=trials)
+
+
+def test_a_law_that_takes_nearly_all_is_one(cabled: Experiment) -> None:
+    floor = declared(cabled)
+    before = standing(cabled)
+    view, after = seen(before)
+    there, here = (detected(one, floor, cabled.fit) for one in (before, after))
+    assert there.left and not here.left
+    assert too_little(before, after, floor) == ()
+    assert taken(before, after, floor) == pytest.approx(1.0, abs=0.05)
+    assert promises_little(view, there) == ""
+    # a screen's gain over the rows of the mean is what the power over the floor falls by
+    assert view.able[0].score.gain / there.rows == pytest.approx(there.ratio - here.ratio, rel=0.3)
+
+
+def test_a_law_that_takes_as_much_as_searches_differ_by_is_none(made: Experiment, cabled: Experiment) -> None:
+    floor = declared(made)
+    plain, strong = (detected(standing(one), floor, made.fit) for one in (made, cabled))
+    share = np.sqrt(0.2 * TOLERATED / (strong.ratio - plain.ratio))
+    before, after = standing(weaker(made, cabled, float(share))), standing(made)
+    assert not detected(before, floor, made.fit).left
+    (reason,) = too_little(before, after, floor)
+    assert "of the floor's power" in reason
+
+
+def test_nothing_is_simulated_that_promises_as_little(cabled: Experiment) -> None:
+    view, _ = seen(standing(cabled))
+    there = detected(view.standing, declared(cabled), cabled.fit)
+    long = replace(there, rows=view.able[0].score.gain / (0.3 * TOLERATED))
+    assert promises_little(view, long) == ""  # there is something to explain
+    assert "minima" in promises_little(view, replace(long, ratio=1.0))
+    assert promises_little(view, replace(there, ratio=1.0)) == ""
+
+
+def test_a_law_that_leaves_most_follows_something_else(cabled: Experiment, made: Experiment) -> None:
+    floor = declared(cabled)
+    share = 1.0 - np.sqrt(1.0 - 0.5 * TAKEN)
+    before, after = standing(cabled), standing(weaker(made, cabled, float(1.0 - share)))
+    (reason,) = too_little(before, after, floor)
+    assert "follows what something else does" in reason
