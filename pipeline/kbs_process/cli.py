@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import click
 
 from kbs_process import __version__, interruption
-from kbs_process.errors import KbsError, did_you_mean
+from kbs_process.errors import KbsError, OutputError, did_you_mean
 
 if TYPE_CHECKING:
     from kbs_process.campaign.progress import Progress
@@ -82,15 +82,18 @@ pdf_option = click.option(
 @click.option(
     "--diagnose/--no-diagnose",
     "why",
-    default=False,
-    show_default=True,
-    help="Where recordings differ from the prediction by more than repeats do, find out why: takes minutes.",
+    default=None,
+    help="Find out why, where recordings differ from the prediction by more than repeats do: takes minutes, after the "
+    "report is written [default: if the recordings allow it].",
 )
 @quiet_option
 def process(
-    campaign: str, output: Path | None, pdf: bool | None, check: bool, why: bool, quiet: bool
+    campaign: str, output: Path | None, pdf: bool | None, check: bool, why: bool | None, quiet: bool
 ) -> None:
-    """Process CAMPAIGN: fit, compare with the prediction, and write the report."""
+    """Process CAMPAIGN: fit, compare with the prediction, and write the report.
+
+    Where the two differ by more than repeats of one trajectory do, a diagnosis follows.
+    """
     from kbs_process.campaign.load import load_campaign
     from kbs_process.campaign.locate import find_campaign, results_folder
 
@@ -104,11 +107,21 @@ def process(
     for line in outcome.verdict_lines:
         click.echo(line)
     click.echo(f"Report: {outcome.report}")
-    if why:
+    if why is not False:
         from kbs_process.campaign.diagnosing import diagnose_results
 
-        for line in diagnose_results(loaded, target, progress=_progress(quiet), pdf=pdf):
-            click.echo(line)
+        try:
+            for line in diagnose_results(loaded, target, progress=_progress(quiet), pdf=pdf):
+                click.echo(line)
+        except OutputError:
+            raise
+        except KbsError as error:
+            if why:
+                raise
+            click.echo(f"Not diagnosed: {error}")
+        except KeyboardInterrupt:
+            _complain("interrupted: the report is written, a diagnosis is not")
+            sys.exit(INTERRUPTED)
     if check and outcome.requirement_met is False:
         sys.exit(NOT_MET)
 

@@ -1,4 +1,4 @@
-"""`kbs-process CAMPAIGN --diagnose`: where the floor is exceeded, inside the results, linked from the report."""
+"""`kbs-process CAMPAIGN` ends with a diagnosis where the floor is exceeded: in its results, linked from the report."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from kbs_process.campaign.config import Campaign
 from kbs_process.campaign.load import load_campaign
 from kbs_process.campaign.progress import SilentProgress
 from kbs_process.campaign.run import Outcome
+from kbs_process.errors import OutputError, RecordingError
 from kbs_process.report.records.common import encode
 from report import sample
 from report.test_report_diagnosis import results
@@ -42,10 +43,10 @@ def finished(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return folder
 
 
-def run(finished: Path) -> int:
+def run(finished: Path, *options: str) -> int:
     folder = make_folder(finished.parent / "campaigns" / "EL089").path
     with pytest.raises(SystemExit) as caught:
-        cli.main([str(folder), "-o", str(finished), "--no-pdf", "-q", "--diagnose"])
+        cli.main([str(folder), "-o", str(finished), "--no-pdf", "-q", *options])
         sys.exit(0)
     return int(caught.value.code or 0)
 
@@ -97,6 +98,52 @@ def test_the_report_stays_when_a_diagnosis_fails(finished: Path, monkeypatch: py
     assert run(finished) == cli.INTERNAL
     assert (finished / "index.html").read_text() == "as processed"
     assert not (finished / "diagnosis").exists()
+
+
+def unfit(*_: object) -> None:
+    raise RecordingError("lasts 4 s", where="EL089P00_1.mcap", remedy="record longer")
+
+
+@pytest.mark.parametrize(("options", "status"), [((), 0), (("--diagnose",), cli.BAD_INPUT)])
+def test_recordings_that_allow_no_diagnosis_are_told_and_an_error_only_where_one_is_asked_for(
+    finished: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    options: tuple[str, ...],
+    status: int,
+) -> None:
+    monkeypatch.setattr(diagnosing, "experiment_of", unfit)
+    assert run(finished, *options) == status
+    told = capsys.readouterr()
+    assert "lasts 4 s\n  -> record longer" in (told.err if options else told.out)
+    assert (finished / "index.html").read_text() == "as processed"
+
+
+def test_no_diagnosis_where_none_is_wanted(finished: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(diagnosing, "experiment_of", lambda *_: pytest.fail("nothing is to be read"))
+    assert run(finished, "--no-diagnose") == 0
+
+
+def test_what_interrupts_a_diagnosis_leaves_the_report_and_says_so(
+    finished: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def interrupted(*_: object, **__: object) -> Outcome:
+        raise KeyboardInterrupt
+
+    detected(monkeypatch, log_p=-50.0)
+    monkeypatch.setattr(diagnosing, "diagnose", interrupted)
+    assert run(finished) == cli.INTERRUPTED
+    assert "the report is written" in capsys.readouterr().err
+    assert (finished / "index.html").read_text() == "as processed"
+
+
+def test_results_that_cannot_be_written_are_an_error(finished: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object, **__: object) -> Outcome:
+        raise OutputError("no space is left")
+
+    detected(monkeypatch, log_p=-50.0)
+    monkeypatch.setattr(diagnosing, "diagnose", full)
+    assert run(finished) == cli.BAD_INPUT
 
 
 def test_a_wrench_that_no_plant_makes_exceeds_the_floor(tmp_path: Path) -> None:

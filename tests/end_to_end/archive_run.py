@@ -61,7 +61,15 @@ def process_apart(
 ) -> None:
     """Process an archived campaign in another process, started in `folder`; warnings are errors."""
     arguments = (
-        ["kbs_process", str(CAMPAIGNS_FOLDER / name), "--output", str(target), "--no-pdf", "--quiet"]
+        [
+            "kbs_process",
+            str(CAMPAIGNS_FOLDER / name),
+            "--output",
+            str(target),
+            "--no-pdf",
+            "--no-diagnose",
+            "--quiet",
+        ]
         if name in WITH_PAGE
         else ["end_to_end.archive_run", str(target), name]
     )

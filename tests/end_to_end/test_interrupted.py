@@ -42,7 +42,17 @@ def read_only(folder: CampaignFolder) -> Iterator[Path]:
 
 def start(campaign: Path, target: Path, *, blocks: str = "unlimited") -> subprocess.Popen[str]:
     """Begin to process a campaign in another process, whose files are no larger than some blocks of 512 bytes."""
-    command = [sys.executable, "-m", "kbs_process", str(campaign), "-o", str(target), "--no-pdf", "--quiet"]
+    command = [
+        sys.executable,
+        "-m",
+        "kbs_process",
+        str(campaign),
+        "-o",
+        str(target),
+        "--no-pdf",
+        "--no-diagnose",
+        "--quiet",
+    ]
     return subprocess.Popen(
         ["sh", "-c", 'ulimit -f "$0" && exec "$@"', blocks, *command],
         stdout=subprocess.PIPE,
