@@ -1,4 +1,4 @@
-"""From inputs at any inlet to the channels of a rig that its measured motion drives: nothing of it is dynamic."""
+"""From inputs at any inlet to the loads of a rig that its measured motion drives: nothing of it is dynamic."""
 
 from __future__ import annotations
 
@@ -6,28 +6,34 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from kbs_process.diagnosis.inlets import Inlet
+from kbs_process.diagnosis.inlets import GROUND_PORT, WRENCH_PORT, Inlet
 from kbs_process.plant.effect import Port
-from kbs_process.plant.moved import reading
+from kbs_process.plant.moved import grounded, pressed, reading
 from kbs_process.rig.model import Rig
 from kbs_process.signals.averages import instants
-from kbs_process.signals.records import Array
+from kbs_process.signals.records import WRENCH_CHANNELS, Array
 
 
-def respond(
-    rig: Rig, columns: Sequence[Mapping[Inlet, Array]], channels: Sequence[str], samples: int
-) -> Array:
-    """Change (n, c, m) of the recorded loads `channels` by columns of inputs, means over the samples' intervals.
+def respond(rig: Rig, columns: Sequence[Mapping[Inlet, Array]], q: Array) -> Array:
+    """Change (n, 6 + joints, m) of `rigid.loads` by columns of inputs, means over the samples' intervals.
 
-    Torques within a joint's drive show in its effort alone. What the laboratory exerts on a link is not covered: such
-    a column is zero, as is one of a law that this motion takes out of bounds.
+    It is that of `plant.moved`. Columns are zero of the floor, and of what has no value on this motion.
     """
-    changed = np.zeros((samples, len(channels), len(columns)))
+    n = len(q)
+    changed = np.zeros((n, 6 + len(rig.joints), len(columns)))
+    wrenches, grounds = pressed(rig, q), grounded(rig, q)
     for m, column in enumerate(columns):
         for inlet, means in column.items():
-            channel = f"{inlet.where}.effort"
             port = Port.__members__.get(inlet.port.upper())
-            if channel in channels and port is not None and np.all(np.isfinite(means)):
-                slope = reading(rig.joint(inlet.where), port)
-                changed[:, channels.index(channel), m] += slope * instants(means[:samples])
+            if not np.all(np.isfinite(means)):
+                continue
+            acting = instants(means[:n])
+            if inlet.port == WRENCH_PORT:
+                component = WRENCH_CHANNELS.index(inlet.axis)
+                changed[:, :, m] += wrenches[inlet.where][:, :, component] * acting[:, None]
+            elif inlet.port == GROUND_PORT:
+                changed[:, :, m] += grounds[inlet.where] * acting[:, None]
+            elif port is not None and inlet.where in rig.joint_names:
+                effort = 6 + rig.joint_names.index(inlet.where)
+                changed[:, effort, m] += reading(rig.joint(inlet.where), port) * acting
     return changed

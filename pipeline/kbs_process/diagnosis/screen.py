@@ -171,17 +171,8 @@ class Bench:
         driven = [column for columns in through if columns is not None for column in columns]
         parts: list[Array] = []
         n = experiment.drives[drive].n
-        if driven and drive not in self.scene.paths:
-            whole = direct.respond(self.scene.hypothesis.rig, driven, experiment.channels, n)
-            moved = iter(np.moveaxis(whole, 2, 0))
-        elif driven:
-            path = self.scene.paths[drive]
-            decimation = round(path.rate * experiment.dt)
-            whole = respond(path, driven, WRENCH_CHANNELS, decimation, n)
-            read = coupled(experiment.rig, experiment, np.eye(6)).T
-            wrench = np.einsum("cw,nwm->ncm", read, whole[:, :6])
-            rows = [6 + path.joints.index(name) for name in experiment.channels[experiment.loads :]]
-            moved = iter(np.moveaxis(np.concatenate([wrench, whole[:, rows]], axis=1), 2, 0))
+        if driven:
+            moved = iter(np.moveaxis(self._driven(driven, drive, n), 2, 0))
         for suspect, columns in zip(suspects, through, strict=True):
             if columns is None:
                 parts.append(suspect.outputs(drive))
@@ -191,6 +182,22 @@ class Bench:
         # What runs away along the linear plant, or has no value on this motion, says nothing.
         bounded = np.max(np.abs(shown), axis=(0, 1), initial=0.0) < _RUNAWAY
         return np.where(bounded, shown, 0.0)
+
+    def _driven(self, columns: Sequence[Mapping[Inlet, Array]], drive: int, n: int) -> Array:
+        """(n, c, m) change of the prediction by inputs of the plant, or of a rig that its motion drives."""
+        experiment, rig = self.known.experiment, self.scene.hypothesis.rig
+        path = self.scene.paths.get(drive)
+        if path is None:
+            motion = experiment.drives[drive].motion
+            assert motion is not None
+            whole = direct.respond(rig, columns, motion.q[:n])
+            rows = rig.loads.index(rig.channels[experiment.wrench_channels :])
+        else:
+            whole = respond(path, columns, WRENCH_CHANNELS, round(path.rate * experiment.dt), n)
+            rows = [6 + path.joints.index(name) for name in experiment.channels[experiment.loads :]]
+        read = coupled(experiment.rig, experiment, np.eye(6)).T
+        wrench = np.einsum("cw,nwm->ncm", read, whole[:, :6])
+        return np.concatenate([wrench, whole[:, rows]], axis=1)
 
 
 def screen(bench: Bench, suspects: Sequence[Suspect]) -> Screening:

@@ -1,7 +1,7 @@
 """Effects along a measured motion: what they add to the loads of a rig that its motion drives.
 
 The motion is what it is, whatever acts: an effect shows only in what the drives have to put in against it. What acts
-between a joint's two links leaves no trace in the wrench beneath them; a force of the laboratory does.
+between a joint's two links leaves no trace in the wrench beneath them; forces and torques of the laboratory do.
 """
 
 from __future__ import annotations
@@ -13,8 +13,10 @@ import numpy as np
 from kbs_process.plant.along import along, signals_of
 from kbs_process.plant.effect import Effect, Port
 from kbs_process.plant.external import external_efforts, external_wrench
-from kbs_process.rig.model import Joint, Rig
+from kbs_process.plant.rigid import axis_of, kinematics, links_beyond
+from kbs_process.rig.model import TRANSDUCER, Joint, Rig
 from kbs_process.signals.averages import instants
+from kbs_process.signals.frames import cross, rotate
 from kbs_process.signals.records import Array
 
 # Ports whose torque acts on the joint as on its rotor, where nothing gives between them.
@@ -29,7 +31,7 @@ def added_loads(rig: Rig, effects: Sequence[Effect], q: Array, qd: Array, dt: fl
     r"""What effects add to `rigid.loads` along a motion q, qd (n, joints): (n, 6 + joints) in its order and units.
 
     Equation: $\Delta \tau_j = -T_j$ of an effect on the output, $-R_j T_j$ of one on the rotor, over the effort's gain;
-        of a force on a link, `external_wrench` and `external_efforts`.
+        of one against the ground, `grounded`; of a force on a link, `external_wrench` and `external_efforts`.
     Validity: stiff transmission, angles good to the rates that an effect asks for. Effects of other ports, and of
         drives that have not their parameters, add nothing.
     """
@@ -39,19 +41,71 @@ def added_loads(rig: Rig, effects: Sequence[Effect], q: Array, qd: Array, dt: fl
         added[:, :6] = external_wrench(rig, effects, q, qd)
         efforts = external_efforts(rig, effects, q, qd)
     for index, joint in enumerate(rig.joints):
-        if joint.effort is None:
-            continue
-        added[:, 6 + index] = efforts[:, index] / float(joint.effort.gain)
+        if joint.effort is not None:
+            added[:, 6 + index] += efforts[:, index] / float(joint.effort.gain)
         if joint.drive is None:
             continue
         known = {name: float(quantity) for name, quantity in joint.drive.parameters.items()}
         for effect in effects:
-            if effect.port in RIGID and all(entry.name in known for entry in effect.parameters):
+            if not all(entry.name in known for entry in effect.parameters):
+                continue
+            if effect.port is Port.GROUND_TORQUE or (effect.port in RIGID and joint.effort is not None):
                 units = unit_torques(effect, joint, q[:, index], known, dt)
                 amplitudes = [known[entry.name] for entry in effect.parameters if entry.role == "amplitude"]
                 torque = instants(units @ np.array(amplitudes))
-                added[:, 6 + index] += reading(joint, effect.port) * torque
+                if effect.port is Port.GROUND_TORQUE:
+                    added += grounded(rig, q)[joint.name] * torque[:, None]
+                else:
+                    added[:, 6 + index] += reading(joint, effect.port) * torque
     return added
+
+
+def grounded(rig: Rig, q: Array) -> dict[str, Array]:
+    r"""What `rigid.loads` (n, 6 + joints) answer to a unit that the ground puts into a joint's output, by joint.
+
+    Equation: `pressed` by the wrench $(0, e_j)$, or $(e_j, (p_j - o) \times e_j)$ of a joint that slides along $e_j$.
+    """
+    still = np.zeros_like(q)
+    links = kinematics(rig, q, still, still)
+    T, answers = links[TRANSDUCER], pressed(rig, q)
+    found = {}
+    for joint in rig.joints:
+        turn, slide = joint.screw
+        axis = axis_of(joint, links[joint.parent])
+        moment = turn * axis + slide * cross(links[joint.name].r - T.r, axis)
+        R_TL = np.swapaxes(T.R, 1, 2)
+        wrench = np.hstack([slide * rotate(R_TL, axis), rotate(R_TL, moment)])
+        found[joint.name] = rotate(answers[joint.name], wrench)
+    return found
+
+
+def pressed(rig: Rig, q: Array) -> dict[str, Array]:
+    r"""What `rigid.loads` answer to units of a wrench of the laboratory on a link, by link, (n, 6 + joints, 6).
+
+    Equation: a wrench (F, M) about T's origin o, in T's axes, on a link is read as it is by a transducer beneath that
+        link; joints j that carry the link put in $-(M \cdot e_j + F \cdot e_j \times (o - p_j))$, or $-F \cdot e_j$
+        if they slide.
+    Units: rad, N, N m -> N, N m, units of the efforts.
+    Validity: a plate that does not give way.
+    """
+    still = np.zeros_like(q)
+    links = kinematics(rig, q, still, still)
+    T = links[TRANSDUCER]
+    R_TL = np.swapaxes(T.R, 1, 2)
+    found = {}
+    for name in rig.joint_names:
+        answer = np.zeros((len(q), 6 + len(rig.joints), 6))
+        if name in links_beyond(rig):
+            answer[:, :6] = np.eye(6)
+        for row, joint in enumerate(rig.joints, 6):
+            if joint.effort is not None and name in links_beyond(rig, joint.name):
+                turn, slide = joint.screw
+                axis = axis_of(joint, links[joint.parent])
+                force = turn * cross(axis, T.r - links[joint.name].r) + slide * axis
+                works = np.hstack([rotate(R_TL, force), turn * rotate(R_TL, axis)])
+                answer[:, row] = -works / float(joint.effort.gain)
+        found[name] = answer
+    return found
 
 
 def reading(joint: Joint, port: Port) -> float:
