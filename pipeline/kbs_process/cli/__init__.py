@@ -1,0 +1,52 @@
+"""The command line. Thin: it parses, calls, prints, and turns errors into messages and exit statuses.
+
+Nothing that computes is imported at the top of any of its files, so that `--help` answers at once.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+
+import click
+
+from kbs_process import interruption
+from kbs_process.cli.group import cli
+from kbs_process.cli.shared import BAD_INPUT, INTERNAL, INTERRUPTED, NOT_MET, complain
+from kbs_process.errors import KbsError
+
+__all__ = ["BAD_INPUT", "INTERNAL", "INTERRUPTED", "NOT_MET", "cli", "main"]
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command line and exit."""
+    # One thread, whatever the user's shell says: sums in one order give the same bits, and small matrices are no faster
+    # with two.
+    os.environ["OPENBLAS_NUM_THREADS"] = "1"
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    debug = "--debug" in words
+    try:
+        with interruption.heeded():
+            cli.main(
+                [word for word in words if word != "--debug"], prog_name="kbs-process", standalone_mode=False
+            )
+    except click.ClickException as error:
+        error.show()
+        sys.exit(error.exit_code)
+    except click.Abort:
+        complain("interrupted: nothing was written, and earlier results are untouched")
+        sys.exit(INTERRUPTED)
+    except KbsError as error:
+        if debug:
+            raise
+        complain(f"error: {error}")
+        sys.exit(error.exit_status)
+    except Exception as error:  # the last one to speak: a user gets words, not a traceback
+        if debug:
+            raise
+        complain(
+            f"error: {type(error).__name__}: {error}\n"
+            "  -> this is a fault of kbs-process: please report it with what the same command prints with --debug"
+        )
+        sys.exit(INTERNAL)

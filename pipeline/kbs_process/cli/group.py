@@ -1,0 +1,67 @@
+"""The command itself, and all its verbs; a new one is a function in a file beside, and a name here."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from kbs_process import __version__
+from kbs_process.cli.correction import diagnose, identify, prove
+from kbs_process.cli.dynamics import modal, stability
+from kbs_process.cli.flight import flight, reference_day
+from kbs_process.cli.prediction import predict, simulate
+from kbs_process.cli.processing import process, report, validate
+from kbs_process.cli.recordings import import_, inspect
+from kbs_process.cli.shared import examples
+from kbs_process.errors import did_you_mean
+
+VERBS = (
+    process,
+    validate,
+    inspect,
+    simulate,
+    predict,
+    flight,
+    reference_day,
+    stability,
+    modal,
+    identify,
+    diagnose,
+    report,
+    prove,
+    import_,
+)
+
+
+class CampaignGroup(click.Group):
+    """A group of verbs; where the first word is none of them, it is a campaign to be processed."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        if args and args[0] not in self.commands and args[0] not in ("--help", "-h", "--version"):
+            self._refuse_misspelt_verb(args[0], ctx)
+            args = ["process", *args]
+        return super().parse_args(ctx, args)
+
+    def _refuse_misspelt_verb(self, word: str, ctx: click.Context) -> None:
+        hint = did_you_mean(word, self.commands)
+        if hint.startswith("did") and not Path(word).exists():
+            raise click.UsageError(f"There is no verb '{word}': {hint}", ctx)
+
+
+@click.group(
+    cls=CampaignGroup,
+    commands=VERBS,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+    epilog=examples("campaign/EL089", "campaign/EL089 --check", "validate campaign/EL089", "VERB --help")
+    + "\n\nExit status: 0 done; 1 a requirement is not met, or a recording has losses (only with --check); "
+    "2 bad input. With --debug, any error shows its traceback.",
+    subcommand_metavar="CAMPAIGN | VERB ...",
+)
+@click.version_option(__version__, prog_name="kbs-process")
+def cli() -> None:
+    """Disturbance torque of a pointing mechanism: from raw force/torque recordings to a correlation report.
+
+    Without a verb, CAMPAIGN is processed. campaign/NAME is the folder campaigns/NAME, here or above; any other
+    folder that holds a campaign.toml goes as well.
+    """

@@ -1,0 +1,108 @@
+"""Run a campaign's plant: on commands alone, or along a recording."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from kbs_process.cli.shared import (
+    EXISTING_FILE,
+    campaign_argument,
+    examples,
+    output_option,
+    progress,
+    quiet_option,
+)
+
+
+@click.command(
+    epilog=examples(
+        "simulate campaign/EL089 --trajectory EL089P00",
+        "simulate campaign/EL089 --command slew.csv --rate 200",
+    )
+)
+@campaign_argument
+@click.option("--trajectory", metavar="NAME", help="Commands of the first recording of this trajectory.")
+@click.option(
+    "--command",
+    type=EXISTING_FILE,
+    help="CSV or Parquet file with columns t (s), and for each joint its angle JOINT (rad) and, if known, "
+    "its rate JOINT.rate (rad/s).",
+)
+@click.option(
+    "--rate",
+    type=click.FloatRange(min=0, min_open=True),
+    metavar="HZ",
+    help="Sampling rate of the wrench [default: the recording's; 100 with --command].",
+)
+@output_option
+@quiet_option
+def simulate(
+    campaign: str,
+    trajectory: str | None,
+    command: Path | None,
+    rate: float | None,
+    output: Path | None,
+    quiet: bool,
+) -> None:
+    """Run CAMPAIGN's plant on commands alone, through its controller.
+
+    Writes wrench, angles and field as Parquet and as simulated.mcap.
+    """
+    if trajectory is not None and command is not None:
+        raise click.UsageError("Give --trajectory or --command, not both.")
+    from kbs_process.campaign.load import load_campaign
+    from kbs_process.campaign.locate import find_campaign, results_folder
+    from kbs_process.campaign.simulate import simulate_commands, simulate_trajectory
+
+    folder = find_campaign(campaign)
+    target = results_folder(folder, output, suffix="-simulated")
+    loaded = load_campaign(folder, checksums=False)
+    if command is not None:
+        written = simulate_commands(loaded, command, target, rate_Hz=rate or 100.0, progress=progress(quiet))
+    else:
+        written = simulate_trajectory(loaded, trajectory, target, rate_Hz=rate, progress=progress(quiet))
+    click.echo(f"Simulated: {written}")
+
+
+@click.command(
+    epilog=examples(
+        "predict campaign/EL089 EL089P00_1",
+        "predict campaign/EL089 other.mcap -o /tmp/other",
+        "predict --model reports/EL089-diagnosis/corrected other.mcap",
+    )
+)
+@click.argument("words", nargs=-1, required=True, metavar="[CAMPAIGN] RECORDING")
+@click.option(
+    "--model",
+    type=click.Path(path_type=Path, exists=True),
+    metavar="FOLDER",
+    help="A corrected model that 'diagnose' wrote, in the place of CAMPAIGN.",
+)
+@output_option
+@quiet_option
+def predict(words: tuple[str, ...], model: Path | None, output: Path | None, quiet: bool) -> None:
+    """Predict one RECORDING: a name from CAMPAIGN, or any MCAP file with the same topics.
+
+    The plant follows what was recorded: field positions, encoders and commands, or, for a campaign that is
+    driven by motion, the measured angles. The rig is the one of the parameter files, nothing is fitted.
+    With --model, RECORDING may also be a table of commands as 'simulate' takes it, CSV or Parquet.
+    Writes the prediction as Parquet and as predicted.mcap.
+    """
+    if len(words) != (2 if model is None else 1):
+        raise click.UsageError("Give CAMPAIGN and RECORDING, or --model FOLDER and RECORDING.")
+    from kbs_process.campaign.load import load_campaign
+    from kbs_process.campaign.locate import find_campaign, results_folder
+    from kbs_process.campaign.simulate import predict_recording, predict_with
+
+    folder = find_campaign(words[0] if model is None else str(model))
+    # The recordings that a model came from may be elsewhere by now.
+    loaded = load_campaign(folder, checksums=False, recordings=model is None)
+    if model is None:
+        target = results_folder(folder, output, suffix="-predicted")
+        written = predict_recording(loaded, words[1], target, progress=progress(quiet))
+    else:
+        named = output or Path("reports") / f"{loaded.name}-corrected-predicted"
+        written = predict_with(loaded, words[0], results_folder(folder, named), progress=progress(quiet))
+    click.echo(f"Predicted: {written}")

@@ -1,0 +1,112 @@
+"""Process a campaign, check it beforehand, and show its report again afterwards."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import click
+
+from kbs_process.cli.shared import (
+    BAD_INPUT,
+    INTERRUPTED,
+    NOT_MET,
+    campaign_argument,
+    complain,
+    examples,
+    output_option,
+    pdf_option,
+    progress,
+    quiet_option,
+)
+from kbs_process.errors import KbsError, OutputError
+
+
+@click.command(epilog=examples("campaign/EL089", "process campaign/EL089 --check --output /data/EL089"))
+@campaign_argument
+@output_option
+@pdf_option
+@click.option("--check", is_flag=True, help="Exit with 1 when a requirement is not met.")
+@click.option(
+    "--diagnose/--no-diagnose",
+    "why",
+    default=None,
+    help="Find out why, where recordings differ from the prediction by more than repeats do: takes minutes, after the "
+    "report is written [default: if the recordings allow it].",
+)
+@quiet_option
+def process(
+    campaign: str, output: Path | None, pdf: bool | None, check: bool, why: bool | None, quiet: bool
+) -> None:
+    """Process CAMPAIGN: fit, compare with the prediction, and write the report.
+
+    Where the two differ by more than repeats of one trajectory do, a diagnosis follows.
+    """
+    from kbs_process.campaign.load import load_campaign
+    from kbs_process.campaign.locate import find_campaign, results_folder
+
+    folder = find_campaign(campaign)
+    target = results_folder(folder, output)
+    loaded = load_campaign(folder)
+    # Bad input is told before all that computes is imported.
+    from kbs_process.campaign.run import process as run
+
+    outcome = run(loaded, target, progress=progress(quiet), pdf=pdf)
+    for line in outcome.verdict_lines:
+        click.echo(line)
+    click.echo(f"Report: {outcome.report}")
+    if why is not False:
+        from kbs_process.campaign.diagnosing import diagnose_results
+
+        try:
+            for line in diagnose_results(loaded, target, progress=progress(quiet), pdf=pdf):
+                click.echo(line)
+        except OutputError:
+            raise
+        except KbsError as error:
+            if why:
+                raise
+            click.echo(f"Not diagnosed: {error}")
+        except KeyboardInterrupt:
+            complain("interrupted: the report is written, a diagnosis is not")
+            sys.exit(INTERRUPTED)
+    if check and outcome.requirement_met is False:
+        sys.exit(NOT_MET)
+
+
+@click.command(epilog=examples("validate campaign/EL089", "validate campaign/EL089 --check"))
+@campaign_argument
+@click.option("--check", is_flag=True, help="Exit with 1 when a recording has losses.")
+@quiet_option
+def validate(campaign: str, check: bool, quiet: bool) -> None:
+    """Check CAMPAIGN's description, and read all its recordings through.
+
+    Exits with 0 if all is well or can be processed, with 2 if something cannot be read.
+    """
+    from kbs_process.campaign.load import load_campaign
+    from kbs_process.campaign.locate import find_campaign
+    from kbs_process.campaign.validate import describe, read_through
+
+    loaded = load_campaign(find_campaign(campaign))
+    findings = read_through(loaded, progress(quiet))
+    click.echo("\n".join(describe(loaded, findings)))
+    if any(finding.error for finding in findings):
+        sys.exit(BAD_INPUT)
+    if check and any(finding.losses for finding in findings):
+        sys.exit(NOT_MET)
+
+
+@click.command(epilog=examples("report reports/EL089", "report reports/EL089 --no-pdf"))
+@click.argument("results", type=click.Path(path_type=Path))
+@pdf_option
+def report(results: Path, pdf: bool | None) -> None:
+    """Render the report again from stored RESULTS, computing nothing."""
+    from kbs_process.campaign.store import revising
+    from kbs_process.report.build import build
+
+    with revising(results, without=("index.html", "report.pdf")) as folder:
+        page = build(folder, pdf)
+        stale = (results / "report.pdf").is_file() and not (folder / "report.pdf").is_file()
+    if stale:
+        click.echo(f"{results / 'report.pdf'} showed the report of before, and is gone: --pdf makes it again")
+    click.echo(f"Report: {results / page.name}")

@@ -1,0 +1,71 @@
+"""Look into recordings, and make a campaign of those in other formats."""
+
+from __future__ import annotations
+
+import functools
+import sys
+from pathlib import Path
+
+import click
+
+from kbs_process.cli.shared import BAD_INPUT, EXISTING_FILE, FOLDER, NOT_MET, examples, progress, quiet_option
+
+
+@click.command(epilog=examples("inspect recording.mcap", "inspect --check campaigns/EL089/recordings/*.mcap"))
+@click.argument("files", nargs=-1, required=True, type=EXISTING_FILE, metavar="FILE...")
+@click.option("--check", is_flag=True, help="Exit with 1 when a recording has losses.")
+def inspect(files: tuple[Path, ...], check: bool) -> None:
+    """Show what is in recordings: topics, rates, gaps, ranges, damage.
+
+    Exits with 2 if one of them cannot be read at all.
+    """
+    from kbs_process.campaign.listing import describe_inspection
+    from kbs_process.ingest.inspection import inspect_recording
+
+    states = set()
+    for path in files:
+        inspection = inspect_recording(path)
+        states.add(inspection.state)
+        click.echo("\n".join(describe_inspection(inspection)))
+    if "unreadable" in states:
+        sys.exit(BAD_INPUT)
+    if check and "lossy" in states:
+        sys.exit(NOT_MET)
+
+
+@click.command(
+    "import",
+    epilog=examples(
+        "import --describe bench.tdms > mapping.toml", "import mapping.toml /data/bench campaigns/BENCH"
+    ),
+)
+@click.argument("mapping", required=False)
+@click.argument("source", required=False, type=click.Path(path_type=Path, exists=True))
+@click.argument("campaign", required=False, type=FOLDER)
+@click.option(
+    "--describe",
+    "file",
+    type=EXISTING_FILE,
+    metavar="FILE",
+    help="Print the beginning of a mapping for FILE.",
+)
+@quiet_option
+def import_(
+    mapping: str | None, source: Path | None, campaign: Path | None, file: Path | None, quiet: bool
+) -> None:
+    """Convert CSV, Parquet, HDF5, TDMS or MDF4 files in SOURCE into a new folder CAMPAIGN.
+
+    MAPPING is a TOML file that says which columns are which channels, or the name of a preset.
+    """
+    from kbs_process.campaign import importers
+
+    if file is not None:
+        click.echo(importers.describe(file), nl=False)
+        return
+    if mapping is None or source is None or campaign is None:
+        raise click.UsageError(
+            f"Give MAPPING, SOURCE and CAMPAIGN, or --describe FILE. Presets: {', '.join(importers.preset_names())}"
+        )
+    notice = functools.partial(click.echo, err=True)
+    made = importers.import_recordings(mapping, source, campaign, progress=progress(quiet), notice=notice)
+    click.echo(f"Campaign: {made}")
