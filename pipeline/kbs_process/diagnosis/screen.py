@@ -1,14 +1,17 @@
 """Every suspect along the linearised plant: what its best amplitudes would do for the residuals.
 
-Signatures are made in batches, whitened, and reduced at once to sums of products (`gls`), so that hundreds of
-candidates need the memory of one batch. Shapes are searched on their grids; amplitudes are linear. Recordings that are
-whitened alike share one pass.
+Signatures are made in batches, side by side, whitened, and reduced at once to sums of products (`gls`), so that
+hundreds of candidates need the memory of a batch for each processor. Shapes are searched on their grids; amplitudes are
+linear. Recordings that are whitened alike share one pass.
 """
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from typing import Protocol
 
 import numpy as np
@@ -200,26 +203,16 @@ class Bench:
         return np.concatenate([wrench, whole[:, rows]], axis=1)
 
 
+_Scored = tuple[Suspect, Score, tuple[str, ...]]  # with the known parameters that absorb it, if any do
+
+
 def screen(bench: Bench, suspects: Sequence[Suspect]) -> Screening:
     """Rank suspects; see `Found`."""
-    scores: dict[tuple[str, str], list[tuple[Suspect, Score, tuple[str, ...]]]] = {}
-    for batch in _batches(suspects):
-        columns = bench.columns(batch)
-        sums = Sums.over(bench.background, columns)
-        begin = 0
-        for suspect in batch:
-            own = np.arange(begin, begin + len(suspect.amplitudes))
-            begin += len(own)
-            mine = (
-                per_trial(bench.background, {k: x[:, own] for k, x in columns.items()})
-                if suspect.each_trial
-                else sums.pick(own)
-            )
-            found = score(bench.background, mine)
-            taken: tuple[str, ...] = ()
-            if found.kappa > ABSORBED:
-                taken = absorbing(bench.background, mine, found.amplitude, bench.known.names)
-            scores.setdefault(suspect.family, []).append((suspect, found, taken))
+    scores: dict[tuple[str, str], list[_Scored]] = {}
+    with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
+        for batch in pool.map(partial(_scored, bench), _batches(suspects)):
+            for one in batch:
+                scores.setdefault(one[0].family, []).append(one)
     looked_at = sum(len(grid) for grid in scores.values())
     rows = bench.background.rows
     candidates = []
@@ -232,6 +225,27 @@ def screen(bench: Bench, suspects: Sequence[Suspect]) -> Screening:
         )
     candidates.sort(key=lambda candidate: -candidate.log_evidence)
     return Screening(tuple(candidates), looked_at)
+
+
+def _scored(bench: Bench, batch: Sequence[Suspect]) -> list[_Scored]:
+    columns = bench.columns(batch)
+    sums = Sums.over(bench.background, columns)
+    found: list[_Scored] = []
+    begin = 0
+    for suspect in batch:
+        own = np.arange(begin, begin + len(suspect.amplitudes))
+        begin += len(own)
+        mine = (
+            per_trial(bench.background, {k: x[:, own] for k, x in columns.items()})
+            if suspect.each_trial
+            else sums.pick(own)
+        )
+        one = score(bench.background, mine)
+        taken: tuple[str, ...] = ()
+        if one.kappa > ABSORBED:
+            taken = absorbing(bench.background, mine, one.amplitude, bench.known.names)
+        found.append((suspect, one, taken))
+    return found
 
 
 def _evidence(found: Score, rows: int) -> float:

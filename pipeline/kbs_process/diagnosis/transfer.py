@@ -220,7 +220,7 @@ def _equilibrium(path: Path, forces: Array, column_of: Index, columns: int) -> A
     return state
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath=True)
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=True)
 def _along(
     knots: Array,
     step: Array,
