@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from kbs_process.plant.linear import Freedom, Linear
-from kbs_process.plant.rigid import kinematics, links_beyond
+from kbs_process.plant.rigid import LinkMotion, kinematics, links_beyond
 from kbs_process.rig.model import TRANSDUCER, Rig
 from kbs_process.signals.frames import rotate
 from kbs_process.signals.records import WRENCH_CHANNELS, Array
@@ -39,12 +39,9 @@ class Inlet:
 
 
 def inlets_of(rig: Rig) -> tuple[Inlet, ...]:
-    """Every inlet of a rig that differs physically: drives, wrenches on each link beyond T, the floor."""
+    """Every inlet of a rig: drives, wrenches on each link beyond T, the floor."""
     drives = [
-        Inlet(port, joint.name)
-        for joint in rig.joints
-        if joint.drive is not None
-        for port in ("motor_torque", "transmission", "joint_torque")
+        Inlet(port, joint.name) for joint in rig.joints if joint.drive is not None for port in DRIVE_PORTS
     ]
     grounds = [Inlet(GROUND_PORT, joint.name) for joint in rig.joints if joint.drive is not None]
     links = [name for name in (TRANSDUCER, *rig.joint_names) if name in links_beyond(rig)]
@@ -67,6 +64,9 @@ def generalised(rig: Rig, system: Linear, inlets: Sequence[Inlet], q: Array) -> 
     reaching = [_reach(freedom, R_TL, T.r[0]) for freedom in system.freedoms]
     size, turning = len(system.M), len(system.freedoms)
     force, direct = np.zeros((size, len(inlets))), np.zeros((6, len(inlets)))
+    rigid = (
+        _rigid_inertia(rig, links) if any(inlet.port == BASE_PORT for inlet in inlets) else np.zeros((6, 6))
+    )
     for column, inlet in enumerate(inlets):
         if inlet.port in DRIVE_PORTS:
             out = system.output(inlet.where)
@@ -88,8 +88,7 @@ def generalised(rig: Rig, system: Linear, inlets: Sequence[Inlet], q: Array) -> 
                     force[row, column] = wrench @ reach
         else:
             axis = _BASE_AXES.index(inlet.axis)
-            rigid = _rigid_inertia(rig, q)[:, axis]
-            direct[:, column] = -rigid
+            direct[:, column] = -rigid[:, axis]
             # The momentum of unit rates about T's origin is, transposed, what moves with the floor feels.
             force[:, column] = -system.momentum[axis]
     return force, direct
@@ -100,10 +99,8 @@ def _reach(freedom: Freedom, R_TL: Array, origin: Array) -> Array:
     return np.concatenate([R_TL @ np.cross(freedom.axis, origin - freedom.point), R_TL @ freedom.axis])
 
 
-def _rigid_inertia(rig: Rig, q: Array) -> Array:
+def _rigid_inertia(rig: Rig, links: Mapping[str, LinkMotion]) -> Array:
     """Inertia (6, 6) of all beyond T as one body about T's origin, in T: force and moment for unit accelerations."""
-    pose = np.asarray(q, dtype=float)[None, :]
-    links = kinematics(rig, pose, np.zeros_like(pose), np.zeros_like(pose))
     T, total = links[TRANSDUCER], np.zeros((6, 6))
     R_TL = T.R[0].T
     for body in rig.bodies:

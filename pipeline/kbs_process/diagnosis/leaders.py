@@ -21,6 +21,7 @@ from kbs_process.diagnosis.plausible import implausible
 from kbs_process.diagnosis.remains import detected
 from kbs_process.diagnosis.rivals import probabilities
 from kbs_process.diagnosis.screen import Bench, Catalogued, Found, Suspect
+from kbs_process.diagnosis.side_by_side import side_by_side
 from kbs_process.diagnosis.thresholds import (
     CLOSE,
     FALSE_ALARM,
@@ -52,17 +53,13 @@ def tried(
     """Leaders of a view refitted and gated against what was believed `before`: those that passed, and those that did
     not.
     """
-    judged: list[Tried] = []
-    joined = []
-    for found in chosen:
-        if found.suspect.each_trial:
-            shown = _trial_by_trial(found.suspect, view.standing, view.bench)
-            judged.append(Tried(found, *shown, view.screening, Own((), ())))
-        else:
-            extra = extra_of(found, view.standing, view.bench, view.scene)
-            joined.append((found, with_extra(view.standing, extra, simulate)))
-    joined.sort(key=lambda one: float(np.nan_to_num(one[1].known.cost, nan=np.inf)))
-    for place, (found, new) in enumerate(joined):
+
+    def join(found: Found) -> tuple[Found, Standing]:
+        extra = extra_of(found, view.standing, view.bench, view.scene)
+        return found, with_extra(view.standing, extra, simulate)
+
+    def judge(one: tuple[int, tuple[Found, Standing]]) -> Tried:
+        place, (found, new) = one
         best = joined[0][1].known
         near = new.known.excess <= SETTLED_TIMES * max(best.excess, TOLERATED * float(best.rows.sum()))
         own = own_of(found, before, new)
@@ -72,7 +69,16 @@ def tried(
             # So much is hardly chance: phases may still be those that made up for what was left out.
             end = resettled(end, floor, simulate, leaps=1)
             verdict = gated(found, before, end, own)
-        judged.append(Tried(found, end, verdict, view.screening, own))
+        return Tried(found, end, verdict, view.screening, own)
+
+    judged = [
+        Tried(found, *_trial_by_trial(found.suspect, view.standing, view.bench), view.screening, Own((), ()))
+        for found in chosen
+        if found.suspect.each_trial
+    ]
+    joined = side_by_side(join, [found for found in chosen if not found.suspect.each_trial])
+    joined.sort(key=lambda one: float(np.nan_to_num(one[1].known.cost, nan=np.inf)))
+    judged += side_by_side(judge, enumerate(joined))
     passed = [one for one in judged if one.gate.passed]
     refused = [
         Refused(identity(one.found.suspect), one.found.score.rho_eff, one.gate.reasons)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from kbs_process.diagnosis.floor import Floor, channel_windows
 from kbs_process.diagnosis.hypothesis import coupled
-from kbs_process.diagnosis.inlets import BASE_PORT, GROUND_PORT, WRENCH_PORT, Inlet, generalised
+from kbs_process.diagnosis.inlets import BASE_PORT, GROUND_PORT, WRENCH_PORT, Inlet
 from kbs_process.diagnosis.joint import Standing
 from kbs_process.diagnosis.known import Known
 from kbs_process.diagnosis.ports import Cells, Complex, PortModel, sine_window
@@ -191,7 +191,8 @@ def frequency_response(path: Path, time: float, inlets: Sequence[Inlet], f: Arra
     """Response (b, 6 + joints, m) of wrench, behind the amplifier, and joint angles, at the pose of a time (s)."""
     index = int(np.argmin(np.abs(path.knots - time * path.rate)))
     system = path.systems[index]
-    force, direct = generalised(path.rig, system, inlets, path.poses[index])
+    chosen = [path.inlets.index(inlet) for inlet in inlets]
+    force, direct = path.force[index][:, chosen], path.direct[index][:, chosen]
     s = 2j * np.pi * f[:, None, None]
     x = np.linalg.solve(
         system.K + s * system.C + s**2 * system.M, np.broadcast_to(force, (len(f), *force.shape))

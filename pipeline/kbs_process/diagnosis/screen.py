@@ -7,9 +7,7 @@ linear. Recordings that are whitened alike share one pass.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from typing import Protocol
@@ -23,6 +21,7 @@ from kbs_process.diagnosis.hypothesis import coupled
 from kbs_process.diagnosis.inlets import Inlet
 from kbs_process.diagnosis.known import Known
 from kbs_process.diagnosis.scene import Scene
+from kbs_process.diagnosis.side_by_side import side_by_side
 from kbs_process.diagnosis.signature import inputs, sensed
 from kbs_process.diagnosis.suspects import Candidate
 from kbs_process.diagnosis.tails import log_tail
@@ -209,10 +208,9 @@ _Scored = tuple[Suspect, Score, tuple[str, ...]]  # with the known parameters th
 def screen(bench: Bench, suspects: Sequence[Suspect]) -> Screening:
     """Rank suspects; see `Found`."""
     scores: dict[tuple[str, str], list[_Scored]] = {}
-    with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
-        for batch in pool.map(partial(_scored, bench), _batches(suspects)):
-            for one in batch:
-                scores.setdefault(one[0].family, []).append(one)
+    for batch in side_by_side(partial(_scored, bench), _batches(suspects)):
+        for one in batch:
+            scores.setdefault(one[0].family, []).append(one)
     looked_at = sum(len(grid) for grid in scores.values())
     rows = bench.background.rows
     candidates = []

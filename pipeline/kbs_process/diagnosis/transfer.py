@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 from scipy.linalg import expm
 
-from kbs_process.diagnosis.inlets import Inlet, generalised
+from kbs_process.diagnosis.inlets import Inlet, generalised, inlets_of
 from kbs_process.plant.effect import SIGNALS, Effect, Port
 from kbs_process.plant.linear import Linear, drive_damping, drive_stiffness, linearise
 from kbs_process.rig.model import Amplifier, Joint, Rig
@@ -46,13 +46,15 @@ class Path:
     joints: tuple[str, ...]
     rate: float  # Hz, of the steps
     knots: Array  # (k,) steps
-    poses: Array  # (k, joints) rad
     systems: tuple[Linear, ...]  # (k,) with the drives' slopes of the operating points
     step: Array  # (k, 2 c, 2 c) of the state [x, x' h]
     push: Array  # (k, 2 c, c) by generalised forces
     wrench: Array  # (k, 6, c) of unit angles: weight's and other loads' in the plate's axes
     drag: Array  # (k, 6, c) of unit rates
     lever: Array  # (k, 6, c) momentum of unit rates
+    inlets: tuple[Inlet, ...]  # m of them: all that the rig has
+    force: Array  # (k, c, m) generalised forces of unit inputs, and
+    direct: Array  # (k, 6, m) what these add to the wrench themselves
     ripple: Array  # (n, joints) N m/rad of the output: slope of the rotor's torque as teeth pass, mean over each step
 
 
@@ -94,18 +96,24 @@ def follow(rig: Rig, effects: Sequence[Effect], taps: Mapping[str, Array], rate:
                 C[pair] += drive_damping(joint.drive, effects, at) / len(points)
         systems.append(replace(bare, C=C, K=K))
     step, push = _discretised(systems, 1.0 / rate)
+    inlets = inlets_of(rig)
+    entered = [
+        generalised(rig, system, inlets, pose) for system, pose in zip(systems, angles[knots], strict=True)
+    ]
     return Path(
         rig,
         tuple(joint.name for joint in driven),
         rate,
         knots.astype(float),
-        angles[knots],
         tuple(systems),
         step,
         push,
         np.stack([system.gravity for system in systems]),
         np.stack([system.drag for system in systems]),
         np.stack([system.momentum for system in systems]),
+        inlets,
+        np.stack([force for force, _ in entered]),
+        np.stack([direct for _, direct in entered]),
         np.stack([_ripple(joint, effects, _signals(taps, joint.name), rate) for joint in driven], axis=1),
     )
 
@@ -176,20 +184,15 @@ def respond(path: Path, drives: Drives, channels: Sequence[str], decimation: int
     rows = [WRENCH_CHANNELS.index(name) for name in channels]
     outs = [path.systems[0].output(name) for name in path.joints]
     result = np.empty((samples, len(rows) + len(outs), len(drives)))
-    inlets = sorted({inlet for drive in drives for inlet in drive}, key=lambda inlet: inlet.label)
-    maps = [
-        generalised(path.rig, system, inlets, pose)
-        for system, pose in zip(path.systems, path.poses, strict=True)
-    ]
-    force, direct = np.stack([m[0] for m in maps]), np.stack([m[1] for m in maps])
+    place = {inlet: k for k, inlet in enumerate(path.inlets)}
     post = _post(path, decimation, samples)
     for first in range(0, len(drives), BATCH):
         batch = drives[first : first + BATCH]
         entries = [(column, inlet) for column, drive in enumerate(batch) for inlet in drive]
         series = np.stack([np.asarray(batch[column][inlet], dtype=float) for column, inlet in entries])
         column_of = np.array([column for column, _ in entries])
-        inlet_of = np.array([inlets.index(inlet) for _, inlet in entries])
-        start = _equilibrium(path, force[0][:, inlet_of] * series[:, 0], column_of, len(batch))
+        inlet_of = np.array([place[inlet] for _, inlet in entries])
+        start = _equilibrium(path, path.force[0][:, inlet_of] * series[:, 0], column_of, len(batch))
         fine = _along(
             path.knots,
             path.step,
@@ -198,8 +201,8 @@ def respond(path: Path, drives: Drives, channels: Sequence[str], decimation: int
             path.drag[:, rows] * path.rate,
             path.lever[:, rows] * path.rate**2,
             np.array(outs, dtype=np.intp),
-            force,
-            direct[:, rows],
+            path.force,
+            path.direct[:, rows],
             series,
             column_of,
             inlet_of,
