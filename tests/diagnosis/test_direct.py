@@ -12,14 +12,17 @@ from kbs_process.diagnosis import direct
 from kbs_process.diagnosis.hypothesis import Tapped
 from kbs_process.diagnosis.inlets import WRENCH_PORT, Inlet
 from kbs_process.diagnosis.signature import inputs
-from kbs_process.diagnosis.suspects import Candidate
+from kbs_process.diagnosis.suspects import Candidate, felt_from_the_ground
 from kbs_process.plant.attach import attach
 from kbs_process.plant.effect import Port
 from kbs_process.plant.effects import CATALOGUE
-from kbs_process.plant.moved import added_loads
+from kbs_process.plant.moved import added_loads, grounded, pressed
+from kbs_process.plant.rigid import axis_of, kinematics, loads
 from kbs_process.rig.model import Effort, Rig
+from kbs_process.signals.frames import rotate
 from kbs_process.signals.records import Array
-from plant.plant_rigs import quantity
+from plant.plant_rigs import body, joint, quantity
+from plant.plant_rigs import rig as plain_rig
 
 RATE = 100.0
 GAIN = 2.0
@@ -81,3 +84,57 @@ def test_a_torque_in_a_drive_shows_in_its_effort_alone() -> None:
     found = direct.respond(rig(), [column, {Inlet(WRENCH_PORT, "az", "Tz"): np.full(len(q), np.nan)}], q)
     assert np.allclose(found[50:-50, 7, 0], -1.0 / GAIN, rtol=2e-3)
     assert not np.delete(found[:, :, 0], 7, axis=1).any() and not found[:, :, 1].any()
+
+
+def chain(carrier: str, slider: int) -> Rig:
+    """Three skewed joints, their transducer in the laboratory or on one of them, one joint sliding."""
+    rng = np.random.default_rng(len(carrier) + slider)
+    parents = {"lab": ("T", "a", "b"), "a": ("lab", "T", "b"), "b": ("lab", "a", "T")}[carrier]
+    joints = []
+    for k, (name, parent) in enumerate(zip("abc", parents, strict=True)):
+        axis = rng.standard_normal(3)
+        one = joint(name, parent, tuple(axis / np.linalg.norm(axis)), 0.3 * rng.standard_normal(3))
+        effort = Effort("V", *(quantity("effort", value) for value in (1.7 + k, 0.1, 0.0, 0.0)))
+        joints.append(replace(one, type="prismatic" if k == slider else "revolute", effort=effort))
+    bodies = tuple(
+        body(f"of {name}", name, 2.0, 0.2 * rng.standard_normal(3), (0.1, 0.1, 0.1)) for name in "abc"
+    )
+    whole = plain_rig(bodies, tuple(joints), tilt=(0.02, -0.03), stiffness=None)
+    return replace(whole, transducer=replace(whole.transducer, on=carrier))
+
+
+@pytest.mark.parametrize("carrier", ["lab", "a", "b"])
+@pytest.mark.parametrize("slider", [-1, 0, 1, 2])
+def test_the_loads_answer_to_a_weight_as_to_a_force_and_to_the_ground_by_its_power(
+    carrier: str, slider: int
+) -> None:
+    here = chain(carrier, slider)
+    q = np.random.default_rng(5).standard_normal((7, 3))
+    still = np.zeros_like(q)
+    links = kinematics(here, q, still, still)
+    R_TL = np.swapaxes(links["T"].R, 1, 2)
+    answers, grounds = pressed(here, q), grounded(here, q)
+    point, mass = np.array([0.2, -0.1, 0.3]), 3.0
+    weight = np.tile([0.0, 0.0, -mass * float(here.gravity)], (len(q), 1))
+    for number, link in enumerate(here.joints):
+        heavier = replace(here, bodies=(*here.bodies, body("more", link.name, mass, point, (0.0, 0.0, 0.0))))
+        added = loads(heavier, q, still, still) - loads(here, q, still, still)
+        arm = rotate(R_TL, links[link.name].r + rotate(links[link.name].R, point) - links["T"].r)
+        force = rotate(R_TL, weight)
+        wrench = np.hstack([force, np.cross(arm, force)])
+        assert np.allclose(rotate(answers[link.name], wrench), added, atol=1e-9)
+        axis = axis_of(link, links[link.parent])
+        for row, other in enumerate(here.joints):
+            rate = still.copy()
+            rate[:, row] = 1.0
+            moved = kinematics(here, q, rate, still)[link.name]
+            power = np.sum(axis * (moved.v if number == slider else moved.omega), axis=1)
+            assert other.effort is not None
+            assert np.allclose(grounds[link.name][:, 6 + row], -power / float(other.effort.gain), atol=1e-12)
+
+
+def test_what_no_transducer_reads_is_no_torque_of_the_ground() -> None:
+    here = rig()
+    assert felt_from_the_ground(here) >= {"az", "el"}
+    assert not felt_from_the_ground(replace(here, transducer=replace(here.transducer, channels=())))
+    assert felt_from_the_ground(chain("b", -1)) & {"a", "b", "c"} == {"c"}

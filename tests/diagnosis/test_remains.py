@@ -53,10 +53,11 @@ def test_a_law_that_takes_nearly_all_is_one(cabled: Experiment) -> None:
     there, here = (detected(one, floor, cabled.fit) for one in (before, after))
     assert there.left and not here.left
     assert too_little(before, after, floor) == ()
-    assert taken(before, after, floor) == pytest.approx(1.0, abs=0.05)
+    assert taken(there, here) == pytest.approx(1.0, abs=0.05)
     assert promises_little(view, there) == ""
     # a screen's gain over the rows of the mean is what the power over the floor falls by
-    assert view.able[0].score.gain / there.rows == pytest.approx(there.ratio - here.ratio, rel=0.3)
+    assert view.able[0].score.gain / there.rows[0] == pytest.approx(there.ratio - here.ratio, rel=0.3)
+    assert there.ratios == {0: pytest.approx(there.ratio)}
 
 
 def test_a_law_that_takes_as_much_as_searches_differ_by_is_none(made: Experiment, cabled: Experiment) -> None:
@@ -72,10 +73,15 @@ def test_a_law_that_takes_as_much_as_searches_differ_by_is_none(made: Experiment
 def test_nothing_is_simulated_that_promises_as_little(cabled: Experiment) -> None:
     view, _ = seen(standing(cabled))
     there = detected(view.standing, declared(cabled), cabled.fit)
-    long = replace(there, rows=view.able[0].score.gain / (0.3 * TOLERATED))
+    times = view.able[0].score.gain / (0.3 * TOLERATED) / there.rows[0]
+    long = replace(there, cells=tuple(replace(cell, rows=times * cell.rows) for cell in there.cells))
     assert promises_little(view, long) == ""  # there is something to explain
     assert "minima" in promises_little(view, replace(long, ratio=1.0))
     assert promises_little(view, replace(there, ratio=1.0)) == ""
+    # along one of two trajectories it may be much
+    short = tuple(replace(cell, trajectory=1) for cell in there.cells)
+    assert promises_little(view, replace(long, cells=(*long.cells, *short), ratio=1.0)) == ""
+    assert len(long.rows) == 1 and replace(long, cells=(*long.cells, *short)).rows[1] == there.rows[0]
 
 
 def test_a_law_that_leaves_most_follows_something_else(cabled: Experiment, made: Experiment) -> None:

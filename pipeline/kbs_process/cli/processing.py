@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
@@ -19,7 +20,11 @@ from kbs_process.cli.shared import (
     progress,
     quiet_option,
 )
-from kbs_process.errors import KbsError, OutputError
+from kbs_process.errors import ConfigError, FitError, RecordingError, SimulationError
+
+if TYPE_CHECKING:
+    from kbs_process.campaign.config import Campaign
+    from kbs_process.campaign.progress import Progress
 
 
 @click.command(epilog=examples("campaign/EL089", "process campaign/EL089 --check --output /data/EL089"))
@@ -52,26 +57,35 @@ def process(
     from kbs_process.campaign.run import process as run
 
     outcome = run(loaded, target, progress=progress(quiet), pdf=pdf)
-    for line in outcome.verdict_lines:
-        click.echo(line)
-    click.echo(f"Report: {outcome.report}")
-    if why is not False:
-        from kbs_process.campaign.diagnosing import diagnose_results
-
-        try:
-            for line in diagnose_results(loaded, target, progress=progress(quiet), pdf=pdf):
-                click.echo(line)
-        except OutputError:
-            raise
-        except KbsError as error:
-            if why:
-                raise
-            click.echo(f"Not diagnosed: {error}")
-        except KeyboardInterrupt:
-            complain("interrupted: the report is written, a diagnosis is not")
-            sys.exit(INTERRUPTED)
+    try:
+        for line in outcome.verdict_lines:
+            click.echo(line)
+        click.echo(f"Report: {outcome.report}")
+        if why is not False:
+            _diagnose(loaded, target, progress=progress(quiet), pdf=pdf, wanted=why is True)
+    except KeyboardInterrupt:
+        complain("interrupted: the report is written, a diagnosis is not")
+        sys.exit(INTERRUPTED)
     if check and outcome.requirement_met is False:
         sys.exit(NOT_MET)
+
+
+def _diagnose(
+    campaign: Campaign, results: Path, *, progress: Progress, pdf: bool | None, wanted: bool
+) -> None:
+    """Diagnose what was processed; recordings that allow no diagnosis are an error only if one is wanted."""
+    from kbs_process.campaign.diagnosing import diagnose_results
+
+    try:
+        for line in diagnose_results(campaign, results, progress=progress, pdf=pdf):
+            click.echo(line)
+    except (ConfigError, RecordingError, FitError, SimulationError) as error:
+        if wanted:
+            raise
+        click.echo(f"Not diagnosed: {error}")
+    except Exception:
+        complain("the report is written, but the diagnosis failed")
+        raise
 
 
 @click.command(epilog=examples("validate campaign/EL089", "validate campaign/EL089 --check"))

@@ -12,15 +12,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kbs_process.diagnosis.inlets import Inlet
+from kbs_process.diagnosis.inlets import GROUND_PORT, Inlet
 from kbs_process.diagnosis.scene import Scene
+from kbs_process.diagnosis.suspects import felt_from_the_ground
 from kbs_process.plant.effects.measured_law import COEFFICIENTS, INTERVALS
 from kbs_process.signals.records import Array
 
 _RESTS = 1e-9
 # Regressor -> unit. A rate is the slope of the angle; both are the output's.
 REGRESSORS = {"joint_angle": "rad", "joint_rate": "rad/s"}
-PORTS = ("joint_torque", "ground_torque")
+PORTS = ("joint_torque", GROUND_PORT)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -85,6 +86,7 @@ def series(scene: Scene, drive: int, joint: str, regressor: str) -> Array:
 def curves(scene: Scene) -> tuple[CurveSuspect, ...]:
     """Every regressor that moves, at every port of every driven joint."""
     found = []
+    reached = felt_from_the_ground(scene.experiment.rig)
     for joint in scene.experiment.rig.joints:
         if joint.drive is None:
             continue
@@ -94,5 +96,9 @@ def curves(scene: Scene) -> tuple[CurveSuspect, ...]:
             if high - low < _RESTS:
                 continue
             knots = np.linspace(low, high, INTERVALS + 1)
-            found += [CurveSuspect(scene, port, joint.name, regressor, knots) for port in PORTS]
+            found += [
+                CurveSuspect(scene, port, joint.name, regressor, knots)
+                for port in PORTS
+                if port != GROUND_PORT or joint.name in reached
+            ]
     return tuple(found)

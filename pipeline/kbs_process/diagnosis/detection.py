@@ -41,6 +41,7 @@ class Cell:
     low_Hz: float
     high_Hz: float
     ratio: float  # mean residual's power over the floor's
+    rows: float  # numbers of noise that the mean residual holds
     log_p: float  # natural logarithm
 
 
@@ -51,12 +52,27 @@ class Detection:
     cells: tuple[Cell, ...]
     log_p: float  # natural logarithm, of all cells
     ratio: float  # power over the floor's, all cells
-    rows: float  # numbers of noise that the mean residuals hold
 
     @property
     def left(self) -> bool:
         """Whether what is left is more than chance, and more than floor and search are good for."""
         return bool(self.log_p < np.log(DETECTED) and self.ratio > 1.0 + TOLERATED)
+
+    @property
+    def rows(self) -> dict[int, float]:
+        """Numbers of noise in the mean residual, by trajectory."""
+        rows: dict[int, float] = {}
+        for cell in self.cells:
+            rows[cell.trajectory] = rows.get(cell.trajectory, 0.0) + cell.rows
+        return rows
+
+    @property
+    def ratios(self) -> dict[int, float]:
+        """Power over the floor's, by trajectory."""
+        power: dict[int, float] = {}
+        for cell in self.cells:
+            power[cell.trajectory] = power.get(cell.trajectory, 0.0) + cell.ratio * cell.rows
+        return {trajectory: power[trajectory] / rows for trajectory, rows in self.rows.items()}
 
     @property
     def log10_p(self) -> float:
@@ -96,7 +112,7 @@ def detect(
             power, expected = power + u, expected + mean
     total = sum(cell.log_p for cell in cells)
     log_p = float(chi_square.logsf(-2.0 * total, 2 * len(cells)))
-    return Detection(tuple(cells), max(log_p, _LEAST_LOG), power / expected, 2.0 * expected)
+    return Detection(tuple(cells), max(log_p, _LEAST_LOG), power / expected)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -160,7 +176,8 @@ def _cells(floor: Floor, one: _Mean, taken: Array) -> list[tuple[Cell, float, fl
         left = max(full - 0.5 * float(lost[inside].sum()), 0.05 * full)
         mean, variance = left, _variance(B, one.channels, nu) * (left / full) * one.spread
         u = 0.5 * float(z2[inside].sum())
-        cell = Cell(one.trajectory, float(low), float(high), u / mean, _log_p(u, mean, variance, left))
+        log_p = _log_p(u, mean, variance, left)
+        cell = Cell(one.trajectory, float(low), float(high), u / mean, 2.0 * mean, log_p)
         found.append((cell, u, mean))
     return found
 

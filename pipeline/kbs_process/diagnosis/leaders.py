@@ -18,7 +18,7 @@ from kbs_process.diagnosis.joint import Own, Standing, bare, standing_of, with_e
 from kbs_process.diagnosis.known import confined, settled
 from kbs_process.diagnosis.outcome import Refused
 from kbs_process.diagnosis.plausible import implausible
-from kbs_process.diagnosis.remains import detected
+from kbs_process.diagnosis.remains import detected, searched
 from kbs_process.diagnosis.rivals import probabilities
 from kbs_process.diagnosis.screen import Bench, Catalogued, Found, Suspect
 from kbs_process.diagnosis.side_by_side import side_by_side
@@ -164,7 +164,7 @@ def resettled(standing: Standing, floor: Floor, simulate: Simulate, *, leaps: in
     """All numbers refitted with the law in the plant, or on its prediction, if that takes away more."""
     known = standing.known
     at_floor = not detected(standing, floor, known.experiment.fit).left
-    if known.experiment.drives[0].schedule is None or (leaps and at_floor):
+    if not searched(known.experiment) or (leaps and at_floor):
         return standing
     moved = settled(known, simulate, leaps=leaps, laws=standing.laws)
     return standing_of(moved, standing.laws, simulate) if moved.cost < known.cost else standing

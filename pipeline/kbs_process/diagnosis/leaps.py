@@ -92,6 +92,7 @@ class _View:
         self.weights = (search.precision + search.ridge)[self.rest]
         normal = sum((j[:, self.rest].T @ j[:, self.rest] for j in J.values()), np.diag(self.weights))
         self.factor = cho_factor(normal)
+        self.judged: dict[bytes, _Followed] = {}
         self.held = np.zeros(len(self.rest))
         for k in set(J) - set(trials):
             self.held += J[k][:, self.rest].T @ search.residual(k, found.predicted)
@@ -122,17 +123,20 @@ class _View:
 
     def followed(self, points: Sequence[Array]) -> list[_Followed]:
         """Judge points by their residuals and the priors."""
-        J = self.J[:, self.rest]
-        found = []
-        for point, z in zip(points, self.residuals(points), strict=True):
-            if not np.isfinite(z).all():
-                found.append(_Followed(point, np.inf, np.zeros(len(self.rest))))
-                continue
-            g = J.T @ z + self.held - (self.weights * (point - self.search.parameters.value)[self.rest])
-            follow = cho_solve(self.factor, g)
-            cost = float(z @ z) + self.search.excess(point) - float(g @ follow)
-            found.append(_Followed(point, cost, follow))
-        return found
+        new = list(
+            {point.tobytes(): point for point in points if point.tobytes() not in self.judged}.values()
+        )
+        for point, z in zip(new, self.residuals(new), strict=True):
+            self.judged[point.tobytes()] = self._judge(point, z)
+        return [self.judged[point.tobytes()] for point in points]
+
+    def _judge(self, point: Array, z: Array) -> _Followed:
+        if not np.isfinite(z).all():
+            return _Followed(point, np.inf, np.zeros(len(self.rest)))
+        excess = self.weights * (point - self.search.parameters.value)[self.rest]
+        g = self.J[:, self.rest].T @ z + self.held - excess
+        follow = cho_solve(self.factor, g)
+        return _Followed(point, float(z @ z) + self.search.excess(point) - float(g @ follow), follow)
 
     def edges(self, theta: Array, contact: Contact) -> list[Array]:
         """Points with the contact's edges where they might be, each after a step of its own."""
@@ -140,7 +144,7 @@ class _View:
         # A phase that these trials show nothing of would leave the equations singular.
         bounded = replace(prior, sigma=np.where(np.isfinite(prior.sigma), prior.sigma, np.pi))
         points = edge_minima(self.residuals, theta, -self.J, bounded, contact, _EDGES)
-        return [*points, *(self.stepped(point) for point in points)]
+        return [*points, *self.stepped(points)]
 
     def walked(self, theta: Array) -> list[Array]:
         """The best place of either edge in turn, the other standing: each meets events of its own.
@@ -158,17 +162,30 @@ class _View:
                 for offset, wide in moves
             ]
             point = min(self.followed([point, *points]), key=lambda one: one.cost).point
-        return [point, self.stepped(point)] if point is not theta else []
+        return [point, *self.stepped([point])] if point is not theta else []
 
-    def stepped(self, point: Array) -> Array:
-        """A Gauss-Newton step in the own numbers and the rest together, of which only the own are taken."""
-        size = np.array([0.05 * max(abs(point[self.own[0]]), 1e-9), _DIFFERENCE, _DIFFERENCE])
+    def stepped(self, points: Sequence[Array]) -> list[Array]:
+        """Gauss-Newton steps from some points in the own numbers and the rest together; only the own are taken."""
+        around = [[point, *self._differenced(point)] for point in points]
+        found = iter(self.residuals([one for own in around for one in own]))
+        return [
+            self._step(point, [next(found) for _ in own]) for point, own in zip(points, around, strict=True)
+        ]
+
+    def _differences(self, point: Array) -> Array:
+        return np.array([0.05 * max(abs(point[self.own[0]]), 1e-9), _DIFFERENCE, _DIFFERENCE])
+
+    def _differenced(self, point: Array) -> list[Array]:
         moved = []
-        for index, d in zip(self.own, size, strict=True):
+        for index, d in zip(self.own, self._differences(point), strict=True):
             one = point.copy()
             one[index] += d
             moved.append(one)
-        z, *others = self.residuals([point, *moved])
+        return moved
+
+    def _step(self, point: Array, residuals: Sequence[Array]) -> Array:
+        z, *others = residuals
+        size = self._differences(point)
         own = np.column_stack([(z - other) / d for other, d in zip(others, size, strict=True)])
         if not (np.isfinite(own).all() and np.isfinite(z).all()):
             return point

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from kbs_process.diagnosis.detection import Detection, detect
+from kbs_process.diagnosis.experiment import Experiment
 from kbs_process.diagnosis.floor import Floor
 from kbs_process.diagnosis.joint import Standing
 from kbs_process.diagnosis.thresholds import LEAD, TAKEN, TOLERATED
@@ -29,42 +30,48 @@ def detected(standing: Standing, floor: Floor, trials: Sequence[int]) -> Detecti
     return detect(experiment, floor, standing.predicted, trials, known=known)
 
 
-def taken(before: Standing, after: Standing, floor: Floor) -> float:
-    """Share that a law takes of what exceeds the floor; all, where nothing does."""
-    fit = before.known.experiment.fit
-    there = detected(before, floor, fit)
-    if not there.left:
-        return 1.0
-    return 1.0 - max(detected(after, floor, fit).ratio - 1.0, 0.0) / (there.ratio - 1.0)
+def taken(there: Detection, here: Detection) -> float:
+    """Share that a law takes of what exceeds the floor `there`, of which it leaves what is `here`; all of nothing."""
+    return 1.0 - max(here.ratio - 1.0, 0.0) / (there.ratio - 1.0) if there.left else 1.0
 
 
 def too_little(before: Standing, after: Standing, floor: Floor) -> tuple[str, ...]:
     """Return why what a law takes does not tell it from something else; nothing, if it does.
 
-    What two minima of phases and tooth contact leave differs, too, and a law with numbers enough follows that.
+    What two minima of phases and tooth contact leave differs, too, and a law with numbers enough follows that. It shows
+    less than that in every trajectory.
     """
-    fit = before.known.experiment.fit
-    there, here = detected(before, floor, fit), detected(after, floor, fit)
+    experiment = before.known.experiment
+    there, here = (detected(one, floor, experiment.fit) for one in (before, after))
     reasons = []
-    share = taken(before, after, floor)
+    share = taken(there, here)
     if not share >= TAKEN:
         reasons.append(
             f"takes {100.0 * share:.0f} % of what exceeds the floor: it follows what something else does"
         )
-    if not there.ratio - here.ratio >= TOLERATED:
-        reasons.append(_slight(there.ratio - here.ratio))
+    left = here.ratios
+    most = max(ratio - left[trajectory] for trajectory, ratio in there.ratios.items())
+    if searched(experiment) and not most >= TOLERATED:
+        reasons.append(f"takes {100.0 * most:.1f} % of the floor's power: {_DIFFER}")
     return tuple(reasons)
 
 
 def promises_little(view: View, there: Detection) -> str:
-    """Return why no suspect of a view is worth a simulation, where nothing is left and none does much; else ''."""
-    if there.left or not view.able:
+    """Return why no suspect of a view is worth a simulation, where nothing is left and none does much; else "".
+
+    All that a suspect gains may be along one trajectory, of which repeats and encoders at rest make less rows.
+    """
+    if there.left or not view.able or not searched(view.standing.known.experiment):
         return ""
-    most = view.able[0].score.gain / there.rows
-    return "" if most >= (1.0 - LEAD) * TOLERATED else _slight(most)
+    most = max(found.score.gain for found in view.able) / min(there.rows.values())
+    if most >= (1.0 - LEAD) * TOLERATED:
+        return ""
+    return f"would take {100.0 * most:.1f} % of the floor's power at most: {_DIFFER}"
 
 
-def _slight(ratio: float) -> str:
-    return (
-        f"takes {100.0 * ratio:.1f} % of the floor's power: minima of the known parameters differ by as much"
-    )
+def searched(experiment: Experiment) -> bool:
+    """Whether phases and tooth contact are searched for: along a measured motion there are none."""
+    return experiment.drives[0].schedule is not None
+
+
+_DIFFER = "minima of the known parameters differ by as much"

@@ -143,7 +143,8 @@ def _passed(view: View, floor: Floor, simulate: Simulate) -> tuple[list[Tried], 
         close = closer(view.standing, simulate)
         lead = [found for found in close.able if not found.suspect.each_trial][:CLOSE_LEADERS]
         passed, refused = tried(lead, close, view.standing, floor, simulate)
-        if any(taken(view.standing, one.standing, floor) > ORDERED for one in passed):
+        fit = known.experiment.fit
+        if any(taken(there, detected(one.standing, floor, fit)) > ORDERED for one in passed):
             return passed, refused
     first, others = leaders(view)
     for chosen in (first, *([found] for found in others)):

@@ -7,15 +7,16 @@ from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
 
+MOST = 4  # threads: each holds a batch of signatures, half a gigabyte for ten minutes of eight channels
 A = TypeVar("A")
 B = TypeVar("B")
 
 
 def side_by_side(work: Callable[[A], B], items: Iterable[A]) -> list[B]:
     """Do `work` on each item in a thread; results in the items' order, and the first error, as in one thread."""
-    pool = ThreadPoolExecutor(len(os.sched_getaffinity(0)))
+    pool = ThreadPoolExecutor(min(len(os.sched_getaffinity(0)), MOST))
     try:
         return list(pool.map(work, items))
     finally:
-        # Who interrupts does not wait for work that is under way.
+        # After an error what is under way ends by itself, at its next simulation at the latest.
         pool.shutdown(wait=False, cancel_futures=True)

@@ -9,11 +9,11 @@ from itertools import product
 from kbs_process.diagnosis.places import Place, points_of
 from kbs_process.diagnosis.ranges import Ranges
 from kbs_process.plant.along import signals_of
-from kbs_process.plant.effect import Effect, Parameter, Port, instance
+from kbs_process.plant.effect import VELOCITIES, Effect, Parameter, Port, instance
 from kbs_process.plant.effects import CATALOGUE
 from kbs_process.plant.rigid import links_beyond
 from kbs_process.plant.sensing import SENSING, Sensing, SensingPort
-from kbs_process.rig.model import Joint, Rig
+from kbs_process.rig.model import LAB, Joint, Rig
 from kbs_process.signals.records import WRENCH_CHANNELS
 
 AXES = ("x", "y", "z")
@@ -104,11 +104,17 @@ def _sites(effect: Effect, rig: Rig, columns: Sequence[str]) -> list[str]:
     if effect.port is Port.BASE_ACCELERATION:
         return list(AXES) if rig.transducer.channels else []
     if effect.port is Port.EXTERNAL_FORCE:
-        return [name for name in rig.joint_names if name in links_beyond(rig)]
+        # A screen has velocities as T sees them.
+        blind = rig.transducer.on != LAB and bool(VELOCITIES & set(effect.arguments))
+        return [] if blind else [name for name in rig.joint_names if name in links_beyond(rig)]
     shared = [entry.name for entry in effect.parameters if entry.role == "shared"]
     needed = [name for name in signals_of(effect) if name != "time"]
 
+    reached = felt_from_the_ground(rig)
+
     def fits(joint: Joint) -> bool:
+        if effect.port is Port.GROUND_TORQUE and joint.name not in reached:
+            return False
         own = {} if joint.drive is None else joint.drive.parameters
         turned = joint.drive is not None or "ratio" not in effect.arguments
         return (
@@ -118,6 +124,11 @@ def _sites(effect: Effect, rig: Rig, columns: Sequence[str]) -> list[str]:
         )
 
     return [joint.name for joint in rig.joints if fits(joint)]
+
+
+def felt_from_the_ground(rig: Rig) -> frozenset[str]:
+    """Joints of which a torque against the ground shows otherwise than one between their links: in a transducer."""
+    return links_beyond(rig) if rig.transducer.channels else frozenset()
 
 
 def next_action(effect: Effect, rig: Rig, site: str, accepted: Sequence[str]) -> Effect:

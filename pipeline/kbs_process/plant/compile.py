@@ -8,6 +8,7 @@ import inspect
 import os
 import sys
 import tempfile
+import threading
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cache
@@ -21,6 +22,8 @@ from kbs_process.plant import elementary, kernels
 from kbs_process.plant.generate import module_text
 from kbs_process.plant.lanes import lanes_text
 from kbs_process.plant.structure import Structure
+
+_ONE_AT_A_TIME = threading.Lock()
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,14 +58,17 @@ def _modules(structure: Structure) -> list[ModuleType | None]:
 def compiled_module(kind: str, text: str, modules: Iterable[ModuleType | None]) -> ModuleType:
     """Import `text` as a module, kept in the cache; `modules` are those whose functions it calls."""
     name = f"{kind}_{_fingerprint(text, modules)}"
-    path = _written(name, text)
-    spec = importlib.util.spec_from_file_location(name, path)
-    if spec is None or spec.loader is None:
-        raise ImportError(f"no loader for {path}")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    spec.loader.exec_module(module)
-    return module
+    with _ONE_AT_A_TIME:  # or each thread would compile its own
+        if name in sys.modules:
+            return sys.modules[name]
+        path = _written(name, text)
+        spec = importlib.util.spec_from_file_location(name, path)
+        if spec is None or spec.loader is None:
+            raise ImportError(f"no loader for {path}")
+        module = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(module)
+        sys.modules[name] = module
+        return module
 
 
 def cache_folder() -> Path:

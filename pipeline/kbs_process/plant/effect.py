@@ -43,6 +43,7 @@ POINT_SIGNALS = {
     "vz": "m/s",
     "time": SIGNALS["time"],
 }
+VELOCITIES = frozenset(("vx", "vy", "vz"))
 FLOOR_SIGNALS = {"time": SIGNALS["time"]}
 
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from kbs_process.plant.effect import POINT_SIGNALS, Effect, Port
+from kbs_process.plant.effect import POINT_SIGNALS, VELOCITIES, Effect, Port
 from kbs_process.plant.rigid import LinkMotion, axis_of, kinematics, links_beyond
 from kbs_process.plant.structure import external_of
 from kbs_process.rig.model import TRANSDUCER, Rig
@@ -41,7 +41,7 @@ def external_wrench(rig: Rig, effects: Sequence[Effect], q: Array, rates: Array 
 def pulls_at_rest(effect: Effect) -> bool:
     """Whether an effect is a force that may act on a point at rest: one that only brakes its motion is none there."""
     asked = POINT_SIGNALS.keys() & set(effect.arguments)
-    brakes = effect.passive and asked <= set(_MOTION[3:])
+    brakes = effect.passive and asked <= VELOCITIES
     return effect.port is Port.EXTERNAL_FORCE and not brakes
 
 

@@ -40,6 +40,7 @@ def added_loads(rig: Rig, effects: Sequence[Effect], q: Array, qd: Array, dt: fl
     if any(effect.port is Port.EXTERNAL_FORCE for effect in effects):
         added[:, :6] = external_wrench(rig, effects, q, qd)
         efforts = external_efforts(rig, effects, q, qd)
+    grounds = grounded(rig, q) if any(effect.port is Port.GROUND_TORQUE for effect in effects) else {}
     for index, joint in enumerate(rig.joints):
         if joint.effort is not None:
             added[:, 6 + index] += efforts[:, index] / float(joint.effort.gain)
@@ -54,7 +55,7 @@ def added_loads(rig: Rig, effects: Sequence[Effect], q: Array, qd: Array, dt: fl
                 amplitudes = [known[entry.name] for entry in effect.parameters if entry.role == "amplitude"]
                 torque = instants(units @ np.array(amplitudes))
                 if effect.port is Port.GROUND_TORQUE:
-                    added += grounded(rig, q)[joint.name] * torque[:, None]
+                    added += grounds[joint.name] * torque[:, None]
                 else:
                     added[:, 6 + index] += reading(joint, effect.port) * torque
     return added
