@@ -37,7 +37,7 @@ from kbs_process.report.records.diagnosis import DiagnosisResults
 LAW = Identity("external wrench", "el", (), "unnamed", "curve over joint angle")
 CABLE = Identity("external wrench", "el", (), "cable", "ground_cable")
 DRAG = Identity("joint torque", "el", (), "friction", "joint_viscous")
-NOTHING = Detection((), -1.0, 1.0, 1.0)
+NOTHING = Detection((), -1.0, 1.0)
 NODES, SIGMA = np.full(COEFFICIENTS, 0.5), np.full(COEFFICIENTS, 0.01)
 
 

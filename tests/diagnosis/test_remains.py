@@ -13,6 +13,7 @@ from kbs_process.diagnosis.experiment import Experiment
 from kbs_process.diagnosis.floor import declared
 from kbs_process.diagnosis.joint import Standing, with_extra
 from kbs_process.diagnosis.remains import detected, promises_little, taken, too_little
+from kbs_process.diagnosis.rounds import diagnose
 from kbs_process.diagnosis.thresholds import TAKEN, TOLERATED
 from kbs_process.diagnosis.tryout import extra_of
 from kbs_process.diagnosis.view import View
@@ -90,3 +91,15 @@ def test_a_law_that_leaves_most_follows_something_else(cabled: Experiment, made:
     before, after = standing(cabled), standing(weaker(made, cabled, float(1.0 - share)))
     (reason,) = too_little(before, after, floor)
     assert "follows what something else does" in reason
+
+
+@pytest.mark.parametrize(("strength", "verdict"), [(0.0, "none"), (8.0, "undecided")])
+def test_what_held_out_recordings_alone_show_is_said_to_be_there(
+    made: Experiment, strength: float, verdict: str
+) -> None:
+    floor = declared(made)
+    here = standing(weaker(made, with_cable(made, (2,)), strength))
+    there = detected(here, floor, made.fit)
+    outcome = diagnose(here.known, floor, here.predicted, bench.serial(made), there)
+    assert outcome.verdict == verdict and not outcome.finds
+    assert outcome.unforeseen == bool(strength) and not there.left

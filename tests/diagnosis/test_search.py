@@ -60,4 +60,4 @@ def test_numbers_without_any_uncertainty_stay_and_their_phases_are_looked_for() 
 def test_what_is_left_is_more_than_chance_and_more_than_the_search_is_good_for(
     log_p: float, ratio: float, left: bool
 ) -> None:
-    assert Detection((), log_p, ratio, 1.0).left is left
+    assert Detection((), log_p, ratio).left is left

@@ -57,4 +57,4 @@ def _detected(experiment: Experiment) -> tuple[Floor, Detection]:
         predicted = dict(zip(drives, simulate([(drive, nominal) for drive in drives]), strict=True))
     left = {k: t.measured - predicted[t.drive].values for k, t in enumerate(experiment.trials)}
     noise = floor.estimate(experiment, left)
-    return noise, detect(experiment, noise, predicted, experiment.fit)
+    return noise, detect(experiment, noise, predicted, range(len(experiment.trials)))

@@ -33,8 +33,12 @@ _NOTES = (
     "prediction of every recording that was held out.",
     "Channels are whitened in their order: each is judged given those before it.",
 )
+_FLOOR = {
+    "repeats": "what repeats of one trajectory differ by",
+    "declared": "what their sensors' stated noise explains",
+}
 _WORDS = {
-    "none": "Nothing exceeds what repeats of one trajectory differ by.",
+    "none": "Nothing exceeds {floor}.",
     "parameters off": "Known parameters are off; no physics was left out that these recordings show.",
     "undecided": "There is a mismatch, and no law passed the gate.",
 }
@@ -55,11 +59,12 @@ def results_of(
         title=campaign.title,
         article=campaign.article,
         verdict=Conclusion(
-            status="undecided" if outcome.verdict == "undecided" else "none", sentence=_sentence(outcome)
+            status="undecided" if outcome.verdict == "undecided" else "none",
+            sentence=_sentence(outcome, trials, floor),
         ),
         provenance=provenance.made(f"kbs-process diagnose {campaign.name}", campaign),
         answer=outcome.verdict,
-        paragraph=_paragraph(outcome, finds, trials),
+        paragraph=_paragraph(outcome, finds, trials, floor),
         floor=floor.statement,
         log10_p=outcome.log_p / float(np.log(10.0)),
         moved=tuple(_moved(outcome.standing.known)),
@@ -88,16 +93,28 @@ def _where(place: records.Place) -> str:
     return ", ".join(part for part in (place.port, place.site or "/".join(place.channels)) if part)
 
 
-def _sentence(outcome: Outcome) -> str:
+def _sentence(outcome: Outcome, trials: Sequence[records.Trial], floor: Floor) -> str:
     if not outcome.finds:
-        return _WORDS[outcome.verdict] + _located(outcome)
+        return _unnamed(outcome, trials, floor) + _located(outcome)
     told = [f"{_words(find.identity.law)} ({_where(place_of(find.identity))})" for find in outcome.finds]
     return f"The model lacks: {'; '.join(told)}."
 
 
+def _unnamed(outcome: Outcome, trials: Sequence[records.Trial], floor: Floor) -> str:
+    """The answer where there is no find."""
+    if not outcome.unforeseen:
+        return _WORDS[outcome.verdict].format(floor=_FLOOR[floor.source])
+    worst = max((trial for trial in trials if trial.role == "held-out"), key=lambda trial: trial.corrected)
+    channel = max(worst.channels, key=lambda name: worst.channels[name])
+    return (
+        f"Recordings that were fitted are predicted, {worst.recording}, which was held out, is not: "
+        f"{channel} differs by {worst.channels[channel]:.3g} times the floor (rms)."
+    )
+
+
 def _located(outcome: Outcome) -> str:
     """Which ports can explain what no law did, where some cannot."""
-    if outcome.verdict != "undecided" or outcome.left is None:
+    if outcome.verdict != "undecided" or outcome.unforeseen or outcome.left is None:
         return ""
     able = [port.name for port in outcome.left.test.ports if port.sufficient]
     if not able or len(able) == len(outcome.left.test.ports):
@@ -105,7 +122,9 @@ def _located(outcome: Outcome) -> str:
     return f" An input free to be anything could explain it at {', '.join(able[:4])}{' and others' * (len(able) > 4)}."
 
 
-def _paragraph(outcome: Outcome, finds: Sequence[records.Find], trials: Sequence[records.Trial]) -> str:
+def _paragraph(
+    outcome: Outcome, finds: Sequence[records.Find], trials: Sequence[records.Trial], floor: Floor
+) -> str:
     """Plain words, to be pasted into a test report."""
     held_out = [trial for trial in trials if trial.role == "held-out"]
     judged = held_out or list(trials)
@@ -113,7 +132,7 @@ def _paragraph(outcome: Outcome, finds: Sequence[records.Find], trials: Sequence
     known, corrected = (max(getattr(trial, step) for trial in judged) for step in ("known", "corrected"))
     parts = [
         f"With all known parameters refitted within their uncertainties, prediction and measurement differ by up to "
-        f"{known:.3g} times (rms) what repeats of one trajectory differ by, among {which}."
+        f"{known:.3g} times (rms) {_FLOOR[floor.source]}, among {which}."
     ]
     for find in finds:
         numbers = ", ".join(
@@ -130,7 +149,7 @@ def _paragraph(outcome: Outcome, finds: Sequence[records.Find], trials: Sequence
     if finds:
         parts.append(f"With it in the plant the difference is {corrected:.3g} times the floor.")
     else:
-        parts.append(_WORDS[outcome.verdict])
+        parts.append(_unnamed(outcome, trials, floor))
     for moved in outcome.moved[:5]:
         parts.append(f"{moved.name} is off by {moved.sigmas:+.1f} sigma.")
     return " ".join(parts)
@@ -295,7 +314,13 @@ def _warnings(campaign: Campaign, floor: Floor, outcome: Outcome) -> Iterator[No
             what="no recording is held out: nothing is shown on recordings that were not used",
             remedy='set role = "held-out" for a repeat or another trajectory',
         )
-    elif outcome.finds and not _other_motions(experiment):
+    if outcome.unforeseen:
+        yield Notice(
+            severity="warning",
+            what="what recordings that were held out show, those that were fitted do not: nothing of it was looked for",
+            remedy='give one of them the role "fit", and hold out another one that shows it',
+        )
+    elif outcome.finds and experiment.held_out and not _other_motions(experiment):
         yield Notice(
             severity="warning",
             what="recordings that were held out repeat motions that were fitted: a law that holds for these alone, or "

@@ -25,7 +25,7 @@ from kbs_process.diagnosis.floor import Floor
 from kbs_process.diagnosis.hypothesis import Hypothesis, Prediction
 from kbs_process.diagnosis.known import Known
 from kbs_process.diagnosis.nuisance import nuisances
-from kbs_process.diagnosis.thresholds import DETECTED, TOLERATED
+from kbs_process.diagnosis.thresholds import DETECTED, TOLERATED, UNFORESEEN
 from kbs_process.diagnosis.whiten import Projector, Whitener, independent
 from kbs_process.signals.records import Array
 
@@ -57,6 +57,11 @@ class Detection:
     def left(self) -> bool:
         """Whether what is left is more than chance, and more than floor and search are good for."""
         return bool(self.log_p < np.log(DETECTED) and self.ratio > 1.0 + TOLERATED)
+
+    @property
+    def unforeseen(self) -> bool:
+        """Likewise of recordings that nothing was fitted to."""
+        return bool(self.log_p < np.log(DETECTED) and self.ratio > 1.0 + UNFORESEEN)
 
     @property
     def rows(self) -> dict[int, float]:

@@ -145,3 +145,8 @@ class Outcome:
     whiteness: tuple[float, float]
     looked_at: int  # suspects with all their shapes
     standing: Standing  # the corrected model
+
+    @property
+    def unforeseen(self) -> bool:
+        """Whether recordings that were held out show what those that were fitted do not."""
+        return not self.after.left and self.held_out is not None and self.held_out[1].unforeseen

@@ -77,7 +77,7 @@ def diagnose(
         held_out = begun, detected(standing, floor, known.experiment.held_out) if accepted else begun
     moved = _moved(standing.known)
     return Outcome(
-        verdict=_verdict(finds, moved, after),
+        verdict=_verdict(finds, moved, after, held_out),
         before=before,
         after=after,
         held_out=held_out,
@@ -183,9 +183,14 @@ def _absorbed(screening: Screening) -> tuple[Absorbed, ...]:
     )
 
 
-def _verdict(finds: Sequence[Find], moved: Sequence[Moved], after: Detection) -> Verdict:
+def _verdict(
+    finds: Sequence[Find],
+    moved: Sequence[Moved],
+    after: Detection,
+    held_out: tuple[Detection, Detection] | None,
+) -> Verdict:
     if finds:
         return "physics"
-    if after.left:
+    if after.left or (held_out is not None and held_out[1].unforeseen):
         return "undecided"
     return "parameters off" if moved else "none"

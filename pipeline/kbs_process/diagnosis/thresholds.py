@@ -34,6 +34,8 @@ DETECTED: Final = 1e-3
 # Share of the floor's power by which what is left has to exceed it, too: the best of many minima of phases and tooth
 # contact leave up to 0.02 more than each other on campaigns without any effect. A law has to take as much.
 TOLERATED: Final = 0.03
+# Likewise of recordings that nothing was fitted to: nulls have left 1.15 of the floor's power.
+UNFORESEEN: Final = 0.5
 ORDERED: Final = 0.5  # share of the residual's excess that the best has to do for the screen's order to count
 # Sigmas of their priors within which numbers are held for a second look, where the first is not ordered: one number in
 # twenty is beyond, and what it does there is little beside what is looked for.
