@@ -125,7 +125,12 @@ def _scores(rows: Sequence[Row], methods: Sequence[str]) -> tuple[Block, ...]:
         for metric in (*SHARES, *MEDIANS):
             found = [find(rows, method, metric, group) for method in methods]
             if any(found):
-                lines.append((metric, *(_cell(row) for row in found)))
+                lines.append(
+                    (
+                        metric,
+                        *(_cell(row, method == OURS) for row, method in zip(found, methods, strict=True)),
+                    )
+                )
         grid = Grid(
             f"Score: {_group(group)}", ("Number", *methods), tuple(lines), "l" + "r" * len(methods), _NOTE
         )
@@ -134,20 +139,21 @@ def _scores(rows: Sequence[Row], methods: Sequence[str]) -> tuple[Block, ...]:
 
 
 _NOTE = (
-    "Shares with exact binomial intervals of 95 %, right of tried; medians with distribution-free intervals. Held-out "
-    "residual and p-value are each method's own statement; all else is compared with what the seals held."
+    "Shares with exact binomial intervals of 95 %, right of tried; medians with distribution-free intervals; those "
+    "of rivals are in score.json. Held-out residual and p-value are each method's own statement; all else is "
+    "compared with what the seals held."
 )
 
 
-def _cell(row: Row | None) -> str:
-    """A number, its interval and of how many, in little room."""
+def _cell(row: Row | None, whole: bool) -> str:
+    """A number, its interval if `whole`, and of how many, in little room."""
     if row is None:
         return MISSING
     scale, digits, sign = (100.0, 2, " %") if row.kind == "share" else (1.0, 3, "")
     value, *ends = (
         MISSING if x is None else number(scale * x, digits) for x in (row.value, row.low, row.high)
     )
-    interval = "" if row.low is None else f" [{', '.join(ends)}]"
+    interval = "" if row.low is None or not whole else f" [{', '.join(ends)}]"
     return f"{value}{sign}{interval} {row.of if row.right is None else f'{row.right}/{row.of}'}"
 
 
@@ -183,7 +189,8 @@ def _beaten(rows: Sequence[Row]) -> tuple[Block, ...]:
         tried = {row.method for row in rows} - {OURS}
         return (Text("Nowhere in this table." if tried and tried != set() else "No rival was run."),)
     lines = tuple(
-        (ours.metric, _group(ours.group), _cell(ours), best.method, _cell(best)) for ours, best in pairs
+        (ours.metric, _group(ours.group), _cell(ours, True), best.method, _cell(best, True))
+        for ours, best in pairs
     )
     note = "By the number itself: where the intervals overlap, the difference may be chance."
     return (Grid("Better rivals", ("Number", "Trials", OURS, "Rival", "Its number"), lines, "llrlr", note),)

@@ -74,7 +74,7 @@ def diagnose(campaign: str, output: Path | None, pdf: bool | None, quiet: bool) 
 
     Detects what exceeds the repeatability floor, refits the known parameters within their uncertainties, locates what
     they leave, names its physics or measures its law, and tries it on recordings that were held out. Writes a
-    corrected model (corrected/) beside the report. Experimental: how often it is right is not measured yet.
+    corrected model (corrected/) beside the report. Experimental: docs/proof.md says how often it is right.
     """
     from kbs_process.campaign.load import load_campaign
     from kbs_process.campaign.locate import find_campaign, results_folder
