@@ -69,14 +69,13 @@ def explain(experiment: Experiment, simulate: Simulate, task: Task) -> Explained
             free = refit(experiment, known.hypothesis, floor, simulate, slopes=known.slopes, leaps=1)
             freed = _stood(free, floor, simulate)
         settled = not freed.after.left
-        if settled or freed.after.ratio - 1.0 < EXPLAINED * (stood.after.ratio - 1.0):
+        explained = settled or freed.after.ratio - 1.0 < EXPLAINED * (stood.after.ratio - 1.0)
+        # Numbers that are off are off in every recording.
+        if explained and not _unseen(freed, floor) > _unseen(stood, floor):
             stood = freed
-    known, predicted, after = stood.known, stood.predicted, stood.after
-    known = replace(known, chi2_before=_squares(known, begun))
-    held_out = None
-    if experiment.held_out:
-        held_out = detect(experiment, floor, predicted, experiment.held_out, known=known)
-    return Explained(experiment, floor, known, predicted, before, after, held_out)
+    known = replace(stood.known, chi2_before=_squares(stood.known, begun))
+    held_out = _held_out(stood, floor) if experiment.held_out else None
+    return Explained(experiment, floor, known, stood.predicted, before, stood.after, held_out)
 
 
 def _squares(known: Known, predicted: Mapping[int, Prediction]) -> Array:
@@ -107,6 +106,16 @@ def _stood(known: Known, floor: Floor, simulate: Simulate) -> _Stood:
     experiment = known.experiment
     predicted = _predicted(experiment, known.hypothesis, simulate)
     return _Stood(known, predicted, detect(experiment, floor, predicted, experiment.fit, known=known))
+
+
+def _held_out(stood: _Stood, floor: Floor) -> Detection:
+    experiment = stood.known.experiment
+    return detect(experiment, floor, stood.predicted, experiment.held_out, known=stood.known)
+
+
+def _unseen(stood: _Stood, floor: Floor) -> float:
+    """Power over the floor's that a refit leaves of recordings which it was not made of; 0 without any."""
+    return _held_out(stood, floor).ratio if stood.known.experiment.held_out else 0.0
 
 
 def _moved_on(stood: _Stood, floor: Floor, simulate: Simulate, leaps: int) -> _Stood:
