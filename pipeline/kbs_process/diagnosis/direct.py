@@ -21,7 +21,9 @@ def respond(rig: Rig, columns: Sequence[Mapping[Inlet, Array]], q: Array) -> Arr
     """
     n = len(q)
     changed = np.zeros((n, 6 + len(rig.joints), len(columns)))
-    wrenches, grounds = pressed(rig, q), grounded(rig, q)
+    ports = {inlet.port for column in columns for inlet in column}
+    wrenches = pressed(rig, q) if WRENCH_PORT in ports else {}
+    grounds = grounded(rig, q) if GROUND_PORT in ports else {}
     for m, column in enumerate(columns):
         for inlet, means in column.items():
             port = Port.__members__.get(inlet.port.upper())

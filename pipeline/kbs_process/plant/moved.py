@@ -69,12 +69,12 @@ def grounded(rig: Rig, q: Array) -> dict[str, Array]:
     still = np.zeros_like(q)
     links = kinematics(rig, q, still, still)
     T, answers = links[TRANSDUCER], pressed(rig, q)
+    R_TL = np.swapaxes(T.R, 1, 2)
     found = {}
     for joint in rig.joints:
         turn, slide = joint.screw
         axis = axis_of(joint, links[joint.parent])
         moment = turn * axis + slide * cross(links[joint.name].r - T.r, axis)
-        R_TL = np.swapaxes(T.R, 1, 2)
         wrench = np.hstack([slide * rotate(R_TL, axis), rotate(R_TL, moment)])
         found[joint.name] = rotate(answers[joint.name], wrench)
     return found
