@@ -80,7 +80,7 @@ def test_every_law_that_the_model_leaves_out_is_a_suspect_once_a_site_and_shape(
     assert {suspect.name for suspect in every} == laws
     assert len(set(every)) == len(every)
     assert {s.site for s in every if s.name == "harness"} == {"az", "el"}
-    assert {s.site for s in every if s.name == "floor_vibration"} == {"x", "y", "z"}
+    assert {s.site for s in every if s.name == "floor_vibration"} == {"floor"}
     assert len({s.site for s in every if s.name == "cross_coupling"}) == 30
     for suspect in every:
         shapes = [entry.name for entry in suspect.effect.parameters if entry.role == "shape"]
@@ -179,14 +179,24 @@ def test_an_area_in_the_air_is_looked_for_around_the_link() -> None:
         np.testing.assert_allclose(np.linalg.norm(force, axis=1), (speed / 0.01) ** 2, rtol=1e-6)
 
 
-def test_a_floor_shakes_along_one_axis_at_a_time() -> None:
-    shaken = one("floor_vibration", "y")
-    assert [entry.name for entry in shaken.amplitudes] == ["floor_y_sin", "floor_y_cos"]
-    sine, _ = inputs(shaken, tapped(), rig(), NOMINAL)
+def test_a_floor_shakes_in_any_direction_and_may_run_up() -> None:
     t = (np.arange(2000) + 0.5) / RATE
-    np.testing.assert_allclose(
-        sine[Inlet("base_acceleration", "", "y")][:-1], np.sin(2.0 * np.pi * 2.3 * t)[:-1], atol=0.01
-    )
+    for sweep in (0.0, 0.05):
+        tones = replace(ranges(), proposed=TONES | {"floor_sweep": (sweep,)})
+        (shaken,) = (
+            s
+            for s in candidates(rig(), NOMINAL, tones, tapped().columns, CHANNELS)
+            if s.name == "floor_vibration" and dict(s.shape)["floor_sweep"] == sweep
+        )
+        assert len(shaken.amplitudes) == 6
+        columns = inputs(shaken, tapped(), rig(), NOMINAL)
+        shown = np.stack([[column[Inlet("base_acceleration", "", a)] for a in "xyz"] for column in columns])
+        phase = np.pi * (2.0 * 2.3 + sweep * t) * t
+        assert shown.shape == (6, 3, 2000)
+        for axis in range(3):
+            np.testing.assert_allclose(shown[2 * axis, axis, :-1], np.sin(phase)[:-1], atol=0.01)
+            np.testing.assert_allclose(shown[2 * axis + 1, axis, :-1], np.cos(phase)[:-1], atol=0.01)
+            assert not np.delete(shown[2 * axis : 2 * axis + 2], axis, axis=1).any()
 
 
 def test_a_wrong_field_is_followed_by_the_motor() -> None:

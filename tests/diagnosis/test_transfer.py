@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import bench
@@ -16,9 +17,10 @@ from kbs_process.diagnosis.signature import inputs
 from kbs_process.diagnosis.suspects import Candidate
 from kbs_process.diagnosis.transfer import amplified, respond
 from kbs_process.plant.attach import attach
-from kbs_process.plant.effect import Effect
+from kbs_process.plant.effect import SIGNALS, Effect, Port
 from kbs_process.plant.effects import CATALOGUE, select
-from kbs_process.rig.model import Amplifier, Quantity, Rig
+from kbs_process.plant.linear import drive_damping
+from kbs_process.rig.model import Amplifier, Drive, Quantity, Rig, substitute
 from kbs_process.signals.records import WRENCH_CHANNELS, Array
 
 NOISE = np.array([0.02] * 3 + [0.002] * 3 + [1.1e-4] * 2)  # of EL089's sensors
@@ -144,3 +146,38 @@ def test_amplifier_is_butterworth() -> None:
             (1.0 + (np.array([0.0, 10.0, 20.0]) / 20.0) ** (2 * order)) ** -0.5
         )
         assert np.angle(response[1]) < 0.0
+
+
+def test_friction_that_pushes_at_some_angles_does_not_make_the_linear_plant_run_away() -> None:
+    """A fluctuation greater than the mean, as a refit may have it: the real motor goes on, carried by its field."""
+    made = bench.experiment(bench.rig(), ("fit",), 1)
+    drives = [joint.drive for joint in made.rig.joints if joint.drive is not None]
+    pushing = {f"joint.{j.name}.drive.d1": 3.0 * float(d.parameters["d0"]) for j, d in zip(made.rig.joints, drives)}
+    hypothesis = Hypothesis(substitute(made.rig, pushing), made.effects)
+    along = Scene.of(made, hypothesis, {0: predict(hypothesis, made, 0)})
+    path = along.paths[0]
+    assert np.isfinite(along.predicted[0].values).all()
+    assert max(abs(np.linalg.eigvals(step)).max() for step in path.step) < 1.0
+    shown = along_trajectory(along, [{Inlet("motor_torque", "az"): np.ones(len(along.signals[0].values))}])
+    assert 0.0 < np.abs(shown).max() < 1e3
+
+
+def test_damping_over_a_change_of_rate_is_the_secant() -> None:
+    drive = bench.rig().joint("el").drive
+    assert drive is not None
+    effects = select(bench.effects())
+    at = dict.fromkeys(SIGNALS, 0.0) | {"rotor_rate": 0.3}
+    reach = {"rotor_rate": 0.5}
+    ends = [
+        drive_torque(drive, effects, at | {"rotor_rate": at["rotor_rate"] + sign * reach["rotor_rate"]})
+        for sign in (1.0, -1.0)
+    ]
+    expected = -float(drive.ratio) ** 2 * (ends[0] - ends[1]) / (2.0 * reach["rotor_rate"])
+    gear = drive_damping(drive, effects, at, reach)[0, 1]
+    assert drive_damping(drive, effects, at, reach)[1, 1] + gear == pytest.approx(expected, rel=1e-9)
+
+
+def drive_torque(drive: Drive, effects: Sequence[Effect], at: dict[str, float]) -> float:
+    """On the rotor, without friction that holds."""
+    known = at | {k: float(q) for k, q in drive.parameters.items()} | {"ratio": float(drive.ratio)}
+    return sum(effect.value(known)[0] for effect in effects if effect.port is Port.MOTOR_TORQUE)

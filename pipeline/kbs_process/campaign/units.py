@@ -13,6 +13,7 @@ DIMENSIONS: dict[str, dict[str, float]] = {
     "mass": {"kg": 1.0, "g": 1e-3},
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0},
     "frequency": {"Hz": 1.0, "kHz": 1e3},
+    "sweep rate": {"Hz/s": 1.0, "kHz/s": 1e3},
     "rate of growth": {"1/s": 1.0, "1/min": 1.0 / 60.0},
     "velocity": {"m/s": 1.0, "mm/s": 1e-3, "km/h": 1.0 / 3.6},
     "acceleration": {"m/s^2": 1.0, "mm/s^2": 1e-3},

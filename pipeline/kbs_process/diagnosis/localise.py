@@ -20,7 +20,7 @@ from kbs_process.plant.rigid import links_beyond
 from kbs_process.rig.model import TRANSDUCER, Rig
 from kbs_process.signals.records import WRENCH_CHANNELS, Array, Mask
 
-_VARIES = 3  # inputs from which on the eight channels leave no room for their first-order changes
+_VARIES = 3  # inputs from which on the eight channels have no room for all of their first-order changes
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,9 +129,7 @@ def _ports(rig: Rig, channels: Sequence[str], wrench: int) -> tuple[PortName, ..
     ]
     grounds = [PortName("ground torque", name) for name in driven]
     links = [name for name in (TRANSDUCER, *rig.joint_names) if name in links_beyond(rig)]
-    outside = [PortName("external wrench", link) for link in links] + [
-        PortName("base", axis) for axis in "xyz"
-    ]
+    outside = [PortName("external wrench", link) for link in links] + [PortName("base")] * bool(links)
     sensors = [PortName("transducer", "", (name,)) for name in channels[:wrench]]
     encoders = [PortName("encoder", name) for name in channels[wrench:]]
     clocks = [PortName("clock", "wrench")] + [PortName("clock", "encoder")] * bool(encoders)
@@ -143,7 +141,7 @@ def _inlets(name: PortName) -> tuple[Inlet, ...]:
         case "external wrench":
             return tuple(Inlet(WRENCH_PORT, name.axis, axis) for axis in WRENCH_CHANNELS)
         case "base":
-            return (Inlet(BASE_PORT, "", name.axis),)
+            return tuple(Inlet(BASE_PORT, "", axis) for axis in "xyz")
         case "ground torque":
             return (Inlet(GROUND_PORT, name.axis),)
         case _:
@@ -171,9 +169,10 @@ def _all_shown(
     shown: dict[str, tuple[Complex, Complex]] = {}
     for name in plant:
         own = [inlets.index(inlet) for inlet in _inlets(name)]
-        varied = (
-            nothing if len(own) >= _VARIES else np.concatenate([by_pose[..., own], by_time[..., own]], axis=2)
-        )
+        if len(own) < _VARIES:
+            varied = np.concatenate([by_pose[..., own], by_time[..., own]], axis=2)
+        else:
+            varied = by_time[..., own] if 2 * len(own) < c - 1 else nothing
         shown[name.label] = H[..., own], varied
     for name in names:
         if name.port == "clock":

@@ -6,6 +6,7 @@ import numpy as np
 
 from kbs_process.diagnosis.known import Known
 from kbs_process.diagnosis.scene import Scene
+from kbs_process.diagnosis.sweeps import sweeping
 from kbs_process.diagnosis.thresholds import LINE_ALPHA, LINES
 from kbs_process.signals.records import Array
 
@@ -21,7 +22,20 @@ def proposed(known: Known, scene: Scene) -> dict[str, tuple[float, ...]]:
     lines = _frequencies(known)
     orders = _orders(known, scene)
     found = dict.fromkeys(_BY_FREQUENCY, lines) | dict.fromkeys(_BY_ORDER, orders)
+    if (tone := _sweep(known)) is not None:
+        found |= {"floor_frequency": (*lines, tone[0]), "floor_sweep": (tone[1],)}
     return {name: values for name, values in found.items() if values}
+
+
+def _sweep(known: Known) -> tuple[float, float] | None:
+    """Frequency at the start and sweep of the strongest tone of all recordings that runs up or down."""
+    experiment = known.experiment
+    tones = [
+        tone
+        for k in experiment.fit
+        if (tone := sweeping(_in_time(known, k), experiment.dt, experiment.highest_Hz)) is not None
+    ]
+    return max(tones)[1:] if tones else None
 
 
 def _frequencies(known: Known) -> tuple[float, ...]:

@@ -15,7 +15,7 @@ from scipy.interpolate import CubicSpline
 from kbs_process.diagnosis.hypothesis import Tapped
 from kbs_process.diagnosis.inlets import BASE_PORT, WRENCH_PORT, Inlet
 from kbs_process.diagnosis.places import point_of
-from kbs_process.diagnosis.suspects import AXES, BY, Candidate, own_values
+from kbs_process.diagnosis.suspects import BY, Candidate, own_values
 from kbs_process.plant.along import along, signals_of
 from kbs_process.plant.effect import Effect, Port
 from kbs_process.plant.effects import select
@@ -85,7 +85,10 @@ def inputs(
         return [{Inlet("motor_torque", site): column} for column in torque.T]
     values = port_inputs(candidate, tapped, rig)
     if candidate.port is Port.BASE_ACCELERATION:
-        return [{Inlet(BASE_PORT, "", site): values[:, a, AXES.index(site)]} for a in range(values.shape[1])]
+        return [
+            {Inlet(BASE_PORT, "", axis): values[:, a, k] for k, axis in enumerate(_POSITION)}
+            for a in range(values.shape[1])
+        ]
     if candidate.port is Port.EXTERNAL_FORCE:
         way = _way(rig, candidate, tapped)
         middle = 0.5 * (way + np.vstack([way[1:], way[-1:]]))

@@ -16,7 +16,7 @@ from kbs_process.plant.sensing import SENSING, Sensing, SensingPort
 from kbs_process.rig.model import LAB, Joint, Rig
 from kbs_process.signals.records import WRENCH_CHANNELS
 
-AXES = ("x", "y", "z")
+FLOOR = "floor"
 BY = "<-"  # in the site of a coupling: channel that reads, channel that acts
 
 
@@ -24,8 +24,8 @@ BY = "<-"  # in the site of a coupling: channel that reads, channel that acts
 class Candidate:
     """One suspect at one site with one choice of its shape.
 
-    `site` is a joint (drives, encoders, the controller), a link (forces of the laboratory), an axis of the floor, a
-    channel ("Tx"), two of them ("Tx<-Fz"), or a stream ("wrench", "encoder").
+    `site` is a joint (drives, encoders, the controller), a link (forces of the laboratory), the floor, a channel ("Tx"),
+    two of them ("Tx<-Fz"), or a stream ("wrench", "encoder").
     """
 
     effect: Effect | Sensing
@@ -48,22 +48,8 @@ class Candidate:
 
     @property
     def amplitudes(self) -> tuple[Parameter, ...]:
-        """Parameters that it is linear in and that act at the site: of a vibration, those along the axis."""
-        chosen = tuple(entry for entry in self.effect.parameters if entry.role == "amplitude")
-        if self.port is not Port.BASE_ACCELERATION:
-            return chosen
-        assert isinstance(self.effect, Effect)
-        return tuple(entry for entry in chosen if _along_axis(self.effect, entry, AXES.index(self.site)))
-
-
-def _along_axis(effect: Effect, amplitude: Parameter, axis: int) -> bool:
-    """Whether an amplitude of a vibration moves the floor along `axis`."""
-    values = {entry.name: entry.prior.middle for entry in effect.parameters if entry.role != "amplitude"}
-    values |= {
-        entry.name: float(entry is amplitude) for entry in effect.parameters if entry.role == "amplitude"
-    }
-    value = effect.equation(*(values.get(name, 0.1) for name in effect.arguments))
-    return bool(value[axis] != 0.0)
+        """Parameters that it is linear in."""
+        return tuple(entry for entry in self.effect.parameters if entry.role == "amplitude")
 
 
 def candidates(
@@ -102,7 +88,7 @@ def candidates(
 
 def _sites(effect: Effect, rig: Rig, columns: Sequence[str]) -> list[str]:
     if effect.port is Port.BASE_ACCELERATION:
-        return list(AXES) if rig.transducer.channels else []
+        return [FLOOR] if rig.transducer.channels else []
     if effect.port is Port.EXTERNAL_FORCE:
         # A screen has velocities as T sees them.
         blind = rig.transducer.on != LAB and bool(VELOCITIES & set(effect.arguments))

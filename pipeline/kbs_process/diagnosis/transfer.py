@@ -29,6 +29,8 @@ from kbs_process.signals.records import WRENCH_CHANNELS, Array
 KNOT_S = 1.0  # s between knots: 2 deg at the fastest rate of the paper's mechanism
 POSE = np.deg2rad(0.25)  # poses nearer than that share their matrices of mass
 PHASES = 4  # operating points around a knot over which the drives' slopes are averaged
+_MIDDLES = (np.arange(PHASES) + 0.5) / PHASES - 0.5  # of knots' intervals
+_RATES = ("joint_rate", "rotor_rate")
 _STANDS = 1e-5  # rad of the motor in a step, below which it stands: a thousandth of a tooth's contact
 BATCH = 32  # columns that pass through the plant together: their states stay in the nearest cache
 _INTERNAL = (Port.MOTOR_TORQUE, Port.MOTOR_FRICTION, Port.TRANSMISSION, Port.JOINT_TORQUE)
@@ -67,6 +69,7 @@ def follow(rig: Rig, effects: Sequence[Effect], taps: Mapping[str, Array], rate:
     driven = tuple(joint for joint in rig.joints if joint.drive is not None)
     n = len(taps[f"joint_angle.{rig.joints[0].name}"])
     every = max(1, round(KNOT_S * rate))
+    half = every // (2 * PHASES)
     knots = np.unique(np.append(np.arange(0, n, every), n - 1))
     angles = np.stack([taps[f"joint_angle.{joint.name}"] for joint in rig.joints], axis=1)
     laboratory = [effect for effect in effects if effect.port not in _INTERNAL]
@@ -80,7 +83,7 @@ def follow(rig: Rig, effects: Sequence[Effect], taps: Mapping[str, Array], rate:
             known[key] = linearise(rig, laboratory, rounded * POSE)
         bare = known[key]
         C, K = bare.C.copy(), bare.K.copy()
-        around = np.unique(np.clip(knot + np.linspace(-0.5, 0.5, PHASES) * every, 0, n - 1).astype(int))
+        around = np.unique(np.clip(knot + _MIDDLES * every, 0, n - 1).astype(int))
         for index, joint in enumerate(driven):
             assert joint.drive is not None
             out = bare.plate + index
@@ -88,12 +91,19 @@ def follow(rig: Rig, effects: Sequence[Effect], taps: Mapping[str, Array], rate:
             signals = _signals(taps, joint.name)
             moves = np.ptp(signals["rotor_angle"][around]) > _STANDS
             points = around if moves else around[:1]
+            damping = np.zeros((2, 2))
             for sample in points:
                 at = dict.fromkeys(SIGNALS, 0.0) | {
                     name: float(values[sample]) for name, values in signals.items()
                 }
+                near = slice(max(0, sample - half), sample + half + 1)
+                reach = {name: 0.5 * float(np.ptp(signals[name][near])) for name in _RATES}
                 K[pair] += drive_stiffness(joint.drive, steady, at) / len(points)
-                C[pair] += drive_damping(joint.drive, effects, at) / len(points)
+                damping += drive_damping(joint.drive, effects, at, reach) / len(points)
+            # Friction that falls with the rate makes a motor run away from an operating point at which it stands or
+            # cycles in truth: of its damping no less than none is left.
+            damping[1, 1] -= min(0.0, float(damping[1].sum()))
+            C[pair] += damping
         systems.append(replace(bare, C=C, K=K))
     step, push = _discretised(systems, 1.0 / rate)
     inlets = inlets_of(rig)

@@ -49,7 +49,7 @@ def port_label(suspect: Suspect) -> str:
     if candidate.port is Port.GROUND_TORQUE:
         return PortName("ground torque", candidate.site).label
     if candidate.port is Port.BASE_ACCELERATION:
-        return PortName("base", candidate.site).label
+        return PortName("base").label
     return PortName(own.port, own.axis, own.channels[:1]).label
 
 

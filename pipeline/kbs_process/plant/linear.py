@@ -133,10 +133,21 @@ def drive_stiffness(drive: Drive, effects: Sequence[Effect], at: Mapping[str, fl
     return -np.stack(slopes, axis=1)
 
 
-def drive_damping(drive: Drive, effects: Sequence[Effect], at: Mapping[str, float]) -> Array:
-    """Return the damping (2, 2) of `drive_slopes` at all signals of the plant."""
-    torques, ratio = _torques(drive, effects), float(drive.ratio)
-    return -np.stack([_slope(torques, at, "joint_rate"), ratio * _slope(torques, at, "rotor_rate")], axis=1)
+def drive_damping(
+    drive: Drive,
+    effects: Sequence[Effect],
+    at: Mapping[str, float],
+    reach: Mapping[str, float] | None = None,
+) -> Array:
+    """Return the damping (2, 2) of `drive_slopes` at all signals of the plant.
+
+    Where a rate changes by a `reach` either way, rad/s, the slope is the mean over these rates, which is the secant.
+    """
+    torques, ratio, reach = _torques(drive, effects), float(drive.ratio), reach or {}
+    output, rotor = (
+        _slope(torques, at, name, max(_STEP, reach.get(name, 0.0))) for name in ("joint_rate", "rotor_rate")
+    )
+    return -np.stack([output, ratio * rotor], axis=1)
 
 
 def _torques(drive: Drive, effects: Sequence[Effect]) -> Callable[[Mapping[str, float]], Array]:
@@ -156,9 +167,11 @@ def _torques(drive: Drive, effects: Sequence[Effect]) -> Callable[[Mapping[str, 
     return torques
 
 
-def _slope(torques: Callable[[Mapping[str, float]], Array], at: Mapping[str, float], signal: str) -> Array:
-    ends = [torques({**at, signal: at[signal] + step}) for step in (_STEP, -_STEP)]
-    return np.asarray((ends[0] - ends[1]) / (2.0 * _STEP), dtype=np.float64)
+def _slope(
+    torques: Callable[[Mapping[str, float]], Array], at: Mapping[str, float], signal: str, reach: float = _STEP
+) -> Array:
+    ends = [torques({**at, signal: at[signal] + step}) for step in (reach, -reach)]
+    return np.asarray((ends[0] - ends[1]) / (2.0 * reach), dtype=np.float64)
 
 
 def ground_slopes(

@@ -16,15 +16,17 @@ def acceleration(
     floor_z_sin: float,
     floor_z_cos: float,
     floor_frequency: float,
+    floor_sweep: float,
 ) -> tuple[float, float, float]:
     r"""Acceleration of the floor, along the undeflected T's axes.
 
-    Equation: $a_i = s_i \sin(2 \pi f t) + c_i \cos(2 \pi f t)$ for i = x, y, z.
-    Units: s, m/s^2 each, Hz -> m/s^2.
-    Validity: one steady tone; a machine's phase differs from recording to recording.
+    Equation: $a_i = s_i \sin\phi + c_i \cos\phi$ for i = x, y, z, $\phi = 2 \pi f t + \pi k t^2$.
+    Units: s, m/s^2 each, Hz, Hz/s -> m/s^2.
+    Validity: one tone, steady or of a machine that runs up or down evenly; its phase differs from recording to
+        recording.
     Source: C. G. Gordon, Generic criteria for vibration-sensitive equipment, Proc. SPIE 1619 (1991) 71.
     """
-    phase = 2.0 * math.pi * floor_frequency * time
+    phase = math.pi * (2.0 * floor_frequency + floor_sweep * time) * time
     sine, cosine = math.sin(phase), math.cos(phase)
     return (
         floor_x_sin * sine + floor_x_cos * cosine,
@@ -51,9 +53,17 @@ FLOOR_VIBRATION = Effect(
             "floor_frequency",
             "Hz",
             LogNormal(5.0, 1.0),
-            "frequency of the tone",
+            "frequency of the tone, at the recording's start",
             (0.01, 500.0),
             over="spectrum",
+        ),
+        Parameter(
+            "floor_sweep",
+            "Hz/s",
+            Normal(0.0, 1e-2),
+            "change of the frequency with time",
+            (-10.0, 10.0),
+            grid=(0.0,),
         ),
     ),
     reference="C. G. Gordon, Generic criteria for vibration-sensitive equipment, Proc. SPIE 1619 (1991) 71",

@@ -1,0 +1,55 @@
+"""A tone whose frequency runs up or down: where the residual has one, for a suspect whose grid only data give."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.optimize import minimize
+
+from kbs_process.diagnosis.tails import log_tail
+from kbs_process.diagnosis.thresholds import LINE_ALPHA
+from kbs_process.signals.records import Array
+
+_PADDED = 2  # times, for frequencies between those that a recording resolves
+_STEP = 1.0  # of the inverse square of a recording's length: sweeps closer than that look alike
+_REACH = 0.5  # of the band, that a tone crosses in a recording at most, and
+_MOST = 400  # steps up and down, which is less in long recordings
+_BETTER = 1.5  # times the power of the strongest steady tone
+
+
+def sweeping(z: Array, dt: float, highest_Hz: float) -> tuple[float, float, float] | None:
+    r"""Power, frequency at the start (Hz) and sweep (Hz/s) of the one tone that takes most of a white series z (n, c).
+
+    Greatest $P(f, k) = \sum_c |\sum_t z_c(t) \exp(-i \pi (2 f + k t) t)|^2 / n$: maximum likelihood of a tone that has an
+    amplitude and a phase in every channel. None, if chance or a steady tone does nearly as well.
+    Validity: more than a few turns in the series; white noise of unit variance.
+    Source: P. M. Djuric, S. M. Kay, Parameter estimation of chirp signals, IEEE Trans. ASSP 38 (1990) 2118.
+    """
+    n = len(z)
+    t = np.arange(n) * dt
+    length = n * dt
+    size = _PADDED * n
+    f = np.fft.fftfreq(size, dt)
+    inside = (f > 0.0) & (f < highest_Hz)
+
+    def strongest(sweep: float) -> tuple[float, float]:
+        turned = z * np.exp(-1j * np.pi * sweep * t**2)[:, None]
+        power = np.sum(np.abs(np.fft.fft(turned, size, axis=0)[inside]) ** 2, axis=1)
+        peak = int(np.argmax(power))
+        return float(power[peak]), float(f[inside][peak])
+
+    count = min(_MOST, int(np.ceil(_REACH * highest_Hz * length / _STEP)))
+    sweeps = np.arange(-count, count + 1) * (_STEP / length**2)
+    found = [strongest(float(sweep)) for sweep in sweeps]
+    best = max(range(len(sweeps)), key=lambda k: found[k][0])
+    power, steady = found[best][0] / n, found[count][0] / n
+    chance = log_tail(2.0 * power, 2 * z.shape[1]) + np.log(len(sweeps) * np.count_nonzero(inside))
+    if chance > np.log(LINE_ALPHA) or power < _BETTER * steady:
+        return None
+
+    def less(x: Array) -> float:
+        phase = np.exp(-1j * np.pi * (2.0 * x[0] / length + x[1] / length**2 * t) * t)
+        return -float(np.sum(np.abs(phase @ z) ** 2)) / n
+
+    begin = np.array([found[best][1] * length, sweeps[best] * length**2])
+    end = minimize(less, begin, method="Nelder-Mead", options={"xatol": 1e-4, "fatol": 1e-6})
+    return -float(end.fun), float(end.x[0] / length), float(end.x[1] / length**2)
