@@ -82,6 +82,7 @@ def test_every_law_that_the_model_leaves_out_is_a_suspect_once_a_site_and_shape(
     assert {s.site for s in every if s.name == "harness"} == {"az", "el"}
     assert {s.site for s in every if s.name == "floor_vibration"} == {"floor"}
     assert len({s.site for s in every if s.name == "cross_coupling"}) == 30
+    assert len({s.site for s in every if s.name == "channel_interaction"}) == 6 * 21 - 6
     for suspect in every:
         shapes = [entry.name for entry in suspect.effect.parameters if entry.role == "shape"]
         assert [name for name, _ in suspect.shape] == shapes

@@ -152,7 +152,10 @@ def test_friction_that_pushes_at_some_angles_does_not_make_the_linear_plant_run_
     """A fluctuation greater than the mean, as a refit may have it: the real motor goes on, carried by its field."""
     made = bench.experiment(bench.rig(), ("fit",), 1)
     drives = [joint.drive for joint in made.rig.joints if joint.drive is not None]
-    pushing = {f"joint.{j.name}.drive.d1": 3.0 * float(d.parameters["d0"]) for j, d in zip(made.rig.joints, drives)}
+    pushing = {
+        f"joint.{j.name}.drive.d1": 3.0 * float(d.parameters["d0"])
+        for j, d in zip(made.rig.joints, drives, strict=True)
+    }
     hypothesis = Hypothesis(substitute(made.rig, pushing), made.effects)
     along = Scene.of(made, hypothesis, {0: predict(hypothesis, made, 0)})
     path = along.paths[0]
@@ -172,7 +175,7 @@ def test_damping_over_a_change_of_rate_is_the_secant() -> None:
         drive_torque(drive, effects, at | {"rotor_rate": at["rotor_rate"] + sign * reach["rotor_rate"]})
         for sign in (1.0, -1.0)
     ]
-    expected = -float(drive.ratio) ** 2 * (ends[0] - ends[1]) / (2.0 * reach["rotor_rate"])
+    expected = -(float(drive.ratio) ** 2) * (ends[0] - ends[1]) / (2.0 * reach["rotor_rate"])
     gear = drive_damping(drive, effects, at, reach)[0, 1]
     assert drive_damping(drive, effects, at, reach)[1, 1] + gear == pytest.approx(expected, rel=1e-9)
 

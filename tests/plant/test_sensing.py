@@ -39,7 +39,8 @@ class TestSensing:
         text = inspect.getdoc(effect.equation) or ""
         assert all(heading in text for heading in ("Equation:", "Units:", "Validity:", "Source:"))
         assert effect.reference
-        assert (effect.port is SensingPort.COUPLING) == ("acting" in effect.arguments)
+        by_others = effect.port in (SensingPort.COUPLING, SensingPort.PRODUCT)
+        assert by_others == ("acting" in effect.arguments)
         assert "code" not in effect.arguments or effect.port is SensingPort.ENCODER
         for entry in effect.parameters:
             low, high = entry.bounds

@@ -113,7 +113,8 @@ class SensingLaw:
     """What a sensor or its clock does to the prediction of one recording."""
 
     law: str  # its name in the catalogue
-    site: str  # channel; two of them, READS<-ACTS; joint of an encoder; "wrench" or "encoder"
+    # Channel; two or three of them, READS<-ACTS or READS<-ACTS<-ACTS; joint of an encoder; "wrench" or "encoder".
+    site: str
     parameters: Mapping[str, Quantity]
 
 

@@ -9,7 +9,7 @@ from kbs_process.campaign.config import SensingLaw
 from kbs_process.campaign.documents import Document, Key, Tree
 from kbs_process.campaign.problems import Problems
 from kbs_process.campaign.quantities import Kind, read_quantity
-from kbs_process.diagnosis.suspects import BY
+from kbs_process.diagnosis.suspects import couplings, products
 from kbs_process.errors import ConfigError, did_you_mean
 from kbs_process.plant.sensing import SENSING, Sensing, SensingPort
 from kbs_process.rig.model import Quantity, Rig
@@ -67,7 +67,9 @@ def _sites(law: Sensing, rig: Rig) -> tuple[str, ...]:
         case SensingPort.CHANNEL:
             return rig.channels
         case SensingPort.COUPLING:
-            return tuple(f"{reads}{BY}{acts}" for reads in channels for acts in channels if reads != acts)
+            return tuple(couplings(channels))
+        case SensingPort.PRODUCT:
+            return tuple(products(channels))
         case SensingPort.STREAM:
             return STREAMS
         case _:

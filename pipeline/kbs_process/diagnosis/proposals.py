@@ -10,18 +10,20 @@ from kbs_process.diagnosis.sweeps import sweeping
 from kbs_process.diagnosis.thresholds import LINE_ALPHA, LINES
 from kbs_process.signals.records import Array
 
-_HIGHEST_ORDER = 420.0  # twice the teeth's passing and what lies around it
+_HIGHEST_ORDER = 420.0  # of a motor: twice the teeth's passing and what lies around it
 _ORDER_STEP = 0.25
+_HIGHEST_OF_DISC = 1000.0  # of an encoder's disc: beyond it a code's interpolation is looked for
 _MOVING = 1e-3  # rad/s of a motor
 _BY_ORDER = ("order", "ripple_order")
+_BY_DISC = ("eccentric_order",)
 _BY_FREQUENCY = ("floor_frequency", "mains_frequency")
 
 
 def proposed(known: Known, scene: Scene) -> dict[str, tuple[float, ...]]:
     """Values to try beside the grids: parameter name -> values, strongest lines of all fit trials."""
     lines = _frequencies(known)
-    orders = _orders(known, scene)
-    found = dict.fromkeys(_BY_FREQUENCY, lines) | dict.fromkeys(_BY_ORDER, orders)
+    found = dict.fromkeys(_BY_FREQUENCY, lines)
+    found |= dict.fromkeys(_BY_ORDER, _orders(known, scene)) | dict.fromkeys(_BY_DISC, _of_discs(known))
     if (tone := _sweep(known)) is not None:
         found |= {"floor_frequency": (*lines, tone[0]), "floor_sweep": (tone[1],)}
     return {name: values for name, values in found.items() if values}
@@ -79,21 +81,48 @@ def _orders(known: Known, scene: Scene) -> tuple[float, ...]:
             moves = (np.abs(np.gradient(angle, experiment.dt)) > _MOVING) & trial.valid
             if np.count_nonzero(moves) < 100 or np.ptp(angle[moves]) < 1.8 * np.pi:
                 continue
-            x = series[moves] / np.maximum(np.std(series[moves], axis=0), 1e-300)
-            power = np.concatenate(
-                [
-                    np.max(np.abs(np.exp(-1j * np.outer(part, angle[moves])) @ x) ** 2, axis=1)
-                    for part in np.array_split(orders, 32)
-                ]
-            ) / np.count_nonzero(moves)
+            power = _along(orders, angle[moves], series[moves])
             # Lines that turn faster than the working rate shows are seen as others.
             fastest = 2.0 * np.pi * experiment.highest_Hz / np.max(np.abs(np.gradient(angle, experiment.dt)))
             power[orders > 10.0 * fastest] = 0.0
-            bound = -np.log(LINE_ALPHA / (len(orders) * x.shape[1] * len(experiment.fit)))
+            bound = -np.log(LINE_ALPHA / (len(orders) * series.shape[1] * len(experiment.fit)))
             inner = power[1:-1]
             peaks = np.flatnonzero((inner >= power[:-2]) & (inner >= power[2:]) & (inner > bound)) + 1
             found += [(float(power[i]), float(np.round(orders[i] * 2.0) / 2.0)) for i in peaks]
     return _apart([value for _, value in sorted(found, reverse=True)], 0.5)
+
+
+def _of_discs(known: Known) -> tuple[float, ...]:
+    """Orders of the encoders' discs at which their own whitened residual stands out, whichever's: whole numbers."""
+    experiment = known.experiment
+    orders = np.arange(1.0, _HIGHEST_OF_DISC)
+    found: list[tuple[float, float]] = []
+    for k in experiment.fit:
+        series, valid = _in_time(known, k), experiment.trials[k].valid
+        for channel in range(experiment.loads, len(experiment.channels)):
+            angle = experiment.trials[k].measured[:, channel]
+            if not np.ptp(angle[valid]) * orders[-1] > 4.0 * np.pi:
+                continue
+            power = _along(orders, angle[valid], series[valid][:, [channel]])
+            fastest = (
+                2.0 * np.pi * experiment.highest_Hz / np.max(np.abs(np.diff(angle[valid]))) * experiment.dt
+            )
+            # Less than two turns in the range is an offset and a gain; faster than the working rate shows is no line.
+            power[(orders * np.ptp(angle[valid]) < 4.0 * np.pi) | (orders > fastest)] = 0.0
+            peak = int(np.argmax(power))
+            if power[peak] > -np.log(LINE_ALPHA / (len(orders) * len(experiment.fit))):
+                found.append((float(power[peak]), float(orders[peak])))
+    return _apart([value for _, value in sorted(found, reverse=True)], 0.5)
+
+
+def _along(orders: Array, angle: Array, series: Array) -> Array:
+    """Power of series (n, c), scaled to unit variance, at each order of an angle (n,): the greatest of its channels."""
+    x = series / np.maximum(np.std(series, axis=0), 1e-300)
+    parts = [
+        np.max(np.abs(np.exp(-1j * np.outer(part, angle)) @ x) ** 2, axis=1)
+        for part in np.array_split(orders, 32)
+    ]
+    return np.concatenate(parts) / len(angle)
 
 
 def _column(columns: tuple[str, ...], values: Array, name: str) -> Array:

@@ -127,10 +127,10 @@ def sensed(
         case SensingPort.STREAM:
             joints = rig.joint_names
             acted = [k for k, name in enumerate(channels) if (name in joints) == (site == "encoder")]
-        case SensingPort.COUPLING:
-            reads, acts = site.split(BY)
+        case SensingPort.COUPLING | SensingPort.PRODUCT:
+            reads, *acts = site.split(BY)
             acted = [channels.index(reads)]
-            given["acting"] = prediction[:, channels.index(acts)]
+            given["acting"] = np.prod(prediction[:, [channels.index(name) for name in acts]], axis=1)
         case _:
             acted = [channels.index(site)]
     if "code" in law.arguments:

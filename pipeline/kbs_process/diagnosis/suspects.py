@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import product
+from itertools import combinations_with_replacement, product
 
 from kbs_process.diagnosis.places import Place, points_of
 from kbs_process.diagnosis.ranges import Ranges
@@ -17,15 +17,15 @@ from kbs_process.rig.model import LAB, Joint, Rig
 from kbs_process.signals.records import WRENCH_CHANNELS
 
 FLOOR = "floor"
-BY = "<-"  # in the site of a coupling: channel that reads, channel that acts
+BY = "<-"  # in the site of a coupling: channel that reads, channel that acts, or the two of which the product does
 
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
     """One suspect at one site with one choice of its shape.
 
-    `site` is a joint (drives, encoders, the controller), a link (forces of the laboratory), the floor, a channel ("Tx"),
-    two of them ("Tx<-Fz"), or a stream ("wrench", "encoder").
+    `site` is a joint (drives, encoders, the controller), a link (forces of the laboratory), the floor, a channel,
+    "Tx", two or three of them ("Tx<-Fz", "Tx<-Fy<-Fz"), or a stream ("wrench", "encoder").
     """
 
     effect: Effect | Sensing
@@ -152,6 +152,17 @@ def _grid(
         yield tuple((entry.name, value) for entry, value in zip(shapes, point, strict=True))
 
 
+def couplings(channels: Sequence[str]) -> list[str]:
+    """Sites of what one channel does to another."""
+    return [f"{reads}{BY}{acts}" for reads in channels for acts in channels if reads != acts]
+
+
+def products(channels: Sequence[str]) -> list[str]:
+    """Sites of what the product of two channels does to one; its own square is its non-linearity's."""
+    pairs = list(combinations_with_replacement(channels, 2))
+    return [BY.join((reads, *pair)) for reads in channels for pair in pairs if pair != (reads, reads)]
+
+
 def _sensed_sites(
     law: Sensing, rig: Rig, channels: Sequence[str], ranges: Ranges, field_recorded: bool
 ) -> list[str]:
@@ -163,8 +174,9 @@ def _sensed_sites(
         case SensingPort.CHANNEL:
             return loads
         case SensingPort.COUPLING:
-            wrench = [name for name in loads if name in WRENCH_CHANNELS]
-            return [f"{reads}{BY}{acts}" for reads in wrench for acts in wrench if reads != acts]
+            return couplings([name for name in loads if name in WRENCH_CHANNELS])
+        case SensingPort.PRODUCT:
+            return products([name for name in loads if name in WRENCH_CHANNELS])
         case SensingPort.ENCODER:
             return encoders
         case SensingPort.STREAM:

@@ -19,8 +19,8 @@ _BETTER = 1.5  # times the power of the strongest steady tone
 def sweeping(z: Array, dt: float, highest_Hz: float) -> tuple[float, float, float] | None:
     r"""Power, frequency at the start (Hz) and sweep (Hz/s) of the one tone that takes most of a white series z (n, c).
 
-    Greatest $P(f, k) = \sum_c |\sum_t z_c(t) \exp(-i \pi (2 f + k t) t)|^2 / n$: maximum likelihood of a tone that has an
-    amplitude and a phase in every channel. None, if chance or a steady tone does nearly as well.
+    Greatest $P(f, k) = \sum_c |\sum_t z_c(t) \exp(-i \pi (2 f + k t) t)|^2 / n$: maximum likelihood of a tone that
+    has an amplitude and a phase in every channel. None, if chance or a steady tone does nearly as well.
     Validity: more than a few turns in the series; white noise of unit variance.
     Source: P. M. Djuric, S. M. Kay, Parameter estimation of chirp signals, IEEE Trans. ASSP 38 (1990) 2118.
     """

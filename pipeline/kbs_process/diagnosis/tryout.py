@@ -34,7 +34,7 @@ def identity(suspect: Suspect) -> Identity:
     assert isinstance(suspect, Catalogued)
     candidate = suspect.candidate
     port = port_word(candidate.name, candidate.port)
-    of_channel = candidate.port in (SensingPort.CHANNEL, SensingPort.COUPLING)
+    of_channel = candidate.port in (SensingPort.CHANNEL, SensingPort.COUPLING, SensingPort.PRODUCT)
     channels = tuple(candidate.site.split(BY)) if of_channel else ()
     axis = "" if of_channel or candidate.port is Port.BASE_ACCELERATION else candidate.site
     return Identity(port, axis, channels, family(candidate.name), candidate.name)

@@ -168,7 +168,10 @@ def _torques(drive: Drive, effects: Sequence[Effect]) -> Callable[[Mapping[str, 
 
 
 def _slope(
-    torques: Callable[[Mapping[str, float]], Array], at: Mapping[str, float], signal: str, reach: float = _STEP
+    torques: Callable[[Mapping[str, float]], Array],
+    at: Mapping[str, float],
+    signal: str,
+    reach: float = _STEP,
 ) -> Array:
     ends = [torques({**at, signal: at[signal] + step}) for step in (reach, -reach)]
     return np.asarray((ends[0] - ends[1]) / (2.0 * reach), dtype=np.float64)

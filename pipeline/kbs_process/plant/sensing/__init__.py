@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from kbs_process.plant.sensing.channel_gain import CHANNEL_GAIN
 from kbs_process.plant.sensing.channel_hysteresis import CHANNEL_HYSTERESIS
+from kbs_process.plant.sensing.channel_interaction import CHANNEL_INTERACTION
 from kbs_process.plant.sensing.channel_lag import CHANNEL_LAG
 from kbs_process.plant.sensing.channel_nonlinearity import CHANNEL_NONLINEARITY
 from kbs_process.plant.sensing.clock_drops import CLOCK_DROPS
@@ -29,6 +30,7 @@ __all__ = ["SENSING", "Sensing", "SensingPort"]
 SENSING: tuple[Sensing, ...] = (
     CHANNEL_GAIN,
     CROSS_COUPLING,
+    CHANNEL_INTERACTION,
     CHANNEL_NONLINEARITY,
     CHANNEL_HYSTERESIS,
     CHANNEL_LAG,

@@ -17,7 +17,7 @@ from kbs_process.signals.records import Array
 
 READINGS = {
     "reading": "what the sensor reads without the effect, in its unit",
-    "acting": "reading of the channel that acts on this one",
+    "acting": "reading of the channel that acts on this one, product of the two that do",
     "rate": "time derivative of the reading",
     "time": "s, on the recording's time axis",
     "temperature": "degC, of the transducer",
@@ -30,6 +30,7 @@ class SensingPort(Enum):
 
     CHANNEL = "one channel of the transducer, or the effort of a joint"
     COUPLING = "one channel, by another"
+    PRODUCT = "one channel, by the product of two"
     ENCODER = "one encoder's angle, rad"
     STREAM = "all channels that one clock stamps"
     CONTROLLER = "field that the controller commands, rad of the motor, where nobody recorded it"
