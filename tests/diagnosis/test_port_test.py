@@ -92,6 +92,19 @@ def test_ports_of_one_direction_are_named_together() -> None:
     assert verdicts["b"].alike == ()
 
 
+def test_the_only_port_is_named_with_those_that_look_the_same_and_with_no_other() -> None:
+    rng = np.random.default_rng(7)
+    cells, ports = experiment(rng, 10.0)
+    twin = PortModel("twin", ports[0].H * drawn(rng, CELLS, 1, 1), ports[0].varied)
+    wider = PortModel("wider", np.concatenate([ports[0].H, drawn(rng, CELLS, C, 1)], axis=2), ports[0].varied)
+    assert set(port_test(cells, [*ports, twin, wider], 0.0).only) == {"a", "twin"}
+    assert port_test(cells, ports[1:], 0.0).only == ()  # none suffices
+    weak, ports = experiment(np.random.default_rng(8), 0.4)
+    assert port_test(weak, ports, 0.0).only == ()  # several do
+    none, ports = experiment(np.random.default_rng(6), 0.0)
+    assert port_test(none, ports[:1], 0.0).only == ()  # nothing is there
+
+
 def test_no_input_at_all_is_told() -> None:
     cells, ports = experiment(np.random.default_rng(6), 0.0)
     found = port_test(cells, ports, 0.0)

@@ -40,7 +40,7 @@ def _answer(said: DiagnosisResults, trial: str, seconds: float) -> Answer:
         log10_p=said.log10_p,
         verdict=said.answer,
         moved=moved,
-        finds=tuple(_claim(find) for find in said.finds),
+        finds=tuple(_claim(find) for find in said.finds) or _place(said),
         held_out=_held_out(said),
         seconds=seconds,
     )
@@ -63,6 +63,16 @@ def _claim(find: Find) -> Claim:
         indistinguishable_from=tuple(Suspect(**_of(rival)) for rival in alike),
         held_out_variance=find.held_out_variance,
     )
+
+
+def _place(said: DiagnosisResults) -> tuple[Claim, ...]:
+    """The claim of a diagnosis that knows where it enters, and no law: ports that look the same are named with it."""
+    places = [Suspect(**_suspect(place, "unnamed")) for place in said.located]
+    if not places:
+        return ()
+    told = msgspec.structs.asdict(places[0])
+    alike = tuple(Candidate(**msgspec.structs.asdict(place)) for place in places[1:])
+    return (Claim(**told, named=False, alternatives=alike, indistinguishable_from=tuple(places[1:])),)
 
 
 def _of(rival: Rival) -> dict[str, str | tuple[str, ...]]:

@@ -8,6 +8,7 @@ from typing import Any, TypeVar, get_origin
 
 import msgspec
 import pytest
+from msgspec.structs import replace
 
 from kbs_process.report.records.common import Conclusion, Provenance, encode
 from kbs_process.report.records.diagnosis import DiagnosisResults, Find, Fitted, Moved, Place, Rival, Trial
@@ -89,6 +90,15 @@ def test_a_diagnosis_is_translated_word_by_word() -> None:
         and said.held_out.before == pytest.approx(12.5**0.5)
         and said.held_out.after == 1.0
     )
+
+
+def test_a_place_without_a_law_is_a_claim() -> None:
+    ports = (Place(port="motor torque", site="az"), Place(port="joint torque", site="az"))
+    without = replace(results(), answer="undecided", finds=(), located=ports)
+    (claim,) = answer_of(encode(without), "T1", 12.0).finds
+    assert (claim.port, claim.axis, claim.family, claim.named) == ("motor torque", "az", "unnamed", False)
+    assert [(one.port, one.axis) for one in claim.indistinguishable_from] == [("joint torque", "az")]
+    assert answer_of(encode(replace(without, located=())), "T1", 12.0).finds == ()
 
 
 def test_words_that_the_bench_does_not_know_are_told() -> None:

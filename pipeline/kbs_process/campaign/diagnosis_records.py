@@ -37,6 +37,7 @@ _FLOOR = {
     "repeats": "what repeats of one trajectory differ by",
     "declared": "what their sensors' stated noise explains",
 }
+_PORTS = {"ground torque": "external wrench"}  # of the port test, in the words of finds
 _WORDS = {
     "none": "Nothing exceeds {floor}.",
     "parameters off": "Known parameters are off; no physics was left out that these recordings show.",
@@ -71,6 +72,10 @@ def results_of(
         finds=finds,
         trials=trials,
         ports=tuple(_ports(outcome)),
+        located=tuple(
+            records.Place(port=_PORTS.get(one.port, one.port), site=one.axis, channels=one.channels)
+            for one in outcome.located
+        ),
         suspects=tuple(_suspects(outcome))[:_SHOWN],
         checks=tuple(Check(name=c.name, ok=c.passed, detail=c.detail) for c in known.checks),
         files=tuple(files),
@@ -116,6 +121,10 @@ def _located(outcome: Outcome) -> str:
     """Which ports can explain what no law did, where some cannot."""
     if outcome.verdict != "undecided" or outcome.unforeseen or outcome.left is None:
         return ""
+    if outcome.located:
+        names = [port.label for port in outcome.located]
+        apart = ", which these recordings cannot tell apart" * (len(names) > 1)
+        return f" It enters at {' or '.join(names)}{apart}."
     able = [port.name for port in outcome.left.test.ports if port.sufficient]
     if not able or len(able) == len(outcome.left.test.ports):
         return ""
@@ -149,7 +158,7 @@ def _paragraph(
     if finds:
         parts.append(f"With it in the plant the difference is {corrected:.3g} times the floor.")
     else:
-        parts.append(_unnamed(outcome, trials, floor))
+        parts.append(_unnamed(outcome, trials, floor) + _located(outcome))
     for moved in outcome.moved[:5]:
         parts.append(f"{moved.name} is off by {moved.sigmas:+.1f} sigma.")
     return " ".join(parts)

@@ -8,6 +8,7 @@ from typing import Literal
 from kbs_process.diagnosis.detection import Detection
 from kbs_process.diagnosis.gate import Gate
 from kbs_process.diagnosis.joint import Standing
+from kbs_process.diagnosis.localise import PortName
 from kbs_process.diagnosis.ports import Cells, PortTest
 from kbs_process.signals.records import Array
 
@@ -125,6 +126,9 @@ class Place:
 
     test: PortTest
     cells: Cells
+    only: tuple[
+        PortName, ...
+    ]  # the port where it enters, and those that look the same; none, where others can do it
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -145,6 +149,13 @@ class Outcome:
     whiteness: tuple[float, float]
     looked_at: int  # suspects with all their shapes
     standing: Standing  # the corrected model
+
+    @property
+    def located(self) -> tuple[PortName, ...]:
+        """Ports, which look the same, of what is left without a law; nothing where other ports may be it as well."""
+        if self.verdict != "undecided" or self.unforeseen or self.left is None:
+            return ()
+        return self.left.only
 
     @property
     def unforeseen(self) -> bool:

@@ -79,6 +79,19 @@ class PortTest:
     significant: NDArray[np.bool_]  # (cells,) after Benjamini and Yekutieli
     log_p: float  # of no input anywhere
 
+    @property
+    def only(self) -> tuple[str, ...]:
+        """The port that suffices with the fewest inputs, and those like it; nothing, if one that is unlike does, too.
+
+        What more inputs can do is no reason to doubt it: they contain it.
+        """
+        able = [port for port in self.ports if port.sufficient]
+        if self.log_p > np.log(PORT_ALPHA) or not able:
+            return ()
+        least = [port for port in able if port.inputs == min(one.inputs for one in able)]
+        best = least[0]
+        return tuple(p.name for p in least) if all(p is best or p.name in best.alike for p in least) else ()
+
 
 def sine_window(n: int) -> Array:
     """(n,) taper of unit power whose cells 2/T apart are uncorrelated for white noise."""

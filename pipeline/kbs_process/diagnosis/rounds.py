@@ -161,8 +161,11 @@ def _passed(view: View, floor: Floor, simulate: Simulate) -> tuple[list[Tried], 
 def _place(standing: Standing, floor: Floor, scene: Scene) -> Place | None:
     if not scene.paths:
         return None
-    cells, models, _ = cells_and_ports(standing, floor, scene.paths)
-    return Place(port_test(cells, models), cells) if len(cells.z) else None
+    cells, models, names = cells_and_ports(standing, floor, scene.paths)
+    if not len(cells.z):
+        return None
+    test = port_test(cells, models)
+    return Place(test, cells, tuple(names[port] for port in test.only))
 
 
 def _moved(known: Known) -> tuple[Moved, ...]:

@@ -172,6 +172,7 @@ class DiagnosisResults(Record, frozen=True, kw_only=True):
     finds: tuple[Find, ...]
     trials: tuple[Trial, ...]
     ports: tuple[PortTest, ...] = ()
+    located: tuple[Place, ...] = ()  # where what no law explains enters: ports that look the same
     suspects: tuple[Suspect, ...] = ()
     checks: tuple[Check, ...] = ()
     files: tuple[str, ...] = ()  # of the corrected model, relative to the results folder
