@@ -183,4 +183,5 @@ def _sensed_sites(
             return [*(["wrench"] if loads else []), *(["encoder"] if encoders else [])]
         case SensingPort.CONTROLLER:
             driven = [joint.name for joint in rig.joints if joint.drive is not None]
-            return [] if field_recorded or rig.controller is None else driven
+            hidden = not field_recorded and rig.controller is not None
+            return driven if hidden or law.behind_record else []

@@ -1,4 +1,4 @@
-"""Latency of the controller beyond its whole cycles."""
+"""Latency of the controller beyond its whole cycles, or of the driver that makes the field."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ def change(rate: Array, latency: float) -> Array:
 
     Equation: $\Delta\theta_f = -\tau \dot\theta_f$.
     Units: rad/s, s -> rad.
-    Validity: open loop, to first order in the latency. Where the field was recorded there is nothing to find.
+    Validity: open loop, to first order in the latency. Where the field was recorded, what comes after the record: the
+        current in a motor's phase follows its command by the winding's time constant.
     Source: G. F. Franklin, J. D. Powell, M. Workman, Digital Control of Dynamic Systems (1998), chapter 5.
     """
     return -latency * rate
@@ -26,4 +27,5 @@ CONTROLLER_LATENCY = Sensing(
         Parameter("latency", "s", Normal(0.0, 0.05), "of the field", (-10.0, 10.0), role="amplitude"),
     ),
     reference="G. F. Franklin, J. D. Powell, M. Workman, Digital Control of Dynamic Systems (1998), chapter 5",
+    behind_record=True,
 )

@@ -33,14 +33,15 @@ class SensingPort(Enum):
     PRODUCT = "one channel, by the product of two"
     ENCODER = "one encoder's angle, rad"
     STREAM = "all channels that one clock stamps"
-    CONTROLLER = "field that the controller commands, rad of the motor, where nobody recorded it"
+    CONTROLLER = "field that the controller commands, rad of the motor"
 
 
 @dataclass(frozen=True, slots=True)
 class Sensing:
     """An equation, the port at which its value is added, and its parameters.
 
-    `each_trial`: its amplitudes belong to a recording, as of what drifts or hums.
+    `each_trial`: its amplitudes belong to a recording, as of what drifts or hums. `behind_record`, of a controller's: it
+    acts on the field after that was recorded, too, as the driver of a motor does.
     """
 
     name: str
@@ -49,6 +50,7 @@ class Sensing:
     parameters: tuple[Parameter, ...]
     reference: str
     each_trial: bool = False
+    behind_record: bool = False
 
     def __post_init__(self) -> None:
         where = f"sensing effect '{self.name}'"
