@@ -42,7 +42,7 @@ def test_what_a_known_parameter_does_is_absorbed_and_named() -> None:
     sums = Sums.over(background, S)
     found = score(background, sums)
     assert found.kappa > 0.99
-    assert absorbing(background, sums, found.amplitude, tuple("abcdef"))[0] == "d"
+    assert absorbing(background, sums, found.whole, tuple("abcdef"))[0] == "d"
     # Held by a narrow prior it takes nothing.
     tight = Background.of(z, J, np.full(KNOWN, 1e9))
     assert score(tight, Sums.over(tight, S)).kappa < 0.01
@@ -60,6 +60,47 @@ def test_gain_of_nothing_is_chi_square() -> None:
         gains.append(score(background, Sums.over(background, S)).gain)
     assert np.mean(gains) == pytest.approx(3.0, abs=4.0 * np.sqrt(6.0 / 300.0))
     assert np.mean(np.array(gains) > chi2.isf(0.1, 3)) == pytest.approx(0.1, abs=0.06)
+
+
+def test_combinations_that_known_parameters_take_up_gain_nothing() -> None:
+    """Two amplitudes, mixed: one does what a known number does, which is far from its prior, the other is its own."""
+    rng = np.random.default_rng(9)
+    J, _ = drawn(rng)
+    mine = {k: rng.standard_normal(ROWS) for k in J}
+    z = {k: 5.0 * J[k][:, 3] + 0.5 * mine[k] + rng.standard_normal(ROWS) for k in J}
+    background = Background.of(z, J, np.full(KNOWN, 0.1), np.full(KNOWN, -50.0))
+    both = {k: np.stack([J[k][:, 3] + mine[k], J[k][:, 3] - mine[k]], axis=1) for k in J}
+    alone = {k: mine[k][:, None] for k in J}
+    found = score(background, Sums.over(background, both))
+    own = score(background, Sums.over(background, alone))
+    assert (found.rank, found.whole_rank) == (1, 2)
+    assert found.gain == pytest.approx(own.gain, rel=1e-2) and found.whole_gain > 1.05 * found.gain
+    first, second = found.amplitude
+    assert first - second == pytest.approx(own.amplitude[0], rel=0.05)
+    assert first + second == pytest.approx(0.0, abs=0.05)
+
+
+def test_known_numbers_that_stand_at_bounds_do_not_do_what_an_effect_does() -> None:
+    rng = np.random.default_rng(10)
+    J, precision = drawn(rng)
+    # Nearly what a known number does, which may go no farther.
+    S = {k: J[k][:, 3:4] + 0.3 * rng.standard_normal((ROWS, 1)) for k in J}
+    z = {k: 4.0 * S[k][:, 0] + 2.0 * J[k][:, 3] + rng.standard_normal(ROWS) for k in J}
+    far, near = np.full(KNOWN, 100.0), np.where(np.arange(KNOWN) == 3, 0.0, 100.0)
+    free, wide, bound = (
+        Background.of(z, J, precision, room=room) for room in (None, (-far, far), (-far, near))
+    )
+    assert wide.bounded is None and bound.bounded is not None
+    without, held = (score(one, Sums.over(one, S)) for one in (free, bound))
+    assert held.gain > 3.0 * without.gain
+    # As by hand: the number that stands at its bound, and would go farther with the effect as well, has no column.
+    A = np.vstack([*[np.hstack([S[k], np.delete(J[k], 3, 1)]) for k in J],
+                   np.hstack([np.zeros((KNOWN - 1, 1)), np.diag(np.sqrt(np.delete(precision, 3)))])])  # fmt: skip
+    y = np.concatenate([*z.values(), np.zeros(KNOWN - 1)])
+    joint, alone = (np.linalg.lstsq(part, y)[0] for part in (A, A[:, 1:]))
+    assert held.amplitude[0] == pytest.approx(joint[0], rel=1e-6)
+    squares = np.sum((y - A[:, 1:] @ alone) ** 2) - np.sum((y - A @ joint) ** 2)
+    assert held.gain == pytest.approx(squares, rel=1e-6)
 
 
 def test_dependent_amplitudes_count_once() -> None:

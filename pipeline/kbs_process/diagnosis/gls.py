@@ -8,7 +8,12 @@ With $H = \sum J^T J + P$ (P the prior's precision) everything follows from sums
     a = A^+ b,   gain = b^T A^+ b,   kappa = 1 - a^T A a / a^T S^T S a
 
 gain is what -2 log likelihood falls by, chi-square with rank(A) degrees of freedom where there is no effect, and the
-square of rho_eff, what is left of rho^2 = a^T S^T S a once the known parameters were refitted.
+square of rho_eff, what is left of rho^2 = a^T S^T S a once the known parameters were refitted. Combinations of
+amplitudes of which these leave less than a hundredth are theirs: what they would gain does not count.
+
+Known numbers that stand at bounds go no farther. Where they would, amplitudes and numbers together are the least
+squares between these bounds, and gain is what that gains beyond the numbers alone: else these seem to do what the
+effect does.
 """
 
 from __future__ import annotations
@@ -22,9 +27,36 @@ from scipy.linalg import cho_factor, cho_solve, eigh
 
 from kbs_process.diagnosis.tails import log_tail
 from kbs_process.diagnosis.thresholds import ABSORBED, DEPENDENT
+from kbs_process.estimation.bounded import bounded_minimum
 from kbs_process.signals.records import Array
 
+_RIDGE = 1e-12  # of unit columns
 _NOTHING = 1e-100  # whitened length of a signature that is nothing: squares of its inverse are still numbers
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Bounded:
+    """Known parameters, scaled, some of which want beyond their bounds."""
+
+    H: Array  # (p, p)
+    h: Array  # (p,)
+    low: Array  # (p,)
+    high: Array  # (p,)
+    alone: float  # what they gain without any candidate
+
+    @classmethod
+    def of(cls, H: Array, h: Array, low: Array, high: Array) -> Bounded:
+        x = bounded_minimum(H, h, low, high)
+        return cls(H, h, low, high, float(2.0 * h @ x - x @ H @ x))
+
+    def beside(self, whole: Array, pull: Array, across: Array) -> tuple[Array, float]:
+        """Best amplitudes (m,) beside them, and what these gain: S^T S (m, m), S^T z (m,), S^T J (m, p), scaled."""
+        m = len(pull)
+        A = np.block([[self.H, across.T], [across, whole + _RIDGE * np.eye(m)]])
+        b = np.concatenate([self.h, pull])
+        free = np.full(m, np.inf)
+        x = bounded_minimum(A, b, np.concatenate([self.low, -free]), np.concatenate([self.high, free]))
+        return x[-m:], max(0.0, float(2.0 * b @ x - x @ A @ x) - self.alone)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,19 +68,34 @@ class Background:
     factor: tuple[Array, bool]  # of H, scaled
     scale: Array  # (p,)
     shift: Array  # (p,) of H's scaled parameters: the known parameters' own step, zero after a refit
+    bounded: Bounded | None = None  # where that step, or a part of it, is barred
 
     @classmethod
     def of(
-        cls, z: Mapping[int, Array], J: Mapping[int, Array], precision: Array, offset: Array | None = None
+        cls,
+        z: Mapping[int, Array],
+        J: Mapping[int, Array],
+        precision: Array,
+        offset: Array | None = None,
+        room: tuple[Array, Array] | None = None,
     ) -> Background:
-        """From residuals, Jacobians, prior precision (p,), and prior mean less present values (p,)."""
+        """From residuals, Jacobians, prior precision (p,), and prior mean less present values (p,).
+
+        `room` is how far each known number may go down and up.
+        """
         H = sum((J[k].T @ J[k] for k in z), np.diag(precision))
         h = sum((J[k].T @ z[k] for k in z), precision * (0.0 if offset is None else offset))
         size = np.sqrt(np.diag(H))
         scale = np.where(size > 0.0, 1.0 / np.where(size > 0.0, size, 1.0), 0.0)
-        H = H * np.outer(scale, scale) + np.diag((size == 0.0) * 1.0) + 1e-12 * np.eye(len(size))
+        H = H * np.outer(scale, scale) + np.diag((size == 0.0) * 1.0) + _RIDGE * np.eye(len(size))
         factor = cho_factor(H)
-        return cls(z, J, factor, scale, cho_solve(factor, scale * h) if len(size) else h)
+        shift = cho_solve(factor, scale * h) if len(size) else h
+        bounded = None
+        if room is not None:
+            low, high = (np.where(size > 0.0, side * size, 0.0) for side in room)
+            if ((shift < low) | (shift > high)).any():
+                bounded = Bounded.of(H, scale * h, low, high)
+        return cls(z, J, factor, scale, shift, bounded)
 
     @property
     def rows(self) -> int:
@@ -86,16 +133,20 @@ class Sums:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Score:
-    """What a candidate with m amplitudes does for the residuals."""
+    """What a candidate with m amplitudes does for the residuals, along combinations that are its own.
+
+    With those that known parameters take up as well: `kappa`, `rho` before anything is refitted, `whole` amplitudes.
+    """
 
     gain: float
     rank: int
-    kappa: float
-    rho: float  # of its own, before anything is refitted
-    free: float  # gain along those combinations of amplitudes that known parameters do not take up
-    free_rank: int
     amplitude: Array  # (m,)
     covariance: Array  # (m, m)
+    kappa: float
+    rho: float
+    whole: Array  # (m,)
+    whole_gain: float
+    whole_rank: int
 
     @property
     def rho_eff(self) -> float:
@@ -121,35 +172,36 @@ def score(background: Background, sums: Sums) -> Score:
         A = A - SJ @ cho_solve(background.factor, SJ.T)
     values, vectors = np.linalg.eigh(A)
     kept = values > DEPENDENT
-    along = vectors[:, kept]
-    root = along / np.sqrt(values[kept])
+    root = _combinations(whole, A, vectors[:, kept])
     a = root @ (root.T @ b)
-    free, free_rank = _free(whole, A, b, along)
-    alone = float(a @ whole @ a)
-    gain = float(np.sum((root.T @ b) ** 2))
+    alone, gain = float(a @ whole @ a), float(np.sum((root.T @ b) ** 2))
+    # Where whole = S^T S is one, root is that of the inverse of 1 - kappa.
+    own = root[:, np.sum((whole @ root) * root, axis=0) * (1.0 - ABSORBED) < 1.0]
+    share, own_gain = own.T @ b, float(np.sum((own.T @ b) ** 2))
+    if background.bounded is not None and own.shape[1]:
+        share, own_gain = background.bounded.beside(own.T @ whole @ own, own.T @ (sums.Sz * unit), own.T @ SJ)
     return Score(
-        gain=gain,
-        rank=int(np.count_nonzero(kept)),
+        gain=own_gain,
+        rank=own.shape[1],
+        amplitude=own @ share * unit,
+        covariance=(own @ own.T) * np.outer(unit, unit),
         kappa=1.0 - gain / alone if alone > 0.0 else 1.0,
         rho=float(np.sqrt(alone)),
-        free=free,
-        free_rank=free_rank,
-        amplitude=a * unit,
-        covariance=(root @ root.T) * np.outer(unit, unit),
+        whole=a * unit,
+        whole_gain=gain,
+        whole_rank=root.shape[1],
     )
 
 
-def _free(whole: Array, left: Array, b: Array, along: Array) -> tuple[float, int]:
-    """Gain and number of the combinations that are left after absorption, each with a kappa of its own.
+def _combinations(whole: Array, left: Array, along: Array) -> Array:
+    """Combinations of amplitudes, columns, that are independent before and after absorption: gains add up.
 
-    In the basis in which whole = S^T S is one and left = S^T P S is diagonal, 1 - kappa of each: gains add up.
+    In that basis left = S^T P S is one, and whole = S^T S diagonal: 1 / (1 - kappa) of each.
     """
     if not along.shape[1]:
-        return 0.0, 0
+        return along
     share, basis = eigh(along.T @ left @ along, along.T @ whole @ along)
-    apart = share > 1.0 - ABSORBED
-    gains = (basis.T @ (along.T @ b)) ** 2 / np.maximum(share, 1e-300)
-    return float(np.sum(gains[apart])), int(np.count_nonzero(apart))
+    return np.asarray(along @ basis / np.sqrt(share), dtype=np.float64)
 
 
 def per_trial(background: Background, columns: Mapping[int, Array]) -> Sums:

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kbs_process.diagnosis.hypothesis import Hypothesis, Prediction, Simulate
-from kbs_process.diagnosis.known import Known, as_it_is, known_of, settled
+from kbs_process.diagnosis.known import Known, as_it_is, descended, known_of, settled
 from kbs_process.diagnosis.search import GEARS, Laws, Search, added
 from kbs_process.estimation.fit import Parameters
 from kbs_process.plant.attach import detach, idle
@@ -61,8 +61,11 @@ class Standing:
         return self.predicted[one.drive].values + added(self.laws, known.free, known.value, reference)
 
 
-def with_extra(standing: Standing, extra: Extra, simulate: Simulate) -> Standing:
-    """Refit all numbers of `standing` with a suspect's beside them, along the slopes that the known ones had."""
+def with_extra(standing: Standing, extra: Extra, simulate: Simulate, steps: int = _STEPS) -> Standing:
+    """Refit all numbers of `standing` with a suspect's beside them, along the slopes that the known ones had.
+
+    After the first few `steps`, `gone_on` takes it to its end.
+    """
     known, experiment = standing.known, standing.known.experiment
     laws = dict(standing.laws)
     for index, scalar in enumerate(extra.linear):
@@ -89,8 +92,16 @@ def with_extra(standing: Standing, extra: Extra, simulate: Simulate) -> Standing
     begun = search.begin(theta, dict(known.slopes), predicted)
     found = begun
     if np.isfinite(search.cost(theta, predicted)[0]):
-        found = search.descend(begun, _STEPS, most=GEARS)
+        found = search.descend(begun, steps, most=GEARS)
     return standing_of(known_of(search, found, known.chi2_before), laws, simulate)
+
+
+def gone_on(standing: Standing, simulate: Simulate) -> Standing:
+    """The refit of `with_extra` taken to its end, unless it is there."""
+    known = standing.known
+    if known.converged or not np.isfinite(known.cost):
+        return standing
+    return standing_of(descended(known, simulate, _STEPS, laws=standing.laws), standing.laws, simulate)
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,7 +18,7 @@ from kbs_process.diagnosis.floor import Floor
 from kbs_process.diagnosis.hypothesis import Hypothesis, Simulate
 from kbs_process.diagnosis.metric import Metric, metrics
 from kbs_process.diagnosis.parameters import Slopes, known_parameters, prior, within
-from kbs_process.diagnosis.search import ALL, Found, Laws, Search
+from kbs_process.diagnosis.search import ALL, GEARS, Found, Laws, Search
 from kbs_process.estimation.fit import Check, Parameters
 from kbs_process.signals.records import Array, Mask
 from kbs_process.stages.output_error import Scalar
@@ -27,6 +27,7 @@ from kbs_process.stages.output_error import Scalar
 MOVED = 4.0
 # Chance below which all together are said to be off: no single one need be, where many make up for what was left out.
 STRAINED = 1e-3
+CONVERGED = "converged"  # name of the check
 CONFINED = 6  # steps of a refit that is looked at, or gone on from
 
 
@@ -64,6 +65,13 @@ class Known:
         return np.where(finite, (self.value - self.parameters.value) / np.where(finite, spread, 1.0), np.nan)
 
     @property
+    def room(self) -> tuple[Array, Array]:
+        """How far numbers may go down and up, (p,) each."""
+        limits = self.parameters
+        assert limits.lower is not None and limits.upper is not None
+        return np.minimum(limits.lower - self.value, 0.0), np.maximum(limits.upper - self.value, 0.0)
+
+    @property
     def chi2(self) -> Array:
         """(trials,) squared lengths of the residuals."""
         return np.array([float(z @ z) for z in self.residual])
@@ -78,6 +86,11 @@ class Known:
         """What is left of the trials that were fitted, over the floor."""
         fit = list(self.experiment.fit)
         return float(self.chi2[fit].sum() / self.rows[fit].sum())
+
+    @property
+    def converged(self) -> bool:
+        """Whether the search that ended here had nothing more to gain."""
+        return next(check.passed for check in self.checks if check.name == CONVERGED)
 
     @property
     def cost(self) -> float:
@@ -172,6 +185,12 @@ def confined(known: Known, simulate: Simulate, reach: float, *, laws: Laws | Non
     return replace(freed, checks=_checks(freed, found))
 
 
+def descended(known: Known, simulate: Simulate, rounds: int, *, laws: Laws | None = None) -> Known:
+    """Go on with the refit of a suspect's numbers and all others, bodies' slopes as they are."""
+    search, begun = _again(known, simulate, laws)
+    return known_of(search, search.descend(begun, rounds, most=GEARS), known.chi2_before)
+
+
 def leapt(known: Known, simulate: Simulate, *, smooth: bool) -> Known:
     """Look for better phases (those that enter smoothly too if `smooth`) and edges all round, and refit from there."""
     search, begun = _again(known, simulate)
@@ -243,7 +262,7 @@ def _checks(known: Known, found: Found) -> tuple[Check, ...]:
     ]
     within = f"all within {MOVED:g} sigma"
     return (
-        Check("converged", found.converged, f"{found.rounds} rounds"),
+        Check(CONVERGED, found.converged, f"{found.rounds} rounds"),
         Check("within bounds", not stuck, ", ".join(stuck) or "none at a bound"),
         Check("within uncertainties", not far, "sigmas: " + ", ".join(far) if far else within),
         Check(

@@ -14,8 +14,8 @@ from kbs_process.diagnosis.floor import Floor
 from kbs_process.diagnosis.gate import Fold, Gate, gate, whiteness
 from kbs_process.diagnosis.gls import Background, Sums, score
 from kbs_process.diagnosis.hypothesis import Simulate
-from kbs_process.diagnosis.joint import Own, Standing, bare, standing_of, with_extra
-from kbs_process.diagnosis.known import confined, settled
+from kbs_process.diagnosis.joint import Own, Standing, bare, gone_on, standing_of, with_extra
+from kbs_process.diagnosis.known import Known, confined, settled
 from kbs_process.diagnosis.outcome import Refused
 from kbs_process.diagnosis.plausible import implausible
 from kbs_process.diagnosis.remains import detected, searched
@@ -25,6 +25,7 @@ from kbs_process.diagnosis.side_by_side import side_by_side
 from kbs_process.diagnosis.thresholds import (
     CLOSE,
     FALSE_ALARM,
+    FIRST,
     LAW_VARIANCE,
     LEAD,
     LEADERS,
@@ -38,13 +39,24 @@ from kbs_process.diagnosis.view import View
 
 
 def leaders(view: View) -> tuple[list[Found], list[Found]]:
-    """The most probable suspects, as many as the linear plant may have in the wrong order, and a few that come next."""
-    able = view.able
+    """The most probable suspects, as many as the linear plant may have in the wrong order, and a few that come next.
+
+    Of a law that a channel can show in many ways, as products of others are, the best stands for all.
+    """
+    best: dict[tuple[str, ...], Found] = {}
+    for found in view.able:
+        best.setdefault(_way(found), found)
+    able = list(best.values())
     if not able:
         return [], []
     bound = (1.0 - LEAD) * able[0].score.gain if view.ordered else 0.0
     first = [found for found in able if found.score.gain >= bound or found is able[0]][:LEADERS]
     return first, [found for found in able if found not in first][:SECOND]
+
+
+def _way(found: Found) -> tuple[str, ...]:
+    own = identity(found.suspect)
+    return own.port, own.axis, own.law, *own.channels[:1]
 
 
 def tried(
@@ -56,14 +68,20 @@ def tried(
 
     def join(found: Found) -> tuple[Found, Standing]:
         extra = extra_of(found, view.standing, view.bench, view.scene)
-        return found, with_extra(view.standing, extra, simulate)
+        return found, with_extra(view.standing, extra, simulate, FIRST)
+
+    def near(new: Standing, best: Known) -> bool:
+        return new.known.excess <= SETTLED_TIMES * max(best.excess, TOLERATED * float(best.rows.sum()))
+
+    def go_on(one: tuple[Found, Standing]) -> tuple[Found, Standing]:
+        found, new = one
+        return found, gone_on(new, simulate) if near(new, joined[0][1].known) else new
 
     def judge(one: tuple[int, tuple[Found, Standing]]) -> Tried:
         place, (found, new) = one
-        best = joined[0][1].known
-        near = new.known.excess <= SETTLED_TIMES * max(best.excess, TOLERATED * float(best.rows.sum()))
         own = own_of(found, before, new)
-        end = resettled(new, floor, simulate, leaps=0) if place < SETTLED and near else new
+        settle = place < SETTLED and near(new, joined[0][1].known)
+        end = resettled(new, floor, simulate, leaps=0) if settle else new
         verdict = gated(found, before, end, own)
         if place == 0 and not verdict.passed and end.known.excess < 0.5 * before.known.excess:
             # So much is hardly chance: phases may still be those that made up for what was left out.
@@ -77,7 +95,9 @@ def tried(
         if found.suspect.each_trial
     ]
     joined = side_by_side(join, [found for found in chosen if not found.suspect.each_trial])
-    joined.sort(key=lambda one: float(np.nan_to_num(one[1].known.cost, nan=np.inf)))
+    joined.sort(key=_cost)
+    # What the first steps have left far behind is not worth the others.
+    joined = sorted(side_by_side(go_on, joined), key=_cost)
     judged += side_by_side(judge, enumerate(joined))
     passed = [one for one in judged if one.gate.passed]
     refused = [
@@ -86,6 +106,10 @@ def tried(
         if not one.gate.passed
     ]
     return passed, refused
+
+
+def _cost(one: tuple[Found, Standing]) -> float:
+    return float(np.nan_to_num(one[1].known.cost, nan=np.inf))
 
 
 def own_of(found: Found, before: Standing, after: Standing) -> Own:

@@ -28,13 +28,13 @@ from kbs_process.diagnosis.outcome import (
     Verdict,
 )
 from kbs_process.diagnosis.ports import port_test
-from kbs_process.diagnosis.remains import detected, promises_little, taken, too_little
+from kbs_process.diagnosis.remains import detected, promises_little, too_little
 from kbs_process.diagnosis.rivals import probabilities
 from kbs_process.diagnosis.scene import Scene
 from kbs_process.diagnosis.screen import Screening
-from kbs_process.diagnosis.thresholds import CLOSE_LEADERS, ORDERED, ROUNDS
+from kbs_process.diagnosis.thresholds import ROUNDS
 from kbs_process.diagnosis.tryout import identity
-from kbs_process.diagnosis.view import View, closer
+from kbs_process.diagnosis.view import View
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -131,31 +131,20 @@ def _law(one: Tried) -> Identity:
 
 
 def _passed(view: View, floor: Floor, simulate: Simulate) -> tuple[list[Tried], list[Refused]]:
-    """Suspects that passed the gate, and those that did not; from closer by first, where known numbers were pulled."""
+    """Suspects that passed the gate, and those that did not."""
     passed: list[Tried] = []
     refused: list[Refused] = []
-    known = view.standing.known
-    there = detected(view.standing, floor, known.experiment.fit)
+    there = detected(view.standing, floor, view.standing.known.experiment.fit)
     if reason := promises_little(view, there):
         found = view.able[0]
         return [], [Refused(identity(found.suspect), found.score.rho_eff, (reason,))]
-    if known.strained and not view.ordered and there.left:
-        close = closer(view.standing, simulate)
-        lead = [found for found in close.able if not found.suspect.each_trial][:CLOSE_LEADERS]
-        passed, refused = tried(lead, close, view.standing, floor, simulate)
-        fit = known.experiment.fit
-        if any(taken(there, detected(one.standing, floor, fit)) > ORDERED for one in passed):
-            return passed, refused
     first, others = leaders(view)
     for chosen in (first, *([found] for found in others)):
         more, less = tried(chosen, view, view.standing, floor, simulate)
         passed, refused = [*passed, *more], [*refused, *less]
         if passed:
             break
-    # One law may have led both views: the better of the two counts.
-    passed.sort(key=lambda one: one.standing.known.cost)
-    best = {_law(one): one for one in reversed(passed)}
-    return list(best.values()), [one for one in refused if one.identity not in best]
+    return passed, refused
 
 
 def _place(standing: Standing, floor: Floor, scene: Scene) -> Place | None:
@@ -182,7 +171,7 @@ def _absorbed(screening: Screening) -> tuple[Absorbed, ...]:
     return tuple(
         Absorbed(identity(found.suspect), found.score.kappa, found.score.rho, found.absorbed_by)
         for found in screening.candidates
-        if found.absorbed and found.significant
+        if found.absorbed
     )
 
 

@@ -103,11 +103,12 @@ class Found:
 
     @property
     def absorbed(self) -> bool:
-        """Whether nothing of it is left that is not also what known parameters do."""
-        if self.score.kappa <= ABSORBED:
+        """Whether it would do something, and nothing that known parameters do not do as well."""
+        score = self.score
+        if score.kappa <= ABSORBED or score.whole_gain < LEAST_RHO**2:
             return False
-        left = log_tail(self.score.free, self.score.free_rank) + np.log(self.grid)
-        return bool(left > np.log(FALSE_ALARM))
+        own, whole = log_tail(score.gain, score.rank), log_tail(score.whole_gain, score.whole_rank)
+        return bool(own + np.log(self.grid) > np.log(FALSE_ALARM) > whole + np.log(self.grid))
 
     @property
     def significant(self) -> bool:
@@ -145,7 +146,7 @@ class Bench:
         precision = np.where(np.isfinite(known.parameters.sigma), known.parameters.sigma, np.inf) ** -2.0
         J = {k: known.jacobian(k) for k in members}
         offset = np.where(precision > 0.0, known.parameters.value - known.value, 0.0)
-        background = Background.of({k: known.residual[k] for k in members}, J, precision, offset)
+        background = Background.of({k: known.residual[k] for k in members}, J, precision, offset, known.room)
         groups: dict[tuple[object, ...], list[int]] = {}
         for k in members:
             trial = known.experiment.trials[k]
@@ -241,7 +242,7 @@ def _scored(bench: Bench, batch: Sequence[Suspect]) -> list[_Scored]:
         one = score(bench.background, mine)
         taken: tuple[str, ...] = ()
         if one.kappa > ABSORBED:
-            taken = absorbing(bench.background, mine, one.amplitude, bench.known.names)
+            taken = absorbing(bench.background, mine, one.whole, bench.known.names)
         found.append((suspect, one, taken))
     return found
 

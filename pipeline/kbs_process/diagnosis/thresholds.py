@@ -37,10 +37,9 @@ TOLERATED: Final = 0.03
 # Likewise of recordings that nothing was fitted to: nulls have left 1.15 of the floor's power.
 UNFORESEEN: Final = 0.5
 ORDERED: Final = 0.5  # share of the residual's excess that the best has to do for the screen's order to count
-# Sigmas of their priors within which numbers are held for a second look, where the first is not ordered: one number in
-# twenty is beyond, and what it does there is little beside what is looked for.
+# Sigmas of their priors within which numbers are drawn back once a law is in the plant, before they are let go again:
+# one in twenty is beyond.
 CLOSE: Final = 2.0
-CLOSE_LEADERS: Final = 3  # that are simulated from there
 LEADERS: Final = 4  # candidates that are simulated; beyond it the linear plant's order has not been wrong
 # A leader's gain is wrong by about twice, at worst three times, the transfer's error of itself; candidates within that
 # are not yet ordered.
@@ -61,6 +60,7 @@ GATE_GAIN: Final = (
 GATE_SHARE: Final = 0.2
 # Of what all gain together: by that one that shows little of a law may be worse, for its formula is not nature's.
 GATE_WORSE: Final = 0.02
+FIRST: Final = 3  # steps of a leader's refit that show whether it is worth the others
 # Leaders that are tried beyond those that the linear plant cannot order, where none of these passes.
 SECOND: Final = 2
 # Of the leaders, those that leave least are refitted with all slopes taken anew before they are compared, if they leave

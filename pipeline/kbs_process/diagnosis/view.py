@@ -6,15 +6,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from kbs_process.diagnosis.curves import curves
-from kbs_process.diagnosis.hypothesis import Simulate
-from kbs_process.diagnosis.joint import Standing, standing_of
-from kbs_process.diagnosis.known import confined
+from kbs_process.diagnosis.joint import Standing
 from kbs_process.diagnosis.proposals import proposed
 from kbs_process.diagnosis.ranges import ranges_of
 from kbs_process.diagnosis.scene import Scene
 from kbs_process.diagnosis.screen import Bench, Catalogued, Found, Screening, Suspect, screen
 from kbs_process.diagnosis.suspects import candidates
-from kbs_process.diagnosis.thresholds import CLOSE, ORDERED
+from kbs_process.diagnosis.thresholds import ORDERED
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,12 +80,3 @@ def suspects_of(standing: Standing, scene: Scene) -> list[Suspect]:
         field_recorded=recorded,
     )
     return [*(Catalogued(candidate, scene) for candidate in chosen), *curves(scene)]
-
-
-def closer(standing: Standing, simulate: Simulate) -> View:
-    """The view from where all numbers are kept closer to what is known of them.
-
-    Known numbers pulled far by what was left out have taken most of it up, and the rest looks like something else.
-    """
-    held = confined(standing.known, simulate, CLOSE, laws=standing.laws)
-    return View.of(standing_of(held, standing.laws, simulate))

@@ -40,8 +40,8 @@ class SensingPort(Enum):
 class Sensing:
     """An equation, the port at which its value is added, and its parameters.
 
-    `each_trial`: its amplitudes belong to a recording, as of what drifts or hums. `behind_record`, of a controller's: it
-    acts on the field after that was recorded, too, as the driver of a motor does.
+    `each_trial`: its amplitudes belong to a recording, as of what drifts or hums. `behind_record`, of a controller's:
+    it acts on the field after that was recorded, too, as the driver of a motor does.
     """
 
     name: str
