@@ -304,3 +304,9 @@ def test_a_little_of_it_in_the_plant_shows_as_its_signature(
         ratio = np.sqrt(expected @ expected / (true @ true))
         assert true @ expected / np.sqrt((true @ true) * (expected @ expected)) > like, channel
         assert ratio == pytest.approx(1.0, abs=0.1), channel
+
+
+def test_weight_has_a_moment_about_no_axis_along_gravity() -> None:
+    assert {s.site for s in suspects() if s.name == "mass_shift"} == {"el"}
+    lying = replace(rig(), joints=tuple(replace(joint, axis=(0.0, 1.0, 0.0)) for joint in rig().joints))
+    assert {s.site for s in suspects(lying) if s.name == "mass_shift"} == {"az", "el"}

@@ -20,7 +20,8 @@ PORTS: dict[Port | SensingPort, str] = {
     SensingPort.STREAM: "clock",
     SensingPort.CONTROLLER: "controller",
 }
-_APPENDAGE = "appendage"
+# Laws that are at a port of their own, wherever their equations act.
+_APART = {"appendage": "appendage", "mass_shift": "mass properties"}
 
 FAMILIES: dict[str, str] = {
     "cogging": "cogging",
@@ -34,6 +35,7 @@ FAMILIES: dict[str, str] = {
     "motor_stribeck": "friction",
     "motor_asymmetry": "friction",
     "motor_drag": "viscous",
+    "motor_dahl": "friction",
     "kinematic_error": "transmission error",
     "backlash": "backlash",
     "stiffness_hardening": "stiffness",
@@ -51,6 +53,7 @@ FAMILIES: dict[str, str] = {
     "local_torque": "local torque",
     "ground_cable": "cable",
     "ground_bump": "local torque",
+    "mass_shift": "mass",
     "air_drag": "air drag",
     "appendage": "appendage",
     "bungee": "bungee",
@@ -86,5 +89,5 @@ def family(name: str) -> str:
 
 
 def port_word(name: str, port: Port | SensingPort) -> str:
-    """Return the word for the port of a law: an appendage is one of its own."""
-    return _APPENDAGE if name == "appendage" else PORTS[port]
+    """Return the word for the port of a law."""
+    return _APART.get(name, PORTS[port])

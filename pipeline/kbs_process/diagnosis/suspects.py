@@ -6,17 +6,21 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations_with_replacement, product
 
+import numpy as np
+
 from kbs_process.diagnosis.places import Place, points_of
 from kbs_process.diagnosis.ranges import Ranges
 from kbs_process.plant.along import signals_of
 from kbs_process.plant.effect import VELOCITIES, Effect, Parameter, Port, instance
 from kbs_process.plant.effects import CATALOGUE
-from kbs_process.plant.rigid import links_beyond
+from kbs_process.plant.rigid import kinematics, links_beyond
 from kbs_process.plant.sensing import SENSING, Sensing, SensingPort
 from kbs_process.rig.model import LAB, Joint, Rig
+from kbs_process.signals.frames import rotate
 from kbs_process.signals.records import WRENCH_CHANNELS
 
 FLOOR = "floor"
+_ALONG_GRAVITY = 0.95  # cosine
 BY = "<-"  # in the site of a coupling: channel that reads, channel that acts, or the two of which the product does
 
 
@@ -101,6 +105,8 @@ def _sites(effect: Effect, rig: Rig, columns: Sequence[str]) -> list[str]:
     def fits(joint: Joint) -> bool:
         if effect.port is Port.GROUND_TORQUE and joint.name not in reached:
             return False
+        if effect.of_weight and not _weighed(rig, joint):
+            return False
         own = {} if joint.drive is None else joint.drive.parameters
         turned = joint.drive is not None or "ratio" not in effect.arguments
         return (
@@ -110,6 +116,13 @@ def _sites(effect: Effect, rig: Rig, columns: Sequence[str]) -> list[str]:
         )
 
     return [joint.name for joint in rig.joints if fits(joint)]
+
+
+def _weighed(rig: Rig, joint: Joint) -> bool:
+    """Whether weight has a moment about a joint's axis: one that turns and is not along gravity."""
+    pose = np.zeros((1, len(rig.joints)))
+    axis = rotate(kinematics(rig, pose, pose, pose)[joint.parent].R, np.asarray(joint.axis, dtype=float))
+    return joint.type == "revolute" and bool(abs(axis[0, 2]) < _ALONG_GRAVITY)
 
 
 def felt_from_the_ground(rig: Rig) -> frozenset[str]:

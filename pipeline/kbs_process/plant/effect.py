@@ -178,7 +178,8 @@ class Effect:
     What acts at the ground's port belongs to the test, unless it is part `of_article`.
     `passive` claims that it never does positive work; the conformance test holds it to that. What comes from outside
     has amplitudes of its own in `each_trial`. A force `anywhere` is tied to no place of its link that a drawing shows:
-    a search looks for its point, too. An effect can act several times: see `instance`.
+    a search looks for its point, too. A moment `of_weight` acts about no axis that is along gravity. An effect can act
+    several times: see `instance`.
     """
 
     name: str
@@ -191,6 +192,7 @@ class Effect:
     each_trial: bool = False
     of_article: bool = False  # although the wrench feels it at a port of the ground: an appendage
     anywhere: bool = False  # a force whose point on its link is not known
+    of_weight: bool = False  # a moment of weight about a joint's axis
     tag: str = ""  # what `instance` has added to the names of parameters and states
 
     def __post_init__(self) -> None:

@@ -36,6 +36,7 @@ from kbs_process.plant.effects.kinematic_error import KINEMATIC_ERROR
 from kbs_process.plant.effects.load_friction import LOAD_FRICTION
 from kbs_process.plant.effects.local_torque import LOCAL_TORQUE
 from kbs_process.plant.effects.lugre import LUGRE
+from kbs_process.plant.effects.mass_shift import MASS_SHIFT
 from kbs_process.plant.effects.measured_law import (
     GROUND_ANGLE_LAW,
     GROUND_RATE_LAW,
@@ -44,6 +45,7 @@ from kbs_process.plant.effects.measured_law import (
 )
 from kbs_process.plant.effects.microstep_error import MICROSTEP_ERROR
 from kbs_process.plant.effects.motor_asymmetry import MOTOR_ASYMMETRY
+from kbs_process.plant.effects.motor_dahl import MOTOR_DAHL
 from kbs_process.plant.effects.motor_drag import MOTOR_DRAG
 from kbs_process.plant.effects.motor_order import MOTOR_ORDER
 from kbs_process.plant.effects.motor_stribeck import MOTOR_STRIBECK
@@ -72,6 +74,7 @@ CATALOGUE: tuple[Effect, ...] = (
     MOTOR_STRIBECK,
     MOTOR_ASYMMETRY,
     MOTOR_DRAG,
+    MOTOR_DAHL,
     # gear
     KINEMATIC_ERROR,
     BACKLASH,
@@ -92,6 +95,7 @@ CATALOGUE: tuple[Effect, ...] = (
     # from outside
     GROUND_CABLE,
     GROUND_BUMP,
+    MASS_SHIFT,
     AIR_DRAG,
     APPENDAGE,
     BUNGEE,
