@@ -310,3 +310,9 @@ def test_weight_has_a_moment_about_no_axis_along_gravity() -> None:
     assert {s.site for s in suspects() if s.name == "mass_shift"} == {"el"}
     lying = replace(rig(), joints=tuple(replace(joint, axis=(0.0, 1.0, 0.0)) for joint in rig().joints))
     assert {s.site for s in suspects(lying) if s.name == "mass_shift"} == {"az", "el"}
+
+
+def test_a_rig_that_its_motion_drives_has_no_field_that_could_be_late() -> None:
+    columns = tuple(name for name in tapped().columns if not name.startswith("field."))
+    names = {s.name for s in candidates(rig(), NOMINAL, ranges(), columns, CHANNELS)}
+    assert "joint_viscous" in names and "controller_latency" not in names

@@ -84,7 +84,7 @@ def candidates(
     sensing = [
         Candidate(law, site, shape)
         for law in SENSING
-        for site in _sensed_sites(law, rig, channels, ranges, field_recorded)
+        for site in _sensed_sites(law, rig, channels, ranges, columns, field_recorded)
         for shape in _grid(law, site, ranges, {})
     ]
     return (*plant, *sensing)
@@ -177,7 +177,12 @@ def products(channels: Sequence[str]) -> list[str]:
 
 
 def _sensed_sites(
-    law: Sensing, rig: Rig, channels: Sequence[str], ranges: Ranges, field_recorded: bool
+    law: Sensing,
+    rig: Rig,
+    channels: Sequence[str],
+    ranges: Ranges,
+    columns: Sequence[str],
+    field_recorded: bool,
 ) -> list[str]:
     encoders = [name for name in rig.joint_names if name in channels]
     loads = [name for name in channels if name not in encoders]
@@ -195,6 +200,6 @@ def _sensed_sites(
         case SensingPort.STREAM:
             return [*(["wrench"] if loads else []), *(["encoder"] if encoders else [])]
         case SensingPort.CONTROLLER:
-            driven = [joint.name for joint in rig.joints if joint.drive is not None]
+            led = [joint.name for joint in rig.joints if f"field.{joint.name}" in columns]
             hidden = not field_recorded and rig.controller is not None
-            return driven if hidden or law.behind_record else []
+            return led if hidden or law.behind_record else []
