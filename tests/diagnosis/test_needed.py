@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import bench
 import pytest
 from test_rounds import ROLES, screened, standing, with_cable
@@ -12,7 +14,7 @@ from kbs_process.diagnosis.floor import declared
 from kbs_process.diagnosis.gate import Gate
 from kbs_process.diagnosis.joint import Standing, with_extra, without
 from kbs_process.diagnosis.leaders import own_of
-from kbs_process.diagnosis.needed import Accepted, needed
+from kbs_process.diagnosis.needed import Accepted, in_the_shade, needed
 from kbs_process.diagnosis.outcome import Find
 from kbs_process.diagnosis.tryout import extra_of, identity
 from kbs_process.plant.effects import CATALOGUE
@@ -94,3 +96,19 @@ def test_finds_of_one_law_at_one_place_stand_or_fall_together(made: Experiment) 
     kept, left = needed([lag, again, cable], both, declared(made), bench.serial(made))
     assert [one.find.identity.law for one in kept] == ["ground_cable"]
     assert not left.laws
+
+
+def test_what_is_small_beside_a_find_at_the_same_place_may_be_its_formula(made: Experiment) -> None:
+    begun = standing(made)
+    _, cable = joined(made, begun, CABLE)
+    _, lag = joined(made, begun, LAG)
+    size = cable.tried.found.score.rho_eff
+
+    def earlier(one: Accepted, rho_eff: float) -> Accepted:
+        return replace(one, find=replace(one.find, rho_eff=rho_eff))
+
+    assert in_the_shade(cable.tried, [earlier(cable, 10.0 * size)]) == ()
+    (reason,) = in_the_shade(cable.tried, [earlier(lag, 100.0 * size), earlier(cable, 100.0 * size)])
+    assert "1.0 %" in reason
+    # At another place it is a law of its own, however small.
+    assert in_the_shade(cable.tried, [earlier(lag, 100.0 * size)]) == ()

@@ -10,18 +10,22 @@ import numpy as np
 from scipy.stats import chi2
 
 from kbs_process.diagnosis.curves import REGRESSORS, CurveSuspect, basis
+from kbs_process.diagnosis.families import family
 from kbs_process.diagnosis.gate import Gate
+from kbs_process.diagnosis.inlets import GROUND_PORT
 from kbs_process.diagnosis.joint import Own, Standing
 from kbs_process.diagnosis.known import Known
 from kbs_process.diagnosis.measured import LAWS
-from kbs_process.diagnosis.outcome import Alternative, Curve, Estimate, Find, Place
+from kbs_process.diagnosis.outcome import Alternative, Curve, Estimate, Find, Identity, Place
 from kbs_process.diagnosis.places import POINT
 from kbs_process.diagnosis.rivals import rivalry
 from kbs_process.diagnosis.screen import Catalogued, Found, Screening, Suspect
+from kbs_process.diagnosis.suspects import weighed
 from kbs_process.diagnosis.thresholds import RIVALS
 from kbs_process.diagnosis.tryout import UNNAMED, identity, in_plant, port_label
 from kbs_process.plant.effect import Effect
 from kbs_process.plant.sensing import Sensing
+from kbs_process.rig.model import Rig
 from kbs_process.signals.records import Array
 
 _ELEMENTS = {f"point[{k}]": name for k, name in enumerate(POINT)}
@@ -48,7 +52,9 @@ def find_of(
     """The find of the `best` of some laws that passed, each right with a chance; `before` stood without it."""
     taken = tried[best]
     suspect, own = taken.found.suspect, identity(taken.found.suspect)
-    alternatives = []
+    equivalent = _equivalents(suspect, taken.standing.known.experiment.rig)
+    chance = float(chances[best]) / (1 + len(equivalent))
+    alternatives = [replace(one, probability=chance) for one in equivalent]
     for index, other in enumerate(tried):
         if index != best and not other.found.suspect.each_trial and not suspect.each_trial:
             apart = rivalry(taken.standing.known, other.standing.known)
@@ -80,7 +86,7 @@ def find_of(
         equation=_equation(_law(suspect)),
         reference=_law(suspect).reference,
         estimates=_estimates(taken, before),
-        probability=float(chances[best]),
+        probability=chance,
         rho=taken.found.score.rho,
         rho_eff=taken.found.score.rho_eff,
         kappa=taken.found.score.kappa,
@@ -90,6 +96,17 @@ def find_of(
         held_out_variance=explained_share(before.known, taken.standing.known),
         curve=_curve(suspect, taken, before) if isinstance(suspect, CurveSuspect) else None,
     )
+
+
+def _equivalents(suspect: Suspect, rig: Rig) -> tuple[Alternative, ...]:
+    """What looks the same whatever is recorded: a torque over the angle, the weight of a mass that moves with it."""
+    if not isinstance(suspect, CurveSuspect) or suspect.port != GROUND_PORT:
+        return ()
+    if suspect.regressor != "joint_angle" or not weighed(rig, rig.joint(suspect.joint)):
+        return ()
+    law = "weight over joint angle"
+    same = Identity("mass properties", suspect.joint, (), family("mass_shift"), law)
+    return (Alternative(same, 0.0, 0.0, 0.5, indistinguishable=True, refitted=False),)
 
 
 def _law(suspect: Suspect) -> Effect | Sensing:

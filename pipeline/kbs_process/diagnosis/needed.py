@@ -15,6 +15,8 @@ from kbs_process.diagnosis.joint import Own, Standing, without
 from kbs_process.diagnosis.leaders import gated
 from kbs_process.diagnosis.outcome import Find
 from kbs_process.diagnosis.remains import detected, too_little
+from kbs_process.diagnosis.thresholds import SHADE
+from kbs_process.diagnosis.tryout import identity
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -23,6 +25,20 @@ class Accepted:
 
     tried: Tried
     find: Find
+
+
+def in_the_shade(one: Tried, accepted: Sequence[Accepted]) -> tuple[str, ...]:
+    """Return why a law does not stand beside a far greater find at the same joint or channel; nothing, if it does."""
+    own = identity(one.found.suspect)
+    for other in accepted:
+        there = other.find.identity
+        same = (own.axis, own.channels[:1]) == (there.axis, there.channels[:1])
+        share = one.found.score.rho_eff / other.find.rho_eff
+        if same and not share >= SHADE:
+            return (
+                f"is {100.0 * share:.1f} % of {there.law} there: its formula may be as far from nature's",
+            )
+    return ()
 
 
 def needed(

@@ -16,7 +16,7 @@ from kbs_process.diagnosis.joint import Standing
 from kbs_process.diagnosis.known import MOVED, Known
 from kbs_process.diagnosis.leaders import leaders, released, reread, resettled, tried
 from kbs_process.diagnosis.localise import cells_and_ports
-from kbs_process.diagnosis.needed import Accepted, needed
+from kbs_process.diagnosis.needed import Accepted, in_the_shade, needed
 from kbs_process.diagnosis.outcome import (
     Absorbed,
     Find,
@@ -57,7 +57,7 @@ def diagnose(
     accepted: list[Accepted] = []
     rounds: list[_Round] = []
     for _ in range(ROUNDS):
-        rounds.append(_round(standing, floor, simulate))
+        rounds.append(_round(standing, floor, simulate, accepted))
         standing, found = rounds[-1].standing, rounds[-1].accepted
         if found is None:
             break
@@ -106,7 +106,7 @@ def _mismatch(before: Detection, first: Screening, kept: Sequence[Accepted]) -> 
     return float(min(0.0, np.log(2.0) + min([before.log_p, *found])))
 
 
-def _round(standing: Standing, floor: Floor, simulate: Simulate) -> _Round:
+def _round(standing: Standing, floor: Floor, simulate: Simulate, accepted: Sequence[Accepted] = ()) -> _Round:
     view = View.of(standing)
     place = _place(standing, floor, view.scene)
     passed, refused = _passed(view, floor, simulate)
@@ -116,7 +116,7 @@ def _round(standing: Standing, floor: Floor, simulate: Simulate) -> _Round:
     best = int(np.argmax(chances))
     settled = released(resettled(passed[best].standing, floor, simulate, leaps=1), floor, simulate)
     told = reread(replace(passed[best], standing=settled), standing, floor, simulate)
-    if reasons := too_little(standing, told.standing, floor):
+    if reasons := too_little(standing, told.standing, floor) or in_the_shade(told, accepted):
         refused.append(Refused(_law(told), told.found.score.rho_eff, reasons))
         return _Round(None, standing, view.screening, tuple(refused), place)
     # Told anew, it may be what another was: their chances are one then.

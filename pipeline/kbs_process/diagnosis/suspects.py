@@ -105,7 +105,7 @@ def _sites(effect: Effect, rig: Rig, columns: Sequence[str]) -> list[str]:
     def fits(joint: Joint) -> bool:
         if effect.port is Port.GROUND_TORQUE and joint.name not in reached:
             return False
-        if effect.of_weight and not _weighed(rig, joint):
+        if effect.of_weight and not weighed(rig, joint):
             return False
         own = {} if joint.drive is None else joint.drive.parameters
         turned = joint.drive is not None or "ratio" not in effect.arguments
@@ -118,7 +118,7 @@ def _sites(effect: Effect, rig: Rig, columns: Sequence[str]) -> list[str]:
     return [joint.name for joint in rig.joints if fits(joint)]
 
 
-def _weighed(rig: Rig, joint: Joint) -> bool:
+def weighed(rig: Rig, joint: Joint) -> bool:
     """Whether weight has a moment about a joint's axis: one that turns and is not along gravity."""
     pose = np.zeros((1, len(rig.joints)))
     axis = rotate(kinematics(rig, pose, pose, pose)[joint.parent].R, np.asarray(joint.axis, dtype=float))

@@ -70,6 +70,9 @@ SETTLED_TIMES: Final = 3.0
 # Share that a law has to take of what exceeds the floor, after all numbers were refitted with it: one that takes little
 # and leaves the rest follows what something else does.
 TAKEN: Final = 0.25
+# Share of an earlier find's distance, at the same joint or channel, below which a law may as well be what the earlier
+# one's formula lacks of nature's: splines and catalogue laws have left 0.02 of effects made by other formulas.
+SHADE: Final = 0.03
 ROUNDS: Final = 5  # finds in one campaign at most
 
 # -- two laws ------------------------------------------------------------------------------------------------------
