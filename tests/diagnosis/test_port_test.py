@@ -99,6 +99,7 @@ def test_the_only_port_is_named_with_those_that_look_the_same_and_with_no_other(
     wider = PortModel("wider", np.concatenate([ports[0].H, drawn(rng, CELLS, C, 1)], axis=2), ports[0].varied)
     assert set(port_test(cells, [*ports, twin, wider], 0.0).only) == {"a", "twin"}
     assert port_test(cells, ports[1:], 0.0).only == ()  # none suffices
+    assert port_test(cells, [wider, *ports[1:]], 0.0).only == ()  # two inputs do, which may be chance
     weak, ports = experiment(np.random.default_rng(8), 0.4)
     assert port_test(weak, ports, 0.0).only == ()  # several do
     none, ports = experiment(np.random.default_rng(6), 0.0)

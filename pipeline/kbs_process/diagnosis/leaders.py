@@ -9,6 +9,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from kbs_process.diagnosis.curves import CurveSuspect
+from kbs_process.diagnosis.dissipation import drives
 from kbs_process.diagnosis.finding import Tried, explained_share
 from kbs_process.diagnosis.floor import Floor
 from kbs_process.diagnosis.gate import Fold, Gate, gate, whiteness
@@ -127,7 +128,14 @@ def gated(found: Found, before: Standing, after: Standing, own: Own) -> Gate:
     if isinstance(found.suspect, CurveSuspect) and share is not None and not share >= LAW_VARIANCE:
         reason = f"a curve that explains {100.0 * share:.0f} % of the held-out excess is no law"
         verdict = replace(verdict, passed=False, reasons=(*verdict.reasons, reason))
-    return _plausible(verdict, found.suspect, [(known.value[k], known.sigma[k]) for k in places])
+    verdict = _plausible(verdict, found.suspect, [(known.value[k], known.sigma[k]) for k in places])
+    if isinstance(found.suspect, Catalogued):
+        index = np.array(places)
+        reasons = drives(found.suspect, known.value[index], known.covariance[np.ix_(index, index)])
+        verdict = replace(
+            verdict, passed=verdict.passed and not reasons, reasons=(*verdict.reasons, *reasons)
+        )
+    return verdict
 
 
 def _plausible(verdict: Gate, suspect: Suspect, numbers: Sequence[tuple[float, float]]) -> Gate:

@@ -81,16 +81,16 @@ class PortTest:
 
     @property
     def only(self) -> tuple[str, ...]:
-        """The port that suffices with the fewest inputs, and those like it; nothing, if one that is unlike does, too.
+        """The port of one input that suffices, and those like it; nothing, if one that is unlike does, too.
 
-        What more inputs can do is no reason to doubt it: they contain it.
+        What ports of several inputs can do is no reason to doubt it: that one input serves all channels is no
+        coincidence. Of three or six it may be.
         """
-        able = [port for port in self.ports if port.sufficient]
+        able = [port for port in self.ports if port.sufficient and port.inputs == 1]
         if self.log_p > np.log(PORT_ALPHA) or not able:
             return ()
-        least = [port for port in able if port.inputs == min(one.inputs for one in able)]
-        best = least[0]
-        return tuple(p.name for p in least) if all(p is best or p.name in best.alike for p in least) else ()
+        best = able[0]
+        return tuple(p.name for p in able) if all(p is best or p.name in best.alike for p in able) else ()
 
 
 def sine_window(n: int) -> Array:

@@ -13,6 +13,7 @@ from kbs_process.signals.records import Array
 _HIGHEST_ORDER = 420.0  # of a motor: twice the teeth's passing and what lies around it
 _ORDER_STEP = 0.25
 _HIGHEST_OF_DISC = 1000.0  # of an encoder's disc: beyond it a code's interpolation is looked for
+_TURNS = 10.0  # of a tone in a recording, fewer of which are drift, or the motion
 _MOVING = 1e-3  # rad/s of a motor
 _BY_ORDER = ("order", "ripple_order")
 _BY_DISC = ("eccentric_order",)
@@ -37,6 +38,9 @@ def _sweep(known: Known) -> tuple[float, float] | None:
         for k in experiment.fit
         if (tone := sweeping(_in_time(known, k), experiment.dt, experiment.highest_Hz)) is not None
     ]
+    shortest = min(len(experiment.trials[k].valid) for k in experiment.fit) * experiment.dt
+    slow = _TURNS / shortest
+    tones = [tone for tone in tones if min(tone[1], tone[1] + tone[2] * shortest) > slow]
     return max(tones)[1:] if tones else None
 
 
@@ -47,7 +51,8 @@ def _frequencies(known: Known) -> tuple[float, ...]:
         layout = known.metric[k].layout(known.residual[k])
         power = np.sum(layout**2, axis=0)
         f = known.metric[k].whiten.f
-        best = power.max(axis=1)
+        length = len(known.experiment.trials[k].valid) * known.experiment.dt
+        best = np.where(f * length < _TURNS, 0.0, power.max(axis=1))
         total[k] = f, best
     found: list[tuple[float, float]] = []
     for f, best in total.values():

@@ -1,0 +1,49 @@
+"""Whether a friction takes work out of the mechanism: one that puts work in stands in for something else."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kbs_process.diagnosis.families import family
+from kbs_process.diagnosis.screen import Catalogued
+from kbs_process.diagnosis.signature import port_inputs
+from kbs_process.diagnosis.suspects import Candidate
+from kbs_process.plant.effect import Effect, Port
+from kbs_process.signals.records import Array
+
+_TAKES = ("friction", "viscous")  # families
+_RATES = {Port.MOTOR_TORQUE: "rotor_rate", Port.JOINT_TORQUE: "joint_rate", Port.GROUND_TORQUE: "joint_rate"}
+SIGMAS = 3.0  # by which work has to be done for a friction to be refused
+
+
+def drives(suspect: Catalogued, amplitudes: Array, covariance: Array) -> tuple[str, ...]:
+    r"""Return why a friction of such amplitudes (m,), covariance (m, m), is none; nothing, if it may be one.
+
+    Equation: $W = \sum_j a_j \sum_t T_j(t) \omega(t) \, dt$ over all trajectories, $T_j$ the torque of a unit of
+        amplitude j at the screen's shape, $\omega$ the rate at its port.
+    Units: N m, rad/s, s -> J.
+    Validity: the friction of the nominal model is known to its sigmas and refitted: less of it is no find.
+    Source: J. C. Willems, Dissipative dynamical systems I, Arch. Rational Mech. Anal. 45 (1972) 321.
+    """
+    candidate = suspect.candidate
+    if not (isinstance(candidate.effect, Effect) and candidate.port in _RATES):
+        return ()
+    if family(candidate.name) not in _TAKES:
+        return ()
+    work = _work(suspect, candidate, _RATES[candidate.port])
+    done, variance = float(work @ amplitudes), float(work @ (covariance @ work))
+    sigma = float(np.sqrt(max(variance, 0.0)))
+    if not done > SIGMAS * sigma:
+        return ()
+    return (f"does work of {done:.3g} J in these motions, and friction takes it",)
+
+
+def _work(suspect: Catalogued, candidate: Candidate, rate: str) -> Array:
+    """(m,) J that a unit of each amplitude does along all trajectories."""
+    scene = suspect.scene
+    total = np.zeros(len(candidate.amplitudes))
+    for tapped in scene.signals.values():
+        torque = port_inputs(candidate, tapped, scene.hypothesis.rig)[:, :, 0]
+        speed = tapped.values[:, tapped.columns.index(f"{rate}.{candidate.site}")]
+        total += torque.T @ speed / tapped.rate
+    return total
