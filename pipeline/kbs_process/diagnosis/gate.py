@@ -1,8 +1,8 @@
 """The gate: a law is accepted only inside the plant, refitted, and if it predicts recordings that were not used.
 
-No held-out trial's whitened residual may become worse and all together have to improve, by as much as chance does not
-and as what was fitted lets expect; the interval of the law's coefficients has to exclude zero, and the residual has to
-be no less white. Where nothing was held out, each fit trial is left out in turn, to first order.
+No held-out trial's whitened residual may become worse, beyond chance, and all together have to improve, by as much as
+chance does not and as what was fitted lets expect; the interval of the law's coefficients has to exclude zero, and the
+residual has to be no less white. Where nothing was held out, each fit trial is left out in turn, to first order.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def gate(before: Known, after: Known, coefficients: Sequence[int]) -> Gate:
     reasons = []
     # Written so that what is no number, of a plant that diverged, is refused.
     gained = sum(fold.gain for fold in folds)
-    if worse := [fold.trial for fold in folds if not fold.gain > -GATE_WORSE * abs(gained)]:
+    if worse := worsened(folds):
         reasons.append(f"{', '.join(worse)} predicted worse")
     if not gained >= GATE_GAIN:
         reasons.append("recordings that were not used gain less than chance could give")
@@ -66,6 +66,12 @@ def gate(before: Known, after: Known, coefficients: Sequence[int]) -> Gate:
     if not white[1] <= white[0] + _spread(after):
         reasons.append("the residual is less white with it")
     return Gate(not reasons, folds, held_out, sigmas, white, tuple(reasons))
+
+
+def worsened(folds: Sequence[Fold]) -> list[str]:
+    """Trials that are predicted worse, by more than chance does it and than is little beside what all gain."""
+    allowed = max(GATE_WORSE * abs(sum(fold.gain for fold in folds)), GATE_GAIN)
+    return [fold.trial for fold in folds if not fold.gain > -allowed]
 
 
 def _sigmas(a: Array, C: Array) -> float:
