@@ -41,6 +41,15 @@ def test_a_friction_takes_work(scene: Scene, name: str) -> None:
     assert said(scene, name, -0.5, sigma=1.0) == ()  # nobody knows its sign
 
 
+def test_two_actions_of_one_law_are_judged_together(scene: Scene) -> None:
+    assert said(scene, "coulomb", 0.5, -0.2) == ()
+    assert said(scene, "coulomb", -0.5, 0.2) != ()
+
+
+def test_a_friction_that_differs_with_the_sense_may_have_either_sign(scene: Scene) -> None:
+    assert said(scene, "motor_asymmetry", 0.3, 0.3) == said(scene, "motor_asymmetry", -0.3, -0.3) == ()
+
+
 def test_viscous_friction_does_the_work_of_its_rate(scene: Scene) -> None:
     tapped = scene.signals[0]
     rate = tapped.values[:, tapped.columns.index("joint_rate.el")]

@@ -90,8 +90,8 @@ def test_known_numbers_that_stand_at_bounds_do_not_do_what_an_effect_does() -> N
     free, wide, bound = (
         Background.of(z, J, precision, room=room) for room in (None, (-far, far), (-far, near))
     )
-    assert wide.bounded is None and bound.bounded is not None
-    without, held = (score(one, Sums.over(one, S)) for one in (free, bound))
+    without, unbarred, held = (score(one, Sums.over(one, S)) for one in (free, wide, bound))
+    assert unbarred.gain == without.gain
     assert held.gain > 3.0 * without.gain
     # As by hand: the number that stands at its bound, and would go farther with the effect as well, has no column.
     A = np.vstack([*[np.hstack([S[k], np.delete(J[k], 3, 1)]) for k in J],
@@ -101,6 +101,21 @@ def test_known_numbers_that_stand_at_bounds_do_not_do_what_an_effect_does() -> N
     assert held.amplitude[0] == pytest.approx(joint[0], rel=1e-6)
     squares = np.sum((y - A[:, 1:] @ alone) ** 2) - np.sum((y - A @ joint) ** 2)
     assert held.gain == pytest.approx(squares, rel=1e-6)
+
+
+def test_known_numbers_that_would_leave_their_bounds_beside_an_effect_do_not() -> None:
+    """Alone the number has nothing to do; an effect that is nearly its own would draw it far out."""
+    rng = np.random.default_rng(11)
+    J, precision = drawn(rng)
+    noise = {k: rng.standard_normal(ROWS) for k in J}
+    S = {k: (J[k][:, 3] + 0.3 * noise[k])[:, None] for k in J}
+    z = {k: 6.0 * noise[k] for k in J}  # the effect of 20 less 20 of the number
+    room = np.full(KNOWN, 1.0)
+    weak = 1e-3 * precision
+    free, bound = Background.of(z, J, weak), Background.of(z, J, weak, room=(-room, room))
+    without, held = (score(one, Sums.over(one, S)) for one in (free, bound))
+    assert without.amplitude[0] == pytest.approx(20.0, rel=0.05)
+    assert held.gain < 0.3 * without.gain and held.amplitude[0] < 5.0
 
 
 def test_dependent_amplitudes_count_once() -> None:

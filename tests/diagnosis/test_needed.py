@@ -107,8 +107,8 @@ def test_what_is_small_beside_a_find_at_the_same_place_may_be_its_formula(made: 
     def earlier(one: Accepted, rho_eff: float) -> Accepted:
         return replace(one, find=replace(one.find, rho_eff=rho_eff))
 
-    assert in_the_shade(cable.tried, [earlier(cable, 10.0 * size)]) == ()
-    (reason,) = in_the_shade(cable.tried, [earlier(lag, 100.0 * size), earlier(cable, 100.0 * size)])
+    assert in_the_shade(cable.tried.found, [earlier(cable, 10.0 * size)]) == ()
+    (reason,) = in_the_shade(cable.tried.found, [earlier(lag, 100.0 * size), earlier(cable, 100.0 * size)])
     assert "1.0 %" in reason
     # At another place it is a law of its own, however small.
-    assert in_the_shade(cable.tried, [earlier(lag, 100.0 * size)]) == ()
+    assert in_the_shade(cable.tried.found, [earlier(lag, 100.0 * size)]) == ()

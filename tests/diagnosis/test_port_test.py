@@ -97,7 +97,8 @@ def test_the_only_port_is_named_with_those_that_look_the_same_and_with_no_other(
     cells, ports = experiment(rng, 10.0)
     twin = PortModel("twin", ports[0].H * drawn(rng, CELLS, 1, 1), ports[0].varied)
     wider = PortModel("wider", np.concatenate([ports[0].H, drawn(rng, CELLS, C, 1)], axis=2), ports[0].varied)
-    assert set(port_test(cells, [*ports, twin, wider], 0.0).only) == {"a", "twin"}
+    assert set(port_test(cells, [*ports, twin], 0.0).only) == {"a", "twin"}
+    assert port_test(cells, [*ports, twin, wider], 0.0).only == ()  # it may be along a part of that
     assert port_test(cells, ports[1:], 0.0).only == ()  # none suffices
     assert port_test(cells, [wider, *ports[1:]], 0.0).only == ()  # two inputs do, which may be chance
     weak, ports = experiment(np.random.default_rng(8), 0.4)

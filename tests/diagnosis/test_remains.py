@@ -89,8 +89,16 @@ def test_a_law_that_leaves_most_follows_something_else(cabled: Experiment, made:
     floor = declared(cabled)
     share = 1.0 - np.sqrt(1.0 - 0.5 * TAKEN)
     before, after = standing(cabled), standing(weaker(made, cabled, float(1.0 - share)))
-    (reason,) = too_little(before, after, floor)
-    assert "follows what something else does" in reason
+    reason, unused = too_little(before, after, floor)
+    assert "follows what something else does" in reason and "not fitted" in unused
+
+
+def test_a_law_has_to_take_as_much_of_recordings_that_were_not_used(
+    cabled: Experiment, made: Experiment
+) -> None:
+    before, after = standing(cabled), standing(with_cable(made, (2,)))
+    (reason,) = too_little(before, after, declared(cabled))
+    assert reason == "takes 0 % of what exceeds the floor where it was not fitted"
 
 
 @pytest.mark.parametrize(("strength", "verdict"), [(0.0, "none"), (8.0, "undecided")])

@@ -21,7 +21,8 @@ KEY = ("model", "sensing")
 def belongs_to_model(law: Sensing) -> bool:
     """Whether a law is the same in every recording, and changes what is read.
 
-    What drifts or hums has numbers of its own each time, and the controller's errors are in the field that is recorded.
+    What drifts or hums has numbers of its own each time; what a controller or a driver does to the field is in no
+    model.
     """
     return not law.each_trial and law.port is not SensingPort.CONTROLLER
 

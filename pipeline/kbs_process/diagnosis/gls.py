@@ -11,9 +11,9 @@ gain is what -2 log likelihood falls by, chi-square with rank(A) degrees of free
 square of rho_eff, what is left of rho^2 = a^T S^T S a once the known parameters were refitted. Combinations of
 amplitudes of which these leave less than a hundredth are theirs: what they would gain does not count.
 
-Known numbers that stand at bounds go no farther. Where they would, amplitudes and numbers together are the least
-squares between these bounds, and gain is what that gains beyond the numbers alone: else these seem to do what the
-effect does.
+Known numbers have bounds. Where they would go farther, alone or beside the effect, amplitudes and numbers together are
+the least squares between these, and gain is what that gains beyond the numbers alone: else these seem to do what the
+effect does. Which combinations are an effect's own is told without bounds: what a number would do if it went on is its.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ _NOTHING = 1e-100  # whitened length of a signature that is nothing: squares of 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Bounded:
-    """Known parameters, scaled, some of which want beyond their bounds."""
+    """Known parameters, scaled, between bounds."""
 
     H: Array  # (p, p)
     h: Array  # (p,)
@@ -48,6 +48,10 @@ class Bounded:
     def of(cls, H: Array, h: Array, low: Array, high: Array) -> Bounded:
         x = bounded_minimum(H, h, low, high)
         return cls(H, h, low, high, float(2.0 * h @ x - x @ H @ x))
+
+    def bars(self, step: Array) -> bool:
+        """Whether a step (p,) leads beyond bounds."""
+        return bool(((step < self.low) | (step > self.high)).any())
 
     def beside(self, whole: Array, pull: Array, across: Array) -> tuple[Array, float]:
         """Best amplitudes (m,) beside them, and what these gain: S^T S (m, m), S^T z (m,), S^T J (m, p), scaled."""
@@ -68,7 +72,7 @@ class Background:
     factor: tuple[Array, bool]  # of H, scaled
     scale: Array  # (p,)
     shift: Array  # (p,) of H's scaled parameters: the known parameters' own step, zero after a refit
-    bounded: Bounded | None = None  # where that step, or a part of it, is barred
+    bounded: Bounded | None = None  # where known numbers have bounds
 
     @classmethod
     def of(
@@ -93,8 +97,7 @@ class Background:
         bounded = None
         if room is not None:
             low, high = (np.where(size > 0.0, side * size, 0.0) for side in room)
-            if ((shift < low) | (shift > high)).any():
-                bounded = Bounded.of(H, scale * h, low, high)
+            bounded = Bounded.of(H, scale * h, low, high)
         return cls(z, J, factor, scale, shift, bounded)
 
     @property
@@ -178,8 +181,10 @@ def score(background: Background, sums: Sums) -> Score:
     # Where whole = S^T S is one, root is that of the inverse of 1 - kappa.
     own = root[:, np.sum((whole @ root) * root, axis=0) * (1.0 - ABSORBED) < 1.0]
     share, own_gain = own.T @ b, float(np.sum((own.T @ b) ** 2))
-    if background.bounded is not None and own.shape[1]:
-        share, own_gain = background.bounded.beside(own.T @ whole @ own, own.T @ (sums.Sz * unit), own.T @ SJ)
+    bounded = background.bounded
+    step = background.shift - cho_solve(background.factor, SJ.T @ (own @ share)) if SJ.shape[1] else share
+    if bounded is not None and own.shape[1] and (bounded.bars(background.shift) or bounded.bars(step)):
+        share, own_gain = bounded.beside(own.T @ whole @ own, own.T @ (sums.Sz * unit), own.T @ SJ)
     return Score(
         gain=own_gain,
         rank=own.shape[1],

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -23,6 +23,7 @@ from kbs_process.diagnosis.remains import detected, searched
 from kbs_process.diagnosis.rivals import probabilities
 from kbs_process.diagnosis.screen import Bench, Catalogued, Found, Suspect
 from kbs_process.diagnosis.side_by_side import side_by_side
+from kbs_process.diagnosis.suspects import BY
 from kbs_process.diagnosis.thresholds import (
     CLOSE,
     FALSE_ALARM,
@@ -39,13 +40,13 @@ from kbs_process.diagnosis.tryout import extra_of, identity, in_plant
 from kbs_process.diagnosis.view import View
 
 
-def leaders(view: View) -> tuple[list[Found], list[Found]]:
+def leaders(view: View, among: Callable[[Found], bool] = lambda _: True) -> tuple[list[Found], list[Found]]:
     """The most probable suspects, as many as the linear plant may have in the wrong order, and a few that come next.
 
     Of a law that a channel can show in many ways, as products of others are, the best stands for all.
     """
     best: dict[tuple[str, ...], Found] = {}
-    for found in view.able:
+    for found in filter(among, view.able):
         best.setdefault(_way(found), found)
     able = list(best.values())
     if not able:
@@ -210,10 +211,10 @@ def reread(chosen: Tried, before: Standing, floor: Floor, simulate: Simulate) ->
     suspect, standing = chosen.found.suspect, chosen.standing
     if in_plant(suspect) or not chosen.own.names:
         return chosen
-    site = suspect.family[1]
+    site = _reads(suspect)
     view = View.of(
         bare(standing, chosen.own, simulate),
-        lambda one: one.family[1] == site and not in_plant(one) and not one.each_trial,
+        lambda one: _reads(one) == site and not in_plant(one) and not one.each_trial,
     )
     if not view.able or _alike(view.able[0].suspect, suspect):
         return chosen
@@ -224,6 +225,11 @@ def reread(chosen: Tried, before: Standing, floor: Floor, simulate: Simulate) ->
     told = Tried(found, new, gated(found, before, new, own), view.screening, own)
     chances = probabilities([standing.known, new.known], view.bench.background.rows)
     return told if told.gate.passed and chances[1] > chances[0] else chosen
+
+
+def _reads(suspect: Suspect) -> str:
+    """Site of a law of readings; of one that others act on, the channel that reads."""
+    return suspect.family[1].split(BY)[0]
 
 
 def _alike(one: Suspect, other: Suspect) -> bool:

@@ -13,8 +13,9 @@ from kbs_process.diagnosis.floor import Floor
 from kbs_process.diagnosis.hypothesis import Simulate
 from kbs_process.diagnosis.joint import Own, Standing, without
 from kbs_process.diagnosis.leaders import gated
-from kbs_process.diagnosis.outcome import Find
+from kbs_process.diagnosis.outcome import Find, Identity
 from kbs_process.diagnosis.remains import detected, too_little
+from kbs_process.diagnosis.screen import Found
 from kbs_process.diagnosis.thresholds import SHADE
 from kbs_process.diagnosis.tryout import identity
 
@@ -27,18 +28,22 @@ class Accepted:
     find: Find
 
 
-def in_the_shade(one: Tried, accepted: Sequence[Accepted]) -> tuple[str, ...]:
+def in_the_shade(found: Found, accepted: Sequence[Accepted]) -> tuple[str, ...]:
     """Return why a law does not stand beside a far greater find at the same joint or channel; nothing, if it does."""
-    own = identity(one.found.suspect)
     for other in accepted:
         there = other.find.identity
-        same = (own.axis, own.channels[:1]) == (there.axis, there.channels[:1])
-        share = one.found.score.rho_eff / other.find.rho_eff
-        if same and not share >= SHADE:
+        share = found.score.rho_eff / other.find.rho_eff
+        if _where(identity(found.suspect)) == _where(there) and not share >= SHADE:
             return (
                 f"is {100.0 * share:.1f} % of {there.law} there: its formula may be as far from nature's",
             )
     return ()
+
+
+def _where(one: Identity) -> tuple[str, ...]:
+    """Mechanics of a joint, its encoder, its field, or a channel."""
+    sensed = one.port in ("transducer", "encoder", "clock", "controller")
+    return (one.port if sensed else "mechanics", one.axis, *one.channels[:1])
 
 
 def needed(

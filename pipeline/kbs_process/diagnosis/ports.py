@@ -83,14 +83,16 @@ class PortTest:
     def only(self) -> tuple[str, ...]:
         """The port of one input that suffices, and those like it; nothing, if one that is unlike does, too.
 
-        What ports of several inputs can do is no reason to doubt it: that one input serves all channels is no
-        coincidence. Of three or six it may be.
+        Nor, if one of several inputs does that looks the same: it may be along one of these.
         """
-        able = [port for port in self.ports if port.sufficient and port.inputs == 1]
-        if self.log_p > np.log(PORT_ALPHA) or not able:
+        able = [port for port in self.ports if port.sufficient]
+        one = [port for port in able if port.inputs == 1]
+        if self.log_p > np.log(PORT_ALPHA) or not one:
             return ()
-        best = able[0]
-        return tuple(p.name for p in able) if all(p is best or p.name in best.alike for p in able) else ()
+        best = one[0]
+        apart = any(port is not best and port.name not in best.alike for port in one)
+        within = any(port.inputs > 1 and port.name in best.alike for port in able)
+        return () if apart or within else tuple(port.name for port in one)
 
 
 def sine_window(n: int) -> Array:

@@ -51,16 +51,16 @@ def _frequencies(known: Known) -> tuple[float, ...]:
         layout = known.metric[k].layout(known.residual[k])
         power = np.sum(layout**2, axis=0)
         f = known.metric[k].whiten.f
-        length = len(known.experiment.trials[k].valid) * known.experiment.dt
-        best = np.where(f * length < _TURNS, 0.0, power.max(axis=1))
+        best = power.max(axis=1)
         total[k] = f, best
+    shortest = min(len(known.experiment.trials[k].valid) for k in total) * known.experiment.dt
     found: list[tuple[float, float]] = []
     for f, best in total.values():
         bound = -2.0 * np.log(LINE_ALPHA / (len(f) * len(total)))
         peaks = (
             np.flatnonzero((best[1:-1] >= best[:-2]) & (best[1:-1] >= best[2:]) & (best[1:-1] > bound)) + 1
         )
-        found += [(float(best[i]), float(f[i])) for i in peaks]
+        found += [(float(best[i]), float(f[i])) for i in peaks if f[i] * shortest > _TURNS]
     return _apart([value for _, value in sorted(found, reverse=True)], 0.05)
 
 
@@ -110,7 +110,11 @@ def _of_discs(known: Known) -> tuple[float, ...]:
                 continue
             power = _along(orders, angle[valid], series[valid][:, [channel]])
             fastest = (
-                2.0 * np.pi * experiment.highest_Hz / np.max(np.abs(np.diff(angle[valid]))) * experiment.dt
+                2.0
+                * np.pi
+                * experiment.highest_Hz
+                / np.max(np.abs(np.diff(angle))[valid[1:] & valid[:-1]])
+                * experiment.dt
             )
             # Less than two turns in the range is an offset and a gain; faster than the working rate shows is no line.
             power[(orders * np.ptp(angle[valid]) < 4.0 * np.pi) | (orders > fastest)] = 0.0

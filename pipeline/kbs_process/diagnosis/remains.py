@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from kbs_process.diagnosis.detection import Detection, detect
 from kbs_process.diagnosis.experiment import Experiment
+from kbs_process.diagnosis.finding import explained_share
 from kbs_process.diagnosis.floor import Floor
 from kbs_process.diagnosis.joint import Standing
 from kbs_process.diagnosis.thresholds import LEAD, TAKEN, TOLERATED
@@ -49,6 +50,9 @@ def too_little(before: Standing, after: Standing, floor: Floor) -> tuple[str, ..
         reasons.append(
             f"takes {100.0 * share:.0f} % of what exceeds the floor: it follows what something else does"
         )
+    unused = explained_share(before.known, after.known)
+    if unused is not None and not unused >= TAKEN:
+        reasons.append(f"takes {100.0 * unused:.0f} % of what exceeds the floor where it was not fitted")
     left = here.ratios
     most = max(ratio - left[trajectory] for trajectory, ratio in there.ratios.items())
     if searched(experiment) and not most >= TOLERATED:

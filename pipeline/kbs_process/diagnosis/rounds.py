@@ -109,14 +109,14 @@ def _mismatch(before: Detection, first: Screening, kept: Sequence[Accepted]) -> 
 def _round(standing: Standing, floor: Floor, simulate: Simulate, accepted: Sequence[Accepted] = ()) -> _Round:
     view = View.of(standing)
     place = _place(standing, floor, view.scene)
-    passed, refused = _passed(view, floor, simulate)
+    passed, refused = _passed(view, floor, simulate, accepted)
     if not passed:
         return _Round(None, standing, view.screening, tuple(refused), place)
     chances = probabilities([one.standing.known for one in passed], view.bench.background.rows)
     best = int(np.argmax(chances))
     settled = released(resettled(passed[best].standing, floor, simulate, leaps=1), floor, simulate)
     told = reread(replace(passed[best], standing=settled), standing, floor, simulate)
-    if reasons := too_little(standing, told.standing, floor) or in_the_shade(told, accepted):
+    if reasons := too_little(standing, told.standing, floor):
         refused.append(Refused(_law(told), told.found.score.rho_eff, reasons))
         return _Round(None, standing, view.screening, tuple(refused), place)
     # Told anew, it may be what another was: their chances are one then.
@@ -130,7 +130,9 @@ def _law(one: Tried) -> Identity:
     return identity(one.found.suspect)
 
 
-def _passed(view: View, floor: Floor, simulate: Simulate) -> tuple[list[Tried], list[Refused]]:
+def _passed(
+    view: View, floor: Floor, simulate: Simulate, accepted: Sequence[Accepted]
+) -> tuple[list[Tried], list[Refused]]:
     """Suspects that passed the gate, and those that did not."""
     passed: list[Tried] = []
     refused: list[Refused] = []
@@ -138,7 +140,13 @@ def _passed(view: View, floor: Floor, simulate: Simulate) -> tuple[list[Tried], 
     if reason := promises_little(view, there):
         found = view.able[0]
         return [], [Refused(identity(found.suspect), found.score.rho_eff, (reason,))]
-    first, others = leaders(view)
+    shaded = {id(found): reasons for found in view.able if (reasons := in_the_shade(found, accepted))}
+    refused += [
+        Refused(identity(found.suspect), found.score.rho_eff, shaded[id(found)])
+        for found in view.able
+        if id(found) in shaded
+    ]
+    first, others = leaders(view, lambda found: id(found) not in shaded)
     for chosen in (first, *([found] for found in others)):
         more, less = tried(chosen, view, view.standing, floor, simulate)
         passed, refused = [*passed, *more], [*refused, *less]

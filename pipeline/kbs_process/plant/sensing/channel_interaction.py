@@ -11,7 +11,7 @@ def change(acting: Array, interaction: float) -> Array:
     r"""Change of a channel by the product of two: a bridge that a load bends out of its place for another one.
 
     Equation: $\Delta y_i = x_{ijk} y_j y_k$, `acting` being the product.
-    Units: the acting channels', SI by channels -> the channel's.
+    Units: the acting channels' product, SI (the channel's unit over that product's) -> the channel's.
     Validity: one of the 21 second-order terms of a balance's calibration; of the loads that are predicted.
     Source: AIAA R-091A-2020, Calibration and use of internal strain-gage balances with application to wind tunnel
         testing, mathematical model of second order.
