@@ -10,7 +10,8 @@ from kbs_process.diagnosis.experiment import Experiment
 from kbs_process.diagnosis.finding import explained_share
 from kbs_process.diagnosis.floor import Floor
 from kbs_process.diagnosis.joint import Standing
-from kbs_process.diagnosis.thresholds import LEAD, TAKEN, TOLERATED
+from kbs_process.diagnosis.known import Known
+from kbs_process.diagnosis.thresholds import LEAD, TAKEN, TOLERATED, UNFORESEEN
 from kbs_process.diagnosis.view import View
 
 
@@ -51,13 +52,19 @@ def too_little(before: Standing, after: Standing, floor: Floor) -> tuple[str, ..
             f"takes {100.0 * share:.0f} % of what exceeds the floor: it follows what something else does"
         )
     unused = explained_share(before.known, after.known)
-    if unused is not None and not unused >= TAKEN:
+    if unused is not None and _unforeseen(after.known) and not unused >= TAKEN:
         reasons.append(f"takes {100.0 * unused:.0f} % of what exceeds the floor where it was not fitted")
     left = here.ratios
     most = max(ratio - left[trajectory] for trajectory, ratio in there.ratios.items())
     if searched(experiment) and not most >= TOLERATED:
         reasons.append(f"takes {100.0 * most:.1f} % of the floor's power: {_DIFFER}")
     return tuple(reasons)
+
+
+def _unforeseen(known: Known) -> bool:
+    """Whether recordings that nothing was fitted to are missed by more than known parameters' uncertainty has them."""
+    held_out = list(known.experiment.held_out)
+    return bool(known.chi2[held_out].sum() > (1.0 + UNFORESEEN) * known.rows[held_out].sum())
 
 
 def promises_little(view: View, there: Detection) -> str:
