@@ -89,8 +89,9 @@ def test_a_law_that_leaves_most_follows_something_else(cabled: Experiment, made:
     floor = declared(cabled)
     share = 1.0 - np.sqrt(1.0 - 0.5 * TAKEN)
     before, after = standing(cabled), standing(weaker(made, cabled, float(1.0 - share)))
-    reason, unused = too_little(before, after, floor)
-    assert "follows what something else does" in reason and "not fitted" in unused
+    reason, *unused = too_little(before, after, floor)
+    assert "follows what something else does" in reason
+    assert unused == []  # an eighth of what was not fitted is enough
 
 
 def test_a_law_has_to_take_as_much_of_recordings_that_were_not_used(
@@ -98,7 +99,7 @@ def test_a_law_has_to_take_as_much_of_recordings_that_were_not_used(
 ) -> None:
     before, after = standing(cabled), standing(with_cable(made, (2,)))
     (reason,) = too_little(before, after, declared(cabled))
-    assert reason == "takes 0 % of what exceeds the floor where it was not fitted"
+    assert reason == "takes 0 % of what r2 exceeds the floor by"
 
 
 @pytest.mark.parametrize(("strength", "verdict"), [(0.0, "none"), (8.0, "undecided")])

@@ -7,11 +7,10 @@ from dataclasses import replace
 
 from kbs_process.diagnosis.detection import Detection, detect
 from kbs_process.diagnosis.experiment import Experiment
-from kbs_process.diagnosis.finding import explained_share
 from kbs_process.diagnosis.floor import Floor
 from kbs_process.diagnosis.joint import Standing
 from kbs_process.diagnosis.known import Known
-from kbs_process.diagnosis.thresholds import LEAD, TAKEN, TOLERATED, UNFORESEEN
+from kbs_process.diagnosis.thresholds import LEAD, TAKEN, TAKEN_UNUSED, TOLERATED, UNFORESEEN
 from kbs_process.diagnosis.view import View
 
 
@@ -51,9 +50,7 @@ def too_little(before: Standing, after: Standing, floor: Floor) -> tuple[str, ..
         reasons.append(
             f"takes {100.0 * share:.0f} % of what exceeds the floor: it follows what something else does"
         )
-    unused = explained_share(before.known, after.known)
-    if unused is not None and _unforeseen(after.known) and not unused >= TAKEN:
-        reasons.append(f"takes {100.0 * unused:.0f} % of what exceeds the floor where it was not fitted")
+    reasons += _missed(before.known, after.known)
     left = here.ratios
     most = max(ratio - left[trajectory] for trajectory, ratio in there.ratios.items())
     if searched(experiment) and not most >= TOLERATED:
@@ -61,10 +58,17 @@ def too_little(before: Standing, after: Standing, floor: Floor) -> tuple[str, ..
     return tuple(reasons)
 
 
-def _unforeseen(known: Known) -> bool:
-    """Whether recordings that nothing was fitted to are missed by more than known parameters' uncertainty has them."""
-    held_out = list(known.experiment.held_out)
-    return bool(known.chi2[held_out].sum() > (1.0 + UNFORESEEN) * known.rows[held_out].sum())
+def _missed(before: Known, after: Known) -> list[str]:
+    """Of every held-out recording that is still missed, by more than nulls are, a law has to take some, too."""
+    reasons = []
+    for k in after.experiment.held_out:
+        left, gained = after.chi2[k] - after.rows[k], before.chi2[k] - after.chi2[k]
+        if left > UNFORESEEN * after.rows[k] and not gained >= TAKEN_UNUSED * (left + gained):
+            share = 100.0 * gained / (left + gained)
+            reasons.append(
+                f"takes {share:.0f} % of what {after.experiment.trials[k].name} exceeds the floor by"
+            )
+    return reasons
 
 
 def promises_little(view: View, there: Detection) -> str:

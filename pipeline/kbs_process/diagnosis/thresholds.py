@@ -70,6 +70,9 @@ SETTLED_TIMES: Final = 3.0
 # Share that a law has to take of what exceeds the floor, after all numbers were refitted with it: one that takes little
 # and leaves the rest follows what something else does.
 TAKEN: Final = 0.25
+# Likewise of each recording that was not used, where it still exceeds the floor by UNFORESEEN: a law that was wrong has
+# taken 0.08 of one, those that may be right 0.12 and more.
+TAKEN_UNUSED: Final = 0.1
 # Share of an earlier find's distance, at the same joint or channel, below which a law may as well be what the earlier
 # one's formula lacks of nature's: splines and catalogue laws have left 0.02 of effects made by other formulas.
 SHADE: Final = 0.03
