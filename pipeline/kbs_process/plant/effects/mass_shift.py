@@ -12,7 +12,7 @@ def torque(
 ) -> float:
     r"""Moment of its weight about the joint's axis, on the output: the laboratory's gravity reacts it.
 
-    Equation: $T = (a \sin\theta_l + b \cos\theta_l) \, \tfrac{1}{2} (1 + \tanh((\theta_l - \theta_0) / w))$.
+    Equation: $T = (a \sin\theta_l + b \cos\theta_l) (1 + \tanh((\theta_l - \theta_0) / w)) / 2$.
     Units: rad, N m, N m, rad, rad -> N m.
     Validity: a joint whose axis is not along gravity; the mass is small beside its link's and moves slowly, so that its
         inertia and what it does about other axes are left out. $a^2 + b^2 = (m g d)^2$, d being how far it moves.
