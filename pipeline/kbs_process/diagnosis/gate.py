@@ -8,7 +8,7 @@ residual has to be no less white. Where nothing was held out, each fit trial is 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import norm
@@ -40,6 +40,10 @@ class Gate:
     sigmas: float  # by which the coefficients are off zero, as one normal number's
     whiteness: tuple[float, float]  # before and after, see `whiteness`
     reasons: tuple[str, ...]  # of a refusal
+
+    def but(self, *reasons: str) -> Gate:
+        """The same with more reasons to refuse; passed still, where there are none."""
+        return replace(self, passed=self.passed and not reasons, reasons=(*self.reasons, *reasons))
 
 
 def gate(before: Known, after: Known, coefficients: Sequence[int]) -> Gate:

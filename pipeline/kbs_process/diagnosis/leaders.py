@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -127,25 +127,20 @@ def gated(found: Found, before: Standing, after: Standing, own: Own) -> Gate:
     verdict = gate(before.known, known, places)
     share = explained_share(before.known, known)
     if isinstance(found.suspect, CurveSuspect) and share is not None and not share >= LAW_VARIANCE:
-        reason = f"a curve that explains {100.0 * share:.0f} % of the held-out excess is no law"
-        verdict = replace(verdict, passed=False, reasons=(*verdict.reasons, reason))
-    verdict = _plausible(verdict, found.suspect, [(known.value[k], known.sigma[k]) for k in places])
-    if isinstance(found.suspect, Catalogued):
-        index = np.array(places)
-        reasons = drives(found.suspect, known.value[index], known.covariance[np.ix_(index, index)])
-        verdict = replace(
-            verdict, passed=verdict.passed and not reasons, reasons=(*verdict.reasons, *reasons)
-        )
-    return verdict
-
-
-def _plausible(verdict: Gate, suspect: Suspect, numbers: Sequence[tuple[float, float]]) -> Gate:
-    """The verdict on a law of the catalogue whose amplitudes have such values and sigmas."""
-    if not isinstance(suspect, Catalogued):
+        verdict = verdict.but(f"a curve that explains {100.0 * share:.0f} % of the held-out excess is no law")
+    if not isinstance(found.suspect, Catalogued):
         return verdict
-    sizes = {name: (float(a), float(b)) for name, (a, b) in zip(suspect.amplitudes, numbers, strict=False)}
-    reasons = (*verdict.reasons, *implausible(suspect.candidate.effect, sizes))
-    return replace(verdict, passed=not reasons, reasons=reasons)
+    index = np.array(places)
+    a, C = known.value[index], known.covariance[np.ix_(index, index)]
+    return verdict.but(*_oversized(found.suspect, a, np.sqrt(np.diag(C))), *drives(found.suspect, a, C))
+
+
+def _oversized(suspect: Suspect, values: Iterable[float], sigmas: Iterable[float]) -> tuple[str, ...]:
+    """Why a law of the catalogue does not have amplitudes of such values and sigmas; nothing, if it may."""
+    if not isinstance(suspect, Catalogued):
+        return ()
+    numbers = zip(map(float, values), map(float, sigmas), strict=True)
+    return implausible(suspect.candidate.effect, dict(zip(suspect.amplitudes, numbers, strict=False)))
 
 
 def _trial_by_trial(suspect: Suspect, standing: Standing, bench: Bench) -> tuple[Standing, Gate]:
@@ -190,7 +185,7 @@ def _trial_by_trial(suspect: Suspect, standing: Standing, bench: Bench) -> tuple
         white,
         reasons,
     )
-    return replace(standing, known=changed), _plausible(verdict, suspect, greatest)
+    return replace(standing, known=changed), verdict.but(*_oversized(suspect, *zip(*greatest, strict=True)))
 
 
 def resettled(standing: Standing, floor: Floor, simulate: Simulate, *, leaps: int) -> Standing:

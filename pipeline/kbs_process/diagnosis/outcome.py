@@ -126,9 +126,8 @@ class Place:
 
     test: PortTest
     cells: Cells
-    only: tuple[
-        PortName, ...
-    ]  # the port where it enters, and those that look the same; none, where others can do it
+    # The port where it enters, and those that look the same; none, where others can do it.
+    only: tuple[PortName, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

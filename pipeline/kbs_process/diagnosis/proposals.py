@@ -109,13 +109,8 @@ def _of_discs(known: Known) -> tuple[float, ...]:
             if not np.ptp(angle[valid]) * orders[-1] > 4.0 * np.pi:
                 continue
             power = _along(orders, angle[valid], series[valid][:, [channel]])
-            fastest = (
-                2.0
-                * np.pi
-                * experiment.highest_Hz
-                / np.max(np.abs(np.diff(angle))[valid[1:] & valid[:-1]])
-                * experiment.dt
-            )
+            rate = np.max(np.abs(np.diff(angle))[valid[1:] & valid[:-1]]) / experiment.dt
+            fastest = 2.0 * np.pi * experiment.highest_Hz / rate
             # Less than two turns in the range is an offset and a gain; faster than the working rate shows is no line.
             power[(orders * np.ptp(angle[valid]) < 4.0 * np.pi) | (orders > fastest)] = 0.0
             peak = int(np.argmax(power))

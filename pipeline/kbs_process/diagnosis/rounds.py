@@ -106,7 +106,7 @@ def _mismatch(before: Detection, first: Screening, kept: Sequence[Accepted]) -> 
     return float(min(0.0, np.log(2.0) + min([before.log_p, *found])))
 
 
-def _round(standing: Standing, floor: Floor, simulate: Simulate, accepted: Sequence[Accepted] = ()) -> _Round:
+def _round(standing: Standing, floor: Floor, simulate: Simulate, accepted: Sequence[Accepted]) -> _Round:
     view = View.of(standing)
     place = _place(standing, floor, view.scene)
     passed, refused = _passed(view, floor, simulate, accepted)
@@ -140,13 +140,10 @@ def _passed(
     if reason := promises_little(view, there):
         found = view.able[0]
         return [], [Refused(identity(found.suspect), found.score.rho_eff, (reason,))]
-    shaded = {id(found): reasons for found in view.able if (reasons := in_the_shade(found, accepted))}
-    refused += [
-        Refused(identity(found.suspect), found.score.rho_eff, shaded[id(found)])
-        for found in view.able
-        if id(found) in shaded
-    ]
-    first, others = leaders(view, lambda found: id(found) not in shaded)
+    for found in view.able:
+        if reasons := in_the_shade(found, accepted):
+            refused.append(Refused(identity(found.suspect), found.score.rho_eff, reasons))
+    first, others = leaders(view, lambda found: not in_the_shade(found, accepted))
     for chosen in (first, *([found] for found in others)):
         more, less = tried(chosen, view, view.standing, floor, simulate)
         passed, refused = [*passed, *more], [*refused, *less]
