@@ -12,13 +12,16 @@ from kbs_process.diagnosis.families import port_word
 from kbs_process.diagnosis.hypothesis import Hypothesis, predict
 from kbs_process.diagnosis.joint import with_extra
 from kbs_process.diagnosis.places import points_of
+from kbs_process.diagnosis.ranges import Ranges
 from kbs_process.diagnosis.scene import Scene
 from kbs_process.diagnosis.screen import Bench, Catalogued, screen
-from kbs_process.diagnosis.suspects import Candidate
+from kbs_process.diagnosis.shapes import bettered
+from kbs_process.diagnosis.suspects import Candidate, candidates
 from kbs_process.diagnosis.tryout import extra_of, identity
 from kbs_process.plant.attach import attach
 from kbs_process.plant.effects import select
 from kbs_process.plant.effects.air_drag import AIR_DRAG
+from kbs_process.plant.effects.bungee import BUNGEE
 from kbs_process.stages.output_error import Scalar
 
 DRAG, POWER, POINT = 0.8, 1.75, np.array([0.3, -0.1, 0.12])  # N at 0.01 m/s, 1, m
@@ -40,7 +43,7 @@ def test_the_point_of_a_drag_is_found_beside_its_size_and_power() -> None:
         for site in ("az", "el")
         for point in points_of(AIR_DRAG, made.rig, site)
     ]
-    best = screen(tried, [Catalogued(one, scene) for one in every]).candidates[0]
+    best = bettered(tried, screen(tried, [Catalogued(one, scene) for one in every]).candidates[0])
     own = identity(best.suspect)
     assert (own.port, own.axis, own.family) == ("external wrench", "el", "air drag")
     assert port_word(AIR_DRAG.name, AIR_DRAG.port) == "external wrench"
@@ -54,3 +57,27 @@ def test_the_point_of_a_drag_is_found_beside_its_size_and_power() -> None:
         print(f"{name}: {number:.4f} +- {after.sigma[found[name]]:.4f}, true {value}")
         assert number == pytest.approx(value, abs=near)
     assert after.level < 1.1 < 100.0 < here.known.level
+
+
+def test_a_cord_that_nobody_stated_is_found_wherever_its_anchor_is() -> None:
+    made = bench.experiment(bench.rig(), ("fit", "fit"), 5)
+    names = tuple(one.name for one in select([*made.effects, BUNGEE.name]))
+    cord = {"stiffness": 3.0, "free_length": 0.8, "anchor_x": 0.45, "anchor_y": -0.3, "anchor_z": 1.3}
+    truth = attach(made.rig, BUNGEE, cord, on="el", point=POINT)
+    bare = predict(Hypothesis(made.rig, made.effects), made, 0).values
+    added = predict(Hypothesis(truth, names), made, 0).values - bare
+    trials = tuple(replace(t, measured=t.measured + added * t.valid[:, None]) for t in made.trials)
+    here = bench.standing(replace(made, trials=trials), FREE)
+    scene = Scene.of(here.known.experiment, here.hypothesis, here.predicted)
+    tried = Bench.of(here.known, scene)
+    none = Ranges({})
+    every = [
+        one for one in candidates(made.rig, made.effects, none, (), made.channels) if one.name == BUNGEE.name
+    ]
+    best = bettered(tried, screen(tried, [Catalogued(one, scene) for one in every]).candidates[0])
+    own = identity(best.suspect)
+    assert (own.port, own.axis, own.family) == ("external wrench", "el", "bungee")
+    after = with_extra(here, extra_of(best, here, tried, scene), bench.serial(made)).known
+    for name, value, sigma in zip(after.names, after.value, after.sigma, strict=True):
+        print(f"{name}: {value:.4f} +- {sigma:.4f}")
+    assert after.level < 1.1 < 5.0 < here.known.level

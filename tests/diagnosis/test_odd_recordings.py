@@ -225,11 +225,14 @@ def test_a_law_of_a_size_that_none_has_is_refused() -> None:
     usual = {"eccentric_sin": (3e-4, 1e-5), "eccentric_cos": (-0.5, 0.4)}
     assert implausible(eccentric, usual) == ()
     (reason,) = implausible(eccentric, usual | {"eccentric_sin": (0.87, 0.002)})
-    assert reason == "eccentric_sin = 0.87 rad, and 0.02 rad is the most that it may be"
+    assert reason == "eccentric_sin = 0.87 rad, and it may be -0.02 to 0.02 rad"
     assert implausible(eccentric, usual | {"eccentric_sin": (np.nan, 0.002)})
     coulomb = next(law for law in CATALOGUE if law.name == "coulomb")
     assert implausible(coulomb, {"coulomb": (90.0, 1.0)}) == ()
     assert implausible(coulomb, {"coulomb": (190.0, 1.0)})
+    cord = next(law for law in CATALOGUE if law.name == "bungee")
+    assert implausible(cord, {"stiffness": (-1.0, 0.5)}) == ()
+    assert implausible(cord, {"stiffness": (-2.0, 0.5)})  # a cord does not push
 
 
 def test_a_signature_of_next_to_no_length_does_nothing() -> None:

@@ -138,6 +138,16 @@ def test_an_accepted_law_may_act_once_more_where_it_acts_already() -> None:
     assert pulled == {"tether_2"}  # a force has one place, wherever the next is looked for
 
 
+def test_what_residuals_propose_is_tried_at_every_action_and_at_its_own_joint() -> None:
+    acting = attach(rig(), one("motor_order", "el", order=2.0).effect, {"order_sin": 1e-3, "order": 2.0})  # type: ignore[arg-type]
+    lines = replace(ranges(), proposed={"order": (17.5,), "local_angle.el": (1.2345,)})
+    every = candidates(acting, NOMINAL, lines, tapped().columns, CHANNELS, accepted=("motor_order",))
+    orders = {dict(s.shape)["order_2"] for s in every if (s.effect.name, s.site) == ("motor_order_2", "el")}
+    assert 17.5 in orders
+    tried = {s.site for s in every if s.name == "local_torque" and dict(s.shape)["local_angle"] == 1.2345}
+    assert tried == {"el"}
+
+
 def test_a_force_on_a_link_is_a_wrench_about_the_transducer() -> None:
     bungee = one("bungee", "el")
     (column,) = inputs(bungee, tapped(), rig(), NOMINAL)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from scipy.stats import chi2
@@ -22,6 +23,7 @@ from kbs_process.diagnosis.plausible import implausible
 from kbs_process.diagnosis.remains import detected, searched
 from kbs_process.diagnosis.rivals import probabilities
 from kbs_process.diagnosis.screen import Bench, Catalogued, Found, Suspect
+from kbs_process.diagnosis.shapes import bettered
 from kbs_process.diagnosis.side_by_side import side_by_side
 from kbs_process.diagnosis.suspects import BY
 from kbs_process.diagnosis.thresholds import (
@@ -34,6 +36,7 @@ from kbs_process.diagnosis.thresholds import (
     SECOND,
     SETTLED,
     SETTLED_TIMES,
+    SHAPED,
     TOLERATED,
 )
 from kbs_process.diagnosis.tryout import extra_of, identity, in_plant
@@ -43,14 +46,16 @@ from kbs_process.diagnosis.view import View
 def leaders(view: View, among: Callable[[Found], bool] = lambda _: True) -> tuple[list[Found], list[Found]]:
     """The most probable suspects, as many as the linear plant may have in the wrong order, and a few that come next.
 
-    Of a law that a channel can show in many ways, as products of others are, the best stands for all.
+    Each with its shape bettered along the linear plant. Of a law that a channel can show in many ways, as products of
+    others are, the best stands for all.
     """
     best: dict[tuple[str, ...], Found] = {}
     for found in filter(among, view.able):
         best.setdefault(_way(found), found)
-    able = list(best.values())
+    able = side_by_side(partial(bettered, view.bench), list(best.values())[:SHAPED])
     if not able:
         return [], []
+    able.sort(key=lambda found: -found.log_evidence)
     bound = (1.0 - LEAD) * able[0].score.gain if view.ordered else 0.0
     first = [found for found in able if found.score.gain >= bound or found is able[0]][:LEADERS]
     return first, [found for found in able if found not in first][:SECOND]
@@ -213,7 +218,7 @@ def reread(chosen: Tried, before: Standing, floor: Floor, simulate: Simulate) ->
     )
     if not view.able or _alike(view.able[0].suspect, suspect):
         return chosen
-    found = view.able[0]
+    found = bettered(view.bench, view.able[0])
     new = with_extra(view.standing, extra_of(found, view.standing, view.bench, view.scene), simulate)
     new = resettled(new, floor, simulate, leaps=0)
     own = own_of(found, before, new)

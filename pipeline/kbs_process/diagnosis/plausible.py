@@ -23,13 +23,14 @@ def implausible(law: Effect | Sensing, amplitudes: Mapping[str, tuple[float, flo
         if parameter.role != "amplitude" or parameter.name not in amplitudes:
             continue
         value, sigma = amplitudes[parameter.name]
-        most = max(map(abs, parameter.bounds))
+        least, most = parameter.bounds
         if isinstance(law, Sensing):
-            most = min(most, SPREADS * parameter.prior.spread)
+            usual = SPREADS * parameter.prior.spread
+            least, most = max(least, -usual), min(most, usual)
         # Written so that what is no number is refused.
-        if not abs(value) - SIGMAS * sigma <= most:
+        if not least - SIGMAS * sigma <= value <= most + SIGMAS * sigma:
             unit = "" if parameter.unit == "1" else f" {parameter.unit}"
             reasons.append(
-                f"{parameter.name} = {value:.3g}{unit}, and {most:.3g}{unit} is the most that it may be"
+                f"{parameter.name} = {value:.3g}{unit}, and it may be {least:.3g} to {most:.3g}{unit}"
             )
     return tuple(reasons)

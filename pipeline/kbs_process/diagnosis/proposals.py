@@ -15,16 +15,26 @@ _ORDER_STEP = 0.25
 _HIGHEST_OF_DISC = 1000.0  # of an encoder's disc: beyond it a code's interpolation is looked for
 _TURNS = 10.0  # of a tone in a recording, fewer of which are drift, or the motion
 _MOVING = 1e-3  # rad/s of a motor
+_PASSING = 1e-5  # rad/s of a joint
 _BY_ORDER = ("order", "ripple_order")
 _BY_DISC = ("eccentric_order",)
+_BY_PLACE = ("local", "touch", "shift")  # with _angle and _width
+_PLACES = 400  # that a joint's range is divided into
+_WIDEST = 0.1  # of the range, of what has a place
+_SEEN = 20.0  # samples at a place, fewer of which count as that many
 _BY_FREQUENCY = ("floor_frequency", "mains_frequency")
 
 
 def proposed(known: Known, scene: Scene) -> dict[str, tuple[float, ...]]:
-    """Values to try beside the grids: parameter name -> values, strongest lines of all fit trials."""
+    """Values to try beside the grids: parameter name, of one site "name.site" -> values that residuals propose."""
     lines = _frequencies(known)
     found = dict.fromkeys(_BY_FREQUENCY, lines)
     found |= dict.fromkeys(_BY_ORDER, _orders(known, scene)) | dict.fromkeys(_BY_DISC, _of_discs(known))
+    for joint, (angle, width) in _local(known, scene).items():
+        for name in _BY_PLACE:
+            # What has been passed rings on for a while.
+            places = (angle - width, angle, angle + width)
+            found |= {f"{name}_angle.{joint}": places, f"{name}_width.{joint}": (width,)}
     if (tone := _sweep(known)) is not None:
         found |= {"floor_frequency": (*lines, tone[0]), "floor_sweep": (tone[1],)}
     return {name: values for name, values in found.items() if values}
@@ -95,6 +105,48 @@ def _orders(known: Known, scene: Scene) -> tuple[float, ...]:
             peaks = np.flatnonzero((inner >= power[:-2]) & (inner >= power[2:]) & (inner > bound)) + 1
             found += [(float(power[i]), float(np.round(orders[i] * 2.0) / 2.0)) for i in peaks]
     return _apart([value for _, value in sorted(found, reverse=True)], 0.5)
+
+
+def _local(known: Known, scene: Scene) -> dict[str, tuple[float, float]]:
+    """Middle and half width of the stretch of each joint's angles in which most of the whitened residual's power is.
+
+    What is local passes whenever the joint passes there, and moves nothing elsewhere. Of all stretches up to a tenth
+    of the range it is the one whose power stands out most, in standard deviations of as many of the other samples.
+    """
+    experiment, found = known.experiment, dict[str, tuple[float, float]]()
+    for joint in experiment.rig.joint_names:
+        angles, powers = [], []
+        for k in experiment.fit:
+            drive = experiment.reference(experiment.trials[k].trajectory)
+            if drive not in scene.signals:
+                continue
+            signals, series = scene.signals[drive], _in_time(known, k)
+            t = np.arange(len(series)) * experiment.dt
+            own = np.arange(len(signals.values)) / signals.rate
+            angle = np.interp(t, own, _column(signals.columns, signals.values, f"joint_angle.{joint}"))
+            moves = (np.abs(np.gradient(angle, experiment.dt)) > _PASSING) & experiment.trials[k].valid
+            angles.append(angle[moves])
+            powers.append(np.sum(series[moves] ** 2, axis=1))
+        angle, power = np.concatenate([*angles, np.zeros(0)]), np.concatenate([*powers, np.zeros(0)])
+        if len(angle) > _PLACES and np.ptp(angle) > 0.0:
+            found[joint] = _stretch(angle, power)
+    return found
+
+
+def _stretch(angle: Array, power: Array) -> tuple[float, float]:
+    """Middle and half width of the stretch of angles (n,) in which power (n,) stands out most."""
+    edges = np.linspace(angle.min(), angle.max(), _PLACES + 1)
+    place = np.clip(np.searchsorted(edges, angle, side="right") - 1, 0, _PLACES - 1)
+    count = np.concatenate([[0.0], np.cumsum(np.bincount(place, minlength=_PLACES))])
+    total = np.concatenate([[0.0], np.cumsum(np.bincount(place, power - power.mean(), minlength=_PLACES))])
+    best = (-np.inf, 0, 1)
+    for width in range(1, round(_WIDEST * _PLACES) + 1):
+        number = count[width:] - count[:-width]
+        score = (total[width:] - total[:-width]) / np.sqrt(np.maximum(number, _SEEN))
+        at = int(np.argmax(score))
+        best = max(best, (float(score[at]), at, width))
+    _, at, width = best
+    return float(0.5 * (edges[at] + edges[at + width])), float(0.5 * (edges[at + width] - edges[at]))
 
 
 def _of_discs(known: Known) -> tuple[float, ...]:

@@ -16,7 +16,8 @@ SPECTRUM = "spectrum"  # grid of a parameter that only tones of a residual give
 class Ranges:
     """What signals sweep over all trials of an experiment, and what the residuals propose.
 
-    `spans`: (site, signal) -> least and greatest value. `proposed`: parameter -> values beside those of its grid.
+    `spans`: (site, signal) -> least and greatest value. `proposed`: parameter, of one site "name.site" -> values beside
+    those of its grid.
     """
 
     spans: Mapping[tuple[str, str], tuple[float, float]]
@@ -28,7 +29,7 @@ class Ranges:
 
         None, where its grid lies over a signal that nobody knows there. Without a grid: `own`, or its prior's middle.
         """
-        proposed = self.proposed.get(entry.name, ())
+        proposed = (*self.proposed.get(entry.name, ()), *self.proposed.get(f"{entry.name}.{site}", ()))
         if entry.over == SPECTRUM:
             return tuple(sorted(proposed))
         if not entry.over:

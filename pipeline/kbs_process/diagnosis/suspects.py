@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations_with_replacement, product
 
 import numpy as np
@@ -160,7 +160,12 @@ def _grid(
 ) -> Iterator[tuple[tuple[str, float], ...]]:
     """Every choice of an effect's shape; a parameter without a grid is what the rig has, or its prior's middle."""
     shapes = [entry for entry in effect.parameters if entry.role == "shape"]
-    choices = [ranges.choices(entry, site, own.get(entry.name)) for entry in shapes]
+    # Whichever action of a law it is, its shape's grid has one name.
+    tag = effect.tag if isinstance(effect, Effect) else ""
+    grids = [replace(entry, name=entry.name.removesuffix(tag)) for entry in shapes]
+    choices = [
+        ranges.choices(grid, site, own.get(entry.name)) for entry, grid in zip(shapes, grids, strict=True)
+    ]
     for point in product(*choices):
         yield tuple((entry.name, value) for entry, value in zip(shapes, point, strict=True))
 

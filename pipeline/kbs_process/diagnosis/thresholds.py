@@ -61,6 +61,8 @@ GATE_SHARE: Final = 0.2
 # Of what all gain together: by that one that shows little of a law may be worse, for its formula is not nature's.
 GATE_WORSE: Final = 0.02
 FIRST: Final = 3  # steps of a leader's refit that show whether it is worth the others
+# Suspects of a screen of which shapes between the places of the grid are looked for, before leaders are chosen.
+SHAPED: Final = 10
 # Leaders that are tried beyond those that the linear plant cannot order, where none of these passes.
 SECOND: Final = 2
 # Of the leaders, those that leave least are refitted with all slopes taken anew before they are compared, if they leave

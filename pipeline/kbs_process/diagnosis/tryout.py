@@ -11,19 +11,18 @@ from kbs_process.diagnosis.hypothesis import Hypothesis
 from kbs_process.diagnosis.joint import Extra, Standing
 from kbs_process.diagnosis.localise import PortName
 from kbs_process.diagnosis.outcome import Identity
-from kbs_process.diagnosis.places import half_lengths, point_of
+from kbs_process.diagnosis.places import point_of
 from kbs_process.diagnosis.scene import Scene
 from kbs_process.diagnosis.screen import Bench, Catalogued, Found, Suspect
+from kbs_process.diagnosis.shapes import bends
 from kbs_process.diagnosis.suspects import BY
 from kbs_process.plant.attach import attach
-from kbs_process.plant.effect import Effect, LogNormal, Port
+from kbs_process.plant.effect import Effect, Port
 from kbs_process.plant.effects import select
 from kbs_process.plant.sensing import SensingPort
 from kbs_process.stages.output_error import Scalar
 
 UNNAMED = "unnamed"
-_FARTHEST = 30.0  # times, up or down, that a shape goes from where the grid had it
-_NEAR = 0.05  # m: steps of a search for a point are no less
 
 
 def identity(suspect: Suspect) -> Identity:
@@ -99,40 +98,25 @@ def extra_of(found: Found, standing: Standing, bench: Bench, scene: Scene) -> Ex
         rig = attach(present.rig, effect, values, on=candidate.site, point=point)
         path = f"external.{effect.name}"
     effects = tuple(one.name for one in select([*dict.fromkeys([*present.effects, effect.name])]))
-    bends = [
-        entry.name for entry in effect.parameters
-        if entry.role == "shape" and isinstance(entry.prior, LogNormal) and not _counted(entry.name)
-    ]  # fmt: skip
+    shaped = bends(candidate, present.rig)
     size = np.sqrt(np.maximum(np.diag(found.score.covariance), 0.0))
-    place, reach = np.zeros(0), np.zeros(0)
-    if effect.anywhere:
-        place, reach = point, np.maximum(half_lengths(present.rig, candidate.site), _NEAR)
-    begin = np.array([shape[name] for name in bends])
-    entries = [entry for entry in effect.parameters if entry.name in bends]
-    widths = [shape[e.name] * e.prior.sigma for e in entries if isinstance(e.prior, LogNormal)]
-    # A shape stays within its bounds, and within what a search by slopes can be trusted over.
-    low = [max(shape[entry.name] / _FARTHEST, entry.bounds[0]) for entry in entries]
-    high = [min(shape[entry.name] * _FARTHEST, entry.bounds[1]) for entry in entries]
-    free = np.full(len(amplitude), np.inf)
-    anywhere = np.full(len(place), np.inf)
+    begin = np.array([one.value for one in shaped])
+    any_size = np.full(len(amplitude), np.inf)
+    # An amplitude that has one sign keeps it.
+    least = np.array([0.0 if entry.bounds[0] == 0.0 else -np.inf for entry in candidate.amplitudes])
     return Extra(
         hypothesis=Hypothesis(rig, effects),
         plant=(
-            *(Scalar(f"{path}.{name}") for name in (*suspect.amplitudes, *bends)),
-            *(Scalar(f"{path}.point", (k,)) for k in range(len(place))),
+            *(Scalar(f"{path}.{name}") for name in suspect.amplitudes),
+            *(one.scalar(path) for one in shaped),
         ),
-        start=np.concatenate([amplitude, begin, place]),
-        prior=np.concatenate([0.0 * amplitude, begin, place]),
-        sigma=np.concatenate([free, widths, anywhere]),
-        scale=np.concatenate([np.maximum(np.abs(amplitude), 5.0 * size), widths, reach]),
-        lower=np.concatenate([-free, low, -anywhere]),
-        upper=np.concatenate([free, high, anywhere]),
+        start=np.concatenate([amplitude, begin]),
+        prior=np.concatenate([0.0 * amplitude, begin]),
+        sigma=np.concatenate([any_size, [one.sigma for one in shaped]]),
+        scale=np.concatenate([np.maximum(np.abs(amplitude), 5.0 * size), [one.size for one in shaped]]),
+        lower=np.concatenate([least, [one.low for one in shaped]]),
+        upper=np.concatenate([any_size, [one.high for one in shaped]]),
     )
-
-
-def _counted(name: str) -> bool:
-    """Orders, which are whole numbers or ratios of teeth, and frequencies stay where a line was found."""
-    return "order" in name or "frequency" in name
 
 
 def _references(standing: Standing) -> set[int]:

@@ -40,11 +40,12 @@ BUNGEE = Effect(
         Parameter(
             "stiffness", "N/m", LogNormal(60.0, 0.3), "of the cord", bounds=(0.0, 1e5), role="amplitude"
         ),
-        Parameter("free_length", "m", Normal(0.7, 0.1), "of the cord when slack", bounds=(0.0, 100.0)),
-        Parameter("anchor_x", "m", Normal(0.0, 0.02), "cord's upper end, along T's x axis", (-100.0, 100.0)),
-        Parameter("anchor_y", "m", Normal(0.0, 0.02), "along T's y axis", (-100.0, 100.0)),
-        Parameter("anchor_z", "m", Normal(3.2, 0.02), "along T's z axis", (-100.0, 100.0)),
+        Parameter("free_length", "m", Normal(0.7, 0.2), "of the cord when slack", bounds=(0.0, 100.0)),
+        Parameter("anchor_x", "m", Normal(0.0, 0.5), "cord's upper end, along T's x axis", (-100.0, 100.0)),
+        Parameter("anchor_y", "m", Normal(0.0, 0.5), "along T's y axis", (-100.0, 100.0)),
+        Parameter("anchor_z", "m", Normal(2.0, 1.0), "along T's z axis", (-100.0, 100.0), grid=(1.5, 3.2)),
     ),
     reference="Measurement and prediction of the performance of a satellite based antenna pointing mechanism "
     "and controller, Trans. Built Environment 19 (1996), section 7",
+    anywhere=True,
 )

@@ -1,0 +1,168 @@
+"""Shapes of a law between the places of its grid: which of them slopes can better, how far they go, and where to."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import minimize
+
+from kbs_process.diagnosis.gls import Score, Sums, score
+from kbs_process.diagnosis.places import half_lengths
+from kbs_process.diagnosis.ranges import SPECTRUM
+from kbs_process.diagnosis.screen import Bench, Catalogued, Found
+from kbs_process.diagnosis.suspects import Candidate
+from kbs_process.plant.effect import Effect, LogNormal, Parameter, Uniform
+from kbs_process.rig.model import Rig
+from kbs_process.signals.records import Array
+from kbs_process.stages.output_error import Scalar
+
+_FARTHEST = 30.0  # times, up or down, that a shape goes from where the grid had it; of what has a sign,
+_STEPS = 6.0  # as many of its steps
+_NEAR = 0.05  # m: steps of a search for a point are no less
+_WHOLE = ("order", "bit")  # in names of numbers that are whole, or ratios of teeth
+_DIFFERENCE = 0.02  # steps
+_DESCENTS = 12  # of the search along the linear plant
+
+
+@dataclass(frozen=True, slots=True)
+class Bend:
+    """A shape that slopes can better: where it is, what one step of it is, between which bounds, and its prior."""
+
+    name: str
+    value: float
+    step: float  # that it is known to
+    low: float
+    high: float
+    alike: bool = False  # whether all values are alike likely; else the step is a standard deviation
+    ratio: bool = False  # whether steps multiply it: then this one is of its logarithm
+    element: tuple[int, ...] = ()  # of a quantity that has several
+
+    def scalar(self, path: str) -> Scalar:
+        """The rig's number, of a law that has its numbers at a path."""
+        return Scalar(f"{path}.{self.name}", self.element)
+
+    @property
+    def size(self) -> float:
+        """Of a step, in its own unit."""
+        return self.value * self.step if self.ratio else self.step
+
+    @property
+    def sigma(self) -> float:
+        """Standard deviation of its prior about `value`."""
+        return float("inf") if self.alike else self.size
+
+    @property
+    def room(self) -> tuple[float, float]:
+        """Steps that it may go down and up."""
+        ends = np.array([self.low, self.high])
+        down, up = np.log(ends / self.value) / self.step if self.ratio else (ends - self.value) / self.step
+        return float(down), float(up)
+
+    def moved(self, steps: float) -> float:
+        """Its value some steps away."""
+        value = self.value * np.exp(steps * self.step) if self.ratio else self.value + steps * self.step
+        return float(np.clip(value, self.low, self.high))
+
+
+def bends(candidate: Candidate, rig: Rig) -> tuple[Bend, ...]:
+    """Return what can be bettered of a candidate, its point last where that may be anywhere.
+
+    Whole numbers and tones stay where a line was found, phases where they were tried all round, and a place where it
+    was put for want of any other.
+    """
+    shape = dict(candidate.shape)
+    own = [
+        _bend(entry, shape[entry.name], step)
+        for entry in candidate.effect.parameters
+        if entry.role == "shape" and (step := _step(entry, candidate)) > 0.0
+    ]
+    if candidate.point is None or not (isinstance(candidate.effect, Effect) and candidate.effect.anywhere):
+        return tuple(own)
+    reach = np.maximum(half_lengths(rig, candidate.site), _NEAR)
+    point = [
+        Bend("point", x, step, -np.inf, np.inf, alike=True, element=(k,))
+        for k, (x, step) in enumerate(zip(candidate.point, reach.tolist(), strict=True))
+    ]
+    return (*own, *point)
+
+
+def _step(entry: Parameter, candidate: Candidate) -> float:
+    """What a shape of the grid is known to: its prior's width, of a place the law's own; 0, where it stays."""
+    put = entry.over == SPECTRUM or (entry.over and len(entry.grid) == 1)
+    if put or isinstance(entry.prior, Uniform) or any(word in entry.name for word in _WHOLE):
+        return 0.0
+    if entry.over and not entry.over.endswith(".span"):
+        wide = [other.name for other in candidate.effect.parameters if other.over == f"{entry.over}.span"]
+        return dict(candidate.shape)[wide[0]] if wide else 0.0
+    if isinstance(entry.prior, LogNormal):
+        return entry.prior.sigma
+    return entry.prior.spread
+
+
+def _bend(entry: Parameter, value: float, step: float) -> Bend:
+    ratio = isinstance(entry.prior, LogNormal)
+    low, high = value - _STEPS * step, value + _STEPS * step
+    if ratio:
+        low, high = value / _FARTHEST, value * _FARTHEST
+    low, high = max(low, entry.bounds[0]), min(high, entry.bounds[1])
+    return Bend(entry.name, value, step, low, high, alike=entry.over != "" and not ratio, ratio=ratio)
+
+
+def bettered(bench: Bench, found: Found) -> Found:
+    """A suspect of the screen with the shape, near that of the grid, with which it does most along the linear plant."""
+    suspect = found.suspect
+    if not isinstance(suspect, Catalogued) or suspect.each_trial:
+        return found
+    free = bends(suspect.candidate, suspect.scene.hypothesis.rig)
+    if not free:
+        return found
+    best = found.suspect, found.score
+
+    def fall(u: Array) -> tuple[float, Array]:
+        nonlocal best
+        around = u + np.vstack([np.zeros(len(u)), _DIFFERENCE * np.eye(len(u))])
+        tried = [_at(suspect, free, one) for one in around]
+        scores = _scores(bench, tried)
+        gains = np.array([_gain(suspect, one) for one in scores])
+        if gains[0] > _gain(suspect, best[1]):
+            best = tried[0], scores[0]
+        return -float(gains[0]), (gains[0] - gains[1:]) / _DIFFERENCE
+
+    minimize(
+        fall,
+        np.zeros(len(free)),
+        jac=True,
+        method="L-BFGS-B",
+        bounds=[one.room for one in free],
+        options={"maxiter": _DESCENTS, "maxfun": 2 * _DESCENTS},
+    )
+    gained = best[1].gain - found.score.gain
+    return replace(found, suspect=best[0], score=best[1], log_evidence=found.log_evidence + 0.5 * gained)
+
+
+def _gain(suspect: Catalogued, found: Score) -> float:
+    """What a suspect does; less than nothing with a lone amplitude of a sign that it has not."""
+    if len(found.amplitude) == 1 and suspect.candidate.amplitudes[0].bounds[0] == 0.0:
+        return float(np.copysign(found.gain, found.amplitude[0]))
+    return found.gain
+
+
+def _at(suspect: Catalogued, free: Sequence[Bend], steps: Array) -> Catalogued:
+    """The suspect with its shape some steps away."""
+    values = [one.moved(float(step)) for one, step in zip(free, steps, strict=True)]
+    moved = {one.name: value for one, value in zip(free, values, strict=True) if not one.element}
+    candidate, point = suspect.candidate, suspect.candidate.point
+    if free[-1].element:
+        x, y, z = values[-3:]
+        point = x, y, z
+    shape = tuple((name, moved.get(name, value)) for name, value in candidate.shape)
+    return replace(suspect, candidate=replace(candidate, shape=shape, point=point))
+
+
+def _scores(bench: Bench, suspects: Sequence[Catalogued]) -> list[Score]:
+    """Of suspects with as many amplitudes each."""
+    sums = Sums.over(bench.background, bench.columns(suspects))
+    own = np.arange(len(suspects[0].amplitudes))
+    return [score(bench.background, sums.pick(own + k * len(own))) for k in range(len(suspects))]
