@@ -10,6 +10,7 @@ import pytest
 
 from kbs_process.diagnosis.experiment import Experiment
 from kbs_process.diagnosis.gate import gate
+from kbs_process.diagnosis.gls import Sums, score
 from kbs_process.diagnosis.hypothesis import Hypothesis, predict
 from kbs_process.diagnosis.joint import Standing, with_extra
 from kbs_process.diagnosis.rivals import rivalry
@@ -147,11 +148,16 @@ def test_a_law_of_the_readings_needs_no_plant_and_its_rival_is_told_apart(made: 
         with_extra(here, extra_of(by_family[family], here, tried, scene), bench.serial(made))
         for family in (("channel_lag", "Ty"), ("channel_gain", "Fz"))
     )
-    assert right.known.value[-1] == pytest.approx(size, abs=4.0 * right.known.sigma[-1])
+    share, time = right.known.value[-2:]
+    assert share == pytest.approx(size, abs=4.0 * right.known.sigma[-2])
     # What the search learns of the known numbers' slopes on its way is not the law's doing.
-    alone = by_family["channel_lag", "Ty"].score.covariance[0, 0]
-    assert right.known.sigma[-1] == pytest.approx(np.sqrt(alone), rel=0.05)
-    assert np.allclose(right.shown(0) - right.predicted[0].values, right.known.value[-1] * moves)
+    slower = right.laws["law.channel_lag.Ty.lag_time"][0]
+    columns = {k: m(np.stack([moves, slower], axis=2)) for k, m in enumerate(here.known.metric[:2])}
+    linear = score(tried.background, Sums.over(tried.background, columns)).covariance
+    prior = np.diag([0.0, right.known.parameters.sigma[-1] ** -2.0])
+    alone = np.linalg.inv(np.linalg.inv(linear) + prior)
+    assert right.known.sigma[-2:] == pytest.approx(np.sqrt(np.diag(alone)), rel=0.15)
+    assert np.allclose(right.shown(0) - right.predicted[0].values, share * moves + time * slower)
     apart = rivalry(right.known, wrong.known)
     assert apart.rho_delta > 20.0 and not apart.indistinguishable and apart.p_wrong < 1e-20
     assert rivalry(right.known, right.known).indistinguishable

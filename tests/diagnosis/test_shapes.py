@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import bench
 import numpy as np
 import pytest
+from test_rounds import candidate, standing
 from test_suspects import rig, suspects
 
-from kbs_process.diagnosis.shapes import Bend, bends
+from kbs_process.diagnosis.finding import Tried, as_it_stands, find_of
+from kbs_process.diagnosis.gate import gate
+from kbs_process.diagnosis.joint import Own, with_extra
+from kbs_process.diagnosis.scene import Scene
+from kbs_process.diagnosis.screen import Bench, Catalogued, Screening, screen
+from kbs_process.diagnosis.shapes import Bend, bends, bettered
+from kbs_process.diagnosis.tryout import extra_of
 from kbs_process.plant.effect import LogNormal
 
 
@@ -49,3 +59,38 @@ def test_a_place_has_no_prior_and_a_width_keeps_its_own() -> None:
     assert place.size == width.value and place.sigma == np.inf
     assert width.sigma == width.value  # a logarithm known to one
     assert Bend("x", 2.0, 0.5, 1.0, 3.0).room == (-2.0, 2.0)
+
+
+def test_the_time_of_a_lag_is_found_between_the_grid_s_with_its_interval() -> None:
+    made = bench.experiment(bench.rig(), ("fit", "fit", "held-out"), 8)
+    before = standing(made)
+    scene = Scene.of(made, before.hypothesis, before.predicted)
+    # A quarter of Ty comes 0.9 s late; the screen tries 0.5 and 2 s.
+    truth = Catalogued(candidate("channel_lag", "Ty", lag_time=0.9), scene)
+    added = 0.25 * Bench.of(before.known, scene).signatures([truth], 0)[:, :, 0]
+    trials = tuple(replace(t, measured=t.measured + added * t.valid[:, None]) for t in made.trials)
+    here = standing(replace(made, trials=trials))
+    scene = Scene.of(here.known.experiment, here.hypothesis, here.predicted)
+    tried = Bench.of(here.known, scene)
+    grid = [Catalogued(candidate("channel_lag", "Ty", lag_time=time), scene) for time in (0.1, 0.5, 2.0)]
+    coarse = screen(tried, grid).candidates[0]
+    found = bettered(tried, coarse)
+    assert isinstance(found.suspect, Catalogued)
+    assert dict(found.suspect.candidate.shape)["lag_time"] == pytest.approx(0.9, rel=0.2)
+    assert found.score.gain > coarse.score.gain
+    for one in (coarse, found):
+        after = with_extra(here, extra_of(one, here, tried, scene), bench.serial(made))
+        own = Own(after.known.names[-2:], after.known.names[-2:-1])
+        told = find_of(
+            [Tried(one, after, gate(here.known, after.known, [-2]), Screening((one,), 3), own)],
+            0,
+            np.ones(1),
+            here,
+            None,
+        )
+        lag, time = told.estimates
+        print(lag, time)
+        assert (lag.name, time.name, time.unit) == ("lag_share", "lag_time", "s")
+        assert time.sigma > 0.0
+        assert as_it_stands(told, own, after.known).estimates == told.estimates
+    assert time.low < 0.9 < time.high and lag.low < 0.25 < lag.high

@@ -12,7 +12,6 @@ from kbs_process.campaign.config import Campaign, SensingLaw
 from kbs_process.campaign.corrected_model import write_model
 from kbs_process.campaign.sensing_laws import belongs_to_model
 from kbs_process.diagnosis.hypothesis import Hypothesis
-from kbs_process.diagnosis.joint import Standing
 from kbs_process.diagnosis.outcome import Find, Outcome
 from kbs_process.diagnosis.suspects import BY
 from kbs_process.plant.effect import Uniform
@@ -44,7 +43,7 @@ def write_corrected(campaign: Campaign, outcome: Outcome, folder: Path) -> tuple
             sigma = quantity.sigma.copy()
             sigma[scalar.element] = known.sigma[index]
             changed[scalar.quantity] = replace(quantity, sigma=sigma, source=source)
-    sensing = tuple(_sensing(find, outcome.standing, source) for find in outcome.finds if _reads(find))
+    sensing = tuple(_sensing(find, source) for find in outcome.finds if _reads(find))
     return write_model(campaign, hypothesis.rig, hypothesis.effects, changed, folder, source, sensing)
 
 
@@ -70,18 +69,14 @@ def _reads(find: Find) -> bool:
     return law is not None and belongs_to_model(law)
 
 
-def _sensing(find: Find, standing: Standing, source: str) -> SensingLaw:
-    """A find as the model's sensors have it, its amplitudes as they stand after all finds."""
+def _sensing(find: Find, source: str) -> SensingLaw:
+    """A find as the model's sensors have it."""
     law, own = _SENSORS[find.identity.law], find.identity
     site = BY.join(own.channels) or own.axis
-    known = standing.known
-    places = {scalar.name: index for index, scalar in enumerate(known.free)}
     numbers = {}
     for one in find.estimates:
         # A second action of the same law has numbered amplitudes.
         entry = next(entry for entry in law.parameters if re.fullmatch(rf"{entry.name}(_\d+)?", one.name))
-        index = places.get(f"law.{law.name}.{site}.{one.name}")
-        value, sigma = (one.value, one.sigma) if index is None else (known.value[index], known.sigma[index])
         name = f"sensing.{site}.{law.name}.{entry.name}"
-        numbers[entry.name] = Quantity(name, np.asarray(value), entry.unit, np.asarray(sigma), source)
+        numbers[entry.name] = Quantity(name, np.asarray(one.value), entry.unit, np.asarray(one.sigma), source)
     return SensingLaw(law.name, site, numbers)

@@ -145,15 +145,15 @@ def _estimates(taken: Tried, before: Standing) -> tuple[Estimate, ...]:
             for name, value, sigma in zip(names, taken.found.score.amplitude, spread, strict=False)
         ]
     else:
-        fitted = [
-            Estimate(
-                _short(known.free[k].name, in_plant(suspect)),
-                units.get(_short(known.free[k].name, True), ""),
-                float(known.value[k]),
-                float(known.sigma[k]),
-            )
-            for k in range(begin, len(known.value))
-        ]
+        fitted = []
+        for scalar, value, sigma in zip(
+            known.free[begin:], map(float, known.value[begin:]), map(float, known.sigma[begin:]), strict=True
+        ):
+            name = _short(scalar.name, in_plant(suspect))
+            # A law of the readings is fitted about the shape that the screen gave it.
+            plain = name if in_plant(suspect) else re.sub(r"_\d$", "", name)
+            about = 0.0 if in_plant(suspect) else fixed.pop(plain, 0.0)
+            fitted.append(Estimate(name, units.get(plain, ""), about + value, sigma, about))
     done = {one.name for one in fitted}
     return (*fitted, *(Estimate(n, units.get(n, ""), v, 0.0) for n, v in fixed.items() if n not in done))
 
@@ -196,7 +196,7 @@ def as_it_stands(find: Find, law: Own, known: Known) -> Find:
     """A find with its law's numbers as they are after all others were found."""
     own = [known.names.index(name) for name in law.names]
     fitted = [
-        replace(one, value=float(known.value[k]), sigma=float(known.sigma[k]))
+        replace(one, value=one.about + float(known.value[k]), sigma=float(known.sigma[k]))
         for one, k in zip(find.estimates, own, strict=False)
     ]
     curve = find.curve and _drawn(find.curve.regressor, find.curve.x, known, own)

@@ -34,6 +34,7 @@ class Estimate:
     unit: str
     value: float
     sigma: float
+    about: float = 0.0  # what was fitted is how far it is from this
 
     @property
     def low(self) -> float:

@@ -142,6 +142,19 @@ def bettered(bench: Bench, found: Found) -> Found:
     return replace(found, suspect=best[0], score=best[1], log_evidence=found.log_evidence + 0.5 * gained)
 
 
+def along(bench: Bench, suspect: Catalogued, amplitude: Array, drive: int) -> Array:
+    """(n, c, shapes) slopes of what a suspect of some amplitudes adds to the prediction, by each of its `bends`."""
+    free = bends(suspect.candidate, suspect.scene.hypothesis.rig)
+    slopes = []
+    for one, step in zip(free, _DIFFERENCE * np.eye(len(free)), strict=True):
+        below, above = (
+            bench.signatures([_at(suspect, free, -step)], drive),
+            bench.signatures([_at(suspect, free, step)], drive),
+        )
+        slopes.append((above - below) @ amplitude / (one.moved(_DIFFERENCE) - one.moved(-_DIFFERENCE)))
+    return np.stack(slopes, axis=2)
+
+
 def _gain(suspect: Catalogued, found: Score) -> float:
     """What a suspect does; less than nothing with a lone amplitude of a sign that it has not."""
     if len(found.amplitude) == 1 and suspect.candidate.amplitudes[0].bounds[0] == 0.0:

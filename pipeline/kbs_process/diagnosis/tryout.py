@@ -14,7 +14,7 @@ from kbs_process.diagnosis.outcome import Identity
 from kbs_process.diagnosis.places import point_of
 from kbs_process.diagnosis.scene import Scene
 from kbs_process.diagnosis.screen import Bench, Catalogued, Found, Suspect
-from kbs_process.diagnosis.shapes import bends
+from kbs_process.diagnosis.shapes import Bend, along, bends
 from kbs_process.diagnosis.suspects import BY
 from kbs_process.plant.attach import attach
 from kbs_process.plant.effect import Effect, Port
@@ -69,16 +69,28 @@ def extra_of(found: Found, standing: Standing, bench: Bench, scene: Scene) -> Ex
     if not in_plant(suspect):
         tag = ".".join(suspect.family)
         used = sum(name.startswith(f"law.{tag}.") for name in standing.laws)
-        names = [f"law.{tag}.{name}{f'_{used}' if used else ''}" for name in suspect.amplitudes]
-        columns = {
-            drive: np.moveaxis(bench.signatures([suspect], drive), 2, 0)
-            for drive in sorted(_references(standing))
-        }
+        drives = sorted(_references(standing))
+        columns = {drive: bench.signatures([suspect], drive) for drive in drives}
+        shaped: tuple[Bend, ...] = ()
+        if isinstance(suspect, Catalogued) and (bent := bends(suspect.candidate, standing.hypothesis.rig)):
+            # How far shapes are from where the screen has them, to first order: zero to begin with.
+            shaped = bent
+            columns = {d: np.dstack([x, along(bench, suspect, amplitude, d)]) for d, x in columns.items()}
+        names = (*suspect.amplitudes, *(one.name for one in shaped))
+        start = np.concatenate([amplitude, np.zeros(len(shaped))])
         free = np.full(len(amplitude), np.inf)
-        linear = tuple(Scalar(name) for name in names)
         return Extra(
-            standing.hypothesis, (), amplitude, 0.0 * amplitude, free, np.zeros(0), -free, free, linear, columns
-        )  # fmt: skip
+            hypothesis=standing.hypothesis,
+            plant=(),
+            start=start,
+            prior=0.0 * start,
+            sigma=np.concatenate([free, [one.sigma for one in shaped]]),
+            scale=np.zeros(0),
+            lower=np.concatenate([-free, [one.low - one.value for one in shaped]]),
+            upper=np.concatenate([free, [one.high - one.value for one in shaped]]),
+            linear=tuple(Scalar(f"law.{tag}.{name}{f'_{used}' if used else ''}") for name in names),
+            columns={drive: np.moveaxis(x, 2, 0) for drive, x in columns.items()},
+        )
     if isinstance(suspect, CurveSuspect):
         return measured.extra(suspect, found.score, standing)
     assert isinstance(suspect, Catalogued) and isinstance(suspect.candidate.effect, Effect)

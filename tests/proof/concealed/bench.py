@@ -144,7 +144,12 @@ def scaled(bench: Bench, effect: Effect, level: float) -> tuple[Effect, Strength
     power, tried = 1.0, (0.0, 0.0)  # rho_eff goes with this power of the amplitude
     for _ in range(_SEARCH):
         effect = effect.scaled(amplitude)
-        found = bench.strength([effect])
+        try:
+            found = bench.strength([effect])
+        except FloatingPointError:
+            # More than the rig can stand with.
+            most = amplitude = 0.5 * amplitude
+            continue
         if amplitude >= most and found.rho_eff < level:
             reached = [weaker for weaker in LEVELS if weaker < found.rho_eff]
             if not reached:
