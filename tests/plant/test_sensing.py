@@ -98,6 +98,9 @@ def test_a_coarse_encoder_reads_whole_coarse_codes() -> None:
 def test_clocks_shift_the_reading() -> None:
     late = READING + changed(law("clock_offset"), late=0.02)
     np.testing.assert_allclose(late[1:], np.interp(T - 0.02, T, READING)[1:], atol=1e-4)
+    late = changed(law("clock_wander"), wander_sin=0.01, wander_cos=0.0, wander_period=40.0)
+    stamped = READING - 0.01 * np.sin(2.0 * np.pi * T / 40.0) * KNOWN["rate"]
+    np.testing.assert_allclose(READING + late, stamped, atol=1e-12)
     dropped = changed(law("clock_drops"), dropped=0.02, drop_time=50.0)
     assert not dropped[T <= 50.0].any() and dropped[T > 50.0].all()
 

@@ -59,6 +59,7 @@ FAMILIES: dict[str, str] = {
     "bungee": "bungee",
     "tether": "cable",
     "floor_vibration": "vibration",
+    "floor_tilt": "inclination",
     "channel_gain": "gain",
     "cross_coupling": "cross-coupling",
     "channel_interaction": "non-linearity",
@@ -78,6 +79,7 @@ FAMILIES: dict[str, str] = {
     "clock_offset": "offset",
     "clock_skew": "skew",
     "clock_drops": "drops",
+    "clock_wander": "wander",
     "controller_gain": "gain",
     "controller_latency": "latency",
 }

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import minimize
 
-from kbs_process.diagnosis.gls import Score, Sums, score
+from kbs_process.diagnosis.gls import Score, Sums, per_trial, score
 from kbs_process.diagnosis.places import half_lengths
 from kbs_process.diagnosis.ranges import SPECTRUM
 from kbs_process.diagnosis.screen import Bench, Catalogued, Found
@@ -113,7 +113,7 @@ def _bend(entry: Parameter, value: float, step: float) -> Bend:
 def bettered(bench: Bench, found: Found) -> Found:
     """A suspect of the screen with the shape, near that of the grid, with which it does most along the linear plant."""
     suspect = found.suspect
-    if not isinstance(suspect, Catalogued) or suspect.each_trial:
+    if not isinstance(suspect, Catalogued):
         return found
     free = bends(suspect.candidate, suspect.scene.hypothesis.rig)
     if not free:
@@ -176,6 +176,11 @@ def _at(suspect: Catalogued, free: Sequence[Bend], steps: Array) -> Catalogued:
 
 def _scores(bench: Bench, suspects: Sequence[Catalogued]) -> list[Score]:
     """Of suspects with as many amplitudes each."""
-    sums = Sums.over(bench.background, bench.columns(suspects))
-    own = np.arange(len(suspects[0].amplitudes))
-    return [score(bench.background, sums.pick(own + k * len(own))) for k in range(len(suspects))]
+    columns = bench.columns(suspects)
+    m = len(suspects[0].amplitudes)
+    owns = [np.arange(k * m, (k + 1) * m) for k in range(len(suspects))]
+    if suspects[0].each_trial:
+        parts = [per_trial(bench.background, {k: x[:, own] for k, x in columns.items()}) for own in owns]
+        return [score(bench.background, part) for part in parts]
+    sums = Sums.over(bench.background, columns)
+    return [score(bench.background, sums.pick(own)) for own in owns]

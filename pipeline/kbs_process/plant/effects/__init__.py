@@ -24,6 +24,7 @@ from kbs_process.plant.effects.coulomb import COULOMB
 from kbs_process.plant.effects.dahl import DAHL
 from kbs_process.plant.effects.dynamic_friction import DYNAMIC_FRICTION
 from kbs_process.plant.effects.flexspline import FLEXSPLINE
+from kbs_process.plant.effects.floor_tilt import FLOOR_TILT
 from kbs_process.plant.effects.floor_vibration import FLOOR_VIBRATION
 from kbs_process.plant.effects.friction_ripple import FRICTION_RIPPLE
 from kbs_process.plant.effects.friction_warmup import FRICTION_WARMUP
@@ -101,6 +102,7 @@ CATALOGUE: tuple[Effect, ...] = (
     BUNGEE,
     TETHER,
     FLOOR_VIBRATION,
+    FLOOR_TILT,
 )
 
 # Measured laws, which have no name: a model can contain them, and no search tries them as suspects.

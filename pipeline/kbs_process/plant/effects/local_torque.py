@@ -31,7 +31,7 @@ LOCAL_TORQUE = Effect(
             Normal(0.0, 3.0),
             "angle of the greatest torque",
             (-100.0, 100.0),
-            grid=tuple((i + 0.5) / 24.0 for i in range(24)),
+            grid=tuple((i + 0.5) / 12.0 for i in range(12)),
             over="joint_angle",
         ),
         Parameter(
@@ -40,7 +40,7 @@ LOCAL_TORQUE = Effect(
             LogNormal(0.03, 1.0),
             "its standard width",
             (1e-4, 3.0),
-            grid=(0.02, 0.06),
+            grid=(0.03, 0.08),
             over="joint_angle.span",
         ),
     ),

@@ -37,7 +37,7 @@ MASS_SHIFT = Effect(
             Normal(0.0, 3.0),
             "angle at which it moves",
             (-100.0, 100.0),
-            grid=tuple((i + 0.5) / 20.0 for i in range(20)),
+            grid=tuple((i + 0.5) / 10.0 for i in range(10)),
             over="joint_angle",
         ),
         Parameter(
@@ -46,7 +46,7 @@ MASS_SHIFT = Effect(
             LogNormal(0.1, 1.0),
             "over which it moves",
             (1e-4, 3.0),
-            grid=(0.03, 0.15),
+            grid=(0.05, 0.15),
             over="joint_angle.span",
         ),
     ),

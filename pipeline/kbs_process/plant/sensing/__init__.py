@@ -10,6 +10,7 @@ from kbs_process.plant.sensing.channel_nonlinearity import CHANNEL_NONLINEARITY
 from kbs_process.plant.sensing.clock_drops import CLOCK_DROPS
 from kbs_process.plant.sensing.clock_offset import CLOCK_OFFSET
 from kbs_process.plant.sensing.clock_skew import CLOCK_SKEW
+from kbs_process.plant.sensing.clock_wander import CLOCK_WANDER
 from kbs_process.plant.sensing.controller_gain import CONTROLLER_GAIN
 from kbs_process.plant.sensing.controller_latency import CONTROLLER_LATENCY
 from kbs_process.plant.sensing.cross_coupling import CROSS_COUPLING
@@ -47,6 +48,7 @@ SENSING: tuple[Sensing, ...] = (
     CLOCK_OFFSET,
     CLOCK_SKEW,
     CLOCK_DROPS,
+    CLOCK_WANDER,
     CONTROLLER_GAIN,
     CONTROLLER_LATENCY,
 )

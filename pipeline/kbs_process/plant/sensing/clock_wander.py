@@ -1,0 +1,44 @@
+"""A clock that wanders about the other: its oscillator warms and cools by turns, or it is set again and again."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kbs_process.plant.effect import LogNormal, Normal, Parameter
+from kbs_process.plant.sensing.sensing import Sensing, SensingPort
+from kbs_process.signals.records import Array
+
+
+def change(time: Array, rate: Array, wander_sin: float, wander_cos: float, wander_period: float) -> Array:
+    r"""Change of a reading whose stamps are early and late by turns.
+
+    Equation: $\Delta y = -(a \sin(2 \pi t / P) + b \cos(2 \pi t / P))\, \dot y$.
+    Units: s, the channel's a second, s, s, s -> the channel's.
+    Validity: one period, to first order in the deviation; its phase is a recording's own.
+    Source: D. W. Allan, N. Ashby, C. C. Hodge, The science of timekeeping, Hewlett-Packard AN 1289 (1997).
+    """
+    phase = 2.0 * np.pi * time / wander_period
+    return -(wander_sin * np.sin(phase) + wander_cos * np.cos(phase)) * rate
+
+
+CLOCK_WANDER = Sensing(
+    name="clock_wander",
+    port=SensingPort.STREAM,
+    equation=change,
+    parameters=(
+        Parameter(
+            "wander_sin", "s", Normal(0.0, 0.02), "sine of the deviation", (-10.0, 10.0), role="amplitude"
+        ),
+        Parameter("wander_cos", "s", Normal(0.0, 0.02), "its cosine", (-10.0, 10.0), role="amplitude"),
+        Parameter(
+            "wander_period",
+            "s",
+            LogNormal(25.0, 0.5),
+            "of the deviation",
+            (0.1, 1e6),
+            grid=(8.0, 12.0, 18.0, 27.0, 40.0, 60.0, 90.0),
+        ),
+    ),
+    reference="D. W. Allan, N. Ashby, C. C. Hodge, The science of timekeeping, Hewlett-Packard AN 1289 (1997)",
+    each_trial=True,
+)
