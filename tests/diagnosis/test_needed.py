@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import bench
+import numpy as np
 import pytest
 from test_rounds import ROLES, screened, standing, with_cable
 
@@ -44,7 +45,7 @@ def joined(made: Experiment, before: Standing, family: tuple[str, str]) -> tuple
         held_out_variance=None,
         curve=None,
     )
-    return after, Accepted(Tried(chosen, after, passed, found, own_of(chosen, before, after)), find)
+    return after, Accepted(Tried(chosen, after, passed, found, own_of(chosen, before, after)), find, before)
 
 
 @pytest.fixture(scope="module")
@@ -72,7 +73,8 @@ def test_the_needless_law_goes_and_the_other_is_judged_without_it(
     begun = standing(made)
     first, needless = joined(made, begun, family)
     both, cable = joined(made, first, CABLE)
-    kept, left = needed([needless, cable], both, declared(made), bench.serial(made))
+    kept, left, fallen = needed([needless, cable], both, declared(made), bench.serial(made))
+    assert [one.identity for one in fallen] == [needless.find.identity] and fallen[0].reasons
     assert [one.find.identity.law for one in kept] == ["ground_cable"]
     assert left.known.names == (*begun.known.names, *cable.tried.own.names)
     assert kept[0].find.gate.folds[0].gain > 500.0
@@ -85,15 +87,32 @@ def test_the_needless_law_goes_and_the_other_is_judged_without_it(
 
 def test_what_was_found_alone_stays_as_it_is(made: Experiment) -> None:
     after, cable = joined(made, standing(made), CABLE)
-    kept, left = needed([cable], after, declared(made), bench.serial(made))
-    assert kept == [cable] and left is after
+    kept, left, fallen = needed([cable], after, declared(made), bench.serial(made))
+    assert kept == [cable] and left is after and fallen == ()
+
+
+def test_what_recordings_that_were_not_used_do_not_show_falls_when_no_more_is_found(made: Experiment) -> None:
+    plain = bench.experiment(bench.rig(), ROLES, 3)
+    fitted = with_cable(plain, (0, 1))
+    other = np.sin(0.9 * bench.DT * np.arange(len(plain.trials[2].measured)))
+    shown = fitted.trials[2].measured.copy()
+    shown[:, 5] += 0.05 * other * fitted.trials[2].valid
+    experiment = replace(fitted, trials=(*fitted.trials[:2], replace(fitted.trials[2], measured=shown)))
+    begun = standing(experiment)
+    after, cable = joined(experiment, begun, CABLE)
+    kept, left, fallen = needed([cable], after, declared(made), bench.serial(made))
+    assert kept == [] and left.known.names == begun.known.names
+    (one,) = fallen
+    assert one.identity == cable.find.identity
+    assert "r2 exceeds the floor by" in one.reasons[0]
 
 
 def test_finds_of_one_law_at_one_place_stand_or_fall_together(made: Experiment) -> None:
     first, lag = joined(made, standing(made), LAG)
     second, again = joined(made, first, LAG)
     both, cable = joined(made, second, CABLE)
-    kept, left = needed([lag, again, cable], both, declared(made), bench.serial(made))
+    kept, left, fallen = needed([lag, again, cable], both, declared(made), bench.serial(made))
+    assert [one.identity for one in fallen] == [lag.find.identity]
     assert [one.find.identity.law for one in kept] == ["ground_cable"]
     assert not left.laws
 

@@ -58,6 +58,13 @@ def test_the_grid_survives_gaps_and_jitter() -> None:
     assert nominal_grid(stamp).rate == pytest.approx(1000.0, rel=1e-5)
 
 
+@pytest.mark.parametrize(("rate", "jitter"), [(1e4, 1.5e-5), (1e4, 2e-5), (1e3, 2e-4), (100.0, 2e-3)])
+def test_jitter_of_a_fifth_of_a_period_is_averaged(rate: float, jitter: float) -> None:
+    rng = np.random.default_rng(2)
+    t = np.sort(np.arange(BLOCK) / rate + jitter * rng.standard_normal(BLOCK))
+    assert nominal_grid(np.unique(np.rint(1e9 * t).astype(np.int64))).rate == pytest.approx(rate, rel=1e-4)
+
+
 @pytest.mark.parametrize(("rate", "stated"), [(100.0, 8.5e-5), (240.0, 5e-7)])
 def test_interpolation_between_samples_errs_by_what_is_stated(rate: float, stated: float) -> None:
     u = np.arange(5000) * (1.0 + 2e-4)  # slips a whole period against the grid: every phase occurs

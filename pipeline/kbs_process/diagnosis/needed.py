@@ -13,8 +13,8 @@ from kbs_process.diagnosis.floor import Floor
 from kbs_process.diagnosis.hypothesis import Simulate
 from kbs_process.diagnosis.joint import Own, Standing, without
 from kbs_process.diagnosis.leaders import gated
-from kbs_process.diagnosis.outcome import Find, Identity
-from kbs_process.diagnosis.remains import detected, too_little
+from kbs_process.diagnosis.outcome import Find, Identity, Refused
+from kbs_process.diagnosis.remains import detected, missed, too_little
 from kbs_process.diagnosis.screen import Found
 from kbs_process.diagnosis.thresholds import SHADE
 from kbs_process.diagnosis.tryout import identity
@@ -26,6 +26,7 @@ class Accepted:
 
     tried: Tried
     find: Find
+    before: Standing  # what was believed without it
 
 
 def in_the_shade(found: Found, accepted: Sequence[Accepted]) -> tuple[str, ...]:
@@ -48,33 +49,46 @@ def _where(one: Identity) -> tuple[str, ...]:
 
 def needed(
     accepted: Sequence[Accepted], standing: Standing, floor: Floor, simulate: Simulate
-) -> tuple[list[Accepted], Standing]:
+) -> tuple[list[Accepted], Standing, tuple[Refused, ...]]:
     """Leave out what later finds made needless: each has to pass the gate once more, as the last of all.
 
-    Finds of one law at one place are one. When one falls, the others are judged again without it.
+    Finds of one law at one place are one. When one falls, the others are judged again without it. Returns those that
+    stay, what is believed with them, and why the others fell.
     """
-    kept, fallen = list(accepted), False
+    kept, fallen = list(accepted), list[Refused]()
     while True:
         judged: list[Accepted] = []
         for group in _alike(kept):
             own = sum((one.tried.own for one in group), Own((), ()))
             as_found = not fallen and group[-1] is kept[-1]  # nothing has changed since
-            if as_found or not own.names:
+            if not own.names:
                 judged += group
                 continue
-            rest = without(standing, own, simulate)
-            verdict = gated(group[0].tried.found, rest, standing, own)
-            left = detected(rest, floor, standing.known.experiment.fit).left
-            if not (verdict.passed and left) or too_little(rest, standing, floor):
-                kept, standing, fallen = [one for one in kept if one not in group], rest, True
+            if as_found:
+                rest, verdict = group[0].before, group[-1].tried.gate
+                reasons = missed(rest.known, standing.known)
+            else:
+                rest = without(standing, own, simulate)
+                verdict = gated(group[0].tried.found, rest, standing, own)
+                reasons = (
+                    *verdict.reasons,
+                    *too_little(rest, standing, floor),
+                    *missed(rest.known, standing.known),
+                )
+                if not detected(rest, floor, standing.known.experiment.fit).left:
+                    reasons = (*reasons, "later finds do what it did")
+            if reasons:
+                rest = without(standing, own, simulate) if as_found else rest
+                fallen.append(Refused(group[0].find.identity, group[0].find.rho_eff, reasons))
+                kept, standing = [one for one in kept if one not in group], rest
                 break
-            if len(group) == 1:
+            if len(group) == 1 and not as_found:
                 share = explained_share(rest.known, standing.known)
                 told = replace(group[0].find, gate=verdict, held_out_variance=share)
                 group = [replace(group[0], find=told)]
             judged += group
         else:
-            return sorted(judged, key=lambda one: _place(one, accepted)), standing
+            return sorted(judged, key=lambda one: _place(one, accepted)), standing, tuple(fallen)
 
 
 def _alike(accepted: Sequence[Accepted]) -> list[list[Accepted]]:

@@ -50,7 +50,6 @@ def too_little(before: Standing, after: Standing, floor: Floor) -> tuple[str, ..
         reasons.append(
             f"takes {100.0 * share:.0f} % of what exceeds the floor: it follows what something else does"
         )
-    reasons += _missed(before.known, after.known)
     left = here.ratios
     most = max(ratio - left[trajectory] for trajectory, ratio in there.ratios.items())
     if searched(experiment) and not most >= TOLERATED:
@@ -58,8 +57,12 @@ def too_little(before: Standing, after: Standing, floor: Floor) -> tuple[str, ..
     return tuple(reasons)
 
 
-def _missed(before: Known, after: Known) -> list[str]:
-    """Of every held-out recording that is still missed, by more than nulls are, a law has to take some, too."""
+def missed(before: Known, after: Known) -> tuple[str, ...]:
+    """Return why recordings that were not used speak against a law, all others being in the plant; nothing, if none do.
+
+    Of every held-out recording that is still missed, by more than nulls are, it has to take some, too. Another law may
+    be what that recording shows, so this is asked when no more are found.
+    """
     reasons = []
     for k in after.experiment.held_out:
         left, gained = after.chi2[k] - after.rows[k], before.chi2[k] - after.chi2[k]
@@ -68,7 +71,7 @@ def _missed(before: Known, after: Known) -> list[str]:
             reasons.append(
                 f"takes {share:.0f} % of what {after.experiment.trials[k].name} exceeds the floor by"
             )
-    return reasons
+    return tuple(reasons)
 
 
 def promises_little(view: View, there: Detection) -> str:

@@ -65,7 +65,7 @@ def diagnose(
         if not detected(standing, floor, known.experiment.fit).left:
             break
     last = rounds[-1]
-    kept, standing = needed(accepted, standing, floor, simulate)
+    kept, standing, fallen = needed(accepted, standing, floor, simulate)
     finds = [as_it_stands(one.find, one.tried.own, standing.known) for one in kept]
     left = last.place
     if last.accepted is not None or len(kept) < len(accepted):
@@ -84,7 +84,7 @@ def diagnose(
         log_p=_mismatch(before, rounds[0].screening, kept),
         moved=moved,
         finds=merged(finds),
-        refused=last.refused,
+        refused=(*fallen, *last.refused),
         absorbed=_absorbed(last.screening),
         place=rounds[0].place,
         left=left,
@@ -123,7 +123,7 @@ def _round(standing: Standing, floor: Floor, simulate: Simulate, accepted: Seque
     others = [k for k, one in enumerate(passed) if k != best and _law(one) != _law(told)]
     chance = [1.0 - float(chances[others].sum()), *chances[others]]
     find = find_of([told, *(passed[k] for k in others)], 0, np.array(chance), standing, place)
-    return _Round(Accepted(told, find), told.standing, view.screening, tuple(refused), place)
+    return _Round(Accepted(told, find, standing), told.standing, view.screening, tuple(refused), place)
 
 
 def _law(one: Tried) -> Identity:

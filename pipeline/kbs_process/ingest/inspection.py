@@ -41,7 +41,7 @@ class TopicInspection:
     count: int
     start_ns: int | None
     end_ns: int | None
-    rate_Hz: float | None  # of the median interval
+    rate_Hz: float | None  # of the mean interval that is no gap
     gaps: int  # intervals above 1.5 medians
     longest_interval_s: float
     repeats: int  # messages with the stamp of the one before
@@ -88,12 +88,21 @@ class Intervals:
             self.sums += np.bincount(bins, weights=steps.astype(np.float64), minlength=len(self.sums))
 
     def median(self) -> float | None:
-        """Return the median interval, ns: the mean of the bin that it lies in, so exact for an even rate."""
+        """Return the median interval, ns: the mean of the bin that it lies in."""
         total = int(self.counts.sum())
         if not total:
             return None
         middle = int(np.searchsorted(np.cumsum(self.counts), (total + 1) // 2))
         return float(self.sums[middle] / self.counts[middle])
+
+    def usual(self) -> float | None:
+        """Return the mean of intervals that are no gaps, ns, over which jitter averages: half to one and a half medians."""
+        median = self.median()
+        if median is None:
+            return None
+        low, high = (int(np.log2(share * median) * BINS_PER_OCTAVE) for share in (2.0 - GAP, GAP))
+        inside = slice(max(low, 0), high + 1)
+        return float(self.sums[inside].sum() / self.counts[inside].sum())
 
     def gaps(self) -> int:
         """Return how many intervals exceed `GAP` medians."""
@@ -183,7 +192,7 @@ def _plan(sample: Sample | str | None) -> _Plan:
 
 def _conclude(topic: TopicSummary, plan: _Plan, gathered: _Gathered) -> TopicInspection:
     intervals = gathered.intervals
-    median = intervals.median()
+    usual = intervals.usual()
     return TopicInspection(
         topic.topic,
         topic.type,
@@ -191,7 +200,7 @@ def _conclude(topic: TopicSummary, plan: _Plan, gathered: _Gathered) -> TopicIns
         gathered.count,
         gathered.start,
         gathered.end,
-        None if median is None else 1e9 / median,
+        None if usual is None else 1e9 / usual,
         intervals.gaps(),
         intervals.longest / 1e9,
         intervals.repeats,

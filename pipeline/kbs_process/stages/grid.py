@@ -12,6 +12,7 @@ from kbs_process.signals.records import Array, Mask, Stamps
 
 GAP = 1.5  # nominal periods: a longer step is a gap
 LEFT, RIGHT = 3, 3  # neighbours that the six-point interpolation needs on either side
+FOLLOWS = 50.0  # stamps over which the clock that they make is averaged while it is counted
 PIECE = 65536  # grid points made at a time, which bounds what a long gap costs in memory
 
 
@@ -36,18 +37,31 @@ class Grid:
 def nominal_grid(stamp: Stamps) -> Grid:
     """Find the grid of increasing stamps (n >= 2).
 
-    The median step tells which steps are of one period, their mean how many periods the others are; a line
-    through the stamps over those counts then averages jitter and rounding. On 8192 stamps rounded to 1 ns the
-    period is good to 1e-9 of itself and better, so the grid stays on the samples of a steady clock for days.
+    The median step tells which steps are of one period; which period each stamp belongs to is told by where it lies
+    on the clock that the stamps before it make, so that jitter does not add up; a line through the stamps over those
+    counts then averages jitter and rounding. On 8192 stamps rounded to 1 ns the period is good to 1e-9 of itself and
+    better, so the grid stays on the samples of a steady clock for days. Jitter of a third of a period is averaged.
     """
     step = np.diff(stamp)
-    one = step[np.abs(step / np.median(step) - 1.0) <= 0.5]
-    count = np.maximum(np.rint(step / one.mean()), 1.0)
-    index = np.concatenate(([0.0], np.cumsum(count)))
-    x = index - index.mean()
+    period = float(step[np.abs(step / np.median(step) - 1.0) <= 0.5].mean())
     y = (stamp - stamp[0]).astype(np.float64)
-    period = float(x @ (y - y.mean()) / (x @ x))
+    for _ in range(2):
+        index = _counted(y / period)
+        x = index - index.mean()
+        period = float(x @ (y - y.mean()) / (x @ x))
     return Grid(int(stamp[0]), period)
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _counted(u: Array) -> Array:
+    """Period that each time (n,), in periods, belongs to: its distance from the mean of those before, rounded."""
+    index = np.zeros(len(u))
+    offset = 0.0  # of the clock's samples from whole periods
+    for k in range(1, len(u)):
+        away = u[k] - index[k - 1] - offset
+        index[k] = index[k - 1] + np.rint(away)
+        offset += (away - np.rint(away)) / min(k + 1.0, FOLLOWS)
+    return index
 
 
 class Regridder:
