@@ -96,7 +96,7 @@ class Intervals:
         return float(self.sums[middle] / self.counts[middle])
 
     def usual(self) -> float | None:
-        """Return the mean of intervals that are no gaps, ns, over which jitter averages: half to one and a half medians."""
+        """Return the mean of intervals of half to one and a half medians, ns: no gaps, and jitter is averaged."""
         median = self.median()
         if median is None:
             return None
