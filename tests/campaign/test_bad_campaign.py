@@ -56,6 +56,12 @@ FAULTS = {
         'encoder = { topic = "/encoder", fields = ["position[az]"] }',
         ["topics.encoder.fields", "1 fields for 2 channels", "az, el"],
     ),
+    "encoders that are the commands": (
+        CAMPAIGN,
+        'encoder = "/encoder"',
+        'encoder = "/command"',
+        ["topics.encoder", "nothing is measured"],
+    ),
     "no commands": (CAMPAIGN, 'command = "/command"', "", ["needs commands", "motion"]),
     "one table for a list": (CAMPAIGN, "[[requirement]]", "[requirement]", ["requirement", "write [[requirement]]"]),
     "missing parameter file": (CAMPAIGN, "parameters/rig.toml", "parameters/rg.toml", ["does not exist"]),

@@ -61,6 +61,11 @@ def _check_drive(campaign: Campaign, document: Document, tables: Merged, problem
         problems.add(
             place, '"command" needs encoder angles to compare with', "name their topic under [topics]"
         )
+    elif topics.command is not None and topics.angle.topic == topics.command.topic:
+        remedy = 'name the topic of what the encoders measure, or set drive = "motion"'
+        problems.add(
+            document.place(("topics", "encoder")), "is the commands' topic: nothing is measured", remedy
+        )
     if not campaign.effects:
         remedy = "name the effects of the nominal model under [model]"
         problems.add(place, '"command" needs a model of the drives', remedy)

@@ -55,7 +55,8 @@ def describe(campaign: Campaign, findings: Sequence[Finding]) -> Iterator[str]:
             yield f"  {finding.error}"
     bad = sum(bool(finding.error) for finding in findings)
     lossy = sum(bool(finding.losses) for finding in findings)
-    yield f"{len(findings)} recordings: {bad} unreadable, {lossy} with losses"
+    recordings = "recording" if len(findings) == 1 else "recordings"
+    yield f"{len(findings)} {recordings}: {bad} unreadable, {lossy} with losses"
 
 
 def in_words(loss: Loss) -> str:
@@ -64,9 +65,9 @@ def in_words(loss: Loss) -> str:
     when = (
         ""
         if start is None
-        else f" at {start:.3f} s"
+        else f" at {start:.4f} s"
         if end in (None, start)
-        else f", {start:.3f} to {end:.3f} s"
+        else f", {start:.4f} to {end:.4f} s"
     )
     detail = f" ({loss.detail})" if loss.detail else ""
     return f"{loss.count} x {loss.kind}{when}, {loss.where}{detail}"
