@@ -60,35 +60,38 @@ def needed(
         judged: list[Accepted] = []
         for group in _alike(kept):
             own = sum((one.tried.own for one in group), Own((), ()))
-            as_found = not fallen and group[-1] is kept[-1]  # nothing has changed since
             if not own.names:
                 judged += group
                 continue
-            if as_found:
-                rest, verdict = group[0].before, group[-1].tried.gate
-                reasons = missed(rest.known, standing.known)
+            last = not fallen and group[-1] is kept[-1]  # nothing has changed since it was found
+            if last:
+                told, reasons = group, missed(group[0].before.known, standing.known)
             else:
                 rest = without(standing, own, simulate)
-                verdict = gated(group[0].tried.found, rest, standing, own)
-                reasons = (
-                    *verdict.reasons,
-                    *too_little(rest, standing, floor),
-                    *missed(rest.known, standing.known),
-                )
-                if not detected(rest, floor, standing.known.experiment.fit).left:
-                    reasons = (*reasons, "later finds do what it did")
+                told, reasons = _again(group, own, rest, standing, floor)
             if reasons:
-                rest = without(standing, own, simulate) if as_found else rest
                 fallen.append(Refused(group[0].find.identity, group[0].find.rho_eff, reasons))
-                kept, standing = [one for one in kept if one not in group], rest
+                kept = [one for one in kept if one not in group]
+                standing = without(standing, own, simulate) if last else rest
                 break
-            if len(group) == 1 and not as_found:
-                share = explained_share(rest.known, standing.known)
-                told = replace(group[0].find, gate=verdict, held_out_variance=share)
-                group = [replace(group[0], find=told)]
-            judged += group
+            judged += told
         else:
             return sorted(judged, key=lambda one: _place(one, accepted)), standing, tuple(fallen)
+
+
+def _again(
+    group: Sequence[Accepted], own: Own, rest: Standing, standing: Standing, floor: Floor
+) -> tuple[list[Accepted], tuple[str, ...]]:
+    """Finds of one law as the last of all, after `rest`, as they are told then; and why they fall, if they do."""
+    verdict = gated(group[0].tried.found, rest, standing, own)
+    reasons = (*verdict.reasons, *too_little(rest, standing, floor), *missed(rest.known, standing.known))
+    if not detected(rest, floor, standing.known.experiment.fit).left:
+        reasons = (*reasons, "later finds do what it did")
+    if len(group) > 1:
+        return list(group), reasons
+    (one,) = group
+    told = replace(one.find, gate=verdict, held_out_variance=explained_share(rest.known, standing.known))
+    return [replace(one, find=told)], reasons
 
 
 def _alike(accepted: Sequence[Accepted]) -> list[list[Accepted]]:
