@@ -94,3 +94,25 @@ def test_the_time_of_a_lag_is_found_between_the_grid_s_with_its_interval() -> No
         assert time.sigma > 0.0
         assert as_it_stands(told, own, after.known).estimates == told.estimates
     assert time.low < 0.9 < time.high and lag.low < 0.25 < lag.high
+
+
+def test_a_shape_is_found_for_what_each_recording_has_an_amount_of() -> None:
+    made = bench.experiment(bench.rig(), ("fit", "fit"), 9)
+    before = standing(made)
+    scene = Scene.of(made, before.hypothesis, before.predicted)
+    truth = Catalogued(candidate("clock_wander", "encoder", wander_period=9.5), scene)
+    unit = Bench.of(before.known, scene).signatures([truth], 0)
+    trials = tuple(
+        replace(t, measured=t.measured + (unit @ amounts) * t.valid[:, None])
+        for t, amounts in zip(made.trials, ([0.05, 0.02], [-0.03, 0.04]), strict=True)
+    )
+    here = standing(replace(made, trials=trials))
+    scene = Scene.of(here.known.experiment, here.hypothesis, here.predicted)
+    tried = Bench.of(here.known, scene)
+    grid = [Catalogued(candidate("clock_wander", "encoder", wander_period=p), scene) for p in (8.0, 12.0)]
+    coarse = screen(tried, grid).candidates[0]
+    found = bettered(tried, coarse)
+    assert isinstance(found.suspect, Catalogued)
+    assert dict(found.suspect.candidate.shape)["wander_period"] == pytest.approx(9.5, rel=0.05)
+    assert found.score.gain > coarse.score.gain > 100.0
+    assert found.score.amplitude == pytest.approx([0.05, 0.02, -0.03, 0.04], abs=0.01)
