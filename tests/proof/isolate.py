@@ -1,7 +1,7 @@
 """Runs a method on a trial where it can see the trial, and nothing that says what is concealed in it.
 
 The method gets a process and a scratch folder of its own, with a copy of the trial under its meaningless name, and an
-environment of five variables. Where the system allows it (Linux with user namespaces and util-linux), the folders
+environment of eight variables. Where the system allows it (Linux with user namespaces and util-linux), the folders
 in `hidden` are empty to it, so are the network and all processes but its own, and no privilege is left to undo
 that. `level` says which of the two it is; results state it.
 """

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from engine.hardware import Hardware
+from engine.ports import NONE
 from proof.concealed import paths, ranges, sensitivity, trials
 from proof.concealed.effects import PHYSICS
 from proof.concealed.ranges import Phase, Range, share
+from proof.concealed.recording import record
 from proof.concealed.trials import Spec
 
 
@@ -101,3 +105,36 @@ def test_a_trial_comes_out_the_same_and_says_nothing_of_what_it_conceals(short: 
         entry["trajectory"] for entry in described[0]["recording"] if entry["role"] == "fit"
     }
     assert Range(1.0, 2.0).draw(np.random.default_rng(0), "development") < 2.0
+
+
+def test_no_kind_of_null_has_just_the_nominal_numbers() -> None:
+    nominal = Hardware.from_campaign(Path(__file__).parents[2] / "campaigns" / "EL089")
+    for kind, most in (("nothing", 0.2), ("within", 4.0)):
+        drawn = trials._hardware(nominal, Spec("development", 3, 1, kind), np.random.default_rng(4))  # type: ignore[arg-type]
+        name = "joint.el.drive.Ka"
+        away = abs(float(drawn[name] - nominal[name]) / float(nominal.sigmas[name]))
+        assert 0.0 < away < most
+        assert drawn.scalar("joint.el.drive.phi_cog") != nominal.scalar("joint.el.drive.phi_cog")
+
+
+def test_when_messages_were_logged_says_nothing_of_what_their_clock_does() -> None:
+    hardware = Hardware.from_campaign(Path(__file__).parents[2] / "campaigns" / "EL089", seed=5)
+    path = paths.calibration(np.random.default_rng(0)).until(12.0)
+    made = {}
+    for clocks in ({}, {"wrench": lambda t: 0.05 * np.sin(0.8 * t)}):
+        run = np.random.SeedSequence(1)
+        made[bool(clocks)] = record(
+            hardware,
+            path,
+            replace(NONE, clocks=clocks),
+            seed=run,
+            epoch_ns=0,
+            wrench_hz=100.0,
+            encoder_hz=50.0,
+        )
+    moved = made[True].wrench.stamp - made[False].wrench.stamp
+    assert np.ptp(moved) > 9e7  # ns
+    for recording in made.values():
+        late = 1e-9 * (recording.wrench.log - recording.wrench.stamp)
+        slow = np.convolve(late, np.ones(100) / 100.0, mode="valid")
+        assert np.ptp(slow) < 1e-3

@@ -51,10 +51,14 @@ def record(
     drift = sensors.DRIFT_SPREAD * hardware.sigmas["transducer.bias"] * run.standard_normal(6)
     raw = sensors.read_transducer(hardware, wrench_t, result.wrench, drift, noise, extra=extra)
     streams = {
-        "wrench": (_stamped("wrench", wrench_reading, wrench_t, extra, jitter), wrench_t, raw),
+        "wrench": (
+            _stamped("wrench", wrench_reading, wrench_t, extra, jitter),
+            _by_clock("wrench", wrench_t, extra),
+            raw,
+        ),
         "encoder": (
             _stamped("encoder", encoder_reading, encoder_t, extra, jitter),
-            encoder_t,
+            _by_clock("encoder", encoder_t, extra),
             result.encoder,
         ),
         "command": (path.t, path.t, np.hstack([path.position, path.rate])),
@@ -72,6 +76,12 @@ def record(
 def _stamped(name: str, reading: Array, t: Array, extra: Extra, rng: np.random.Generator) -> Array:
     """What the clock reads, with its jitter; never backwards."""
     read = reading + STAMP_JITTER * rng.standard_normal(len(t))
-    if name in extra.clocks:
-        read = read + extra.clocks[name](t)
-    return np.asarray(np.maximum.accumulate(read))
+    return np.asarray(np.maximum.accumulate(read + _by_clock(name, t, extra) - t))
+
+
+def _by_clock(name: str, t: Array, extra: Extra) -> Array:
+    """Instants as a clock that does something has them.
+
+    Messages arrive by it too: else the times at which they were logged would tell what it does, beside all physics.
+    """
+    return t + extra.clocks[name](t) if name in extra.clocks else t
