@@ -9,7 +9,7 @@ from scipy.optimize import lsq_linear
 from kbs_process.estimation.bounded import bounded_minimum
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(40))
 def test_it_is_the_bounded_minimum(seed: int) -> None:
     rng = np.random.default_rng(seed)
     J = rng.standard_normal((60, 20)) @ np.diag(10.0 ** rng.uniform(-2, 0, 20))

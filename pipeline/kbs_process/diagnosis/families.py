@@ -59,7 +59,7 @@ FAMILIES: dict[str, str] = {
     "bungee": "bungee",
     "tether": "cable",
     "floor_vibration": "vibration",
-    "floor_tilt": "inclination",
+    "floor_tilt": "tilt",
     "channel_gain": "gain",
     "cross_coupling": "cross-coupling",
     "channel_interaction": "non-linearity",

@@ -24,6 +24,8 @@ def bounded_minimum(A: Array, b: Array, low: Array, high: Array) -> Array:
         first = int(np.argmin(np.where(free, shares, np.inf)))
         if shares[first] < 1.0:
             x = np.clip(x + shares[first] * way, low, high)
+            # On the bound, and not within it by a rounding: there it would never be let go again.
+            x[first] = high[first] if way[first] > 0.0 else low[first]
             free[first] = False
             continue
         x = target

@@ -12,7 +12,7 @@ from kbs_process.signals.records import Array, Mask, Stamps
 
 GAP = 1.5  # nominal periods: a longer step is a gap
 LEFT, RIGHT = 3, 3  # neighbours that the six-point interpolation needs on either side
-FOLLOWS = 50.0  # stamps over which the clock that they make is averaged while it is counted
+AROUND = 4  # stamps on either side that a long step is held against
 PIECE = 65536  # grid points made at a time, which bounds what a long gap costs in memory
 
 
@@ -37,31 +37,33 @@ class Grid:
 def nominal_grid(stamp: Stamps) -> Grid:
     """Find the grid of increasing stamps (n >= 2).
 
-    The median step tells which steps are of one period; which period each stamp belongs to is told by where it lies
-    on the clock that the stamps before it make, so that jitter does not add up; a line through the stamps over those
-    counts then averages jitter and rounding. On 8192 stamps rounded to 1 ns the period is good to 1e-9 of itself and
-    better, so the grid stays on the samples of a steady clock for days. Jitter of a third of a period is averaged.
+    The median step tells which steps are of one period, their mean how many periods the others are; a line through
+    the stamps over those counts then averages jitter and rounding. A long step between stamps that the stamps around
+    it contradict is jitter, and no period more. On 8192 stamps rounded to 1 ns the period is good to 1e-9 of itself and
+    better, so the grid stays on the samples of a steady clock for days. Jitter of a fifth of a period is averaged.
     """
     step = np.diff(stamp)
     period = float(step[np.abs(step / np.median(step) - 1.0) <= 0.5].mean())
     y = (stamp - stamp[0]).astype(np.float64)
-    for _ in range(2):
-        index = _counted(y / period)
-        x = index - index.mean()
-        period = float(x @ (y - y.mean()) / (x @ x))
-    return Grid(int(stamp[0]), period)
+    index = np.concatenate(([0.0], np.cumsum(_counted(y / period))))
+    x = index - index.mean()
+    return Grid(int(stamp[0]), float(x @ (y - y.mean()) / (x @ x)))
 
 
-@numba.njit(cache=True, error_model="numpy")
 def _counted(u: Array) -> Array:
-    """Period that each time (n,), in periods, belongs to: its distance from the mean of those before, rounded."""
-    index = np.zeros(len(u))
-    offset = 0.0  # of the clock's samples from whole periods
-    for k in range(1, len(u)):
-        away = u[k] - index[k - 1] - offset
-        index[k] = index[k - 1] + np.rint(away)
-        offset += (away - np.rint(away)) / min(k + 1.0, FOLLOWS)
-    return index
+    """Periods that each step between times (n,), in periods, takes."""
+    count = np.maximum(np.rint(np.diff(u)), 1.0)
+    for k in np.flatnonzero(count > 1.0):
+        # What stamps on both sides are apart, beyond a period for each step between them.
+        around = [
+            np.rint(u[k + 1 + after] - u[k - before]) - (before + after)
+            for before in range(1, AROUND + 1)
+            for after in range(1, AROUND + 1)
+            if before <= k and k + 1 + after < len(u)
+        ]
+        # Other gaps nearby make it more, nothing makes it less.
+        count[k] = max(1.0, min(count[k], float(np.median(around)))) if around else count[k]
+    return count
 
 
 class Regridder:

@@ -24,7 +24,9 @@ from kbs_process.signals.smoothing import kernel_length, smooth
 
 Source = Literal["auto", "encoder", "command+encoder", "rate"]
 _CORNERS = (0.05, 0.1, 0.2, 0.5)  # Hz, of the low-pass on encoder - command
-_PHASES = (0.0, 0.25, 0.5, 0.75)  # of an encoder code, over which its rounding error is averaged
+# Of an encoder code, over which its rounding error is averaged. A joint at rest reads a whole code: half a code from it
+# the last digit of its angle would say which way it is rounded.
+_PHASES = (0.125, 0.375, 0.625, 0.875)
 _OVERSAMPLING = 5  # encoder samples to one of the working rate, where its own rate is not known
 
 
