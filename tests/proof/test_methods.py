@@ -4,19 +4,22 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Any, TypeVar, get_origin
+from typing import Any, TypeVar, get_args, get_origin
 
 import msgspec
 import pytest
 from msgspec.structs import replace
 
+from kbs_process.diagnosis.families import FAMILIES, port_word
+from kbs_process.plant.effects import CATALOGUE
+from kbs_process.plant.sensing import SENSING
 from kbs_process.report.records.common import Conclusion, Provenance, encode
 from kbs_process.report.records.diagnosis import DiagnosisResults, Find, Fitted, Moved, Place, Rival, Trial
 from proof import answer, methods
 from proof.bundle import pack
 from proof.diagnosis import answer_of
 from proof.methods import Job, answer_trial
-from proof.words import OURS
+from proof.words import OURS, Family, Port
 
 R = TypeVar("R", bound=msgspec.Struct)
 
@@ -118,3 +121,9 @@ def test_a_method_that_fails_has_answered_with_its_failure(
     monkeypatch.setattr(methods, "DIAGNOSE", (sys.executable, "-c", "import time; time.sleep(60)"))
     late = answer.decode(answer_trial(Job("T1", pack(tmp_path), (OURS,), timeout_s=0.5))[OURS])
     assert late.failure == "no answer within 0.5 s"
+
+
+def test_whatever_a_diagnosis_may_name_the_score_has_a_word_for() -> None:
+    assert {*FAMILIES.values()} <= {*get_args(Family)}
+    laws = [law for law in (*CATALOGUE, *SENSING) if law.name in FAMILIES]
+    assert {port_word(law.name, law.port) for law in laws} <= {*get_args(Port)}

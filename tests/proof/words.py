@@ -55,6 +55,7 @@ Family = Literal[
     "offset",
     "skew",
     "drops",
+    "wander",
     "latency",
     "unnamed",
 ]
