@@ -32,7 +32,7 @@ def test_command_and_encoder_together_beat_the_encoder_where_the_command_is_true
     rig, q = pointing_rig(), slow_ramp()
     run = record(rig, "slow", q, np.random.default_rng(0), deviation=5e-4)
     alone = estimate(run, rig, MotionSettings(source="encoder"))
-    joined = estimate(run, rig)
+    joined = estimate(run, rig, MotionSettings(source="command+encoder"))
     assert "command and encoder" in joined.history[1]
     error_alone, inner = _errors(alone, q)
     error_joined, _ = _errors(joined, q)
@@ -41,6 +41,8 @@ def test_command_and_encoder_together_beat_the_encoder_where_the_command_is_true
         stated = np.sqrt(np.mean(motion.sigma_q[inner, 1] ** 2))
         actual = np.sqrt(np.mean(error[:, 1] ** 2))
         assert 0.4 * actual < stated < 3.0 * actual
+        if motion is alone:
+            assert stated == pytest.approx(actual, rel=0.1)
 
 
 def test_the_encoder_is_kept_where_the_joint_leaves_its_command():
