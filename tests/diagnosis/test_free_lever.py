@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import bench
 import numpy as np
 import pytest
 
+from kbs_process.diagnosis.experiment import Experiment
 from kbs_process.diagnosis.families import port_word
 from kbs_process.diagnosis.hypothesis import Hypothesis, predict
-from kbs_process.diagnosis.joint import with_extra
+from kbs_process.diagnosis.joint import Standing, with_extra
 from kbs_process.diagnosis.places import points_of
 from kbs_process.diagnosis.ranges import Ranges
 from kbs_process.diagnosis.scene import Scene
@@ -19,6 +21,7 @@ from kbs_process.diagnosis.shapes import bettered
 from kbs_process.diagnosis.suspects import Candidate, candidates
 from kbs_process.diagnosis.tryout import extra_of, identity
 from kbs_process.plant.attach import attach
+from kbs_process.plant.effect import Effect
 from kbs_process.plant.effects import select
 from kbs_process.plant.effects.air_drag import AIR_DRAG
 from kbs_process.plant.effects.bungee import BUNGEE
@@ -28,14 +31,19 @@ DRAG, POWER, POINT = 0.8, 1.75, np.array([0.3, -0.1, 0.12])  # N at 0.01 m/s, 1,
 FREE = (Scalar("body.antenna.cog", (0,)), Scalar("joint.el.drive.Ka"))
 
 
-def test_the_point_of_a_drag_is_found_beside_its_size_and_power() -> None:
+def pulled(effect: Effect, values: Mapping[str, float]) -> tuple[Experiment, Standing]:
+    """EL089's rig, and what is believed where a force that nobody stated acts on its antenna, at `POINT`."""
     made = bench.experiment(bench.rig(), ("fit", "fit"), 5)
-    names = tuple(one.name for one in select([*made.effects, AIR_DRAG.name]))
-    truth = attach(made.rig, AIR_DRAG, {"air_drag": DRAG, "air_drag_power": POWER}, on="el", point=POINT)
+    names = tuple(one.name for one in select([*made.effects, effect.name]))
+    truth = attach(made.rig, effect, values, on="el", point=POINT)
     bare = predict(Hypothesis(made.rig, made.effects), made, 0).values
     added = predict(Hypothesis(truth, names), made, 0).values - bare
     trials = tuple(replace(t, measured=t.measured + added * t.valid[:, None]) for t in made.trials)
-    here = bench.standing(replace(made, trials=trials), FREE)
+    return made, bench.standing(replace(made, trials=trials), FREE)
+
+
+def test_the_point_of_a_drag_is_found_beside_its_size_and_power() -> None:
+    made, here = pulled(AIR_DRAG, {"air_drag": DRAG, "air_drag_power": POWER})
     scene = Scene.of(here.known.experiment, here.hypothesis, here.predicted)
     tried = Bench.of(here.known, scene)
     every = [
@@ -60,14 +68,8 @@ def test_the_point_of_a_drag_is_found_beside_its_size_and_power() -> None:
 
 
 def test_a_cord_that_nobody_stated_is_found_wherever_its_anchor_is() -> None:
-    made = bench.experiment(bench.rig(), ("fit", "fit"), 5)
-    names = tuple(one.name for one in select([*made.effects, BUNGEE.name]))
     cord = {"stiffness": 3.0, "free_length": 0.8, "anchor_x": 0.45, "anchor_y": -0.3, "anchor_z": 1.3}
-    truth = attach(made.rig, BUNGEE, cord, on="el", point=POINT)
-    bare = predict(Hypothesis(made.rig, made.effects), made, 0).values
-    added = predict(Hypothesis(truth, names), made, 0).values - bare
-    trials = tuple(replace(t, measured=t.measured + added * t.valid[:, None]) for t in made.trials)
-    here = bench.standing(replace(made, trials=trials), FREE)
+    made, here = pulled(BUNGEE, cord)
     scene = Scene.of(here.known.experiment, here.hypothesis, here.predicted)
     tried = Bench.of(here.known, scene)
     none = Ranges({})
