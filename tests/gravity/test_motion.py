@@ -32,17 +32,27 @@ def test_command_and_encoder_together_beat_the_encoder_where_the_command_is_true
     rig, q = pointing_rig(), slow_ramp()
     run = record(rig, "slow", q, np.random.default_rng(0), deviation=5e-4)
     alone = estimate(run, rig, MotionSettings(source="encoder"))
-    joined = estimate(run, rig, MotionSettings(source="command+encoder"))
+    joined = estimate(run, rig)
     assert "command and encoder" in joined.history[1]
     error_alone, inner = _errors(alone, q)
     error_joined, _ = _errors(joined, q)
-    assert error_joined[:, 1].std() < 0.9 * error_alone[:, 1].std()
-    for motion, error in ((alone, error_alone), (joined, error_joined)):
-        stated = np.sqrt(np.mean(motion.sigma_q[inner, 1] ** 2))
-        actual = np.sqrt(np.mean(error[:, 1] ** 2))
-        assert 0.4 * actual < stated < 3.0 * actual
-        if motion is alone:
-            assert stated == pytest.approx(actual, rel=0.1)
+    assert error_joined[:, 1].std() < 0.1 * error_alone[:, 1].std()
+    actual = np.sqrt(np.mean(error_alone[:, 1] ** 2))
+    assert np.sqrt(np.mean(alone.sigma_q[inner, 1] ** 2)) == pytest.approx(actual, rel=0.1)
+    # What the joined angles may have missed can be told no better than the encoder's own error allows.
+    stated = np.sqrt(np.mean(joined.sigma_q[inner, 1] ** 2))
+    assert np.sqrt(np.mean(error_joined[:, 1] ** 2)) < stated < 0.3 * actual
+
+
+@pytest.mark.parametrize("rate", [0.0, 2e-5, 5e-5, 1e-4])
+def test_the_error_of_joined_angles_is_stated(rate):
+    """Ramps so slow that what the corner leaves of the rounding is most of the error."""
+    rig, q = pointing_rig(), slow_ramp(rate=rate)
+    motion = estimate(record(rig, "slow", q, np.random.default_rng(0), deviation=5e-4), rig)
+    assert "command and encoder" in motion.history[1]
+    error, inner = _errors(motion, q)
+    actual = np.sqrt(np.mean(error[:, 1] ** 2))
+    assert np.sqrt(np.mean(motion.sigma_q[inner, 1] ** 2)) == pytest.approx(actual, rel=0.25)
 
 
 def test_the_encoder_is_kept_where_the_joint_leaves_its_command():

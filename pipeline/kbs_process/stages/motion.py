@@ -198,7 +198,7 @@ def _from_both(
         if corner >= band or kernel_length(corner, dt) > len(measured) // 2:
             continue
         slow = smooth(measured - commanded, dt, corner)
-        rounding = rounding_histories(motion, dt, step, encoder_rate, corner)
+        rounding = rounding_histories(commanded + slow, dt, step, encoder_rate, corner)
         known = rounding_error(rounding, dt)
         missed = _rms(deviation - slow) ** 2 - max(_rms(in_band) ** 2 - _rms(known) ** 2, 0.0)
         sigma = np.sqrt(known**2 + max(missed, 0.0))
