@@ -9,29 +9,73 @@ import pytest
 
 from diagnosis import bench
 from kbs_process.diagnosis.detection import Detection
+from kbs_process.diagnosis.experiment import Experiment
 from kbs_process.diagnosis.floor import declared
 from kbs_process.diagnosis.hypothesis import Hypothesis
 from kbs_process.diagnosis.known import refit
 from kbs_process.diagnosis.metric import metrics
 from kbs_process.diagnosis.parameters import known_parameters, prior
-from kbs_process.diagnosis.search import Search
+from kbs_process.diagnosis.search import GEARS, Predictions, Search, Step
 from kbs_process.diagnosis.thresholds import DETECTED, TOLERATED
 from kbs_process.rig.model import substitute
+from kbs_process.signals.records import Array
+
+
+def searching(made: Experiment) -> Search:
+    begin, simulate = Hypothesis(made.rig, made.effects), bench.serial(made)
+    free = known_parameters(made.rig, made.effects)
+    metric = metrics(made, declared(made), dict(enumerate(simulate([(0, begin)]))), begin)
+    return Search(made, metric, simulate, begin, free, prior(made.rig, made.rig, made.effects, free))
 
 
 def test_differences_span_what_a_step_has_moved_within_their_bounds() -> None:
     made = bench.experiment(bench.rig(), ("fit",), seed=3)
-    begin, simulate = Hypothesis(made.rig, made.effects), bench.serial(made)
-    free = known_parameters(made.rig, made.effects)
-    metric = metrics(made, declared(made), dict(enumerate(simulate([(0, begin)]))), begin)
-    search = Search(made, metric, simulate, begin, free, prior(made.rig, made.rig, made.effects, free))
+    search = searching(made)
     sharp = np.diag(1e12 / search.spread**2)  # which a difference of next to nothing would show
-    search.settle(sharp, np.zeros(len(free)))
+    search.settle(sharp, np.zeros(len(search.free)))
     still = search.differences.copy()
     search.settle(sharp, 0.1 * search.spread)
     assert np.allclose(search.differences, 0.1 * search.spread) and (still < search.differences).all()
     search.settle(sharp, 100.0 * search.spread)
     assert (search.differences < search.spread).all()
+
+
+def test_steps_correct_slopes_until_those_of_the_drives_are_taken_anew() -> None:
+    search = searching(bench.experiment(bench.rig(), ("fit",), seed=3))
+    begun = search.begin(search.hypothesis.values(search.free))
+    theta = begun.theta + 0.3 * np.where(np.isfinite(search.parameters.sigma), search.parameters.sigma, 0.1)
+    stepped = Step(theta, search.predict([theta], [0])[0], promised=0.0, gained=0.0)
+    corrected = search.updated(begun.gradients, begun.theta, stepped)
+    (body,) = (i for i in search.slow if search.free[i].name == "body.antenna.mass")
+    assert not np.array_equal(corrected[0].columns[body], begun.gradients[0].columns[body])
+    change = np.tensordot(theta - begun.theta, corrected[0].columns, axes=1)
+    assert np.allclose(change, stepped.predicted[0].values - begun.predicted[0].values, atol=1e-9)
+    again = search.slopes(theta, corrected, GEARS)
+    assert np.array_equal(again[0].columns[body], begun.gradients[0].columns[body])
+    (drive,) = (i for i in search.geared if search.free[i].name == "joint.el.drive.Tmax")
+    assert not np.array_equal(again[0].columns[drive], begun.gradients[0].columns[drive])
+
+
+@pytest.mark.parametrize(("wave", "share", "rounds"), [(0.5, 0.1, 1), (0.5, 0.5, 10), (0.01, 0.1, 10)])
+def test_a_descent_gives_up_where_much_is_left_and_a_step_does_little_of_it(
+    monkeypatch: pytest.MonkeyPatch, wave: float, share: float, rounds: int
+) -> None:
+    """A wave (N) that no number makes, and steps that are said to gain a `share` of what is left."""
+    made = bench.experiment(bench.rig(), ("fit",), seed=3)
+    (trial,) = made.trials
+    missing = np.zeros_like(trial.measured)
+    missing[:, 2] = wave * np.sin(2.0 * np.pi * 3.0 * made.dt * np.arange(len(missing))) * trial.valid
+    search = searching(replace(made, trials=(replace(trial, measured=trial.measured + missing),)))
+    begun = search.begin(search.hypothesis.values(search.free))
+
+    def step(theta: Array, predicted: Predictions, H: Array, g: Array) -> Step:
+        left = max(search.left(begun), 1e4)
+        return Step(theta, predicted, promised=1.5 * share * left, gained=share * left)
+
+    monkeypatch.setattr(search, "step", step)
+    ended = search.descend(begun, giving_up=True)
+    assert (search.gross(ended), ended.rounds, ended.converged) == (wave > 0.1, rounds, False)
+    assert search.descend(begun).rounds == 10
 
 
 def test_numbers_without_any_uncertainty_stay_and_their_phases_are_looked_for() -> None:

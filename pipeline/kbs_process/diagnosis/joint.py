@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kbs_process.diagnosis.hypothesis import Hypothesis, Prediction, Simulate
-from kbs_process.diagnosis.known import Known, as_it_is, descended, known_of, settled
+from kbs_process.diagnosis.known import Known, as_it_is, known_of, resumed, settled
 from kbs_process.diagnosis.search import GEARS, Laws, Search, added
 from kbs_process.estimation.fit import Parameters
 from kbs_process.plant.attach import detach, idle
@@ -61,10 +61,12 @@ class Standing:
         return self.predicted[one.drive].values + added(self.laws, known.free, known.value, reference)
 
 
-def with_extra(standing: Standing, extra: Extra, simulate: Simulate, steps: int = _STEPS) -> Standing:
+def with_extra(
+    standing: Standing, extra: Extra, simulate: Simulate, steps: int = _STEPS, *, most: int = GEARS
+) -> Standing:
     """Refit all numbers of `standing` with a suspect's beside them, along the slopes that the known ones had.
 
-    After the first few `steps`, `gone_on` takes it to its end.
+    After the first few `steps`, `moved_on` takes it to its end.
     """
     known, experiment = standing.known, standing.known.experiment
     laws = dict(standing.laws)
@@ -92,16 +94,17 @@ def with_extra(standing: Standing, extra: Extra, simulate: Simulate, steps: int 
     begun = search.begin(theta, dict(known.slopes), predicted)
     found = begun
     if np.isfinite(search.cost(theta, predicted)[0]):
-        found = search.descend(begun, steps, most=GEARS)
+        found = search.descend(begun, steps, most=most, giving_up=True)
     return standing_of(known_of(search, found, known.chi2_before), laws, simulate)
 
 
-def gone_on(standing: Standing, simulate: Simulate) -> Standing:
-    """The refit of `with_extra` taken to its end, unless it is there."""
+def moved_on(standing: Standing, simulate: Simulate) -> Standing:
+    """The refit of `with_extra` taken to its end: to better phases first, which made up for what was left out."""
     known = standing.known
-    if known.converged or not np.isfinite(known.cost):
+    if not np.isfinite(known.cost):
         return standing
-    return standing_of(descended(known, simulate, _STEPS, laws=standing.laws), standing.laws, simulate)
+    moved = resumed(known, simulate, laws=standing.laws)
+    return standing_of(moved, standing.laws, simulate) if moved.cost < known.cost else standing
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,7 +142,10 @@ def _stripped(standing: Standing, own: Own) -> tuple[Known, Laws]:
         parameters=_chosen(known.parameters, others),
         scale=known.scale[others],
         value=known.value[others],
-        slopes={drive: replace(one, columns=one.columns[others]) for drive, one in known.slopes.items()},
+        slopes={
+            drive: replace(one, columns=one.columns[others], taken=one.taken[others])
+            for drive, one in known.slopes.items()
+        },
     )
     return rest, {name: columns for name, columns in standing.laws.items() if name not in own.names}
 

@@ -18,7 +18,7 @@ from kbs_process.diagnosis.floor import Floor
 from kbs_process.diagnosis.hypothesis import Hypothesis, Simulate
 from kbs_process.diagnosis.metric import Metric, metrics
 from kbs_process.diagnosis.parameters import Slopes, known_parameters, prior, within
-from kbs_process.diagnosis.search import ALL, GEARS, Found, Laws, Search
+from kbs_process.diagnosis.search import ALL, EARLY, GROSS, Found, Laws, Search
 from kbs_process.estimation.fit import Check, Parameters
 from kbs_process.signals.records import Array, Mask
 from kbs_process.stages.output_error import Scalar
@@ -104,6 +104,11 @@ class Known:
         return float((self.chi2 - self.rows)[fit].sum())
 
     @property
+    def gross(self) -> bool:
+        """Whether so much is left of these trials that something is missing, or wrong by far."""
+        return self.excess > GROSS * float(self.rows[list(self.experiment.fit)].sum())
+
+    @property
     def prior_chi2(self) -> float:
         return float(np.nansum(self.moved**2))
 
@@ -157,10 +162,17 @@ def refit(
 
 
 def settled(known: Known, simulate: Simulate, *, leaps: int, laws: Laws | None = None) -> Known:
-    """Refit all numbers of `known`, those of suspects too, along slopes of the plant that has these in it."""
+    """Refit all numbers of `known`, those of suspects too, along slopes of the plant that has these in it.
+
+    Where so much is left that something is missing, wrong phases would do as well as right ones: no leaps then.
+    """
     search, begun = _again(known, simulate, laws)
-    renewed = replace(begun, gradients=search.slopes(begun.theta, begun.gradients))
-    return known_of(search, search.run(renewed, leaps=leaps), known.chi2_before)
+    found = replace(begun, gradients=search.slopes(begun.theta, begun.gradients))
+    if leaps:
+        found = search.descend(found, EARLY, giving_up=True)
+    if not search.gross(found):
+        found = search.run(found, leaps=leaps)
+    return known_of(search, found, known.chi2_before)
 
 
 def as_it_is(known: Known, simulate: Simulate, *, laws: Laws | None = None) -> Known:
@@ -185,17 +197,21 @@ def confined(known: Known, simulate: Simulate, reach: float, *, laws: Laws | Non
     return replace(freed, checks=_checks(freed, found))
 
 
-def descended(known: Known, simulate: Simulate, rounds: int, *, laws: Laws | None = None) -> Known:
-    """Go on with the refit of a suspect's numbers and all others, bodies' slopes as they are."""
+def resumed(known: Known, simulate: Simulate, *, laws: Laws | None = None) -> Known:
+    """Go on with the refit of a suspect's numbers and all others: from better phases, where there are any."""
     search, begun = _again(known, simulate, laws)
-    return known_of(search, search.descend(begun, rounds, most=GEARS), known.chi2_before)
+    moved = search.leapt(begun, smooth=True)
+    begun = moved or replace(begun, gradients=search.slopes(begun.theta, begun.gradients))
+    return known_of(search, search.descend(begun, giving_up=True), known.chi2_before)
 
 
-def leapt(known: Known, simulate: Simulate, *, smooth: bool) -> Known:
+def leapt(known: Known, simulate: Simulate, *, smooth: bool, laws: Laws | None = None) -> Known:
     """Look for better phases (those that enter smoothly too if `smooth`) and edges all round, and refit from there."""
-    search, begun = _again(known, simulate)
+    search, begun = _again(known, simulate, laws)
     moved = search.leapt(begun, smooth=smooth)
-    return known if moved is None else known_of(search, search.descend(moved), known.chi2_before)
+    if moved is None:
+        return known
+    return known_of(search, search.descend(moved, giving_up=True), known.chi2_before)
 
 
 def _again(known: Known, simulate: Simulate, laws: Laws | None = None) -> tuple[Search, Found]:

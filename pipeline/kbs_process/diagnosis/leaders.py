@@ -16,10 +16,11 @@ from kbs_process.diagnosis.floor import Floor
 from kbs_process.diagnosis.gate import Fold, Gate, gate, whiteness
 from kbs_process.diagnosis.gls import Background, Sums, score
 from kbs_process.diagnosis.hypothesis import Simulate
-from kbs_process.diagnosis.joint import Own, Standing, bare, gone_on, standing_of, with_extra
-from kbs_process.diagnosis.known import Known, confined, settled
+from kbs_process.diagnosis.joint import Own, Standing, bare, standing_of, with_extra
+from kbs_process.diagnosis.known import confined, settled
 from kbs_process.diagnosis.outcome import Refused
 from kbs_process.diagnosis.plausible import implausible
+from kbs_process.diagnosis.race import own_of, raced
 from kbs_process.diagnosis.remains import detected, searched
 from kbs_process.diagnosis.rivals import probabilities
 from kbs_process.diagnosis.screen import Bench, Catalogued, Found, Suspect
@@ -29,15 +30,11 @@ from kbs_process.diagnosis.suspects import BY
 from kbs_process.diagnosis.thresholds import (
     CLOSE,
     FALSE_ALARM,
-    FIRST,
     LAW_VARIANCE,
     LEAD,
     LEADERS,
     SECOND,
-    SETTLED,
-    SETTLED_TIMES,
     SHAPED,
-    TOLERATED,
 )
 from kbs_process.diagnosis.tryout import extra_of, identity, in_plant
 from kbs_process.diagnosis.view import View
@@ -73,39 +70,15 @@ def tried(
     not.
     """
 
-    def join(found: Found) -> tuple[Found, Standing]:
-        extra = extra_of(found, view.standing, view.bench, view.scene)
-        return found, with_extra(view.standing, extra, simulate, FIRST)
-
-    def near(new: Standing, best: Known) -> bool:
-        return new.known.excess <= SETTLED_TIMES * max(best.excess, TOLERATED * float(best.rows.sum()))
-
-    def go_on(one: tuple[Found, Standing]) -> tuple[Found, Standing]:
-        found, new = one
-        return found, gone_on(new, simulate) if near(new, joined[0][1].known) else new
-
-    def judge(one: tuple[int, tuple[Found, Standing]]) -> Tried:
-        place, (found, new) = one
-        own = own_of(found, before, new)
-        settle = place < SETTLED and near(new, joined[0][1].known)
-        end = resettled(new, floor, simulate, leaps=0) if settle else new
-        verdict = gated(found, before, end, own)
-        if place == 0 and not verdict.passed and end.known.excess < 0.5 * before.known.excess:
-            # So much is hardly chance: phases may still be those that made up for what was left out.
-            end = resettled(end, floor, simulate, leaps=1)
-            verdict = gated(found, before, end, own)
-        return Tried(found, end, verdict, view.screening, own)
-
     judged = [
         Tried(found, *_trial_by_trial(found.suspect, view.standing, view.bench), view.screening, Own((), ()))
         for found in chosen
         if found.suspect.each_trial
     ]
-    joined = side_by_side(join, [found for found in chosen if not found.suspect.each_trial])
-    joined.sort(key=_cost)
-    # What the first steps have left far behind is not worth the others.
-    joined = sorted(side_by_side(go_on, joined), key=_cost)
-    judged += side_by_side(judge, enumerate(joined))
+    for runner in raced([found for found in chosen if not found.suspect.each_trial], view, floor, simulate):
+        own = own_of(runner.found, before, runner.standing)
+        verdict = gated(runner.found, before, runner.standing, own)
+        judged.append(Tried(runner.found, runner.standing, verdict, view.screening, own))
     passed = [one for one in judged if one.gate.passed]
     refused = [
         Refused(identity(one.found.suspect), one.found.score.rho_eff, one.gate.reasons)
@@ -113,16 +86,6 @@ def tried(
         if not one.gate.passed
     ]
     return passed, refused
-
-
-def _cost(one: tuple[Found, Standing]) -> float:
-    return float(np.nan_to_num(one[1].known.cost, nan=np.inf))
-
-
-def own_of(found: Found, before: Standing, after: Standing) -> Own:
-    """The numbers that a law has brought: its amplitudes, then its shapes."""
-    names = after.known.names[len(before.known.names) :]
-    return Own(names, names[: len(found.suspect.amplitudes)])
 
 
 def gated(found: Found, before: Standing, after: Standing, own: Own) -> Gate:

@@ -63,7 +63,8 @@ def needed(
             if not own.names:
                 judged += group
                 continue
-            last = not fallen and group[-1] is kept[-1]  # nothing has changed since it was found
+            # Nothing has changed since it was found, and what was believed then was all that could be.
+            last = not fallen and group[-1] is kept[-1] and not group[0].before.known.gross
             if last:
                 told, reasons = group, missed(group[0].before.known, standing.known)
             else:

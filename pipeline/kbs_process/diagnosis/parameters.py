@@ -59,6 +59,7 @@ class Slopes:
 
     base: Prediction
     columns: Array  # (p, n, c)
+    taken: Array  # (p, n, c) as differences had them, before steps of a search corrected them
 
 
 def slopes(
@@ -73,7 +74,8 @@ def slopes(
 ) -> dict[int, Slopes]:
     """Difference the plant in each free number by `differences` (p,); the cross-coupling's columns are exact.
 
-    `keep` holds, for some drives, which numbers' columns (indices) need not be taken again, and all columns.
+    `keep` holds, for some drives, which numbers' columns (indices) need not be taken again, and all columns as they
+    were taken.
     """
     tasks: list[Task] = [(drive, hypothesis) for drive in drives]
     places: list[tuple[int, int]] = []
@@ -107,7 +109,7 @@ def slopes(
             for drive in drives:
                 acting = bases[drive].wrench[:, j]
                 columns[drive][index][:, :wrench] = acting[:, None] * M[:, rows.index(i)]
-    return {drive: Slopes(bases[drive], columns[drive]) for drive in drives}
+    return {drive: Slopes(bases[drive], columns[drive], columns[drive]) for drive in drives}
 
 
 def _inward(

@@ -31,8 +31,8 @@ from kbs_process.diagnosis.ports import port_test
 from kbs_process.diagnosis.remains import detected, promises_little, too_little
 from kbs_process.diagnosis.rivals import probabilities
 from kbs_process.diagnosis.scene import Scene
-from kbs_process.diagnosis.screen import Screening
-from kbs_process.diagnosis.thresholds import ROUNDS
+from kbs_process.diagnosis.screen import Catalogued, Screening
+from kbs_process.diagnosis.thresholds import ROUNDS, TOLERATED
 from kbs_process.diagnosis.tryout import identity
 from kbs_process.diagnosis.view import View
 
@@ -112,6 +112,7 @@ def _round(standing: Standing, floor: Floor, simulate: Simulate, accepted: Seque
     passed, refused = _passed(view, floor, simulate, accepted)
     if not passed:
         return _Round(None, standing, view.screening, tuple(refused), place)
+    passed = named_first(passed)
     chances = probabilities([one.standing.known for one in passed], view.bench.background.rows)
     best = int(np.argmax(chances))
     settled = released(resettled(passed[best].standing, floor, simulate, leaps=1), floor, simulate)
@@ -124,6 +125,25 @@ def _round(standing: Standing, floor: Floor, simulate: Simulate, accepted: Seque
     chance = [1.0 - float(chances[others].sum()), *chances[others]]
     find = find_of([told, *(passed[k] for k in others)], 0, np.array(chance), standing, place)
     return _Round(Accepted(told, find, standing), told.standing, view.screening, tuple(refused), place)
+
+
+def named_first(passed: Sequence[Tried]) -> list[Tried]:
+    """Laws without the curves that a law of the catalogue does as well as, at the same place.
+
+    A curve follows what a formula has differently from nature, too: as far as the plant is not exact, that is no reason
+    to leave a law without its name.
+    """
+    named = [one for one in passed if isinstance(one.found.suspect, Catalogued)]
+
+    def told(curve: Tried) -> bool:
+        known = curve.standing.known
+        least = known.cost + TOLERATED * float(known.rows[list(known.experiment.fit)].sum())
+        where = _law(curve).port, _law(curve).axis
+        return any(
+            (_law(one).port, _law(one).axis) == where and one.standing.known.cost <= least for one in named
+        )
+
+    return [one for one in passed if one in named or not told(one)]
 
 
 def _law(one: Tried) -> Identity:

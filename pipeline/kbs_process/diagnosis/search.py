@@ -34,12 +34,15 @@ _DAMPING = (0.0, 1e-2, 1e-1, 1.0, 10.0, 1e3)  # tried side by side
 _AGREED = 0.9  # gained over promised, above which slopes are only updated
 _HALF = 0.5  # of the same, below which slopes of drives alone do not do
 _STALLED = 0.1  # of the same, below which a descent goes nowhere
+GROSS = 0.3  # of the noise: what is left beyond it that no wrong phase alone leaves
+_HOPE = 0.3  # of what is left: a right model's steps, along slopes taken there, gain more
 # Which slopes are taken where the search stands: none, those of suspects alone, of drives too, all.
 _OLD, _OWN, GEARS, ALL = range(4)
 GAIN = 2.0  # of -2 log likelihood: a step that promises less ends a descent
 LITTLE = 25.0  # of the same: what exact slopes gained, below which more rounds are not worth their time
-SLIGHT = 1e-2  # of all that is left: likewise
-_EARLY = 2  # steps before the first leap: masses and centres of gravity are right then
+SLIGHT = 3e-2  # of all that is left: likewise
+_MUCH = 0.5  # prior sigmas of a body's number, within which its slopes and others' stay what they are
+EARLY = 2  # steps before the first leap: masses and centres of gravity are right then
 _RIDGE = 1e-10  # of unit columns: numbers that nothing shows would leave the equations singular
 _ROUNDS = 10  # steps of a descent at most
 _NEGLIGIBLE = (
@@ -65,7 +68,9 @@ class Found:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Step:
+class Step:
+    """Where a step leads, and what it gains of what slopes promised."""
+
     theta: Array
     predicted: Predictions
     promised: float
@@ -115,6 +120,7 @@ class Search:
         self.calibrations = {trial.drive for trial in trials if trial.role == "calibration"}
         self.alike = {trial.drive: experiment.reference(trial.trajectory) for trial in trials}
         self.idle: dict[int, list[int]] = {}
+        self.bodies_at: Array | None = None  # where slopes of bodies were taken last
 
     # what a point costs
 
@@ -178,10 +184,7 @@ class Search:
         if gradients is None:
             gradients = self.slopes(theta, {}, ALL)
         elif missing := len(self.free) - len(gradients[self.references[0]].columns):
-            wider = {
-                drive: Slopes(predicted[drive], np.pad(slope.columns, ((0, missing), (0, 0), (0, 0))))
-                for drive, slope in gradients.items()
-            }
+            wider = {drive: _widened(slope, predicted[drive], missing) for drive, slope in gradients.items()}
             gradients = self.slopes(theta, wider, _OWN)
         found = Found(theta, predicted, gradients)
         self.idle = {drive: self._idle(drive, found.gradients) for drive in self.references}
@@ -201,18 +204,21 @@ class Search:
         The first leap is made early: what is left out, or a wrong phase, has not yet pulled the others far then.
         """
         for number in range(leaps):
-            found = self.descend(found, _EARLY if number == 0 else _ROUNDS)
+            found = self.descend(found, EARLY if number == 0 else _ROUNDS)
             moved = self.leapt(found, smooth=number == 0)
             if moved is not None:
                 found = moved
             elif number > 0:
                 break
-        return self.descend(found)
+        return self.descend(found, giving_up=True)
 
-    def descend(self, found: Found, rounds: int = _ROUNDS, *, most: int = ALL) -> Found:
+    def descend(
+        self, found: Found, rounds: int = _ROUNDS, *, most: int = ALL, giving_up: bool = False
+    ) -> Found:
         """Steps until slopes that are all taken anew promise little, or do not keep what they promise.
 
-        All of them, or only those of suspects' own numbers, as `most` says.
+        All of them, or only those of suspects' own numbers, as `most` says. When `giving_up`, also until a step does
+        little of what is to be done: no number here does it then, and more steps only bend them towards it.
         """
         fresh = min(GEARS, most)
         for number in range(found.rounds + 1, found.rounds + rounds + 1):
@@ -225,13 +231,15 @@ class Search:
             if step.gained > 0.0:
                 gradients = self.updated(found.gradients, found.theta, step)
                 found = replace(found, theta=step.theta, predicted=step.predicted, gradients=gradients)
-            found = replace(
-                found, rounds=number, converged=arrived and (fresh == most or step.promised < little)
-            )
+            freshest = min(most, ALL if self._bodies_moved(found.theta) else GEARS)
+            converged = arrived and (fresh >= freshest or step.promised < little)
+            found = replace(found, rounds=number, converged=converged)
             if found.converged:
                 break
+            if giving_up and fresh != _OLD and self.gross(found) and step.gained < _HOPE * self.left(found):
+                break
             stale = step.gained < max(little, _HALF * step.promised)
-            fresh = _OLD if kept else min(most, ALL if stale and fresh == GEARS else GEARS)
+            fresh = _OLD if kept else freshest if stale and fresh == GEARS else min(most, GEARS)
             if fresh != _OLD:
                 found = replace(found, gradients=self.slopes(found.theta, found.gradients, fresh))
         return found
@@ -248,12 +256,19 @@ class Search:
         """-2 log likelihood beyond that of noise."""
         return self.cost(found.theta, found.predicted)[0] - self.rows
 
+    def gross(self, found: Found) -> bool:
+        """Whether so much is left that something is missing, or wrong by far."""
+        return self.left(found) > GROSS * self.rows
+
     def slopes(self, theta: Array, held: Gradients, fresh: int = GEARS) -> Gradients:
         """Slopes at theta; where some are held, only those that `fresh` names are taken again.
 
         Those of bodies change with the resonances, slowly. Calibrations, slow and at rest for the most part, keep what
-        others show better. A law's column is its slope.
+        others show better. A law's column is its slope. What is not taken again is as it was taken: a step of drives
+        that stick or slip corrects the columns of all that moved with them, and theirs with the wrong ones.
         """
+        if fresh == ALL:
+            self.bodies_at = theta
         keep = {}
         for drive in self.references:
             same = set(self.idle.get(drive, ())) if drive in held else set()
@@ -261,7 +276,7 @@ class Search:
                 same |= set(self.slow) | (set(self.geared) if fresh == _OWN else set())
                 if drive in self.calibrations:
                     same |= {i for i in self.geared if self._shown_beside(i, drive)}
-            columns = held[drive].columns.copy() if drive in held else None
+            columns = held[drive].taken.copy() if drive in held else None
             if self.laws:
                 if columns is None:
                     grid = self.experiment.drives[drive].n, len(self.experiment.channels)
@@ -277,6 +292,13 @@ class Search:
             self.experiment, here, free, self.differences, self.references, self.simulate, keep=keep
         )
         return {drive: replace(one, base=self._shown(theta, drive, one.base)) for drive, one in taken.items()}
+
+    def _bodies_moved(self, theta: Array) -> bool:
+        """Whether numbers on which slopes of bodies depend have moved much since these were taken."""
+        if self.bodies_at is None:
+            return True
+        moved = np.abs(theta - self.bodies_at)[self.slow] / self.spread[self.slow]
+        return bool((moved > _MUCH).any())
 
     def _room(self, theta: Array) -> tuple[Array, Array]:
         """How far each number may go down and up, in the chart of cosines and sines: these have no bounds."""
@@ -295,18 +317,19 @@ class Search:
         others = set(self.idle) - self.calibrations - {drive}
         return any(index not in self.idle[other] for other in others)
 
-    def updated(self, gradients: Gradients, theta: Array, step: _Step) -> Gradients:
+    def updated(self, gradients: Gradients, theta: Array, step: Step) -> Gradients:
         """Broyden's update, lengths in prior sigmas; what laws add is exact."""
         moved = np.zeros(len(theta))
         moved[self.inside] = ((step.theta - theta) / self.spread)[self.inside]
         if not moved.any():
-            return {drive: Slopes(step.predicted[drive], slope.columns) for drive, slope in gradients.items()}
+            return {drive: replace(slope, base=step.predicted[drive]) for drive, slope in gradients.items()}
         along = moved / (moved @ moved) / self.spread
         new = {}
         for drive, slope in gradients.items():
             promised = np.tensordot(step.theta - theta, slope.columns, axes=1)
             missed = step.predicted[drive].values - slope.base.values - promised
-            new[drive] = Slopes(step.predicted[drive], slope.columns + along[:, None, None] * missed)
+            columns = slope.columns + along[:, None, None] * missed
+            new[drive] = replace(slope, base=step.predicted[drive], columns=columns)
         return new
 
     def settle(self, H: Array, moved: Array) -> None:
@@ -321,7 +344,7 @@ class Search:
             _MOST_DIFFERENCE * self.spread,
         )
 
-    def step(self, theta: Array, predicted: Predictions, H: Array, g: Array) -> _Step:
+    def step(self, theta: Array, predicted: Predictions, H: Array, g: Array) -> Step:
         """One step in the chart of cosines and sines, as damped as lowers the cost most."""
         data, excess = self.cost(theta, predicted)
         # While much is unexplained, residuals count for less, so that no step is rash.
@@ -338,14 +361,20 @@ class Search:
             promised = promised or float(2.0 * b @ du - du @ A @ du) / weight
             candidates.append(self.clipped(self.polar.back(self.polar.flat(theta) + scale * du)))
         if promised < GAIN:
-            return _Step(theta, predicted, promised, 0.0)
+            return Step(theta, predicted, promised, 0.0)
         now = weight * data + excess
         tried = self.predict(candidates, self.drives)
         costs = [weight * d + e for d, e in itertools.starmap(self.cost, zip(candidates, tried, strict=True))]
         best = int(np.argmin(costs))
         if not costs[best] < now:
-            return _Step(theta, predicted, promised, 0.0)
-        return _Step(candidates[best], {**predicted, **tried[best]}, promised, (now - costs[best]) / weight)
+            return Step(theta, predicted, promised, 0.0)
+        return Step(candidates[best], {**predicted, **tried[best]}, promised, (now - costs[best]) / weight)
+
+
+def _widened(slope: Slopes, base: Prediction, missing: int) -> Slopes:
+    """Slopes with room for `missing` more numbers."""
+    more = (0, missing), (0, 0), (0, 0)
+    return Slopes(base, np.pad(slope.columns, more), np.pad(slope.taken, more))
 
 
 def added(laws: Laws, free: Sequence[Scalar], values: Array, reference: int) -> Array | float:

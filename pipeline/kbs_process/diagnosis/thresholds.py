@@ -65,9 +65,7 @@ FIRST: Final = 3  # steps of a leader's refit that show whether it is worth the 
 SHAPED: Final = 10
 # Leaders that are tried beyond those that the linear plant cannot order, where none of these passes.
 SECOND: Final = 2
-# Of the leaders, those that leave least are refitted with all slopes taken anew before they are compared, if they leave
-# no more than some times what the best leaves.
-SETTLED: Final = 2
+# Leaders are refitted to the end if their first steps leave no more than some times what the best one's leave.
 SETTLED_TIMES: Final = 3.0
 # Share that a law has to take of what exceeds the floor, after all numbers were refitted with it: one that takes little
 # and leaves the rest follows what something else does.

@@ -1,0 +1,80 @@
+"""Leaders of a screen in the plant: each goes a few steps, then who leads shows the others the way.
+
+Phases of tooth contact that made up for what was left out are farther away than a descent goes, and to look for better
+ones costs more than all else. Where they are right beside one law, they are about right beside each that does the same.
+So whoever leads looks for them, and the others begin where it has brought the known numbers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from kbs_process.diagnosis.floor import Floor
+from kbs_process.diagnosis.hypothesis import Simulate
+from kbs_process.diagnosis.joint import Own, Standing, bare, moved_on, with_extra
+from kbs_process.diagnosis.remains import detected
+from kbs_process.diagnosis.screen import Found
+from kbs_process.diagnosis.side_by_side import side_by_side
+from kbs_process.diagnosis.thresholds import FIRST, SETTLED_TIMES, TOLERATED
+from kbs_process.diagnosis.tryout import extra_of
+from kbs_process.diagnosis.view import View
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Runner:
+    """A suspect in the plant, as far as it has come."""
+
+    found: Found
+    standing: Standing
+    leapt: bool = False  # whether better phases were looked for beside it
+
+    @property
+    def cost(self) -> float:
+        """-2 log posterior; infinite for a plant that diverged."""
+        return float(np.nan_to_num(self.standing.known.cost, nan=np.inf))
+
+
+def raced(chosen: Sequence[Found], view: View, floor: Floor, simulate: Simulate) -> list[Runner]:
+    """Suspects refitted, best first. Those that the first steps leave far behind go no farther."""
+
+    def begun(found: Found) -> Runner:
+        extra = extra_of(found, view.standing, view.bench, view.scene)
+        return Runner(found, with_extra(view.standing, extra, simulate, FIRST))
+
+    def led(by: Standing, runner: Runner) -> Runner:
+        """A runner from where another has brought the known numbers, if it gets farther from there."""
+        extra = extra_of(runner.found, by, view.bench, view.scene)
+        known = runner.standing.known
+        extra = replace(extra, start=known.value[len(view.standing.known.free) :])
+        new = replace(runner, standing=with_extra(by, extra, simulate))
+        return min(runner, new, key=lambda one: one.cost)
+
+    runners = sorted(side_by_side(begun, chosen), key=lambda one: one.cost)
+    near = [one for one in runners if _near(one, runners[0])]
+    behind = [one for one in runners if one not in near]
+    while near and not near[0].leapt and not _at_floor(near[0], floor):
+        first = replace(near[0], standing=moved_on(near[0].standing, simulate), leapt=True)
+        way = bare(first.standing, own_of(first.found, view.standing, first.standing), simulate)
+        near = [first, *side_by_side(partial(led, way), near[1:])]
+        near.sort(key=lambda one: one.cost)
+    return [*near, *behind]
+
+
+def own_of(found: Found, before: Standing, after: Standing) -> Own:
+    """The numbers that a law has brought: its amplitudes, then its shapes."""
+    names = after.known.names[len(before.known.names) :]
+    return Own(names, names[: len(found.suspect.amplitudes)])
+
+
+def _near(one: Runner, best: Runner) -> bool:
+    least = best.standing.known
+    return one.standing.known.excess <= SETTLED_TIMES * max(least.excess, TOLERATED * float(least.rows.sum()))
+
+
+def _at_floor(one: Runner, floor: Floor) -> bool:
+    experiment = one.standing.known.experiment
+    return not detected(one.standing, floor, experiment.fit).left

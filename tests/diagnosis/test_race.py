@@ -1,0 +1,73 @@
+"""Leaders in the plant: the right law comes first, and none is worse off for following; a name goes before a curve."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import bench
+import numpy as np
+import pytest
+from test_rounds import ROLES, standing, with_cable
+
+from kbs_process.diagnosis.finding import Tried
+from kbs_process.diagnosis.floor import declared
+from kbs_process.diagnosis.gate import Gate
+from kbs_process.diagnosis.joint import Own, with_extra
+from kbs_process.diagnosis.race import Runner, raced
+from kbs_process.diagnosis.rounds import named_first
+from kbs_process.diagnosis.screen import Found
+from kbs_process.diagnosis.thresholds import FIRST, TOLERATED
+from kbs_process.diagnosis.tryout import extra_of, identity
+from kbs_process.diagnosis.view import View
+
+RIGHT, WRONG, CURVE = ("ground_cable", "el"), ("harness", "el"), ("ground_torque of joint_angle", "el")
+
+
+@pytest.fixture(scope="module")
+def view() -> View:
+    made = with_cable(bench.experiment(bench.rig(), ROLES, 3), (0, 1, 2))
+    return View.of(standing(made), lambda one: one.family in (RIGHT, WRONG, CURVE))
+
+
+@pytest.fixture(scope="module")
+def by_family(view: View) -> dict[tuple[str, str], Found]:
+    return {one.suspect.family: one for one in view.screening.candidates}
+
+
+def test_the_right_law_comes_first_and_who_follows_gets_no_less_far(
+    view: View, by_family: dict[tuple[str, str], Found]
+) -> None:
+    made = view.standing.known.experiment
+    simulate = bench.serial(made)
+    chosen = [by_family[WRONG], by_family[RIGHT]]
+    runners = raced(chosen, view, declared(made), simulate)
+    assert [one.found.suspect.family for one in runners] == [RIGHT, WRONG]
+    assert runners[0].cost < runners[1].cost
+    for one in runners:
+        extra = extra_of(one.found, view.standing, view.bench, view.scene)
+        assert one.cost <= with_extra(view.standing, extra, simulate, FIRST).known.cost
+
+
+@pytest.mark.parametrize(("better", "names"), [(0.5, [RIGHT]), (2.0, [RIGHT, CURVE])])
+def test_a_law_keeps_its_name_beside_a_curve_that_does_a_little_more(
+    view: View, by_family: dict[tuple[str, str], Found], better: float, names: list[tuple[str, str]]
+) -> None:
+    """A curve at the same place that leaves less, in units of what the plant is exact to."""
+    known = view.standing.known
+    left = [float(known.rows[k]) for k in range(len(known.rows))]
+    share = 1.0 - better * TOLERATED * sum(left[k] for k in known.experiment.fit) / known.cost
+    less = replace(known, residual=tuple(np.sqrt(share) * z for z in known.residual))
+    passed = Gate(True, (), True, 0.0, (1.0, 1.0), ())
+
+    def tried(family: tuple[str, str], with_known: object) -> Tried:
+        told = replace(view.standing, known=with_known)
+        return Tried(by_family[family], told, passed, view.screening, Own((), ()))
+
+    law, curve = tried(RIGHT, known), tried(CURVE, less)
+    assert identity(law.found.suspect).port == identity(curve.found.suspect).port
+    assert [one.found.suspect.family for one in named_first([curve, law])] == names[::-1]
+
+
+def test_a_plant_that_diverged_comes_last(view: View, by_family: dict[tuple[str, str], Found]) -> None:
+    known = replace(view.standing.known, residual=tuple(np.nan * z for z in view.standing.known.residual))
+    assert Runner(by_family[RIGHT], replace(view.standing, known=known)).cost == np.inf
