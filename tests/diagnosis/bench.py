@@ -97,6 +97,7 @@ def standing(made: Experiment, free: tuple[Scalar, ...]) -> Standing:
         covariance=np.diag(parameters.sigma**2),
         metric=metric,
         slopes=slopes(made, hypothesis, free, 0.1 * parameters.sigma, [0], simulate),
+        shown=predicted,
         residual=tuple(m(t.measured - predicted[0].values) for m, t in zip(metric, made.trials, strict=True)),
         chi2_before=np.zeros(len(made.trials)),
         checks=(),

@@ -93,7 +93,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
         left=None,
         whiteness=(1.0, 1.0),
         looked_at=10,
-        standing=standing_of(found, before.laws, bench.serial(experiment)),
+        standing=standing_of(found, before.laws),
     )
     trajectory = family(limits_of(experiment.drives, experiment.dt), ("az", "el"), 60.0, "el")[0]
     proposal = Proposal(

@@ -110,6 +110,6 @@ def test_what_held_out_recordings_alone_show_is_said_to_be_there(
     floor = declared(made)
     here = standing(weaker(made, with_cable(made, (2,)), strength))
     there = detected(here, floor, made.fit)
-    outcome = diagnose(here.known, floor, here.predicted, bench.serial(made), there)
+    outcome = diagnose(here.known, floor, bench.serial(made), there)
     assert outcome.verdict == verdict and not outcome.finds
     assert outcome.unforeseen == bool(strength) and not there.left

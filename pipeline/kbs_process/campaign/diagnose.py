@@ -106,12 +106,10 @@ def diagnose(
     with Simulators(experiment) as simulate:
         explained = explain(experiment, simulate, progress.task)
         with progress.task("Suspects: what the known parameters leave"):
-            outcome = rounds.diagnose(
-                explained.known, explained.floor, explained.predicted, simulate, explained.after
-            )
+            outcome = rounds.diagnose(explained.known, explained.floor, simulate, explained.after)
     with progress.task("Next test"):
         proposal = proposed(outcome, explained.floor)
     with progress.task("Writing the report"):
         return write_diagnosis(
-            campaign, explained.floor, explained.known, explained.predicted, outcome, target, pdf, proposal
+            campaign, explained.floor, explained.known, explained.known.shown, outcome, target, pdf, proposal
         )

@@ -23,12 +23,11 @@ from kbs_process.diagnosis.floor import Floor, estimate, smaller
 from kbs_process.diagnosis.hypothesis import Hypothesis, Prediction, Simulate
 from kbs_process.diagnosis.known import MOVED, Known, leapt, refit
 from kbs_process.diagnosis.search import LITTLE, SLIGHT
-from kbs_process.diagnosis.thresholds import EXPLAINED
+from kbs_process.diagnosis.thresholds import EXPLAINED, MOST
 from kbs_process.signals.records import Array
 
 NEAR = 0.99 * MOVED  # sigmas
 LEAPS = 4  # after a descent
-_MOST = 0.5  # of what numbers near their priors leave: less is left where these are off
 Task = Callable[[str], AbstractContextManager[object]]  # shows that something of some length is done
 
 
@@ -39,7 +38,6 @@ class Explained:
     experiment: Experiment
     floor: Floor
     known: Known
-    predicted: dict[int, Prediction]  # by drive, with the refitted numbers
     before: Detection  # with the parameter files' numbers
     after: Detection  # with the refitted ones, over the recordings that these were fitted to
     held_out: Detection | None  # likewise over the others
@@ -58,21 +56,21 @@ def explain(experiment: Experiment, simulate: Simulate, task: Task) -> Explained
     if not _driven_alike(experiment):
         with task("The floor, with a model that is about right"):
             rough = refit(experiment, start, floor, simulate, reach=NEAR, leaps=1)
-            rough = _moved_on(_stood(rough, floor, simulate), floor, simulate, LEAPS // 2).known
+            rough = _moved_on(_stood(rough, floor), floor, simulate, LEAPS // 2).known
             start, slopes, leaps = rough.hypothesis, rough.slopes, 0
             floor = smaller(floor, _floor(experiment, _predicted(experiment, start, simulate)))
     with task("Refitting the known parameters, near what is known of them"):
         near = refit(experiment, start, floor, simulate, reach=NEAR, slopes=slopes, leaps=leaps)
-        stood = _moved_on(_stood(near, floor, simulate), floor, simulate, LEAPS)
+        stood = _moved_on(_stood(near, floor), floor, simulate, LEAPS)
     if stood.after.left and (stood.known.gross or _may_be_off(stood.known)):
         with task("Refitting the known parameters, free"):
             known = stood.known
             free = refit(experiment, known.hypothesis, floor, simulate, leaps=0)
-            if free.excess < _MOST * known.excess:
+            if free.excess < MOST * known.excess:
                 # Phases were looked for beside numbers that were wrong.
                 (start,) = phasing.begin(experiment, free.hypothesis, floor, simulate)
                 free = refit(experiment, start, floor, simulate, leaps=1)
-            freed = _moved_on(_stood(free, floor, simulate), floor, simulate, LEAPS)
+            freed = _moved_on(_stood(free, floor), floor, simulate, LEAPS)
         settled = not freed.after.left
         explained = settled or freed.after.ratio - 1.0 < EXPLAINED * (stood.after.ratio - 1.0)
         # Numbers that are off are off in every recording.
@@ -80,7 +78,7 @@ def explain(experiment: Experiment, simulate: Simulate, task: Task) -> Explained
             stood = freed
     known = replace(stood.known, chi2_before=_squares(stood.known, begun))
     held_out = _held_out(stood, floor) if experiment.held_out else None
-    return Explained(experiment, floor, known, stood.predicted, before, stood.after, held_out)
+    return Explained(experiment, floor, known, before, stood.after, held_out)
 
 
 def _squares(known: Known, predicted: Mapping[int, Prediction]) -> Array:
@@ -103,19 +101,17 @@ class _Stood:
     """A refit, and what it leaves of the recordings that it was made of."""
 
     known: Known
-    predicted: dict[int, Prediction]
     after: Detection
 
 
-def _stood(known: Known, floor: Floor, simulate: Simulate) -> _Stood:
+def _stood(known: Known, floor: Floor) -> _Stood:
     experiment = known.experiment
-    predicted = _predicted(experiment, known.hypothesis, simulate)
-    return _Stood(known, predicted, detect(experiment, floor, predicted, experiment.fit, known=known))
+    return _Stood(known, detect(experiment, floor, known.shown, experiment.fit, known=known))
 
 
 def _held_out(stood: _Stood, floor: Floor) -> Detection:
     experiment = stood.known.experiment
-    return detect(experiment, floor, stood.predicted, experiment.held_out, known=stood.known)
+    return detect(experiment, floor, stood.known.shown, experiment.held_out, known=stood.known)
 
 
 def _unseen(stood: _Stood, floor: Floor) -> float:
@@ -137,7 +133,7 @@ def _moved_on(stood: _Stood, floor: Floor, simulate: Simulate, leaps: int) -> _S
         gained = known.cost - moved.cost
         idle = 0 if gained > max(LITTLE, SLIGHT * known.excess) else idle + 1
         if gained > 0.0:
-            stood = _stood(moved, floor, simulate)
+            stood = _stood(moved, floor)
     return stood
 
 

@@ -95,7 +95,7 @@ def with_extra(
     found = begun
     if np.isfinite(search.cost(theta, predicted)[0]):
         found = search.descend(begun, steps, most=most, giving_up=True)
-    return standing_of(known_of(search, found, known.chi2_before), laws, simulate)
+    return standing_of(known_of(search, found, known.chi2_before), laws)
 
 
 def moved_on(standing: Standing, simulate: Simulate) -> Standing:
@@ -104,7 +104,7 @@ def moved_on(standing: Standing, simulate: Simulate) -> Standing:
     if not np.isfinite(known.cost):
         return standing
     moved = resumed(known, simulate, laws=standing.laws)
-    return standing_of(moved, standing.laws, simulate) if moved.cost < known.cost else standing
+    return standing_of(moved, standing.laws) if moved.cost < known.cost else standing
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,13 +121,13 @@ class Own:
 def without(standing: Standing, own: Own, simulate: Simulate) -> Standing:
     """Refit all other numbers of `standing` with a law taken out."""
     rest, laws = _stripped(standing, own)
-    return standing_of(settled(rest, simulate, leaps=1, laws=laws), laws, simulate)
+    return standing_of(settled(rest, simulate, leaps=1, laws=laws), laws)
 
 
 def bare(standing: Standing, own: Own, simulate: Simulate) -> Standing:
     """All other numbers of `standing` where they are, with a law taken out, and what that leaves."""
     rest, laws = _stripped(standing, own)
-    return standing_of(as_it_is(rest, simulate, laws=laws), laws, simulate)
+    return standing_of(as_it_is(rest, simulate, laws=laws), laws)
 
 
 def _stripped(standing: Standing, own: Own) -> tuple[Known, Laws]:
@@ -142,6 +142,7 @@ def _stripped(standing: Standing, own: Own) -> tuple[Known, Laws]:
         parameters=_chosen(known.parameters, others),
         scale=known.scale[others],
         value=known.value[others],
+        shown={},
         slopes={
             drive: replace(one, columns=one.columns[others], taken=one.taken[others])
             for drive, one in known.slopes.items()
@@ -160,11 +161,17 @@ def _less(hypothesis: Hypothesis, given: Sequence[str]) -> Hypothesis:
     return Hypothesis(rig, effects)
 
 
-def standing_of(known: Known, laws: Laws, simulate: Simulate) -> Standing:
+def standing_of(known: Known, laws: Laws) -> Standing:
     """What is believed, with the plant's own predictions."""
-    drives = range(len(known.experiment.drives))
-    predicted = simulate([(drive, known.hypothesis) for drive in drives])
-    return Standing(known, dict(zip(drives, predicted, strict=True)), laws)
+    if not laws:
+        return Standing(known, known.shown, laws)
+    experiment = known.experiment
+    alike = {trial.drive: experiment.reference(trial.trajectory) for trial in experiment.trials}
+    own = {
+        drive: replace(shown, values=shown.values - added(laws, known.free, known.value, alike[drive]))
+        for drive, shown in known.shown.items()
+    }
+    return Standing(known, own, laws)
 
 
 def _extended(parameters: Parameters, extra: Extra) -> Parameters:

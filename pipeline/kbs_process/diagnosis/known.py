@@ -15,7 +15,7 @@ from scipy.stats import chi2
 
 from kbs_process.diagnosis.experiment import Experiment
 from kbs_process.diagnosis.floor import Floor
-from kbs_process.diagnosis.hypothesis import Hypothesis, Simulate
+from kbs_process.diagnosis.hypothesis import Hypothesis, Prediction, Simulate
 from kbs_process.diagnosis.metric import Metric, metrics
 from kbs_process.diagnosis.parameters import Slopes, known_parameters, prior, within
 from kbs_process.diagnosis.search import ALL, EARLY, GROSS, Found, Laws, Search
@@ -44,6 +44,9 @@ class Known:
     covariance: Array  # (p, p)
     metric: tuple[Metric, ...]  # of each trial
     slopes: dict[int, Slopes]  # by drive
+    shown: dict[
+        int, Prediction
+    ]  # what they predict, by drive, with laws that are columns of it; {} if not known
     residual: tuple[Array, ...]  # of each trial, whitened
     chi2_before: Array  # (trials,)
     checks: tuple[Check, ...]
@@ -226,7 +229,7 @@ def _again(known: Known, simulate: Simulate, laws: Laws | None = None) -> tuple[
         laws,
         known.scale,
     )
-    return search, search.begin(known.value, known.slopes)
+    return search, search.begin(known.value, known.slopes, known.shown)
 
 
 def residuals(search: Search, found: Found) -> tuple[Array, ...]:
@@ -236,7 +239,9 @@ def residuals(search: Search, found: Found) -> tuple[Array, ...]:
 
 def known_of(search: Search, found: Found, before: Array) -> Known:
     """What a search has found, with its covariance and checks."""
-    predicted = search.predict([found.theta], search.everything)[0]
+    # A step predicts the recordings that are fitted alone.
+    rest = [drive for drive in search.everything if drive not in search.drives]
+    predicted = {**found.predicted, **search.predict([found.theta], rest)[0]}
     found = replace(found, predicted=predicted)
     H, _ = search.normal(found.gradients, predicted)
     precision = search.precision + search.ridge
@@ -256,6 +261,7 @@ def known_of(search: Search, found: Found, before: Array) -> Known:
         covariance=np.asarray(inverse * np.outer(size, size), dtype=np.float64),
         metric=search.metric,
         slopes=found.gradients,
+        shown=predicted,
         residual=residuals(search, found),
         chi2_before=before,
         checks=(),

@@ -163,7 +163,7 @@ def resettled(standing: Standing, floor: Floor, simulate: Simulate, *, leaps: in
     if not searched(known.experiment) or (leaps and at_floor):
         return standing
     moved = settled(known, simulate, leaps=leaps, laws=standing.laws)
-    return standing_of(moved, standing.laws, simulate) if moved.cost < known.cost else standing
+    return standing_of(moved, standing.laws) if moved.cost < known.cost else standing
 
 
 def reread(chosen: Tried, before: Standing, floor: Floor, simulate: Simulate) -> Tried:
@@ -208,5 +208,5 @@ def released(standing: Standing, floor: Floor, simulate: Simulate) -> Standing:
     if not known.strained or not detected(standing, floor, known.experiment.fit).left:
         return standing
     held = confined(known, simulate, CLOSE, laws=standing.laws)
-    again = resettled(standing_of(held, standing.laws, simulate), floor, simulate, leaps=1)
+    again = resettled(standing_of(held, standing.laws), floor, simulate, leaps=1)
     return again if again.known.cost < known.cost else standing

@@ -188,7 +188,9 @@ class _Stage:
         suspect, amplitude = found
         empty = {k: np.zeros(0) for k in drives}
         background = Background.of(empty, {k: np.zeros((0, 0)) for k in drives}, np.zeros(0))
-        bare = replace(known, experiment=planned, metric=metric, slopes={}, residual=tuple(empty.values()))
+        bare = replace(
+            known, experiment=planned, metric=metric, slopes={}, shown={}, residual=tuple(empty.values())
+        )
         bench = Bench(bare, scene, background, ())
         columns = {k: metric[k](bench.signatures([suspect], k)) for k in drives}
         # The planned recordings show the law: what proposes shapes of rivals looks at that.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,7 +11,7 @@ from kbs_process.diagnosis.detection import Detection
 from kbs_process.diagnosis.finding import Tried, as_it_stands, find_of, merged
 from kbs_process.diagnosis.floor import Floor
 from kbs_process.diagnosis.gate import whiteness
-from kbs_process.diagnosis.hypothesis import Prediction, Simulate
+from kbs_process.diagnosis.hypothesis import Simulate
 from kbs_process.diagnosis.joint import Standing
 from kbs_process.diagnosis.known import MOVED, Known
 from kbs_process.diagnosis.leaders import leaders, released, reread, resettled, tried
@@ -32,7 +32,7 @@ from kbs_process.diagnosis.remains import detected, promises_little, too_little
 from kbs_process.diagnosis.rivals import probabilities
 from kbs_process.diagnosis.scene import Scene
 from kbs_process.diagnosis.screen import Catalogued, Screening
-from kbs_process.diagnosis.thresholds import ROUNDS, TOLERATED
+from kbs_process.diagnosis.thresholds import MOST, ROUNDS, TOLERATED
 from kbs_process.diagnosis.tryout import identity
 from kbs_process.diagnosis.view import View
 
@@ -46,14 +46,10 @@ class _Round:
     place: Place | None
 
 
-def diagnose(
-    known: Known, floor: Floor, predicted: Mapping[int, Prediction], simulate: Simulate, before: Detection
-) -> Outcome:
-    """Find the laws that the refitted known parameters leave out.
-
-    `predicted` are the predictions of `known.hypothesis` by drive, `before` is what detection says of them.
-    """
-    standing = Standing(known, predicted, {})
+def diagnose(known: Known, floor: Floor, simulate: Simulate, before: Detection) -> Outcome:
+    """Find the laws that the refitted known parameters leave out; `before` is what detection says of these."""
+    begun = Standing(known, known.shown, {})
+    standing = begun
     accepted: list[Accepted] = []
     rounds: list[_Round] = []
     for _ in range(ROUNDS):
@@ -73,8 +69,8 @@ def diagnose(
     after = detected(standing, floor, known.experiment.fit) if accepted else before
     held_out = None
     if known.experiment.held_out:
-        begun = detected(Standing(known, predicted, {}), floor, known.experiment.held_out)
-        held_out = begun, detected(standing, floor, known.experiment.held_out) if accepted else begun
+        unseen = detected(begun, floor, known.experiment.held_out)
+        held_out = unseen, detected(standing, floor, known.experiment.held_out) if accepted else unseen
     moved = _moved(standing.known)
     return Outcome(
         verdict=_verdict(finds, moved, after, held_out),
@@ -115,7 +111,9 @@ def _round(standing: Standing, floor: Floor, simulate: Simulate, accepted: Seque
     passed = named_first(passed)
     chances = probabilities([one.standing.known for one in passed], view.bench.background.rows)
     best = int(np.argmax(chances))
-    settled = released(resettled(passed[best].standing, floor, simulate, leaps=1), floor, simulate)
+    settled = resettled(passed[best].standing, floor, simulate, leaps=1)
+    if settled.known.excess < MOST * standing.known.excess:
+        settled = released(settled, floor, simulate)
     told = reread(replace(passed[best], standing=settled), standing, floor, simulate)
     if reasons := too_little(standing, told.standing, floor):
         refused.append(Refused(_law(told), told.found.score.rho_eff, reasons))

@@ -49,6 +49,10 @@ LEAD: Final = 3.0 * TRANSFER_ERROR
 # Share of what numbers held near their priors leave, below which numbers set free are said to explain it.
 EXPLAINED: Final = 0.05
 
+# Share of what was left that is left still, below which most of it is done: phases were looked for, or numbers pulled,
+# beside something that was wrong by far.
+MOST: Final = 0.5
+
 # -- gate ----------------------------------------------------------------------------------------------------------
 # By which a coefficient's interval has to exclude zero once all numbers are refitted beside it: near LEAST_RHO, as what
 # a longer search gains for the known numbers must not be taken for the law's.
