@@ -105,6 +105,17 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
         campaign, declared(experiment), known, before.predicted, outcome, target, False, proposal
     )
     assert told.verdict_lines[0] == "The model lacks: curve over joint angle (external wrench, el)."
+    more = write_diagnosis(
+        campaign,
+        declared(experiment),
+        known,
+        before.predicted,
+        replace(outcome, after=Detection((), -80.0, 2.25)),
+        target,
+        False,
+        proposal,
+    )
+    assert "1.5 times the floor (rms) is left: more is missing, or" in more.verdict_lines[0]
     assert told.verdict_lines[-1] == f"Next test: {target / 'next-test.csv'}"
     return target
 

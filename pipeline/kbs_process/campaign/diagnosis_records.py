@@ -102,7 +102,15 @@ def _sentence(outcome: Outcome, trials: Sequence[records.Trial], floor: Floor) -
     if not outcome.finds:
         return _unnamed(outcome, trials, floor) + _located(outcome)
     told = [f"{_words(find.identity.law)} ({_where(place_of(find.identity))})" for find in outcome.finds]
-    return f"The model lacks: {'; '.join(told)}."
+    return f"The model lacks: {'; '.join(told)}.{_reserve(outcome)}"
+
+
+def _reserve(outcome: Outcome) -> str:
+    """What is to be said of finds with which something is left: among known laws they are the nearest ones."""
+    if not outcome.after.left:
+        return ""
+    level = f"{_rms(outcome.after.ratio):.3g} times the floor (rms)"
+    return f" With that in the plant {level} is left: more is missing, or a law found stands in for one like it."
 
 
 def _unnamed(outcome: Outcome, trials: Sequence[records.Trial], floor: Floor) -> str:
@@ -156,7 +164,9 @@ def _paragraph(
             + (f", not to be told from {', '.join(apart)} by these recordings." if apart else ".")
         )
     if finds:
-        parts.append(f"With it in the plant the difference is {corrected:.3g} times the floor.")
+        parts.append(
+            f"With it in the plant the difference is {corrected:.3g} times the floor.{_reserve(outcome)}"
+        )
     else:
         parts.append(_unnamed(outcome, trials, floor) + _located(outcome))
     for moved in outcome.moved[:5]:
