@@ -11,7 +11,7 @@ import pytest
 
 from engine.hardware import Hardware
 from engine.ports import NONE
-from proof.concealed import paths, ranges, sensitivity, trials
+from proof.concealed import paths, ranges, trials
 from proof.concealed.effects import PHYSICS
 from proof.concealed.ranges import Phase, Range, share
 from proof.concealed.recording import record
@@ -47,27 +47,6 @@ def test_trajectories_stay_within_the_limits_and_move_both_axes(split: ranges.Sp
         assert len(drawn) == 3
         assert all(np.all(np.ptp(path.position, axis=0) > 0.02) for path in drawn[:1])
         assert all(55.0 < path.t[-1] < 90.0 for path in drawn)
-
-
-@pytest.fixture
-def short(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Trajectories of a few seconds, from the first instant on the move, and fewer parameters."""
-    monkeypatch.setattr(sensitivity, "DRIVE", sensitivity.RUN_FRICTION)
-    whole, calibration = paths.draw, paths.calibration
-
-    def cut(*arguments: object) -> list[paths.Commands]:
-        made = []
-        for path in whole(*arguments):  # type: ignore[arg-type]
-            late = path.t >= 20.0
-            made.append(
-                paths.Commands(path.t[late] - path.t[late][0], path.position[late], path.rate[late]).until(
-                    3.0
-                )
-            )
-        return made
-
-    monkeypatch.setattr(paths, "draw", cut)
-    monkeypatch.setattr(paths, "calibration", lambda rng: calibration(rng).until(3.0))
 
 
 def files(folder: Path) -> dict[str, bytes]:
@@ -110,7 +89,7 @@ def test_a_trial_comes_out_the_same_and_says_nothing_of_what_it_conceals(short: 
 def test_no_kind_of_null_has_just_the_nominal_numbers() -> None:
     nominal = Hardware.from_campaign(Path(__file__).parents[2] / "campaigns" / "EL089")
     for kind, most in (("nothing", 0.2), ("within", 4.0)):
-        drawn = trials._hardware(nominal, Spec("development", 3, 1, kind), np.random.default_rng(4))  # type: ignore[arg-type]
+        drawn = trials.hardware_of(kind, nominal, np.random.default_rng(4))  # type: ignore[arg-type]
         name = "joint.el.drive.Ka"
         away = abs(float(drawn[name] - nominal[name]) / float(nominal.sigmas[name]))
         assert 0.0 < away < most

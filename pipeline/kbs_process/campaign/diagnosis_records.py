@@ -110,7 +110,9 @@ def _reserve(outcome: Outcome) -> str:
     if not outcome.after.left:
         return ""
     level = f"{_rms(outcome.after.ratio):.3g} times the floor (rms)"
-    return f" With that in the plant {level} is left: more is missing, or a law found stands in for one like it."
+    return (
+        f" With that in the plant {level} is left: more is missing, or a law found stands in for one like it."
+    )
 
 
 def _unnamed(outcome: Outcome, trials: Sequence[records.Trial], floor: Floor) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -52,9 +52,23 @@ def rates(rng: np.random.Generator, split: Split) -> tuple[float, float]:
 
 def set_corner(folder: Path, corner: float) -> None:
     """Write the amplifier's corner (Hz), which goes with the sampling rate."""
+
+    def change(transducer: Tree) -> None:
+        transducer["amplifier"]["corner"] |= {"value": corner, "sigma": round(0.01 * corner, 4)}
+
+    _rewrite(folder, change)
+
+
+def scale_noise(folder: Path, factor: float) -> None:
+    """Write another noise of the transducer: at another sampling rate, the same density is another number."""
+    _rewrite(folder, lambda transducer: _scale(transducer["noise"], factor))
+
+
+def _rewrite(folder: Path, change: Callable[[Tree], None]) -> None:
+    """Change the transducer in the file that describes it."""
     file = folder / FILES[0]
     tree = tomllib.loads(file.read_text())
-    tree["transducer"]["amplifier"]["corner"] |= {"value": corner, "sigma": round(0.01 * corner, 4)}
+    change(tree["transducer"])
     file.write_text(f"#:schema ../../../schemas/parameters.schema.json\n{_toml(tree)}")
 
 

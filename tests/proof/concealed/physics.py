@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from enum import IntEnum
 
 from proof.concealed.laws import Law
 from proof.concealed.ranges import Drawn
@@ -33,7 +34,7 @@ class Physics:
     name: str
     port: str
     family: str
-    law: Law | Sense
+    law: IntEnum | Sense  # Law, or a law that somebody else lets act
     places: tuple[
         str, ...
     ]  # joints, links, streams, or channels "Tx" and "Tx<-Fz"; "" where there is but one

@@ -8,7 +8,7 @@ from engine import sensors
 from engine.hardware import AXES, Array, Hardware
 from engine.ports import Extra
 from engine.sensors import Recording, Stream
-from engine.simulation import integrate, sample
+from engine.simulation import TIME_STEP, integrate, sample
 from engine.trajectories import Commands
 from proof.concealed.ranges import RUN_TO_RUN, STAMP_JITTER
 
@@ -35,6 +35,8 @@ def record(
     epoch_ns: int,
     wrench_hz: float,
     encoder_hz: float,
+    stamp_jitter: float = STAMP_JITTER,
+    time_step: float = TIME_STEP,
 ) -> Recording:
     """Simulate one run with what is concealed, and record it. The same arguments give the same bits."""
     run, clocks, noise, jitter, *arrivals = (np.random.default_rng(s) for s in seed.spawn(8))
@@ -43,7 +45,7 @@ def record(
         sensors.draw_clock(clocks, wrench_hz),
         sensors.draw_clock(clocks, encoder_hz),
     )
-    dense = integrate(hardware, path, extra=extra)
+    dense = integrate(hardware, path, time_step=time_step, extra=extra)
     duration = float(path.t[-1])
     wrench_reading, wrench_t = sensors.ticks(wrench_clock, wrench_hz, duration)
     encoder_reading, encoder_t = sensors.ticks(encoder_clock, encoder_hz, duration)
@@ -52,12 +54,12 @@ def record(
     raw = sensors.read_transducer(hardware, wrench_t, result.wrench, drift, noise, extra=extra)
     streams = {
         "wrench": (
-            _stamped("wrench", wrench_reading, wrench_t, extra, jitter),
+            _stamped("wrench", wrench_reading, wrench_t, extra, stamp_jitter, jitter),
             _by_clock("wrench", wrench_t, extra),
             raw,
         ),
         "encoder": (
-            _stamped("encoder", encoder_reading, encoder_t, extra, jitter),
+            _stamped("encoder", encoder_reading, encoder_t, extra, stamp_jitter, jitter),
             _by_clock("encoder", encoder_t, extra),
             result.encoder,
         ),
@@ -73,9 +75,11 @@ def record(
     )
 
 
-def _stamped(name: str, reading: Array, t: Array, extra: Extra, rng: np.random.Generator) -> Array:
-    """What the clock reads, with its jitter; never backwards."""
-    read = reading + STAMP_JITTER * rng.standard_normal(len(t))
+def _stamped(
+    name: str, reading: Array, t: Array, extra: Extra, jitter: float, rng: np.random.Generator
+) -> Array:
+    """What the clock reads, with its jitter (s, one sigma); never backwards."""
+    read = reading + jitter * rng.standard_normal(len(t))
     return np.asarray(np.maximum.accumulate(read + _by_clock(name, t, extra) - t))
 
 

@@ -30,7 +30,7 @@ _TRIES = 4
 _NOTHING = 0.05  # sigmas that numbers are off where nothing is
 
 _EPOCH_FIRST, _EPOCH_LAST = 803_206_800, 1_700_000_000  # s: days of a test programme somewhere in these years
-_RUN_S = 900
+RUN_S = 900
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,26 +102,37 @@ def _generators(spec: Spec) -> list[np.random.SeedSequence]:
 def prepare(spec: Spec, folder: Path) -> tuple[Bench, list[dict[str, Any]]]:
     """Write the parameter files; draw hardware and trajectories; work out the metric."""
     article, drawn, motions, _, runs, off = _generators(spec)
-    rng = np.random.default_rng(article)
-    loop = str(rng.choice(["open", "closed"]))
-    articles.write(folder, rng, spec.split, loop)
-    wrench_hz, encoder_hz = articles.rates(rng, spec.split)
-    articles.set_corner(folder, round(wrench_hz * ARTICLE["transducer.corner"].draw(rng, spec.split), 1))
-    campaign.describe(folder, [])
+    rates = describe_article(folder, np.random.default_rng(article), spec.split)
     nominal = Hardware.from_campaign(folder)
-    hardware = _hardware(nominal, spec, np.random.default_rng(drawn))
+    hardware = hardware_of(spec.kind, nominal, np.random.default_rng(drawn))
     trajectories = paths.draw(np.random.default_rng(motions), spec.split, 3)
     calibration = paths.calibration(np.random.default_rng(runs.spawn(2)[1]))
-    bench = measure(hardware, trajectories, (wrench_hz, encoder_hz), calibration)
+    bench = measure(hardware, trajectories, rates, calibration)
     if spec.kind != "beyond":
         return bench, []
     hardware, moved = beyond(bench, nominal, np.random.default_rng(off), spec.split)
     return replace(bench, hardware=hardware), moved
 
 
-def _hardware(nominal: Hardware, spec: Spec, rng: np.random.Generator) -> Hardware:
+def describe_article(
+    folder: Path, rng: np.random.Generator, split: Split, loop: str = ""
+) -> tuple[float, float]:
+    """Write a drawn article's campaign, without recordings; return the rates of wrench and encoders, Hz.
+
+    The loop is drawn, too, where none is given.
+    """
+    drawn = str(rng.choice(["open", "closed"]))
+    articles.write(folder, rng, split, loop or drawn)
+    wrench_hz, encoder_hz = articles.rates(rng, split)
+    articles.set_corner(folder, round(wrench_hz * ARTICLE["transducer.corner"].draw(rng, split), 1))
+    campaign.describe(folder, [])
+    return wrench_hz, encoder_hz
+
+
+def hardware_of(kind: Kind, nominal: Hardware, rng: np.random.Generator) -> Hardware:
+    """Draw the hardware around its nominal numbers."""
     drawn = nominal.drawn(rng)
-    if spec.kind != "nothing":
+    if kind != "nothing":
         return drawn
     # Numbers that are just what the files say would tell the kind apart, beside all physics.
     near = {
@@ -169,7 +180,7 @@ def make(spec: Spec, folder: Path) -> dict[str, Any]:
         "kind": spec.kind,
         "split": spec.split,
         "level": max((level for _, _, level in concealed), default=0.0),
-        "effects": [_truth(bench, effect, found) for effect, found, _ in concealed],
+        "effects": [told(effect, found) for effect, found, _ in concealed],
         "beyond": moved,
         "rho_eff": total,
     }
@@ -183,7 +194,8 @@ def make_named(spec: Spec, out: Path, truths: Path) -> dict[str, Any]:
     return made
 
 
-def _truth(bench: Bench, effect: Effect, found: Strength) -> dict[str, Any]:
+def told(effect: Effect, found: Strength) -> dict[str, Any]:
+    """What a truth says of one effect."""
     physics = effect.physics
     shapes = [
         {"name": shape.name, "unit": shape.unit, "value": value, "sigma_cr": None}
@@ -216,8 +228,8 @@ def _record(
 ) -> None:
     """Record all runs and describe the campaign."""
     names, starts, *streams = seed.spawn(10)
-    runs = _runs(np.random.default_rng(names), len(bench.trajectories))
-    start = int(np.random.default_rng(starts).integers(_EPOCH_FIRST, _EPOCH_LAST))
+    runs = named(np.random.default_rng(names), planned(len(bench.trajectories)))
+    start = first_second(np.random.default_rng(starts))
     (folder / "recordings").mkdir(exist_ok=True)
     checked: list[dict[str, Any]] = []
     for k, run in enumerate(runs):
@@ -228,24 +240,35 @@ def _record(
             path,
             bench.extra(hidden, float(path.t[-1])) if hidden else NONE,
             seed=streams[k],
-            epoch_ns=(start + k * _RUN_S) * 1_000_000_000,
+            epoch_ns=(start + k * RUN_S) * 1_000_000_000,
             wrench_hz=bench.rates[0],
             encoder_hz=bench.rates[1],
         )
-        file = folder / "recordings" / run.file
-        write(file, recording, Format(message_index=False))
-        digest = hashlib.sha256(file.read_bytes()).hexdigest()
-        trajectory = "CALIBRATION" if run.path < 0 else f"TRACK{run.path + 1}"
-        checked.append(
-            {"file": f"recordings/{run.file}", "sha256": digest, "trajectory": trajectory, "role": run.role,
-             "repeat": run.repeat}
-        )  # fmt: skip
+        write(folder / "recordings" / run.file, recording, Format(message_index=False))
+        checked.append(entry(folder, run))
     campaign.describe(folder, checked)
 
 
-def _runs(rng: np.random.Generator, trajectories: int) -> list[Run]:
-    """Calibration, two runs of each trajectory for fitting, one more of the first and two of the last held out."""
-    planned = [(-1, "calibration", 1)]
-    planned += [(path, "fit", repeat) for path in range(trajectories - 1) for repeat in (1, 2)]
-    planned += [(0, "held-out", 3), (trajectories - 1, "held-out", 1)]
-    return [Run(f"{rng.bytes(4).hex()}.mcap", *one) for one in planned]
+def first_second(rng: np.random.Generator) -> int:
+    """Draw when a campaign starts, s since 1970."""
+    return int(rng.integers(_EPOCH_FIRST, _EPOCH_LAST))
+
+
+def entry(folder: Path, run: Run) -> dict[str, Any]:
+    """What the campaign's description says of a recording that was written."""
+    file = f"recordings/{run.file}"
+    digest = hashlib.sha256((folder / file).read_bytes()).hexdigest()
+    trajectory = "CALIBRATION" if run.path < 0 else f"TRACK{run.path + 1}"
+    return {"file": file, "sha256": digest, "trajectory": trajectory, "role": run.role, "repeat": run.repeat}
+
+
+def planned(trajectories: int) -> list[tuple[int, str, int]]:
+    """Calibration, two runs of each trajectory for fitting, one more of the first and one of the last held out."""
+    runs = [(-1, "calibration", 1)]
+    runs += [(path, "fit", repeat) for path in range(trajectories - 1) for repeat in (1, 2)]
+    return [*runs, (0, "held-out", 3), (trajectories - 1, "held-out", 1)]
+
+
+def named(rng: np.random.Generator, runs: Sequence[tuple[int, str, int]]) -> list[Run]:
+    """Give the recordings of these runs (path, role, repeat) names that say nothing."""
+    return [Run(f"{rng.bytes(4).hex()}.mcap", *run) for run in runs]
