@@ -56,7 +56,7 @@ def test_steps_correct_slopes_until_those_of_the_drives_are_taken_anew() -> None
     assert not np.array_equal(again[0].columns[drive], begun.gradients[0].columns[drive])
 
 
-@pytest.mark.parametrize(("wave", "share", "rounds"), [(0.5, 0.1, 1), (0.5, 0.5, 10), (0.01, 0.1, 10)])
+@pytest.mark.parametrize(("wave", "share", "rounds"), [(1.0, 0.05, 1), (1.0, 0.5, 10), (0.01, 0.05, 10)])
 def test_a_descent_gives_up_where_much_is_left_and_a_step_does_little_of_it(
     monkeypatch: pytest.MonkeyPatch, wave: float, share: float, rounds: int
 ) -> None:

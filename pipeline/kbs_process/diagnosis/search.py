@@ -34,8 +34,8 @@ _DAMPING = (0.0, 1e-2, 1e-1, 1.0, 10.0, 1e3)  # tried side by side
 _AGREED = 0.9  # gained over promised, above which slopes are only updated
 _HALF = 0.5  # of the same, below which slopes of drives alone do not do
 _STALLED = 0.1  # of the same, below which a descent goes nowhere
-GROSS = 0.3  # of the noise: what is left beyond it that no wrong phase alone leaves
-_HOPE = 0.3  # of what is left: a right model's steps, along slopes taken there, gain more
+GROSS = 1.0  # of the noise: wrong phases alone have left 0.8
+_HOPE = 0.1  # of what is left: a right model's steps, along slopes taken there, gain more
 # Which slopes are taken where the search stands: none, those of suspects alone, of drives too, all.
 _OLD, _OWN, GEARS, ALL = range(4)
 GAIN = 2.0  # of -2 log likelihood: a step that promises less ends a descent
@@ -236,7 +236,8 @@ class Search:
             found = replace(found, rounds=number, converged=converged)
             if found.converged:
                 break
-            if giving_up and fresh != _OLD and self.gross(found) and step.gained < _HOPE * self.left(found):
+            hope = _HOPE * self.left(found)
+            if giving_up and fresh >= freshest and self.gross(found) and step.gained < hope:
                 break
             stale = step.gained < max(little, _HALF * step.promised)
             fresh = _OLD if kept else freshest if stale and fresh == GEARS else min(most, GEARS)
