@@ -61,9 +61,7 @@ class Standing:
         return self.predicted[one.drive].values + added(self.laws, known.free, known.value, reference)
 
 
-def with_extra(
-    standing: Standing, extra: Extra, simulate: Simulate, steps: int = _STEPS, *, most: int = GEARS
-) -> Standing:
+def with_extra(standing: Standing, extra: Extra, simulate: Simulate, steps: int = _STEPS) -> Standing:
     """Refit all numbers of `standing` with a suspect's beside them, along the slopes that the known ones had.
 
     After the first few `steps`, `moved_on` takes it to its end.
@@ -94,7 +92,7 @@ def with_extra(
     begun = search.begin(theta, dict(known.slopes), predicted)
     found = begun
     if np.isfinite(search.cost(theta, predicted)[0]):
-        found = search.descend(begun, steps, most=most, giving_up=True)
+        found = search.descend(begun, steps, most=GEARS, giving_up=True)
     return standing_of(known_of(search, found, known.chi2_before), laws)
 
 

@@ -46,7 +46,7 @@ class Known:
     slopes: dict[int, Slopes]  # by drive
     shown: dict[
         int, Prediction
-    ]  # what they predict, by drive, with laws that are columns of it; {} if not known
+    ]  # what they predict, by drive, laws that are columns in it; {}: to be predicted
     residual: tuple[Array, ...]  # of each trial, whitened
     chi2_before: Array  # (trials,)
     checks: tuple[Check, ...]
@@ -208,9 +208,9 @@ def resumed(known: Known, simulate: Simulate, *, laws: Laws | None = None) -> Kn
     return known_of(search, search.descend(begun, giving_up=True), known.chi2_before)
 
 
-def leapt(known: Known, simulate: Simulate, *, smooth: bool, laws: Laws | None = None) -> Known:
+def leapt(known: Known, simulate: Simulate, *, smooth: bool) -> Known:
     """Look for better phases (those that enter smoothly too if `smooth`) and edges all round, and refit from there."""
-    search, begun = _again(known, simulate, laws)
+    search, begun = _again(known, simulate)
     moved = search.leapt(begun, smooth=smooth)
     if moved is None:
         return known
