@@ -1,7 +1,10 @@
-"""A law at one place of a joint: the residual says where, between the places of any grid, and the plant how wide."""
+"""A law of a joint's angle: the residual says where it acts, or how often in a turn, between the places of any grid,
+and the plant how wide it is.
+"""
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 
 import bench
@@ -17,7 +20,10 @@ from kbs_process.diagnosis.shapes import bettered
 from kbs_process.diagnosis.suspects import Candidate
 from kbs_process.diagnosis.tryout import extra_of
 from kbs_process.plant.attach import attach
+from kbs_process.plant.effect import Effect
 from kbs_process.plant.effects import select
+from kbs_process.plant.effects.harness import HARNESS
+from kbs_process.plant.effects.joint_order import JOINT_ORDER
 from kbs_process.plant.effects.local_torque import LOCAL_TORQUE
 from kbs_process.stages.output_error import Scalar
 
@@ -27,10 +33,14 @@ TORQUE, ANGLE, WIDTH = 0.6, 1.27941, 1e-3  # N m, rad, rad: a fortieth of the sw
 
 def with_bump(angle: float = ANGLE) -> Standing:
     """EL089's rig with a narrow local torque at elevation that nobody stated."""
+    return with_law(LOCAL_TORQUE, {"local": TORQUE, "local_angle": angle, "local_width": WIDTH})
+
+
+def with_law(law: Effect, values: dict[str, float]) -> Standing:
+    """EL089's rig with a law at elevation that nobody stated."""
     made = bench.experiment(bench.rig(), ("fit", "fit"), 6)
-    names = tuple(one.name for one in select([*made.effects, LOCAL_TORQUE.name]))
-    values = {"local": TORQUE, "local_angle": angle, "local_width": WIDTH}
-    truth = attach(made.rig, LOCAL_TORQUE, values, joints=["el"])
+    names = tuple(one.name for one in select([*made.effects, law.name]))
+    truth = attach(made.rig, law, values, joints=["el"])
     bare = predict(Hypothesis(made.rig, made.effects), made, 0).values
     added = predict(Hypothesis(truth, names), made, 0).values - bare
     trials = tuple(replace(t, measured=t.measured + added * t.valid[:, None]) for t in made.trials)
@@ -47,6 +57,35 @@ def test_the_residual_says_where_a_law_acts(angle: float) -> None:
         print(name, places, width)
         assert min(abs(place - angle) for place in places) < WIDTH
         assert 0.2 * WIDTH < width < 4.0 * WIDTH
+
+
+@pytest.mark.parametrize("order", [310.0, 367.3])
+def test_the_residual_says_how_often_in_a_turn_a_law_comes_again(order: float) -> None:
+    here = with_law(JOINT_ORDER, {"joint_sin": 0.2, "joint_cos": 0.1, "joint_order": order})
+    scene = Scene.of(here.known.experiment, here.hypothesis, here.predicted)
+    lines = proposed(here.known, scene)["joint_order.el"]
+    print(lines)
+    # A swing of 0.046 rad tells two orders apart that are 137 from each other.
+    assert min(abs(line - order) for line in lines) < 10.0
+
+
+@pytest.mark.parametrize("rest", [1.265, 1.288])
+def test_a_spring_that_yields_away_from_the_middle_is_followed_there(rest: float) -> None:
+    values = {"harness_taut": 0.5, "harness_middle": rest, "harness_reach": 4e-3, "harness_memory": 0.01}
+    here = with_law(HARNESS, values)
+    scene = Scene.of(here.known.experiment, here.hypothesis, here.predicted)
+    tried = Bench.of(here.known, scene)
+    ranges = Ranges({("el", "joint_angle"): (1.254, 1.3)}, {})
+    shapes = {e.name: ranges.choices(e, "el", None) for e in HARNESS.parameters if e.role == "shape"}
+    every = [
+        Catalogued(Candidate(HARNESS, "el", tuple(zip(shapes, shape, strict=True))), scene)
+        for shape in itertools.product(*shapes.values())
+    ]
+    best = bettered(tried, screen(tried, every).candidates[0])
+    found = dict(best.suspect.candidate.shape)
+    print(found, best.score.gain, here.known.excess)
+    assert abs(found["harness_middle"] - rest) < 1e-3
+    assert best.score.gain > 0.95 * here.known.excess
 
 
 def test_place_and_width_of_a_bump_are_found_in_the_plant() -> None:

@@ -45,7 +45,7 @@ def test_whole_numbers_tones_phases_and_middles_of_series_stay() -> None:
         found.setdefault(suspect.name, set()).update(one.name for one in bends(suspect, rig()))
     assert found["motor_order"] == found["floor_vibration"] - {"floor_sweep"} == set()
     assert found["encoder_interpolation"] == found["channel_nonlinearity"] == set()
-    assert found["harness"] == {"harness_reach", "harness_memory"}
+    assert found["harness"] == {"harness_middle", "harness_reach", "harness_memory"}
     assert found["local_torque"] == {"local_angle", "local_width"}
     assert found["channel_lag"] == {"lag_time"}
     assert found["tether"] == set()  # it acts at the CoG

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from kbs_process.diagnosis.known import Known
@@ -13,6 +15,10 @@ from kbs_process.signals.records import Array
 _HIGHEST_ORDER = 420.0  # of a motor: twice the teeth's passing and what lies around it
 _ORDER_STEP = 0.25
 _HIGHEST_OF_DISC = 1000.0  # of an encoder's disc: beyond it a code's interpolation is looked for
+_HIGHEST_OF_JOINT = 500.0  # of a joint: twice the teeth of its gear, and what lies around it
+_FASTEST = 0.999  # share of the steps between samples, beyond which a gap lies
+_FINE = 8.0  # steps of an order that a line of a joint's range is wide
+_SAMPLES = 100  # while a joint moves, fewer of which show no line along its angle
 _TURNS = 10.0  # of a tone in a recording, fewer of which are drift, or the motion
 _MOVING = 1e-3  # rad/s of a motor
 _PASSING = 1e-5  # rad/s of a joint
@@ -30,6 +36,7 @@ def proposed(known: Known, scene: Scene) -> dict[str, tuple[float, ...]]:
     lines = _frequencies(known)
     found = dict.fromkeys(_BY_FREQUENCY, lines)
     found |= dict.fromkeys(_BY_ORDER, _orders(known, scene)) | dict.fromkeys(_BY_DISC, _of_discs(known))
+    found |= {f"joint_order.{joint}": lines for joint, lines in _of_joints(known, scene).items()}
     for joint, (angle, width) in _local(known, scene).items():
         for name in _BY_PLACE:
             # What has been passed rings on for a while.
@@ -94,7 +101,7 @@ def _orders(known: Known, scene: Scene) -> tuple[float, ...]:
         for joint in experiment.rig.joint_names:
             angle = np.interp(t, own, _column(signals.columns, signals.values, f"rotor_angle.{joint}"))
             moves = (np.abs(np.gradient(angle, experiment.dt)) > _MOVING) & trial.valid
-            if np.count_nonzero(moves) < 100 or np.ptp(angle[moves]) < 1.8 * np.pi:
+            if np.count_nonzero(moves) < _SAMPLES or np.ptp(angle[moves]) < 1.8 * np.pi:
                 continue
             power = _along(orders, angle[moves], series[moves])
             # Lines that turn faster than the working rate shows are seen as others.
@@ -107,6 +114,46 @@ def _orders(known: Known, scene: Scene) -> tuple[float, ...]:
     return _apart([value for _, value in sorted(found, reverse=True)], 0.5)
 
 
+def _of_joints(known: Known, scene: Scene) -> dict[str, tuple[float, ...]]:
+    """Orders of each joint's own angle at which the whitened residual stands out: balls, teeth and slots that pass.
+
+    A joint that turns in a range has lines as wide as a turn over that: they need not be whole numbers.
+    """
+    experiment, found = known.experiment, dict[str, tuple[float, ...]]()
+    for joint in experiment.rig.joint_names:
+        lines: list[tuple[float, float]] = []
+        for angle, series in _passed(known, scene, joint):
+            if len(angle) < _SAMPLES or not (wide := np.ptp(angle)) * _HIGHEST_OF_JOINT > 4.0 * np.pi:
+                continue
+            width = 2.0 * np.pi / wide
+            step = np.quantile(np.abs(np.diff(angle)), _FASTEST)
+            fastest = 2.0 * np.pi * experiment.highest_Hz * experiment.dt / step
+            # Less than two turns in the range is an offset and a slope.
+            orders = np.arange(2.0 * width, min(_HIGHEST_OF_JOINT, fastest), width / _FINE)
+            power = _along(orders, angle, series)
+            bound = -np.log(LINE_ALPHA / (len(orders) * series.shape[1] * len(experiment.fit)))
+            inner = power[1:-1]
+            peaks = np.flatnonzero((inner >= power[:-2]) & (inner >= power[2:]) & (inner > bound)) + 1
+            lines += [(float(power[i]), float(orders[i])) for i in peaks]
+        found[joint] = _apart([value for _, value in sorted(lines, reverse=True)], 1.0)
+    return found
+
+
+def _passed(known: Known, scene: Scene, joint: str) -> Iterator[tuple[Array, Array]]:
+    """Angles (n,) of a joint and the whitened residual (n, c) in time while it moves, of every trial that is fitted."""
+    experiment = known.experiment
+    for k in experiment.fit:
+        drive = experiment.reference(experiment.trials[k].trajectory)
+        if drive not in scene.signals:
+            continue
+        signals, series = scene.signals[drive], _in_time(known, k)
+        t = np.arange(len(series)) * experiment.dt
+        own = np.arange(len(signals.values)) / signals.rate
+        angle = np.interp(t, own, _column(signals.columns, signals.values, f"joint_angle.{joint}"))
+        moves = (np.abs(np.gradient(angle, experiment.dt)) > _PASSING) & experiment.trials[k].valid
+        yield angle[moves], series[moves]
+
+
 def _local(known: Known, scene: Scene) -> dict[str, tuple[float, float]]:
     """Middle and half width of the stretch of each joint's angles in which most of the whitened residual's power is.
 
@@ -115,19 +162,9 @@ def _local(known: Known, scene: Scene) -> dict[str, tuple[float, float]]:
     """
     experiment, found = known.experiment, dict[str, tuple[float, float]]()
     for joint in experiment.rig.joint_names:
-        angles, powers = [], []
-        for k in experiment.fit:
-            drive = experiment.reference(experiment.trials[k].trajectory)
-            if drive not in scene.signals:
-                continue
-            signals, series = scene.signals[drive], _in_time(known, k)
-            t = np.arange(len(series)) * experiment.dt
-            own = np.arange(len(signals.values)) / signals.rate
-            angle = np.interp(t, own, _column(signals.columns, signals.values, f"joint_angle.{joint}"))
-            moves = (np.abs(np.gradient(angle, experiment.dt)) > _PASSING) & experiment.trials[k].valid
-            angles.append(angle[moves])
-            powers.append(np.sum(series[moves] ** 2, axis=1))
-        angle, power = np.concatenate([*angles, np.zeros(0)]), np.concatenate([*powers, np.zeros(0)])
+        passed = list(_passed(known, scene, joint))
+        angle = np.concatenate([*(one for one, _ in passed), np.zeros(0)])
+        power = np.concatenate([*(np.sum(series**2, axis=1) for _, series in passed), np.zeros(0)])
         if len(angle) > _PLACES and np.ptp(angle) > 0.0:
             found[joint] = _stretch(angle, power)
     return found

@@ -71,9 +71,9 @@ HARNESS = Effect(
             "harness_middle",
             "rad",
             Normal(0.0, 3.0),
-            "angle of the series",
+            "angle of the series, and where it yields",
             (-1e2, 1e2),
-            grid=(0.5,),
+            grid=(0.2, 0.5, 0.8),
             over="joint_angle",
         ),
         Parameter(
