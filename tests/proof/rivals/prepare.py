@@ -30,7 +30,7 @@ def prepare(folder: Path) -> Case:
     experiment = experiment_of(load_campaign(folder, checksums=False), SilentProgress())
     with Simulators(experiment) as simulate:
         explained = explain(experiment, simulate, SilentProgress().task)
-    found, predicted = explained.known, explained.predicted
+    found, predicted = explained.known, explained.known.shown
     signals = {
         drive: _signals(experiment, found.hypothesis, drive, seen.wrench) for drive, seen in predicted.items()
     }
@@ -60,8 +60,8 @@ def prepare(folder: Path) -> Case:
 def _signals(experiment: Experiment, hypothesis: Hypothesis, drive: int, wrench: Array) -> dict[str, Array]:
     """The plant's signals at the working rate, each the mean over a working sample."""
     taps = tapped(hypothesis, experiment, drive)
-    time = experiment.dt * np.arange(len(wrench))
-    found = {"time": time}
+    time = experiment.dt * np.arange(len(wrench), dtype=np.float64)
+    found: dict[str, Array] = {"time": time}
     for joint in experiment.rig.joint_names:
         for name in _SIGNALS:
             found[f"{name}.{joint}"] = _averaged(taps, f"{name}.{joint}", time, experiment.dt)
@@ -95,7 +95,7 @@ def _repeatability(experiment: Experiment, left: list[Array]) -> Array:
         encoder = experiment.rig.joints[joint].encoder
         codes.append(float(encoder.step) if encoder else 0.0)
     least = np.maximum(np.array(codes) / np.sqrt(12.0), 1e-12)
-    return np.maximum(np.sqrt(np.mean(rows**2, axis=0)), least)
+    return np.asarray(np.maximum(np.sqrt(np.mean(rows**2, axis=0)), least), dtype=np.float64)
 
 
 def _recording(
