@@ -13,6 +13,7 @@ from kbs_process.diagnosis.finding import Tried
 from kbs_process.diagnosis.floor import declared
 from kbs_process.diagnosis.gate import Gate
 from kbs_process.diagnosis.joint import Own, with_extra
+from kbs_process.diagnosis.leaders import various
 from kbs_process.diagnosis.race import Runner, raced
 from kbs_process.diagnosis.rounds import named_first
 from kbs_process.diagnosis.screen import Found
@@ -21,17 +22,24 @@ from kbs_process.diagnosis.tryout import extra_of, identity
 from kbs_process.diagnosis.view import View
 
 RIGHT, WRONG, CURVE = ("ground_cable", "el"), ("harness", "el"), ("ground_torque of joint_angle", "el")
+KIN = ("tether", "el")  # of the right one's family and place
 
 
 @pytest.fixture(scope="module")
 def view() -> View:
     made = with_cable(bench.experiment(bench.rig(), ROLES, 3), (0, 1, 2))
-    return View.of(standing(made), lambda one: one.family in (RIGHT, WRONG, CURVE))
+    return View.of(standing(made), lambda one: one.family in (RIGHT, WRONG, CURVE, KIN))
 
 
 @pytest.fixture(scope="module")
 def by_family(view: View) -> dict[tuple[str, str], Found]:
     return {one.suspect.family: one for one in view.screening.candidates}
+
+
+def test_one_family_does_not_crowd_others_out(by_family: dict[tuple[str, str], Found]) -> None:
+    order = [by_family[one] for one in (RIGHT, KIN, CURVE, WRONG)]
+    assert [one.suspect.family for one in various(order)] == [RIGHT, CURVE, WRONG, KIN]
+    assert various(order[:1]) == order[:1]
 
 
 def test_the_right_law_comes_first_and_who_follows_gets_no_less_far(

@@ -44,7 +44,7 @@ def leaders(view: View, among: Callable[[Found], bool] = lambda _: True) -> tupl
     """The most probable suspects, as many as the linear plant may have in the wrong order, and a few that come next.
 
     Each with its shape bettered along the linear plant. Of a law that a channel can show in many ways, as products of
-    others are, the best stands for all.
+    others are, the best stands for all; laws of one family at one place come after the best of the others.
     """
     best: dict[tuple[str, ...], Found] = {}
     for found in filter(among, view.able):
@@ -54,8 +54,17 @@ def leaders(view: View, among: Callable[[Found], bool] = lambda _: True) -> tupl
         return [], []
     able.sort(key=lambda found: -found.log_evidence)
     bound = (1.0 - LEAD) * able[0].score.gain if view.ordered else 0.0
-    first = [found for found in able if found.score.gain >= bound or found is able[0]][:LEADERS]
+    first = various([found for found in able if found.score.gain >= bound or found is able[0]])[:LEADERS]
     return first, [found for found in able if found not in first][:SECOND]
+
+
+def various(chosen: Sequence[Found]) -> list[Found]:
+    """The best of each family at each place, then the others; in either part the order is kept."""
+    best: dict[tuple[str, ...], Found] = {}
+    for found in chosen:
+        own = identity(found.suspect)
+        best.setdefault((own.port, own.axis, own.family, *own.channels), found)
+    return [*best.values(), *(found for found in chosen if found not in best.values())]
 
 
 def _way(found: Found) -> tuple[str, ...]:
