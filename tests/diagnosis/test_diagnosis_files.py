@@ -101,6 +101,11 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     )
     target = tmp_path_factory.mktemp("diagnosis") / "out"
     campaign = load_campaign(bench.CAMPAIGN, checksums=False)
+    off = replace(outcome, finds=(), verdict="parameters off")
+    told_off = write_diagnosis(
+        campaign, declared(experiment), known, before.predicted, off, target, False, None
+    )
+    assert "would look the same" in told_off.verdict_lines[0] and "{" not in told_off.verdict_lines[0]
     told = write_diagnosis(
         campaign, declared(experiment), known, before.predicted, outcome, target, False, proposal
     )

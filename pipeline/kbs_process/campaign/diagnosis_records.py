@@ -40,7 +40,8 @@ _FLOOR = {
 _PORTS = {"ground torque": "external wrench"}  # of the port test, in the words of finds
 _WORDS = {
     "none": "Nothing exceeds {floor}.",
-    "parameters off": "Known parameters are off; no physics was left out that these recordings show.",
+    "parameters off": "Known parameters are off: moved, they leave nothing that exceeds {floor}. Physics that does "
+    "what they do would look the same; one that is farther off than its file can be wrong stands for such physics.",
     "undecided": "There is a mismatch, and no law passed the gate.",
 }
 
