@@ -8,8 +8,10 @@ import itertools
 from dataclasses import replace
 
 import bench
+import numpy as np
 import pytest
 
+from kbs_process.diagnosis import proposals
 from kbs_process.diagnosis.hypothesis import Hypothesis, predict
 from kbs_process.diagnosis.joint import Standing, with_extra
 from kbs_process.diagnosis.proposals import proposed
@@ -67,6 +69,15 @@ def test_the_residual_says_how_often_in_a_turn_a_law_comes_again(order: float) -
     print(lines)
     # A swing of 0.046 rad tells two orders apart that are 137 from each other.
     assert min(abs(line - order) for line in lines) < 10.0
+
+
+def test_a_joint_too_fast_for_any_line_along_its_angle_has_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    here = with_bump()
+    scene = Scene.of(here.known.experiment, here.hypothesis, here.predicted)
+    to_and_fro = np.tile([0.0, 0.5], 200)
+    passed = to_and_fro, np.random.default_rng(1).standard_normal((len(to_and_fro), 8))
+    monkeypatch.setattr(proposals, "_passed", lambda *_: iter([passed]))
+    assert "joint_order.el" not in proposed(here.known, scene)
 
 
 @pytest.mark.parametrize("rest", [1.265, 1.288])

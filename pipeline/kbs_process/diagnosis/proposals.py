@@ -123,13 +123,15 @@ def _of_joints(known: Known, scene: Scene) -> dict[str, tuple[float, ...]]:
     for joint in experiment.rig.joint_names:
         lines: list[tuple[float, float]] = []
         for angle, series in _passed(known, scene, joint):
-            if len(angle) < _SAMPLES or not (wide := np.ptp(angle)) * _HIGHEST_OF_JOINT > 4.0 * np.pi:
+            if len(angle) < _SAMPLES:
                 continue
-            width = 2.0 * np.pi / wide
+            width = 2.0 * np.pi / np.ptp(angle)
             step = np.quantile(np.abs(np.diff(angle)), _FASTEST)
             fastest = 2.0 * np.pi * experiment.highest_Hz * experiment.dt / step
             # Less than two turns in the range is an offset and a slope.
             orders = np.arange(2.0 * width, min(_HIGHEST_OF_JOINT, fastest), width / _FINE)
+            if not len(orders):
+                continue
             power = _along(orders, angle, series)
             bound = -np.log(LINE_ALPHA / (len(orders) * series.shape[1] * len(experiment.fit)))
             inner = power[1:-1]
