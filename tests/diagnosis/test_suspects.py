@@ -15,7 +15,7 @@ from kbs_process.diagnosis.hypothesis import Tapped
 from kbs_process.diagnosis.inlets import Inlet
 from kbs_process.diagnosis.places import half_lengths, point_of
 from kbs_process.diagnosis.ranges import Ranges, ranges_of
-from kbs_process.diagnosis.signature import field_change, inputs, port_inputs, sensed
+from kbs_process.diagnosis.signature import inputs, port_inputs, sensed
 from kbs_process.diagnosis.suspects import Candidate, candidates
 from kbs_process.diagnosis.transfer import follow, respond
 from kbs_process.plant.attach import attach
@@ -218,7 +218,9 @@ def test_a_wrong_field_is_followed_by_the_motor() -> None:
     stiffness = float(drive.parameters["Tmax"]) * float(drive.parameters["Kangle"])
     (column,) = inputs(late, tapped(), rig(), NOMINAL)
     np.testing.assert_allclose(
-        column[Inlet("motor_torque", "el")], stiffness * field_change(late, tapped())[:, 0], rtol=1e-6
+        column[Inlet("motor_torque", "el")],
+        stiffness * port_inputs(late, tapped(), rig())[:, 0, 0],
+        rtol=1e-6,
     )
 
 

@@ -27,7 +27,8 @@ def amplitudes(effect: Effect) -> list[str]:
 def around(effect: Effect) -> dict[str, float]:
     """Signals of a drive that turns, or of a point that moves; shapes in the middle of their priors."""
     signals = {
-        "field": 3.02, "rotor_angle": 3.0, "rotor_rate": 0.5, "rotor_travel": 0.0, "ratio": 100.0,
+        "field": 3.02, "field_travel": 0.7, "field_rate": 0.4,
+        "rotor_angle": 3.0, "rotor_rate": 0.5, "rotor_travel": 0.0, "ratio": 100.0,
         "joint_angle": 0.0291, "joint_rate": 0.004, "time": 2.5,
         "x": 0.1, "y": -0.2, "z": 0.4, "vx": 0.01, "vy": 0.02, "vz": -0.01,
     }  # fmt: skip
@@ -86,6 +87,7 @@ class TestSuspects:
         _module(effect)(columns, np.array([values[name] for name in given]), dt, 1, out)
         middle = values | {name: values[name] + 0.5 * travel[name] for name in base} | {"rotor_travel": 5e-4}
         middle |= {"rotor_rate": 0.5, "joint_rate": 4e-3, "vx": 0.01, "vy": 0.02, "vz": -0.01}
+        middle |= {"field_rate": 0.5, "field_travel": 2.5e-4}
         start = {state.name: state.initial for state in effect.states}
         zero = dict.fromkeys(names, 0.0)
         rates = value(effect, middle | start, **zero)[1 if effect.port.of_drive else 3 :]

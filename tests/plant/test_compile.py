@@ -45,7 +45,7 @@ def test_module_is_readable_python_that_calls_each_effect() -> None:
     text = module_text(TWO)
     compile(text, "plant", "exec")
     for effect in TWO.effects:
-        assert f" = effect_{effect.name}(" in text
+        assert f"= effect_{effect.name}(" in text
 
 
 def test_file_is_written_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -19,7 +19,7 @@ from kbs_process.signals.records import Array
 SECONDS = 6.0
 RATES: dict[str, Any] = {"rate_Hz": 100.0, "angle_rate_Hz": 40.0, "duration_s": SECONDS}
 BEFORE = 0.73  # s, that commands begin before the recording
-WITH_STATES = [*NOMINAL, "ground_cable", "bungee"]
+WITH_STATES = [*NOMINAL, "controller_latency", "ground_cable", "bungee"]
 
 
 def schedule(joints: int) -> Schedule:
@@ -29,11 +29,12 @@ def schedule(joints: int) -> Schedule:
 
 
 def loaded(loop: str) -> Rig:
-    """With an effect that has a state and is reacted by the laboratory, and one that pulls at a link."""
-    cable, bungee = select(["ground_cable", "bungee"])
+    """With a field that lags, a torque of the laboratory that has a state, and a force that pulls at a link."""
+    late, cable, bungee = select(["controller_latency", "ground_cable", "bungee"])
     rig = attach(
         two_axis(loop=loop, latency=2), cable, {"cable_spring": 0.3, "cable_friction": 0.2}, joints=["el"]
     )
+    rig = attach(rig, late, {"field_latency": 4e-3}, joints=["el"])
     numbers = {"stiffness": 30.0, "free_length": 0.5, "anchor_z": 1.5}
     return attach(rig, bungee, numbers, on="el", point=np.array([0.1, 0.0, 0.2]))
 

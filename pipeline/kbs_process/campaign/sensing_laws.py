@@ -19,12 +19,8 @@ KEY = ("model", "sensing")
 
 
 def belongs_to_model(law: Sensing) -> bool:
-    """Whether a law is the same in every recording, and changes what is read.
-
-    What drifts or hums has numbers of its own each time; what a controller or a driver does to the field is in no
-    model.
-    """
-    return not law.each_trial and law.port is not SensingPort.CONTROLLER
+    """Whether a law is the same in every recording; what drifts or hums has numbers of its own each time."""
+    return not law.each_trial
 
 
 LAWS = {law.name: law for law in SENSING if belongs_to_model(law)}

@@ -6,6 +6,7 @@ from kbs_process.plant.effect import Port
 from kbs_process.plant.sensing import SensingPort
 
 PORTS: dict[Port | SensingPort, str] = {
+    Port.FIELD: "controller",
     Port.MOTOR_TORQUE: "motor torque",
     Port.MOTOR_FRICTION: "motor torque",
     Port.TRANSMISSION: "transmission",
@@ -18,7 +19,6 @@ PORTS: dict[Port | SensingPort, str] = {
     SensingPort.PRODUCT: "transducer",
     SensingPort.ENCODER: "encoder",
     SensingPort.STREAM: "clock",
-    SensingPort.CONTROLLER: "controller",
 }
 # Laws that are at a port of their own, wherever their equations act.
 _APART = {"appendage": "appendage", "mass_shift": "mass properties"}

@@ -27,7 +27,7 @@ from kbs_process.diagnosis.suspects import Candidate
 from kbs_process.diagnosis.tails import log_tail
 from kbs_process.diagnosis.thresholds import ABSORBED, FALSE_ALARM, LEAST_RHO
 from kbs_process.diagnosis.transfer import BATCH, respond
-from kbs_process.plant.sensing import Sensing, SensingPort
+from kbs_process.plant.sensing import Sensing
 from kbs_process.signals.records import WRENCH_CHANNELS, Array
 
 _RUNAWAY = 1e30  # of a unit amplitude's signature
@@ -74,7 +74,7 @@ class Catalogued:
         return self.candidate.effect.each_trial
 
     def inputs(self, drive: int) -> Sequence[Mapping[Inlet, Array]] | None:
-        if isinstance(self.candidate.effect, Sensing) and self.candidate.port is not SensingPort.CONTROLLER:
+        if isinstance(self.candidate.effect, Sensing):
             return None
         hypothesis = self.scene.hypothesis
         columns = inputs(self.candidate, self.scene.signals[drive], hypothesis.rig, hypothesis.effects)

@@ -32,8 +32,8 @@ _POSITION = ("x", "y", "z")  # signals of an effect at a point; its velocity is 
 def port_inputs(candidate: Candidate, tapped: Tapped, rig: Rig) -> Array:
     """What a suspect of the plant puts in at its port, for a unit of each amplitude, (m, amplitudes, components).
 
-    Components: one at a drive (N m), three at a point of a link (N) or the floor (m/s^2), along the undeflected T's
-    axes. Each row is the mean from one tap to the next.
+    Components: one at a drive (N m, of its field rad), three at a point of a link (N) or the floor (m/s^2), along the
+    undeflected T's axes. Each row is the mean from one tap to the next.
     """
     effect = candidate.effect
     assert isinstance(effect, Effect)
@@ -75,15 +75,14 @@ def inputs(
     follows it, as `effects`, those of the model, have it at rest.
     """
     site = candidate.site
-    if candidate.port is SensingPort.CONTROLLER:
-        changed = field_change(candidate, tapped)
+    values = port_inputs(candidate, tapped, rig)
+    if candidate.port is Port.FIELD:
         drive = rig.joint(site).drive
         assert drive is not None
         _, _, by_field = drive_slopes(drive, select(effects))
         # Both are meant at the output: the rotor's torque is `ratio` times the motor's, the field's angle a `ratio`-th.
-        torque = changed * by_field[1] / float(drive.ratio) ** 2
+        torque = values[:, :, 0] * by_field[1] / float(drive.ratio) ** 2
         return [{Inlet("motor_torque", site): column} for column in torque.T]
-    values = port_inputs(candidate, tapped, rig)
     if candidate.port is Port.BASE_ACCELERATION:
         return [
             {Inlet(BASE_PORT, "", axis): values[:, a, k] for k, axis in enumerate(_POSITION)}
@@ -99,13 +98,6 @@ def inputs(
         ]
     assert isinstance(candidate.port, Port)
     return [{Inlet(candidate.port.name.lower(), site): values[:, a, 0]} for a in range(values.shape[1])]
-
-
-def field_change(candidate: Candidate, tapped: Tapped) -> Array:
-    """Change of a field (m, amplitudes), motor rad, by a unit of each amplitude of a suspect controller."""
-    field = tapped.values[:, tapped.columns.index(f"field.{candidate.site}")]
-    time = np.arange(len(field)) / tapped.rate
-    return _changes(candidate, time, field, {})
 
 
 def sensed(

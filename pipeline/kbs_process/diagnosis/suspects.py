@@ -28,7 +28,7 @@ BY = "<-"  # in the site of a coupling: channel that reads, channel that acts, o
 class Candidate:
     """One suspect at one site with one choice of its shape.
 
-    `site` is a joint (drives, encoders, the controller), a link (forces of the laboratory), the floor, a channel,
+    `site` is a joint (drives, encoders), a link (forces of the laboratory), the floor, a channel,
     "Tx", two or three of them ("Tx<-Fz", "Tx<-Fy<-Fz"), or a stream ("wrench", "encoder").
     """
 
@@ -71,7 +71,11 @@ def candidates(
     `columns` are those of the signals along which suspects are run, `channels` those of the prediction. An effect among
     the `accepted` that acts at a site already is a suspect there once more, as its next action.
     """
-    left_out = [effect for effect in CATALOGUE if effect.name not in nominal]
+    left_out = [
+        effect
+        for effect in CATALOGUE
+        if effect.name not in nominal and not (effect.recorded and (field_recorded or rig.controller is None))
+    ]
     plant = [
         Candidate(effect, site, shape, point)
         for law in left_out
@@ -84,7 +88,7 @@ def candidates(
     sensing = [
         Candidate(law, site, shape)
         for law in SENSING
-        for site in _sensed_sites(law, rig, channels, ranges, columns, field_recorded)
+        for site in _sensed_sites(law, rig, channels, ranges)
         for shape in _grid(law, site, ranges, {})
     ]
     return (*plant, *sensing)
@@ -186,8 +190,6 @@ def _sensed_sites(
     rig: Rig,
     channels: Sequence[str],
     ranges: Ranges,
-    columns: Sequence[str],
-    field_recorded: bool,
 ) -> list[str]:
     encoders = [name for name in rig.joint_names if name in channels]
     loads = [name for name in channels if name not in encoders]
@@ -204,7 +206,3 @@ def _sensed_sites(
             return encoders
         case SensingPort.STREAM:
             return [*(["wrench"] if loads else []), *(["encoder"] if encoders else [])]
-        case SensingPort.CONTROLLER:
-            led = [joint.name for joint in rig.joints if f"field.{joint.name}" in columns]
-            hidden = not field_recorded and rig.controller is not None
-            return led if hidden or law.behind_record else []

@@ -19,7 +19,15 @@ from kbs_process.plant.effect import Effect, Parameter, Port, State
 from kbs_process.signals.records import Array
 
 # Rates are the slopes of these between samples, not their instants there, at which a microstep's ripple would alias.
-SLOPES = {"rotor_rate": "rotor_angle", "joint_rate": "joint_angle", "vx": "x", "vy": "y", "vz": "z"}
+SLOPES = {
+    "field_rate": "field",
+    "rotor_rate": "rotor_angle",
+    "joint_rate": "joint_angle",
+    "vx": "x",
+    "vy": "y",
+    "vz": "z",
+}
+TRAVELS = {"rotor_travel": "rotor_angle", "field_travel": "field"}
 SLIDING = 1e-3  # rad/s of the rotor at which a Coulomb friction along given signals is full
 FINEST = 32  # parts of an interval
 ENOUGH = 0.03  # change of the result, by twice as many parts, that ends their doubling
@@ -33,7 +41,7 @@ def signals_of(effect: Effect) -> tuple[str, ...]:
     asked = [name for name in effect.arguments if name not in own]
     if effect.port is Port.MOTOR_FRICTION:
         asked.append("rotor_rate")
-    based = [SLOPES.get(name, name).replace("rotor_travel", "rotor_angle") for name in asked]
+    based = [(SLOPES | TRAVELS).get(name, name) for name in asked]
     return tuple(dict.fromkeys(based)) or ("time",)
 
 
@@ -108,6 +116,9 @@ def along_text(effect: Effect) -> str:
         lines_of["rotor_travel"] = (
             f"rotor_travel = slope(signals, i, {column['rotor_angle']}) / max(parts, 1)"
         )
+    if "field" in column:
+        c = column["field"]
+        lines_of["field_travel"] = f"field_travel = at(signals, i, share, {c}) - signals[0, {c}]"
     wired = {*effect.arguments, *(["rotor_rate"] if effect.port is Port.MOTOR_FRICTION else [])}
     signals = [line for name, line in lines_of.items() if name in wired]
     lines = [

@@ -46,15 +46,25 @@ POINT_SIGNALS = {
 VELOCITIES = frozenset(("vx", "vy", "vz"))
 FLOOR_SIGNALS = {"time": SIGNALS["time"]}
 
+# What a change of the field can ask for: the field as it is commanded, as an angle of the motor.
+FIELD_SIGNALS = {
+    "field_travel": "rad, turned by the field since the first command",
+    "field_rate": "rad/s, of the field",
+    "ratio": SIGNALS["ratio"],
+    "time": SIGNALS["time"],
+}
+
 
 class Port(Enum):
     """Where an equation's value acts.
 
-    Motor torque, friction, transmission and joint torque act between a joint's output, its rotor and the body that
-    carries the motor: what they do is internal. The others come from the laboratory, and the transducer feels them.
+    The field is what a driver makes of the controller's command. Motor torque, friction, transmission and joint torque
+    act between a joint's output, its rotor and the body that carries the motor: what they do is internal. The others
+    come from the laboratory, and the transducer feels them.
     Ports of a drive have their parameters at every joint, the others once in the rig (`rig.model.External`).
     """
 
+    FIELD = "change of the magnetic field's position, as an angle of the motor, rad"
     MOTOR_TORQUE = "torque on the rotor, N m"
     MOTOR_FRICTION = "greatest Coulomb friction torque on the rotor, N m, >= 0: opposes motion, holds at rest"
     TRANSMISSION = "torque of the gear on the output, N m; the rotor gets -1/ratio of it"
@@ -76,6 +86,8 @@ class Port(Enum):
     def signals(self) -> dict[str, str]:
         """What an equation at this port can ask for by name, with its unit and meaning."""
         match self:
+            case Port.FIELD:
+                return FIELD_SIGNALS
             case Port.EXTERNAL_FORCE:
                 return POINT_SIGNALS
             case Port.BASE_ACCELERATION:
@@ -178,8 +190,9 @@ class Effect:
     What acts at the ground's port belongs to the test, unless it is part `of_article`.
     `passive` claims that it never does positive work; the conformance test holds it to that. What comes from outside
     has amplitudes of its own in `each_trial`. A force `anywhere` is tied to no place of its link that a drawing shows:
-    a search looks for its point, too. A moment `of_weight` acts about no axis that is along gravity. An effect can act
-    several times: see `instance`.
+    a search looks for its point, too. A moment `of_weight` acts about no axis that is along gravity. What is `recorded`
+    is in the record of the field, and leaves nothing to find where there is one. An effect can act several times: see
+    `instance`.
     """
 
     name: str
@@ -193,6 +206,7 @@ class Effect:
     of_article: bool = False  # although the wrench feels it at a port of the ground: an appendage
     anywhere: bool = False  # a force whose point on its link is not known
     of_weight: bool = False  # a moment of weight about a joint's axis
+    recorded: bool = False  # a change of the field before that is recorded
     tag: str = ""  # what `instance` has added to the names of parameters and states
 
     def __post_init__(self) -> None:
@@ -211,6 +225,8 @@ class Effect:
             raise TypeError(f"{where}: {sorted(unused)} is declared, but not an argument of the equation")
         if self.states and not self.port.of_drive:
             raise TypeError(f"{where}: states of its own belong to a drive")
+        if self.states and self.port is Port.FIELD:
+            raise TypeError(f"{where}: a field has no states of its own")
         hints = get_type_hints(self.equation)
         untyped = [
             name for name in inspect.signature(self.equation).parameters if hints.get(name) is not float

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from kbs_process.plant.effect import Port
+from collections.abc import Iterator
+
+from kbs_process.plant.effect import Effect, Port
 from kbs_process.plant.loop import LOOP
 from kbs_process.plant.multibody import joint_offset, multibody_text, placing, unrolled
 from kbs_process.plant.stepping import accelerated, state_layout, stepping_text, tuple_of
-from kbs_process.plant.structure import DRIVE, MICROSTEP, RATIO, ROTOR, Structure
+from kbs_process.plant.structure import DRIVE, FIRST, JOINTS, MICROSTEP, RATIO, ROTOR, Structure
 from kbs_process.plant.taps import taps_text
 
 
@@ -16,6 +18,7 @@ def module_text(structure: Structure) -> str:
         [
             *_head(structure),
             *_drive(structure),
+            *_arriving(structure),
             *multibody_text(structure),
             *stepping_text(structure),
             *_balance(structure),
@@ -62,12 +65,9 @@ def _drive(structure: Structure) -> list[str]:
         *[f"    {total} = 0.0" for total in [*totals.values(), *ground]],
     ]
     rates: list[str] = []
-    parameter = 0
-    for effect in structure.effects:
-        wires = {}
-        for entry in effect.parameters:
-            wires[entry.name] = f"p[k + {parameter}]"
-            parameter += 1
+    for effect, wires in _wired(structure):
+        if effect.port is Port.FIELD:
+            continue
         results = []
         for state in effect.states:
             wires[state.name] = f"z[{len(rates)}]"
@@ -78,6 +78,35 @@ def _drive(structure: Structure) -> list[str]:
         lines.append(f"    {totals.get(effect.port, 'joint')} += value")
         lines += ["    ground += value"] * (effect.port is Port.GROUND_TORQUE)
     return [*lines, f"    return {', '.join([*totals.values(), *rates, *ground])}", "", ""]
+
+
+def _wired(structure: Structure) -> Iterator[tuple[Effect, dict[str, str]]]:
+    """The effects of a drive, with the expressions of their parameters."""
+    place = 0
+    for effect in structure.effects:
+        wires = {entry.name: f"p[k + {place + i}]" for i, entry in enumerate(effect.parameters)}
+        place += len(wires)
+        yield effect, wires
+
+
+def _arriving(structure: Structure) -> list[str]:
+    """Emit what becomes of the field on its way from the controller to the motor."""
+    lines = [
+        "@compiled",
+        "def arriving(joint, field_0, field_1, time, H, p):",
+        '    """Field that a motor has at the beginning of a step, in microsteps; ends of a step are as commanded."""',
+        f"    k = {JOINTS} + joint * {structure.stride}",
+        f"    microsteps, ratio = p[k + {MICROSTEP}], p[k + {RATIO}]",
+        f"    field_travel = (0.5 * (field_0 + field_1) - p[k + {FIRST}]) / microsteps",
+        "    field_rate = (field_1 - field_0) / (H * microsteps)",
+        f"    k += {DRIVE}",
+        "    change = 0.0",
+    ]
+    for effect, wires in _wired(structure):
+        if effect.port is Port.FIELD:
+            call = f"effect_{effect.name}({', '.join(wires.get(name, name) for name in effect.arguments)})"
+            lines.append(f"    change += {call}")
+    return [*lines, "    return field_0 + microsteps * change", "", ""]
 
 
 def _balance(structure: Structure) -> list[str]:

@@ -23,7 +23,7 @@ from kbs_process.plant.structure import Structure
 
 LANES = 8  # doubles in the widest vector
 _OF_JOINTS = (
-    "drifted", "q", "qd", "carrier", "turning", "spin", "theta", "w", "share", "inverse", "pitch", "out"
+    "drifted", "q", "qd", "carrier", "turning", "spin", "theta", "w", "share", "inverse", "begin", "pitch", "out"
 )  # fmt: skip
 
 
@@ -57,21 +57,7 @@ class Rows:
         names += [(f"r_{load.effect.name}", 3) for load in self.structure.forces]
         for j in range(n):
             names += [(f"a_{j}", 3), (f"S_{j}", 6), (f"I_{j}", 10)]
-            single = [
-                "drifted",
-                "q",
-                "qd",
-                "carrier",
-                "turning",
-                "spin",
-                "theta",
-                "w",
-                "share",
-                "inverse",
-                "pitch",
-                "out",
-            ]
-            names += [(f"{name}_{j}", 1) for name in [*single, *["ground"] * self.structure.grounded]]
+            names += [(f"{name}_{j}", 1) for name in [*_OF_JOINTS, *["ground"] * self.structure.grounded]]
             names += [(f"z_{j}", max(z, 1)), (f"zd_{j}", max(z, 1))]
         return names
 
@@ -111,7 +97,7 @@ def lanes_text(structure: Structure) -> str:
     state, rows = InRows(structure), Rows(structure)
     n = structure.joints
     turning = ["theta", "w", "z", "zd", "out", *["ground"] * structure.grounded]
-    still = ["q", "qd", "turning", "share", "inverse", "pitch"]
+    still = ["q", "qd", "turning", "share", "inverse", "begin", "pitch"]
     ends = [
         "    p = P[:, l]",
         *[
@@ -121,7 +107,7 @@ def lanes_text(structure: Structure) -> str:
     ]
     times = ["    half = 0.5 * H", "    ahead = H * H / 12.0", f"    h = H / {ROTOR_STEPS}"]
     guess = ", ".join([*(state.at("omegad", i) for i in range(3)), *(state.at("qdd", j) for j in range(n))])
-    last = [name for name in rows.names if not name.startswith(("share_", "inverse_", "pitch_"))]
+    last = [name for name in rows.names if not name.startswith(("share_", "inverse_", "begin_", "pitch_"))]
     begin = [*ends, *drifted(structure, state), *prepared(structure, state), *rows.stored(rows.names)]
     turn = [
         *ends,

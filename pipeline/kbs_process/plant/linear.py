@@ -154,7 +154,7 @@ def _torques(drive: Drive, effects: Sequence[Effect]) -> Callable[[Mapping[str, 
     """Torques (2,) on output and rotor, as angles at the output count, for signals of the plant."""
     ratio = float(drive.ratio)
     constants = {name: float(quantity) for name, quantity in drive.parameters.items()} | {"ratio": ratio}
-    acting = [e for e in effects if e.port.of_drive and e.port is not Port.MOTOR_FRICTION]
+    acting = [e for e in effects if e.port.of_drive and e.port not in (Port.MOTOR_FRICTION, Port.FIELD)]
 
     def torques(signals: Mapping[str, float]) -> Array:
         known = dict(signals) | constants

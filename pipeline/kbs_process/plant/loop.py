@@ -86,7 +86,7 @@ def advance(
             for c in range(x.shape[0]):
                 states[samples, c] = x[c]
             for j in range(n):
-                states[samples, x.shape[0] + j] = field_0[j]
+                states[samples, x.shape[0] + j] = arriving(j, field_0[j], field_1[j], time, H, p)
         force = step(x, field_0, field_1, time, H, p)
         if sampling:
             if order == 0:

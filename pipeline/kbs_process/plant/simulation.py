@@ -11,7 +11,7 @@ from kbs_process.plant.effect import Effect
 from kbs_process.plant.equilibrium import at_rest
 from kbs_process.plant.schedule import Schedule, covering
 from kbs_process.plant.stepping import state_layout
-from kbs_process.plant.structure import JOINTS, MICROSTEP, RATIO, parameters, structure_of
+from kbs_process.plant.structure import FIRST, JOINTS, MICROSTEP, RATIO, parameters, structure_of
 from kbs_process.plant.taps import OF_JOINTS
 from kbs_process.rig.model import Rig
 from kbs_process.signals.records import Array
@@ -47,6 +47,7 @@ class Simulation:
         per_output = self.microsteps * self.p[offsets + RATIO]
         self.knots = cycles.t
         self.fields = cycles.position * per_output if cycles.field is None else cycles.field * self.microsteps
+        self.p[offsets + FIRST] = self.fields[0]
         self.first = int(np.ceil(self.knots[0] / step / per_sample - 1e-9)) * per_sample
         self.cycles = cycles
         self.closed = cycles.field is None and controller is not None and controller.loop == "closed"

@@ -192,6 +192,7 @@ def prepared(structure: Structure, state: InVector) -> list[str]:
             f"    zd_{j} = {tuple_of([state.at('zd', i) for i in own])}",
             f"    share_{j} = (field_1[{j}] - field_0[{j}]) / {ROTOR_STEPS}",
             f"    inverse_{j} = 1.0 / share_{j}",
+            f"    begin_{j} = arriving({j}, field_0[{j}], field_1[{j}], time, H, p)",
             f"    pitch_{j} = 1.0 / p[{k + MICROSTEP}]",
             f"    out_{j} = 0.0",
             *[f"    ground_{j} = 0.0"] * structure.grounded,
@@ -205,7 +206,7 @@ def turned(structure: Structure, state: InVector) -> list[str]:
     for j in range(structure.joints):
         k, qdd = joint_offset(structure, j), state.at("qdd", j)
         lines += [
-            f"    from_ = field_0[{j}] + i * share_{j}",
+            f"    from_ = begin_{j} + i * share_{j}",
             f"    field = mean_rounded(from_, from_ + share_{j}, inverse_{j}) * pitch_{j}",
             f"    angle = q_{j} + off * (qd_{j} + 0.5 * off * {qdd})",
             f"    rate = qd_{j} + off * {qdd}",

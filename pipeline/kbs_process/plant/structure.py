@@ -15,7 +15,9 @@ from kbs_process.signals.records import Array
 
 GRAVITY, STIFFNESS, DAMPING, PLATE = 0, 3, 6, 9  # offsets in the parameter vector
 JOINTS = 19  # offset of the first joint
-AXIS, ORIGIN, TURN, LINK, RATIO, ROTOR, MICROSTEP, DRIVE = 0, 3, 6, 33, 43, 44, 45, 46  # within a joint
+AXIS, ORIGIN, TURN, LINK, RATIO, ROTOR, MICROSTEP, FIRST, DRIVE = (
+    0, 3, 6, 33, 43, 44, 45, 46, 47
+)  # within a joint  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -200,7 +202,10 @@ def _external(rig: Rig, load: Load) -> Array:
 
 
 def _joint(rig: Rig, joint: Joint, structure: Structure) -> Array:
-    """Return the numbers of one joint: geometry, link, motor, then the effects' parameters in order."""
+    """Return the numbers of one joint: geometry, link, motor, then the effects' parameters in order.
+
+    The field's first position, in microsteps, is that of a schedule.
+    """
     drive = joint.drive
     if drive is None:
         raise ConfigError(
@@ -225,4 +230,4 @@ def _joint(rig: Rig, joint: Joint, structure: Structure) -> Array:
                     remedy=did_you_mean(parameter.name, drive.parameters),
                 )
             values.append(float(drive.parameters[parameter.name]))
-    return np.concatenate([axis, joint.origin.value, rotation.ravel(), body, motor, values])
+    return np.concatenate([axis, joint.origin.value, rotation.ravel(), body, motor, [0.0], values])

@@ -20,6 +20,8 @@ from kbs_process.plant.effects.asymmetric_viscous import ASYMMETRIC_VISCOUS
 from kbs_process.plant.effects.backlash import BACKLASH
 from kbs_process.plant.effects.bungee import BUNGEE
 from kbs_process.plant.effects.cogging import COGGING
+from kbs_process.plant.effects.controller_gain import CONTROLLER_GAIN
+from kbs_process.plant.effects.controller_latency import CONTROLLER_LATENCY
 from kbs_process.plant.effects.coulomb import COULOMB
 from kbs_process.plant.effects.dahl import DAHL
 from kbs_process.plant.effects.dynamic_friction import DYNAMIC_FRICTION
@@ -67,6 +69,9 @@ CATALOGUE: tuple[Effect, ...] = (
     DYNAMIC_FRICTION,
     TOOTH_STICTION,
     FLEXSPLINE,
+    # field
+    CONTROLLER_GAIN,
+    CONTROLLER_LATENCY,
     # motor
     MOTOR_ORDER,
     MICROSTEP_ERROR,

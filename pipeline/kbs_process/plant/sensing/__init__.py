@@ -1,4 +1,4 @@
-"""What sensors, clocks and the controller do to a prediction, one file each; a new one is a file and a line here."""
+"""What sensors and clocks do to a prediction, one file each; a new one is a file and a line here."""
 
 from __future__ import annotations
 
@@ -11,8 +11,6 @@ from kbs_process.plant.sensing.clock_drops import CLOCK_DROPS
 from kbs_process.plant.sensing.clock_offset import CLOCK_OFFSET
 from kbs_process.plant.sensing.clock_skew import CLOCK_SKEW
 from kbs_process.plant.sensing.clock_wander import CLOCK_WANDER
-from kbs_process.plant.sensing.controller_gain import CONTROLLER_GAIN
-from kbs_process.plant.sensing.controller_latency import CONTROLLER_LATENCY
 from kbs_process.plant.sensing.cross_coupling import CROSS_COUPLING
 from kbs_process.plant.sensing.drift_exponential import DRIFT_EXPONENTIAL
 from kbs_process.plant.sensing.drift_linear import DRIFT_LINEAR
@@ -49,6 +47,4 @@ SENSING: tuple[Sensing, ...] = (
     CLOCK_SKEW,
     CLOCK_DROPS,
     CLOCK_WANDER,
-    CONTROLLER_GAIN,
-    CONTROLLER_LATENCY,
 )

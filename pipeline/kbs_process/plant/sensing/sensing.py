@@ -1,4 +1,4 @@
-"""What a sensor, a clock or the controller does to its signal: an equation on whole arrays, and where it acts.
+"""What a sensor or a clock does to its signal: an equation on whole arrays, and where it acts.
 
 As an effect of the plant, a sensing effect is a plain function whose argument names are its wiring, with its
 declaration beneath. It returns the change of its reading, to be added; it is linear in its amplitudes.
@@ -33,15 +33,13 @@ class SensingPort(Enum):
     PRODUCT = "one channel, by the product of two"
     ENCODER = "one encoder's angle, rad"
     STREAM = "all channels that one clock stamps"
-    CONTROLLER = "field that the controller commands, rad of the motor"
 
 
 @dataclass(frozen=True, slots=True)
 class Sensing:
     """An equation, the port at which its value is added, and its parameters.
 
-    `each_trial`: its amplitudes belong to a recording, as of what drifts or hums. `behind_record`, of a controller's:
-    it acts on the field after that was recorded, too, as the driver of a motor does.
+    `each_trial`: its amplitudes belong to a recording, as of what drifts or hums.
     """
 
     name: str
@@ -50,7 +48,6 @@ class Sensing:
     parameters: tuple[Parameter, ...]
     reference: str
     each_trial: bool = False
-    behind_record: bool = False
 
     def __post_init__(self) -> None:
         where = f"sensing effect '{self.name}'"

@@ -1,0 +1,72 @@
+"""What becomes of a field on its way to the motor, against schedules that have it already."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from plant_rigs import NOMINAL, two_axis
+
+from kbs_process.plant.attach import attach
+from kbs_process.plant.effects import select
+from kbs_process.plant.predict import predict, tap_columns
+from kbs_process.plant.schedule import Schedule
+from kbs_process.rig.model import Rig
+from kbs_process.signals.records import Array
+
+SECONDS, CYCLE, LATE, SCALE = 8.0, 0.05, 5e-3, 2e-3
+START, REACH = np.array([0.4, -0.3]), np.array([0.12, 0.08])
+OMEGA = 2.0 * np.pi / 8.0  # from rest to rest
+
+
+def way(t: Array) -> Array:
+    whole: Array = START + np.outer(1.0 - np.cos(OMEGA * np.clip(t, 0.0, None)), 0.5 * REACH)
+    return whole
+
+
+def schedule(position: Array, t: Array) -> Schedule:
+    return Schedule(t, position, np.gradient(position, t, axis=0))
+
+
+def shown(rig: Rig, effects: list[str], driven: Schedule) -> tuple[Array, Array]:
+    """Angles, and the fields that the effects see."""
+    streams: dict[str, list[Array]] = {"wrench": [], "angle": [], "field": [], "state": []}
+    for key, block in predict(
+        rig,
+        effects,
+        driven,
+        rate_Hz=100.0,
+        angle_rate_Hz=100.0,
+        duration_s=SECONDS,
+        step_s=1e-3,
+        quantise=False,
+        taps=True,
+    ):
+        streams[key].append(block.values)
+    columns = [k for k, name in enumerate(tap_columns(rig)) if name.startswith("field.")]
+    return np.concatenate(streams["angle"]), np.concatenate(streams["state"])[:, columns]
+
+
+@pytest.mark.parametrize(
+    ("name", "number"), [("controller_latency", "field_latency"), ("controller_gain", "field_gain")]
+)
+def test_a_changed_field_is_that_of_a_schedule_that_was_changed(name: str, number: str) -> None:
+    t = np.arange(-1.0, SECONDS + 0.2, CYCLE)
+    rig = two_axis(loop="open")
+    changed = {
+        "controller_latency": way(t - LATE),
+        "controller_gain": way(t) + SCALE * (way(t) - START),
+    }[name]
+    changed[:, 0] = way(t)[:, 0]  # of the second joint alone
+    (effect,) = select([name])
+    value = LATE if name == "controller_latency" else SCALE
+    with_effect = attach(rig, effect, {number: value}, joints=[rig.joint_names[1]])
+    plain = shown(rig, list(NOMINAL), schedule(way(t), t))
+    expected = shown(rig, list(NOMINAL), schedule(changed, t))
+    found = shown(with_effect, [*NOMINAL, name], schedule(way(t), t))
+    microstep = 2.0 * np.pi / 12800.0
+    for motor, (bare, right, got) in zip((0.01, 1.0), zip(plain, expected, found, strict=True), strict=True):
+        moved = right - bare
+        assert np.abs(moved[:, 1]).max() > 20.0 * microstep * motor
+        # What is left: a cycle's linear motion against the true way's bend, and a rounding of microsteps.
+        np.testing.assert_allclose(got, right, atol=0.02 * np.abs(moved).max() + 1.01 * microstep * motor)
+        np.testing.assert_allclose(got[:, 0], right[:, 0], atol=1e-6)
