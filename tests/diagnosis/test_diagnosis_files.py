@@ -93,6 +93,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
         left=None,
         whiteness=(1.0, 1.0),
         looked_at=10,
+        known=known,
         standing=standing_of(found, before.laws),
     )
     trajectory = family(limits_of(experiment.drives, experiment.dt), ("az", "el"), 60.0, "el")[0]
@@ -102,19 +103,13 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     target = tmp_path_factory.mktemp("diagnosis") / "out"
     campaign = load_campaign(bench.CAMPAIGN, checksums=False)
     off = replace(outcome, finds=(), verdict="parameters off")
-    told_off = write_diagnosis(
-        campaign, declared(experiment), known, before.predicted, off, target, False, None
-    )
+    told_off = write_diagnosis(campaign, declared(experiment), off, target, False, None)
     assert "would look the same" in told_off.verdict_lines[0] and "{" not in told_off.verdict_lines[0]
-    told = write_diagnosis(
-        campaign, declared(experiment), known, before.predicted, outcome, target, False, proposal
-    )
+    told = write_diagnosis(campaign, declared(experiment), outcome, target, False, proposal)
     assert told.verdict_lines[0] == "The model lacks: curve over joint angle (external wrench, el)."
     more = write_diagnosis(
         campaign,
         declared(experiment),
-        known,
-        before.predicted,
         replace(outcome, after=Detection((), -80.0, 2.25)),
         target,
         False,

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from test_rounds import ROLES, screened, standing, with_cable
 
+from kbs_process.diagnosis import rounds
 from kbs_process.diagnosis.experiment import Experiment
 from kbs_process.diagnosis.floor import declared
 from kbs_process.diagnosis.joint import Standing, with_extra
 from kbs_process.diagnosis.remains import detected, missed, promises_little, taken, too_little
-from kbs_process.diagnosis.rounds import diagnose
-from kbs_process.diagnosis.thresholds import TAKEN, TOLERATED
+from kbs_process.diagnosis.thresholds import LEAST_RHO, TAKEN, TOLERATED
 from kbs_process.diagnosis.tryout import extra_of
 from kbs_process.diagnosis.view import View
 
@@ -110,6 +110,29 @@ def test_what_held_out_recordings_alone_show_is_said_to_be_there(
     floor = declared(made)
     here = standing(weaker(made, with_cable(made, (2,)), strength))
     there = detected(here, floor, made.fit)
-    outcome = diagnose(here.known, floor, bench.serial(made), there)
+    outcome = rounds.diagnose(here.known, floor, bench.serial(made), there)
     assert outcome.verdict == verdict and not outcome.finds
     assert outcome.unforeseen == bool(strength) and not there.left
+
+
+@pytest.mark.parametrize(("sigmas", "elsewhere"), [(3.0, False), (40.0, False), (40.0, True)])
+def test_a_law_beside_numbers_that_stayed_is_likelier_than_numbers_beyond_belief(
+    made: Experiment, cabled: Experiment, monkeypatch: pytest.MonkeyPatch, sigmas: float, elsewhere: bool
+) -> None:
+    """Numbers that explain all, some sigmas from their prior, against those that leave a cable to be found."""
+    floor = declared(made)
+    near, explained = standing(cabled).known, standing(made).known
+    stiffness = explained.names.index("joint.el.drive.Ka")
+    value = explained.value.copy()
+    value[stiffness] += sigmas * explained.parameters.sigma[stiffness]
+    far = replace(explained, value=value)
+    monkeypatch.setattr(rounds, "refit", lambda *_, **__: explained if elsewhere else far)
+    there = detected(standing(made), floor, made.fit)
+    outcome = rounds.diagnose(far, floor, bench.serial(cabled), there, near)
+    if elsewhere or sigmas**2 < LEAST_RHO**2:
+        assert not outcome.finds and outcome.verdict == "none" and not outcome.otherwise
+        assert outcome.known.cost == (explained if elsewhere else far).cost
+        return
+    assert outcome.verdict == "physics" and outcome.known is near
+    (moved,) = outcome.otherwise
+    assert moved.name == "joint.el.drive.Ka" and moved.sigmas == pytest.approx(sigmas)

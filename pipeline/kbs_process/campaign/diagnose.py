@@ -106,10 +106,10 @@ def diagnose(
     with Simulators(experiment) as simulate:
         explained = explain(experiment, simulate, progress.task)
         with progress.task("Suspects: what the known parameters leave"):
-            outcome = rounds.diagnose(explained.known, explained.floor, simulate, explained.after)
+            outcome = rounds.diagnose(
+                explained.known, explained.floor, simulate, explained.after, explained.near
+            )
     with progress.task("Next test"):
         proposal = proposed(outcome, explained.floor)
     with progress.task("Writing the report"):
-        return write_diagnosis(
-            campaign, explained.floor, explained.known, explained.known.shown, outcome, target, pdf, proposal
-        )
+        return write_diagnosis(campaign, explained.floor, outcome, target, pdf, proposal)

@@ -30,17 +30,13 @@ from kbs_process.signals.records import Array
 def write_diagnosis(
     campaign: Campaign,
     floor: Floor,
-    known: Known,
-    predicted: Mapping[int, Prediction],
     outcome: Outcome,
     target: Path,
     pdf: bool | None,
     proposal: Proposal | None = None,
 ) -> Told:
-    """Write results, tables, corrected model and report to `target`, and the commands of the next test.
-
-    `known` is what stood before any find, and `predicted` what it predicts, by drive.
-    """
+    """Write results, tables, corrected model and report to `target`, and the commands of the next test."""
+    known = outcome.known
     with writing(target) as folder:
         files = write_corrected(campaign, outcome, folder / CORRECTED)
         if proposal is not None:
@@ -48,9 +44,9 @@ def write_diagnosis(
         write_maps(folder, outcome)
         for k in range(len(known.experiment.trials)):
             _spectra(folder, known, outcome.standing.known, k)
-            _histories(folder, known.experiment, predicted, outcome.standing, k)
+            _histories(folder, known.experiment, known.shown, outcome.standing, k)
         results = results_of(
-            campaign, floor, known, outcome, [path.relative_to(folder).as_posix() for path in files], proposal
+            campaign, floor, outcome, [path.relative_to(folder).as_posix() for path in files], proposal
         )
         (folder / "results.json").write_bytes(encode(results))
         page = build.build(folder, pdf)

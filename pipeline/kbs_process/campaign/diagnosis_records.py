@@ -49,11 +49,11 @@ _WORDS = {
 def results_of(
     campaign: Campaign,
     floor: Floor,
-    known: Known,
     outcome: Outcome,
     files: Sequence[str],
     proposal: Proposal | None,
 ) -> records.DiagnosisResults:
+    known = outcome.known
     finds = tuple(_find(find, known.experiment) for find in outcome.finds)
     trials = tuple(_trials(known, outcome.standing.known))
     return records.DiagnosisResults(
@@ -172,6 +172,10 @@ def _paragraph(
         )
     else:
         parts.append(_unnamed(outcome, trials, floor) + _located(outcome))
+    if outcome.otherwise:
+        farthest = sorted(outcome.otherwise, key=lambda moved: -abs(moved.sigmas))[:3]
+        numbers = ", ".join(f"{moved.name} by {moved.sigmas:+.1f} sigma" for moved in farthest)
+        parts.append(f"Without a law known parameters would have to be off, beyond belief: {numbers}.")
     for moved in outcome.moved[:5]:
         parts.append(f"{moved.name} is off by {moved.sigmas:+.1f} sigma.")
     return " ".join(parts)

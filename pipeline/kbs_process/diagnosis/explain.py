@@ -3,6 +3,7 @@
 Physics that was left out pulls numbers away from where they are, and a search that follows it ends where neither they
 nor what is left are right. So all numbers stay within a few sigmas of their priors at first. If something is left, and
 numbers set free explain it, then parameters are off; else what is left is looked at beside the numbers that stayed.
+Numbers that had to go so far that a law might be likelier are compared with one: those that stayed are kept for it.
 
 Repeats that were not driven alike, as in a closed loop, differ by what the model makes of their drives too: their floor
 is estimated again as soon as the model is about right.
@@ -23,7 +24,7 @@ from kbs_process.diagnosis.floor import Floor, estimate, smaller
 from kbs_process.diagnosis.hypothesis import Hypothesis, Prediction, Simulate
 from kbs_process.diagnosis.known import MOVED, Known, leapt, refit
 from kbs_process.diagnosis.search import LITTLE, SLIGHT
-from kbs_process.diagnosis.thresholds import EXPLAINED, MOST
+from kbs_process.diagnosis.thresholds import EXPLAINED, LEAST_RHO, MOST
 from kbs_process.signals.records import Array
 
 NEAR = 0.99 * MOVED  # sigmas
@@ -38,6 +39,7 @@ class Explained:
     experiment: Experiment
     floor: Floor
     known: Known
+    near: Known | None  # numbers that stayed near their priors, where `known` are implausibly far from theirs
     before: Detection  # with the parameter files' numbers
     after: Detection  # with the refitted ones, over the recordings that these were fitted to
     held_out: Detection | None  # likewise over the others
@@ -60,8 +62,9 @@ def explain(experiment: Experiment, simulate: Simulate, task: Task) -> Explained
             start, slopes, leaps = rough.hypothesis, rough.slopes, 0
             floor = smaller(floor, _floor(experiment, _predicted(experiment, start, simulate)))
     with task("Refitting the known parameters, near what is known of them"):
-        near = refit(experiment, start, floor, simulate, reach=NEAR, slopes=slopes, leaps=leaps)
-        stood = _moved_on(_stood(near, floor), floor, simulate, LEAPS)
+        held = refit(experiment, start, floor, simulate, reach=NEAR, slopes=slopes, leaps=leaps)
+        stood = _moved_on(_stood(held, floor), floor, simulate, LEAPS)
+    near: Known | None = None
     if stood.after.left and (stood.known.gross or _may_be_off(stood.known)):
         with task("Refitting the known parameters, free"):
             known = stood.known
@@ -75,10 +78,12 @@ def explain(experiment: Experiment, simulate: Simulate, task: Task) -> Explained
         explained = settled or freed.after.ratio - 1.0 < EXPLAINED * (stood.after.ratio - 1.0)
         # Numbers that are off are off in every recording.
         if explained and not _unseen(freed, floor) > _unseen(stood, floor):
+            if freed.known.prior_chi2 > LEAST_RHO**2:
+                near = replace(stood.known, chi2_before=_squares(stood.known, begun))
             stood = freed
     known = replace(stood.known, chi2_before=_squares(stood.known, begun))
     held_out = _held_out(stood, floor) if experiment.held_out else None
-    return Explained(experiment, floor, known, before, stood.after, held_out)
+    return Explained(experiment, floor, known, near, before, stood.after, held_out)
 
 
 def _squares(known: Known, predicted: Mapping[int, Prediction]) -> Array:

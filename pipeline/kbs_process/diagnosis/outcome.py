@@ -8,6 +8,7 @@ from typing import Literal
 from kbs_process.diagnosis.detection import Detection
 from kbs_process.diagnosis.gate import Gate
 from kbs_process.diagnosis.joint import Standing
+from kbs_process.diagnosis.known import Known
 from kbs_process.diagnosis.localise import PortName
 from kbs_process.diagnosis.ports import Cells, PortTest
 from kbs_process.signals.records import Array
@@ -148,7 +149,9 @@ class Outcome:
     left: Place | None  # after all finds
     whiteness: tuple[float, float]
     looked_at: int  # suspects with all their shapes
+    known: Known  # refitted, without any law: what stood before the first find
     standing: Standing  # the corrected model
+    otherwise: tuple[Moved, ...] = ()  # known parameters that would have to be off if there were no law
 
     @property
     def located(self) -> tuple[PortName, ...]:

@@ -12,8 +12,8 @@ from kbs_process.diagnosis.finding import Tried, as_it_stands, find_of, merged
 from kbs_process.diagnosis.floor import Floor
 from kbs_process.diagnosis.gate import whiteness
 from kbs_process.diagnosis.hypothesis import Simulate
-from kbs_process.diagnosis.joint import Standing
-from kbs_process.diagnosis.known import MOVED, Known
+from kbs_process.diagnosis.joint import Standing, standing_of
+from kbs_process.diagnosis.known import MOVED, Known, refit
 from kbs_process.diagnosis.leaders import leaders, released, reread, resettled, tried
 from kbs_process.diagnosis.localise import cells_and_ports
 from kbs_process.diagnosis.needed import Accepted, in_the_shade, needed
@@ -32,7 +32,7 @@ from kbs_process.diagnosis.remains import detected, promises_little, too_little
 from kbs_process.diagnosis.rivals import probabilities
 from kbs_process.diagnosis.scene import Scene
 from kbs_process.diagnosis.screen import Catalogued, Screening
-from kbs_process.diagnosis.thresholds import MOST, ROUNDS, TOLERATED
+from kbs_process.diagnosis.thresholds import LEAST_RHO, MOST, ROUNDS, TOLERATED
 from kbs_process.diagnosis.tryout import identity
 from kbs_process.diagnosis.view import View
 
@@ -46,8 +46,38 @@ class _Round:
     place: Place | None
 
 
-def diagnose(known: Known, floor: Floor, simulate: Simulate, before: Detection) -> Outcome:
-    """Find the laws that the refitted known parameters leave out; `before` is what detection says of these."""
+def diagnose(
+    known: Known, floor: Floor, simulate: Simulate, before: Detection, near: Known | None = None
+) -> Outcome:
+    """Find the laws that the refitted known parameters leave out; `before` is what detection says of these.
+
+    Where these explain it, but far from their priors, `near` are numbers that stayed: a law beside them is what was
+    left out, if both together are likelier by as much as a law has to bring.
+    """
+    if near is not None:
+        left = detected(standing_of(near, {}), floor, near.experiment.fit)
+        instead = _diagnosed(near, floor, simulate, left)
+        if instead.finds:
+            alone = _alone(known, near, instead.standing.known, floor, simulate)
+            if instead.standing.known.cost < alone.cost - LEAST_RHO**2:
+                return replace(instead, otherwise=_moved(alone))
+            if alone is not known:
+                known, before = alone, detected(standing_of(alone, {}), floor, alone.experiment.fit)
+    return _diagnosed(known, floor, simulate, before)
+
+
+def _alone(known: Known, near: Known, beside: Known, floor: Floor, simulate: Simulate) -> Known:
+    """Known numbers without a law, set free from where they were, or from where they are `beside` one.
+
+    A search ends in one of many minima, and those that are without a law begin with as good a chance.
+    """
+    start = near.hypothesis.at(near.free, beside.value[: len(near.free)])
+    again = refit(known.experiment, start, floor, simulate, leaps=1)
+    return replace(again, chi2_before=known.chi2_before) if again.cost < known.cost else known
+
+
+def _diagnosed(known: Known, floor: Floor, simulate: Simulate, before: Detection) -> Outcome:
+    """Find what one refit of the known parameters leaves out."""
     begun = Standing(known, known.shown, {})
     standing = begun
     accepted: list[Accepted] = []
@@ -86,6 +116,7 @@ def diagnose(known: Known, floor: Floor, simulate: Simulate, before: Detection) 
         left=left,
         whiteness=(whiteness(known), whiteness(standing.known)),
         looked_at=rounds[0].screening.looked_at,
+        known=known,
         standing=standing,
     )
 
