@@ -18,6 +18,7 @@ from kbs_process.diagnosis.known import Known
 from kbs_process.diagnosis.needed import Accepted, in_the_shade, needed
 from kbs_process.diagnosis.outcome import Find
 from kbs_process.diagnosis.race import own_of
+from kbs_process.diagnosis.thresholds import CLEAR
 from kbs_process.diagnosis.tryout import extra_of, identity
 from kbs_process.plant.effects import CATALOGUE
 
@@ -148,3 +149,20 @@ def test_what_is_small_beside_a_find_at_the_same_place_may_be_its_formula(made: 
     assert "1.0 %" in reason
     # At another place it is a law of its own, however small.
     assert in_the_shade(cable.tried.found, [earlier(lag, 100.0 * size)]) == ()
+
+
+def test_a_small_gain_that_numbers_alone_could_have_had_is_no_find() -> None:
+    """The law came with a better minimum of the known numbers than the one that it is compared with."""
+    plain = bench.experiment(bench.rig(), ROLES, 3)
+    begun = standing(plain)
+    after, cable = joined(plain, begun, CABLE)
+    share = 0.6 * CLEAR
+    worse = replace(
+        begun.known, residual=tuple(z * np.sqrt(1.0 + share * len(z) / (z @ z)) for z in begun.known.residual)
+    )
+    rows = float(worse.rows[list(plain.fit)].sum())
+    assert not worse.gross and 0.0 < worse.cost - after.known.cost < CLEAR * rows
+    before = replace(cable.before, known=worse)
+    kept, left, fallen = needed([replace(cable, before=before)], after, declared(plain), bench.serial(plain))
+    assert kept == [] and left.known.names == begun.known.names
+    assert fallen[0].identity == cable.find.identity

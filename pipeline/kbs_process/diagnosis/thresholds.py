@@ -34,6 +34,9 @@ DETECTED: Final = 1e-3
 # Share of the floor's power by which what is left has to exceed it, too: the best of many minima of phases and tooth
 # contact leave up to 0.02 more than each other on campaigns without any effect. A law has to take as much.
 TOLERATED: Final = 0.03
+# -2 log likelihood of a law a row, below which it is taken out once more and numbers are refitted from where they are
+# beside it: they found a minimum there that was better by 0.02 than any before, where parameters were off.
+CLEAR: Final = 3.0 * TOLERATED
 # Likewise of recordings that nothing was fitted to: nulls have left 1.15 of the floor's power.
 UNFORESEEN: Final = 0.5
 ORDERED: Final = 0.5  # share of the residual's excess that the best has to do for the screen's order to count
