@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from test_rounds import ROLES, standing, with_cable
 
+from kbs_process.diagnosis import race
 from kbs_process.diagnosis.finding import Tried
 from kbs_process.diagnosis.floor import declared
 from kbs_process.diagnosis.gate import Gate
@@ -79,3 +80,28 @@ def test_a_law_keeps_its_name_beside_a_curve_that_does_a_little_more(
 def test_a_plant_that_diverged_comes_last(view: View, by_family: dict[tuple[str, str], Found]) -> None:
     known = replace(view.standing.known, residual=tuple(np.nan * z for z in view.standing.known.residual))
     assert Runner(by_family[RIGHT], replace(view.standing, known=known)).cost == np.inf
+
+
+@pytest.mark.parametrize(("sigmas", "share", "drawn"), [(9.0, 0.1, 1), (0.0, 0.1, 0), (9.0, 0.9, 0)])
+def test_pulled_numbers_are_drawn_back_beside_a_promising_law_that_does_little(
+    view: View,
+    by_family: dict[tuple[str, str], Found],
+    monkeypatch: pytest.MonkeyPatch,
+    sigmas: float,
+    share: float,
+    drawn: int,
+) -> None:
+    """Of what the screen promised, `share` is done, beside numbers of which one is `sigmas` off."""
+    standing = view.standing
+    value = standing.known.value.copy()
+    index = standing.known.names.index("joint.el.drive.Ka")
+    value[index] += sigmas * standing.known.parameters.sigma[index]
+    pulled = replace(standing, known=replace(standing.known, value=value))
+    simulate = bench.serial(pulled.known.experiment)
+    extra = extra_of(by_family[RIGHT], standing, view.bench, view.scene)
+    done = pulled.known.cost - with_extra(pulled, extra, simulate, FIRST).known.cost
+    chosen = replace(by_family[RIGHT], score=replace(by_family[RIGHT].score, gain=done / share))
+    seen = []
+    monkeypatch.setattr(race, "released", lambda standing, *_: seen.append(standing) or standing)
+    raced([chosen], replace(view, standing=pulled), declared(standing.known.experiment), simulate)
+    assert len(seen) == drawn

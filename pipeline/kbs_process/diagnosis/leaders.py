@@ -16,19 +16,17 @@ from kbs_process.diagnosis.floor import Floor
 from kbs_process.diagnosis.gate import Fold, Gate, gate, whiteness
 from kbs_process.diagnosis.gls import Background, Sums, score
 from kbs_process.diagnosis.hypothesis import Simulate
-from kbs_process.diagnosis.joint import Own, Standing, bare, standing_of, with_extra
-from kbs_process.diagnosis.known import confined, settled
+from kbs_process.diagnosis.joint import Own, Standing, bare, with_extra
 from kbs_process.diagnosis.outcome import Refused
 from kbs_process.diagnosis.plausible import implausible
 from kbs_process.diagnosis.race import own_of, raced
-from kbs_process.diagnosis.remains import detected, searched
 from kbs_process.diagnosis.rivals import probabilities
 from kbs_process.diagnosis.screen import Bench, Catalogued, Found, Suspect
+from kbs_process.diagnosis.settling import resettled
 from kbs_process.diagnosis.shapes import bettered
 from kbs_process.diagnosis.side_by_side import side_by_side
 from kbs_process.diagnosis.suspects import BY
 from kbs_process.diagnosis.thresholds import (
-    CLOSE,
     FALSE_ALARM,
     LAW_VARIANCE,
     LEAD,
@@ -165,16 +163,6 @@ def _trial_by_trial(suspect: Suspect, standing: Standing, bench: Bench) -> tuple
     return replace(standing, known=changed), verdict.but(*_oversized(suspect, *zip(*greatest, strict=True)))
 
 
-def resettled(standing: Standing, floor: Floor, simulate: Simulate, *, leaps: int) -> Standing:
-    """All numbers refitted with the law in the plant, or on its prediction, if that takes away more."""
-    known = standing.known
-    at_floor = not detected(standing, floor, known.experiment.fit).left
-    if not searched(known.experiment) or (leaps and at_floor):
-        return standing
-    moved = settled(known, simulate, leaps=leaps, laws=standing.laws)
-    return standing_of(moved, standing.laws) if moved.cost < known.cost else standing
-
-
 def reread(chosen: Tried, before: Standing, floor: Floor, simulate: Simulate) -> Tried:
     """A law of the readings told anew among all of its channel, now that the known numbers have settled beside it.
 
@@ -209,13 +197,3 @@ def _alike(one: Suspect, other: Suspect) -> bool:
     if not (isinstance(one, Catalogued) and isinstance(other, Catalogued)):
         return one.family == other.family
     return one.family == other.family and one.candidate.shape == other.candidate.shape
-
-
-def released(standing: Standing, floor: Floor, simulate: Simulate) -> Standing:
-    """Known numbers that were pulled before the law was in the plant, drawn back to their priors and let go again."""
-    known = standing.known
-    if not known.strained or not detected(standing, floor, known.experiment.fit).left:
-        return standing
-    held = confined(known, simulate, CLOSE, laws=standing.laws)
-    again = resettled(standing_of(held, standing.laws), floor, simulate, leaps=1)
-    return again if again.known.cost < known.cost else standing

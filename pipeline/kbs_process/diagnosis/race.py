@@ -2,7 +2,8 @@
 
 Phases of tooth contact that made up for what was left out are farther away than a descent goes, and to look for better
 ones costs more than all else. Where they are right beside one law, they are about right beside each that does the same.
-So whoever leads looks for them, and the others begin where it has brought the known numbers.
+So whoever leads looks for them, and the others begin where it has brought the known numbers. Where the most promising
+does not do what the screen promised, known numbers were pulled too far: they are drawn back beside it and let go again.
 """
 
 from __future__ import annotations
@@ -18,8 +19,9 @@ from kbs_process.diagnosis.hypothesis import Simulate
 from kbs_process.diagnosis.joint import Own, Standing, bare, moved_on, with_extra
 from kbs_process.diagnosis.remains import detected
 from kbs_process.diagnosis.screen import Found
+from kbs_process.diagnosis.settling import released
 from kbs_process.diagnosis.side_by_side import side_by_side
-from kbs_process.diagnosis.thresholds import FIRST, SETTLED_TIMES, TOLERATED
+from kbs_process.diagnosis.thresholds import FIRST, MOST, SETTLED_TIMES, TOLERATED
 from kbs_process.diagnosis.tryout import extra_of
 from kbs_process.diagnosis.view import View
 
@@ -53,7 +55,11 @@ def raced(chosen: Sequence[Found], view: View, floor: Floor, simulate: Simulate)
         new = replace(runner, standing=with_extra(by, extra, simulate))
         return min(runner, new, key=lambda one: one.cost)
 
-    runners = sorted(side_by_side(begun, chosen), key=lambda one: one.cost)
+    runners = side_by_side(begun, chosen)
+    runners.sort(key=lambda one: -one.found.score.gain)
+    if runners and _stuck(runners[0], view.standing):
+        runners[0] = replace(runners[0], standing=released(runners[0].standing, floor, simulate))
+    runners.sort(key=lambda one: one.cost)
     near = [one for one in runners if _near(one, runners[0])]
     behind = [one for one in runners if one not in near]
     while near and not near[0].leapt and not _at_floor(near[0], floor):
@@ -68,6 +74,15 @@ def own_of(found: Found, before: Standing, after: Standing) -> Own:
     """The numbers that a law has brought: its amplitudes, then its shapes."""
     names = after.known.names[len(before.known.names) :]
     return Own(names, names[: len(found.suspect.amplitudes)])
+
+
+def _stuck(runner: Runner, before: Standing) -> bool:
+    """Whether it does less than half of what the screen promised, beside numbers that something had pulled.
+
+    They stand where they made up for what was left out, and a few steps do not bring them back.
+    """
+    gained = before.known.cost - runner.cost
+    return before.known.strained and gained < MOST * runner.found.score.gain
 
 
 def _near(one: Runner, best: Runner) -> bool:

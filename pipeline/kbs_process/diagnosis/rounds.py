@@ -14,7 +14,7 @@ from kbs_process.diagnosis.gate import whiteness
 from kbs_process.diagnosis.hypothesis import Simulate
 from kbs_process.diagnosis.joint import Standing, standing_of
 from kbs_process.diagnosis.known import MOVED, Known, refit
-from kbs_process.diagnosis.leaders import leaders, released, reread, resettled, tried
+from kbs_process.diagnosis.leaders import leaders, reread, tried
 from kbs_process.diagnosis.localise import cells_and_ports
 from kbs_process.diagnosis.needed import Accepted, in_the_shade, needed
 from kbs_process.diagnosis.outcome import (
@@ -32,6 +32,7 @@ from kbs_process.diagnosis.remains import detected, promises_little, too_little
 from kbs_process.diagnosis.rivals import probabilities
 from kbs_process.diagnosis.scene import Scene
 from kbs_process.diagnosis.screen import Catalogued, Screening
+from kbs_process.diagnosis.settling import released, resettled
 from kbs_process.diagnosis.thresholds import LEAST_RHO, MOST, ROUNDS, TOLERATED
 from kbs_process.diagnosis.tryout import identity
 from kbs_process.diagnosis.view import View

@@ -1,0 +1,30 @@
+"""Known numbers that settle beside a law: refitted from where they are, or drawn back and let go again."""
+
+from __future__ import annotations
+
+from kbs_process.diagnosis.floor import Floor
+from kbs_process.diagnosis.hypothesis import Simulate
+from kbs_process.diagnosis.joint import Standing, standing_of
+from kbs_process.diagnosis.known import confined, settled
+from kbs_process.diagnosis.remains import detected, searched
+from kbs_process.diagnosis.thresholds import CLOSE
+
+
+def resettled(standing: Standing, floor: Floor, simulate: Simulate, *, leaps: int) -> Standing:
+    """All numbers refitted with the law in the plant, or on its prediction, if that takes away more."""
+    known = standing.known
+    at_floor = not detected(standing, floor, known.experiment.fit).left
+    if not searched(known.experiment) or (leaps and at_floor):
+        return standing
+    moved = settled(known, simulate, leaps=leaps, laws=standing.laws)
+    return standing_of(moved, standing.laws) if moved.cost < known.cost else standing
+
+
+def released(standing: Standing, floor: Floor, simulate: Simulate) -> Standing:
+    """Known numbers that were pulled before the law was in the plant, drawn back to their priors and let go again."""
+    known = standing.known
+    if not known.strained or not detected(standing, floor, known.experiment.fit).left:
+        return standing
+    held = confined(known, simulate, CLOSE, laws=standing.laws)
+    again = resettled(standing_of(held, standing.laws), floor, simulate, leaps=1)
+    return again if again.known.cost < known.cost else standing
