@@ -70,3 +70,16 @@ def test_a_changed_field_is_that_of_a_schedule_that_was_changed(name: str, numbe
         # What is left: a cycle's linear motion against the true way's bend, and a rounding of microsteps.
         np.testing.assert_allclose(got, right, atol=0.02 * np.abs(moved).max() + 1.01 * microstep * motor)
         np.testing.assert_allclose(got[:, 0], right[:, 0], atol=1e-6)
+
+
+def test_a_recorded_field_has_the_gain_in_it_already() -> None:
+    t = np.arange(-1.0, SECONDS + 0.2, CYCLE)
+    rig = two_axis(loop="open")
+    ratios = np.array([float(joint.drive.ratio) for joint in rig.joints if joint.drive is not None])
+    recorded = Schedule(t, way(t), np.gradient(way(t), t, axis=0), way(t) * ratios)
+    gain, late = select(["controller_gain", "controller_latency"])
+    plain, _ = shown(rig, list(NOMINAL), recorded)
+    gained, _ = shown(attach(rig, gain, {"field_gain": SCALE}), [*NOMINAL, gain.name], recorded)
+    lagging, _ = shown(attach(rig, late, {"field_latency": LATE}), [*NOMINAL, late.name], recorded)
+    np.testing.assert_array_equal(gained, plain)
+    assert np.abs(lagging - plain).max() > 1e-4  # the driver comes after the record

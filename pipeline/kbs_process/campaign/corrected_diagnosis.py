@@ -24,7 +24,7 @@ _SENSORS = {law.name: law for law in SENSING}
 
 
 def left_out(find: Find) -> bool:
-    """Whether a find is in no model: each recording's own, or the controller's."""
+    """Whether a find is in no model: each recording's own."""
     law = _SENSORS.get(find.identity.law)
     return law is not None and not belongs_to_model(law)
 

@@ -24,7 +24,7 @@ from kbs_process.rig.model import Joint, Rig
 CORRECTED = "corrected"  # folder of the corrected model, and
 COMMANDS = "next-test.csv"  # file of the next test's commands, in that of the results
 _SHOWN = 25  # suspects in the table
-_EACH_TIME = "it is each recording's own, or the controller's: the corrected model is without it"
+_EACH_TIME = "it is each recording's own: the corrected model is without it"
 _NOTES = (
     "The floor is what repeats of one trajectory differ by. Constants and slopes of the transducer's channels and "
     "errors of the clocks, each recording's own, are taken out of every comparison.",

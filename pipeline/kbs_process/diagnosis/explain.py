@@ -78,15 +78,16 @@ def explain(experiment: Experiment, simulate: Simulate, task: Task) -> Explained
         explained = settled or freed.after.ratio - 1.0 < EXPLAINED * (stood.after.ratio - 1.0)
         # Numbers that are off are off in every recording.
         if explained and not _unseen(freed, floor) > _unseen(stood, floor):
-            if freed.known.prior_chi2 > LEAST_RHO**2:
+            if freed.known.prior_chi2 > stood.known.prior_chi2 + LEAST_RHO**2:
                 near = replace(stood.known, chi2_before=_squares(stood.known, begun))
             stood = freed
     elif _may_be_off(stood.known):
         with task("Refitting the known parameters, free"):
             # What a number cannot reach, a law would do for it.
             free = refit(experiment, stood.known.hypothesis, floor, simulate, leaps=0)
-        if free.cost < stood.known.cost:
-            stood = _stood(free, floor)
+        freed = _stood(free, floor)
+        if free.cost < stood.known.cost and not _unseen(freed, floor) > _unseen(stood, floor):
+            stood = freed
     known = replace(stood.known, chi2_before=_squares(stood.known, begun))
     held_out = _held_out(stood, floor) if experiment.held_out else None
     return Explained(experiment, floor, known, near, before, stood.after, held_out)

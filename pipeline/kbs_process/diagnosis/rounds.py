@@ -70,11 +70,17 @@ def diagnose(
 def _alone(known: Known, near: Known, beside: Known, floor: Floor, simulate: Simulate) -> Known:
     """Known numbers without a law, set free from where they were, or from where they are `beside` one.
 
-    A search ends in one of many minima, and those that are without a law begin with as good a chance.
+    A search ends in one of many minima, and those that are without a law begin with as good a chance. A minimum by
+    which recordings that were held out are predicted worse is none of theirs.
     """
+    unseen = known.experiment.held_out
     start = near.hypothesis.at(near.free, beside.value[: len(near.free)])
     again = refit(known.experiment, start, floor, simulate, leaps=1)
-    return replace(again, chi2_before=known.chi2_before) if again.cost < known.cost else known
+    here, there = (
+        detected(standing_of(one, {}), floor, unseen).ratio if unseen else 1.0 for one in (again, known)
+    )
+    better = again.cost < known.cost and not here > there
+    return replace(again, chi2_before=known.chi2_before) if better else known
 
 
 def _diagnosed(known: Known, floor: Floor, simulate: Simulate, before: Detection) -> Outcome:

@@ -69,7 +69,7 @@ def suspects_of(standing: Standing, scene: Scene) -> list[Suspect]:
         temperature=all(trial.temperature is not None for trial in experiment.trials),
     )
     columns = next((signals.columns for signals in scene.signals.values()), ())
-    recorded = all(one.schedule is None or one.schedule.field is not None for one in experiment.drives)
+    recorded = any(one.schedule is not None and one.schedule.field is not None for one in experiment.drives)
     chosen = candidates(
         rig,
         experiment.effects,

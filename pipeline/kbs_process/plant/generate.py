@@ -94,7 +94,7 @@ def _arriving(structure: Structure) -> list[str]:
     lines = [
         "@compiled",
         "def arriving(joint, field_0, field_1, time, H, p):",
-        '    """Field that a motor has at the beginning of a step, in microsteps; ends of a step are as commanded."""',
+        '    """Field that a motor has at the beginning of a step, in microsteps; `field_0` and 1 as commanded."""',
         f"    k = {JOINTS} + joint * {structure.stride}",
         f"    microsteps, ratio = p[k + {MICROSTEP}], p[k + {RATIO}]",
         f"    field_travel = (0.5 * (field_0 + field_1) - p[k + {FIRST}]) / microsteps",

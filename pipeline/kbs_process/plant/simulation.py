@@ -20,6 +20,8 @@ from kbs_process.signals.records import Array
 class Simulation:
     """The plant of `rig` with `effects`, at rest under the first command; `advance` moves it on.
 
+    A recorded field has in it what changed it before: effects that are `recorded` do not act again.
+
     Time is counted in whole steps from the recording's time zero, so that nothing drifts over a day.
     """
 
@@ -36,7 +38,8 @@ class Simulation:
         taps: bool = False,
     ) -> None:
         self.step, self.per_sample, self.angle_rate, self.taps = step, per_sample, angle_rate, taps
-        self.structure = structure_of(rig, effects)
+        acting = tuple(one for one in effects if schedule.field is None or not one.recorded)
+        self.structure = structure_of(rig, acting)
         self.plant = compiled_plant(self.structure)
         self.p = parameters(rig, self.structure)
         n = self.structure.joints

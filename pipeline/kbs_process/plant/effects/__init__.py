@@ -2,7 +2,7 @@
 
 A campaign's nominal model names some of them; the others are suspects when a prediction fails. What the rig already
 describes is no effect: mass, CoG and inertia of bodies, inclination and compliance of the transducer, misalignment of
-axes, gains of the controller. They are found by refitting them. Gyroscopic and Coriolis terms are part of the rigid
+axes, Kp and Ki of the controller. They are found by refitting them. Gyroscopic and Coriolis terms are part of the rigid
 bodies, and cannot be left out.
 """
 
