@@ -1,4 +1,7 @@
-"""Every threshold of the diagnosis, with the reason for its value. They were set on development cases alone."""
+"""Every threshold of the diagnosis, with the reason for its value.
+
+They were set on development cases, and on validation trials that were spent; docs/proof.md says which.
+"""
 
 from __future__ import annotations
 
