@@ -40,6 +40,7 @@ class Tried:
     gate: Gate
     screening: Screening  # that it led
     own: Own  # none, of a law that was taken off each recording
+    leapt: bool = False  # whether better phases were looked for beside it
 
 
 def find_of(

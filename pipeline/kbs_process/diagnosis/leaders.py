@@ -85,7 +85,7 @@ def tried(
     for runner in raced([found for found in chosen if not found.suspect.each_trial], view, floor, simulate):
         own = own_of(runner.found, before, runner.standing)
         verdict = gated(runner.found, before, runner.standing, own)
-        judged.append(Tried(runner.found, runner.standing, verdict, view.screening, own))
+        judged.append(Tried(runner.found, runner.standing, verdict, view.screening, own, runner.leapt))
     passed = [one for one in judged if one.gate.passed]
     refused = [
         Refused(identity(one.found.suspect), one.found.score.rho_eff, one.gate.reasons)

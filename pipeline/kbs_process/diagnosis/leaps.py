@@ -7,6 +7,7 @@ judged. All other numbers follow as the slopes say.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -20,11 +21,12 @@ from kbs_process.stages.contact import edge_minima
 from kbs_process.stages.screening import Contact, contacts
 
 if TYPE_CHECKING:
-    from kbs_process.diagnosis.search import Found, Search
+    from kbs_process.diagnosis.search import Found, Predictions, Search
 
 _SMOOTH = 8  # phases tried all round
 _EDGES = 4  # pairs of edges tried of a contact
 _DIFFERENCE = 0.01  # rad, of an edge, and 5 % of a torque, for a candidate's own step
+_STRIDES = 2  # pairs of edges tried of a contact by steps of all numbers
 _REACH = 0.06  # rad: an edge's own step goes no farther than half the grid that proposed it
 _WALK = (-0.3, -0.16, -0.08, -0.03, 0.03, 0.08, 0.16, 0.3)  # rad, outwards: an edge's places that are tried
 _NARROWEST = 0.02  # rad, half a contact
@@ -38,35 +40,76 @@ def leap(search: Search, found: Found, *, smooth: bool) -> Array | None:
     theta, moved = found.theta, list[int]()
     J = {k: search.jacobian(k, found.gradients) for k in search.experiment.fit}
     for trials, joints in stages(search.experiment):
-        prefixes = tuple(f"joint.{name}.drive." for name in joints)
         for pair in search.pairs:
-            if smooth and pair.smooth and search.free[pair.phase].name.startswith(prefixes):
-                view = _View(search, found, J, trials, (pair.amplitude, pair.phase))
+            if smooth and pair.smooth and search.free[pair.phase].name.startswith(_paths(joints)):
+                view = Moving(search, found, J, trials, (pair.amplitude, pair.phase))
                 moved += view.own
                 turns = np.arange(_SMOOTH) * (2.0 * np.pi / _SMOOTH)
                 middle = search.parameters.value[pair.amplitude]
                 theta = view.best(theta, [view.at(theta, (middle, turn)) for turn in turns])
-        for contact in contacts(search.hypothesis.rig, search.hypothesis.effects, search.free):
-            if search.free[contact.phase].name.startswith(prefixes):
-                view = _View(search, found, J, trials, (contact.torque, contact.width, contact.phase))
-                moved += view.own
-                theta = view.best(theta, view.edges(theta, contact))
-                theta = view.best(theta, view.walked(theta))
+        for contact in _contacts(search, joints):
+            view = Moving(search, found, J, trials, (contact.torque, contact.width, contact.phase))
+            moved += view.own
+            theta = view.best(theta, view.edges(theta, contact))
+            theta = view.best(theta, view.walked(theta))
     if theta is found.theta:
         return None
-    # What the others are to follow by is linear, and may be far from true: less of it then.
-    own = np.isin(np.arange(len(theta)), sorted(set(moved)))
+    point, _, cost = _followed(search, found, theta, sorted(set(moved)))
+    return point if cost < _RISE * sum(search.cost(found.theta, found.predicted)) else None
+
+
+def stride(search: Search, found: Found, steps: int, most: int) -> Found | None:
+    """Where some `steps` of all numbers lead, from tooth contact elsewhere; None where nowhere better.
+
+    A place far away is judged wrongly by how the others follow along the slopes that they have where it is not. So
+    those that the least squares over all edges rank before the present one are tried, along slopes taken there.
+    """
+    begun = found
+    for trials, joints in stages(search.experiment):
+        for contact in _contacts(search, joints):
+            J = {k: search.jacobian(k, found.gradients) for k in search.experiment.fit}
+            view = Moving(search, found, J, trials, (contact.torque, contact.width, contact.phase))
+            here, *others = view.followed([found.theta, *view.ranked(found.theta, contact, _STRIDES)])
+            reached = [found]
+            for one in others:
+                theta = view.with_rest(found.theta, one, here)
+                point, predicted, _ = _followed(search, found, theta, view.own)
+                gone = replace(found, theta=point, predicted={**found.predicted, **predicted})
+                gone = replace(gone, gradients=search.slopes(point, found.gradients), rounds=begun.rounds)
+                reached.append(search.descend(gone, steps, most=most))
+            costs = [sum(search.cost(one.theta, one.predicted)) for one in reached]
+            best = int(np.argmin(costs))
+            found = reached[best] if costs[best] < costs[0] - _BETTER else found
+    return None if found is begun else found
+
+
+def _paths(joints: Sequence[str]) -> tuple[str, ...]:
+    return tuple(f"joint.{name}.drive." for name in joints)
+
+
+def _contacts(search: Search, joints: Sequence[str]) -> list[Contact]:
+    """Tooth contacts of some joints' drives."""
+    found = contacts(search.hypothesis.rig, search.hypothesis.effects, search.free)
+    return [contact for contact in found if search.free[contact.phase].name.startswith(_paths(joints))]
+
+
+def _followed(
+    search: Search, found: Found, theta: Array, moved: Sequence[int]
+) -> tuple[Array, Predictions, float]:
+    """`theta` with as much of how the others follow as does best, what is predicted there, and its cost.
+
+    What the others are to follow by is linear, and may be far from true.
+    """
+    own = np.isin(np.arange(len(theta)), moved)
     points = [np.where(own, theta, found.theta + share * (theta - found.theta)) for share in _FOLLOWED]
-    costs = [
-        sum(search.cost(point, predicted))
-        for point, predicted in zip(points, search.predict(points, search.drives), strict=True)
-    ]
+    predicted = search.predict(points, search.drives)
+    costs = [sum(search.cost(point, one)) for point, one in zip(points, predicted, strict=True)]
     best = int(np.argmin(costs))
-    return points[best] if costs[best] < _RISE * sum(search.cost(found.theta, found.predicted)) else None
+    return points[best], predicted[best], costs[best]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Followed:
+class Followed:
     """A point whose `own` numbers were simulated: the cost once the rest has followed, and by how much that moves."""
 
     point: Array
@@ -74,7 +117,7 @@ class _Followed:
     follow: Array  # (rest,)
 
 
-class _View:
+class Moving:
     """Some trials in which some numbers, `own`, are moved; the other trials hold the rest by what they already say."""
 
     def __init__(
@@ -92,7 +135,7 @@ class _View:
         self.weights = (search.precision + search.ridge)[self.rest]
         normal = sum((j[:, self.rest].T @ j[:, self.rest] for j in J.values()), np.diag(self.weights))
         self.factor = cho_factor(normal)
-        self.judged: dict[bytes, _Followed] = {}
+        self.judged: dict[bytes, Followed] = {}
         self.held = np.zeros(len(self.rest))
         for k in set(J) - set(trials):
             self.held += J[k][:, self.rest].T @ search.residual(k, found.predicted)
@@ -115,13 +158,15 @@ class _View:
         """The best of some points, the rest having followed; `theta` itself where none is better by `_BETTER`."""
         here, *others = self.followed([theta, *points])
         chosen = min(others, key=lambda one: one.cost, default=here)
-        if chosen.cost > here.cost - _BETTER:
-            return theta
+        return theta if chosen.cost > here.cost - _BETTER else self.with_rest(theta, chosen, here)
+
+    def with_rest(self, theta: Array, chosen: Followed, here: Followed) -> Array:
+        """`theta` moved to a point that was judged, the rest following."""
         better = self.at(theta, chosen.point[self.own])
         better[self.rest] += chosen.follow - here.follow
         return self.at(better, better[self.own])
 
-    def followed(self, points: Sequence[Array]) -> list[_Followed]:
+    def followed(self, points: Sequence[Array]) -> list[Followed]:
         """Judge points by their residuals and the priors."""
         new = list(
             {point.tobytes(): point for point in points if point.tobytes() not in self.judged}.values()
@@ -130,21 +175,37 @@ class _View:
             self.judged[point.tobytes()] = self._judge(point, z)
         return [self.judged[point.tobytes()] for point in points]
 
-    def _judge(self, point: Array, z: Array) -> _Followed:
+    def _judge(self, point: Array, z: Array) -> Followed:
         if not np.isfinite(z).all():
-            return _Followed(point, np.inf, np.zeros(len(self.rest)))
+            return Followed(point, np.inf, np.zeros(len(self.rest)))
         excess = self.weights * (point - self.search.parameters.value)[self.rest]
         g = self.J[:, self.rest].T @ z + self.held - excess
         follow = cho_solve(self.factor, g)
-        return _Followed(point, float(z @ z) + self.search.excess(point) - float(g @ follow), follow)
+        return Followed(point, float(z @ z) + self.search.excess(point) - float(g @ follow), follow)
 
     def edges(self, theta: Array, contact: Contact) -> list[Array]:
         """Points with the contact's edges where they might be, each after a step of its own."""
+        points = self.minima(theta, contact, _EDGES)
+        return [*points, *self.stepped(points)]
+
+    def minima(self, theta: Array, contact: Contact, most: int) -> list[Array]:
+        """Points with the contact's edges where least squares have them, best first."""
         prior = self.search.parameters
         # A phase that these trials show nothing of would leave the equations singular.
         bounded = replace(prior, sigma=np.where(np.isfinite(prior.sigma), prior.sigma, np.pi))
-        points = edge_minima(self.residuals, theta, -self.J, bounded, contact, _EDGES)
-        return [*points, *self.stepped(points)]
+        return edge_minima(self.residuals, theta, -self.J, bounded, contact, most)
+
+    def ranked(self, theta: Array, contact: Contact, most: int) -> list[Array]:
+        """Those of them that come before the place where the contact is."""
+        points = self.minima(theta, contact, most)
+        _, width, phase = theta[self.own]
+
+        def here(point: Array) -> bool:
+            _, wide, turn = point[self.own]
+            apart = np.mod(turn - phase + np.pi, 2.0 * np.pi) - np.pi
+            return bool(abs(apart) + abs(wide - width) < _REACH)  # the farther of both edges
+
+        return list(itertools.takewhile(lambda point: not here(point), points))
 
     def walked(self, theta: Array) -> list[Array]:
         """The best place of either edge in turn, the other standing: each meets events of its own.

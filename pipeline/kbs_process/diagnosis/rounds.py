@@ -149,7 +149,9 @@ def _round(standing: Standing, floor: Floor, simulate: Simulate, accepted: Seque
     passed = named_first(passed)
     chances = probabilities([one.standing.known for one in passed], view.bench.background.rows)
     best = int(np.argmax(chances))
-    settled = resettled(passed[best].standing, floor, simulate, leaps=1)
+    settled = passed[best].standing
+    if not passed[best].leapt:
+        settled = resettled(settled, floor, simulate, leaps=1)
     if settled.known.excess < MOST * standing.known.excess:
         settled = released(settled, floor, simulate)
     told = reread(replace(passed[best], standing=settled), standing, floor, simulate)

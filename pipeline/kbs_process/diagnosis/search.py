@@ -15,7 +15,7 @@ import numpy as np
 
 from kbs_process.diagnosis.experiment import Experiment
 from kbs_process.diagnosis.hypothesis import Hypothesis, Prediction, Simulate
-from kbs_process.diagnosis.leaps import leap
+from kbs_process.diagnosis.leaps import leap, stride
 from kbs_process.diagnosis.metric import Metric
 from kbs_process.diagnosis.parameters import Slopes, known_parameters, slopes
 from kbs_process.estimation.bounded import bounded_minimum
@@ -246,7 +246,12 @@ class Search:
         return found
 
     def leapt(self, found: Found, *, smooth: bool) -> Found | None:
-        """Where a leap leads, with slopes; None where it leads nowhere."""
+        """Where a stride leads, or else a leap, with slopes; None where neither leads anywhere.
+
+        Where something is missing by far, it makes wrong places as good as right ones.
+        """
+        if not self.gross(found) and (reached := stride(self, found, EARLY, GEARS)):
+            return reached
         theta = leap(self, found, smooth=smooth)
         if theta is None:
             return None

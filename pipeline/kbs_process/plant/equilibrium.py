@@ -14,7 +14,9 @@ from kbs_process.signals.records import Array
 
 ITERATIONS = 60
 STANDSTILL = 1e-6  # rad/s^2, of base, outputs and rotors
-ROUNDING = 1e-8  # of the same, below which a step finds no less
+ROUNDING = 1e-8  # of the same, below which there is nothing to look for
+GAINED = 0.1  # share left at a standstill by a step that did not meet rounding
+LEAST_SHARE = 1e-4  # of a step
 # rad, by which gears are wound up to begin with: one with play has no stiffness unloaded
 WOUND = (0.0, 3e-4, 2.1e-3, 1.1e-2)
 UNHELD = (
@@ -78,17 +80,16 @@ def _settled(acceleration: Callable[[Array], Array], values: Array) -> tuple[Arr
             break
         jacobian = np.stack([_slope(acceleration, values, i) for i in range(len(values))], axis=1)
         change = -_solved(jacobian, residual)
-        share = 1.0
-        while (norm := float(np.linalg.norm(acceleration(values + share * change)))) > np.linalg.norm(
-            residual
-        ):
+        size, still = float(np.linalg.norm(residual)), np.abs(residual).max() < STANDSTILL
+        share, left = 1.0, acceleration(values + change)
+        while not still and np.linalg.norm(left) > size and share > LEAST_SHARE:
             share *= 0.5
-            if share < 1e-4:
-                break
-        if share < 1e-4 or not np.isfinite(norm):
+            left = acceleration(values + share * change)
+        if not np.linalg.norm(left) < size:
             break  # rounding is all that is left, or there is no equilibrium
-        values = values + share * change
-        residual = acceleration(values)
+        values, residual = values + share * change, left
+        if still and not np.linalg.norm(left) < GAINED * size:
+            break
     return values, residual
 
 

@@ -1,9 +1,9 @@
 """Write the time loop of several plants of one structure side by side: number by number the same as each alone.
 
 A processor's vector does with eight numbers at once what it does with one. Every plant has a lane of each row of `s`:
-its state, the fields, its wrench, and what the parts of a step hand on to each other; and of each row of `P`, its
-parameters. Rows are of a fixed length, so that the compiler sees that they do not overlap; each innermost loop is over
-the lanes, without a branch.
+its parameters, its state, the fields, its wrench, and what the parts of a step hand on to each other. Rows are of a
+fixed length and all in one array, so that the compiler sees that they do not overlap; each innermost loop is over the
+lanes, without a branch.
 """
 
 from __future__ import annotations
@@ -28,21 +28,28 @@ _OF_JOINTS = (
 
 
 class InRows(InVector):
-    """The numbers of the state in the rows of a lane."""
+    """The numbers of the state in the rows of a lane, behind the parameters."""
+
+    def __init__(self, structure: Structure) -> None:
+        super().__init__(structure)
+        self.first = structure.size
 
     def place(self, i: int) -> str:
         """Number `i` of all."""
-        return f"s[{LANES * i} + l]"
+        return f"s[{LANES * (self.first + i)} + l]"
 
 
 class Rows:
-    """Which rows of `s` hold what: the state, fields at a step's ends, the wrench over it, then what is handed on."""
+    """Which rows of `s` hold what: parameters, state, fields at a step's ends, its wrench, what is handed on."""
 
     def __init__(self, structure: Structure) -> None:
         self.structure = structure
-        self.state = max(part.stop for part in state_layout(structure).values())
+        layout = state_layout(structure)
+        self.state = slice(structure.size, structure.size + max(part.stop for part in layout.values()))
+        self.q, self.qd = (structure.size + layout[name].start for name in ("q", "qd"))
         n = structure.joints
-        self.field_0, self.field_1, self.wrench = self.state, self.state + n, self.state + 2 * n
+        self.field_0, self.field_1 = self.state.stop, self.state.stop + n
+        self.wrench = self.state.stop + 2 * n
         self._first = self.wrench + 6
         self._rows: dict[str, tuple[int, int]] = {}
         self.count = self._first
@@ -99,7 +106,7 @@ def lanes_text(structure: Structure) -> str:
     turning = ["theta", "w", "z", "zd", "out", *["ground"] * structure.grounded]
     still = ["q", "qd", "turning", "share", "inverse", "begin", "pitch"]
     ends = [
-        "    p = P[:, l]",
+        "    p = parameters[:, l]",
         *[
             f"    field_{end} = {tuple_of([f's[{LANES * (row + j)} + l]' for j in range(n)])}"
             for end, row in enumerate((rows.field_0, rows.field_1))
@@ -116,7 +123,7 @@ def lanes_text(structure: Structure) -> str:
         *rows.stored(rows.of_rotors(*turning)),
     ]
     finish = [
-        "    p = P[:, l]",
+        "    p = parameters[:, l]",
         *rows.loaded(last),
         f"    guess = ({guess})",
         *handed_over(structure, state),
@@ -125,21 +132,19 @@ def lanes_text(structure: Structure) -> str:
     ]
     step = [
         "@compiled",
-        "def step_lanes(s, time, H, P):",
+        "def step_lanes(s, time, H, lanes):",
         '    """Advance all lanes by H."""',
-        "    lanes = P.shape[1]",
-        f"    P = carray(address(P), ({structure.size}, {LANES}))",
+        f"    parameters = carray(address(s), ({structure.size}, {LANES}))",
         *times,
         *_over_lanes(begin, 1),
         f"    for i in range({ROTOR_STEPS}):",
         *_over_lanes(turn, 2),
         *_over_lanes(finish, 1),
     ]
-    layout = state_layout(structure)
     numbers = {
         "LANES": LANES,
-        "Q": layout["q"].start,
-        "QD": layout["qd"].start,
+        "Q": rows.q,
+        "QD": rows.qd,
         "FIELD_0": rows.field_0,
         "FIELD_1": rows.field_1,
         "WRENCH": rows.wrench,
@@ -159,7 +164,7 @@ def _over_lanes(lines: list[str], depth: int) -> list[str]:
 
 _LOOP = '''@njit(cache=True, nogil=True, error_model="numpy")
 def advance_lanes(
-    first, count, H, P, s, cursor, closed, recorded, latency, command, rate, encoder, readings, gains, sums,
+    first, count, H, s, cursor, closed, recorded, latency, command, rate, encoder, readings, gains, sums,
     knots, fields, per_sample, held, low_pass, drive_in, amplifier, wrench, angle_rate, angle_first, angle,
 ):
     """As `advance`, of all lanes: what belongs to one has the lane for its first axis; held is (6, lanes)."""
@@ -198,7 +203,7 @@ def advance_lanes(
             for l in range(<LANES>):
                 for c in range(6):
                     wrench[l, samples, c] = amplifier[l, c, order - 1]
-        step_lanes(s, time, H, P)
+        step_lanes(s, time, H, encoder.shape[0])
         if sampling:
             if order == 0:
                 for l in range(<LANES>):

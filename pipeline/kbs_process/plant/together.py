@@ -9,7 +9,6 @@ import numpy as np
 from kbs_process.plant.compile import compiled_lanes
 from kbs_process.plant.lanes import LANES, Rows
 from kbs_process.plant.simulation import Simulation
-from kbs_process.plant.stepping import state_layout
 from kbs_process.signals.records import Array
 
 
@@ -35,8 +34,8 @@ class Together:
         first = self.each[0]
         rows = Rows(first.structure)
         s = np.zeros((rows.count, LANES))
-        s[: rows.state] = np.stack([one.state for one in self.each], axis=1)
-        P = np.stack([one.p for one in self.each], axis=1)
+        s[: rows.state.start] = np.stack([one.p for one in self.each], axis=1)
+        s[rows.state] = np.stack([one.state for one in self.each], axis=1)
         held = np.stack([one.wrench for one in self.each], axis=1)
         encoder, readings, gains, sums, fields, low_pass, drive_in, amplified = (
             np.stack([getattr(one, name) for one in self.each])
@@ -52,7 +51,7 @@ class Together:
         def move(begin: int, steps: int, seen: Array, sampled: int, turned: Array) -> int:
             return int(
                 self.advance(
-                    begin, steps, first.step, P, s.reshape(-1), cursor, first.closed, first.recorded, first.latency,
+                    begin, steps, first.step, s.reshape(-1), cursor, first.closed, first.recorded, first.latency,
                     first.cycles.position, first.cycles.rate, encoder, readings, gains, sums, first.knots, fields,
                     first.per_sample, held, low_pass, drive_in, amplified, seen, first.angle_rate, sampled, turned,
                 )
@@ -62,6 +61,6 @@ class Together:
             unseen = np.empty((LANES, -first.first // first.per_sample, 6))
             move(first.first, -first.first, unseen, 0, np.empty((LANES, 0, n)))
         # The sample at time zero ends no step.
-        start = s[state_layout(first.structure)["q"]].T[:, None, :].copy()
+        start = s[rows.q : rows.qd].T[:, None, :].copy()
         move(0, samples * first.per_sample, wrench, 1, angle)
         return wrench[: self.count], np.concatenate([start, angle], axis=1)[: self.count, :angles]
