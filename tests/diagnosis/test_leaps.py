@@ -7,32 +7,58 @@ import numpy as np
 from diagnosis import bench
 from kbs_process.diagnosis.floor import declared
 from kbs_process.diagnosis.hypothesis import Hypothesis
-from kbs_process.diagnosis.leaps import leap
+from kbs_process.diagnosis.leaps import leap, stride
 from kbs_process.diagnosis.metric import metrics
 from kbs_process.diagnosis.parameters import known_parameters, prior
-from kbs_process.diagnosis.search import Search
+from kbs_process.diagnosis.search import GEARS, Found, Search
 from kbs_process.rig.model import substitute
+from kbs_process.signals.records import Array
 
-PHASE, WIDTH = "joint.az.drive.phi_stat", "joint.az.drive.delta"
+PHASE, WIDTH, TORQUE = "joint.az.drive.phi_stat", "joint.az.drive.delta", "joint.az.drive.Ts0"
 
 
-def test_a_leap_finds_the_edges_of_a_contact() -> None:
+def searching(wrong: dict[str, float]) -> tuple[Search, Found, dict[str, float]]:
+    """A search for the drives' numbers that begins with some of them wrong: by what, or times what (torques)."""
     truth = bench.rig()
     made = bench.experiment(truth, ("fit",), seed=11)
-    own = {name: float(truth.quantities()[name]) for name in (PHASE, WIDTH)}
-    wrong = substitute(made.rig, {PHASE: own[PHASE] + 1.0, WIDTH: own[WIDTH] * 1.3})
+    own = {name: float(truth.quantities()[name]) for name in (PHASE, WIDTH, TORQUE)}
+    rig = substitute(made.rig, {name: own[name] + by for name, by in wrong.items()})
     free = tuple(s for s in known_parameters(made.rig, made.effects) if s.name.startswith("joint."))
-    begin = Hypothesis(wrong, made.effects)
-    parameters = prior(wrong, made.rig, made.effects, free)
+    begin = Hypothesis(rig, made.effects)
+    parameters = prior(rig, made.rig, made.effects, free)
     simulate = bench.serial(made)
     metric = metrics(made, declared(made), dict(enumerate(simulate([(0, begin)]))), begin)
     search = Search(made, metric, simulate, begin, free, parameters)
-    found = search.begin(begin.values(free))
+    return search, search.begin(begin.values(free)), own
+
+
+def farther_edge(search: Search, theta: Array, own: dict[str, float]) -> float:
+    """By how much the farther of the contact's edges is off, rad."""
+    moved = dict(zip((scalar.name for scalar in search.free), theta, strict=True))
+    turned = float(np.angle(np.exp(1j * (moved[PHASE] - own[PHASE]))))
+    return abs(turned) + abs(moved[WIDTH] - own[WIDTH])
+
+
+def test_a_leap_finds_the_edges_of_a_contact() -> None:
+    width = float(bench.rig().quantities()[WIDTH])
+    search, found, own = searching({PHASE: 1.0, WIDTH: 0.3 * width})
     theta = leap(search, found, smooth=False)
     assert theta is not None
-    moved = dict(zip((scalar.name for scalar in free), theta, strict=True))
-    turned = float(np.angle(np.exp(1j * (moved[PHASE] - own[PHASE]))))
-    wider = moved[WIDTH] - own[WIDTH]
-    assert (
-        max(abs(turned - wider), abs(turned + wider)) < 0.05
-    )  # rad; where the farther was off by more than one
+    assert farther_edge(search, theta, own) < 0.05  # where the farther was off by more than one
+
+
+def test_a_stride_finds_a_contact_that_has_vanished_elsewhere() -> None:
+    """Most of its torque gone, other numbers have settled without it."""
+    torque = float(bench.rig().quantities()[TORQUE])
+    search, found, own = searching({PHASE: 1.0, TORQUE: -0.9 * torque})
+    stuck = search.descend(found)
+    reached = stride(search, stuck, 2, GEARS)
+    assert reached is not None
+    settled = search.descend(reached)
+    assert farther_edge(search, settled.theta, own) < 0.05
+    assert sum(search.cost(settled.theta, settled.predicted)) < sum(search.cost(stuck.theta, stuck.predicted))
+
+
+def test_no_stride_leaves_the_right_place() -> None:
+    search, found, _ = searching({})
+    assert stride(search, found, 2, GEARS) is None

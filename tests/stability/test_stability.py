@@ -49,14 +49,17 @@ def test_an_integrator_with_delay_has_its_textbook_limit(latency: int, limit: fl
     assert found.frequency == pytest.approx(1.0 / (0.1 * 2.0 * (2 * latency + 1)), rel=1e-3)
 
 
-def test_the_cycle_is_discretised_exactly() -> None:
-    system, _ = flexible()
+@pytest.mark.parametrize("arriving", [(), ((1.0, -0.03), (0.9, 0.0))])
+def test_the_cycle_is_discretised_exactly(arriving: tuple[tuple[float, float], ...]) -> None:
+    system = replace(flexible()[0], arriving=arriving)
+    of_field, of_rate = np.array(arriving or [(1.0, 0.0)] * 2).T
     c, n = len(system.M), len(system.joints)
     Phi, G_u, G_v = stability.discretised(system, 0.1)
     start, u, v = np.linspace(-1e-3, 1e-3, 2 * c), np.array([1e-3, -2e-3]), np.array([5e-4, 1e-3])
 
     def rates(t: float, s: Any) -> Any:
-        force = system.B @ (u + v * t / 0.1) - system.K @ s[:c] - system.C @ s[c:]
+        field = of_field * (u + v * t / 0.1) + of_rate * v / 0.1
+        force = system.B @ field - system.K @ s[:c] - system.C @ s[c:]
         return np.concatenate([s[c:], np.linalg.solve(system.M, force)])
 
     end = solve_ivp(rates, (0.0, 0.1), start, method="Radau", rtol=1e-8, atol=1e-12).y[:, -1]
@@ -97,13 +100,15 @@ def test_closed_loop_poles_are_those_of_the_loop_matrix() -> None:
     assert slowest < 0.0
 
 
-@pytest.mark.parametrize("integral", [1.0, 10.0])
-def test_simulation_loses_stability_where_the_linear_loop_does(integral: float) -> None:
-    rig = onset.smooth_rig(two_axis())
+@pytest.mark.parametrize(("integral", "lag"), [(1.0, 0.0), (10.0, 0.0), (1.0, 0.02)])
+def test_simulation_loses_stability_where_the_linear_loop_does(integral: float, lag: float) -> None:
+    effects = [*NOMINAL, "controller_latency"]
+    rig = onset.smooth_rig(two_axis(drive={"field_latency": lag}))
     assert rig.controller is not None
-    system = linearise(rig, select(NOMINAL), POSE)
+    system = linearise(rig, select(effects), POSE)
+    assert system.arriving == ((1.0, pytest.approx(-lag)),) * 2
     predicted = stability.critical(system, rig.controller, integral=integral)
-    found = onset.onset(rig, NOMINAL, POSE, predicted.factor, integral=integral, tolerance=5e-3)
+    found = onset.onset(rig, effects, POSE, predicted.factor, integral=integral, tolerance=5e-3)
     assert found is not None
     assert found.factor == pytest.approx(predicted.factor, rel=0.01)
     assert found.frequency == pytest.approx(predicted.frequency, abs=0.11)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kbs_process.plant.effect import POINT_SIGNALS, SIGNALS, Effect, Port
+from kbs_process.plant.effect import FIELD_SIGNALS, POINT_SIGNALS, SIGNALS, Effect, Port
 from kbs_process.plant.rigid import LinkMotion, inertia_matrix, kinematics, links_beyond
 from kbs_process.plant.structure import external_of
 from kbs_process.rig.model import LAB, TRANSDUCER, Drive, Joint, Rig
@@ -45,6 +45,8 @@ class Linear:
     gravity: Array  # (6, c) change of the wrench of weight and other loads in the plate's own axes, for unit angles
     drag: Array  # (6, c) change of the other loads' wrench, for unit rates
     freedoms: tuple[Freedom, ...] = ()  # of plate and outputs, in the coordinates' order
+    # Of each joint's field, and of its rate (s), what a motor has: all of the first and none of the second if not said.
+    arriving: tuple[tuple[float, float], ...] = ()
 
     def output(self, joint: str) -> int:
         """Return the coordinate of a driven joint's angle."""
@@ -106,9 +108,24 @@ def linearise(rig: Rig, effects: Sequence[Effect], q: Array) -> Linear:
             matrix[inboard, out] -= slope * np.array([freedoms[i].axis @ axis for i in inboard])
             matrix[out, out] -= slope
             external[3:, out] += slope * (R_TL @ axis)
-    return Linear(
-        plate, tuple(joint.name for joint in driven), M, C, K, B, momentum, gravity, drag, tuple(freedoms)
-    )
+    names = tuple(joint.name for joint in driven)
+    arriving = tuple(field_slopes(joint.drive, effects) for joint in driven if joint.drive is not None)
+    return Linear(plate, names, M, C, K, B, momentum, gravity, drag, tuple(freedoms), arriving)
+
+
+def field_slopes(drive: Drive, effects: Sequence[Effect]) -> tuple[float, float]:
+    """Return how the field that a motor has answers to the commanded one: to itself (1), and to its rate (s)."""
+    known = dict.fromkeys(FIELD_SIGNALS, 0.0) | {"ratio": float(drive.ratio)}
+    known |= {name: float(quantity) for name, quantity in drive.parameters.items()}
+    slopes = {"field_travel": 1.0, "field_rate": 0.0}
+    for effect in effects:
+        if effect.port is Port.FIELD:
+            for signal in slopes:
+                ahead, behind = (
+                    effect.value(known | {signal: known[signal] + step}) for step in (_STEP, -_STEP)
+                )
+                slopes[signal] += (ahead[0] - behind[0]) / (2.0 * _STEP)
+    return slopes["field_travel"], slopes["field_rate"]
 
 
 def drive_slopes(

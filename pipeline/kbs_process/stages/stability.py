@@ -100,13 +100,18 @@ def loop(system: Linear, controller: Controller, *, proportional: float = 1.0, i
 
 
 def discretised(system: Linear, cycle: float) -> tuple[Array, Array, Array]:
-    """Return Phi (2c, 2c), G_u (2c, n) and G_v (2c, n) of one cycle, exact for a field that moves linearly in it."""
+    """Return Phi (2c, 2c), G_u (2c, n) and G_v (2c, n) of one cycle, exact for a field that moves linearly in it.
+
+    What becomes of the field on its way to the motor is in G_u and G_v.
+    """
     c, n = len(system.M), len(system.joints)
+    of_field, of_rate = np.array(system.arriving or [(1.0, 0.0)] * n).T
     A = np.zeros((2 * c + 2 * n, 2 * c + 2 * n))
     A[:c, c : 2 * c] = np.eye(c)
     A[c : 2 * c, :c] = -np.linalg.solve(system.M, system.K)
     A[c : 2 * c, c : 2 * c] = -np.linalg.solve(system.M, system.C)
-    A[c : 2 * c, 2 * c : 2 * c + n] = np.linalg.solve(system.M, system.B)
+    A[c : 2 * c, 2 * c : 2 * c + n] = np.linalg.solve(system.M, system.B) * of_field
+    A[c : 2 * c, 2 * c + n :] = np.linalg.solve(system.M, system.B) * of_rate / cycle
     A[2 * c : 2 * c + n, 2 * c + n :] = np.eye(n) / cycle
     exact = expm(A * cycle)
     return exact[: 2 * c, : 2 * c], exact[: 2 * c, 2 * c : 2 * c + n], exact[: 2 * c, 2 * c + n :]
