@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from diagnosis import bench
 from kbs_process.diagnosis.floor import declared
 from kbs_process.diagnosis.hypothesis import Hypothesis
-from kbs_process.diagnosis.leaps import leap, stride
+from kbs_process.diagnosis.leaps import stride
 from kbs_process.diagnosis.metric import metrics
 from kbs_process.diagnosis.parameters import known_parameters, prior
 from kbs_process.diagnosis.search import GEARS, Found, Search
@@ -39,12 +41,16 @@ def farther_edge(search: Search, theta: Array, own: dict[str, float]) -> float:
     return abs(turned) + abs(moved[WIDTH] - own[WIDTH])
 
 
-def test_a_leap_finds_the_edges_of_a_contact() -> None:
+def test_edges_of_a_contact_are_found() -> None:
     width = float(bench.rig().quantities()[WIDTH])
     search, found, own = searching({PHASE: 1.0, WIDTH: 0.3 * width})
-    theta = leap(search, found, smooth=False)
-    assert theta is not None
-    assert farther_edge(search, theta, own) < 0.05  # where the farther was off by more than one
+    moved = search.leapt(found, smooth=False)
+    assert moved is not None
+    settled = search.descend(moved)
+    # Where the farther was off by more than one; twelve seconds do not tell edges apart that are nearer.
+    assert farther_edge(search, settled.theta, own) < 0.2
+    right, there, _ = searching({})
+    assert sum(search.cost(settled.theta, settled.predicted)) < sum(right.cost(there.theta, there.predicted))
 
 
 def test_a_stride_finds_a_contact_that_has_vanished_elsewhere() -> None:
@@ -62,3 +68,15 @@ def test_a_stride_finds_a_contact_that_has_vanished_elsewhere() -> None:
 def test_no_stride_leaves_the_right_place() -> None:
     search, found, _ = searching({})
     assert stride(search, found, 2, GEARS) is None
+
+
+def test_numbers_that_nothing_shows_do_not_end_the_search() -> None:
+    """As a law's reach, while its amplitude is zero: all its slopes are."""
+    search, found, _ = searching({PHASE: 1.0})
+    search.precision[0] = 0.0
+    none = {
+        drive: replace(one, columns=one.columns * (np.arange(len(search.free)) > 0)[:, None, None])
+        for drive, one in found.gradients.items()
+    }
+    moved = search.leapt(replace(found, gradients=none), smooth=False)
+    assert moved is not None and np.isfinite(moved.theta).all()

@@ -27,6 +27,7 @@ from kbs_process.diagnosis.shapes import bettered
 from kbs_process.diagnosis.side_by_side import side_by_side
 from kbs_process.diagnosis.suspects import BY
 from kbs_process.diagnosis.thresholds import (
+    BENT,
     FALSE_ALARM,
     LAW_VARIANCE,
     LEAD,
@@ -41,15 +42,19 @@ from kbs_process.diagnosis.view import View
 def leaders(view: View, among: Callable[[Found], bool] = lambda _: True) -> tuple[list[Found], list[Found]]:
     """The most probable suspects, as many as the linear plant may have in the wrong order, and a few that come next.
 
-    Each with its shape bettered along the linear plant. Of a law that a channel can show in many ways, as products of
-    others are, the best stands for all; laws of one family at one place come after the best of the others.
+    Each with its shape bettered along the linear plant, if that could bring it among them. Of a law that a channel can
+    show in many ways, as products of others are, the best stands for all; laws of one family at one place come after
+    the best of the others.
     """
     best: dict[tuple[str, ...], Found] = {}
     for found in filter(among, view.able):
         best.setdefault(_way(found), found)
-    able = side_by_side(partial(bettered, view.bench), list(best.values())[:SHAPED])
+    able = list(best.values())[:SHAPED]
     if not able:
         return [], []
+    least = (1.0 - LEAD) * max(found.score.gain for found in able) / BENT if view.ordered else 0.0
+    worth = [found for found in able if found.score.gain >= least]
+    able = [*side_by_side(partial(bettered, view.bench), worth), *(one for one in able if one not in worth)]
     able.sort(key=lambda found: -found.log_evidence)
     bound = (1.0 - LEAD) * able[0].score.gain if view.ordered else 0.0
     first = various([found for found in able if found.score.gain >= bound or found is able[0]])[:LEADERS]

@@ -16,6 +16,7 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from kbs_process.diagnosis.phasing import stages
+from kbs_process.diagnosis.side_by_side import side_by_side
 from kbs_process.signals.records import Array
 from kbs_process.stages.contact import edge_minima
 from kbs_process.stages.screening import Contact, contacts
@@ -31,6 +32,7 @@ _REACH = 0.06  # rad: an edge's own step goes no farther than half the grid that
 _WALK = (-0.3, -0.16, -0.08, -0.03, 0.03, 0.08, 0.16, 0.3)  # rad, outwards: an edge's places that are tried
 _NARROWEST = 0.02  # rad, half a contact
 _BETTER = 10.0  # of -2 log likelihood, for which something is moved
+_RIDGE = 1e-10  # of each number's own information
 _FOLLOWED = (1.0, 0.3, 0.0)  # shares of how the others follow
 _RISE = 1.5  # times the cost, that a leap may bring before the others have settled
 
@@ -38,7 +40,7 @@ _RISE = 1.5  # times the cost, that a leap may bring before the others have sett
 def leap(search: Search, found: Found, *, smooth: bool) -> Array | None:
     """Return better values (p,), or None where there are none; phases that enter smoothly are tried if `smooth`."""
     theta, moved = found.theta, list[int]()
-    J = {k: search.jacobian(k, found.gradients) for k in search.experiment.fit}
+    J = search.jacobians(found.gradients)
     for trials, joints in stages(search.experiment):
         for pair in search.pairs:
             if smooth and pair.smooth and search.free[pair.phase].name.startswith(_paths(joints)):
@@ -50,7 +52,8 @@ def leap(search: Search, found: Found, *, smooth: bool) -> Array | None:
         for contact in _contacts(search, joints):
             view = Moving(search, found, J, trials, (contact.torque, contact.width, contact.phase))
             moved += view.own
-            theta = view.best(theta, view.edges(theta, contact))
+            if search.gross(found):
+                theta = view.best(theta, view.edges(theta, contact))
             theta = view.best(theta, view.walked(theta))
     if theta is found.theta:
         return None
@@ -67,7 +70,7 @@ def stride(search: Search, found: Found, steps: int, most: int) -> Found | None:
     begun = found
     for trials, joints in stages(search.experiment):
         for contact in _contacts(search, joints):
-            J = {k: search.jacobian(k, found.gradients) for k in search.experiment.fit}
+            J = search.jacobians(found.gradients)
             view = Moving(search, found, J, trials, (contact.torque, contact.width, contact.phase))
             here, *others = view.followed([found.theta, *view.ranked(found.theta, contact, _STRIDES)])
             reached = [found]
@@ -103,7 +106,7 @@ def _followed(
     own = np.isin(np.arange(len(theta)), moved)
     points = [np.where(own, theta, found.theta + share * (theta - found.theta)) for share in _FOLLOWED]
     predicted = search.predict(points, search.drives)
-    costs = [sum(search.cost(point, one)) for point, one in zip(points, predicted, strict=True)]
+    costs = [sum(one) for one in search.costs(points, predicted)]
     best = int(np.argmin(costs))
     return points[best], predicted[best], costs[best]
 
@@ -134,7 +137,9 @@ class Moving:
         self.drives = sorted({search.experiment.trials[k].drive for k in trials})
         self.weights = (search.precision + search.ridge)[self.rest]
         normal = sum((j[:, self.rest].T @ j[:, self.rest] for j in J.values()), np.diag(self.weights))
-        self.factor = cho_factor(normal)
+        # A law's number that nothing shows has no prior either, and would leave the equations singular.
+        size = np.diag(normal)
+        self.factor = cho_factor(normal + np.diag(np.where(size > 0.0, _RIDGE * size, 1.0)))
         self.judged: dict[bytes, Followed] = {}
         self.held = np.zeros(len(self.rest))
         for k in set(J) - set(trials):
@@ -149,10 +154,10 @@ class Moving:
     def residuals(self, points: Sequence[Array]) -> list[Array]:
         """Whitened residuals of the trials, end to end, at each point; those that no plant has are not finite."""
         search = self.search
-        return [
-            np.concatenate([search.residual(k, predicted) for k in self.trials])
-            for predicted in search.predict(points, self.drives)
-        ]
+        return side_by_side(
+            lambda predicted: np.concatenate([search.residual(k, predicted) for k in self.trials]),
+            search.predict(points, self.drives),
+        )
 
     def best(self, theta: Array, points: Sequence[Array]) -> Array:
         """The best of some points, the rest having followed; `theta` itself where none is better by `_BETTER`."""

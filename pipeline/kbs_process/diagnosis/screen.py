@@ -144,7 +144,7 @@ class Bench:
         """Over `trials`, else all that may be fitted."""
         members = tuple(known.experiment.fit if trials is None else trials)
         precision = np.where(np.isfinite(known.parameters.sigma), known.parameters.sigma, np.inf) ** -2.0
-        J = {k: known.jacobian(k) for k in members}
+        J = dict(zip(members, side_by_side(known.jacobian, members), strict=True))
         offset = np.where(precision > 0.0, known.parameters.value - known.value, 0.0)
         background = Background.of({k: known.residual[k] for k in members}, J, precision, offset, known.room)
         groups: dict[tuple[object, ...], list[int]] = {}

@@ -7,7 +7,6 @@ minima by the dozen: see `leaps`.
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -18,6 +17,7 @@ from kbs_process.diagnosis.hypothesis import Hypothesis, Prediction, Simulate
 from kbs_process.diagnosis.leaps import leap, stride
 from kbs_process.diagnosis.metric import Metric
 from kbs_process.diagnosis.parameters import Slopes, known_parameters, slopes
+from kbs_process.diagnosis.side_by_side import side_by_side
 from kbs_process.estimation.bounded import bounded_minimum
 from kbs_process.estimation.fit import Parameters
 from kbs_process.signals.records import Array
@@ -155,6 +155,10 @@ class Search:
         data = sum(float(z @ z) for z in (self.residual(k, predicted) for k in self.experiment.fit))
         return data if np.isfinite(data) else np.inf, self.excess(theta)
 
+    def costs(self, thetas: Sequence[Array], predicted: Sequence[Predictions]) -> list[tuple[float, float]]:
+        """`cost` of several points."""
+        return side_by_side(lambda one: self.cost(*one), list(zip(thetas, predicted, strict=True)))
+
     def excess(self, theta: Array) -> float:
         moved = (theta - self.parameters.value) / self.parameters.sigma
         return float(moved @ moved)
@@ -164,14 +168,23 @@ class Search:
         reference = self.experiment.reference(self.experiment.trials[k].trajectory)
         return self.metric[k](np.moveaxis(gradients[reference].columns, 0, 2))
 
+    def jacobians(self, gradients: Gradients) -> dict[int, Array]:
+        """Those of all trials that are fitted."""
+        fit = self.experiment.fit
+        return dict(zip(fit, side_by_side(lambda k: self.jacobian(k, gradients), fit), strict=True))
+
     def normal(self, gradients: Gradients, predicted: Predictions) -> tuple[Array, Array]:
         """Normal matrix (p, p) and right-hand side (p,) of the data."""
+
+        def part(k: int) -> tuple[Array, Array]:
+            J = self.jacobian(k, gradients)
+            return J.T @ J, J.T @ self.residual(k, predicted)
+
         p = len(self.free)
         H, g = np.zeros((p, p)), np.zeros(p)
-        for k in self.experiment.fit:
-            J = self.jacobian(k, gradients)
-            H += J.T @ J
-            g += J.T @ self.residual(k, predicted)
+        for square, along in side_by_side(part, self.experiment.fit):
+            H += square
+            g += along
         return H, g
 
     # how it is lowered
@@ -370,7 +383,7 @@ class Search:
             return Step(theta, predicted, promised, 0.0)
         now = weight * data + excess
         tried = self.predict(candidates, self.drives)
-        costs = [weight * d + e for d, e in itertools.starmap(self.cost, zip(candidates, tried, strict=True))]
+        costs = [weight * d + e for d, e in self.costs(candidates, tried)]
         best = int(np.argmin(costs))
         if not costs[best] < now:
             return Step(theta, predicted, promised, 0.0)
