@@ -117,15 +117,8 @@ def field_slopes(drive: Drive, effects: Sequence[Effect]) -> tuple[float, float]
     """Return how the field that a motor has answers to the commanded one: to itself (1), and to its rate (s)."""
     known = dict.fromkeys(FIELD_SIGNALS, 0.0) | {"ratio": float(drive.ratio)}
     known |= {name: float(quantity) for name, quantity in drive.parameters.items()}
-    slopes = {"field_travel": 1.0, "field_rate": 0.0}
-    for effect in effects:
-        if effect.port is Port.FIELD:
-            for signal in slopes:
-                ahead, behind = (
-                    effect.value(known | {signal: known[signal] + step}) for step in (_STEP, -_STEP)
-                )
-                slopes[signal] += (ahead[0] - behind[0]) / (2.0 * _STEP)
-    return slopes["field_travel"], slopes["field_rate"]
+    of_field, of_rate = _port_slopes(effects, Port.FIELD, known, ("field_travel", "field_rate"))
+    return 1.0 + of_field, of_rate
 
 
 def drive_slopes(
@@ -200,14 +193,19 @@ def ground_slopes(
     """Return the slopes of the laboratory's torques on an output with its angle and rate: N m/rad, N m s/rad."""
     known = dict.fromkeys(SIGNALS, 0.0) | {"ratio": float(drive.ratio)}
     known |= {name: float(quantity) for name, quantity in drive.parameters.items()} | dict(at or {})
-    slopes = dict.fromkeys(("joint_angle", "joint_rate"), 0.0)
-    for effect in effects:
-        if effect.port is not Port.GROUND_TORQUE:
-            continue
-        for signal in slopes:
-            ahead, behind = (effect.value(known | {signal: known[signal] + step}) for step in (_STEP, -_STEP))
-            slopes[signal] += (ahead[0] - behind[0]) / (2.0 * _STEP)
-    return slopes["joint_angle"], slopes["joint_rate"]
+    return _port_slopes(effects, Port.GROUND_TORQUE, known, ("joint_angle", "joint_rate"))
+
+
+def _port_slopes(
+    effects: Sequence[Effect], port: Port, known: Mapping[str, float], signals: tuple[str, str]
+) -> tuple[float, float]:
+    """Slopes, with two signals, of the sum of all effects at a port."""
+    found = []
+    for signal in signals:
+        ends = [{**known, signal: known[signal] + step} for step in (_STEP, -_STEP)]
+        ahead, behind = (sum(e.value(end)[0] for e in effects if e.port is port) for end in ends)
+        found.append((ahead - behind) / (2.0 * _STEP))
+    return found[0], found[1]
 
 
 def _freedoms(rig: Rig, links: dict[str, LinkMotion], driven: Sequence[Joint]) -> list[Freedom]:
