@@ -2,7 +2,7 @@
 
 What a weak effect does shows only once the strong ones are right. A phase that enters smoothly is tried all round;
 tooth contact at the best pairs of edges (`stages.contact`), each followed by a step in its own numbers before it is
-judged. All other numbers follow as the slopes say.
+judged. All other numbers follow as the slopes say. Where these are those of a wrong minimum, a stride asks the plant.
 """
 
 from __future__ import annotations
