@@ -1,10 +1,11 @@
-"""Which recordings count as predicted worse."""
+"""Which recordings count as predicted worse, and when all of them gain enough."""
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
-from kbs_process.diagnosis.gate import Fold, worsened
+from kbs_process.diagnosis.gate import Fold, foretold, worsened
 
 
 def folds(*gains: float) -> list[Fold]:
@@ -26,3 +27,23 @@ def test_worse_is_what_chance_and_the_formula_do_not_explain(
     gains: tuple[float, ...], worse: list[str]
 ) -> None:
     assert worsened(folds(*gains)) == worse
+
+
+@pytest.mark.parametrize(
+    ("size", "noise", "enough"),
+    [
+        (1.0, 1.0, True),  # a law that is right, in recordings that show little of it
+        (1.6, 1.0, False),  # of the right form, too strong by more than a half
+        (-1.0, 1.0, False),
+        (1.0, 100.0, False),  # less than a suspect has to show
+    ],
+)
+def test_a_law_that_is_right_gains_the_square_of_what_it_changes(
+    size: float, noise: float, enough: bool
+) -> None:
+    rng = np.random.default_rng(5)
+    law = np.full(2000, 0.4) / noise
+    left = rng.standard_normal(2000)
+    before, after = left + law, left + law - size * law
+    changed = float((size * law) @ (size * law))
+    assert foretold(float(before @ before - after @ after), changed) == enough

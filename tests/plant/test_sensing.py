@@ -89,6 +89,14 @@ def test_hysteresis_depends_on_the_way_and_not_on_time() -> None:
     assert loop.min() < -0.99 and loop.max() > 0.99
 
 
+def test_a_channel_steps_where_its_load_passes() -> None:
+    step = changed(law("channel_step"), jump=0.5, jump_load=0.3, jump_width=0.01)
+    np.testing.assert_allclose(step[READING > 0.35], 0.5, atol=1e-4)
+    np.testing.assert_allclose(step[READING < 0.25], 0.0, atol=1e-4)
+    there = law("channel_step").equation(reading=np.array([0.3]), jump=0.5, jump_load=0.3, jump_width=0.01)
+    np.testing.assert_allclose(there, 0.25, rtol=1e-12)
+
+
 def test_a_coarse_encoder_reads_whole_coarse_codes() -> None:
     coarse = READING + changed(law("encoder_quantisation"), coarse_share=1.0, coarse_codes=8.0)
     codes = coarse / (8.0 * float(np.asarray(KNOWN["code"])))

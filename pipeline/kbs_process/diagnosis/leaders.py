@@ -32,8 +32,10 @@ from kbs_process.diagnosis.thresholds import (
     LAW_VARIANCE,
     LEAD,
     LEADERS,
+    REREAD,
     SECOND,
     SHAPED,
+    TOLERATED,
 )
 from kbs_process.diagnosis.tryout import extra_of, identity, in_plant
 from kbs_process.diagnosis.view import View
@@ -171,15 +173,29 @@ def _trial_by_trial(suspect: Suspect, standing: Standing, bench: Bench) -> tuple
 def reread(chosen: Tried, before: Standing, floor: Floor, simulate: Simulate) -> Tried:
     """A law of the readings told anew among all of its channel, now that the known numbers have settled beside it.
 
-    In the plant shapes are fitted; such a law has the one that the screen gave it while numbers were still pulled.
+    In the plant shapes are fitted; such a law has the one that the screen gave it while numbers were still pulled, and
+    goes on from there to first order. So it is told again as long as that changes much.
     """
-    suspect, standing = chosen.found.suspect, chosen.standing
-    if in_plant(suspect) or not chosen.own.names:
+    if in_plant(chosen.found.suspect) or not chosen.own.names:
         return chosen
+    enough = TOLERATED * float(before.known.rows[list(before.known.experiment.fit)].sum())
+    for _ in range(REREAD):
+        told = _told_anew(chosen, before, floor, simulate)
+        gained = chosen.standing.known.cost - told.standing.known.cost
+        chosen = told
+        if not gained > enough:
+            break
+    return chosen
+
+
+def _told_anew(chosen: Tried, before: Standing, floor: Floor, simulate: Simulate) -> Tried:
+    """The best law of a channel beside the known numbers as they are, if it is likelier than the one `chosen`."""
+    suspect, standing = chosen.found.suspect, chosen.standing
     site = _reads(suspect)
     view = View.of(
         bare(standing, chosen.own, simulate),
         lambda one: _reads(one) == site and not in_plant(one) and not one.each_trial,
+        linear=False,
     )
     if not view.able or _alike(view.able[0].suspect, suspect):
         return chosen

@@ -28,13 +28,20 @@ class Scene:
     paths: Mapping[int, Path]  # likewise
 
     @classmethod
-    def of(cls, experiment: Experiment, hypothesis: Hypothesis, predicted: Mapping[int, Prediction]) -> Scene:
-        """Tap and linearise the plant of a hypothesis; `predicted` by drive."""
+    def of(
+        cls,
+        experiment: Experiment,
+        hypothesis: Hypothesis,
+        predicted: Mapping[int, Prediction],
+        *,
+        linear: bool = True,
+    ) -> Scene:
+        """Tap the plant of a hypothesis; linearise it, if asked to, for what goes through. `predicted` by drive."""
         signals, paths = {}, {}
         for trajectory in range(len(experiment.repeats)):
             drive = experiment.reference(trajectory)
             signals[drive] = tapped(hypothesis, experiment, drive)
-            if experiment.drives[drive].schedule is not None:
+            if linear and experiment.drives[drive].schedule is not None:
                 paths[drive] = _path(experiment, hypothesis, signals[drive], drive)
         return cls(experiment, hypothesis, predicted, signals, paths)
 

@@ -69,6 +69,9 @@ GATE_GAIN: Final = (
 )
 # Of what recordings that were fitted gain, row by row: what was fitted to one motion alone does less for another.
 GATE_SHARE: Final = 0.2
+# Or else of the square of what a law changes there, all of which one that is right gains. The step of a converter that
+# showed this rule's want (spent) gained 1.06 of it, but 0.15 of the share row by row; wrong laws beside it less than 0.
+GATE_FORETOLD: Final = 0.5
 # Of what all gain together: by that one that shows little of a law may be worse, for its formula is not nature's.
 GATE_WORSE: Final = 0.02
 FIRST: Final = 3  # steps of a leader's refit that show whether it is worth the others
@@ -77,6 +80,8 @@ SHAPED: Final = 10
 # Times what it does at the best place of its grid that a law does between places: 1 to 2 on five
 # screens, one of a spent trial; up to 3.8 where it did little.
 BENT: Final = 2.0
+# Times that a law of readings is told anew at most, each time around the shape that it had.
+REREAD: Final = 3
 # Leaders that are tried beyond those that the linear plant cannot order, where none of these passes.
 SECOND: Final = 2
 # Leaders are refitted to the end if their first steps leave no more than some times what the best one's leave.

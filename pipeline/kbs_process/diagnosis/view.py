@@ -25,10 +25,12 @@ class View:
     screening: Screening
 
     @classmethod
-    def of(cls, standing: Standing, among: Callable[[Suspect], bool] = lambda _: True) -> View:
-        """Of all suspects, or of those for which `among` is true."""
+    def of(
+        cls, standing: Standing, among: Callable[[Suspect], bool] = lambda _: True, *, linear: bool = True
+    ) -> View:
+        """Of all suspects, or of those for which `among` is true; none of the plant's, if it is not made `linear`."""
         known = standing.known
-        scene = Scene.of(known.experiment, standing.hypothesis, standing.predicted)
+        scene = Scene.of(known.experiment, standing.hypothesis, standing.predicted, linear=linear)
         bench = Bench.of(known, scene)
         chosen = [suspect for suspect in suspects_of(standing, scene) if among(suspect)]
         return cls(standing, bench, scene, screen(bench, chosen))
