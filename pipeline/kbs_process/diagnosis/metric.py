@@ -46,6 +46,13 @@ class Metric:
         root = np.sqrt(np.where(self.share > 0.0, self.share, 1.0))
         return np.asarray(z[: int(np.prod(shape))].reshape(shape) / root, dtype=np.float64)
 
+    def in_time(self, z: Array, n: int) -> Array:
+        """(n, c) a residual as a whitened series."""
+        layout = self.layout(z)
+        spectrum = np.zeros((n // 2 + 1, layout.shape[2]), dtype=complex)
+        spectrum[self.whiten.inside] = layout[0] + 1j * layout[1]
+        return np.asarray(np.fft.irfft(spectrum, n, axis=0), dtype=np.float64)
+
 
 def counted(whiten: Whitener, share: Array, x: Array) -> Array:
     """Whitened numbers that count for as many as are independent."""

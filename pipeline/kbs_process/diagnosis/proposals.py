@@ -226,11 +226,7 @@ def _column(columns: tuple[str, ...], values: Array, name: str) -> Array:
 
 def _in_time(known: Known, k: int) -> Array:
     """(n, c) whitened residual of a trial as a series."""
-    metric, n = known.metric[k], len(known.experiment.trials[k].valid)
-    layout = metric.layout(known.residual[k])
-    spectrum = np.zeros((n // 2 + 1, layout.shape[2]), dtype=complex)
-    spectrum[metric.whiten.inside] = layout[0] + 1j * layout[1]
-    return np.asarray(np.fft.irfft(spectrum, n, axis=0), dtype=np.float64)
+    return known.metric[k].in_time(known.residual[k], len(known.experiment.trials[k].valid))
 
 
 def _apart(values: list[float], least: float) -> tuple[float, ...]:

@@ -16,6 +16,7 @@ from kbs_process.diagnosis.joint import Standing, standing_of
 from kbs_process.diagnosis.known import MOVED, Known, refit
 from kbs_process.diagnosis.leaders import leaders, reread, tried
 from kbs_process.diagnosis.localise import cells_and_ports
+from kbs_process.diagnosis.moments import only_while
 from kbs_process.diagnosis.needed import Accepted, in_the_shade, needed
 from kbs_process.diagnosis.outcome import (
     Absorbed,
@@ -155,7 +156,10 @@ def _round(standing: Standing, floor: Floor, simulate: Simulate, accepted: Seque
     if settled.known.excess < MOST * standing.known.excess:
         settled = released(settled, floor, simulate)
     told = reread(replace(passed[best], standing=settled), standing, floor, simulate)
-    if reasons := too_little(standing, told.standing, floor):
+    # One more action of a law at the same place is part of the find.
+    earlier = [(one.find.identity.law, one.tried.own) for one in accepted if one.find.identity != _law(told)]
+    little = too_little(standing, told.standing, floor)
+    if reasons := little or only_while(earlier, standing, told.standing.known, simulate):
         refused.append(Refused(_law(told), told.found.score.rho_eff, reasons))
         return _Round(None, standing, view.screening, tuple(refused), place)
     # Told anew, it may be what another was: their chances are one then.

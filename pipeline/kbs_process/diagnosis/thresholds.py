@@ -81,7 +81,7 @@ SHAPED: Final = 10
 # screens, one of a spent trial; up to 3.8 where it did little.
 BENT: Final = 2.0
 # Times that a law of readings is told anew at most, each time around the shape that it had.
-REREAD: Final = 3
+REREAD: Final = 2
 # Leaders that are tried beyond those that the linear plant cannot order, where none of these passes.
 SECOND: Final = 2
 # Leaders are refitted to the end if their first steps leave no more than some times what the best one's leave.
@@ -95,6 +95,12 @@ TAKEN_UNUSED: Final = 0.1
 # Share of an earlier find's distance, at the same joint or channel, below which a law may as well be what the earlier
 # one's formula lacks of nature's: splines and catalogue laws have left 0.02 of effects made by other formulas.
 SHADE: Final = 0.03
+# Share of the time in which an earlier law does MOSTLY of what it does, below which one that gains more than WHILE of
+# what it gains just then is what the earlier one's formula lacks. A bump in a sector that is seldom passed had been
+# given a stiffening gear beside it (development).
+MOMENTS: Final = 0.2
+MOSTLY: Final = 0.8
+WHILE: Final = 0.6
 ROUNDS: Final = 5  # finds in one campaign at most
 
 # -- two laws ------------------------------------------------------------------------------------------------------
