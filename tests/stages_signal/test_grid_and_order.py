@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from kbs_process.signals.records import Block
 from kbs_process.stages.grid import Grid, Regridder, nominal_grid
 from kbs_process.stages.ordering import BLOCK, Orderer, Reblock, concatenate, judge
+from kbs_process.stages.stream import Timeline
 
 
 def block(stamp: np.ndarray) -> Block:
@@ -91,3 +92,31 @@ def test_a_long_gap_is_filled_in_pieces_and_flagged() -> None:
     flags = np.concatenate([np.zeros(len(r), dtype=bool) if f is None else f for r, f in pieces])
     np.testing.assert_allclose(rows, np.arange(200_100.0), atol=1e-6)
     np.testing.assert_array_equal(np.flatnonzero(flags), np.arange(100, 200_000))
+
+
+def jittered(lost: slice, seed: int = 4) -> np.ndarray:
+    """Stamps, ns, of a sensor at 10 kHz that jitter by a fifth of its period; `lost` are missing."""
+    rng = np.random.default_rng(seed)
+    t = np.sort(np.arange(4 * BLOCK) * 1e-4 + 2e-5 * rng.standard_normal(4 * BLOCK))
+    return np.unique(np.rint(1e9 * np.delete(t, lost)).astype(np.int64))
+
+
+@pytest.mark.parametrize("lost", [slice(0, 0), slice(9000, 9040)])
+def test_stamps_that_jitter_leave_no_gaps_but_where_samples_are_missing(lost: slice) -> None:
+    stamp = jittered(lost)
+    grid = nominal_grid(stamp[:BLOCK])
+    assert np.count_nonzero(np.diff(stamp) > 1.5 * grid.period_ns) > 0.02 * len(stamp)
+    line, regrid = Timeline("wrench"), Regridder(grid)
+    for start in range(0, len(stamp), 3001):
+        line.push(block(stamp[start : start + 3001]))
+    line.flush()
+    u = grid.periods(stamp)
+    pieces = [*regrid.push(u, u[:, None]), *regrid.flush()]
+    flags = np.concatenate([np.zeros(len(r), dtype=bool) if f is None else f for r, f in pieces])
+    missing = lost.stop - lost.start
+    assert sum(gap.missing for gap in line.gaps) == pytest.approx(missing, abs=2)
+    # Of thousands of long steps one may look like a lost sample.
+    assert len(line.gaps) <= (missing > 0) + 1 and line.gaps_unlisted == 0
+    assert np.count_nonzero(flags) == pytest.approx(missing, abs=4)  # both ends of a gap jitter
+    if missing:
+        assert line.gaps[0].start == pytest.approx(0.9, abs=2e-3)

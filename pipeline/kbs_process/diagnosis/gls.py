@@ -96,7 +96,7 @@ class Background:
         shift = cho_solve(factor, scale * h) if len(size) else h
         bounded = None
         if room is not None:
-            low, high = (np.where(size > 0.0, side * size, 0.0) for side in room)
+            low, high = (np.multiply(side, size, out=np.zeros_like(size), where=size > 0.0) for side in room)
             bounded = Bounded.of(H, scale * h, low, high)
         return cls(z, J, factor, scale, shift, bounded)
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from kbs_process.diagnosis.hypothesis import Hypothesis, Prediction, Simulate
 from kbs_process.diagnosis.known import Known, as_it_is, known_of, resumed, settled
-from kbs_process.diagnosis.search import GEARS, Laws, Search, added
+from kbs_process.diagnosis.search import GEARS, Found, Laws, Search, added
 from kbs_process.estimation.fit import Parameters
 from kbs_process.plant.attach import detach, idle
 from kbs_process.plant.effects import select
@@ -61,11 +61,41 @@ class Standing:
         return self.predicted[one.drive].values + added(self.laws, known.free, known.value, reference)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Entered:
+    """A refit with a suspect's numbers beside the others, as far as it has come."""
+
+    search: Search
+    found: Found
+    before: Array  # chi2 that the known numbers had before any refit
+
+    def on(self, steps: int) -> Entered:
+        """Some more steps, along the slopes that the known numbers had; none of a plant that diverged."""
+        if not np.isfinite(self.left):
+            return self
+        return replace(self, found=self.search.descend(self.found, steps, most=GEARS, giving_up=True))
+
+    @property
+    def left(self) -> float:
+        """-2 log likelihood beyond that of noise."""
+        return self.search.left(self.found)
+
+    @property
+    def standing(self) -> Standing:
+        """What is believed there."""
+        return standing_of(known_of(self.search, self.found, self.before), self.search.laws)
+
+
 def with_extra(standing: Standing, extra: Extra, simulate: Simulate, steps: int = _STEPS) -> Standing:
     """Refit all numbers of `standing` with a suspect's beside them, along the slopes that the known ones had.
 
     After the first few `steps`, `moved_on` takes it to its end.
     """
+    return entered(standing, extra, simulate).on(steps).standing
+
+
+def entered(standing: Standing, extra: Extra, simulate: Simulate) -> Entered:
+    """A refit that begins with a suspect's numbers beside those of `standing`."""
     known, experiment = standing.known, standing.known.experiment
     laws = dict(standing.laws)
     for index, scalar in enumerate(extra.linear):
@@ -84,16 +114,12 @@ def with_extra(standing: Standing, extra: Extra, simulate: Simulate, steps: int 
     start = extra.start
     for _ in range(_TRIES):
         theta = np.concatenate([known.value, start])
-        predicted = search.predict([theta], search.everything)[0]
+        predicted = search.predict([theta], search.drives)[0]
         if np.isfinite(search.cost(theta, predicted)[0]):
             break
         # Too strong for the plant to run: the search then begins with less of it.
         start = extra.prior + _LESS * (start - extra.prior)
-    begun = search.begin(theta, dict(known.slopes), predicted)
-    found = begun
-    if np.isfinite(search.cost(theta, predicted)[0]):
-        found = search.descend(begun, steps, most=GEARS, giving_up=True)
-    return standing_of(known_of(search, found, known.chi2_before), laws)
+    return Entered(search, search.begin(theta, dict(known.slopes), predicted), known.chi2_before)
 
 
 def moved_on(standing: Standing, simulate: Simulate) -> Standing:

@@ -240,7 +240,7 @@ def residuals(search: Search, found: Found) -> tuple[Array, ...]:
 def known_of(search: Search, found: Found, before: Array) -> Known:
     """What a search has found, with its covariance and checks."""
     # A step predicts the recordings that are fitted alone.
-    rest = [drive for drive in search.everything if drive not in search.drives]
+    rest = [drive for drive in search.everything if drive not in found.predicted]
     predicted = {**found.predicted, **search.predict([found.theta], rest)[0]}
     found = replace(found, predicted=predicted)
     H, _ = search.normal(found.gradients, predicted)

@@ -77,8 +77,10 @@ def stride(search: Search, found: Found, steps: int, most: int) -> Found | None:
             for one in others:
                 theta = view.with_rest(found.theta, one, here)
                 point, predicted, _ = _followed(search, found, theta, view.own)
-                gone = replace(found, theta=point, predicted={**found.predicted, **predicted})
-                gone = replace(gone, gradients=search.slopes(point, found.gradients), rounds=begun.rounds)
+                gradients = search.slopes(point, found.gradients)
+                gone = replace(
+                    found, theta=point, predicted=predicted, gradients=gradients, rounds=begun.rounds
+                )
                 reached.append(search.descend(gone, steps, most=most))
             costs = [sum(search.cost(one.theta, one.predicted)) for one in reached]
             best = int(np.argmin(costs))

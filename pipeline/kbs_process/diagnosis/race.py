@@ -16,12 +16,12 @@ import numpy as np
 
 from kbs_process.diagnosis.floor import Floor
 from kbs_process.diagnosis.hypothesis import Simulate
-from kbs_process.diagnosis.joint import Own, Standing, bare, moved_on, with_extra
+from kbs_process.diagnosis.joint import Entered, Own, Standing, bare, entered, moved_on, with_extra
 from kbs_process.diagnosis.remains import detected
 from kbs_process.diagnosis.screen import Found
 from kbs_process.diagnosis.settling import released
 from kbs_process.diagnosis.side_by_side import side_by_side
-from kbs_process.diagnosis.thresholds import FIRST, MOST, SETTLED_TIMES, TOLERATED
+from kbs_process.diagnosis.thresholds import FAR_BEHIND, FIRST, MOST, SETTLED_TIMES, TOLERATED
 from kbs_process.diagnosis.tryout import extra_of
 from kbs_process.diagnosis.view import View
 
@@ -43,9 +43,12 @@ class Runner:
 def raced(chosen: Sequence[Found], view: View, floor: Floor, simulate: Simulate) -> list[Runner]:
     """Suspects refitted, best first. Those that the first steps leave far behind go no farther."""
 
-    def begun(found: Found) -> Runner:
+    def begun(found: Found) -> Entered:
         extra = extra_of(found, view.standing, view.bench, view.scene)
-        return Runner(found, with_extra(view.standing, extra, simulate, FIRST))
+        return entered(view.standing, extra, simulate).on(1)
+
+    def gone_on(of: Entered) -> Entered:
+        return of.on(FIRST - 1) if of.left <= far else of
 
     def led(by: Standing, runner: Runner) -> Runner:
         """A runner from where another has brought the known numbers, if it gets farther from there."""
@@ -55,7 +58,11 @@ def raced(chosen: Sequence[Found], view: View, floor: Floor, simulate: Simulate)
         new = replace(runner, standing=with_extra(by, extra, simulate))
         return min(runner, new, key=lambda one: one.cost)
 
-    runners = side_by_side(begun, chosen)
+    heat = side_by_side(begun, chosen)
+    rows = float(view.standing.known.rows[list(view.standing.known.experiment.fit)].sum())
+    far = FAR_BEHIND * max(min((one.left for one in heat), default=0.0), TOLERATED * rows)
+    ahead = side_by_side(gone_on, heat)
+    runners = [Runner(found, one.standing) for found, one in zip(chosen, ahead, strict=True)]
     runners.sort(key=lambda one: -one.found.score.gain)
     if runners and _stuck(runners[0], view.standing):
         runners[0] = replace(runners[0], standing=released(runners[0].standing, floor, simulate))

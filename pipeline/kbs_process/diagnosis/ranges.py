@@ -27,7 +27,8 @@ class Ranges:
     def choices(self, entry: Parameter, site: str, own: float | None) -> tuple[float, ...]:
         """Return the values of a shape parameter that are tried at a site, least first.
 
-        None, where its grid lies over a signal that nobody knows there. Without a grid: `own`, or its prior's middle.
+        None, where its grid lies over a signal that nobody knows there, or that rests: places and widths in what it
+        sweeps are within bounds, or there are none. Without a grid: `own`, or its prior's middle.
         """
         proposed = (*self.proposed.get(entry.name, ()), *self.proposed.get(f"{entry.name}.{site}", ()))
         if entry.over == SPECTRUM:
@@ -41,7 +42,9 @@ class Ranges:
             return ()
         low, high = span
         start = 0.0 if kind == "span" else low
-        return tuple(sorted({*(start + share * (high - low) for share in entry.grid), *proposed}))
+        least, most = entry.bounds
+        places = {*(start + share * (high - low) for share in entry.grid), *proposed} if high > low else set()
+        return tuple(sorted(place for place in places if least <= place <= most))
 
 
 def ranges_of(

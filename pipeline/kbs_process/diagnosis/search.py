@@ -61,10 +61,11 @@ class Found:
     """Where the search stands."""
 
     theta: Array
-    predicted: Predictions
+    predicted: Predictions  # of drives that were simulated here: those that are fitted, at least
     gradients: Gradients
     converged: bool = False
     rounds: int = 0
+    due: int = _OLD  # which slopes are to be taken before the next step
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -233,8 +234,9 @@ class Search:
         All of them, or only those of suspects' own numbers, as `most` says. When `giving_up`, also until a step does
         little of what is to be done: no number here does it then, and more steps only bend them towards it.
         """
-        fresh = min(GEARS, most)
+        fresh = found.due if found.due != _OLD else min(GEARS, most)
         for number in range(found.rounds + 1, found.rounds + rounds + 1):
+            found = self.with_slopes(found)
             H, g = self.normal(found.gradients, found.predicted)
             step = self.step(found.theta, found.predicted, H, g)
             self.settle(H, np.abs(step.theta - found.theta))
@@ -254,8 +256,7 @@ class Search:
                 break
             stale = step.gained < max(little, _HALF * step.promised)
             fresh = _OLD if kept else freshest if stale and fresh == GEARS else min(most, GEARS)
-            if fresh != _OLD:
-                found = replace(found, gradients=self.slopes(found.theta, found.gradients, fresh))
+            found = replace(found, due=fresh)
         return found
 
     def leapt(self, found: Found, *, smooth: bool) -> Found | None:
@@ -263,6 +264,7 @@ class Search:
 
         Where something is missing by far, it makes wrong places as good as right ones.
         """
+        found = self.with_slopes(found)
         if not self.gross(found) and (reached := stride(self, found, EARLY, GEARS)):
             return reached
         theta = leap(self, found, smooth=smooth)
@@ -270,6 +272,12 @@ class Search:
             return None
         predicted = self.predict([theta], self.everything)[0]
         return Found(theta, predicted, self.slopes(theta, found.gradients), rounds=found.rounds)
+
+    def with_slopes(self, found: Found) -> Found:
+        """The same with the slopes that are due."""
+        if found.due == _OLD:
+            return found
+        return replace(found, gradients=self.slopes(found.theta, found.gradients, found.due), due=_OLD)
 
     def left(self, found: Found) -> float:
         """-2 log likelihood beyond that of noise."""
@@ -387,7 +395,7 @@ class Search:
         best = int(np.argmin(costs))
         if not costs[best] < now:
             return Step(theta, predicted, promised, 0.0)
-        return Step(candidates[best], {**predicted, **tried[best]}, promised, (now - costs[best]) / weight)
+        return Step(candidates[best], tried[best], promised, (now - costs[best]) / weight)
 
 
 def _widened(slope: Slopes, base: Prediction, missing: int) -> Slopes:

@@ -10,7 +10,7 @@ import numpy as np
 
 from kbs_process.signals.records import Array, Mask, Stamps
 
-GAP = 1.5  # nominal periods: a longer step is a gap
+GAP = 1.5  # nominal periods: a longer step is a gap, if the stamps around it do not say that it is jitter
 LEFT, RIGHT = 3, 3  # neighbours that the six-point interpolation needs on either side
 AROUND = 4  # stamps on either side that a long step is held against
 PIECE = 65536  # grid points made at a time, which bounds what a long gap costs in memory
@@ -45,14 +45,15 @@ def nominal_grid(stamp: Stamps) -> Grid:
     step = np.diff(stamp)
     period = float(step[np.abs(step / np.median(step) - 1.0) <= 0.5].mean())
     y = (stamp - stamp[0]).astype(np.float64)
-    index = np.concatenate(([0.0], np.cumsum(_counted(y / period))))
+    index = np.concatenate(([0.0], np.cumsum(counted(y / period))))
     x = index - index.mean()
     return Grid(int(stamp[0]), float(x @ (y - y.mean()) / (x @ x)))
 
 
-def _counted(u: Array) -> Array:
-    """Periods that each step between times (n,), in periods, takes."""
-    count = np.maximum(np.rint(np.diff(u)), 1.0)
+def counted(u: Array) -> Array:
+    """Periods (n - 1,) that each step between times u (n,), in periods, takes: more than one is a gap."""
+    step = np.diff(u)
+    count = np.where(step > GAP, np.rint(step), 1.0)
     for k in np.flatnonzero(count > 1.0):
         # What stamps on both sides are apart, beyond a period for each step between them.
         around = [
@@ -72,7 +73,7 @@ class Regridder:
     Samples that lie on the grid pass unchanged. Between samples: Lagrange's polynomial through the six
     nearest, where their spacing is regular to half a period, else a straight line. Worst gain error of the
     former, half way between samples, 5/1024 (2 pi f T)^6: 8e-5 at 8 Hz sampled at 100 Hz, 3e-7 at 240 Hz;
-    of the latter (2 pi f T)^2/8. Points in steps of more than `GAP` periods are flagged as invented.
+    of the latter (2 pi f T)^2/8. Points in gaps are flagged as invented.
     """
 
     def __init__(self, grid: Grid) -> None:
@@ -109,16 +110,19 @@ class Regridder:
                 self._next = stop
                 yield x[first : first + n], None
                 return
+        gap = counted(u) > 1.0
         while self._next < stop:
             n = min(stop - self._next, PIECE)
             rows, invented = np.empty((n, x.shape[1])), np.zeros(n, dtype=np.bool_)
-            _interpolate(u, x, self._next, self._on_grid, rows, invented)
+            _interpolate(u, x, gap, self._next, self._on_grid, rows, invented)
             self._next += n
             yield rows, invented if invented.any() else None
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _interpolate(u: Array, x: Array, first: int, on_grid: float, rows: Array, invented: Mask) -> None:
+def _interpolate(
+    u: Array, x: Array, gap: Mask, first: int, on_grid: float, rows: Array, invented: Mask
+) -> None:
     last = len(u) - 1
     weight = np.empty(6)
     i = 0
@@ -151,7 +155,7 @@ def _interpolate(u: Array, x: Array, first: int, on_grid: float, rows: Array, in
                     total += weight[j] * x[i - 2 + j, c]
                 rows[k, c] = total
         else:
-            invented[k] = step > GAP
+            invented[k] = gap[i]
             share = (at - u[i]) / step
             for c in range(x.shape[1]):
                 rows[k, c] = x[i, c] + share * (x[i + 1, c] - x[i, c])

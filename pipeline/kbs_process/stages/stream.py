@@ -9,7 +9,7 @@ import numpy as np
 from kbs_process.signals.records import Array, Block, Loss, Mask, Stamps
 from kbs_process.stages.clocks import ClockData, LatencyFloor
 from kbs_process.stages.envelope import MinMax
-from kbs_process.stages.grid import GAP, Grid, Regridder, nominal_grid
+from kbs_process.stages.grid import AROUND, Grid, Regridder, counted, nominal_grid
 from kbs_process.stages.ordering import Orderer, Reblock, finite_rows, judge
 from kbs_process.stages.resample import Kept, Reducer, design
 from kbs_process.stages.spectrum import Welch
@@ -19,7 +19,7 @@ GAPS_LISTED = 20  # one by one; the others in one line
 
 @dataclass(frozen=True, slots=True)
 class Gap:
-    """A step of more than `GAP` nominal periods."""
+    """Samples that are missing between two."""
 
     start: float  # s on the stream's own clock, last sample before
     end: float  # first sample after
@@ -43,6 +43,10 @@ class Timeline:
     _floor: LatencyFloor | None = None
     _first: int = 0
     _last: int = 0
+    _near: Stamps = field(
+        default_factory=lambda: np.empty(0, dtype=np.int64)
+    )  # of steps that are not judged yet
+    _judged: int = 0  # steps between these that are
 
     def push(self, chunk: Block) -> list[Block]:
         """Take a chunk in file order; return ordered blocks that nothing can precede any more."""
@@ -54,6 +58,8 @@ class Timeline:
         last = self._orderer.flush() if self._orderer else None
         if last is not None:
             ready.append(self._timed(last))
+        if self.grid is not None:
+            self._find_gaps(self._near[:0], self.grid, held_back=0)
         return ready
 
     def _order(self, block: Block) -> list[Block]:
@@ -74,21 +80,26 @@ class Timeline:
             self.grid = nominal_grid(block.stamp)
         self._floor.push(block.stamp, block.log)
         if self.grid is not None:
-            self._find_gaps(block.stamp, self.grid)
+            self._find_gaps(block.stamp, self.grid, held_back=AROUND)
         self._last = int(block.stamp[-1])
         self.samples += len(block)
         return block
 
-    def _find_gaps(self, stamp: Stamps, grid: Grid) -> None:
-        steps = np.diff(stamp, prepend=np.int64(self._last))
-        for index in np.flatnonzero(steps > GAP * grid.period_ns):
-            missing = max(round(float(steps[index]) / grid.period_ns) - 1, 1)
+    def _find_gaps(self, stamp: Stamps, grid: Grid, held_back: int) -> None:
+        """Judge steps by the stamps around them; the last `held_back` wait for those that follow."""
+        stamp = np.concatenate((self._near, stamp))
+        count = counted(grid.periods(stamp))
+        judged = max(len(count) - held_back, self._judged)
+        for index in self._judged + np.flatnonzero(count[self._judged : judged] > 1.0):
+            missing = int(count[index]) - 1
             if len(self.gaps) < GAPS_LISTED:
-                end = int(stamp[index])
-                self.gaps.append(Gap(self.own_one(end - int(steps[index])), self.own_one(end), missing))
+                start, end = (self.own_one(int(one)) for one in stamp[index : index + 2])
+                self.gaps.append(Gap(start, end, missing))
             else:
                 self.gaps_unlisted += 1
                 self.missing_unlisted += missing
+        kept = max(judged - AROUND, 0)
+        self._near, self._judged = stamp[kept:].copy(), judged - kept
 
     def own_one(self, stamp: int) -> float:
         """Time of one stamp, s from the stream's first."""
