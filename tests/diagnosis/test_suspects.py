@@ -328,3 +328,17 @@ def test_a_rig_that_its_motion_drives_has_no_field_that_could_be_late() -> None:
     columns = tuple(name for name in tapped().columns if not name.startswith("field."))
     names = {s.name for s in candidates(rig(), NOMINAL, ranges(), columns, CHANNELS)}
     assert "joint_viscous" in names and "controller_latency" not in names
+
+
+@pytest.mark.parametrize("swept", [0.0, 1e-12])
+def test_what_rests_has_no_places_and_no_widths(swept: float) -> None:
+    """A channel that shows nothing of any load: a share of nothing would be a width of zero."""
+    law = next(one for one in SENSING if one.name == "channel_step")
+    shapes = [entry for entry in law.parameters if entry.role == "shape"]
+    still = Ranges({("Tx", "reading"): (2.0, 2.0 + swept)})
+    assert not still.choices(next(e for e in shapes if e.name == "jump_width"), "Tx", None)
+    moved = Ranges({("Tx", "reading"): (2.0, 3.0)})
+    for entry in shapes:
+        choices = moved.choices(entry, "Tx", None)
+        assert len(choices) == len(entry.grid)
+        assert all(entry.bounds[0] <= value <= entry.bounds[1] for value in choices)
