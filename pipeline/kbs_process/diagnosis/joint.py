@@ -71,9 +71,13 @@ class Entered:
 
     def on(self, steps: int) -> Entered:
         """Some more steps, along the slopes that the known numbers had; none of a plant that diverged."""
-        if not np.isfinite(self.left):
+        if self.found.converged or not np.isfinite(self.left):
             return self
         return replace(self, found=self.search.descend(self.found, steps, most=GEARS, giving_up=True))
+
+    def ended(self) -> Entered:
+        """The same with the slopes that a next step would want, for whoever goes on from there."""
+        return replace(self, found=self.search.with_slopes(self.found))
 
     @property
     def left(self) -> float:
@@ -91,7 +95,7 @@ def with_extra(standing: Standing, extra: Extra, simulate: Simulate, steps: int 
 
     After the first few `steps`, `moved_on` takes it to its end.
     """
-    return entered(standing, extra, simulate).on(steps).standing
+    return entered(standing, extra, simulate).on(steps).ended().standing
 
 
 def entered(standing: Standing, extra: Extra, simulate: Simulate) -> Entered:

@@ -48,7 +48,7 @@ def raced(chosen: Sequence[Found], view: View, floor: Floor, simulate: Simulate)
         return entered(view.standing, extra, simulate).on(1)
 
     def gone_on(of: Entered) -> Entered:
-        return of.on(FIRST - 1) if of.left <= far else of
+        return of.on(FIRST - 1).ended() if of.left <= far else of
 
     def led(by: Standing, runner: Runner) -> Runner:
         """A runner from where another has brought the known numbers, if it gets farther from there."""
