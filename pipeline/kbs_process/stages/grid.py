@@ -54,16 +54,18 @@ def counted(u: Array) -> Array:
     """Periods (n - 1,) that each step between times u (n,), in periods, takes: more than one is a gap."""
     step = np.diff(u)
     count = np.where(step > GAP, np.rint(step), 1.0)
-    for k in np.flatnonzero(count > 1.0):
-        # What stamps on both sides are apart, beyond a period for each step between them.
-        around = [
-            np.rint(u[k + 1 + after] - u[k - before]) - (before + after)
-            for before in range(1, AROUND + 1)
-            for after in range(1, AROUND + 1)
-            if before <= k and k + 1 + after < len(u)
-        ]
-        # Other gaps nearby make it more, nothing makes it less.
-        count[k] = max(1.0, min(count[k], float(np.median(around)))) if around else count[k]
+    k = np.flatnonzero(count > 1.0)
+    # What stamps on both sides are apart, beyond a period for each step between them.
+    around = np.full((AROUND, AROUND, len(k)), np.nan)
+    for before, after in np.ndindex(AROUND, AROUND):
+        first, last = k - before - 1, k + after + 2
+        known = (first >= 0) & (last < len(u))
+        apart = np.rint(u[last[known]] - u[first[known]])
+        around[before, after, known] = apart - (before + after + 2)
+    judged = np.isfinite(around).any(axis=(0, 1))
+    # Other gaps nearby make it more, nothing makes it less.
+    most = np.nanmedian(around[:, :, judged].reshape(AROUND**2, -1), axis=0)
+    count[k[judged]] = np.maximum(np.minimum(count[k[judged]], most), 1.0)
     return count
 
 
