@@ -75,7 +75,8 @@ GATE_FORETOLD: Final = 0.5
 # Of what all gain together: by that one that shows little of a law may be worse, for its formula is not nature's.
 GATE_WORSE: Final = 0.02
 FIRST: Final = 3  # steps of a leader's refit that show whether it is worth the others
-# After one step they go on to these only if it leaves no more than this many times what the best one's leaves.
+# After one step they go on to these only if it leaves no more than this many times what the best one's leaves: far more
+# than the factor below, as one step says less. It was set on no case.
 FAR_BEHIND: Final = 10.0
 # Suspects of a screen of which shapes between the places of the grid are looked for, before leaders are chosen.
 SHAPED: Final = 10
