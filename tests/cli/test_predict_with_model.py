@@ -20,6 +20,7 @@ from kbs_process.campaign.load import load_campaign
 from kbs_process.diagnosis.hypothesis import Hypothesis
 from kbs_process.diagnosis.measured import inserted
 from kbs_process.ingest.inspection import inspect_recording
+from kbs_process.plant.effects.measured_law import MEASURED
 from kbs_process.rig.model import Quantity
 from kbs_process.signals.records import Array
 
@@ -39,7 +40,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A campaign, a model that corrects it, far from it, and a recording of neither."""
     top = tmp_path_factory.mktemp("predict")
     campaign = load_campaign(make_folder(top / "campaigns" / "EL089").path)
-    law, ends = ("ground_torque", "joint_angle"), (1.0, 1.6)
+    law, ends = next(one for one in MEASURED if one.effect.name == "ground_angle_law"), (1.0, 1.6)
     hypothesis, _ = inserted(
         Hypothesis(campaign.rig, campaign.effects), law, "el", ends, np.full(10, PULL), np.full(10, 0.01)
     )

@@ -30,10 +30,11 @@ from kbs_process.diagnosis.outcome import (
     Refused,
 )
 from kbs_process.diagnosis.trajectories import family, limits_of
-from kbs_process.plant.effects.measured_law import COEFFICIENTS
+from kbs_process.plant.effects.measured_law import COEFFICIENTS, MEASURED
 from kbs_process.report.records.common import load
 from kbs_process.report.records.diagnosis import DiagnosisResults
 
+OVER_ANGLE = next(one for one in MEASURED if one.effect.name == "ground_angle_law")
 LAW = Identity("external wrench", "el", (), "unnamed", "curve over joint angle")
 CABLE = Identity("external wrench", "el", (), "cable", "ground_cable")
 DRAG = Identity("joint torque", "el", (), "friction", "joint_viscous")
@@ -46,8 +47,8 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A curve was found, inside the plant; a cable was not refused by these recordings."""
     before = standing(bench.experiment(bench.rig(), ("fit", "held-out"), 4))
     known, experiment = before.known, before.known.experiment
-    law, ends = ("ground_torque", "joint_angle"), (1.25, 1.30)
-    hypothesis, scalars = inserted(before.hypothesis, law, "el", ends, NODES, SIGMA)
+    ends = (1.25, 1.30)
+    hypothesis, scalars = inserted(before.hypothesis, OVER_ANGLE, "el", ends, NODES, SIGMA)
     spread = np.diag(np.concatenate([np.diag(known.covariance), SIGMA**2]))
     found = replace(
         known,
@@ -77,7 +78,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
         alternatives=(Alternative(CABLE, 0.1, 2.0, 0.16, True, True),),
         ports_alike=(),
         held_out_variance=0.95,
-        curve=Curve("joint_angle", "rad", x, np.full(101, 0.5), np.full(101, 0.01)),
+        curve=Curve(OVER_ANGLE, x, np.full(101, 0.5), np.full(101, 0.01)),
     )
     outcome = Outcome(
         verdict="physics",

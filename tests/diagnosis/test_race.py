@@ -22,7 +22,7 @@ from kbs_process.diagnosis.thresholds import FIRST, TOLERATED
 from kbs_process.diagnosis.tryout import extra_of, identity
 from kbs_process.diagnosis.view import View
 
-RIGHT, WRONG, CURVE = ("ground_cable", "el"), ("harness", "el"), ("ground_torque of joint_angle", "el")
+RIGHT, WRONG, CURVE = ("ground_cable", "el"), ("harness", "el"), ("ground_angle_law", "el")
 KIN = ("tether", "el")  # of the right one's family and place
 
 

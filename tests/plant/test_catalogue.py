@@ -30,6 +30,7 @@ def around(effect: Effect) -> dict[str, float]:
         "field": 3.02, "field_travel": 0.7, "field_rate": 0.4,
         "rotor_angle": 3.0, "rotor_rate": 0.5, "rotor_travel": 0.0, "ratio": 100.0,
         "joint_angle": 0.0291, "joint_rate": 0.004, "time": 2.5,
+        "other_angle": 0.3, "other_rate": 0.004,
         "x": 0.1, "y": -0.2, "z": 0.4, "vx": 0.01, "vy": 0.02, "vz": -0.01,
     }  # fmt: skip
     shapes = {entry.name: entry.prior.middle for entry in effect.parameters if entry.role != "amplitude"}
@@ -76,7 +77,7 @@ class TestSuspects:
     def test_compiled_along_signals_it_is_the_equation(self, effect: Effect) -> None:
         """One interval in one part: the equation at its middle, rates the slopes, states after half their step."""
         dt, values = 1e-3, around(effect)
-        travel = {"field": 5e-4, "rotor_angle": 5e-4, "joint_angle": 4e-6, "time": dt}
+        travel = {"field": 5e-4, "rotor_angle": 5e-4, "joint_angle": 4e-6, "other_angle": 4e-6, "time": dt}
         travel |= {"x": 1e-5, "y": 2e-5, "z": -1e-5}
         base = signals_of(effect)
         columns = np.array([[values[name] + k * travel[name] for name in base] for k in range(2)])
@@ -86,7 +87,14 @@ class TestSuspects:
         out = np.zeros((2, len(names), 1 if effect.port.of_drive else 3))
         _module(effect)(columns, np.array([values[name] for name in given]), dt, 1, out)
         middle = values | {name: values[name] + 0.5 * travel[name] for name in base} | {"rotor_travel": 5e-4}
-        middle |= {"rotor_rate": 0.5, "joint_rate": 4e-3, "vx": 0.01, "vy": 0.02, "vz": -0.01}
+        middle |= {
+            "rotor_rate": 0.5,
+            "joint_rate": 4e-3,
+            "other_rate": 4e-3,
+            "vx": 0.01,
+            "vy": 0.02,
+            "vz": -0.01,
+        }
         middle |= {"field_rate": 0.5, "field_travel": 2.5e-4}
         start = {state.name: state.initial for state in effect.states}
         zero = dict.fromkeys(names, 0.0)

@@ -44,7 +44,7 @@ class TestCatalogue:
         values |= {entry.name: entry.prior.middle or entry.prior.spread for entry in effect.parameters}
         if "ratio" in values:
             values["ratio"] = 100.0
-        result = effect.equation(**values)
+        result = effect.equation(*(values[name] for name in effect.arguments))
         torque = result[0] if effect.states else result
         assert np.isfinite(result).all()
         if effect.port is Port.MOTOR_FRICTION:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from plant_rigs import NOMINAL, one_axis, two_axis
 
+from kbs_process.errors import ConfigError
 from kbs_process.plant.attach import attach
 from kbs_process.plant.effects import select
 from kbs_process.plant.predict import LANES, predict, predict_together, simulation_of
@@ -19,6 +20,7 @@ from kbs_process.signals.records import Array
 SECONDS = 6.0
 RATES: dict[str, Any] = {"rate_Hz": 100.0, "angle_rate_Hz": 40.0, "duration_s": SECONDS}
 BEFORE = 0.73  # s, that commands begin before the recording
+CROSSING = "joint_other_rate_law"
 WITH_STATES = [*NOMINAL, "controller_latency", "ground_cable", "bungee"]
 
 
@@ -37,6 +39,21 @@ def loaded(loop: str) -> Rig:
     rig = attach(rig, late, {"field_latency": 4e-3}, joints=["el"])
     numbers = {"stiffness": 30.0, "free_length": 0.5, "anchor_z": 1.5}
     return attach(rig, bungee, numbers, on="el", point=np.array([0.1, 0.0, 0.2]))
+
+
+def crossed() -> Rig:
+    """With a torque of the elevation over the azimuth's rate."""
+    (law,) = select([CROSSING])
+    bent = {f"other_rate_law_{k}": 0.05 * k**2 for k in range(10)}
+    return attach(
+        two_axis(), law, bent | {"other_rate_law_low": -0.05, "other_rate_law_high": 0.05}, joints=["el"]
+    )
+
+
+def test_a_joint_has_another_one_to_depend_on() -> None:
+    rig, (law,) = one_axis(), select([CROSSING])
+    with pytest.raises(ConfigError, match="one alone"):
+        begun([attach(rig, law)], [*NOMINAL, CROSSING])
 
 
 def varied(rig: Rig, count: int) -> list[Rig]:
@@ -76,8 +93,9 @@ def alone(rig: Rig, effects: list[str]) -> tuple[Array, Array]:
         (loaded("open"), WITH_STATES),
         (loaded("closed"), WITH_STATES),
         (one_axis(stiffness=None, amplifier=None), list(NOMINAL)),
+        (crossed(), [*NOMINAL, CROSSING]),
     ],
-    ids=["open loop", "closed loop", "rigid base, no amplifier"],
+    ids=["open loop", "closed loop", "rigid base, no amplifier", "one axis acts on the other"],
 )
 def test_each_shows_what_it_shows_alone(rig: Rig, effects: list[str]) -> None:
     rigs = varied(rig, 3)

@@ -6,14 +6,13 @@ import re
 
 import pytest
 
-from kbs_process.diagnosis.measured import LAWS
 from kbs_process.plant.effect import Effect
-from kbs_process.plant.effects import CATALOGUE
+from kbs_process.plant.effects import CATALOGUE, MEASURED
 from kbs_process.plant.sensing import SENSING, Sensing
 from kbs_process.report.figures.formula import equation, formula
 from kbs_process.report.panel import Formula
 
-EVERY = (*CATALOGUE, *SENSING, *LAWS.values())
+EVERY = (*CATALOGUE, *SENSING, *MEASURED)
 
 
 def shown(law: Effect | Sensing) -> str:

@@ -17,6 +17,7 @@ from kbs_process.diagnosis.known import Known
 from kbs_process.diagnosis.next_test import Proposal
 from kbs_process.diagnosis.outcome import Curve, Find, Identity, Outcome
 from kbs_process.diagnosis.thresholds import RIVALS
+from kbs_process.plant.effects.measured_law import unit_of
 from kbs_process.report.records import diagnosis as records
 from kbs_process.report.records.common import Check, Conclusion, Notice
 from kbs_process.rig.model import Joint, Rig
@@ -243,8 +244,8 @@ def _unit(turning: str, joint: Joint | None) -> str:
 
 def _curve(curve: Curve, joint: Joint | None) -> records.Curve:
     return records.Curve(
-        regressor=curve.regressor.replace("_", " "),
-        x_unit=_unit(curve.unit, joint),
+        regressor=curve.law.regressor.replace("_", " "),
+        x_unit=_unit(unit_of(curve.law.regressor), joint),
         y_unit=_unit("N m", joint),
         x=tuple(curve.x.tolist()),
         y=tuple(curve.value.tolist()),

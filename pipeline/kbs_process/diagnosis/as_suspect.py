@@ -8,15 +8,13 @@ from collections.abc import Mapping
 import numpy as np
 
 from kbs_process.diagnosis.curves import CurveSuspect, basis
-from kbs_process.diagnosis.measured import law_of
 from kbs_process.diagnosis.outcome import Estimate, Find
 from kbs_process.diagnosis.places import POINT, Place
 from kbs_process.diagnosis.scene import Scene
 from kbs_process.diagnosis.screen import Catalogued, Suspect
 from kbs_process.diagnosis.suspects import BY, Candidate
-from kbs_process.plant.effect import Effect
+from kbs_process.plant.effect import ACTION, Effect
 from kbs_process.plant.effects import CATALOGUE
-from kbs_process.plant.effects.measured_law import INTERVALS
 from kbs_process.plant.sensing import SENSING, Sensing
 from kbs_process.signals.records import Array
 
@@ -28,11 +26,10 @@ def suspect_of(find: Find, scene: Scene) -> tuple[Suspect, Array] | None:
     """Return a find as a suspect of a scene, with its amplitudes; None for what is each recording's own."""
     own = find.identity
     if find.curve is not None:
-        port, regressor = law_of(own.port, find.curve)
-        x = find.curve.x
-        knots = np.linspace(x[0], x[-1], INTERVALS + 1)
-        coefficients = np.linalg.lstsq(basis(x, float(x[0]), float(x[-1])), find.curve.value, rcond=None)[0]
-        return CurveSuspect(scene, port, own.axis, regressor, knots), np.asarray(coefficients)
+        over, x = find.curve.law, find.curve.x
+        ends = float(x[0]), float(x[-1])
+        coefficients = np.linalg.lstsq(basis(over, x, *ends), find.curve.value, rcond=None)[0]
+        return CurveSuspect(scene, over, own.axis, ends), np.asarray(coefficients)
     law = _LAWS.get(own.law)
     site = BY.join(own.channels) or own.axis
     if law is None or law.each_trial or not site:
@@ -47,7 +44,7 @@ def suspect_of(find: Find, scene: Scene) -> tuple[Suspect, Array] | None:
 
 def _numbers(find: Find) -> dict[str, Estimate]:
     """Estimates by the names of the law's first action, whichever this is."""
-    return {re.sub(r"_[2-9]$", "", one.name): one for one in find.estimates} | {
+    return {re.sub(f"{ACTION}$", "", one.name): one for one in find.estimates} | {
         one.name: one for one in find.estimates
     }
 

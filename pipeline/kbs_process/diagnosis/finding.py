@@ -9,13 +9,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import chi2
 
-from kbs_process.diagnosis.curves import REGRESSORS, CurveSuspect, basis
+from kbs_process.diagnosis.curves import CurveSuspect, along, basis
 from kbs_process.diagnosis.families import family
 from kbs_process.diagnosis.gate import Gate
-from kbs_process.diagnosis.inlets import GROUND_PORT
 from kbs_process.diagnosis.joint import Own, Standing
 from kbs_process.diagnosis.known import Known
-from kbs_process.diagnosis.measured import LAWS
 from kbs_process.diagnosis.outcome import Alternative, Curve, Estimate, Find, Identity, Place
 from kbs_process.diagnosis.places import POINT
 from kbs_process.diagnosis.rivals import rivalry
@@ -23,7 +21,8 @@ from kbs_process.diagnosis.screen import Catalogued, Found, Screening, Suspect
 from kbs_process.diagnosis.suspects import weighed
 from kbs_process.diagnosis.thresholds import RIVALS
 from kbs_process.diagnosis.tryout import UNNAMED, identity, in_plant, port_label
-from kbs_process.plant.effect import Effect
+from kbs_process.plant.effect import ACTION, ACTIONS, Effect
+from kbs_process.plant.effects.measured_law import Measured
 from kbs_process.plant.sensing import Sensing
 from kbs_process.rig.model import Rig
 from kbs_process.signals.records import Array
@@ -101,9 +100,9 @@ def find_of(
 
 def _equivalents(suspect: Suspect, rig: Rig) -> tuple[Alternative, ...]:
     """What looks the same whatever is recorded: a torque over the angle, the weight of a mass that moves with it."""
-    if not isinstance(suspect, CurveSuspect) or suspect.port != GROUND_PORT:
+    if not isinstance(suspect, CurveSuspect) or suspect.law.effect.name != "ground_angle_law":
         return ()
-    if suspect.regressor != "joint_angle" or not weighed(rig, rig.joint(suspect.joint)):
+    if not weighed(rig, rig.joint(suspect.joint)):
         return ()
     law = "weight over joint angle"
     same = Identity("mass properties", suspect.joint, (), family("mass_shift"), law)
@@ -112,7 +111,7 @@ def _equivalents(suspect: Suspect, rig: Rig) -> tuple[Alternative, ...]:
 
 def _law(suspect: Suspect) -> Effect | Sensing:
     if isinstance(suspect, CurveSuspect):
-        return LAWS[suspect.port, suspect.regressor]
+        return suspect.law.effect
     assert isinstance(suspect, Catalogued)
     return suspect.candidate.effect
 
@@ -133,11 +132,14 @@ def _equation(law: Effect | Sensing) -> str:
 def _estimates(taken: Tried, before: Standing) -> tuple[Estimate, ...]:
     suspect, known = taken.found.suspect, taken.standing.known
     begin = len(before.known.value)
-    units = {f"{name}{action}": "m" for name in POINT for action in ("", *(f"_{k}" for k in range(2, 10)))}
+    units = {
+        f"{name}{action}": "m" for name in POINT for action in ("", *(f"_{k}" for k in range(2, ACTIONS + 1)))
+    }
     fixed: dict[str, float] = {}
     if isinstance(suspect, Catalogued):
-        units |= {entry.name: entry.unit for entry in suspect.candidate.effect.parameters}
-        fixed = dict(suspect.candidate.shape)
+        for action in suspect.candidate.actions:
+            units |= {entry.name: entry.unit for entry in action.effect.parameters}
+            fixed |= dict(action.shape)
     if suspect.each_trial:
         spread = np.sqrt(np.diag(taken.found.score.covariance))
         names = suspect.amplitudes
@@ -164,33 +166,37 @@ def _short(name: str, plant: bool) -> str:
     if short not in _ELEMENTS:
         return short
     # A second action of a force has numbered amplitudes; its point is told likewise.
-    action = re.search(r"_[2-9]$", path)
+    action = re.search(f"{ACTION}$", path)
     return _ELEMENTS[short] + (action[0] if action else "")
 
 
-def explained_share(before: Known, after: Known) -> float | None:
-    """Share of the held-out residual's excess over the floor that a law takes away."""
+def explained_share(before: Known, after: Known, beyond: float = 0.0) -> float | None:
+    """Share of the held-out residual's excess over the floor, `beyond` a part of it, that a law takes away."""
     chosen = before.experiment.held_out
     if not chosen:
         return None
-    excess = sum(float(before.chi2[k] - before.rows[k]) for k in chosen)
+    excess = sum(float(before.chi2[k] - (1.0 + beyond) * before.rows[k]) for k in chosen)
     gained = sum(float(before.chi2[k] - after.chi2[k]) for k in chosen)
     return float(min(1.0, gained / excess)) if excess > 0.0 else None
 
 
 def _curve(suspect: CurveSuspect, taken: Tried, before: Standing) -> Curve:
     known = taken.standing.known
-    x = np.linspace(suspect.knots[0], suspect.knots[-1], 101)
-    return _drawn(suspect.regressor, x, known, range(len(before.known.value), len(known.value)))
+    return _drawn(
+        suspect.law,
+        along(suspect.law, *suspect.ends),
+        known,
+        range(len(before.known.value), len(known.value)),
+    )
 
 
-def _drawn(regressor: str, x: Array, known: Known, own: Sequence[int]) -> Curve:
-    """The curve whose coefficients are some numbers, `own`, over x that spans its knots."""
-    columns = basis(x, float(x[0]), float(x[-1]))
+def _drawn(law: Measured, x: Array, known: Known, own: Sequence[int]) -> Curve:
+    """The curve whose coefficients are some numbers, `own`, over x from end to end."""
+    columns = basis(law, x, float(x[0]), float(x[-1]))
     index = np.asarray(own)
     C = known.covariance[np.ix_(index, index)]
     spread = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", columns, C, columns), 0.0))
-    return Curve(regressor, REGRESSORS[regressor], x, columns @ known.value[index], spread)
+    return Curve(law, x, columns @ known.value[index], spread)
 
 
 def as_it_stands(find: Find, law: Own, known: Known) -> Find:
@@ -200,7 +206,7 @@ def as_it_stands(find: Find, law: Own, known: Known) -> Find:
         replace(one, value=one.about + float(known.value[k]), sigma=float(known.sigma[k]))
         for one, k in zip(find.estimates, own, strict=False)
     ]
-    curve = find.curve and _drawn(find.curve.regressor, find.curve.x, known, own)
+    curve = find.curve and _drawn(find.curve.law, find.curve.x, known, own)
     return replace(find, estimates=(*fitted, *find.estimates[len(own) :]), curve=curve)
 
 

@@ -2,8 +2,8 @@
 
 No held-out trial's whitened residual may become worse, beyond chance, and all together have to improve, by as much as
 chance does not and as what was fitted, or what the law changes there, lets expect; the interval of the law's
-coefficients has to exclude zero, and the residual has to be no less white. Where nothing was held out, each fit trial
-is left out in turn, to first order.
+coefficients has to exclude zero, and the residual's power has to be no less even along frequency. Where nothing was
+held out, each fit trial is left out in turn, to first order.
 """
 
 from __future__ import annotations
@@ -77,7 +77,8 @@ def gate(before: Known, after: Known, coefficients: Sequence[int]) -> Gate:
     if not sigmas >= GATE_SIGMA:
         size = f"{sigmas:.1f} sigma off zero" if np.isfinite(sigmas) else "not determined"
         reasons.append(f"its coefficients are {size}")
-    if not white[1] <= white[0] + _spread(after):
+    # In units of the floor: what is left has more of a colour, the less that is.
+    if not white[1] * after.level <= white[0] * before.level + _spread(after):
         reasons.append("the residual is less white with it")
     return Gate(not reasons, folds, held_out, sigmas, white, tuple(reasons))
 

@@ -33,8 +33,8 @@ class Extra:
     plant: tuple[Scalar, ...]  # numbers of its rig
     start: Array  # (plant + linear,)
     prior: Array  # (plant + linear,) means, and
-    sigma: Array  # their standard deviations; inf where nothing is known
-    scale: Array  # (plant,) sizes of steps for slopes
+    sigma: Array  # their standard deviations
+    scale: Array  # (plant + linear,) sizes of steps
     lower: Array  # (plant + linear,) bounds
     upper: Array
     linear: tuple[Scalar, ...] = ()
@@ -113,7 +113,7 @@ def entered(standing: Standing, extra: Extra, simulate: Simulate) -> Entered:
         (*known.free, *extra.plant, *extra.linear),
         parameters,
         laws,
-        np.concatenate([known.scale, extra.scale, np.abs(extra.start[len(extra.scale) :])]),
+        np.concatenate([known.scale, extra.scale]),
     )
     start = extra.start
     for _ in range(_TRIES):

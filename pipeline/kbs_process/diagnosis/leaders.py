@@ -17,6 +17,7 @@ from kbs_process.diagnosis.gate import Fold, Gate, gate, whiteness
 from kbs_process.diagnosis.gls import Background, Sums, score
 from kbs_process.diagnosis.hypothesis import Simulate
 from kbs_process.diagnosis.joint import Own, Standing, bare, with_extra
+from kbs_process.diagnosis.orders import with_orders
 from kbs_process.diagnosis.outcome import Refused
 from kbs_process.diagnosis.plausible import implausible
 from kbs_process.diagnosis.race import own_of, raced
@@ -44,7 +45,8 @@ from kbs_process.diagnosis.view import View
 def leaders(view: View, among: Callable[[Found], bool] = lambda _: True) -> tuple[list[Found], list[Found]]:
     """The most probable suspects, as many as the linear plant may have in the wrong order, and a few that come next.
 
-    Each with its shape bettered along the linear plant, if that could bring it among them. Of a law that a channel can
+    Each with its shape bettered along the linear plant, if that could bring it among them, and with all orders that it
+    needs. Of a law that a channel can
     show in many ways, as products of others are, the best stands for all; laws of one family at one place come after
     the best of the others.
     """
@@ -56,7 +58,8 @@ def leaders(view: View, among: Callable[[Found], bool] = lambda _: True) -> tupl
         return [], []
     least = (1.0 - LEAD) * max(found.score.gain for found in able) / BENT if view.ordered else 0.0
     worth = [found for found in able if found.score.gain >= least]
-    able = [*side_by_side(partial(bettered, view.bench), worth), *(one for one in able if one not in worth)]
+    shaped = side_by_side(partial(bettered, view.bench), worth)
+    able = [*(with_orders(view, one) for one in shaped), *(one for one in able if one not in worth)]
     able.sort(key=lambda found: -found.log_evidence)
     bound = (1.0 - LEAD) * able[0].score.gain if view.ordered else 0.0
     first = various([found for found in able if found.score.gain >= bound or found is able[0]])[:LEADERS]
@@ -107,7 +110,8 @@ def gated(found: Found, before: Standing, after: Standing, own: Own) -> Gate:
     known = after.known
     places = [known.names.index(name) for name in own.amplitudes]
     verdict = gate(before.known, known, places)
-    share = explained_share(before.known, known)
+    # What minima of the known parameters leave differs, and is no law's.
+    share = explained_share(before.known, known, beyond=TOLERATED)
     if isinstance(found.suspect, CurveSuspect) and share is not None and not share >= LAW_VARIANCE:
         verdict = verdict.but(f"a curve that explains {100.0 * share:.0f} % of the held-out excess is no law")
     if not isinstance(found.suspect, Catalogued):
@@ -122,7 +126,10 @@ def _oversized(suspect: Suspect, values: Iterable[float], sigmas: Iterable[float
     if not isinstance(suspect, Catalogued):
         return ()
     numbers = zip(map(float, values), map(float, sigmas), strict=True)
-    return implausible(suspect.candidate.effect, dict(zip(suspect.amplitudes, numbers, strict=False)))
+    named = dict(zip(suspect.amplitudes, numbers, strict=False))
+    return tuple(
+        reason for action in suspect.candidate.actions for reason in implausible(action.effect, named)
+    )
 
 
 def _trial_by_trial(suspect: Suspect, standing: Standing, bench: Bench) -> tuple[Standing, Gate]:

@@ -11,34 +11,18 @@ from kbs_process.diagnosis.curves import CurveSuspect
 from kbs_process.diagnosis.gls import Score
 from kbs_process.diagnosis.hypothesis import Hypothesis
 from kbs_process.diagnosis.joint import Extra, Standing
-from kbs_process.diagnosis.outcome import Curve
 from kbs_process.diagnosis.suspects import next_action
 from kbs_process.plant.attach import attach
-from kbs_process.plant.effect import Effect
 from kbs_process.plant.effects import select
-from kbs_process.plant.effects.measured_law import (
-    COEFFICIENTS,
-    GROUND_ANGLE_LAW,
-    GROUND_RATE_LAW,
-    JOINT_ANGLE_LAW,
-    JOINT_RATE_LAW,
-)
+from kbs_process.plant.effects.measured_law import COEFFICIENTS, SLIDES, Measured
 from kbs_process.rig.model import Joint
 from kbs_process.signals.records import Array
 from kbs_process.stages.output_error import Scalar
 
-# By port and regressor of a curve.
-LAWS: Mapping[tuple[str, str], Effect] = {
-    ("joint_torque", "joint_angle"): JOINT_ANGLE_LAW,
-    ("joint_torque", "joint_rate"): JOINT_RATE_LAW,
-    ("ground_torque", "joint_angle"): GROUND_ANGLE_LAW,
-    ("ground_torque", "joint_rate"): GROUND_RATE_LAW,
-}
-
 
 def inserted(
     hypothesis: Hypothesis,
-    law: tuple[str, str],
+    law: Measured,
     joint: str,
     ends: tuple[float, float],
     coefficients: Array,
@@ -46,14 +30,15 @@ def inserted(
 ) -> tuple[Hypothesis, tuple[Scalar, ...]]:
     """Return a hypothesis with a measured law in its plant, and the rig's numbers that its coefficients are.
 
-    `law` is a key of LAWS, `ends` the range of its regressor, `coefficients` those of `curves.basis` (COEFFICIENTS,),
-    `sigma` theirs. A joint that has such a law already gets one more action of it.
+    `ends` are the range of its regressor, `coefficients` those of `curves.basis` (COEFFICIENTS,), `sigma` theirs. A
+    joint that has such a law already gets one more action of it.
     """
-    effect = next_action(LAWS[law], hypothesis.rig, joint, hypothesis.effects)
+    effect = next_action(law.effect, hypothesis.rig, joint, hypothesis.effects)
     names = [entry.name for entry in effect.parameters]
-    values = dict(zip(names, (*map(float, coefficients), *ends), strict=True))
+    shape = (*ends, SLIDES[law.opposed]) if law.opposed else ends
+    values = dict(zip(names, (*map(float, coefficients), *shape), strict=True))
     rig = attach(hypothesis.rig, effect, values, joints=[joint])
-    spread = dict(zip(names, (*map(float, sigma), 0.0, 0.0), strict=True))
+    spread = dict(zip(names, (*map(float, sigma), *(0.0 for _ in shape)), strict=True))
     new = {
         one.name for one in hypothesis.rig.joints if one.drive is None or names[0] not in one.drive.parameters
     }
@@ -84,25 +69,20 @@ def _stated(joint: Joint, spread: Mapping[str, float]) -> Joint:
 
 
 def extra(suspect: CurveSuspect, score: Score, standing: Standing) -> Extra:
-    """A curve in the non-linear plant at the screen's coefficients, these without a prior."""
-    low, high = float(suspect.knots[0]), float(suspect.knots[-1])
+    """A curve in the non-linear plant at the screen's coefficients, these with a prior of ten times their size."""
     size = np.sqrt(np.maximum(np.diag(score.covariance), 0.0))
+    largest = max(float(np.abs(score.amplitude).max()), 5.0 * float(size.min()))
     hypothesis, scalars = inserted(
-        standing.hypothesis, (suspect.port, suspect.regressor), suspect.joint, (low, high), score.amplitude, size
+        standing.hypothesis, suspect.law, suspect.joint, suspect.ends, score.amplitude, size
     )  # fmt: skip
     return Extra(
         hypothesis=hypothesis,
         plant=scalars,
         start=score.amplitude,
         prior=0.0 * score.amplitude,
-        sigma=np.full(COEFFICIENTS, np.inf),
+        sigma=np.full(COEFFICIENTS, 10.0 * largest),
         # One size for all: a coefficient that is zero by chance has a slope as well.
-        scale=np.full(COEFFICIENTS, max(float(np.abs(score.amplitude).max()), 5.0 * float(size.min()))),
+        scale=np.full(COEFFICIENTS, largest),
         lower=np.full(COEFFICIENTS, -np.inf),
         upper=np.full(COEFFICIENTS, np.inf),
     )
-
-
-def law_of(port: str, curve: Curve) -> tuple[str, str]:
-    """Key of LAWS of a curve that was found at a port, in the words of `tryout.identity`."""
-    return ("ground_torque" if port == "external wrench" else "joint_torque"), curve.regressor

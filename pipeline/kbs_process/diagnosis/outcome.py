@@ -11,6 +11,7 @@ from kbs_process.diagnosis.joint import Standing
 from kbs_process.diagnosis.known import Known
 from kbs_process.diagnosis.localise import PortName
 from kbs_process.diagnosis.ports import Cells, PortTest
+from kbs_process.plant.effects.measured_law import Measured
 from kbs_process.signals.records import Array
 
 Verdict = Literal["none", "parameters off", "physics", "undecided"]
@@ -60,10 +61,9 @@ class Alternative:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Curve:
-    """A measured law: value over regressor with one standard deviation."""
+    """A measured law: value over its regressor with one standard deviation."""
 
-    regressor: str
-    unit: str  # of the regressor
+    law: Measured
     x: Array  # (m,)
     value: Array  # (m,) at the port: N m
     sigma: Array  # (m,)

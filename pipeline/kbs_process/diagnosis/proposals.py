@@ -117,7 +117,8 @@ def _orders(known: Known, scene: Scene) -> tuple[float, ...]:
 def _of_joints(known: Known, scene: Scene) -> dict[str, tuple[float, ...]]:
     """Orders of each joint's own angle at which the whitened residual stands out: balls, teeth and slots that pass.
 
-    A joint that turns in a range has lines as wide as a turn over that: they need not be whole numbers.
+    A joint that turns in a range has lines as wide as a turn over that: they need not be whole numbers. One that turns
+    all round comes to where it was.
     """
     experiment, found = known.experiment, dict[str, tuple[float, ...]]()
     for joint in experiment.rig.joint_names:
@@ -130,6 +131,8 @@ def _of_joints(known: Known, scene: Scene) -> dict[str, tuple[float, ...]]:
             fastest = 2.0 * np.pi * experiment.highest_Hz * experiment.dt / step
             # Less than two turns in the range is an offset and a slope.
             orders = np.arange(2.0 * width, min(_HIGHEST_OF_JOINT, fastest), width / _FINE)
+            if width <= 1.0:
+                orders = np.arange(1.0, min(_HIGHEST_OF_JOINT, fastest))
             if not len(orders):
                 continue
             power = _along(orders, angle, series)

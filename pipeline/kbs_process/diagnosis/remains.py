@@ -36,17 +36,17 @@ def taken(there: Detection, here: Detection) -> float:
     return 1.0 - max(here.ratio - 1.0, 0.0) / (there.ratio - 1.0) if there.left else 1.0
 
 
-def too_little(before: Standing, after: Standing, floor: Floor) -> tuple[str, ...]:
+def too_little(before: Standing, after: Standing, floor: Floor, *, more: bool = False) -> tuple[str, ...]:
     """Return why what a law takes does not tell it from something else; nothing, if it does.
 
     What two minima of phases and tooth contact leave differs, too, and a law with numbers enough follows that. It shows
-    less than that in every trajectory.
+    less than that in every trajectory. What is `more` of a law that was found need take no share of all that is left.
     """
     experiment = before.known.experiment
     there, here = (detected(one, floor, experiment.fit) for one in (before, after))
     reasons = []
     share = taken(there, here)
-    if not share >= TAKEN:
+    if not (more or share >= TAKEN):
         reasons.append(
             f"takes {100.0 * share:.0f} % of what exceeds the floor: it follows what something else does"
         )

@@ -147,7 +147,7 @@ def _round(standing: Standing, floor: Floor, simulate: Simulate, accepted: Seque
     passed, refused = _passed(view, floor, simulate, accepted)
     if not passed:
         return _Round(None, standing, view.screening, tuple(refused), place)
-    passed = named_first(passed)
+    passed = continued(named_first(passed), [one.find.identity for one in accepted])
     chances = probabilities([one.standing.known for one in passed], view.bench.background.rows)
     best = int(np.argmax(chances))
     settled = passed[best].standing
@@ -158,7 +158,8 @@ def _round(standing: Standing, floor: Floor, simulate: Simulate, accepted: Seque
     told = reread(replace(passed[best], standing=settled), standing, floor, simulate)
     # One more action of a law at the same place is part of the find.
     earlier = [(one.find.identity.law, one.tried.own) for one in accepted if one.find.identity != _law(told)]
-    little = too_little(standing, told.standing, floor)
+    more = any(one.find.identity == _law(told) for one in accepted)
+    little = too_little(standing, told.standing, floor, more=more)
     if reasons := little or only_while(earlier, standing, told.standing.known, simulate):
         refused.append(Refused(_law(told), told.found.score.rho_eff, reasons))
         return _Round(None, standing, view.screening, tuple(refused), place)
@@ -178,14 +179,26 @@ def named_first(passed: Sequence[Tried]) -> list[Tried]:
     named = [one for one in passed if isinstance(one.found.suspect, Catalogued)]
 
     def told(curve: Tried) -> bool:
-        known = curve.standing.known
-        least = known.cost + TOLERATED * float(known.rows[list(known.experiment.fit)].sum())
         where = _law(curve).port, _law(curve).axis
-        return any(
-            (_law(one).port, _law(one).axis) == where and one.standing.known.cost <= least for one in named
-        )
+        return any((_law(one).port, _law(one).axis) == where and _as_good(one, curve) for one in named)
 
     return [one for one in passed if one in named or not told(one)]
+
+
+def continued(passed: Sequence[Tried], accepted: Sequence[Identity]) -> list[Tried]:
+    """Laws that were found already, if one more action of one does as well as the best; else all.
+
+    A ripple has more orders than were added at once, and what is left of it has the form of something else, too.
+    """
+    more = [one for one in passed if _law(one) in accepted and all(_as_good(one, other) for other in passed)]
+    return more or list(passed)
+
+
+def _as_good(one: Tried, other: Tried) -> bool:
+    """Whether a law leaves no more than another, as far as the plant is exact."""
+    known = other.standing.known
+    least = known.cost + TOLERATED * float(known.rows[list(known.experiment.fit)].sum())
+    return one.standing.known.cost <= least
 
 
 def _law(one: Tried) -> Identity:

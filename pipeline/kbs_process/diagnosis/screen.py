@@ -77,8 +77,11 @@ class Catalogued:
         if isinstance(self.candidate.effect, Sensing):
             return None
         hypothesis = self.scene.hypothesis
-        columns = inputs(self.candidate, self.scene.signals[drive], hypothesis.rig, hypothesis.effects)
-        return [self.scene.stepped(drive, column) for column in columns]
+        return [
+            self.scene.stepped(drive, column)
+            for action in self.candidate.actions
+            for column in inputs(action, self.scene.signals[drive], hypothesis.rig, hypothesis.effects)
+        ]
 
     def outputs(self, drive: int) -> Array:
         experiment = self.scene.experiment

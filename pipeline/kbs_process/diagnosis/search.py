@@ -93,7 +93,7 @@ class Search:
         scale: Array | None = None,
     ) -> None:
         """`laws` are columns of the prediction by the names of free numbers that no rig has; `scale` says in what
-        steps free numbers go that have no prior (p,), if not their own size.
+        steps free numbers go that have no stated prior (p,), if not their own size.
         """
         self.experiment, self.metric, self.simulate = experiment, metric, simulate
         self.hypothesis, self.free, self.parameters = hypothesis, free, parameters
@@ -107,11 +107,14 @@ class Search:
         size = np.ones(len(free))
         size[self.inside] = np.abs(hypothesis.values([free[i] for i in self.inside]))
         self.scale = np.where(phase, 1.0, np.maximum(size if scale is None else scale, 1e-12))
-        self.spread = np.where(np.isfinite(self.parameters.sigma), self.parameters.sigma, self.scale)
+        files = set(known_parameters(experiment.rig, experiment.effects))
+        # A law's number has a prior that is wider by far than it is large.
+        stated = np.array([one in files for one in free], dtype=np.bool_) & np.isfinite(parameters.sigma)
+        self.spread = np.where(stated, parameters.sigma, self.scale)
         # A phase that nothing shows would leave the equations singular.
         self.ridge = np.where(phase, np.pi**-2.0, 0.0)
         self.differences = _DIFFERENCE * self.spread
-        others = set(known_parameters(experiment.rig, experiment.effects)) - gears
+        others = files - gears
         self.slow = [i for i, scalar in enumerate(free) if scalar in others]
         self.geared = [i for i, scalar in enumerate(free) if scalar in gears]
         trials = experiment.trials

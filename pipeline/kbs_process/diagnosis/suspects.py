@@ -11,8 +11,9 @@ import numpy as np
 from kbs_process.diagnosis.places import Place, points_of
 from kbs_process.diagnosis.ranges import Ranges
 from kbs_process.plant.along import signals_of
-from kbs_process.plant.effect import VELOCITIES, Effect, Parameter, Port, instance
+from kbs_process.plant.effect import ACTIONS, VELOCITIES, Effect, Parameter, Port, instance
 from kbs_process.plant.effects import CATALOGUE
+from kbs_process.plant.effects.joint_order import JOINT_ORDER
 from kbs_process.plant.rigid import kinematics, links_beyond
 from kbs_process.plant.sensing import SENSING, Sensing, SensingPort
 from kbs_process.rig.model import LAB, Joint, Rig
@@ -36,6 +37,7 @@ class Candidate:
     site: str
     shape: tuple[tuple[str, float], ...]  # every parameter that is neither an amplitude nor shared
     point: Place | None = None  # of a force: where it acts on the link; None is the CoG
+    again: tuple[Candidate, ...] = ()  # further actions of the same law there, as of other orders
 
     @property
     def name(self) -> str:
@@ -52,8 +54,14 @@ class Candidate:
 
     @property
     def amplitudes(self) -> tuple[Parameter, ...]:
-        """Parameters that it is linear in."""
-        return tuple(entry for entry in self.effect.parameters if entry.role == "amplitude")
+        """Parameters that it is linear in, action by action."""
+        own = tuple(entry for entry in self.effect.parameters if entry.role == "amplitude")
+        return own + tuple(entry for other in self.again for entry in other.amplitudes)
+
+    @property
+    def actions(self) -> tuple[Candidate, ...]:
+        """Each of its actions alone."""
+        return (replace(self, again=()), *self.again)
 
 
 def candidates(
@@ -111,6 +119,8 @@ def _sites(effect: Effect, rig: Rig, columns: Sequence[str]) -> list[str]:
             return False
         if effect.of_weight and not weighed(rig, joint):
             return False
+        if effect is JOINT_ORDER and _direct(joint):
+            return False  # the motor's orders are the joint's
         own = {} if joint.drive is None else joint.drive.parameters
         turned = joint.drive is not None or "ratio" not in effect.arguments
         return (
@@ -120,6 +130,11 @@ def _sites(effect: Effect, rig: Rig, columns: Sequence[str]) -> list[str]:
         )
 
     return [joint.name for joint in rig.joints if fits(joint)]
+
+
+def _direct(joint: Joint) -> bool:
+    """Whether a motor turns with its joint."""
+    return joint.effort is not None if joint.drive is None else float(joint.drive.ratio) == 1.0
 
 
 def weighed(rig: Rig, joint: Joint) -> bool:
@@ -135,16 +150,20 @@ def felt_from_the_ground(rig: Rig) -> frozenset[str]:
 
 
 def next_action(effect: Effect, rig: Rig, site: str, accepted: Sequence[str]) -> Effect:
-    """The effect itself, or its first instance that does not act at the site."""
+    """The effect itself, or its first instance that does not act at the site; the last, where all do."""
+    return next(free_actions(effect, rig, site, accepted), instance(effect, ACTIONS))
+
+
+def free_actions(effect: Effect, rig: Rig, site: str, accepted: Sequence[str]) -> Iterator[Effect]:
+    """Of the effect itself and its instances those that do not act at the site."""
     own = own_values(rig, site)
-    for number in range(1, 10):
+    for number in range(1, ACTIONS + 1):
         action = effect if number == 1 else instance(effect, number)
         amplitudes = [entry.name for entry in action.parameters if entry.role == "amplitude"]
         # A drive's effect has numbers at every joint; one of the laboratory acts at a single place.
         here = not action.port.of_drive or any(own.get(name, 0.0) for name in amplitudes)
         if action.name not in accepted or not here:
-            return action
-    return action
+            yield action
 
 
 def own_values(rig: Rig, site: str) -> dict[str, float]:

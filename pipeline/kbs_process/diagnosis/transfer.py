@@ -21,8 +21,9 @@ from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 from scipy.linalg import expm
 
 from kbs_process.diagnosis.inlets import Inlet, generalised, inlets_of
-from kbs_process.plant.effect import SIGNALS, Effect, Port
+from kbs_process.plant.effect import CROSSED, SIGNALS, Effect, Port
 from kbs_process.plant.linear import Linear, drive_damping, drive_stiffness, linearise
+from kbs_process.plant.structure import other_joint
 from kbs_process.rig.model import Amplifier, Joint, Rig
 from kbs_process.signals.records import WRENCH_CHANNELS, Array
 
@@ -88,7 +89,7 @@ def follow(rig: Rig, effects: Sequence[Effect], taps: Mapping[str, Array], rate:
             assert joint.drive is not None
             out = bare.plate + index
             pair = np.ix_([out, out + len(driven)], [out, out + len(driven)])
-            signals = _signals(taps, joint.name)
+            signals = _signals(taps, joint.name, other_joint(rig, joint.name))
             moves = np.ptp(signals["rotor_angle"][around]) > _STANDS
             points = around if moves else around[:1]
             damping = np.zeros((2, 2))
@@ -124,12 +125,16 @@ def follow(rig: Rig, effects: Sequence[Effect], taps: Mapping[str, Array], rate:
         inlets,
         np.stack([force for force, _ in entered]),
         np.stack([direct for _, direct in entered]),
-        np.stack([_ripple(joint, effects, _signals(taps, joint.name), rate) for joint in driven], axis=1),
+        np.stack(
+            [_ripple(joint, effects, _signals(taps, joint.name, joint.name), rate) for joint in driven],
+            axis=1,
+        ),
     )
 
 
-def _signals(taps: Mapping[str, Array], joint: str) -> dict[str, Array]:
-    return {name.partition(".")[0]: values for name, values in taps.items() if name.endswith(f".{joint}")}
+def _signals(taps: Mapping[str, Array], joint: str, other: str) -> dict[str, Array]:
+    own = {name.partition(".")[0]: values for name, values in taps.items() if name.endswith(f".{joint}")}
+    return own | {name: taps[f"{name.replace('other', 'joint')}.{other}"] for name in CROSSED}
 
 
 def _passes(effect: Effect) -> bool:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from kbs_process.diagnosis import measured
 from kbs_process.diagnosis.curves import CurveSuspect
-from kbs_process.diagnosis.families import family, port_word
+from kbs_process.diagnosis.families import PORTS, family, port_word
 from kbs_process.diagnosis.hypothesis import Hypothesis
 from kbs_process.diagnosis.joint import Extra, Standing
 from kbs_process.diagnosis.localise import PortName
@@ -15,11 +17,12 @@ from kbs_process.diagnosis.places import point_of
 from kbs_process.diagnosis.scene import Scene
 from kbs_process.diagnosis.screen import Bench, Catalogued, Found, Suspect
 from kbs_process.diagnosis.shapes import Bend, along, bends
-from kbs_process.diagnosis.suspects import BY
+from kbs_process.diagnosis.suspects import BY, Candidate
 from kbs_process.plant.attach import attach
 from kbs_process.plant.effect import Effect, Port
 from kbs_process.plant.effects import select
 from kbs_process.plant.sensing import SensingPort
+from kbs_process.signals.records import Array
 from kbs_process.stages.output_error import Scalar
 
 UNNAMED = "unnamed"
@@ -28,8 +31,8 @@ UNNAMED = "unnamed"
 def identity(suspect: Suspect) -> Identity:
     """In the field's words."""
     if isinstance(suspect, CurveSuspect):
-        port = "external wrench" if suspect.port == "ground_torque" else suspect.port.replace("_", " ")
-        return Identity(port, suspect.joint, (), UNNAMED, f"curve over {suspect.regressor.replace('_', ' ')}")
+        port = PORTS[suspect.law.effect.port]
+        return Identity(port, suspect.joint, (), UNNAMED, suspect.law.words)
     assert isinstance(suspect, Catalogued)
     candidate = suspect.candidate
     port = port_word(candidate.name, candidate.port)
@@ -64,7 +67,11 @@ def in_plant(suspect: Suspect) -> bool:
 
 
 def extra_of(found: Found, standing: Standing, bench: Bench, scene: Scene) -> Extra:
-    """The suspect at the screen's amplitudes; they have no prior, nor has the point of a force `anywhere`."""
+    """The suspect at the screen's amplitudes, of which its bounds are all that is known.
+
+    So wide a prior changes nothing that recordings show, and holds what they do not: the torque of a cable in its
+    middle, where a transducer's zero is fitted. The point of a force `anywhere` has none.
+    """
     suspect, amplitude = found.suspect, found.score.amplitude
     if not in_plant(suspect):
         tag = ".".join(suspect.family)
@@ -79,13 +86,15 @@ def extra_of(found: Found, standing: Standing, bench: Bench, scene: Scene) -> Ex
         names = (*suspect.amplitudes, *(one.name for one in shaped))
         start = np.concatenate([amplitude, np.zeros(len(shaped))])
         free = np.full(len(amplitude), np.inf)
+        wide = _widths(suspect) if isinstance(suspect, Catalogued) else free
+        sizes = [one.size for one in shaped]
         return Extra(
             hypothesis=standing.hypothesis,
             plant=(),
             start=start,
             prior=0.0 * start,
-            sigma=np.concatenate([free, [one.sigma for one in shaped]]),
-            scale=np.zeros(0),
+            sigma=np.concatenate([wide, [one.sigma for one in shaped]]),
+            scale=np.concatenate([np.abs(amplitude), sizes]),
             lower=np.concatenate([-free, [one.low - one.value for one in shaped]]),
             upper=np.concatenate([free, [one.high - one.value for one in shaped]]),
             linear=tuple(Scalar(f"law.{tag}.{name}{f'_{used}' if used else ''}") for name in names),
@@ -95,21 +104,11 @@ def extra_of(found: Found, standing: Standing, bench: Bench, scene: Scene) -> Ex
         return measured.extra(suspect, found.score, standing)
     assert isinstance(suspect, Catalogued) and isinstance(suspect.candidate.effect, Effect)
     candidate, effect = suspect.candidate, suspect.candidate.effect
-    shape = dict(candidate.shape)
-    values = shape | dict(zip(suspect.amplitudes, map(float, amplitude), strict=True))
     present = standing.hypothesis
-    if effect.port.of_drive:
-        rig, path = (
-            attach(present.rig, effect, values, joints=[candidate.site]),
-            f"joint.{candidate.site}.drive",
-        )
-    else:
-        point = (
-            point_of(present.rig, candidate.site) if candidate.point is None else np.array(candidate.point)
-        )
-        rig = attach(present.rig, effect, values, on=candidate.site, point=point)
-        path = f"external.{effect.name}"
-    effects = tuple(one.name for one in select([*dict.fromkeys([*present.effects, effect.name])]))
+    hypothesis = inserted(
+        candidate, dict(zip(suspect.amplitudes, map(float, amplitude), strict=True)), present
+    )
+    path = f"joint.{candidate.site}.drive" if effect.port.of_drive else f"external.{effect.name}"
     shaped = bends(candidate, present.rig)
     size = np.sqrt(np.maximum(np.diag(found.score.covariance), 0.0))
     begin = np.array([one.value for one in shaped])
@@ -117,18 +116,40 @@ def extra_of(found: Found, standing: Standing, bench: Bench, scene: Scene) -> Ex
     # An amplitude that has one sign keeps it.
     least = np.array([0.0 if entry.bounds[0] == 0.0 else -np.inf for entry in candidate.amplitudes])
     return Extra(
-        hypothesis=Hypothesis(rig, effects),
+        hypothesis=hypothesis,
         plant=(
             *(Scalar(f"{path}.{name}") for name in suspect.amplitudes),
             *(one.scalar(path) for one in shaped),
         ),
         start=np.concatenate([amplitude, begin]),
         prior=np.concatenate([0.0 * amplitude, begin]),
-        sigma=np.concatenate([any_size, [one.sigma for one in shaped]]),
+        sigma=np.concatenate([_widths(suspect), [one.sigma for one in shaped]]),
         scale=np.concatenate([np.maximum(np.abs(amplitude), 5.0 * size), [one.size for one in shaped]]),
         lower=np.concatenate([least, [one.low for one in shaped]]),
         upper=np.concatenate([any_size, [one.high for one in shaped]]),
     )
+
+
+def inserted(candidate: Candidate, amplitudes: Mapping[str, float], hypothesis: Hypothesis) -> Hypothesis:
+    """Return a hypothesis with a law of the catalogue in its plant, each of its actions with its own numbers."""
+    rig, names = hypothesis.rig, [*hypothesis.effects]
+    for action in candidate.actions:
+        effect = action.effect
+        assert isinstance(effect, Effect)
+        values = dict(action.shape) | {entry.name: amplitudes[entry.name] for entry in action.amplitudes}
+        if effect.port.of_drive:
+            rig = attach(rig, effect, values, joints=[action.site])
+        else:
+            point = point_of(rig, action.site) if action.point is None else np.array(action.point)
+            rig = attach(rig, effect, values, on=action.site, point=point)
+        names.append(effect.name)
+    return Hypothesis(rig, tuple(one.name for one in select([*dict.fromkeys(names)])))
+
+
+def _widths(suspect: Catalogued) -> Array:
+    """(m,) how large amplitudes may be."""
+    bounds = np.array([entry.bounds for entry in suspect.candidate.amplitudes])
+    return np.asarray(np.abs(bounds).max(axis=1), dtype=np.float64)
 
 
 def _references(standing: Standing) -> set[int]:

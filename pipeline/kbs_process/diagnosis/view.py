@@ -22,6 +22,7 @@ class View:
     standing: Standing
     bench: Bench
     scene: Scene
+    suspects: tuple[Suspect, ...]
     screening: Screening
 
     @classmethod
@@ -32,8 +33,8 @@ class View:
         known = standing.known
         scene = Scene.of(known.experiment, standing.hypothesis, standing.predicted, linear=linear)
         bench = Bench.of(known, scene)
-        chosen = [suspect for suspect in suspects_of(standing, scene) if among(suspect)]
-        return cls(standing, bench, scene, screen(bench, chosen))
+        chosen = tuple(suspect for suspect in suspects_of(standing, scene) if among(suspect))
+        return cls(standing, bench, scene, chosen, screen(bench, chosen))
 
     @property
     def able(self) -> list[Found]:

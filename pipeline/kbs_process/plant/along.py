@@ -23,6 +23,7 @@ SLOPES = {
     "field_rate": "field",
     "rotor_rate": "rotor_angle",
     "joint_rate": "joint_angle",
+    "other_rate": "other_angle",
     "vx": "x",
     "vy": "y",
     "vz": "z",

@@ -25,10 +25,14 @@ SIGNALS = {
     "its mean over it, so that no jump is rounded to a time step; 0 at an instant",
     "joint_angle": "rad, output with respect to the same body",
     "joint_rate": "rad/s, output with respect to the same body",
+    "other_angle": "rad, output of the joint after this one, after the last of the first, as joint_angle",
+    "other_rate": "rad/s, its rate",
     "ratio": "1, motor turns in a turn of the output",
     "time": "s, on the recording's time axis",
 }
 
+
+CROSSED = frozenset(("other_angle", "other_rate"))  # signals of another joint
 
 # Phases that a search tries, rad.
 EIGHTHS = tuple(math.pi * (i / 4.0 - 1.0) for i in range(8))
@@ -192,7 +196,7 @@ class Effect:
     has amplitudes of its own in `each_trial`. A force `anywhere` is tied to no place of its link that a drawing shows:
     a search looks for its point, too. A moment `of_weight` acts about no axis that is along gravity. What is `recorded`
     is in the record of the field, and leaves nothing to find where there is one. An effect can act several times: see
-    `instance`.
+    `instance`. Effects that share an equation say with `wires` what its arguments are for each.
     """
 
     name: str
@@ -208,6 +212,9 @@ class Effect:
     of_weight: bool = False  # a moment of weight about a joint's axis
     recorded: bool = False  # a change of the field before that is recorded
     tag: str = ""  # what `instance` has added to the names of parameters and states
+    wires: tuple[
+        tuple[str, str], ...
+    ] = ()  # argument of the equation -> signal or parameter, where they differ
 
     def __post_init__(self) -> None:
         where = f"effect '{self.name}'"
@@ -242,7 +249,14 @@ class Effect:
         """Names that the equation's arguments are wired to, in order."""
         names = [entry.name for entry in self.parameters] + [state.name for state in self.states]
         own = {name.removesuffix(self.tag): name for name in names}
-        return tuple(own.get(name, name) for name in _asked(self.equation))
+        wires = dict(self.wires)
+        asked = (wires.get(name, name) for name in _asked(self.equation))
+        return tuple(own.get(name, name) for name in asked)
+
+    @property
+    def crossed(self) -> bool:
+        """Whether it depends on another joint's motion."""
+        return not CROSSED.isdisjoint(self.arguments)
 
     @property
     def flies(self) -> bool:
@@ -262,6 +276,10 @@ class Effect:
 def _asked(equation: Callable[..., Any]) -> tuple[str, ...]:
     """Names of an equation's arguments; looking at a signature takes longer than the equation."""
     return tuple(inspect.signature(equation).parameters)
+
+
+ACTIONS = 24  # of one effect at one place
+ACTION = r"_([2-9]|1\d|2[0-4])"  # what `instance` adds to names
 
 
 def instance(effect: Effect, number: int) -> Effect:

@@ -60,7 +60,8 @@ def _drive(structure: Structure) -> list[str]:
     ground = ["ground"] * structure.grounded
     lines = [
         "@compiled",
-        "def drive(field, rotor_angle, rotor_rate, rotor_travel, joint_angle, joint_rate, ratio, time, z, p, k):",
+        "def drive(field, rotor_angle, rotor_rate, rotor_travel, joint_angle, joint_rate,",
+        f"          {'other_angle, other_rate, ' * structure.crossed}ratio, time, z, p, k):",
         '    """Motor torque, Coulomb limit, gear torque, joint torque, then the rates of the states."""',
         *[f"    {total} = 0.0" for total in [*totals.values(), *ground]],
     ]
@@ -129,10 +130,12 @@ def _balance(structure: Structure) -> list[str]:
         earth = [f"ground_{j}"] * structure.grounded
         states = tuple_of([f"x[{layout['z'].start + i}]" for i in range(j * z, (j + 1) * z)])
         rotor = f"x[{layout['theta'].start + j}]"
+        other = f"q_{structure.other(j)}, 0.0, " * structure.crossed
         lines += [
             f"    field_{j} = floor(field[{j}] + 0.5) / p[{k + MICROSTEP}]",
             f"    {', '.join(['motor', '_', 'gear', 'joint', *['_'] * z, *earth])} = drive(",
-            f"        field_{j}, {rotor}, 0.0, 0.0, q_{j}, 0.0, p[{k + RATIO}], 0.0, {states}, p, int({k + DRIVE})",
+            f"        field_{j}, {rotor}, 0.0, 0.0, q_{j}, 0.0, {other}p[{k + RATIO}], 0.0, {states},",
+            f"        p, int({k + DRIVE})",
             "    )",
             f"    out_{j} = gear + joint",
             f"    drag_{j} = motor - gear / p[{k + RATIO}]",

@@ -89,13 +89,14 @@ def _rotor(structure: Structure) -> list[str]:
     z = len(structure.states)
     rates = [f"d{i}" for i in range(z)]
     unused = ["_"] * z
+    other = "other_angle, other_rate, " * structure.crossed
     ground, ground_1 = (["ground"], ["ground_1"]) if structure.grounded else ([], [])
     earth = ", 0.5 * (ground + ground_1)" * structure.grounded
     state = tuple_of([f"z[{i}] + 0.5 * h * zd[{i}]" for i in range(z)])
     after = tuple_of([f"z[{i}] + h * d{i}" for i in range(z)])
 
     def drive(results: list[str], w: str) -> str:
-        given = f"field, middle, {w}, h * w, angle, rate, ratio, time, state, p, k + {DRIVE}"
+        given = f"field, middle, {w}, h * w, angle, rate, {other}ratio, time, state, p, k + {DRIVE}"
         return f"{', '.join(results)} = drive({given})"
 
     secant = [
@@ -107,11 +108,11 @@ def _rotor(structure: Structure) -> list[str]:
     ]
     return [
         "@compiled",
-        "def turn_rotor(theta, w, carrier_rate, field, angle, rate, time, h, z, zd, p, k):",
+        f"def turn_rotor(theta, w, carrier_rate, field, angle, rate, {other}time, h, z, zd, p, k):",
         '    """Angle and rate after `h`, mean torque on the output, the effects\' states and their rates.',
         "",
         "    `carrier_rate` is the carrier's acceleration about the rotor's axis, `angle` and `rate` the output's in",
-        "    the middle of the step, `field` the mean over it.",
+        "    the middle of the step, `field` the mean over it. Another joint moves as in the middle of the whole step.",
         '    """',
         f"    ratio = p[k + {RATIO}]",
         f"    mobility = h / p[k + {ROTOR}]",
@@ -204,14 +205,15 @@ def turned(structure: Structure, state: InVector) -> list[str]:
     """Emit one of the rotors' steps: side by side, so that the processor need not wait for one of them."""
     lines = ["    off = (i + 0.5) * h - half"]
     for j in range(structure.joints):
-        k, qdd = joint_offset(structure, j), state.at("qdd", j)
+        k, qdd, o = joint_offset(structure, j), state.at("qdd", j), structure.other(j)
+        other = f"q_{o}, qd_{o}, " * structure.crossed
         lines += [
             f"    from_ = begin_{j} + i * share_{j}",
             f"    field = mean_rounded(from_, from_ + share_{j}, inverse_{j}) * pitch_{j}",
             f"    angle = q_{j} + off * (qd_{j} + 0.5 * off * {qdd})",
             f"    rate = qd_{j} + off * {qdd}",
             f"    theta_{j}, w_{j}, out, z_{j}, zd_{j}{', earth' * structure.grounded} = turn_rotor(",
-            f"        theta_{j}, w_{j}, turning_{j}, field, angle, rate, time + half + off, h,",
+            f"        theta_{j}, w_{j}, turning_{j}, field, angle, rate, {other}time + half + off, h,",
             f"        z_{j}, zd_{j}, p, int({k}),",
             "    )",
             f"    out_{j} += out / {ROTOR_STEPS}",
@@ -242,11 +244,13 @@ def kicked(structure: Structure, state: InVector) -> list[str]:
     n, z = structure.joints, len(structure.states)
     lines = []
     for j in range(n):
-        k = joint_offset(structure, j)
+        k, o = joint_offset(structure, j), structure.other(j)
 
-        def gear(tag: str, angle: str, rate: str, j: int = j, k: int = k) -> str:
-            rotor = f"0.0, theta_{j}, w_{j}, 0.0"
-            given = f"{rotor}, {angle}, {rate}, p[{k + RATIO}], time + half, z_{j}, p, int({k + DRIVE})"
+        def gear(tag: str, angle: str, rate: str, j: int = j, k: int = k, o: int = o) -> str:
+            rotor, other = f"0.0, theta_{j}, w_{j}, 0.0", f"q_{o}, qd_{o}, " * structure.crossed
+            given = (
+                f"{rotor}, {angle}, {rate}, {other}p[{k + RATIO}], time + half, z_{j}, p, int({k + DRIVE})"
+            )
             results = ", ".join(["_", "_", f"gear{tag}", f"joint{tag}", *["_"] * (z + structure.grounded)])
             return f"    {results} = drive({given})"
 

@@ -63,6 +63,15 @@ class Structure:
         return any(effect.port is Port.GROUND_TORQUE for effect in self.effects)
 
     @property
+    def crossed(self) -> bool:
+        """Whether a drive depends on another joint's motion."""
+        return any(effect.crossed for effect in self.effects)
+
+    def other(self, joint: int) -> int:
+        """Return the joint that is the other one for an effect of `joint`."""
+        return (joint + 1) % self.joints
+
+    @property
     def forces(self) -> tuple[Load, ...]:
         """Forces of the laboratory on points of the rig."""
         return tuple(load for load in self.loads if load.effect.port is Port.EXTERNAL_FORCE)
@@ -82,6 +91,12 @@ class Structure:
     def states(self) -> tuple[float, ...]:
         """Initial values of the effects' own states of one drive."""
         return tuple(state.initial for effect in self.effects for state in effect.states)
+
+
+def other_joint(rig: Rig, joint: str) -> str:
+    """Return the joint that is the other one for effects of `joint`: itself, where it is alone."""
+    names = rig.joint_names
+    return names[(names.index(joint) + 1) % len(names)]
 
 
 def structure_of(rig: Rig, effects: Sequence[Effect]) -> Structure:
@@ -106,6 +121,12 @@ def structure_of(rig: Rig, effects: Sequence[Effect]) -> Structure:
     if not any(effect.port is Port.TRANSMISSION for effect in effects):
         raise ConfigError(
             "no effect connects motor and output", where="[model] effects", remedy="add 'flexspline'"
+        )
+    if len(parents) < 2 and (crossed := next((effect.name for effect in effects if effect.crossed), None)):
+        raise ConfigError(
+            f"'{crossed}' depends on another joint, and there is one alone",
+            where="[model] effects",
+            remedy="leave it out",
         )
     loads = tuple(
         Load(effect, links.get(external_of(rig, effect).on, -1))

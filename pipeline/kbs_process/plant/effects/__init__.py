@@ -12,7 +12,7 @@ import re
 from collections.abc import Sequence
 
 from kbs_process.errors import ConfigError, did_you_mean
-from kbs_process.plant.effect import Effect, instance
+from kbs_process.plant.effect import ACTION, Effect, instance
 from kbs_process.plant.effects.air_drag import AIR_DRAG
 from kbs_process.plant.effects.appendage import APPENDAGE
 from kbs_process.plant.effects.asymmetric_coulomb import ASYMMETRIC_COULOMB
@@ -40,12 +40,7 @@ from kbs_process.plant.effects.load_friction import LOAD_FRICTION
 from kbs_process.plant.effects.local_torque import LOCAL_TORQUE
 from kbs_process.plant.effects.lugre import LUGRE
 from kbs_process.plant.effects.mass_shift import MASS_SHIFT
-from kbs_process.plant.effects.measured_law import (
-    GROUND_ANGLE_LAW,
-    GROUND_RATE_LAW,
-    JOINT_ANGLE_LAW,
-    JOINT_RATE_LAW,
-)
+from kbs_process.plant.effects.measured_law import MEASURED as MEASURED_LAWS
 from kbs_process.plant.effects.microstep_error import MICROSTEP_ERROR
 from kbs_process.plant.effects.motor_asymmetry import MOTOR_ASYMMETRY
 from kbs_process.plant.effects.motor_dahl import MOTOR_DAHL
@@ -111,7 +106,7 @@ CATALOGUE: tuple[Effect, ...] = (
 )
 
 # Measured laws, which have no name: a model can contain them, and no search tries them as suspects.
-MEASURED: tuple[Effect, ...] = (JOINT_ANGLE_LAW, JOINT_RATE_LAW, GROUND_ANGLE_LAW, GROUND_RATE_LAW)
+MEASURED: tuple[Effect, ...] = tuple(law.effect for law in MEASURED_LAWS)
 
 _EVERY = (*CATALOGUE, *MEASURED)
 _POSITION = {effect.name: index for index, effect in enumerate(_EVERY)}
@@ -121,7 +116,7 @@ def find(name: str) -> Effect | None:
     """Return the effect of that name; `NAME_2`, `NAME_3`, ... is one more action of the same."""
     if name in _POSITION:
         return _EVERY[_POSITION[name]]
-    again = re.fullmatch(r"(.+)_([2-9])", name)
+    again = re.fullmatch(f"(.+){ACTION}", name)
     if again is None or again[1] not in _POSITION:
         return None
     return instance(_EVERY[_POSITION[again[1]]], int(again[2]))

@@ -1,11 +1,15 @@
-"""Laws that were measured and have no name: a torque over a joint's angle or rate, as a spline's coefficients."""
+"""Laws that were measured and have no name: a torque over a signal of the mechanism, as a spline's coefficients."""
 
 from __future__ import annotations
 
-from kbs_process.plant.effect import Effect, Normal, Parameter, Port
+import math
+from dataclasses import dataclass
+
+from kbs_process.plant.effect import Effect, LogNormal, Normal, Parameter, Port
 
 COEFFICIENTS = 10
 INTERVALS = COEFFICIENTS - 3
+DENSE = 0.05  # of a rate's range: nodes are dense within as much of rest
 
 
 def weight(u: float) -> float:
@@ -15,7 +19,7 @@ def weight(u: float) -> float:
     return (outer * outer * outer - 4.0 * inner * inner * inner) / 6.0
 
 
-def spline(
+def torque(
     x: float,
     low: float,
     high: float,
@@ -30,9 +34,12 @@ def spline(
     c8: float,
     c9: float,
 ) -> float:
-    r"""Cubic spline over `INTERVALS` equal intervals from `low` to `high`, held beyond them.
+    r"""Torque over a signal x: a cubic spline over `INTERVALS` equal intervals from `low` to `high`, held beyond them.
 
-    Equation: $f(x) = \sum_k c_k B(u - k + 1)$, $u = 7 (x - x_0) / (x_1 - x_0)$ within 0 and 7; with equal c it is c.
+    Equation: $T = \sum_k c_k B(u - k + 1)$, $u = 7 (x - x_0) / (x_1 - x_0)$ within 0 and 7; with equal c it is c.
+    Units: that of x (three), N m (ten) -> N m.
+    Validity: between the ends, where it was measured. What jumps, as friction does at rest, is rounded to an interval.
+    Source: C. de Boor, A Practical Guide to Splines (2001), chapter IX.
     """
     u = 7.0 * min(1.0, max(0.0, (x - low) / (high - low)))
     return (
@@ -49,127 +56,128 @@ def spline(
     )
 
 
-def joint_over_angle(
-    joint_angle: float,
-    angle_law_0: float,
-    angle_law_1: float,
-    angle_law_2: float,
-    angle_law_3: float,
-    angle_law_4: float,
-    angle_law_5: float,
-    angle_law_6: float,
-    angle_law_7: float,
-    angle_law_8: float,
-    angle_law_9: float,
-    angle_law_low: float,
-    angle_law_high: float,
+def friction(
+    rate: float,
+    slide: float,
+    x: float,
+    low: float,
+    high: float,
+    c0: float,
+    c1: float,
+    c2: float,
+    c3: float,
+    c4: float,
+    c5: float,
+    c6: float,
+    c7: float,
+    c8: float,
+    c9: float,
 ) -> float:
-    r"""Torque on the output, reacted by the body that carries the motor, over the joint's angle.
+    r"""Torque that opposes a rate by as much as a signal x says.
 
-    Equation: $T = \sum_k c_k B_k(\theta_l)$, $B_k$ cubic B-splines on equal intervals.
-    Units: rad, N m (ten), rad, rad -> N m.
-    Validity: between the two angles, where it was measured; held beyond them.
+    Equation: $T = -\tanh(\omega / \omega_s) \sum_k c_k B_k(x)$, $B_k$ the cubic B-splines of a measured torque.
+    Units: rad/s, rad/s, that of x (three), N m (ten) -> N m.
+    Validity: rates above $\omega_s$, below which it creeps in place of sticking; x between the ends.
     Source: C. de Boor, A Practical Guide to Splines (2001), chapter IX.
     """
-    return spline(
-        joint_angle, angle_law_low, angle_law_high, angle_law_0, angle_law_1, angle_law_2, angle_law_3, angle_law_4,
-        angle_law_5, angle_law_6, angle_law_7, angle_law_8, angle_law_9,
-    )  # fmt: skip
+    return -math.tanh(rate / slide) * torque(x, low, high, c0, c1, c2, c3, c4, c5, c6, c7, c8, c9)
 
 
-def joint_over_rate(
-    joint_rate: float,
-    rate_law_0: float,
-    rate_law_1: float,
-    rate_law_2: float,
-    rate_law_3: float,
-    rate_law_4: float,
-    rate_law_5: float,
-    rate_law_6: float,
-    rate_law_7: float,
-    rate_law_8: float,
-    rate_law_9: float,
-    rate_law_low: float,
-    rate_law_high: float,
+def bent(rate: float, low: float, high: float) -> float:
+    """A rate on the scale of a table: close to rest, where friction changes, its nodes are a hundred times as dense."""
+    return rate / (abs(rate) + DENSE * (high - low))
+
+
+def torque_over_rate(
+    x: float,
+    low: float,
+    high: float,
+    c0: float,
+    c1: float,
+    c2: float,
+    c3: float,
+    c4: float,
+    c5: float,
+    c6: float,
+    c7: float,
+    c8: float,
+    c9: float,
 ) -> float:
-    r"""Torque on the output, reacted by the body that carries the motor, over the joint's rate.
+    r"""Torque over a rate x: a cubic spline whose nodes are dense about rest.
 
-    Equation: $T = \sum_k c_k B_k(\omega_l)$, $B_k$ cubic B-splines on equal intervals.
-    Units: rad/s, N m (ten), rad/s, rad/s -> N m.
-    Validity: between the two rates, where it was measured; held beyond them. A jump at rest is rounded to an interval.
+    Equation: $T = \sum_k c_k B_k(x / (|x| + r))$, $r = (x_1 - x_0) / 20$, $B_k$ those of a measured torque.
+    Units: rad/s (three), N m (ten) -> N m.
+    Validity: between the ends, where it was measured. A jump at rest is rounded to a hundredth of the range.
     Source: C. de Boor, A Practical Guide to Splines (2001), chapter IX.
     """
-    return spline(
-        joint_rate, rate_law_low, rate_law_high, rate_law_0, rate_law_1, rate_law_2, rate_law_3, rate_law_4,
-        rate_law_5, rate_law_6, rate_law_7, rate_law_8, rate_law_9,
-    )  # fmt: skip
+    u, first, last = bent(x, low, high), bent(low, low, high), bent(high, low, high)
+    return torque(u, first, last, c0, c1, c2, c3, c4, c5, c6, c7, c8, c9)
 
 
-def ground_over_angle(
-    joint_angle: float,
-    ground_angle_law_0: float,
-    ground_angle_law_1: float,
-    ground_angle_law_2: float,
-    ground_angle_law_3: float,
-    ground_angle_law_4: float,
-    ground_angle_law_5: float,
-    ground_angle_law_6: float,
-    ground_angle_law_7: float,
-    ground_angle_law_8: float,
-    ground_angle_law_9: float,
-    ground_angle_law_low: float,
-    ground_angle_law_high: float,
+def friction_over_rate(
+    rate: float,
+    slide: float,
+    x: float,
+    low: float,
+    high: float,
+    c0: float,
+    c1: float,
+    c2: float,
+    c3: float,
+    c4: float,
+    c5: float,
+    c6: float,
+    c7: float,
+    c8: float,
+    c9: float,
 ) -> float:
-    r"""Torque on the output, reacted by the laboratory, over the joint's angle.
+    r"""Torque that opposes a rate by as much as another rate x says.
 
-    Equation: $T = \sum_k c_k B_k(\theta_l)$, $B_k$ cubic B-splines on equal intervals.
-    Units: rad, N m (ten), rad, rad -> N m.
-    Validity: between the two angles, where it was measured; held beyond them.
+    Equation: $T = -\tanh(\omega / \omega_s) \sum_k c_k B_k(x / (|x| + r))$, $r = (x_1 - x_0) / 20$.
+    Units: rad/s (five), N m (ten) -> N m.
+    Validity: rates above $\omega_s$, below which it creeps in place of sticking; x between the ends.
     Source: C. de Boor, A Practical Guide to Splines (2001), chapter IX.
     """
-    return spline(
-        joint_angle, ground_angle_law_low, ground_angle_law_high, ground_angle_law_0, ground_angle_law_1,
-        ground_angle_law_2, ground_angle_law_3, ground_angle_law_4, ground_angle_law_5, ground_angle_law_6,
-        ground_angle_law_7, ground_angle_law_8, ground_angle_law_9,
-    )  # fmt: skip
-
-
-def ground_over_rate(
-    joint_rate: float,
-    ground_rate_law_0: float,
-    ground_rate_law_1: float,
-    ground_rate_law_2: float,
-    ground_rate_law_3: float,
-    ground_rate_law_4: float,
-    ground_rate_law_5: float,
-    ground_rate_law_6: float,
-    ground_rate_law_7: float,
-    ground_rate_law_8: float,
-    ground_rate_law_9: float,
-    ground_rate_law_low: float,
-    ground_rate_law_high: float,
-) -> float:
-    r"""Torque on the output, reacted by the laboratory, over the joint's rate.
-
-    Equation: $T = \sum_k c_k B_k(\omega_l)$, $B_k$ cubic B-splines on equal intervals.
-    Units: rad/s, N m (ten), rad/s, rad/s -> N m.
-    Validity: between the two rates, where it was measured; held beyond them. A jump at rest is rounded to an interval.
-    Source: C. de Boor, A Practical Guide to Splines (2001), chapter IX.
-    """
-    return spline(
-        joint_rate, ground_rate_law_low, ground_rate_law_high, ground_rate_law_0, ground_rate_law_1,
-        ground_rate_law_2, ground_rate_law_3, ground_rate_law_4, ground_rate_law_5, ground_rate_law_6,
-        ground_rate_law_7, ground_rate_law_8, ground_rate_law_9,
-    )  # fmt: skip
+    return -math.tanh(rate / slide) * torque_over_rate(x, low, high, c0, c1, c2, c3, c4, c5, c6, c7, c8, c9)
 
 
 REFERENCE = "C. de Boor, A Practical Guide to Splines (2001), chapter IX"
 
 
-def _numbers(prefix: str, unit: str, farthest: float) -> tuple[Parameter, ...]:
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """A measured law: what it is over, and the rate that it opposes, if it is a friction."""
+
+    effect: Effect
+    regressor: str  # signal
+    opposed: str = ""  # signal
+
+    @property
+    def of_rate(self) -> bool:
+        """Whether it is over a rate, and its nodes are dense about rest."""
+        return self.regressor.endswith("rate")
+
+    @property
+    def words(self) -> str:
+        """What it is, for tables."""
+        return f"{'friction' if self.opposed else 'curve'} over {self.regressor.replace('_', ' ')}"
+
+
+SLIDES = {"joint_rate": 5e-4, "rotor_rate": 0.05}  # rad/s at which a measured friction is full
+UNITS = {"angle": "rad", "rate": "rad/s"}
+
+
+def unit_of(regressor: str) -> str:
+    """Return the unit of a signal that a law is over."""
+    return UNITS[regressor.rpartition("_")[2]]
+
+
+def _over(regressor: str, port: Port, law: str, opposed: str = "") -> Measured:
+    """A law with parameters named after it."""
+    unit = unit_of(regressor)
     coefficients = tuple(
         Parameter(
-            f"{prefix}_{k}",
+            f"{law}_{k}",
             "N m",
             Normal(0.0, 1.0),
             "about the torque at that node of the table, the first and the last one outside it",
@@ -178,34 +186,36 @@ def _numbers(prefix: str, unit: str, farthest: float) -> tuple[Parameter, ...]:
         )
         for k in range(COEFFICIENTS)
     )
-    ends = (("low", -1.0), ("high", 1.0))
-    return coefficients + tuple(
-        Parameter(
-            f"{prefix}_{end}", unit, Normal(sign, 1.0), "end of what was measured", (-farthest, farthest)
-        )
-        for end, sign in ends
-    )
+    shape = [
+        Parameter(f"{law}_{end}", unit, Normal(sign, 1.0), "end of what was measured", (-1e2, 1e2))
+        for end, sign in (("low", -1.0), ("high", 1.0))
+    ]
+    wires = [("x", regressor), *((f"c{k}", f"{law}_{k}") for k in range(COEFFICIENTS))]
+    wires += [(end, f"{law}_{end}") for end in ("low", "high")]
+    if opposed:
+        slides = LogNormal(SLIDES[opposed], 1.0)
+        shape.append(Parameter(f"{law}_slide", "rad/s", slides, "rate of full friction", (1e-6, 10.0)))
+        wires += [("rate", opposed), ("slide", f"{law}_slide")]
+    equations = (friction, friction_over_rate) if opposed else (torque, torque_over_rate)
+    effect = Effect(
+        f"{port.name.lower().removesuffix('_torque')}_{law.removeprefix('ground_').removeprefix('motor_')}",
+        port, equations[unit == UNITS["rate"]], (*coefficients, *shape), REFERENCE, wires=tuple(wires),
+    )  # fmt: skip
+    return Measured(effect, regressor, opposed)
 
 
-_OVER_ANGLE, _OVER_RATE = ("rad", 1e2), ("rad/s", 1e2)
-
-JOINT_ANGLE_LAW = Effect(
-    "joint_angle_law", Port.JOINT_TORQUE, joint_over_angle, _numbers("angle_law", *_OVER_ANGLE), REFERENCE
-)
-JOINT_RATE_LAW = Effect(
-    "joint_rate_law", Port.JOINT_TORQUE, joint_over_rate, _numbers("rate_law", *_OVER_RATE), REFERENCE
-)
-GROUND_ANGLE_LAW = Effect(
-    "ground_angle_law",
-    Port.GROUND_TORQUE,
-    ground_over_angle,
-    _numbers("ground_angle_law", *_OVER_ANGLE),
-    REFERENCE,
-)
-GROUND_RATE_LAW = Effect(
-    "ground_rate_law",
-    Port.GROUND_TORQUE,
-    ground_over_rate,
-    _numbers("ground_rate_law", *_OVER_RATE),
-    REFERENCE,
+_JOINT, _MOTOR, _GROUND = Port.JOINT_TORQUE, Port.MOTOR_TORQUE, Port.GROUND_TORQUE
+MEASURED: tuple[Measured, ...] = (
+    _over("joint_angle", _JOINT, "angle_law"),
+    _over("joint_rate", _JOINT, "rate_law"),
+    _over("other_angle", _JOINT, "other_angle_law"),
+    _over("other_rate", _JOINT, "other_rate_law"),
+    _over("joint_angle", _JOINT, "friction_angle_law", "joint_rate"),
+    _over("other_rate", _JOINT, "friction_other_rate_law", "joint_rate"),
+    _over("joint_angle", _GROUND, "ground_angle_law"),
+    _over("joint_rate", _GROUND, "ground_rate_law"),
+    _over("other_angle", _GROUND, "ground_other_angle_law"),
+    _over("rotor_rate", _MOTOR, "motor_rate_law"),
+    _over("joint_angle", _MOTOR, "motor_friction_angle_law", "rotor_rate"),
+    _over("other_rate", _MOTOR, "motor_friction_other_rate_law", "rotor_rate"),
 )

@@ -1,0 +1,109 @@
+"""All orders of a law that has orders: a ripple is seldom one sine, and what is left of it would hide what is not.
+
+Along the linear plant the orders of a law's grid, those that residuals proposed among them, are added one by one to the
+best: that one next which, all amplitudes fitted anew, gains most.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kbs_process.diagnosis.gls import Score, Sums, score
+from kbs_process.diagnosis.screen import Bench, Catalogued, Found
+from kbs_process.diagnosis.suspects import Candidate, free_actions
+from kbs_process.diagnosis.tails import log_tail
+from kbs_process.diagnosis.thresholds import FALSE_ALARM, LEAST_RHO, SHADE
+from kbs_process.diagnosis.view import View
+from kbs_process.plant.effect import Effect
+from kbs_process.plant.effects import find
+
+
+def with_orders(view: View, found: Found) -> Found:
+    """A suspect of the screen with all orders that it needs; itself, if its law has none or one alone does.
+
+    Each has to gain what a suspect has to, after as many trials as it was chosen from, and to be no smaller a part of
+    the whole than what a formula may miss of nature's.
+    """
+    suspect = found.suspect
+    if not (isinstance(suspect, Catalogued) and isinstance(suspect.candidate.effect, Effect)):
+        return found
+    order, rest = _apart(suspect.candidate)
+    others = [
+        one
+        for one in view.suspects
+        if order
+        and isinstance(one, Catalogued)
+        and one.family == suspect.family
+        and _apart(one.candidate)[1] == rest
+        and one.candidate.shape != suspect.candidate.shape
+    ]
+    actions = _free(suspect)
+    chosen, best = _added(view.bench, suspect, others, found.score, len(actions))
+    if not chosen:
+        return found
+    gained = best.gain - found.score.gain
+    spent = 0.5 * (best.rank - found.score.rank) * np.log(view.bench.background.rows)
+    again = tuple(_as(action, others[k].candidate) for action, k in zip(actions, chosen, strict=False))
+    whole = replace(suspect, candidate=replace(suspect.candidate, again=again))
+    return replace(
+        found, suspect=whole, score=best, log_evidence=found.log_evidence + 0.5 * gained - float(spent)
+    )
+
+
+def _apart(candidate: Candidate) -> tuple[str, dict[str, float]]:
+    """The name of a law's order, "" without one, and the rest of its shape."""
+    rest = dict(candidate.shape)
+    name = next((name for name in rest if "order" in name), "")
+    rest.pop(name, None)
+    return name, rest
+
+
+def _added(
+    bench: Bench, suspect: Catalogued, others: list[Catalogued], first: Score, most: int
+) -> tuple[list[int], Score]:
+    """Which of the `others`, at `most` so many, belong to a suspect, and what all of them do."""
+    if not others:
+        return [], first
+    sums = Sums.over(bench.background, bench.columns([suspect, *others]))
+    m = len(suspect.amplitudes)
+    chosen: list[int] = []
+    best, rows = first, bench.background.rows
+    excess = sum(float(z @ z) for z in bench.background.z.values()) / rows
+    while len(chosen) < min(len(others), most):
+        left = [k for k in range(len(others)) if k not in chosen]
+        tried = [score(bench.background, sums.pick(_columns([-1, *chosen, k], m))) for k in left]
+        place = int(np.argmax([one.gain for one in tried]))
+        gained, rank = tried[place].gain - best.gain, tried[place].rank - best.rank
+        chance = log_tail(max(gained, 0.0), max(rank, 1)) + np.log(len(left))
+        # What is left beside all others counts as noise: it has some of every order.
+        level = max(1.0, excess - tried[place].gain / rows)
+        least = max(level * LEAST_RHO**2, SHADE**2 * first.gain)
+        if rank < 1 or not gained > least or chance > np.log(FALSE_ALARM):
+            break
+        chosen.append(left[place])
+        best = tried[place]
+    return chosen, best
+
+
+def _columns(members: list[int], m: int) -> NDArray[np.intp]:
+    """Places of the amplitudes of some suspects, -1 the first."""
+    return np.concatenate([np.arange((k + 1) * m, (k + 2) * m) for k in members])
+
+
+def _free(suspect: Catalogued) -> list[Effect]:
+    """Further actions of a suspect's law that it can have at its site."""
+    hypothesis, candidate = suspect.scene.hypothesis, suspect.candidate
+    law = find(candidate.name)
+    assert law is not None
+    free = free_actions(law, hypothesis.rig, candidate.site, hypothesis.effects)
+    return [action for action in free if action.name != candidate.effect.name]
+
+
+def _as(action: Effect, other: Candidate) -> Candidate:
+    """A candidate as another action of its law, with names of its own."""
+    names = [entry.name for entry in action.parameters if entry.role == "shape"]
+    shape = zip(names, (value for _, value in other.shape), strict=True)
+    return Candidate(action, other.site, tuple(shape))

@@ -1,0 +1,88 @@
+"""A ripple that is no sine: its orders are found together, and are put into the plant as actions of one law."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import bench
+import numpy as np
+import pytest
+
+from kbs_process.diagnosis.hypothesis import Hypothesis, predict
+from kbs_process.diagnosis.joint import with_extra
+from kbs_process.diagnosis.orders import with_orders
+from kbs_process.diagnosis.scene import Scene
+from kbs_process.diagnosis.screen import Bench, Catalogued, screen
+from kbs_process.diagnosis.suspects import Candidate
+from kbs_process.diagnosis.tryout import extra_of, identity
+from kbs_process.diagnosis.view import View
+from kbs_process.plant.attach import attach
+from kbs_process.plant.effects import find, select
+from kbs_process.stages.output_error import Scalar
+
+GRID = (150.0, 250.0, 350.0, 500.0, 620.0, 750.0, 900.0)
+RIPPLE = {250.0: 0.3, 500.0: -0.2, 750.0: 0.15}  # N m, sines
+
+
+@pytest.fixture(scope="module")
+def view() -> View:
+    """What is believed where the elevation has a ripple of three orders, and its orders alone are suspects."""
+    made = bench.experiment(bench.rig(), ("fit", "fit"), 8)
+    names = ["joint_order", "joint_order_2", "joint_order_3"]
+    truth = made.rig
+    for effect, (order, size) in zip(select(names), RIPPLE.items(), strict=True):
+        sine, cosine, shape = (entry.name for entry in effect.parameters)
+        truth = attach(truth, effect, {sine: size, cosine: 0.0, shape: order}, joints=["el"])
+    bare = predict(Hypothesis(made.rig, made.effects), made, 0).values
+    added = predict(Hypothesis(truth, (*made.effects, *names)), made, 0).values - bare
+    trials = tuple(replace(t, measured=t.measured + added * t.valid[:, None]) for t in made.trials)
+    here = bench.standing(replace(made, trials=trials), (Scalar("body.antenna.cog", (0,)),))
+    scene = Scene.of(here.known.experiment, here.hypothesis, here.predicted)
+    along = Bench.of(here.known, scene)
+    law = find("joint_order")
+    assert law is not None
+    suspects = tuple(Catalogued(Candidate(law, "el", (("joint_order", order),)), scene) for order in GRID)
+    return View(here, along, scene, suspects, screen(along, suspects))
+
+
+def test_all_orders_are_found_and_no_other(view: View) -> None:
+    (alone,) = view.screening.candidates
+    whole = with_orders(view, alone)
+    assert isinstance(whole.suspect, Catalogued)
+    print(view.standing.known.level, alone.score.gain, whole.score.gain)
+    found = [value for action in whole.suspect.candidate.actions for _, value in action.shape]
+    assert sorted(found) == sorted(RIPPLE)
+    assert whole.score.gain > 1.2 * alone.score.gain
+    assert whole.log_evidence > alone.log_evidence
+    assert identity(whole.suspect) == identity(alone.suspect)
+    again = with_orders(replace(view, suspects=view.suspects[:1]), alone)
+    assert again is alone or sorted(again.suspect.amplitudes) != sorted(whole.suspect.amplitudes)
+
+
+def test_in_the_plant_each_has_its_size(view: View) -> None:
+    whole = with_orders(view, view.screening.candidates[0])
+    assert isinstance(whole.suspect, Catalogued)
+    extra = extra_of(whole, view.standing, view.bench, view.scene)
+    after = with_extra(view.standing, extra, bench.serial(view.standing.known.experiment)).known
+    assert after.level < 1.02 < 1.2 < view.standing.known.level
+    numbers = dict(zip(after.names, after.value, strict=True))
+    sigmas = dict(zip(after.names, after.sigma, strict=True))
+    for action in whole.suspect.candidate.actions:
+        sine, cosine = (f"joint.el.drive.{entry.name}" for entry in action.amplitudes)
+        ((_, order),) = action.shape
+        assert abs(numbers[sine] - RIPPLE[order]) < 5.0 * sigmas[sine]
+        assert abs(numbers[cosine]) < 5.0 * sigmas[cosine]
+        assert sigmas[sine] < 0.2 * abs(RIPPLE[order])
+
+
+def test_noise_has_no_orders(view: View) -> None:
+    """Beside a residual that is the floor's, as beside one that is large and has none."""
+    rng = np.random.default_rng(1)
+    found = view.screening.candidates[0]
+    for size in (1.0, 30.0):
+        z = {k: size * rng.standard_normal(len(one)) for k, one in view.bench.background.z.items()}
+        noisy = replace(view.bench, background=replace(view.bench.background, z=z))
+        best = screen(noisy, view.suspects).candidates[0]
+        assert (
+            with_orders(replace(view, bench=noisy), replace(found, score=best.score)).suspect is found.suspect
+        )
