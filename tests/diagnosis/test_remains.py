@@ -35,7 +35,7 @@ def seen(before: Standing) -> tuple[View, Standing]:
     after = with_extra(
         before, extra_of(found.candidates[0], before, tried, scene), bench.serial(before.known.experiment)
     )
-    return View(before, tried, scene, found), after
+    return View(before, tried, scene, (), found), after
 
 
 def weaker(made: Experiment, cabled: Experiment, share: float) -> Experiment:
@@ -91,6 +91,7 @@ def test_a_law_that_leaves_most_follows_something_else(cabled: Experiment, made:
     before, after = standing(cabled), standing(weaker(made, cabled, float(1.0 - share)))
     (reason,) = too_little(before, after, floor)
     assert "follows what something else does" in reason
+    assert too_little(before, after, floor, more=True) == ()  # one more action of what that is
     assert missed(before.known, after.known) == ()  # an eighth of what was not fitted is enough
 
 
