@@ -110,4 +110,6 @@ ROUNDS: Final = 5  # finds in one campaign at most
 RIVALS: Final = 4.65  # rho_delta: P(wrong) = Q(rho_delta / 2) = 1 %
 
 # -- measured law --------------------------------------------------------------------------------------------------
-LAW_VARIANCE: Final = 0.5  # share of the residual's excess on trials not used that a curve has to explain
+# Share of the residual's excess on trials not used that a curve has to explain, TOLERATED aside. On a development case
+# (friction by the other axis' rate) the right one explained 0.46, a wrong one 0.28.
+LAW_VARIANCE: Final = 0.4
