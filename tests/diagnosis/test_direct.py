@@ -9,13 +9,17 @@ import numpy as np
 import pytest
 
 from kbs_process.diagnosis import direct
-from kbs_process.diagnosis.hypothesis import Tapped
+from kbs_process.diagnosis.curves import CurveSuspect, series
+from kbs_process.diagnosis.hypothesis import Hypothesis, Tapped
 from kbs_process.diagnosis.inlets import WRENCH_PORT, Inlet
+from kbs_process.diagnosis.measured import inserted
+from kbs_process.diagnosis.scene import Scene
 from kbs_process.diagnosis.signature import inputs
 from kbs_process.diagnosis.suspects import Candidate, felt_from_the_ground
 from kbs_process.plant.attach import attach
 from kbs_process.plant.effect import Port
 from kbs_process.plant.effects import CATALOGUE
+from kbs_process.plant.effects.measured_law import MEASURED, Measured
 from kbs_process.plant.moved import added_loads, grounded, pressed
 from kbs_process.plant.rigid import axis_of, kinematics, loads
 from kbs_process.rig.model import Effort, Rig
@@ -25,6 +29,8 @@ from plant.plant_rigs import body, joint, quantity
 from plant.plant_rigs import rig as plain_rig
 
 RATE = 100.0
+_TAPPED = ("rotor_angle", "rotor_rate", "joint_angle", "joint_rate")
+COEFFICIENTS = np.array([0.3, 0.5, -0.2, 0.1, 0.4, 0.2, -0.3, 0.1, 0.6, 0.2])
 GAIN = 2.0
 
 
@@ -138,3 +144,25 @@ def test_what_no_transducer_reads_is_no_torque_of_the_ground() -> None:
     assert felt_from_the_ground(here) >= {"az", "el"}
     assert not felt_from_the_ground(replace(here, transducer=replace(here.transducer, channels=())))
     assert felt_from_the_ground(chain("b", -1)) & {"a", "b", "c"} == {"c"}
+
+
+@pytest.mark.parametrize("law", MEASURED, ids=lambda law: law.effect.name)
+def test_a_curve_s_signature_is_what_it_adds_to_the_loads(law: Measured) -> None:
+    """Of each joint, over its own motion and the other one's."""
+    here, (q, qd) = rig(), motion()
+    names = tuple(f"{of}.{joint}" for of in _TAPPED for joint in here.joint_names)
+    ratio = float(here.joints[0].drive.ratio)  # type: ignore[union-attr]
+    tapped = Tapped(RATE, names, np.hstack([ratio * q, ratio * qd, q, qd]))
+    hypothesis = Hypothesis(here, ())
+    scene = object.__new__(Scene)
+    for name, value in {"hypothesis": hypothesis, "signals": {0: tapped}, "paths": {}}.items():
+        object.__setattr__(scene, name, value)
+    for site in here.joint_names:
+        swept = series(scene, 0, site, law.regressor)
+        curve = CurveSuspect(scene, law, site, (float(swept.min()), float(swept.max())))
+        expected = direct.respond(here, curve.inputs(0), q) @ COEFFICIENTS
+        acting, _ = inserted(hypothesis, law, site, curve.ends, COEFFICIENTS, 0.1 * COEFFICIENTS)
+        added = added_loads(acting.rig, [law.effect], q, qd, 1.0 / RATE)
+        size = np.max(np.abs(added))
+        assert size > 0.01
+        np.testing.assert_allclose(expected, added, atol=0.03 * size)

@@ -51,7 +51,8 @@ def added_loads(rig: Rig, effects: Sequence[Effect], q: Array, qd: Array, dt: fl
             if not all(entry.name in known for entry in effect.parameters):
                 continue
             if effect.port is Port.GROUND_TORQUE or (effect.port in RIGID and joint.effort is not None):
-                units = unit_torques(effect, joint, q[:, index], known, dt)
+                other = q[:, (index + 1) % len(rig.joints)]
+                units = unit_torques(effect, joint, q[:, index], known, dt, other)
                 amplitudes = [known[entry.name] for entry in effect.parameters if entry.role == "amplitude"]
                 torque = instants(units @ np.array(amplitudes))
                 if effect.port is Port.GROUND_TORQUE:
@@ -117,12 +118,16 @@ def reading(joint: Joint, port: Port) -> float:
     return -ratio / float(joint.effort.gain)
 
 
-def unit_torques(effect: Effect, joint: Joint, q: Array, values: Mapping[str, float], dt: float) -> Array:
+def unit_torques(
+    effect: Effect, joint: Joint, q: Array, values: Mapping[str, float], dt: float, other: Array | None = None
+) -> Array:
     """Means over the samples' intervals of an effect's torque, (n, amplitudes), for 1 of each amplitude.
 
-    `values` are the parameters that are no amplitudes. The rotor turns with the joint's coordinate q (n,).
+    `values` are the parameters that are no amplitudes. The rotor turns with the joint's coordinate q (n,); `other` is
+    that of the other joint, where there is one.
     """
     ratio = 1.0 if joint.drive is None else float(joint.drive.ratio)
-    turned = {"joint_angle": q, "rotor_angle": ratio * q, "time": dt * np.arange(len(q), dtype=np.float64)}
+    turned = {"joint_angle": q, "rotor_angle": ratio * q, "other_angle": q if other is None else other}
+    turned["time"] = dt * np.arange(len(q), dtype=np.float64)
     signals = {name: turned[name] for name in signals_of(effect)}
     return along(effect, signals, {**values, "ratio": ratio}, dt)[:, :, 0]
