@@ -1,0 +1,35 @@
+"""Lines of a residual along an angle: the power at each order is that of the sum over all samples."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from kbs_process.diagnosis.proposals import _along
+
+
+@pytest.mark.parametrize(
+    "orders", [np.arange(0.25, 60.0, 0.25), np.arange(7.3, 90.0, 0.61), np.arange(1.0, 3.0)]
+)
+def test_power_along_orders_is_that_of_the_sum(orders: np.ndarray) -> None:
+    rng = np.random.default_rng(4)
+    angle = np.cumsum(rng.normal(0.01, 0.02, 4000)) - 11.0
+    line = orders[len(orders) // 2]
+    series = rng.standard_normal((4000, 3))
+    series[:, 1] += 0.3 * np.sin(line * angle + 0.4)
+    x = series / series.std(axis=0)
+    expected = np.max(np.abs(np.exp(-1j * np.outer(orders, angle)) @ x) ** 2, axis=1) / len(angle)
+    found = _along(orders, angle, series)
+    assert orders[found.argmax()] == orders[expected.argmax()] == line
+    assert found.max() == pytest.approx(expected.max(), rel=0.03)
+    # Noise of other orders, which a cell of the angle adds to each.
+    np.testing.assert_allclose(found, expected, atol=0.35 + 0.03 * expected.max())
+
+
+def test_a_slow_and_a_fast_half_count_alike() -> None:
+    """Samples are weighed as they are, wherever they are dense."""
+    angle = np.concatenate([np.linspace(0.0, 1.0, 3000), np.linspace(1.0, 12.0, 1000)])
+    series = np.cos(5.0 * angle)[:, None]
+    orders = np.arange(1.0, 30.0)
+    expected = np.abs(np.exp(-1j * np.outer(orders, angle)) @ (series[:, 0] / series.std())) ** 2 / len(angle)
+    np.testing.assert_allclose(_along(orders, angle, series), expected, rtol=0.1, atol=0.01 * expected.max())
