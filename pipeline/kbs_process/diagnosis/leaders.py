@@ -24,7 +24,7 @@ from kbs_process.diagnosis.race import own_of, raced
 from kbs_process.diagnosis.rivals import probabilities
 from kbs_process.diagnosis.screen import Bench, Catalogued, Found, Suspect
 from kbs_process.diagnosis.settling import resettled
-from kbs_process.diagnosis.shapes import bettered
+from kbs_process.diagnosis.shapes import bettered, possible
 from kbs_process.diagnosis.side_by_side import side_by_side
 from kbs_process.diagnosis.suspects import BY
 from kbs_process.diagnosis.thresholds import (
@@ -60,7 +60,9 @@ def leaders(view: View, among: Callable[[Found], bool] = lambda _: True) -> tupl
     worth = [found for found in able if found.score.gain >= least]
     shaped = side_by_side(partial(bettered, view.bench), worth)
     able = [*(with_orders(view, one) for one in shaped), *(one for one in able if one not in worth)]
-    able.sort(key=lambda found: -found.log_evidence)
+    able = sorted(filter(possible, able), key=lambda found: -found.log_evidence)
+    if not able:
+        return [], []
     bound = (1.0 - LEAD) * able[0].score.gain if view.ordered else 0.0
     first = various([found for found in able if found.score.gain >= bound or found is able[0]])[:LEADERS]
     return first, [found for found in able if found not in first][:SECOND]

@@ -156,10 +156,19 @@ def along(bench: Bench, suspect: Catalogued, amplitude: Array, drive: int) -> Ar
 
 
 def _gain(suspect: Catalogued, found: Score) -> float:
-    """What a suspect does; less than nothing with a lone amplitude of a sign that it has not."""
-    if len(found.amplitude) == 1 and suspect.candidate.amplitudes[0].bounds[0] == 0.0:
-        return float(np.copysign(found.gain, found.amplitude[0]))
-    return found.gain
+    """What a suspect does; less than nothing with a sign that it has not."""
+    return -found.gain if _reversed(suspect, found) else found.gain
+
+
+def _reversed(suspect: Catalogued, found: Score) -> bool:
+    """Whether a lone amplitude has a sign that its law has not: no inertia is less than none."""
+    lone = len(found.amplitude) == 1 and suspect.candidate.amplitudes[0].bounds[0] == 0.0
+    return lone and float(found.amplitude[0]) < 0.0
+
+
+def possible(found: Found) -> bool:
+    """Whether a suspect of the screen has a sign that its law may have."""
+    return not (isinstance(found.suspect, Catalogued) and _reversed(found.suspect, found.score))
 
 
 def _at(suspect: Catalogued, free: Sequence[Bend], steps: Array) -> Catalogued:

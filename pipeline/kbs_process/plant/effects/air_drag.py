@@ -31,7 +31,7 @@ AIR_DRAG = Effect(
     port=Port.EXTERNAL_FORCE,
     equation=force,
     parameters=(
-        Parameter("air_drag", "N", Normal(0.0, 0.1), "drag at 0.01 m/s", (-100.0, 100.0), role="amplitude"),
+        Parameter("air_drag", "N", Normal(0.0, 0.1), "drag at 0.01 m/s", (0.0, 100.0), role="amplitude"),
         Parameter("air_drag_power", "1", LogNormal(2.0, 0.15), "power of the speed", (1.0, 3.0)),
     ),
     reference="S. F. Hoerner, Fluid-Dynamic Drag (1965), chapters 2 and 3",

@@ -36,7 +36,7 @@ APPENDAGE = Effect(
     equation=torque,
     parameters=(
         Parameter(
-            "sway_inertia", "kg m^2", Normal(0.0, 0.1), "inertia of the mode", (-10.0, 10.0), role="amplitude"
+            "sway_inertia", "kg m^2", Normal(0.0, 0.1), "inertia of the mode", (0.0, 10.0), role="amplitude"
         ),
         Parameter(
             "sway_frequency",

@@ -26,7 +26,7 @@ BACKLASH = Effect(
     port=Port.TRANSMISSION,
     equation=torque,
     parameters=(
-        Parameter("lost_motion", "rad", Normal(0.0, 1e-4), "half the play", (-0.01, 0.01), role="amplitude"),
+        Parameter("lost_motion", "rad", Normal(0.0, 1e-4), "half the play", (0.0, 0.01), role="amplitude"),
         Parameter(
             "soft_zone",
             "rad",
