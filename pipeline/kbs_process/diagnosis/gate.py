@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import norm
 
 from kbs_process.diagnosis.gls import Background
@@ -26,6 +27,8 @@ from kbs_process.diagnosis.thresholds import (
     LEAST_RHO,
 )
 from kbs_process.signals.records import Array
+
+_ROUNDING = 1e-12  # of a variance, which a difference of two may lose
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,14 +57,17 @@ class Gate:
         return replace(self, passed=self.passed and not reasons, reasons=(*self.reasons, *reasons))
 
 
-def gate(before: Known, after: Known, coefficients: Sequence[int]) -> Gate:
-    """Judge the numbers `coefficients` of `after`, the amplitudes of a law that `before` is without."""
+def gate(before: Known, after: Known, coefficients: Sequence[int], shapes: Sequence[int] = ()) -> Gate:
+    """Judge the numbers `coefficients` of `after`, the amplitudes of a law that `before` is without.
+
+    Its `shapes` count as they are: what makes up for an amplitude, as the lever of a force does, says nothing against
+    it, and a law of no amplitude has none.
+    """
     experiment = after.experiment
     held_out = bool(experiment.held_out)
     folds = _held_out(before, after) if held_out else _left_out(before, after)
     index = np.asarray(coefficients)
-    a, C = after.value[index], after.covariance[np.ix_(index, index)]
-    sigmas = _sigmas(a, C)
+    sigmas = _sigmas(after.value[index], _beside(after.covariance, index, np.asarray(shapes, dtype=np.intp)))
     white = whiteness(before), whiteness(after)
     reasons = []
     # Written so that what is no number, of a plant that diverged, is refused.
@@ -87,6 +93,17 @@ def worsened(folds: Sequence[Fold]) -> list[str]:
     """Trials that are predicted worse, by more than chance does it and than is little beside what all gain."""
     allowed = max(GATE_WORSE * abs(sum(fold.gain for fold in folds)), GATE_GAIN)
     return [fold.trial for fold in folds if not fold.gain > -allowed]
+
+
+def _beside(C: Array, index: NDArray[np.intp], held: NDArray[np.intp]) -> Array:
+    """Covariance of some numbers where others are `held`: C_ii - C_ih C_hh^+ C_hi, all other numbers free."""
+    own, across = C[np.ix_(index, index)], C[np.ix_(index, held)]
+    if not len(held) or not np.isfinite(C).all():
+        return np.asarray(own)
+    size = 1.0 / np.sqrt(np.maximum(np.diag(C)[held], 1e-300))
+    scaled = C[np.ix_(held, held)] * np.outer(size, size)
+    left = own - (across * size) @ np.linalg.lstsq(scaled, (across * size).T, rcond=1e-10)[0]
+    return np.asarray(left + _ROUNDING * np.diag(np.diag(own)))
 
 
 def _sigmas(a: Array, C: Array) -> float:

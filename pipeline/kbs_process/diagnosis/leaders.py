@@ -111,7 +111,8 @@ def gated(found: Found, before: Standing, after: Standing, own: Own) -> Gate:
     """The gate's verdict on a law that `after` has and `before` is without; sizes have to be such as it may have."""
     known = after.known
     places = [known.names.index(name) for name in own.amplitudes]
-    verdict = gate(before.known, known, places)
+    shapes = [known.names.index(name) for name in own.names if name not in own.amplitudes]
+    verdict = gate(before.known, known, places, shapes)
     # What minima of the known parameters leave differs, and is no law's.
     share = explained_share(before.known, known, beyond=TOLERATED)
     if isinstance(found.suspect, CurveSuspect) and share is not None and not share >= LAW_VARIANCE:
