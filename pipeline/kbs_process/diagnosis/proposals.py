@@ -9,6 +9,7 @@ from scipy.fft import fft, next_fast_len
 
 from kbs_process.diagnosis.known import Known
 from kbs_process.diagnosis.scene import Scene
+from kbs_process.diagnosis.side_by_side import side_by_side
 from kbs_process.diagnosis.sweeps import sweeping
 from kbs_process.diagnosis.thresholds import LINE_ALPHA, LINES
 from kbs_process.signals.records import Array
@@ -52,11 +53,11 @@ def proposed(known: Known, scene: Scene) -> dict[str, tuple[float, ...]]:
 def _sweep(known: Known) -> tuple[float, float] | None:
     """Frequency at the start and sweep of the strongest tone of all recordings that runs up or down."""
     experiment = known.experiment
-    tones = [
-        tone
-        for k in experiment.fit
-        if (tone := sweeping(_in_time(known, k), experiment.dt, experiment.highest_Hz)) is not None
-    ]
+
+    def tone_of(k: int) -> tuple[float, float, float] | None:
+        return sweeping(_in_time(known, k), experiment.dt, experiment.highest_Hz)
+
+    tones = [tone for tone in side_by_side(tone_of, experiment.fit) if tone is not None]
     shortest = min(len(experiment.trials[k].valid) for k in experiment.fit) * experiment.dt
     slow = _TURNS / shortest
     tones = [tone for tone in tones if min(tone[1], tone[1] + tone[2] * shortest) > slow]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.fft import fft, next_fast_len
 from scipy.optimize import minimize
 
 from kbs_process.diagnosis.tails import log_tail
@@ -27,22 +28,26 @@ def sweeping(z: Array, dt: float, highest_Hz: float) -> tuple[float, float, floa
     n = len(z)
     t = np.arange(n) * dt
     length = n * dt
-    size = _PADDED * n
-    f = np.fft.fftfreq(size, dt)
-    inside = (f > 0.0) & (f < highest_Hz)
+    size = next_fast_len(_PADDED * n)
+    channels = np.ascontiguousarray(z.T)
+    inside = np.arange(1, int(np.ceil(highest_Hz * size * dt)))
+    f = inside / (size * dt)
 
-    def strongest(sweep: float) -> tuple[float, float]:
-        turned = z * np.exp(-1j * np.pi * sweep * t**2)[:, None]
-        power = np.sum(np.abs(np.fft.fft(turned, size, axis=0)[inside]) ** 2, axis=1)
-        peak = int(np.argmax(power))
-        return float(power[peak]), float(f[inside][peak])
+    def strongest(sweep: float) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Power and frequency of a tone with that sweep, and with the opposite one: z is real, and has it at -f."""
+        turned = fft(channels * np.exp(-1j * np.pi * sweep * t**2), size, axis=1)
+        power = np.sum(turned.real**2 + turned.imag**2, axis=0)
+        sides = power[inside], power[size - inside]
+        up, down = ((float(side.max()), float(f[side.argmax()])) for side in sides)
+        return up, down
 
     count = min(_MOST, int(np.ceil(_REACH * highest_Hz * length / _STEP)))
     sweeps = np.arange(-count, count + 1) * (_STEP / length**2)
-    found = [strongest(float(sweep)) for sweep in sweeps]
+    both = [strongest(float(sweep)) for sweep in sweeps[count:]]
+    found = [*(down for _, down in both[:0:-1]), *(up for up, _ in both)]
     best = max(range(len(sweeps)), key=lambda k: found[k][0])
     power, steady = found[best][0] / n, found[count][0] / n
-    chance = log_tail(2.0 * power, 2 * z.shape[1]) + np.log(len(sweeps) * np.count_nonzero(inside))
+    chance = log_tail(2.0 * power, 2 * z.shape[1]) + np.log(len(sweeps) * len(inside))
     if chance > np.log(LINE_ALPHA) or power < _BETTER * steady:
         return None
 
