@@ -10,7 +10,7 @@ import pytest
 
 from kbs_process.diagnosis.hypothesis import Hypothesis, predict
 from kbs_process.diagnosis.joint import with_extra
-from kbs_process.diagnosis.orders import with_orders
+from kbs_process.diagnosis.orders import _of_order, _others, with_orders
 from kbs_process.diagnosis.scene import Scene
 from kbs_process.diagnosis.screen import Bench, Catalogued, screen
 from kbs_process.diagnosis.suspects import Candidate
@@ -86,3 +86,19 @@ def test_noise_has_no_orders(view: View) -> None:
         assert (
             with_orders(replace(view, bench=noisy), replace(found, score=best.score)).suspect is found.suspect
         )
+
+
+def test_the_rest_of_a_shape_is_the_suspect_s_own(view: View) -> None:
+    law = find("friction_ripple")
+    assert law is not None
+    grid = [
+        Catalogued(Candidate(law, "el", (("ripple_order", order), ("ripple_rate", 0.05))), view.scene)
+        for order in (1.0, 2.0)
+    ]
+    own = replace(
+        grid[0], candidate=replace(grid[0].candidate, shape=(("ripple_order", 1.0), ("ripple_rate", 0.2)))
+    )
+    other = replace(grid[0], candidate=replace(grid[0].candidate, site="az", shape=(("ripple_order", 7.0),)))
+    orders = _others(replace(view, suspects=(*grid, other)), own)
+    assert orders == [2.0]
+    assert _of_order(own, orders[0]).candidate.shape == (("ripple_order", 2.0), ("ripple_rate", 0.2))

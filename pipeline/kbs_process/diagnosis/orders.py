@@ -30,16 +30,7 @@ def with_orders(view: View, found: Found) -> Found:
     suspect = found.suspect
     if not (isinstance(suspect, Catalogued) and isinstance(suspect.candidate.effect, Effect)):
         return found
-    order, rest = _apart(suspect.candidate)
-    others = [
-        one
-        for one in view.suspects
-        if order
-        and isinstance(one, Catalogued)
-        and one.family == suspect.family
-        and _apart(one.candidate)[1] == rest
-        and one.candidate.shape != suspect.candidate.shape
-    ]
+    others = [_of_order(suspect, order) for order in _others(view, suspect)]
     actions = _free(suspect)
     chosen, best = _added(view.bench, suspect, others, found.score, len(actions))
     if not chosen:
@@ -53,12 +44,25 @@ def with_orders(view: View, found: Found) -> Found:
     )
 
 
-def _apart(candidate: Candidate) -> tuple[str, dict[str, float]]:
-    """The name of a law's order, "" without one, and the rest of its shape."""
-    rest = dict(candidate.shape)
-    name = next((name for name in rest if "order" in name), "")
-    rest.pop(name, None)
-    return name, rest
+def _others(view: View, suspect: Catalogued) -> list[float]:
+    """Orders of a suspect's law that the screen has tried, but for its own; none of a law without."""
+    tried = [
+        value
+        for one in view.suspects
+        if isinstance(one, Catalogued) and one.family == suspect.family
+        for value in _orders(one)
+    ]
+    return [value for value in dict.fromkeys(tried) if value not in _orders(suspect)]
+
+
+def _orders(suspect: Catalogued) -> list[float]:
+    return [value for name, value in suspect.candidate.shape if "order" in name]
+
+
+def _of_order(suspect: Catalogued, order: float) -> Catalogued:
+    """A suspect with another order, and the rest of its shape."""
+    shape = tuple((name, order if "order" in name else value) for name, value in suspect.candidate.shape)
+    return replace(suspect, candidate=replace(suspect.candidate, shape=shape))
 
 
 def _added(
