@@ -15,17 +15,19 @@ from kbs_process.diagnosis.gls import Score, Sums, score
 from kbs_process.diagnosis.screen import Bench, Catalogued, Found
 from kbs_process.diagnosis.suspects import Candidate, free_actions
 from kbs_process.diagnosis.tails import log_tail
-from kbs_process.diagnosis.thresholds import FALSE_ALARM, LEAST_RHO, SHADE
+from kbs_process.diagnosis.thresholds import FALSE_ALARM, ITS_OWN, LEAST_RHO, SHADE
 from kbs_process.diagnosis.view import View
 from kbs_process.plant.effect import Effect
 from kbs_process.plant.effects import find
+from kbs_process.signals.records import Array
 
 
 def with_orders(view: View, found: Found) -> Found:
     """A suspect of the screen with all orders that it needs; itself, if its law has none or one alone does.
 
     Each has to gain what a suspect has to, after as many trials as it was chosen from, and to be no smaller a part of
-    the whole than what a formula may miss of nature's.
+    the whole than what a formula may miss of nature's. It has to be another order on the motions that were recorded: in
+    a part of a turn some low ones together are any curve.
     """
     suspect = found.suspect
     if not (isinstance(suspect, Catalogued) and isinstance(suspect.candidate.effect, Effect)):
@@ -76,8 +78,15 @@ def _added(
     chosen: list[int] = []
     best, rows = first, bench.background.rows
     excess = sum(float(z @ z) for z in bench.background.z.values()) / rows
-    while len(chosen) < min(len(others), most):
-        left = [k for k in range(len(others)) if k not in chosen]
+    while len(chosen) < most:
+        before = _columns([-1, *chosen], m)
+        left = [
+            k
+            for k in range(len(others))
+            if k not in chosen and _own(sums.SS, before, _columns([k], m)) > ITS_OWN
+        ]
+        if not left:
+            break
         tried = [score(bench.background, sums.pick(_columns([-1, *chosen, k], m))) for k in left]
         place = int(np.argmax([one.gain for one in tried]))
         gained, rank = tried[place].gain - best.gain, tried[place].rank - best.rank
@@ -90,6 +99,17 @@ def _added(
         chosen.append(left[place])
         best = tried[place]
     return chosen, best
+
+
+def _own(SS: Array, before: NDArray[np.intp], new: NDArray[np.intp]) -> float:
+    """Least share of some columns' squared length that those before them do not have, along any combination."""
+    across = SS[np.ix_(before, new)]
+    size = np.sqrt(np.maximum(np.diag(SS), 1e-300))
+    basis = np.linalg.lstsq(
+        SS[np.ix_(before, before)] / np.outer(size[before], size[before]), across / size[before, None]
+    )
+    rest = SS[np.ix_(new, new)] - (across / size[before, None]).T @ basis[0]
+    return float(np.linalg.eigvalsh(rest / np.outer(size[new], size[new]))[0])
 
 
 def _columns(members: list[int], m: int) -> NDArray[np.intp]:

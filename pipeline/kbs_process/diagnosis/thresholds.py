@@ -104,6 +104,8 @@ SHADE: Final = 0.03
 MOMENTS: Final = 0.2
 MOSTLY: Final = 0.8
 WHILE: Final = 0.6
+# Share of an order's signature that other orders have not, from which on it is another one.
+ITS_OWN: Final = 0.5
 ROUNDS: Final = 5  # finds in one campaign at most
 
 # -- two laws ------------------------------------------------------------------------------------------------------
