@@ -69,11 +69,15 @@ def leaders(view: View, among: Callable[[Found], bool] = lambda _: True) -> tupl
 
 
 def various(chosen: Sequence[Found]) -> list[Found]:
-    """The best of each family at each place, then the others; in either part the order is kept."""
+    """The best of each family at each place, then the others; in either part the order is kept.
+
+    Many orders together follow what another law of their family has, and do not stand for it.
+    """
     best: dict[tuple[str, ...], Found] = {}
     for found in chosen:
         own = identity(found.suspect)
-        best.setdefault((own.port, own.axis, own.family, *own.channels), found)
+        several = isinstance(found.suspect, Catalogued) and bool(found.suspect.candidate.again)
+        best.setdefault((own.port, own.axis, own.family, str(several), *own.channels), found)
     return [*best.values(), *(found for found in chosen if found not in best.values())]
 
 
