@@ -31,13 +31,9 @@ def detected(standing: Standing, floor: Floor, trials: Sequence[int]) -> Detecti
     return detect(experiment, floor, standing.predicted, trials, known=known)
 
 
-def taken(there: Detection, here: Detection, beyond: float = 0.0) -> float:
-    """Share that a law takes of what exceeds the floor `there`, `beyond` a part of it; all of nothing.
-
-    It leaves what is `here`.
-    """
-    excess = there.ratio - 1.0 - beyond
-    return (there.ratio - max(here.ratio, 1.0)) / excess if there.left and excess > 0.0 else 1.0
+def taken(there: Detection, here: Detection) -> float:
+    """Share that a law takes of what exceeds the floor `there`, of which it leaves what is `here`; all of nothing."""
+    return 1.0 - max(here.ratio - 1.0, 0.0) / (there.ratio - 1.0) if there.left else 1.0
 
 
 def too_little(before: Standing, after: Standing, floor: Floor, *, more: bool = False) -> tuple[str, ...]:
@@ -49,15 +45,14 @@ def too_little(before: Standing, after: Standing, floor: Floor, *, more: bool = 
     experiment = before.known.experiment
     there, here = (detected(one, floor, experiment.fit) for one in (before, after))
     reasons = []
-    minima = searched(experiment)
-    share = taken(there, here, beyond=TOLERATED if minima else 0.0)
+    share = taken(there, here)
     if not (more or share >= TAKEN):
         reasons.append(
             f"takes {100.0 * share:.0f} % of what exceeds the floor: it follows what something else does"
         )
     left = here.ratios
     most = max(ratio - left[trajectory] for trajectory, ratio in there.ratios.items())
-    if minima and not most >= TOLERATED:
+    if searched(experiment) and not most >= TOLERATED:
         reasons.append(f"takes {100.0 * most:.1f} % of the floor's power: {_DIFFER}")
     return tuple(reasons)
 
