@@ -13,6 +13,7 @@ from test_rounds import standing
 from kbs_process.campaign.corrected_model import write_model
 from kbs_process.campaign.load import load_campaign
 from kbs_process.diagnosis.curves import CurveSuspect, along, basis, curves
+from kbs_process.diagnosis.dissipation import pushes
 from kbs_process.diagnosis.gls import Sums, score
 from kbs_process.diagnosis.hypothesis import Hypothesis, predict
 from kbs_process.diagnosis.joint import with_extra
@@ -101,6 +102,16 @@ def bench_of(scene: Scene) -> Bench:
     known = object.__new__(Known)
     object.__setattr__(known, "experiment", scene.experiment)
     return Bench(known, scene, None, ())  # type: ignore[arg-type]
+
+
+def test_a_friction_that_pushes_is_none(scene: Scene) -> None:
+    curve = suspect(scene, named("joint_friction_angle_law"))
+    C = 1e-4 * np.eye(COEFFICIENTS)
+    assert pushes(curve, BUMP, C) == ()
+    (reason,) = pushes(curve, -BUMP, C)
+    assert "friction brakes" in reason
+    assert pushes(curve, -BUMP, 1e4 * C) == ()  # it may be anything
+    assert pushes(suspect(scene, OVER_ANGLE), -BUMP, C) == ()
 
 
 def test_a_second_one_at_the_same_joint_has_names_of_its_own(scene: Scene) -> None:

@@ -13,7 +13,7 @@ from kbs_process.diagnosis.places import POINT, Place
 from kbs_process.diagnosis.scene import Scene
 from kbs_process.diagnosis.screen import Catalogued, Suspect
 from kbs_process.diagnosis.suspects import BY, Candidate
-from kbs_process.plant.effect import ACTION, Effect
+from kbs_process.plant.effect import ACTION, ACTIONS, Effect, instance
 from kbs_process.plant.effects import CATALOGUE
 from kbs_process.plant.sensing import SENSING, Sensing
 from kbs_process.signals.records import Array
@@ -37,9 +37,26 @@ def suspect_of(find: Find, scene: Scene) -> tuple[Suspect, Array] | None:
     numbers = _numbers(find)
     if not all(entry.name in numbers for entry in law.parameters if entry.role != "shared"):
         return None
-    shape = tuple((e.name, numbers[e.name].value) for e in law.parameters if e.role == "shape")
-    candidate = Candidate(law, site, shape, _point(numbers))
+    candidate = Candidate(law, site, _shape(law, numbers), _point(numbers), _again(law, site, find))
     return Catalogued(candidate, scene), np.array([numbers[e.name].value for e in candidate.amplitudes])
+
+
+def _again(law: Effect | Sensing, site: str, find: Find) -> tuple[Candidate, ...]:
+    """Further actions of a law whose numbers a find has, too: other orders."""
+    if not isinstance(law, Effect) or not law.port.of_drive:
+        return ()
+    numbers = {one.name: one for one in find.estimates}
+    actions = (instance(law, number) for number in range(2, ACTIONS + 1))
+    told = [
+        action
+        for action in actions
+        if all(entry.name in numbers for entry in action.parameters if entry.role != "shared")
+    ]
+    return tuple(Candidate(action, site, _shape(action, numbers)) for action in told)
+
+
+def _shape(law: Effect | Sensing, numbers: Mapping[str, Estimate]) -> tuple[tuple[str, float], ...]:
+    return tuple((e.name, numbers[e.name].value) for e in law.parameters if e.role == "shape")
 
 
 def _numbers(find: Find) -> dict[str, Estimate]:

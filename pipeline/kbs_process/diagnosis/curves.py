@@ -125,6 +125,8 @@ def curves(scene: Scene) -> tuple[CurveSuspect, ...]:
         for law in MEASURED:
             if law.effect.port is Port.GROUND_TORQUE and joint.name not in reached:
                 continue
+            if law.effect.port is Port.MOTOR_TORQUE and not scene.paths:
+                continue  # along a measured motion it is a torque of the joint
             if law.effect.crossed and other_joint(rig, joint.name) == joint.name:
                 continue
             swept = [series(scene, drive, joint.name, law.regressor) for drive in scene.signals]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from kbs_process.diagnosis.curves import CurveSuspect, along
 from kbs_process.diagnosis.families import family
 from kbs_process.diagnosis.screen import Catalogued
 from kbs_process.diagnosis.signature import port_inputs
@@ -41,6 +42,17 @@ def drives(suspect: Catalogued, amplitudes: Array, covariance: Array) -> tuple[s
     if not done > max(SIGMAS * float(np.sqrt(max(variance, 0.0))), _SHARE * all_of_it):
         return ()
     return (f"does work of {done:.3g} J in these motions, and friction takes it",)
+
+
+def pushes(suspect: CurveSuspect, coefficients: Array, covariance: Array) -> tuple[str, ...]:
+    """Return why a measured friction is none: along its table it pushes more than it brakes; nothing, if it may be."""
+    if not suspect.law.opposed:
+        return ()
+    mean = suspect.basis(along(suspect.law, *suspect.ends)).mean(axis=0)
+    value, variance = float(mean @ coefficients), float(mean @ covariance @ mean)
+    if not value < -SIGMAS * float(np.sqrt(max(variance, 0.0))):
+        return ()
+    return (f"pushes with {-value:.3g} N m along its table, and friction brakes",)
 
 
 def _power(suspect: Catalogued, candidate: Candidate, rate: str) -> Array:

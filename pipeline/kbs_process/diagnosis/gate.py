@@ -85,7 +85,7 @@ def gate(before: Known, after: Known, coefficients: Sequence[int], shapes: Seque
         reasons.append(f"its coefficients are {size}")
     # In units of the floor: what is left has more of a colour, the less that is.
     if not white[1] * after.level <= white[0] * before.level + _spread(after):
-        reasons.append("the residual is less white with it")
+        reasons.append("the residual's power is less even with it")
     return Gate(not reasons, folds, held_out, sigmas, white, tuple(reasons))
 
 

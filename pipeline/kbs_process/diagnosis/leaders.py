@@ -10,7 +10,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from kbs_process.diagnosis.curves import CurveSuspect
-from kbs_process.diagnosis.dissipation import drives
+from kbs_process.diagnosis.dissipation import drives, pushes
 from kbs_process.diagnosis.finding import Tried, explained_share
 from kbs_process.diagnosis.floor import Floor
 from kbs_process.diagnosis.gate import Fold, Gate, gate, whiteness
@@ -119,12 +119,17 @@ def gated(found: Found, before: Standing, after: Standing, own: Own) -> Gate:
     verdict = gate(before.known, known, places, shapes)
     # What minima of the known parameters leave differs, and is no law's.
     share = explained_share(before.known, known, beyond=TOLERATED)
-    if isinstance(found.suspect, CurveSuspect) and share is not None and not share >= LAW_VARIANCE:
-        verdict = verdict.but(f"a curve that explains {100.0 * share:.0f} % of the held-out excess is no law")
-    if not isinstance(found.suspect, Catalogued):
-        return verdict
+    share = explained_share(before.known, known) if share is None else share
     index = np.array(places)
     a, C = known.value[index], known.covariance[np.ix_(index, index)]
+    if isinstance(found.suspect, CurveSuspect):
+        if share is not None and not share >= LAW_VARIANCE:
+            verdict = verdict.but(
+                f"a curve that explains {100.0 * share:.0f} % of the held-out excess is no law"
+            )
+        return verdict.but(*pushes(found.suspect, a, C))
+    if not isinstance(found.suspect, Catalogued):
+        return verdict
     return verdict.but(*_oversized(found.suspect, a, np.sqrt(np.diag(C))), *drives(found.suspect, a, C))
 
 

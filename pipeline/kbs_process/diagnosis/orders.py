@@ -77,7 +77,7 @@ def _added(
     m = len(suspect.amplitudes)
     chosen: list[int] = []
     best, rows = first, bench.background.rows
-    excess = sum(float(z @ z) for z in bench.background.z.values()) / rows
+    whole = sum(float(z @ z) for z in bench.background.z.values()) / rows
     while len(chosen) < most:
         before = _columns([-1, *chosen], m)
         left = [
@@ -92,7 +92,7 @@ def _added(
         gained, rank = tried[place].gain - best.gain, tried[place].rank - best.rank
         chance = log_tail(max(gained, 0.0), max(rank, 1)) + np.log(len(left))
         # What is left beside all others counts as noise: it has some of every order.
-        level = max(1.0, excess - tried[place].gain / rows)
+        level = max(1.0, whole - tried[place].gain / rows)
         least = max(level * LEAST_RHO**2, SHADE**2 * first.gain)
         if rank < 1 or not gained > least or chance > np.log(FALSE_ALARM):
             break
@@ -102,7 +102,10 @@ def _added(
 
 
 def _own(SS: Array, before: NDArray[np.intp], new: NDArray[np.intp]) -> float:
-    """Least share of some columns' squared length that those before them do not have, along any combination."""
+    """How far some columns are from those before them, and from each other: the least share of a combination's square.
+
+    1 where all are orthogonal; a sine and a cosine that a short motion shows as one are no order of their own either.
+    """
     across = SS[np.ix_(before, new)]
     size = np.sqrt(np.maximum(np.diag(SS), 1e-300))
     basis = np.linalg.lstsq(

@@ -133,18 +133,19 @@ def _of_joints(known: Known, scene: Scene) -> dict[str, tuple[float, ...]]:
             step = np.quantile(np.abs(np.diff(angle)), _FASTEST)
             fastest = 2.0 * np.pi * experiment.highest_Hz * experiment.dt / step
             # Less than two turns in the range is an offset and a slope.
-            highest = min(_HIGHEST_OF_JOINT, fastest)
-            orders = (
-                np.arange(2.0 * width, highest, width / _FINE) if width > 1.0 else np.arange(1.0, highest)
-            )
+            round_ = width <= 1.0
+            first, apart = (np.ceil(2.0 * width), 1.0) if round_ else (2.0 * width, width / _FINE)
+            orders = np.arange(first, min(_HIGHEST_OF_JOINT, fastest), apart)
             if len(orders) < 2:
                 continue
             power = _along(orders, angle, series)
             bound = -np.log(LINE_ALPHA / (len(orders) * series.shape[1] * len(experiment.fit)))
             inner = power[1:-1]
             peaks = np.flatnonzero((inner >= power[:-2]) & (inner >= power[2:]) & (inner > bound)) + 1
+            if round_:
+                peaks = np.flatnonzero(power > bound)  # neighbours are orders of their own
             lines += [(float(power[i]), float(orders[i])) for i in peaks]
-        found[joint] = _apart([value for _, value in sorted(lines, reverse=True)], 1.0)
+        found[joint] = _apart([value for _, value in sorted(lines, reverse=True)], 0.99)
     return found
 
 

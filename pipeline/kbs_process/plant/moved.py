@@ -51,7 +51,7 @@ def added_loads(rig: Rig, effects: Sequence[Effect], q: Array, qd: Array, dt: fl
             if not all(entry.name in known for entry in effect.parameters):
                 continue
             if effect.port is Port.GROUND_TORQUE or (effect.port in RIGID and joint.effort is not None):
-                other = q[:, (index + 1) % len(rig.joints)]
+                other = q[:, (index + 1) % len(rig.joints)] if len(rig.joints) > 1 else None
                 units = unit_torques(effect, joint, q[:, index], known, dt, other)
                 amplitudes = [known[entry.name] for entry in effect.parameters if entry.role == "amplitude"]
                 torque = instants(units @ np.array(amplitudes))
@@ -127,7 +127,8 @@ def unit_torques(
     that of the other joint, where there is one.
     """
     ratio = 1.0 if joint.drive is None else float(joint.drive.ratio)
-    turned = {"joint_angle": q, "rotor_angle": ratio * q, "other_angle": q if other is None else other}
-    turned["time"] = dt * np.arange(len(q), dtype=np.float64)
+    turned = {"joint_angle": q, "rotor_angle": ratio * q, "time": dt * np.arange(len(q), dtype=np.float64)}
+    if other is not None:
+        turned["other_angle"] = other
     signals = {name: turned[name] for name in signals_of(effect)}
     return along(effect, signals, {**values, "ratio": ratio}, dt)[:, :, 0]

@@ -187,7 +187,7 @@ def _over(regressor: str, port: Port, law: str, opposed: str = "") -> Measured:
         for k in range(COEFFICIENTS)
     )
     shape = [
-        Parameter(f"{law}_{end}", unit, Normal(sign, 1.0), "end of what was measured", (-1e2, 1e2))
+        Parameter(f"{law}_{end}", unit, Normal(sign, 1.0), "end of what was measured", (-1e4, 1e4))
         for end, sign in (("low", -1.0), ("high", 1.0))
     ]
     wires = [("x", regressor), *((f"c{k}", f"{law}_{k}") for k in range(COEFFICIENTS))]
