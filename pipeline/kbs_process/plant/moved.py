@@ -14,6 +14,7 @@ from kbs_process.plant.along import along, signals_of
 from kbs_process.plant.effect import Effect, Port
 from kbs_process.plant.external import external_efforts, external_wrench
 from kbs_process.plant.rigid import axis_of, kinematics, links_beyond
+from kbs_process.plant.structure import other_joint
 from kbs_process.rig.model import TRANSDUCER, Joint, Rig
 from kbs_process.signals.averages import instants
 from kbs_process.signals.frames import cross, rotate
@@ -51,7 +52,7 @@ def added_loads(rig: Rig, effects: Sequence[Effect], q: Array, qd: Array, dt: fl
             if not all(entry.name in known for entry in effect.parameters):
                 continue
             if effect.port is Port.GROUND_TORQUE or (effect.port in RIGID and joint.effort is not None):
-                other = q[:, (index + 1) % len(rig.joints)] if len(rig.joints) > 1 else None
+                other = q[:, rig.joint_names.index(other_joint(rig, joint.name))]
                 units = unit_torques(effect, joint, q[:, index], known, dt, other)
                 amplitudes = [known[entry.name] for entry in effect.parameters if entry.role == "amplitude"]
                 torque = instants(units @ np.array(amplitudes))
