@@ -78,7 +78,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
         alternatives=(Alternative(CABLE, 0.1, 2.0, 0.16, True, True),),
         ports_alike=(),
         held_out_variance=0.95,
-        curve=Curve(OVER_ANGLE, x, np.full(101, 0.5), np.full(101, 0.01)),
+        curve=Curve(OVER_ANGLE, x, np.linspace(0.6, 0.4, 101), np.full(101, 0.01)),
     )
     outcome = Outcome(
         verdict="physics",
@@ -126,6 +126,8 @@ def test_results_read_back_and_the_page_tells_them(written: Path) -> None:
     (find,) = results.finds
     assert not find.named
     assert {one.unit for one in find.parameters} == {"N m"}
+    curve = "from 0.4 N m (sigma 0.01) at 1.3 rad to 0.6 N m (sigma 0.01) at 1.25 rad of the joint angle"
+    assert curve in results.paragraph and "law_3" not in results.paragraph
     assert find.rivals[0].name == "ground_cable"
     assert [(one.name, one.distance, one.absorbed, one.outcome) for one in results.suspects] == [
         ("curve over joint angle", 30.0, 0.1, "accepted"),

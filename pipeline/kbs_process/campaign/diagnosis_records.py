@@ -18,6 +18,7 @@ from kbs_process.diagnosis.next_test import Proposal
 from kbs_process.diagnosis.outcome import Curve, Find, Identity, Outcome
 from kbs_process.diagnosis.thresholds import RIVALS
 from kbs_process.plant.effects.measured_law import unit_of
+from kbs_process.plant.structure import other_joint
 from kbs_process.report.records import diagnosis as records
 from kbs_process.report.records.common import Check, Conclusion, Notice
 from kbs_process.rig.model import Joint, Rig
@@ -156,10 +157,7 @@ def _paragraph(
         f"{known:.3g} times (rms) {_FLOOR[floor.source]}, among {which}."
     ]
     for find in finds:
-        numbers = ", ".join(
-            f"{one.name} = {one.value:.4g} ({one.low:.4g} to {one.high:.4g}) {one.unit}"
-            for one in find.parameters[:4]
-        )
+        numbers = _curve_in_words(find.curve) if find.curve else _numbers_in_words(find.parameters)
         apart = [_words(rival.name) for rival in find.rivals if rival.distance < RIVALS]
         begin = "Left out was" if find.named else "No law of the catalogue passes; measured was a"
         parts.append(
@@ -180,6 +178,22 @@ def _paragraph(
     for moved in outcome.moved[:5]:
         parts.append(f"{moved.name} is off by {moved.sigmas:+.1f} sigma.")
     return " ".join(parts)
+
+
+def _numbers_in_words(numbers: Sequence[records.Fitted]) -> str:
+    return ", ".join(
+        f"{one.name} = {one.value:.4g} ({one.low:.4g} to {one.high:.4g}) {one.unit}" for one in numbers[:4]
+    )
+
+
+def _curve_in_words(curve: records.Curve) -> str:
+    """Between what a measured law varies, where, and how well that is known."""
+    least, *_, most = sorted(range(len(curve.y)), key=lambda k: curve.y[k])
+    ends = " to ".join(
+        f"{curve.y[k]:.4g} {curve.y_unit} (sigma {curve.sigma[k]:.2g}) at {curve.x[k]:.4g} {curve.x_unit}"
+        for k in (least, most)
+    )
+    return f"from {ends} of the {curve.regressor}"
 
 
 def _find(find: Find, experiment: Experiment) -> records.Find:
@@ -228,7 +242,7 @@ def _find(find: Find, experiment: Experiment) -> records.Find:
             for fold in find.gate.folds
         ),
         same_ports=find.ports_alike,
-        curve=None if find.curve is None else _curve(find.curve, joint),
+        curve=None if find.curve is None else _curve(find.curve, experiment.rig, joint),
         held_out_variance=find.held_out_variance,
     )
 
@@ -242,10 +256,13 @@ def _unit(turning: str, joint: Joint | None) -> str:
     return turning if joint is None else joint.unit_of(turning)
 
 
-def _curve(curve: Curve, joint: Joint | None) -> records.Curve:
+def _curve(curve: Curve, rig: Rig, joint: Joint | None) -> records.Curve:
+    over = joint
+    if joint is not None and curve.law.effect.crossed:
+        over = rig.joint(other_joint(rig, joint.name))
     return records.Curve(
         regressor=curve.law.regressor.replace("_", " "),
-        x_unit=_unit(unit_of(curve.law.regressor), joint),
+        x_unit=_unit(unit_of(curve.law.regressor), over),
         y_unit=_unit("N m", joint),
         x=tuple(curve.x.tolist()),
         y=tuple(curve.value.tolist()),

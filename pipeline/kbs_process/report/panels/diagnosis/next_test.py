@@ -38,7 +38,7 @@ def _blocks(test: NextTest) -> tuple[Block, ...]:
     return (
         Text(f"{question} Run next, for {number(test.seconds)} s: {test.trajectory}. {power}"),
         Text(
-            "Commands, as `kbs-process simulate --command` reads them, within what the rig has gone through:",
+            "Commands, as kbs-process simulate --command reads them, within what the rig has gone through:",
             (test.file,),
         ),
         Grid("Trajectories that were compared, best first", ("Trajectory", worth), rows, "lr", note),
