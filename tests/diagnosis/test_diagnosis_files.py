@@ -11,9 +11,11 @@ import pytest
 from test_rounds import standing
 
 from kbs_process.campaign.commands import read_commands
+from kbs_process.campaign.corrected_diagnosis import write_corrected
 from kbs_process.campaign.diagnosis_files import write_diagnosis
 from kbs_process.campaign.load import load_campaign
 from kbs_process.diagnosis.detection import Detection
+from kbs_process.diagnosis.finding import merged
 from kbs_process.diagnosis.floor import declared
 from kbs_process.diagnosis.gate import Fold, Gate
 from kbs_process.diagnosis.joint import standing_of
@@ -40,6 +42,14 @@ CABLE = Identity("external wrench", "el", (), "cable", "ground_cable")
 DRAG = Identity("joint torque", "el", (), "friction", "joint_viscous")
 NOTHING = Detection((), -1.0, 1.0)
 NODES, SIGMA = np.full(COEFFICIENTS, 0.5), np.full(COEFFICIENTS, 0.01)
+
+
+def disc(like: Find, order: float, tag: str) -> Find:
+    """An eccentric disc that was found with one order; of a second find the numbers are tagged."""
+    own = Identity("encoder", "el", (), "eccentricity", "encoder_eccentricity")
+    values = {"eccentric_sin": 1e-4 * order, "eccentric_cos": 0.0, "eccentric_order": order}
+    told = tuple(Estimate(f"{name}{tag}", "", value, 1e-6) for name, value in values.items())
+    return replace(like, identity=own, estimates=told, curve=None)
 
 
 @pytest.fixture(scope="module")
@@ -92,8 +102,6 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
         absorbed=(Absorbed(DRAG, 0.999, 12.0, ("joint.el.drive.b_m",)),),
         place=None,
         left=None,
-        whiteness=(1.0, 1.0),
-        looked_at=10,
         known=known,
         standing=standing_of(found, before.laws),
     )
@@ -103,6 +111,8 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     )
     target = tmp_path_factory.mktemp("diagnosis") / "out"
     campaign = load_campaign(bench.CAMPAIGN, checksums=False)
+    discs = merged([disc(find, 1.0, ""), disc(find, 2.0, "_2")])
+    write_corrected(campaign, replace(outcome, finds=discs), target.parent / "discs")
     off = replace(outcome, finds=(), verdict="parameters off")
     told_off = write_diagnosis(campaign, declared(experiment), off, target, False, None)
     assert "would look the same" in told_off.verdict_lines[0] and "{" not in told_off.verdict_lines[0]
@@ -159,6 +169,13 @@ def test_the_corrected_model_has_the_curve_in_its_plant(written: Path) -> None:
         "az.drive.ground_angle_law_3",
     ):
         assert quantities[f"joint.{name}"].source.startswith("by diagnosis of r0"), name
+
+
+def test_a_sensor_s_law_that_was_found_twice_acts_twice_in_the_corrected_model(written: Path) -> None:
+    laws = load_campaign(written.parent / "discs", checksums=False).sensing
+    told = [{name: float(quantity) for name, quantity in law.parameters.items()} for law in laws]
+    assert [(law.law, law.site) for law in laws] == [("encoder_eccentricity", "el")] * 2
+    assert [(one["eccentric_order"], one["eccentric_sin"]) for one in told] == [(1.0, 1e-4), (2.0, 2e-4)]
 
 
 def test_the_next_test_can_be_simulated(written: Path) -> None:

@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from kbs_process.diagnosis import direct
-from kbs_process.diagnosis.curves import CurveSuspect, series
+from kbs_process.diagnosis.curves import CurveSuspect, curves, series
 from kbs_process.diagnosis.hypothesis import Hypothesis, Tapped
 from kbs_process.diagnosis.inlets import WRENCH_PORT, Inlet
 from kbs_process.diagnosis.measured import inserted
+from kbs_process.diagnosis.parameters import known_parameters
 from kbs_process.diagnosis.scene import Scene
 from kbs_process.diagnosis.signature import inputs
 from kbs_process.diagnosis.suspects import Candidate, felt_from_the_ground
@@ -139,6 +140,18 @@ def test_the_loads_answer_to_a_weight_as_to_a_force_and_to_the_ground_by_its_pow
             assert np.allclose(grounds[link.name][:, 6 + row], -power / float(other.effort.gain), atol=1e-12)
 
 
+def test_drives_without_an_effect_s_numbers_have_none_that_are_known() -> None:
+    """Such effects add nothing along a measured motion."""
+    here = rig()
+    az, el = here.joints
+    assert el.drive is not None
+    fewer = replace(el, drive=replace(el.drive, parameters={}))
+    names = {one.name for one in known_parameters(replace(here, joints=(az, fewer)), ("kinematic_error",))}
+    law = next(one for one in CATALOGUE if one.name == "kinematic_error")
+    assert any(f"joint.az.drive.{entry.name}" in names for entry in law.parameters)
+    assert not any(f"joint.el.drive.{entry.name}" in names for entry in law.parameters)
+
+
 def test_what_no_transducer_reads_is_no_torque_of_the_ground() -> None:
     here = rig()
     assert felt_from_the_ground(here) >= {"az", "el"}
@@ -146,17 +159,27 @@ def test_what_no_transducer_reads_is_no_torque_of_the_ground() -> None:
     assert felt_from_the_ground(chain("b", -1)) & {"a", "b", "c"} == {"c"}
 
 
-@pytest.mark.parametrize("law", MEASURED, ids=lambda law: law.effect.name)
-def test_a_curve_s_signature_is_what_it_adds_to_the_loads(law: Measured) -> None:
-    """Of each joint, over its own motion and the other one's."""
+@pytest.mark.parametrize(
+    ("law", "geared"),
+    [(law, geared) for law in MEASURED for geared in (True, False)],
+    ids=lambda value: getattr(getattr(value, "effect", None), "name", str(value)),
+)
+def test_a_curve_s_signature_is_what_it_adds_to_the_loads(law: Measured, geared: bool) -> None:
+    """Of each joint, over its own motion and the other one's; of joints of which no drive is described, too."""
     here, (q, qd) = rig(), motion()
     names = tuple(f"{of}.{joint}" for of in _TAPPED for joint in here.joint_names)
-    ratio = float(here.joints[0].drive.ratio)  # type: ignore[union-attr]
+    ratio = float(here.joints[0].drive.ratio) if geared else 1.0  # type: ignore[union-attr]
+    if not geared:
+        here = replace(here, joints=tuple(replace(joint, drive=None) for joint in here.joints))
     tapped = Tapped(RATE, names, np.hstack([ratio * q, ratio * qd, q, qd]))
     hypothesis = Hypothesis(here, ())
     scene = object.__new__(Scene)
-    for name, value in {"hypothesis": hypothesis, "signals": {0: tapped}, "paths": {}}.items():
+    experiment = replace(bench.experiment(bench.rig(), ("fit",), 1), rig=here)
+    told = {"experiment": experiment, "hypothesis": hypothesis, "signals": {0: tapped}, "paths": {}}
+    for name, value in told.items():
         object.__setattr__(scene, name, value)
+    if law.effect.port is not Port.MOTOR_TORQUE:
+        assert {one.joint for one in curves(scene) if one.law is law} == set(here.joint_names)
     for site in here.joint_names:
         swept = series(scene, 0, site, law.regressor)
         curve = CurveSuspect(scene, law, site, (float(swept.min()), float(swept.max())))

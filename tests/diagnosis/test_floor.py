@@ -99,6 +99,18 @@ def test_encoders_at_rest_say_nothing_and_moving_ones_round() -> None:
     assert windows[:, 0].any()
 
 
+def test_an_encoder_at_rest_beside_a_gap_says_nothing_either() -> None:
+    """What is missing is zero in a trial, and no motion."""
+    experiment = bench.experiment(bench.rig(), ("fit",), seed=1)
+    trial = experiment.trials[0]
+    valid = trial.valid.copy()
+    valid[100:130] = False
+    measured = np.where(np.arange(CHANNELS) == 6, 0.5, trial.measured) * valid[:, None]
+    gappy = replace(trial, measured=measured, valid=valid)
+    assert not floor.channel_windows(experiment, gappy, valid)[:, 6].any()
+    assert floor.channel_windows(experiment, gappy, valid)[:, 7].any()
+
+
 def test_rounding_along_a_path_is_that_of_codes() -> None:
     """Against rounding itself, at an offset that the estimate does not know."""
     experiment = bench.experiment(bench.rig(), ("fit",), seed=1)

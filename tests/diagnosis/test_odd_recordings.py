@@ -173,6 +173,22 @@ def test_recordings_without_anything_in_common_are_no_repeats() -> None:
     assert sorted(map(len, experiment.repeats)) == [1, 1]
 
 
+def test_recordings_that_were_driven_alike_in_no_common_part_are_no_repeats() -> None:
+    a = replace(recording("a", 0.0), unknown=((-1.0, 0.5 * N * bench.DT),))
+    b = replace(recording("b", 0.0), unknown=((0.5 * N * bench.DT, 1e3),))
+    assert sorted(map(len, made(a, b).repeats)) == [1, 1]
+
+
+def test_nothing_is_compared_where_a_measured_motion_has_a_gap() -> None:
+    run, moved = swinging()
+    t = bench.DT * np.arange(N)
+    gone = (t > 20.0) & (t < 22.0)
+    for motion, missing in ((moved, 0.0), (replace(moved, valid=moved.valid & ~gone), 4.0)):
+        (trial,) = made(Recorded("fit", "SWING", run, None, motion)).trials
+        assert trial.valid[gone].any() != bool(missing)
+        assert np.count_nonzero(~trial.valid) * bench.DT == pytest.approx(missing, abs=0.2)
+
+
 def test_nothing_is_compared_after_the_last_command_of_a_motion() -> None:
     experiment = made(replace(recording("a", 0.0), known_until=30.0))
     t = bench.DT * np.arange(N)

@@ -85,14 +85,14 @@ def cable(made: Experiment) -> Standing:
 def test_nothing_is_found_where_nothing_is(made: Experiment) -> None:
     _, _, found = screened(standing(made))
     assert not any(one.significant for one in found.candidates)
-    assert all(probability < 0.5 for probability in found.probabilities)
+    assert found.candidates[0].log_evidence < 0.0
 
 
 def test_a_cable_is_found_refitted_in_the_plant_and_accepted(made: Experiment, cable: Standing) -> None:
     tried, scene, found = screened(cable)
     best = found.candidates[0]
     assert best.suspect.family == ("ground_cable", "el")
-    assert found.probabilities[0] > 0.99
+    assert best.log_evidence > np.log(99.0) + max(0.0, found.candidates[1].log_evidence)
     assert (identity(best.suspect).port, identity(best.suspect).family) == ("external wrench", "cable")
     begin = len(cable.known.value)
     after = with_extra(cable, extra_of(best, cable, tried, scene), bench.serial(made))

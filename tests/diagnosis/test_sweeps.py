@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import bench
 import numpy as np
 import pytest
 
+from kbs_process.diagnosis.proposals import proposed
+from kbs_process.diagnosis.scene import Scene
 from kbs_process.diagnosis.sweeps import sweeping
 from kbs_process.signals.records import Array
+from kbs_process.stages.output_error import Scalar
 
+FREE = (Scalar("joint.el.drive.Ka"),)
 DT, HIGHEST = 0.1, 4.0
 
 
@@ -34,6 +41,24 @@ def test_a_tone_that_runs_is_found(sweep: float) -> None:
     assert frequency == pytest.approx(start, abs=4.0 * bound)
     assert rate == pytest.approx(sweep, abs=4.0 * bound * 2.0 / seconds)
     assert power == pytest.approx(0.25 * 1.25 * seconds / DT, rel=0.2)
+
+
+@pytest.mark.parametrize(("size", "seen"), [(7e-4, True), (0.0, False)])
+def test_one_that_is_a_fraction_of_the_noise_is_proposed_from_whitened_residuals(
+    size: float, seen: bool
+) -> None:
+    """Its distance from the noise is some twenty sigmas, and what whitened series show is in units of these."""
+    made = bench.experiment(bench.rig(), ("fit", "fit"), 1, seconds=60.0)
+    t = bench.DT * np.arange(len(made.trials[0].valid))
+    tone: Array = np.zeros((len(t), len(made.channels)))
+    tone[:, 3] = size * np.sin(np.pi * (2.0 * 0.7 + 0.02 * t) * t)
+    trials = [replace(one, measured=one.measured + tone * one.valid[:, None]) for one in made.trials]
+    held = bench.standing(replace(made, trials=tuple(trials)), FREE)
+    found = proposed(held.known, Scene.of(held.known.experiment, held.hypothesis, held.predicted))
+    assert ("floor_sweep" in found) == seen
+    if seen:
+        assert found["floor_sweep"][0] == pytest.approx(0.02, abs=2e-3)
+        assert found["floor_frequency"][-1] == pytest.approx(0.7, abs=0.05)
 
 
 def test_a_steady_tone_and_noise_do_not_run() -> None:

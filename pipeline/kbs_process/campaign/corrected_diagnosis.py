@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,21 +13,24 @@ from kbs_process.campaign.config import Campaign, SensingLaw
 from kbs_process.campaign.corrected_model import write_model
 from kbs_process.campaign.sensing_laws import belongs_to_model
 from kbs_process.diagnosis.hypothesis import Hypothesis
-from kbs_process.diagnosis.outcome import Find, Outcome
+from kbs_process.diagnosis.outcome import Estimate, Find, Outcome
 from kbs_process.diagnosis.suspects import BY
 from kbs_process.plant.effect import Uniform
-from kbs_process.plant.effects import select
+from kbs_process.plant.effects import CATALOGUE, select
 from kbs_process.plant.sensing import SENSING
 from kbs_process.rig.model import Quantity, substitute
 from kbs_process.signals.records import Array
 
 _SENSORS = {law.name: law for law in SENSING}
+_EACH_TIME = {
+    *(effect.name for effect in CATALOGUE if effect.each_trial),
+    *(law.name for law in SENSING if law.each_trial),
+}
 
 
 def left_out(find: Find) -> bool:
     """Whether a find is in no model: each recording's own."""
-    law = _SENSORS.get(find.identity.law)
-    return law is not None and not belongs_to_model(law)
+    return find.identity.law in _EACH_TIME
 
 
 def write_corrected(campaign: Campaign, outcome: Outcome, folder: Path) -> tuple[Path, ...]:
@@ -43,7 +47,9 @@ def write_corrected(campaign: Campaign, outcome: Outcome, folder: Path) -> tuple
             sigma = quantity.sigma.copy()
             sigma[scalar.element] = known.sigma[index]
             changed[scalar.quantity] = replace(quantity, sigma=sigma, source=source)
-    sensing = tuple(_sensing(find, source) for find in outcome.finds if _reads(find))
+    sensing = tuple(
+        _sensing(find, own, source) for find in outcome.finds if _reads(find) for own in find.actions
+    )
     return write_model(campaign, hypothesis.rig, hypothesis.effects, changed, folder, source, sensing)
 
 
@@ -69,12 +75,12 @@ def _reads(find: Find) -> bool:
     return law is not None and belongs_to_model(law)
 
 
-def _sensing(find: Find, source: str) -> SensingLaw:
-    """A find as the model's sensors have it."""
+def _sensing(find: Find, estimates: Sequence[Estimate], source: str) -> SensingLaw:
+    """A find, or one of its actions, as the model's sensors have it."""
     law, own = _SENSORS[find.identity.law], find.identity
     site = BY.join(own.channels) or own.axis
     numbers = {}
-    for one in find.estimates:
+    for one in estimates:
         # A second action of the same law has numbered amplitudes.
         entry = next(entry for entry in law.parameters if re.fullmatch(rf"{entry.name}(_\d+)?", one.name))
         name = f"sensing.{site}.{law.name}.{entry.name}"

@@ -32,7 +32,7 @@ _NOTES = (
     "errors of the clocks, each recording's own, are taken out of every comparison.",
     "Known parameters are refitted within their priors before anything is looked for, and again beside each suspect.",
     "A find has passed the gate: inside the non-linear plant, with all known parameters refitted, it improves the "
-    "prediction of every recording that was held out.",
+    "prediction of recordings that it was not fitted to, all together, and makes none of them markedly worse.",
     "Channels are whitened in their order: each is judged given those before it.",
 )
 _FLOOR = {

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -34,8 +34,11 @@ def suspect_of(find: Find, scene: Scene) -> tuple[Suspect, Array] | None:
     site = BY.join(own.channels) or own.axis
     if law is None or law.each_trial or not site:
         return None
-    numbers = _numbers(find)
+    # Of a sensor's law that was found more than once, the action that was found first.
+    numbers = _numbers(find.estimates if isinstance(law, Effect) else find.actions[0])
     if not all(entry.name in numbers for entry in law.parameters if entry.role != "shared"):
+        return None
+    if "temperature" in law.arguments and any(one.temperature is None for one in scene.experiment.trials):
         return None
     candidate = Candidate(law, site, _shape(law, numbers), _point(numbers), _again(law, site, find))
     return Catalogued(candidate, scene), np.array([numbers[e.name].value for e in candidate.amplitudes])
@@ -59,11 +62,10 @@ def _shape(law: Effect | Sensing, numbers: Mapping[str, Estimate]) -> tuple[tupl
     return tuple((e.name, numbers[e.name].value) for e in law.parameters if e.role == "shape")
 
 
-def _numbers(find: Find) -> dict[str, Estimate]:
+def _numbers(estimates: Sequence[Estimate]) -> dict[str, Estimate]:
     """Estimates by the names of the law's first action, whichever this is."""
-    return {re.sub(f"{ACTION}$", "", one.name): one for one in find.estimates} | {
-        one.name: one for one in find.estimates
-    }
+    own = {one.name: one for one in estimates}
+    return {re.sub(f"{ACTION}$", "", name): one for name, one in own.items()} | own
 
 
 def _point(numbers: Mapping[str, Estimate]) -> Place | None:
@@ -79,5 +81,5 @@ def sigma_of(find: Find, suspect: Suspect, amplitude: Array) -> Array:
     if find.curve is not None:
         nodes = np.linspace(0.0, len(find.curve.x) - 1.0, len(amplitude)).round().astype(int)
         return np.asarray(find.curve.sigma[nodes])
-    numbers = _numbers(find)
+    numbers = _numbers(find.actions[0] if isinstance(_LAWS[find.identity.law], Sensing) else find.estimates)
     return np.array([numbers[name].sigma for name in suspect.amplitudes])

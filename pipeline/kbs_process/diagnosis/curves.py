@@ -120,8 +120,6 @@ def curves(scene: Scene) -> tuple[CurveSuspect, ...]:
     rig = scene.experiment.rig
     reached = felt_from_the_ground(rig)
     for joint in rig.joints:
-        if joint.drive is None:
-            continue
         for law in MEASURED:
             if law.effect.port is Port.GROUND_TORQUE and joint.name not in reached:
                 continue

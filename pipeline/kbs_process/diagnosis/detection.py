@@ -24,6 +24,7 @@ from kbs_process.diagnosis.experiment import Experiment
 from kbs_process.diagnosis.floor import Floor
 from kbs_process.diagnosis.hypothesis import Hypothesis, Prediction
 from kbs_process.diagnosis.known import Known
+from kbs_process.diagnosis.metric import counted
 from kbs_process.diagnosis.nuisance import nuisances
 from kbs_process.diagnosis.thresholds import DETECTED, TOLERATED, UNFORESEEN
 from kbs_process.diagnosis.whiten import Projector, Whitener, independent
@@ -108,7 +109,7 @@ def detect(
     for one in whitened:
         lost = one.leverage.copy()
         if known is not None and (slopes := known.slopes.get(experiment.reference(one.trajectory))):
-            J = one.project(one.whiten(np.moveaxis(slopes.columns, 0, 2)))[: len(lost)]
+            J = one(np.moveaxis(slopes.columns, 0, 2))
             fitted = any(k in experiment.fit for k in experiment.repeats[one.trajectory] if k in trials)
             share = np.einsum("rp,pq,rq->r", J, known.covariance, J, optimize=True)
             lost += np.minimum(share, 1.0) if fitted else -share
@@ -128,10 +129,13 @@ class _Mean:
     f: Array  # (b,)
     z: Array  # (rows,)
     leverage: Array  # (rows,) of the nuisances
-    channels: int  # that show something
-    spread: float  # by how much windows correlate neighbours, mean over channels
+    share: Array  # (c,) of each channel's numbers that are independent, and that it counts for
     project: Projector
     whiten: Whitener
+
+    def __call__(self, x: Array) -> Array:
+        """(rows, k) of x (n, c, k), as `z` is of the residual."""
+        return self.project(counted(self.whiten, self.share, x))[: len(self.z)]
 
 
 def _mean(
@@ -147,18 +151,15 @@ def _mean(
     whiten = floor.whitener(trials[0], near.values, valid=valid, repeats=len(trials))
     left = np.mean([trial.measured - predicted[trial.drive].values for trial in trials], axis=0)
     N, precision = nuisances(experiment, trials[0], near, hypothesis)
-    project = Projector.of(whiten(N), precision * np.sqrt(len(trials)))
-    windows = whiten.window
-    seen = windows.any(axis=0)
-    spread = float(np.mean(1.0 / independent(windows[:, seen])))
-    size = 2 * len(whiten.f) * windows.shape[1]
+    share = independent(whiten.window)
+    project = Projector.of(counted(whiten, share, N), precision * np.sqrt(len(trials)))
+    size = 2 * len(whiten.f) * len(share)
     return _Mean(
         trials[0].trajectory,
         whiten.f,
-        project(whiten(left))[:size],
+        project(counted(whiten, share, left))[:size],
         np.sum(project.basis**2, axis=1),
-        int(seen.sum()),
-        spread,
+        share,
         project,
         whiten,
     )
@@ -169,7 +170,7 @@ def _cells(floor: Floor, one: _Mean, taken: Array) -> list[tuple[Cell, float, fl
     b = len(one.f)
     z2 = np.sum((one.z.reshape(2, b, -1)) ** 2, axis=(0, 2))
     lost = np.sum(taken.reshape(2, b, -1), axis=(0, 2))
-    edges = floor.edges
+    edges, seen = floor.edges, one.share[one.share > 0.0]
     found = []
     for low, high in itertools.pairwise(edges):
         inside = (one.f > low) & (one.f <= high)
@@ -177,9 +178,10 @@ def _cells(floor: Floor, one: _Mean, taken: Array) -> list[tuple[Cell, float, fl
         if B == 0:
             continue
         nu = float(floor.freedom(one.f[inside]).mean())
-        full = float(B * one.channels)
+        full = float(B * seen.sum())
         left = max(full - 0.5 * float(lost[inside].sum()), 0.05 * full)
-        mean, variance = left, _variance(B, one.channels, nu) * (left / full) * one.spread
+        # A channel's numbers are correlated by 1 / share and count for share each.
+        mean, variance = left, _variance(B, len(seen), nu) * float(seen.mean()) * (left / full)
         u = 0.5 * float(z2[inside].sum())
         log_p = _log_p(u, mean, variance, left)
         cell = Cell(one.trajectory, float(low), float(high), u / mean, 2.0 * mean, log_p)

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d
 
 from kbs_process.plant.predict import Schedule
 from kbs_process.rig.model import Rig
@@ -26,6 +27,8 @@ _SAME_FIELD = 0.5  # microsteps, and _SAME_COMMAND rad: two drives that differ b
 _SAME_COMMAND = 1e-6
 _SAME_RATE = 0.02  # relative, of two recorders of one kind
 _IN_COMMON = 0.4  # of a recording: that much has to be there in all its repeats
+_THERE = 0.99  # of a sample between others, that these have
+_SMOOTHED = 1.0  # s, that the low-pass of angles reaches into what is beside a gap
 _ALIKE = 1e-9  # s, shift below which nothing is interpolated
 
 
@@ -141,7 +144,7 @@ def assemble(
     channels, units = _channels(recorded[0], rig, driven_by_motion)
     trials: list[Trial] = []
     drives: list[Drive] = []
-    for number, members in enumerate(_trajectories(recorded)):
+    for number, members in enumerate(_trajectories(recorded, channels)):
         reference = members[0][0]
         own: list[int] = []
         for one, shift in members:
@@ -179,7 +182,26 @@ def _loads(run: Run) -> Signal:
     return run.loads
 
 
-def _trajectories(recorded: Sequence[Recorded]) -> list[list[tuple[Recorded, float]]]:
+def _seen(one: Recorded, channels: Sequence[str]) -> Mask:
+    """Where all of a recording's channels are there, and what drove it is known, on the grid of its loads."""
+    loads, angle = _loads(one.run), one.run.angle
+    seen = loads.valid & (loads.t >= one.known_from) & (loads.t <= one.known_until)
+    for start, end in one.unknown:
+        seen = seen & ~((loads.t > start) & (loads.t < end))
+    if angle is not None and any(name not in loads.channels for name in channels):
+        seen = seen & angle.valid
+    if one.motion is not None:
+        moved = one.motion
+        reach = 2 * round(_SMOOTHED / moved.dt) + 1
+        gone = maximum_filter1d((~moved.valid).astype(np.float64), reach, mode="nearest")
+        known = np.interp(loads.t, moved.t0 + moved.dt * np.arange(len(gone)), 1.0 - gone, 0.0, 0.0) > _THERE
+        seen = seen & known
+    return np.asarray(seen, dtype=np.bool_)
+
+
+def _trajectories(
+    recorded: Sequence[Recorded], channels: Sequence[str]
+) -> list[list[tuple[Recorded, float]]]:
     """Recordings that repeat each other with the time (s) by which each is later than the first, the longest.
 
     Those of which gaps leave too little at the same time stay apart, whatever they repeat, and so do those that were
@@ -199,14 +221,15 @@ def _trajectories(recorded: Sequence[Recorded]) -> list[list[tuple[Recorded, flo
             shift = lag(target, moved)
             if shift is None:
                 continue
-            both = common[number] & _valid_at(_loads(reference.run).t + shift, _loads(one.run))
-            if np.count_nonzero(both) >= _IN_COMMON * np.count_nonzero(_loads(reference.run).valid):
+            t = _loads(reference.run).t + shift
+            both = common[number] & _seen_at(t, _loads(one.run), _seen(one, channels))
+            if np.count_nonzero(both) >= _IN_COMMON * np.count_nonzero(_seen(reference, channels)):
                 group.append((one, shift))
                 common[number] = both
                 break
         else:
             groups.append([(one, 0.0)])
-            common.append(_loads(one.run).valid)
+            common.append(_seen(one, channels))
     return groups
 
 
@@ -216,8 +239,8 @@ def _sampled_alike(one: Run, other: Run) -> bool:
     return bool(np.allclose(first, second, rtol=_SAME_RATE))
 
 
-def _valid_at(t: Array, signal: Signal) -> Mask:
-    return np.asarray(np.interp(t, signal.t, signal.valid, left=0.0, right=0.0) > 0.99, dtype=np.bool_)
+def _seen_at(t: Array, loads: Signal, seen: Mask) -> Mask:
+    return np.asarray(np.interp(t, loads.t, seen, left=0.0, right=0.0) > _THERE, dtype=np.bool_)
 
 
 def _length(run: Run) -> int:
@@ -287,18 +310,13 @@ def _trial(
     one: Recorded, shift: float, trajectory: int, drive: int, n: int, channels: Sequence[str]
 ) -> Trial:
     run, loads = one.run, _loads(one.run)
-    columns, valid = [], loads.valid & (loads.t >= one.known_from) & (loads.t <= one.known_until)
-    for start, end in one.unknown:
-        valid = valid & ~((loads.t > start) & (loads.t < end))
+    columns = []
     for channel in channels:
-        source = loads
-        if channel not in source.channels:
-            assert run.angle is not None
-            source = run.angle
-            valid = valid & source.valid
+        source = loads if channel in loads.channels else run.angle
+        assert source is not None
         columns.append(source.column(channel))
     dt = loads.dt
-    measured, inside = _moved(np.stack(columns, axis=1), valid, dt, loads.t0, shift, n)
+    measured, inside = _moved(np.stack(columns, axis=1), _seen(one, channels), dt, loads.t0, shift, n)
     driven = run.clocks.get("field") or run.clocks.get("command")
     late = 0.0 if driven is None else offset_sigma(driven)
     angle = run.clocks.get("angle")

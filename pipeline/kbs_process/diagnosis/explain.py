@@ -36,24 +36,20 @@ Task = Callable[[str], AbstractContextManager[object]]  # shows that something o
 class Explained:
     """How far the known parameters get, and what they leave."""
 
-    experiment: Experiment
     floor: Floor
     known: Known
     near: Known | None  # numbers that stayed near their priors, where `known` are implausibly far from theirs
-    before: Detection  # with the parameter files' numbers
-    after: Detection  # with the refitted ones, over the recordings that these were fitted to
-    held_out: Detection | None  # likewise over the others
+    after: Detection  # with the refitted numbers, over the recordings that these were fitted to
 
 
 def explain(experiment: Experiment, simulate: Simulate, task: Task) -> Explained:
-    """Floor, detection, refit of the known parameters, detection of what they leave."""
+    """Floor, refit of the known parameters, detection of what they leave."""
     nominal = Hypothesis(experiment.rig, experiment.effects)
-    with task("Repeatability floor, and what exceeds it"):
+    with task("Repeatability floor"):
         begun = _predicted(experiment, nominal, simulate)
         floor = _floor(experiment, begun)
-        before = detect(experiment, floor, begun, experiment.fit)
     with task("Phases of cogging, friction and tooth contact"):
-        (start,) = phasing.begin(experiment, nominal, floor, simulate)
+        start = phasing.begin(experiment, nominal, floor, simulate)
     slopes, leaps = None, 1
     if not _driven_alike(experiment):
         with task("The floor, with a model that is about right"):
@@ -71,7 +67,7 @@ def explain(experiment: Experiment, simulate: Simulate, task: Task) -> Explained
             free = refit(experiment, known.hypothesis, floor, simulate, leaps=0)
             if free.excess < MOST * known.excess:
                 # Phases were looked for beside numbers that were wrong.
-                (start,) = phasing.begin(experiment, free.hypothesis, floor, simulate)
+                start = phasing.begin(experiment, free.hypothesis, floor, simulate)
                 free = refit(experiment, start, floor, simulate, leaps=1)
             freed = _moved_on(_stood(free, floor), floor, simulate, LEAPS)
         settled = not freed.after.left
@@ -89,8 +85,7 @@ def explain(experiment: Experiment, simulate: Simulate, task: Task) -> Explained
         if free.cost < stood.known.cost and not _unseen(freed, floor) > _unseen(stood, floor):
             stood = freed
     known = replace(stood.known, chi2_before=_squares(stood.known, begun))
-    held_out = _held_out(stood, floor) if experiment.held_out else None
-    return Explained(experiment, floor, known, near, before, stood.after, held_out)
+    return Explained(floor, known, near, stood.after)
 
 
 def _squares(known: Known, predicted: Mapping[int, Prediction]) -> Array:
@@ -121,14 +116,12 @@ def _stood(known: Known, floor: Floor) -> _Stood:
     return _Stood(known, detect(experiment, floor, known.shown, experiment.fit, known=known))
 
 
-def _held_out(stood: _Stood, floor: Floor) -> Detection:
-    experiment = stood.known.experiment
-    return detect(experiment, floor, stood.known.shown, experiment.held_out, known=stood.known)
-
-
 def _unseen(stood: _Stood, floor: Floor) -> float:
     """Power over the floor's that a refit leaves of recordings which it was not made of; 0 without any."""
-    return _held_out(stood, floor).ratio if stood.known.experiment.held_out else 0.0
+    experiment, known = stood.known.experiment, stood.known
+    if not experiment.held_out:
+        return 0.0
+    return detect(experiment, floor, known.shown, experiment.held_out, known=known).ratio
 
 
 def _moved_on(stood: _Stood, floor: Floor, simulate: Simulate, leaps: int) -> _Stood:

@@ -227,6 +227,7 @@ def merged(finds: Sequence[Find]) -> tuple[Find, ...]:
         merged[place] = replace(
             first,
             estimates=(*first.estimates, *find.estimates),
+            parts=(*first.actions, find.estimates),
             gate=replace(first.gate, folds=folds, whiteness=white),
             rho=float(np.hypot(first.rho, find.rho)),
             rho_eff=float(np.hypot(first.rho_eff, find.rho_eff)),

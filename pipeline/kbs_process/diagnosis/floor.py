@@ -321,8 +321,17 @@ def channel_windows(experiment: Experiment, trial: Trial, valid: Mask) -> Array:
     windows = np.repeat(whole[:, None], len(experiment.channels), axis=1)
     for k, step in enumerate(encoder_steps(experiment), experiment.loads):
         if step > 0.0:
-            windows[:, k] = window_of(valid & _moving(trial.measured[:, k], step, experiment.dt))
+            windows[:, k] = window_of(valid & _moving(_filled(trial, k), step, experiment.dt))
     return windows
+
+
+def _filled(trial: Trial, channel: int) -> Array:
+    """(n,) a channel as measured, straight across gaps: what is not there does not move."""
+    there = np.flatnonzero(trial.valid)
+    if not len(there):
+        return trial.measured[:, channel]
+    filled = np.interp(np.arange(len(trial.valid)), there, trial.measured[there, channel])
+    return np.asarray(filled, dtype=np.float64)
 
 
 def _moving(angle: Array, step: float, dt: float) -> Mask:

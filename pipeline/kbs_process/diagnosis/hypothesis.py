@@ -119,7 +119,7 @@ def predict_together(
         try:
             simulation = simulation_of(
                 hypothesis.rig,
-                _acting(hypothesis, driven),
+                acting(hypothesis, driven),
                 driven.schedule,
                 **_rates(experiment, driven, rate, angle_rate),
             )
@@ -215,8 +215,8 @@ def _working(
     return resample(wrench, rate, working)[: driven.n], resample(angle, angle_rate, working)[: driven.n]
 
 
-def _acting(hypothesis: Hypothesis, driven: Drive) -> list[str]:
-    """Effects that act in a recording."""
+def acting(hypothesis: Hypothesis, driven: Drive) -> list[str]:
+    """Return the effects that act in a recording."""
     return [effect for effect in hypothesis.effects if effect not in driven.absent]
 
 
@@ -249,7 +249,7 @@ def _streams(
     streams: dict[str, list[Array]] = {"wrench": [], "angle": [], "field": [], "state": []}
     for key, block in simulate_plant(
         hypothesis.rig,
-        _acting(hypothesis, drive),
+        acting(hypothesis, drive),
         drive.schedule,
         **_rates(experiment, drive, rate, angle_rate),
         quantise=False,
@@ -270,7 +270,7 @@ def _moved(hypothesis: Hypothesis, experiment: Experiment, driven: Drive) -> tup
     assert driven.motion is not None
     motion, rig = driven.motion, experiment.rig
     values = rigid_loads(hypothesis.rig, motion.q, motion.qd, motion.qdd)
-    acting = select(_acting(hypothesis, driven))
-    values = values + added_loads(hypothesis.rig, acting, motion.q, motion.qd, motion.dt)
+    effects = select(acting(hypothesis, driven))
+    values = values + added_loads(hypothesis.rig, effects, motion.q, motion.qd, motion.dt)
     efforts = rig.loads.index(rig.channels[experiment.wrench_channels :])
     return values[:, :6], values[:, efforts]

@@ -15,7 +15,7 @@ from kbs_process.signals.records import WRENCH_CHANNELS, Array
 
 DRIVE_PORTS = ("motor_torque", "motor_friction", "transmission", "joint_torque")
 GROUND_PORT, WRENCH_PORT, BASE_PORT = "ground_torque", "external_wrench", "base_acceleration"
-_BASE_AXES = ("x", "y", "z", "rx", "ry", "rz")
+_BASE_AXES = ("x", "y", "z")
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,17 +25,12 @@ class Inlet:
     A drive's: `where` is its joint, N m with the sign of `plant.effect.Port` (friction: as a torque on the rotor).
     "ground_torque": on the output of joint `where` about its axis, N m, reacted by the laboratory.
     "external_wrench": from the laboratory on link `where`, `axis` one of Fx .. Tz, N or N m, about T's origin in the
-    undeflected T's axes. "base_acceleration": of the floor along (m/s^2) or about (rad/s^2) T's axes, x .. rz.
+    undeflected T's axes. "base_acceleration": of the floor along T's axes, x .. z, m/s^2.
     """
 
     port: str
     where: str
     axis: str = ""
-
-    @property
-    def label(self) -> str:
-        """For tables: port, place, axis."""
-        return " ".join(part for part in (self.port.replace("_", " "), self.where, self.axis) if part)
 
 
 def inlets_of(rig: Rig) -> tuple[Inlet, ...]:

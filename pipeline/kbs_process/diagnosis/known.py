@@ -103,13 +103,17 @@ class Known:
     @property
     def excess(self) -> float:
         """-2 log likelihood beyond that of noise, of the trials that were fitted."""
-        fit = list(self.experiment.fit)
-        return float((self.chi2 - self.rows)[fit].sum())
+        return float(self.chi2[list(self.experiment.fit)].sum()) - self.fit_rows
+
+    @property
+    def fit_rows(self) -> float:
+        """Numbers of noise in the residuals of these trials."""
+        return float(self.rows[list(self.experiment.fit)].sum())
 
     @property
     def gross(self) -> bool:
         """Whether so much is left of these trials that something is missing, or wrong by far."""
-        return self.excess > GROSS * float(self.rows[list(self.experiment.fit)].sum())
+        return self.excess > GROSS * self.fit_rows
 
     @property
     def prior_chi2(self) -> float:

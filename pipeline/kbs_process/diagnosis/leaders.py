@@ -197,7 +197,7 @@ def reread(chosen: Tried, before: Standing, floor: Floor, simulate: Simulate) ->
     """
     if in_plant(chosen.found.suspect) or not chosen.own.names:
         return chosen
-    enough = TOLERATED * float(before.known.rows[list(before.known.experiment.fit)].sum())
+    enough = TOLERATED * before.known.fit_rows
     for _ in range(REREAD):
         told = _told_anew(chosen, before, floor, simulate)
         gained = chosen.standing.known.cost - told.standing.known.cost

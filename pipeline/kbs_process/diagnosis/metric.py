@@ -47,11 +47,11 @@ class Metric:
         return np.asarray(z[: int(np.prod(shape))].reshape(shape) / root, dtype=np.float64)
 
     def in_time(self, z: Array, n: int) -> Array:
-        """(n, c) a residual as a whitened series."""
+        """(n, c) a residual as a whitened series: of unit variance, if the band is all that a series can show."""
         layout = self.layout(z)
         spectrum = np.zeros((n // 2 + 1, layout.shape[2]), dtype=complex)
         spectrum[self.whiten.inside] = layout[0] + 1j * layout[1]
-        return np.asarray(np.fft.irfft(spectrum, n, axis=0), dtype=np.float64)
+        return np.asarray(np.fft.irfft(spectrum, n, axis=0) * np.sqrt(0.5 * n), dtype=np.float64)
 
 
 def counted(whiten: Whitener, share: Array, x: Array) -> Array:

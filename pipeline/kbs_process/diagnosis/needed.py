@@ -89,8 +89,7 @@ def _clear(before: Known, after: Known) -> bool:
 
     Along a measured motion no minima have to be told apart.
     """
-    rows = float(before.rows[list(before.experiment.fit)].sum())
-    return not searched(before.experiment) or before.cost - after.cost > CLEAR * rows
+    return not searched(before.experiment) or before.cost - after.cost > CLEAR * before.fit_rows
 
 
 def _again(

@@ -13,7 +13,7 @@ each trajectory's own simulation.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 
@@ -24,7 +24,7 @@ from kbs_process.diagnosis.as_suspect import sigma_of, suspect_of
 from kbs_process.diagnosis.experiment import Drive, Experiment, Trial
 from kbs_process.diagnosis.floor import Floor
 from kbs_process.diagnosis.gls import Background
-from kbs_process.diagnosis.hypothesis import Simulate
+from kbs_process.diagnosis.hypothesis import Prediction, Simulate
 from kbs_process.diagnosis.joint import Standing
 from kbs_process.diagnosis.metric import metrics
 from kbs_process.diagnosis.outcome import Find, Identity
@@ -159,6 +159,15 @@ def _planned(experiment: Experiment, trajectories: Sequence[Trajectory]) -> Expe
     return replace(experiment, drives=tuple(drives), trials=tuple(trials))
 
 
+def _as_predicted(planned: Experiment, predicted: Mapping[int, Prediction]) -> Experiment:
+    """Planned recordings with what is to be expected of them: where a joint moves, its encoder shows something."""
+    trials = [
+        replace(trial, measured=predicted[trial.drive].values * trial.valid[:, None])
+        for trial in planned.trials
+    ]
+    return replace(planned, trials=tuple(trials))
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class _Stage:
     """The family of trajectories with the found law on it."""
@@ -180,7 +189,8 @@ class _Stage:
         predicted = dict(zip(drives, simulate([(drive, hypothesis) for drive in drives]), strict=True))
         if not all(np.isfinite(one.values).all() for one in predicted.values()):
             return None
-        metric = metrics(planned, replace(floor, experiment=planned), predicted)
+        planned = _as_predicted(planned, predicted)
+        metric = metrics(planned, replace(floor, experiment=planned), predicted, hypothesis)
         scene = Scene.of(planned, hypothesis, predicted)
         found = suspect_of(find, scene)
         if found is None:
@@ -207,8 +217,9 @@ class _Stage:
         C = known.covariance[np.ix_(free, free)]
         if not np.isfinite(C).all():
             return None
-        values, vectors = np.linalg.eigh(np.linalg.pinv(C, hermitian=True))
-        prior = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T
+        size = np.sqrt(np.diag(C))  # numbers of any units
+        values, vectors = np.linalg.eigh(np.linalg.pinv(C / np.outer(size, size), hermitian=True))
+        prior = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T / size
         return cls(
             Standing(shown, predicted, {}),
             replace(bench, known=shown),

@@ -87,6 +87,14 @@ class Find:
     ports_alike: tuple[str, ...]  # ports that these channels cannot tell from its own
     held_out_variance: float | None  # share of the excess on held-out recordings that it explains
     curve: Curve | None
+    parts: tuple[
+        tuple[Estimate, ...], ...
+    ] = ()  # of a law that was found more than once: each action's estimates
+
+    @property
+    def actions(self) -> tuple[tuple[Estimate, ...], ...]:
+        """Estimates of each time that the law was found."""
+        return self.parts or (self.estimates,)
 
     @property
     def indistinguishable_from(self) -> tuple[Identity, ...]:
@@ -147,8 +155,6 @@ class Outcome:
     absorbed: tuple[Absorbed, ...]
     place: Place | None  # before any find; None for a rig that its motion drives
     left: Place | None  # after all finds
-    whiteness: tuple[float, float]
-    looked_at: int  # suspects with all their shapes
     known: Known  # refitted, without any law: what stood before the first find
     standing: Standing  # the corrected model
     otherwise: tuple[Moved, ...] = ()  # known parameters that would have to be off if there were no law

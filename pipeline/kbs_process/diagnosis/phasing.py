@@ -22,19 +22,13 @@ LOWEST_HZ = 0.5
 _TURN = 2.0 * np.pi  # rad of the motor: joints that turn less show no phases
 
 
-def begin(
-    experiment: Experiment, hypothesis: Hypothesis, floor: Floor, simulate: Simulate, *, most: int = 1
-) -> tuple[Hypothesis, ...]:
-    """Return up to `most` hypotheses to begin a refit at, best first."""
+def begin(experiment: Experiment, hypothesis: Hypothesis, floor: Floor, simulate: Simulate) -> Hypothesis:
+    """Return the hypothesis to begin a refit at."""
     if experiment.drives[0].schedule is None or hypothesis.rig.transducer.stiffness is None:
-        return (hypothesis,)
-    candidates = [hypothesis]
+        return hypothesis
     for used, joints in stages(experiment):
-        stage = _Stage(experiment, floor, simulate, used, joints)
-        candidates = [
-            found for one in candidates for found in stage.search(one, most if one is candidates[0] else 1)
-        ]
-    return tuple(candidates[:most])
+        hypothesis = _Stage(experiment, floor, simulate, used, joints).search(hypothesis)
+    return hypothesis
 
 
 def stages(experiment: Experiment) -> list[tuple[tuple[int, ...], tuple[str, ...]]]:
@@ -85,14 +79,14 @@ class _Stage:
         self.recordings = tuple(_measured(experiment, k) for k in used)
         self.calibrations = all(experiment.trials[k].role == "calibration" for k in used)
 
-    def search(self, hypothesis: Hypothesis, most: int) -> tuple[Hypothesis, ...]:
+    def search(self, hypothesis: Hypothesis) -> Hypothesis:
         experiment = self.experiment
         gears = identification.gearbox(hypothesis.rig, hypothesis.effects)
         own = self.prefixes if self.calibrations else (*self.prefixes, "transducer.")
         free = tuple(scalar for scalar in gears if scalar.name.startswith(own))
         coarse = output_error.Experiment(hypothesis.rig, hypothesis.effects, free, self.recordings, LOWEST_HZ)
         if not phases(hypothesis.rig, hypothesis.effects, free):
-            return (hypothesis,)
+            return hypothesis
         spectra = [sensor_spectra(coarse, recording) for recording in self.recordings]
         place = {recording.name: k for recording, k in zip(self.recordings, self.used, strict=True)}
 
@@ -120,7 +114,8 @@ class _Stage:
         values = hypothesis.values(free)
         if not self.calibrations:
             values = match_resonances(coarse, values, spectra, run)
-        return tuple(hypothesis.at(free, s.values) for s in starts(coarse, values, spectra, evaluate, most))
+        (start,) = starts(coarse, values, spectra, evaluate, 1)
+        return hypothesis.at(free, start.values)
 
 
 def _ratios(experiment: Experiment) -> Array:

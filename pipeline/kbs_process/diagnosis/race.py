@@ -59,8 +59,9 @@ def raced(chosen: Sequence[Found], view: View, floor: Floor, simulate: Simulate)
         return min(runner, new, key=lambda one: one.cost)
 
     heat = side_by_side(begun, chosen)
-    rows = float(view.standing.known.rows[list(view.standing.known.experiment.fit)].sum())
-    far = FAR_BEHIND * max(min((one.left for one in heat), default=0.0), TOLERATED * rows)
+    far = FAR_BEHIND * max(
+        min((one.left for one in heat), default=0.0), TOLERATED * view.standing.known.fit_rows
+    )
     ahead = side_by_side(gone_on, heat)
     runners = [Runner(found, one.standing) for found, one in zip(chosen, ahead, strict=True)]
     runners.sort(key=lambda one: -one.found.score.gain)
@@ -94,7 +95,7 @@ def _stuck(runner: Runner, before: Standing) -> bool:
 
 def _near(one: Runner, best: Runner) -> bool:
     least = best.standing.known
-    return one.standing.known.excess <= SETTLED_TIMES * max(least.excess, TOLERATED * float(least.rows.sum()))
+    return one.standing.known.excess <= SETTLED_TIMES * max(least.excess, TOLERATED * least.fit_rows)
 
 
 def _at_floor(one: Runner, floor: Floor) -> bool:

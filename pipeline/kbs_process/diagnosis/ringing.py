@@ -13,7 +13,7 @@ import numpy as np
 from scipy.linalg import expm
 
 from kbs_process.diagnosis.experiment import Experiment
-from kbs_process.diagnosis.hypothesis import Hypothesis, coupled
+from kbs_process.diagnosis.hypothesis import Hypothesis, acting, coupled
 from kbs_process.plant.effect import Port
 from kbs_process.plant.effects import select
 from kbs_process.plant.linear import linearise
@@ -35,7 +35,7 @@ def decays(experiment: Experiment, hypothesis: Hypothesis, drive: int, begin: in
     # Friction of a rotor at rest has slopes of either sign; what rings is held by motors and gears.
     held = [
         effect
-        for effect in select(hypothesis.effects)
+        for effect in select(acting(hypothesis, experiment.drives[drive]))
         if effect.port not in _MOTOR or "field" in effect.arguments
     ]
     system = linearise(hypothesis.rig, held, schedule.position[0])

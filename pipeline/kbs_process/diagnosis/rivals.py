@@ -46,9 +46,13 @@ def rivalry(accepted: Known, rival: Known) -> Rivalry:
     return Rivalry(rho, float(norm.sf(0.5 * rho)))
 
 
-def probabilities(models: Sequence[Known], rows: int) -> Array:
-    """(models,) that each is right, one of them being so: Schwarz's criterion of the refitted non-linear models."""
-    logs = np.array([-0.5 * model.cost - 0.5 * len(model.free) * np.log(rows) for model in models])
+def probabilities(models: Sequence[Known], rows: int, fitted: Sequence[int] = ()) -> Array:
+    """(models,) that each is right, one of them being so: Schwarz's criterion of the refitted non-linear models.
+
+    `fitted` numbers were taken off the recordings before, beside those that are free in a model.
+    """
+    count = np.array([len(model.free) for model in models]) + (np.array(fitted) if fitted else 0)
+    logs = -0.5 * np.array([model.cost for model in models]) - 0.5 * count * np.log(rows)
     found: Array = np.exp(logs - logsumexp(logs))
     return found
 

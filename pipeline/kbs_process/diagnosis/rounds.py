@@ -10,11 +10,10 @@ import numpy as np
 from kbs_process.diagnosis.detection import Detection
 from kbs_process.diagnosis.finding import Tried, as_it_stands, find_of, merged
 from kbs_process.diagnosis.floor import Floor
-from kbs_process.diagnosis.gate import whiteness
 from kbs_process.diagnosis.hypothesis import Simulate
 from kbs_process.diagnosis.joint import Standing, standing_of
 from kbs_process.diagnosis.known import MOVED, Known, refit
-from kbs_process.diagnosis.leaders import leaders, reread, tried
+from kbs_process.diagnosis.leaders import gated, leaders, reread, tried
 from kbs_process.diagnosis.localise import cells_and_ports
 from kbs_process.diagnosis.moments import only_while
 from kbs_process.diagnosis.needed import Accepted, in_the_shade, needed
@@ -122,8 +121,6 @@ def _diagnosed(known: Known, floor: Floor, simulate: Simulate, before: Detection
         absorbed=_absorbed(last.screening),
         place=rounds[0].place,
         left=left,
-        whiteness=(whiteness(known), whiteness(standing.known)),
-        looked_at=rounds[0].screening.looked_at,
         known=known,
         standing=standing,
     )
@@ -148,7 +145,8 @@ def _round(standing: Standing, floor: Floor, simulate: Simulate, accepted: Seque
     if not passed:
         return _Round(None, standing, view.screening, tuple(refused), place)
     passed = continued(named_first(passed), [one.find.identity for one in accepted])
-    chances = probabilities([one.standing.known for one in passed], view.bench.background.rows)
+    fitted = [_each_time(one) for one in passed]
+    chances = probabilities([one.standing.known for one in passed], view.bench.background.rows, fitted)
     best = int(np.argmax(chances))
     settled = passed[best].standing
     if not passed[best].leapt:
@@ -156,6 +154,7 @@ def _round(standing: Standing, floor: Floor, simulate: Simulate, accepted: Seque
     if settled.known.excess < MOST * standing.known.excess:
         settled = released(settled, floor, simulate)
     told = reread(replace(passed[best], standing=settled), standing, floor, simulate)
+    told = _judged_again(told, passed[best], standing)
     # One more action of a law at the same place is part of the find.
     earlier = [(one.find.identity.law, one.tried.own) for one in accepted if one.find.identity != _law(told)]
     more = any(one.find.identity == _law(told) for one in accepted)
@@ -168,6 +167,20 @@ def _round(standing: Standing, floor: Floor, simulate: Simulate, accepted: Seque
     chance = [1.0 - float(chances[others].sum()), *chances[others]]
     find = find_of([told, *(passed[k] for k in others)], 0, np.array(chance), standing, place)
     return _Round(Accepted(told, find, standing), told.standing, view.screening, tuple(refused), place)
+
+
+def _each_time(one: Tried) -> int:
+    """Numbers that a law brought which are each recording's own, and no free ones of the model."""
+    suspect, known = one.found.suspect, one.standing.known
+    return len(suspect.amplitudes) * len(known.experiment.fit) if suspect.each_trial else 0
+
+
+def _judged_again(told: Tried, passed: Tried, before: Standing) -> Tried:
+    """A law where its numbers have settled, if it passes the gate there as well; else where it `passed`."""
+    if not told.own.names:
+        return told
+    verdict = gated(told.found, before, told.standing, told.own)
+    return replace(told, gate=verdict) if verdict.passed else passed
 
 
 def named_first(passed: Sequence[Tried]) -> list[Tried]:
@@ -197,8 +210,7 @@ def continued(passed: Sequence[Tried], accepted: Sequence[Identity]) -> list[Tri
 def _as_good(one: Tried, other: Tried) -> bool:
     """Whether a law leaves no more than another, as far as the plant is exact."""
     known = other.standing.known
-    least = known.cost + TOLERATED * float(known.rows[list(known.experiment.fit)].sum())
-    return one.standing.known.cost <= least
+    return one.standing.known.cost <= known.cost + TOLERATED * known.fit_rows
 
 
 def _law(one: Tried) -> Identity:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kbs_process.diagnosis.experiment import Experiment
-from kbs_process.diagnosis.hypothesis import Hypothesis, Prediction, Tapped, tapped
+from kbs_process.diagnosis.hypothesis import Hypothesis, Prediction, Tapped, acting, tapped
 from kbs_process.diagnosis.inlets import Inlet
 from kbs_process.diagnosis.transfer import Path, follow
 from kbs_process.plant.effects import select
@@ -64,7 +64,7 @@ def _path(experiment: Experiment, hypothesis: Hypothesis, signals: Tapped, drive
         name: np.interp(t, own, column)
         for name, column in zip(signals.columns, signals.values.T, strict=True)
     }
-    return follow(hypothesis.rig, select(hypothesis.effects), taps, rate)
+    return follow(hypothesis.rig, select(acting(hypothesis, experiment.drives[drive])), taps, rate)
 
 
 def rebinned(means: Array, rate: float, target: float, count: int) -> Array:

@@ -87,7 +87,8 @@ class Catalogued:
         experiment = self.scene.experiment
         prediction = self.scene.predicted[drive].values
         t = np.asarray(np.arange(len(prediction)) * experiment.dt, dtype=np.float64)
-        temperature = next((one.temperature for one in experiment.trials if one.drive == drive), None)
+        own = [one for one in experiment.trials if one.drive == drive]
+        temperature = min(own, key=lambda one: one.role == "held-out").temperature  # the first that is fitted
         return sensed(
             self.candidate, t, prediction, experiment.channels, self.scene.hypothesis.rig, temperature
         )
@@ -124,13 +125,6 @@ class Screening:
 
     candidates: tuple[Found, ...]
     looked_at: int  # points of all grids
-
-    @property
-    def probabilities(self) -> Array:
-        """(candidates,) that each is the one, all being equally likely before and one of them, or none, at work."""
-        logs = np.array([candidate.log_evidence for candidate in self.candidates] + [0.0])
-        found: Array = np.exp(logs - logsumexp(logs))[:-1]
-        return found
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -335,7 +335,6 @@ def _along(
 class _Post:
     """To the working rate, in the frequency domain: amplifier, averages undone, what lies beyond Nyquist cut."""
 
-    pad: int
     length: int
     decimation: int
     samples: int
@@ -369,7 +368,7 @@ def _post(path: Path, decimation: int, samples: int) -> _Post:
     exact = np.exp(-1j * np.pi * f / path.rate) / np.sinc(f / path.rate) ** 3
     exact[-1] = 0.0
     return _Post(
-        pad, length, decimation, n // decimation, exact * amplified(path.rig.transducer.amplifier, f), exact
+        length, decimation, n // decimation, exact * amplified(path.rig.transducer.amplifier, f), exact
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 
 import numpy as np
@@ -75,7 +76,8 @@ def extra_of(found: Found, standing: Standing, bench: Bench, scene: Scene) -> Ex
     suspect, amplitude = found.suspect, found.score.amplitude
     if not in_plant(suspect):
         tag = ".".join(suspect.family)
-        used = sum(name.startswith(f"law.{tag}.") for name in standing.laws)
+        first = re.escape(f"law.{tag}.{suspect.amplitudes[0]}")
+        used = sum(re.fullmatch(rf"{first}(_\d+)?", name) is not None for name in standing.laws)
         drives = sorted(_references(standing))
         columns = {drive: bench.signatures([suspect], drive) for drive in drives}
         shaped: tuple[Bend, ...] = ()
@@ -97,7 +99,7 @@ def extra_of(found: Found, standing: Standing, bench: Bench, scene: Scene) -> Ex
             scale=np.concatenate([np.abs(amplitude), sizes]),
             lower=np.concatenate([-free, [one.low - one.value for one in shaped]]),
             upper=np.concatenate([free, [one.high - one.value for one in shaped]]),
-            linear=tuple(Scalar(f"law.{tag}.{name}{f'_{used}' if used else ''}") for name in names),
+            linear=tuple(Scalar(f"law.{tag}.{name}{f'_{used + 1}' if used else ''}") for name in names),
             columns={drive: np.moveaxis(x, 2, 0) for drive, x in columns.items()},
         )
     if isinstance(suspect, CurveSuspect):

@@ -39,7 +39,10 @@ def gearbox(rig: Rig, effects: Sequence[str]) -> tuple[Scalar, ...]:
         for effect in of_drives(effects):
             for parameter in effect.parameters:
                 name = f"joint.{joint.name}.drive.{parameter.name}"
-                if quantities[name].sigma > 0.0 or isinstance(parameter.prior, Uniform):
+                # Effects add nothing to a measured motion where a drive has not their numbers.
+                if name in quantities and (
+                    quantities[name].sigma > 0.0 or isinstance(parameter.prior, Uniform)
+                ):
                     found.append(Scalar(name))
     for name in ("transducer.stiffness", "transducer.damping"):
         if name in quantities:
