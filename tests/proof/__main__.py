@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from time import monotonic
 
-from proof.prove import prove
+from proof.prove import finish, judge
 from proof.score import Row
 from proof.seal import SealError
 from proof.words import METHODS, OURS
@@ -31,6 +31,11 @@ def parser() -> argparse.ArgumentParser:
     options.add_argument("--work", type=Path, help="working folder; a bench begun there goes on")
     options.add_argument("--output", "-o", type=Path, help="where score and page go [default: reports/proof]")
     options.add_argument("--jobs", type=int, default=len(os.sched_getaffinity(0)), help="processes")
+    options.add_argument(
+        "--answered",
+        action="store_true",
+        help="do no more: score the trials before the first one, by name, without an answer; the others are lost",
+    )
     options.add_argument("--dask", metavar="ADDRESS", help="scheduler of a Dask cluster, tcp://HOST:PORT")
     return options
 
@@ -38,7 +43,7 @@ def parser() -> argparse.ArgumentParser:
 def main() -> int:
     """Run a bench; return 1 if `failed`, 2 if it could not be run."""
     asked = parser().parse_args()
-    command = " ".join(["kbs-process", "prove", *sys.argv[1:]])
+    command = " ".join(["python -m proof", *sys.argv[1:]])
     split = asked.split or ("validation" if asked.full else "development")
     count = asked.trials or (FULL if asked.full else SMALL)
     methods = tuple(dict.fromkeys(asked.method or (METHODS if asked.full else (OURS,))))
@@ -51,7 +56,9 @@ def main() -> int:
 
     try:
         work = Work(folder, split, count, asked.seed, command)
-        rows = prove(work, methods, target, jobs=asked.jobs, dask=asked.dask, command=command, tell=tell)
+        if not asked.answered:
+            finish(work, methods, jobs=asked.jobs, dask=asked.dask, tell=tell)
+        rows = judge(work, methods, target, dask=asked.dask, command=command, tell=tell)
     except (BenchError, SealError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 2

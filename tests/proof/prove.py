@@ -56,21 +56,9 @@ def workers(jobs: int, dask: str | None) -> Iterator[Executor]:
         yield pool
 
 
-def prove(
-    work: Work,
-    methods: tuple[str, ...],
-    target: Path,
-    *,
-    jobs: int,
-    dask: str | None,
-    command: str,
-    tell: Tell,
-) -> tuple[Row, ...]:
-    """Run what is left of a bench, and write score and page to `target`."""
-    isolation = _ISOLATION[isolate.level()]
-    if dask is not None:
-        isolation += " (on the machine of this command; each machine of the cluster does what it can)"
-    tell(f"Each method runs in {isolation}")
+def finish(work: Work, methods: tuple[str, ...], *, jobs: int, dask: str | None, tell: Tell) -> None:
+    """Make the trials of a bench that are missing, and let every method answer those that it has not."""
+    tell(f"Each method runs in {isolation(dask)}")
     with workers(jobs, dask) as pool:
         orders = work.orders()
         for done, (order, content) in enumerate(_each(pool, make_sealed, orders), start=1):
@@ -82,13 +70,24 @@ def prove(
             for method, content in given.items():
                 work.keep_answer(job.trial, method, content)
             tell(f"answered {job.trial}, {done} of {len(unanswered)}: {', '.join(given)}")
-    truths, answers = work.open(work.close(methods))
+
+
+def judge(
+    work: Work, methods: tuple[str, ...], target: Path, *, dask: str | None, command: str, tell: Tell
+) -> tuple[Row, ...]:
+    """Close the ledger, break the seals, and write score and page to `target`.
+
+    Of a bench that was not finished, the trials before the first one, by name, that lacks an answer.
+    """
+    ledger = work.close(methods)
+    tell(f"{len(ledger.seals)} of {len(work.plan.names)} trials are scored")
+    truths, answers = work.open(ledger)
     rows = score(truths, answers)
     bench = Bench(
         split=work.plan.split,
         seed=str(work.plan.seed),
         command=command,
-        isolation=isolation,
+        isolation=isolation(dask),
         rows=rows,
         truths=tuple(truths),
         answers=tuple(answers),
@@ -99,6 +98,12 @@ def prove(
     (target / "ledger.json").write_bytes((work.folder / "ledger.json").read_bytes())
     write_page(bench, target / "index.html")
     return rows
+
+
+def isolation(dask: str | None) -> str:
+    """What a method runs in."""
+    elsewhere = " (on the machine of this command; each machine of the cluster does what it can)"
+    return _ISOLATION[isolate.level()] + (elsewhere if dask is not None else "")
 
 
 _ISOLATION = {

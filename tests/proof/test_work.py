@@ -51,6 +51,28 @@ def finished(folder: Path) -> Work:
     return bench
 
 
+def test_what_is_answered_before_the_first_gap_can_be_judged_and_the_rest_stays_sealed(
+    tmp_path: Path,
+) -> None:
+    bench = work(tmp_path)
+    for order in bench.orders():
+        bench.keep_trial(order.name, trials.make_sealed(order))
+    names = sorted(bench.plan.names)
+    with pytest.raises(BenchError, match="first trial has no answer"):
+        bench.close(METHODS)
+    for name in (names[0], names[2]):
+        for method in METHODS:
+            bench.keep_answer(name, method, answered(name, method))
+    truths, answers = bench.open(bench.close(METHODS))
+    assert [truth.trial for truth in truths] == names[:1]
+    assert {one.trial for one in answers} == {names[0]}
+    # Once seals are broken there is no going on.
+    for method in METHODS:
+        bench.keep_answer(names[1], method, answered(names[1], method))
+    with pytest.raises(BenchError, match="changed after seals were broken"):
+        bench.close(METHODS)
+
+
 def test_only_what_is_missing_is_done_again(tmp_path: Path) -> None:
     bench = work(tmp_path)
     first, *others = bench.orders()

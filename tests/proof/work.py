@@ -101,9 +101,21 @@ class Work:
         """Store an answer."""
         _replace(self._answer(method, name), content)
 
+    def answered(self, methods: tuple[str, ...]) -> list[str]:
+        """Trials, in the order of their names, before the first one that a method has not answered.
+
+        A prefix of random names is no choice: which trials take long says what is in them.
+        """
+        names = sorted(self.plan.names)
+        missing = self.unanswered(methods)
+        return names[: names.index(missing[0][0])] if missing else names
+
     def close(self, methods: tuple[str, ...]) -> Ledger:
-        """Write the ledger: from here on, no answer may change. Raises BenchError if one did."""
-        seals = {name: seal.digest(member(self.trial(name), SEAL)) for name in sorted(self.plan.names)}
+        """Write the ledger of what is answered: from here on, no answer may change. Raises BenchError if one did."""
+        names = self.answered(methods)
+        if not names:
+            raise BenchError("the first trial has no answer yet\n  -> go on without --answered")
+        seals = {name: seal.digest(member(self.trial(name), SEAL)) for name in names}
         answers = {
             method: {name: seal.digest(self._answer(method, name).read_bytes()) for name in seals}
             for method in methods
