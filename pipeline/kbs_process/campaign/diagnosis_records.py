@@ -66,7 +66,7 @@ def results_of(
             status="undecided" if outcome.verdict == "undecided" else "none",
             sentence=_sentence(outcome, trials, floor),
         ),
-        provenance=provenance.made(f"kbs-process diagnose {campaign.name}", campaign),
+        provenance=provenance.made("diagnose", campaign),
         answer=outcome.verdict,
         paragraph=_paragraph(outcome, finds, trials, floor),
         floor=floor.statement,

@@ -58,9 +58,7 @@ def _results(campaign: Campaign, rig: Rig, flight: Flight, sources: Sequence[Pat
         article=campaign.article,
         verdict=_conclusion(requirements),
         provenance=provenance.made(
-            f"kbs-process flight {campaign.name} --samples {units + flight.failed} --seed {flight.seed}",
-            campaign,
-            sources,
+            "flight", campaign, sources, f"--samples {units + flight.failed} --seed {flight.seed}"
         ),
         trajectory=flight.trajectory,
         duration_s=flight.duration_s,

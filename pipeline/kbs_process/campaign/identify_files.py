@@ -99,7 +99,7 @@ def _results(campaign: Campaign, outcomes: Outcomes, files: tuple[str, ...]) -> 
         title=campaign.title,
         article=campaign.article,
         verdict=_verdict(checks, misfits, parameters),
-        provenance=provenance.made(f"kbs-process identify {campaign.name}", campaign),
+        provenance=provenance.made("identify", campaign),
         band_Hz=found.experiment.bands(found.experiment.recordings[0])[0],
         samples=len(found.jacobian),
         misfit_rms=found.fit.residual_rms,

@@ -62,8 +62,8 @@ def software() -> dict[str, Any]:
     }
 
 
-def made(command: str, campaign: Campaign, others: Sequence[Path] = ()) -> Provenance:
-    """Return what made results: `command`, the software, the campaign's files, and `others` that were read."""
+def made(verb: str, campaign: Campaign, others: Sequence[Path] = (), options: str = "") -> Provenance:
+    """Return what made results: the command, the software, the campaign's files, and `others` that were read."""
     about = software()
     files = {entry["file"]: entry["sha256"] for entry in inputs(campaign)}
     files |= {_relative(path, campaign.folder): sha256(path) for path in others}
@@ -72,7 +72,9 @@ def made(command: str, campaign: Campaign, others: Sequence[Path] = ()) -> Prove
         python=about["python"],
         libraries=about["libraries"],
         platform=about["platform"],
-        command=command,
+        command=" ".join(
+            part for part in ("kbs-process", verb, f"campaign/{campaign.name}", options) if part
+        ),
         commit=about["commit"] or "",
         inputs=tuple(InputFile(file=file, sha256=digest) for file, digest in files.items()),
     )

@@ -85,7 +85,7 @@ def write_results(
         title=campaign.title,
         article=campaign.article,
         verdict=_conclusion(judged),
-        provenance=provenance.made(f"kbs-process reference-day {campaign.name}", campaign, (day.path,)),
+        provenance=provenance.made("reference-day", campaign, (day.path,)),
         geometry=_geometry(day, planned),
         phases=tuple(
             records.Phase(

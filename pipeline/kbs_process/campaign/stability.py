@@ -85,7 +85,7 @@ def analyse_stability(
             title=campaign.title,
             article=campaign.article,
             verdict=_conclusion(margins, critical[worst], sensitivities),
-            provenance=provenance.made(f"kbs-process stability {campaign.name}", campaign),
+            provenance=provenance.made("stability", campaign),
             joint=swept,
             joints=systems[0].joints,
             cycle_s=float(controller.cycle),

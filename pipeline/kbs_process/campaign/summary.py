@@ -46,7 +46,7 @@ def summarise(
             frame="joint" if campaign.rig.frame == "joint" else "T",
         ),
         verdict=_conclusion(findings.requirements),
-        provenance=provenance.made(f"kbs-process {campaign.name}", campaign),
+        provenance=provenance.made("", campaign),
         requirements=findings.requirements,
         warnings=tuple(notices(campaign, analyses, model, findings, conventions)),
         recordings=tuple(_recording(analysis) for analysis in analyses),
