@@ -21,7 +21,6 @@ def clone(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """What the tutorial needs of a clone in which the README's command has been run."""
     folder = tmp_path_factory.mktemp("clone")
     shutil.copytree(ROOT / "campaigns" / "EL089", folder / "campaigns" / "EL089")
-    (folder / "bench").mkdir()
     activate = folder / ".venv" / "bin" / "activate"
     activate.parent.mkdir(parents=True)
     activate.write_text(f'PATH="{Path(sys.executable).parent}:$PATH"\n')

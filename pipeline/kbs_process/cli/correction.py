@@ -74,7 +74,7 @@ def diagnose(campaign: str, output: Path | None, pdf: bool | None, quiet: bool) 
 
     Detects what exceeds the repeatability floor, refits the known parameters within their uncertainties, locates what
     they leave, names its physics or measures its law, and tries it on recordings that were held out. Writes a
-    corrected model (corrected/) beside the report. Experimental: docs/proof.md says how often it is right.
+    corrected model (corrected/) beside the report. Experimental: docs/validations.md says how often it is right.
     """
     from kbs_process.campaign.load import load_campaign
     from kbs_process.campaign.locate import find_campaign, results_folder
@@ -93,17 +93,24 @@ def diagnose(campaign: str, output: Path | None, pdf: bool | None, quiet: bool) 
 @click.command(
     epilog=examples("prove", "prove --full --jobs 8", "prove --full --dask tcp://10.0.0.5:8786")
     + "\n\nFrom a checkout; an interrupted bench goes on where it stopped. Exit status 1: a find in a trial without "
-    "a concealed effect."
+    "a concealed effect, or a trial without an answer."
 )
 @click.option(
     "--full", is_flag=True, help="All validation trials and all rivals: hours, to reports/proof/full."
 )
 @click.option("--trials", type=click.IntRange(1), metavar="N", help="How many [default: 6; 200 with --full].")
 @click.option(
-    "--work", type=FOLDER, metavar="FOLDER", help="Where trials and answers are kept [default: .proof]."
+    "--work",
+    type=FOLDER,
+    metavar="FOLDER",
+    help="Where trials and answers are kept [default: .proof/SPLIT-N].",
 )
 @click.option(
-    "--output", "-o", type=FOLDER, metavar="FOLDER", help="Where the score goes [default: reports/proof]."
+    "--output",
+    "-o",
+    type=FOLDER,
+    metavar="FOLDER",
+    help="Where the score goes [default: reports/proof/small or full].",
 )
 @click.option("--jobs", type=click.IntRange(1), metavar="N", help="Processes [default: one a core].")
 @click.option("--dask", metavar="ADDRESS", help="Scheduler of a Dask cluster to run on: tcp://HOST:PORT.")

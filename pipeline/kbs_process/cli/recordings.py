@@ -53,7 +53,7 @@ def inspect(files: tuple[Path, ...], check: bool) -> None:
 def import_(
     mapping: str | None, source: Path | None, campaign: Path | None, file: Path | None, quiet: bool
 ) -> None:
-    """Convert CSV, Parquet, HDF5, TDMS or MDF4 files in SOURCE into a new folder CAMPAIGN.
+    """Convert CSV, Parquet, HDF5, TDMS, MDF4, MATLAB or NumPy files in SOURCE into a new folder CAMPAIGN.
 
     MAPPING is a TOML file that says which columns are which channels, or the name of a preset.
     """

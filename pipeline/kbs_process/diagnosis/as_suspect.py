@@ -36,7 +36,7 @@ def suspect_of(find: Find, scene: Scene) -> tuple[Suspect, Array] | None:
         return None
     # Of a sensor's law that was found more than once, the action that was found first.
     numbers = _numbers(find.estimates if isinstance(law, Effect) else find.actions[0])
-    if not all(entry.name in numbers for entry in law.parameters if entry.role != "shared"):
+    if not _tells(numbers, law):
         return None
     if "temperature" in law.arguments and any(one.temperature is None for one in scene.experiment.trials):
         return None
@@ -50,12 +50,13 @@ def _again(law: Effect | Sensing, site: str, find: Find) -> tuple[Candidate, ...
         return ()
     numbers = {one.name: one for one in find.estimates}
     actions = (instance(law, number) for number in range(2, ACTIONS + 1))
-    told = [
-        action
-        for action in actions
-        if all(entry.name in numbers for entry in action.parameters if entry.role != "shared")
-    ]
+    told = [action for action in (law, *actions) if _tells(numbers, action)][1:]  # the first has the law's names
     return tuple(Candidate(action, site, _shape(action, numbers)) for action in told)
+
+
+def _tells(numbers: Mapping[str, Estimate], law: Effect | Sensing) -> bool:
+    """Whether a law's numbers are all among some."""
+    return all(entry.name in numbers for entry in law.parameters if entry.role != "shared")
 
 
 def _shape(law: Effect | Sensing, numbers: Mapping[str, Estimate]) -> tuple[tuple[str, float], ...]:
@@ -63,9 +64,9 @@ def _shape(law: Effect | Sensing, numbers: Mapping[str, Estimate]) -> tuple[tupl
 
 
 def _numbers(estimates: Sequence[Estimate]) -> dict[str, Estimate]:
-    """Estimates by the names of the law's first action, whichever this is."""
+    """Estimates by their names, and those of the first action by the law's, whichever action this is."""
     own = {one.name: one for one in estimates}
-    return {re.sub(f"{ACTION}$", "", name): one for name, one in own.items()} | own
+    return {re.sub(f"{ACTION}$", "", name): own[name] for name in reversed(own)} | own
 
 
 def _point(numbers: Mapping[str, Estimate]) -> Place | None:

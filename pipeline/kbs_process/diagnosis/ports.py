@@ -5,7 +5,7 @@ transfer vectors H (c, d). What is left of z outside H's span,
 
     Q = |z - H (H^H H)^{-1} H^H z|^2,   (nu - q + 1) / (q nu) Q ~ F(2 q, 2 (nu - q + 1)),   q = c - d,
 
-nu being the floor's degrees of freedom (diagnosis.md). Inside a window the input's envelope and the pose change, which
+nu being the floor's degrees of freedom. Inside a window the input's envelope and the pose change, which
 turns H u into H u + H' u_1 + H_pose u_2 to first order: these directions are free too. What the transfer is uncertain
 by is added to the noise. Known parameters are refitted to what a port leaves. Windows have sine tapers and
 frequencies lie 2/T apart, which makes cells independent. Cells combine by Fisher, ports by Holm.
@@ -199,7 +199,7 @@ def alike(cells: Cells, ports: Sequence[PortModel]) -> dict[str, tuple[str, ...]
     """For each port those that these recordings cannot tell from it.
 
     What the port's own best input shows is fitted by the other port, input and first-order changes free: twice the
-    power left, less what noise leaves, is rho_delta^2 (diagnosis.md).
+    power left, less what noise leaves, is rho_delta^2.
     """
     own = {port.name: _basis(port.H)[0] for port in ports}
     free = {port.name: _basis(np.concatenate([port.H, port.varied], axis=2))[0] for port in ports}

@@ -1,6 +1,6 @@
 """Every threshold of the diagnosis, with the reason for its value.
 
-They were set on development cases, and on validation trials that were spent; docs/proof.md says which.
+They were set on development cases, and on validation trials that were spent; docs/validations.md says which.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ TRANSFER_ERROR: Final = 0.10
 
 # -- port test -----------------------------------------------------------------------------------------------------
 WINDOW_S: Final = 16.0  # longer: the pose changes; shorter: the resonance (decay 3 s) is not over
-PORT_ALPHA: Final = 0.05  # family-wise (Holm), the port's level of diagnosis.md
+PORT_ALPHA: Final = 0.05  # family-wise (Holm)
 CELL_ALPHA: Final = 0.05  # false-discovery rate (Benjamini-Yekutieli) of cells of the maps
 # Relative error of transfer vectors beyond their change with frequency and pose, which is free in the test.
 PORT_ERROR: Final = 0.02
@@ -30,9 +30,9 @@ FALSE_ALARM: Final = (
 # rho_eff that a suspect needs to be looked at: neither plant nor floor is exact, and what they lack (rounding of
 # encoders along repeated paths most) gave the best suspect of campaigns without any effect up to 8.7.
 LEAST_RHO: Final = 12.0
-ABSORBED: Final = 0.99  # kappa: what a known parameter takes up of a signature (diagnosis.md)
+ABSORBED: Final = 0.99  # kappa: what a known parameter takes up of a signature
 DEPENDENT: Final = 1e-8  # relative eigenvalue below which amplitudes of a candidate are one and the same
-# P-value below which what is left counts as there (diagnosis.md: 1 % of null campaigns at most claim a find).
+# P-value below which what is left counts as there (1 % of null campaigns at most are to claim a find).
 DETECTED: Final = 1e-3
 # Share of the floor's power by which what is left has to exceed it, too: the best of many minima of phases and tooth
 # contact leave up to 0.02 more than each other on campaigns without any effect. A law has to take as much.
