@@ -11,9 +11,10 @@ from diagnosis import bench
 from diagnosis.test_floor import CHANNELS, N, made
 from kbs_process.diagnosis import floor
 from kbs_process.diagnosis.detection import Cell, Detection, detect
-from kbs_process.diagnosis.experiment import Experiment
+from kbs_process.diagnosis.experiment import Experiment, Trial
 from kbs_process.diagnosis.hypothesis import Prediction
-from kbs_process.signals.records import Array
+from kbs_process.diagnosis.whiten import window_of
+from kbs_process.signals.records import Array, Mask
 
 NOTHING = {0: Prediction(np.zeros((N, CHANNELS)), np.zeros((N, 6)))}
 
@@ -54,6 +55,41 @@ def test_what_repeats_differ_by_is_no_detection() -> None:
     changed = replace(first, measured=first.measured + burst * first.valid[:, None])
     found = detected(replace(experiment, trials=(changed, *experiment.trials[1:])))
     assert found.log10_p > -6.0
+
+
+SHOWN = 300  # samples of two encoders that rest otherwise
+
+
+@pytest.fixture
+def resting(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Both encoders show a tenth of every trial."""
+
+    def windows(experiment: Experiment, trial: Trial, valid: Mask) -> Array:
+        part = valid & (np.arange(N) < SHOWN)
+        return np.stack(
+            [window_of(part if k >= experiment.loads else valid) for k in range(CHANNELS)], axis=1
+        )
+
+    monkeypatch.setattr(floor, "channel_windows", windows)
+
+
+@pytest.mark.usefixtures("resting")
+def test_channels_that_show_little_leave_p_values_uniform() -> None:
+    found = [detected(made(seed, 3, np.zeros((N, CHANNELS)))) for seed in range(8)]
+    p = np.array([float(np.exp(cell.log_p)) for one in found for cell in one.cells])
+    assert 0.0 <= np.mean(p < 0.05) < 0.13
+    assert 0.35 < np.mean(p) < 0.7  # what the floor is known by is taken for more than it is
+    assert np.mean([one.ratio for one in found]) == pytest.approx(1.0, abs=0.06)
+
+
+def test_channels_that_show_little_do_not_hide_what_others_show(request: pytest.FixtureRequest) -> None:
+    t = bench.DT * np.arange(N)
+    tone: Array = np.zeros((N, CHANNELS))
+    tone[:, 3] = 3e-4 * np.sin(2.0 * np.pi * 1.5 * t)
+    whole = min(cell.log_p for cell in detected(made(3, 3, tone)).cells)
+    request.getfixturevalue("resting")
+    part = min(cell.log_p for cell in detected(made(3, 3, tone)).cells)
+    assert part < 0.8 * whole < np.log(1e-4)
 
 
 def _log_p(cell: Cell) -> float:

@@ -183,7 +183,7 @@ def test_nothing_is_compared_where_a_measured_motion_has_a_gap() -> None:
     run, moved = swinging()
     t = bench.DT * np.arange(N)
     gone = (t > 20.0) & (t < 22.0)
-    for motion, missing in ((moved, 0.0), (replace(moved, valid=moved.valid & ~gone), 4.0)):
+    for motion, missing in ((moved, 0.0), (replace(moved, valid=moved.valid & ~gone, reach=1.5), 5.0)):
         (trial,) = made(Recorded("fit", "SWING", run, None, motion)).trials
         assert trial.valid[gone].any() != bool(missing)
         assert np.count_nonzero(~trial.valid) * bench.DT == pytest.approx(missing, abs=0.2)

@@ -113,7 +113,8 @@ def test_a_find_of_several_orders_is_such_a_suspect_again(view: View, first: int
     actions = whole.suspect.candidate.actions[first:]
     told = []
     for action in actions:
-        told += [Estimate(entry.name, "N m", 0.1, 0.01) for entry in action.amplitudes]
+        size = 0.01 * action.shape[0][1]
+        told += [Estimate(entry.name, "N m", size, 0.01) for entry in action.amplitudes]
         told += [Estimate(name, "1", value, 0.0) for name, value in action.shape]
     find_ = object.__new__(Find)
     for name, value in {"identity": identity(whole.suspect), "estimates": tuple(told), "curve": None}.items():
@@ -123,4 +124,5 @@ def test_a_find_of_several_orders_is_such_a_suspect_again(view: View, first: int
     again, amplitude = found
     assert isinstance(again, Catalogued)
     assert [one.shape[0][1] for one in again.candidate.actions] == [one.shape[0][1] for one in actions]
-    assert len(amplitude) == len(again.amplitudes) == 2 * len(actions)
+    assert len(again.amplitudes) == 2 * len(actions)
+    assert amplitude == pytest.approx(np.repeat([0.01 * one.shape[0][1] for one in actions], 2))

@@ -8,12 +8,16 @@ import bench
 import numpy as np
 import pytest
 
+from kbs_process.diagnosis import rounds
 from kbs_process.diagnosis.experiment import Experiment
+from kbs_process.diagnosis.finding import Tried
 from kbs_process.diagnosis.gate import gate
 from kbs_process.diagnosis.gls import Sums, score
 from kbs_process.diagnosis.hypothesis import Hypothesis, predict
-from kbs_process.diagnosis.joint import Standing, with_extra
-from kbs_process.diagnosis.rivals import rivalry
+from kbs_process.diagnosis.joint import Own, Standing, with_extra
+from kbs_process.diagnosis.leaders import gated
+from kbs_process.diagnosis.race import own_of
+from kbs_process.diagnosis.rivals import probabilities, rivalry
 from kbs_process.diagnosis.scene import Scene
 from kbs_process.diagnosis.screen import Bench, Catalogued, Found, Screening, screen
 from kbs_process.diagnosis.suspects import Candidate
@@ -125,6 +129,29 @@ def test_without_held_out_recordings_each_is_left_out_in_turn(made: Experiment, 
     )
     assert not verdict.held_out and [fold.trial for fold in verdict.folds] == ["r0", "r1"]
     assert verdict.passed, verdict.reasons
+
+
+def test_numbers_of_each_recording_count_as_those_of_the_model_do(cable: Standing) -> None:
+    known = cable.known
+    assert probabilities([known, known], 1000) == pytest.approx([0.5, 0.5])
+    odds = 1000.0**2  # Schwarz: half the logarithm of the rows for each of four numbers
+    assert probabilities([known, known], 1000, (0, 4)) == pytest.approx([odds / (1 + odds), 1 / (1 + odds)])
+
+
+def test_a_law_is_judged_where_its_numbers_have_settled(made: Experiment, cable: Standing) -> None:
+    tried, scene, found = screened(cable)
+    best = found.candidates[0]
+    after = with_extra(cable, extra_of(best, cable, tried, scene), bench.serial(made))
+    begun = Tried(
+        best, after, gated(best, cable, after, own_of(best, cable, after)), found, own_of(best, cable, after)
+    )
+    assert begun.gate.passed
+    known = after.known
+    worse = replace(known, residual=tuple(5.0 * one for one in known.residual))
+    told = rounds._judged_again(replace(begun, standing=replace(after, known=worse)), cable)
+    assert not told.gate.passed and any("predicted worse" in reason for reason in told.gate.reasons)
+    alone = replace(begun, own=Own((), ()))  # of what is each recording's own the verdict stays
+    assert rounds._judged_again(alone, cable) is alone
 
 
 def test_a_law_of_the_readings_needs_no_plant_and_its_rival_is_told_apart(made: Experiment) -> None:

@@ -374,7 +374,8 @@ def _warnings(campaign: Campaign, floor: Floor, outcome: Outcome) -> Iterator[No
     if floor.source == "declared":
         yield Notice(
             severity="warning",
-            what=f"{floor.statement}: other noise would be taken for a mismatch",
+            what=f"{floor.statement}: other noise would be taken for a mismatch, and one below that frequency alone is "
+            "not detected",
             remedy="repeat a trajectory",
         )
     for entry in campaign.recordings:

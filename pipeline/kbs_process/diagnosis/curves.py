@@ -115,7 +115,7 @@ def _slope(scene: Scene, drive: int, signal: str, joint: str) -> Array:
 
 
 def curves(scene: Scene) -> tuple[CurveSuspect, ...]:
-    """Every measured law at every driven joint whose regressor moves."""
+    """Every measured law at every joint where its regressor moves."""
     found = []
     rig = scene.experiment.rig
     reached = felt_from_the_ground(rig)

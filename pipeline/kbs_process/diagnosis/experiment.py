@@ -28,7 +28,6 @@ _SAME_COMMAND = 1e-6
 _SAME_RATE = 0.02  # relative, of two recorders of one kind
 _IN_COMMON = 0.4  # of a recording: that much has to be there in all its repeats
 _THERE = 0.99  # of a sample between others, that these have
-_SMOOTHED = 1.0  # s, that the low-pass of angles reaches into what is beside a gap
 _ALIKE = 1e-9  # s, shift below which nothing is interpolated
 
 
@@ -192,7 +191,7 @@ def _seen(one: Recorded, channels: Sequence[str]) -> Mask:
         seen = seen & angle.valid
     if one.motion is not None:
         moved = one.motion
-        reach = 2 * round(_SMOOTHED / moved.dt) + 1
+        reach = 2 * round(moved.reach / moved.dt) + 1
         gone = maximum_filter1d((~moved.valid).astype(np.float64), reach, mode="nearest")
         known = np.interp(loads.t, moved.t0 + moved.dt * np.arange(len(gone)), 1.0 - gone, 0.0, 0.0) > _THERE
         seen = seen & known
@@ -212,6 +211,7 @@ def _trajectories(
     for one in sorted(recorded, key=lambda r: -_length(r.run)):
         moved = motion_of(one.run)
         assert moved is not None
+        seen = _seen(one, channels)
         for number, group in enumerate(groups):
             reference = group[0][0]
             if reference.trajectory != one.trajectory or not _sampled_alike(reference.run, one.run):
@@ -222,14 +222,15 @@ def _trajectories(
             if shift is None:
                 continue
             t = _loads(reference.run).t + shift
-            both = common[number] & _seen_at(t, _loads(one.run), _seen(one, channels))
-            if np.count_nonzero(both) >= _IN_COMMON * np.count_nonzero(_seen(reference, channels)):
+            both = common[number] & _seen_at(t, _loads(one.run), seen)
+            longest = max(np.count_nonzero(_seen(reference, channels)), np.count_nonzero(seen))
+            if np.count_nonzero(both) >= _IN_COMMON * longest:
                 group.append((one, shift))
                 common[number] = both
                 break
         else:
             groups.append([(one, 0.0)])
-            common.append(_seen(one, channels))
+            common.append(seen)
     return groups
 
 

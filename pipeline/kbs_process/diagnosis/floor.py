@@ -170,7 +170,7 @@ def declared(experiment: Experiment) -> Floor:
     level[0, wrench:] = np.where(encoder_steps(experiment) > 0.0, _UNSEEN, 1.0)
     statement = (
         "no trajectory was repeated: the sensors' stated noise and rounding, and 1/f noise below "
-        f"{_KNEE:g} Hz, are taken for all that differs from run to run; below that nothing is tested"
+        f"{_KNEE:g} Hz, are taken for all that differs from run to run"
     )
     return Floor(
         experiment, np.geomspace(_KNEE, experiment.highest_Hz, 16), np.ones(1), np.eye(c)[None].astype(complex),

@@ -217,7 +217,7 @@ class _Stage:
         C = known.covariance[np.ix_(free, free)]
         if not np.isfinite(C).all():
             return None
-        size = np.sqrt(np.diag(C))  # numbers of any units
+        size = np.sqrt(np.where(np.diag(C) > 0.0, np.diag(C), 1.0))  # numbers of any units
         values, vectors = np.linalg.eigh(np.linalg.pinv(C / np.outer(size, size), hermitian=True))
         prior = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T / size
         return cls(

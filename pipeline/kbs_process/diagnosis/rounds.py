@@ -154,12 +154,12 @@ def _round(standing: Standing, floor: Floor, simulate: Simulate, accepted: Seque
     if settled.known.excess < MOST * standing.known.excess:
         settled = released(settled, floor, simulate)
     told = reread(replace(passed[best], standing=settled), standing, floor, simulate)
-    told = _judged_again(told, passed[best], standing)
+    told = _judged_again(told, standing)
     # One more action of a law at the same place is part of the find.
     earlier = [(one.find.identity.law, one.tried.own) for one in accepted if one.find.identity != _law(told)]
     more = any(one.find.identity == _law(told) for one in accepted)
     little = too_little(standing, told.standing, floor, more=more)
-    if reasons := little or only_while(earlier, standing, told.standing.known, simulate):
+    if reasons := told.gate.reasons or little or only_while(earlier, standing, told.standing.known, simulate):
         refused.append(Refused(_law(told), told.found.score.rho_eff, reasons))
         return _Round(None, standing, view.screening, tuple(refused), place)
     # Told anew, it may be what another was: their chances are one then.
@@ -175,12 +175,11 @@ def _each_time(one: Tried) -> int:
     return len(suspect.amplitudes) * len(known.experiment.fit) if suspect.each_trial else 0
 
 
-def _judged_again(told: Tried, passed: Tried, before: Standing) -> Tried:
-    """A law where its numbers have settled, if it passes the gate there as well; else where it `passed`."""
+def _judged_again(told: Tried, before: Standing) -> Tried:
+    """A law with the gate's verdict on it where its numbers have settled."""
     if not told.own.names:
         return told
-    verdict = gated(told.found, before, told.standing, told.own)
-    return replace(told, gate=verdict) if verdict.passed else passed
+    return replace(told, gate=gated(told.found, before, told.standing, told.own))
 
 
 def named_first(passed: Sequence[Tried]) -> list[Tried]:

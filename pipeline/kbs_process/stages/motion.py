@@ -58,6 +58,7 @@ class Motion:
     offset: Array  # (joints,) rad, taken off the encoders' readings
     valid: Mask  # (n,)
     history: tuple[str, ...] = ()
+    reach: float = 0.0  # s about a gap in which its low-passes show it
 
     def __len__(self) -> int:
         return len(self.q)
@@ -77,6 +78,7 @@ class _Angle:
     missed: float
     sigma: Array  # (n,)
     how: str
+    corner: float  # Hz, the lowest that it was low-passed at
 
 
 def estimate(run: Run, rig: Rig, settings: MotionSettings = MotionSettings()) -> Motion:
@@ -119,6 +121,8 @@ def estimate(run: Run, rig: Rig, settings: MotionSettings = MotionSettings()) ->
                 else []
             ),
         ),
+        # Tails of a kernel are below 1 % beyond the half of its length.
+        reach=0.5 * grid.dt * kernel_length(min(angle.corner for angle in angles), grid.dt),
     )
 
 
@@ -170,14 +174,16 @@ def _integrated(rate: Array, dt: float, band: float) -> _Angle:
     q = np.concatenate([[0.0], np.cumsum(0.5 * dt * (rate[1:] + rate[:-1]))])
     noise = float(np.std(rate - smooth(rate, dt, band)))
     sigma = noise * dt * np.sqrt(np.arange(len(q)))
-    return _Angle(q, np.zeros((len(_PHASES), len(q))), _rms(sigma), sigma, "integral of the measured rate")
+    return _Angle(
+        q, np.zeros((len(_PHASES), len(q))), _rms(sigma), sigma, "integral of the measured rate", band
+    )
 
 
 def _from_encoder(measured: Array, dt: float, step: float, encoder_rate: float, band: float) -> _Angle:
     motion = smooth(measured, dt, band)
     rounding = rounding_histories(motion, dt, step, encoder_rate, band)
     sigma = rounding_error(rounding, dt)
-    return _Angle(measured, rounding, 0.0, sigma, f"encoder alone, sigma {_rms(sigma):.2g} rad")
+    return _Angle(measured, rounding, 0.0, sigma, f"encoder alone, sigma {_rms(sigma):.2g} rad", band)
 
 
 def _from_both(
@@ -205,7 +211,7 @@ def _from_both(
         if _rms(sigma) < least:
             least = _rms(sigma)
             how = f"command and encoder, joined at {corner:g} Hz, sigma {least:.2g} rad"
-            best = _Angle(commanded + slow, rounding, float(np.sqrt(max(missed, 0.0))), sigma, how)
+            best = _Angle(commanded + slow, rounding, float(np.sqrt(max(missed, 0.0))), sigma, how, corner)
     return best
 
 
