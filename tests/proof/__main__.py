@@ -58,7 +58,7 @@ def main() -> int:
         work = Work(folder, split, count, asked.seed, command)
         if not asked.answered:
             finish(work, methods, jobs=asked.jobs, dask=asked.dask, tell=tell)
-        rows = judge(work, methods, target, dask=asked.dask, command=command, tell=tell)
+        rows = judge(work, methods, target, command=command, tell=tell)
     except (BenchError, SealError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 2

@@ -58,7 +58,8 @@ def workers(jobs: int, dask: str | None) -> Iterator[Executor]:
 
 def finish(work: Work, methods: tuple[str, ...], *, jobs: int, dask: str | None, tell: Tell) -> None:
     """Make the trials of a bench that are missing, and let every method answer those that it has not."""
-    tell(f"Each method runs in {isolation(dask)}")
+    work.begin(isolation(dask))
+    tell(f"Each method runs in {work.isolation}")
     with workers(jobs, dask) as pool:
         orders = work.orders()
         for done, (order, content) in enumerate(_each(pool, make_sealed, orders), start=1):
@@ -72,9 +73,7 @@ def finish(work: Work, methods: tuple[str, ...], *, jobs: int, dask: str | None,
             tell(f"answered {job.trial}, {done} of {len(unanswered)}: {', '.join(given)}")
 
 
-def judge(
-    work: Work, methods: tuple[str, ...], target: Path, *, dask: str | None, command: str, tell: Tell
-) -> tuple[Row, ...]:
+def judge(work: Work, methods: tuple[str, ...], target: Path, *, command: str, tell: Tell) -> tuple[Row, ...]:
     """Close the ledger, break the seals, and write score and page to `target`.
 
     Of a bench that was not finished, the trials before the first one, by name, that lacks an answer.
@@ -87,7 +86,7 @@ def judge(
         split=work.plan.split,
         seed=str(work.plan.seed),
         command=command,
-        isolation=isolation(dask),
+        isolation=work.isolation,
         rows=rows,
         truths=tuple(truths),
         answers=tuple(answers),

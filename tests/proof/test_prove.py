@@ -74,9 +74,7 @@ def test_a_bench_ends_with_a_score_a_ledger_and_a_page(tmp_path: Path) -> None:
     def run(methods: tuple[str, ...]) -> dict[tuple[str, str], float | None]:
         bench = Work(tmp_path / "work", "development", 4, 1, "kbs-process prove")
         prove.finish(bench, methods, jobs=2, dask=None, tell=said.append)
-        rows = prove.judge(
-            bench, methods, tmp_path / "out", dask=None, command="python -m proof", tell=said.append
-        )
+        rows = prove.judge(bench, methods, tmp_path / "out", command="python -m proof", tell=said.append)
         return {(row.method, row.metric): row.value for row in rows if row.group == "all"}
 
     values = run((OURS,))

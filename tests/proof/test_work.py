@@ -71,6 +71,8 @@ def test_what_is_answered_before_the_first_gap_can_be_judged_and_the_rest_stays_
         bench.keep_answer(names[1], method, answered(names[1], method))
     with pytest.raises(BenchError, match="changed after seals were broken"):
         bench.close(METHODS)
+    with pytest.raises(BenchError, match="its other trials are lost"):
+        bench.begin("alone")
 
 
 def test_only_what_is_missing_is_done_again(tmp_path: Path) -> None:

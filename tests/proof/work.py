@@ -4,7 +4,8 @@ plan.json            what was asked for; specifications of trials are drawn agai
 key                  breaks the seals; readable by the owner, and covered while a method runs
 trials/NAME.tar      a campaign and its seal
 answers/METHOD/NAME.json
-ledger.json          digests of all seals and answers, written when the last answer is
+isolation            what the methods ran in
+ledger.json          digests of all seals and answers that are scored, written before any seal is broken
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ class Plan(Part, frozen=True, kw_only=True):
 
 
 class Ledger(Part, frozen=True, kw_only=True):
-    """SHA-256 of every seal and every answer, taken before any seal was broken."""
+    """SHA-256 of every seal and every answer that is scored, taken before any seal was broken."""
 
     seals: dict[str, str]
     answers: dict[str, dict[str, str]]
@@ -69,6 +70,21 @@ class Work:
             )
             _create_private(plan_file, msgspec.json.encode(self.plan))
         self.key = key_file.read_bytes()
+
+    @property
+    def isolation(self) -> str:
+        """What the methods ran in, as noted when they did."""
+        return (self.folder / "isolation").read_text(encoding="utf-8")
+
+    def begin(self, isolation: str) -> None:
+        """Note what methods run in. Raises BenchError if some seals were broken and others were not."""
+        path = self.folder / "ledger.json"
+        if path.is_file() and len(_ledger(path).seals) < len(self.plan.names):
+            raise BenchError(
+                f"{self.folder} was judged as far as it was answered: its other trials are lost\n"
+                "  -> a new bench needs new trials: give another folder with --work"
+            )
+        _replace(self.folder / "isolation", isolation.encode())
 
     def orders(self) -> list[Order]:
         """Trials that are still to be made."""
@@ -123,7 +139,7 @@ class Work:
         path = self.folder / "ledger.json"
         ledger = Ledger(seals=seals, answers=answers)
         if path.is_file():
-            before = msgspec.json.decode(path.read_bytes(), type=Ledger)
+            before = _ledger(path)
             changed = [m for m in before.answers if m in answers and before.answers[m] != answers[m]]
             if changed or before.seals != seals:
                 raise BenchError(
@@ -154,6 +170,10 @@ class Work:
 
     def _answer(self, method: str, name: str) -> Path:
         return self.folder / "answers" / method / f"{name}.json"
+
+
+def _ledger(path: Path) -> Ledger:
+    return msgspec.json.decode(path.read_bytes(), type=Ledger)
 
 
 def _create_private(path: Path, content: bytes) -> None:

@@ -99,7 +99,11 @@ def _results(campaign: Campaign, outcomes: Outcomes, files: tuple[str, ...]) -> 
         title=campaign.title,
         article=campaign.article,
         verdict=_verdict(checks, misfits, parameters),
-        provenance=provenance.made("identify", campaign),
+        provenance=provenance.made(
+            "identify",
+            campaign,
+            options=f"--starts {outcomes.settings.starts} --run-to-run {outcomes.settings.run_to_run:g}",
+        ),
         band_Hz=found.experiment.bands(found.experiment.recordings[0])[0],
         samples=len(found.jacobian),
         misfit_rms=found.fit.residual_rms,

@@ -72,12 +72,16 @@ def made(verb: str, campaign: Campaign, others: Sequence[Path] = (), options: st
         python=about["python"],
         libraries=about["libraries"],
         platform=about["platform"],
-        command=" ".join(
-            part for part in ("kbs-process", verb, f"campaign/{campaign.name}", options) if part
-        ),
+        command=" ".join(part for part in ("kbs-process", verb, _named(campaign), options) if part),
         commit=about["commit"] or "",
         inputs=tuple(InputFile(file=file, sha256=digest) for file, digest in files.items()),
     )
+
+
+def _named(campaign: Campaign) -> str:
+    """A campaign as commands name it: an archived one, or the folder's name alone, wherever that is."""
+    folder = campaign.folder.absolute()
+    return f"campaign/{folder.name}" if folder.parent.name == "campaigns" else folder.name
 
 
 def constants(rig: Rig) -> Iterable[Constant]:
