@@ -8,6 +8,7 @@ import bench
 import numpy as np
 import pytest
 
+from kbs_process.campaign.relief import without_forces
 from kbs_process.diagnosis import direct
 from kbs_process.diagnosis.curves import CurveSuspect, curves, series
 from kbs_process.diagnosis.hypothesis import Hypothesis, Tapped
@@ -25,7 +26,7 @@ from kbs_process.plant.moved import added_loads, grounded, pressed
 from kbs_process.plant.rigid import axis_of, kinematics, loads
 from kbs_process.rig.model import Effort, Rig
 from kbs_process.signals.frames import rotate
-from kbs_process.signals.records import Array
+from kbs_process.signals.records import Array, Signal
 from plant.plant_rigs import body, joint, quantity
 from plant.plant_rigs import rig as plain_rig
 
@@ -138,6 +139,21 @@ def test_the_loads_answer_to_a_weight_as_to_a_force_and_to_the_ground_by_its_pow
             power = np.sum(axis * (moved.v if number == slider else moved.omega), axis=1)
             assert other.effort is not None
             assert np.allclose(grounds[link.name][:, 6 + row], -power / float(other.effort.gain), atol=1e-12)
+
+
+def test_what_the_laboratory_exerts_is_taken_from_efforts_too() -> None:
+    law = next(one for one in CATALOGUE if one.name == "tether")
+    values = {"tether_x": 3.0, "tether_z": -5.0, "tether_ky": 40.0}
+    here = attach(rig(), law, values, on="el", point=np.array([0.2, 0.1, -0.3]))
+    q, _ = motion()
+    whole = Signal(
+        0.0, 1.0 / RATE, np.zeros((len(q), 8)), here.channels, ("",) * 8, "T", np.ones(len(q), dtype=np.bool_)
+    )
+    still = np.zeros_like(q)
+    expected = added_loads(here, [law], q, still, 1.0 / RATE)
+    left = without_forces(whole, here, (law,), q)
+    assert np.max(np.abs(expected[:, 6:])) > 0.1
+    np.testing.assert_allclose(left.values, -expected, atol=1e-9)
 
 
 def test_drives_without_an_effect_s_numbers_have_none_that_are_known() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -26,6 +27,8 @@ from importer_files import (
 
 from kbs_process.campaign import importers
 from kbs_process.campaign.importers import text
+from kbs_process.campaign.importers.clock import numbers
+from kbs_process.campaign.importers.mapping import Text
 
 NO_TIME = MAPPING.replace('[time]\ncolumn = "t"\nunit = "s"\n', "")
 
@@ -159,6 +162,41 @@ def test_units_signs_and_wrapped_angles_across_pieces(
     expected = np.column_stack([1000.0 * force, -2.0 * force, force])
     np.testing.assert_allclose(blocks["wrench"][1], expected, rtol=1e-15)
     np.testing.assert_allclose(blocks["encoder"][1][:, 0], np.radians(degrees), atol=1e-12)
+
+
+def test_a_motor_s_angle_is_unwrapped_before_it_is_geared_down(tmp_path: Path) -> None:
+    t = np.arange(400) * 0.01
+    degrees = 50.0 + 250.0 * t
+    zero = 0.0 * t
+    write_csv(tmp_path / "run.csv", {"t": t, "Fx": zero, "Fy": zero, "Fz": zero, "angle": degrees % 360.0})
+    mapping = MAPPING.replace('unit = "rad"', 'unit = "deg", scale = 0.01, unwrap = true')
+    folder = importers.import_recordings(
+        write_mapping(tmp_path, "run.csv", mapping), tmp_path, tmp_path / "c"
+    )
+    found = read_back(folder, "turn_1")["encoder"][1][:, 0]
+    np.testing.assert_allclose(found, 0.01 * np.radians(degrees), atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("content", "options", "names", "first"),
+    [
+        ("t;Fx\n0,0;1,5\n0,1;overload\n0,2;2,5\n", {"decimal": ","}, ("t", "Fx"), [0.0, 1.5]),
+        ("# logger\n\nt;Fx\n0,0;1,5\n0,1;2,5\n", {"decimal": ",", "comment": "#"}, ("t", "Fx"), [0.0, 1.5]),
+        ("# logger\nt;Fx\ns;N\n0.0;1.5\n", {"comment": "#", "units_row": True}, ("t", "Fx"), [0.0, 1.5]),
+        ('"t (s)","Force, x (N)"\n0.0,1.5\n', {}, ("t (s)", "Force, x (N)"), [0.0, 1.5]),
+        ("0,00\t1,5\t2,5\n0,01\t1,6\t2,6\n", {"decimal": ","}, ("1", "2", "3"), [0.0, 1.5, 2.5]),
+        ("2026-01-31T12:00:00,1.5\n2026-01-31T12:00:01,2.5\n", {}, ("1", "2"), [np.nan, 1.5]),
+    ],
+    ids=["text among commas", "comments", "units", "quotes", "tabs", "dates"],
+)
+def test_what_loggers_write(
+    tmp_path: Path, content: str, options: dict[str, Any], names: tuple[str, ...], first: list[float]
+) -> None:
+    (tmp_path / "a.csv").write_text(content)
+    table = text.TextTable(tmp_path / "a.csv", Text(**options))
+    assert tuple(column.name for column in table.columns) == names
+    (cells,) = table.chunks(names)
+    np.testing.assert_array_equal([numbers(column)[0] for column in cells], first)
 
 
 def test_force_resolved_in_fixed_axes_is_turned_into_the_transducer(tmp_path: Path) -> None:

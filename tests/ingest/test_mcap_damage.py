@@ -271,6 +271,16 @@ def test_work_is_bounded_by_the_size_of_the_file(tmp_path: Path, piece: bytes) -
     assert inspection.state == "unreadable"
 
 
+def test_a_tail_of_zeros_is_one_loss(whole: Path, tmp_path: Path) -> None:
+    """What a logger had set aside and not written when its power failed."""
+    path = tmp_path / "a.mcap"
+    data = whole.read_bytes()
+    path.write_bytes(data[: len(data) // 2] + bytes(100_000))
+    read = try_reading(path)
+    assert read is not None
+    assert len(read[1]) < 5
+
+
 def test_an_index_that_overlaps_is_never_followed(whole: Path, tmp_path: Path) -> None:
     """The summary's chunk indexes may say what they like: chunks are read once, where they are."""
     data = whole.read_bytes()

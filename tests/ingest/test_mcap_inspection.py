@@ -58,6 +58,16 @@ def test_clean(tmp_path: Path) -> None:
     assert (topic.gaps, topic.repeats, topic.out_of_order) == (0, 0, 0)
 
 
+def test_true_and_false_are_no_numbers_and_lose_no_message(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    payload = b'{"locked": true, "temp": 20.5, "flags": [true, false]}'
+    path.write_bytes(build([(i, payload) for i in range(30)], ("State", "jsonschema", b"{}"), "json"))
+    found = inspect_recording(path)
+    (topic,) = found.topics
+    assert (found.state, topic.count) == ("clean", 30)
+    assert [one.field for one in topic.ranges] == ["temp"]
+
+
 def test_messages_of_any_type_are_counted(tmp_path: Path) -> None:
     path = tmp_path / "a.mcap"
     path.write_bytes(build([(i, bytes(100)) for i in range(30)], ("a/Image", "ros1msg", b""), "ros1"))

@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from kbs_process.plant.effects import select
+from kbs_process.plant.attach import attach
+from kbs_process.plant.effect import instance
+from kbs_process.plant.effects import CATALOGUE, select
 from kbs_process.plant.linear import Linear, linearise
 from kbs_process.rig.model import Controller, Quantity
 from kbs_process.stages import onset, stability
@@ -39,6 +41,29 @@ def flexible() -> tuple[Linear, Controller]:
     rig = onset.smooth_rig(two_axis(drive={"Ka": 800.0}, Kp=0.05, Ki=0.01))
     assert rig.controller is not None
     return linearise(rig, select(NOMINAL), POSE), rig.controller
+
+
+def test_what_is_without_friction_has_none_of_any_law() -> None:
+    laws = {
+        "coulomb": {"coulomb": 0.5},
+        "joint_viscous": {"joint_viscous": 3.0},
+        "motor_order": {"order_sin": 0.01},
+    }
+    rig = two_axis()
+    for name, values in laws.items():
+        effect = next(one for one in CATALOGUE if one.name == name)
+        shape = {entry.name: entry.prior.middle for entry in effect.parameters if entry.role == "shape"}
+        zeros = {entry.name: 0.0 for entry in effect.parameters if entry.role == "amplitude"}
+        rig = attach(rig, effect, shape | zeros | values, joints=["el"])
+    again = instance(next(one for one in CATALOGUE if one.name == "coulomb"), 2)
+    rig = attach(rig, again, {entry.name: 1e-3 for entry in again.parameters}, joints=["el"])
+    joint = onset.smooth_rig(rig).joint("el")
+    assert joint.drive is not None
+    found = joint.drive.parameters
+    gone = ("tcog", "d0", "Ts0", "coulomb", "coulomb_2", "order_sin")
+    assert [float(found[name]) for name in gone] == [0.0] * len(gone)
+    assert float(found["joint_viscous"]) == 3.0
+    assert float(found["Ka"]) > 0.0
 
 
 @pytest.mark.parametrize(("latency", "limit"), [(0, 2.0), (1, 1.0), (2, 2.0 * np.sin(np.pi / 10.0))])

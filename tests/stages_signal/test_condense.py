@@ -174,6 +174,23 @@ def test_an_absolute_encoder_is_followed_through_full_turns() -> None:
     )
 
 
+def test_a_joint_that_slides_is_no_angle() -> None:
+    """After a gap it may be farther on than half a turn is in rad."""
+
+    def sliding(t: np.ndarray) -> np.ndarray:
+        return np.column_stack((np.where(t < 15.0, 0.0, 4.0), np.where(t < 15.0, 0.0, 4.0)))
+
+    found = condense(
+        "slide",
+        [("angle", stream(sliding, 240.0, 30.0))],
+        {"angle": ("slide", "wheel")},
+        SETTINGS,
+        units={"angle": ("m", "rad")},
+    )
+    assert found.angle is not None
+    np.testing.assert_allclose(found.angle.values[-50, :], [4.0, 4.0 - 2.0 * np.pi], atol=1e-6)
+
+
 def test_a_stream_that_begins_late_is_flagged_until_it_does() -> None:
     streams = {
         "wrench": stream(wrench, 1000.0, 40.0),

@@ -126,11 +126,13 @@ def _pairs(campaign: Campaign, residual: Signal, disturbance: Signal | None) -> 
         measured = bandpass.apply(residual, band)
         predicted = None if disturbance is None else bandpass.apply(disturbance, band)
         pairs[campaign.rig.frame, band.name] = Pair(measured, predicted)
-        if spacecraft is not None and measured.channels == WRENCH_CHANNELS:
-            pairs["S", band.name] = Pair(
-                to_spacecraft(measured, spacecraft),
-                None if predicted is None else to_spacecraft(predicted, spacecraft),
+        if spacecraft is not None and set(WRENCH_CHANNELS) <= set(measured.channels):
+            whole, foreseen = (
+                None if one is None else to_spacecraft(select(one, WRENCH_CHANNELS), spacecraft)
+                for one in (measured, predicted)
             )
+            assert whole is not None
+            pairs["S", band.name] = Pair(whole, foreseen)
     return pairs
 
 

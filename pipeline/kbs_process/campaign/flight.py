@@ -14,7 +14,7 @@ from kbs_process.campaign.config import Campaign, PointingRequirement, Requireme
 from kbs_process.campaign.flight_files import write_flight
 from kbs_process.campaign.judging import band_of
 from kbs_process.campaign.parallel import ordered_map
-from kbs_process.campaign.predicting import schedule_of
+from kbs_process.campaign.predicting import approached, schedule_of
 from kbs_process.campaign.progress import Progress
 from kbs_process.campaign.reading import read_run
 from kbs_process.campaign.run import Outcome
@@ -226,7 +226,7 @@ def _commanded(
     """Return the trajectory's name and commands, from time zero on, and the file that they come from."""
     if commands is not None:
         schedule = read_commands(commands, campaign.rig.joint_names)
-        return commands.stem, replace(schedule, t=schedule.t - schedule.t[0]), (commands,)
+        return commands.stem, approached(replace(schedule, t=schedule.t - schedule.t[0])), (commands,)
     first = {entry.trajectory: entry for entry in reversed(campaign.recordings)}
     name = trajectory or campaign.recordings[-1].trajectory
     if name not in first:
@@ -236,4 +236,4 @@ def _commanded(
     with progress.task(f"Reading {first[name].name}"):
         run = read_run(campaign, first[name])
     schedule = schedule_of(run, campaign.rig)
-    return name, replace(schedule, field=None, encoder=None), (first[name].path,)
+    return name, approached(replace(schedule, field=None, encoder=None)), (first[name].path,)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,9 +10,9 @@ import numpy as np
 from kbs_process.campaign.config import Campaign, RecordingEntry
 from kbs_process.plant.effect import Effect
 from kbs_process.plant.effects import select
-from kbs_process.plant.external import external_wrench, pulls_at_rest
+from kbs_process.plant.external import external_efforts, external_wrench, pulls_at_rest
 from kbs_process.rig.model import Rig, substitute
-from kbs_process.signals.records import WRENCH_CHANNELS, Array, Run, Signal
+from kbs_process.signals.records import Array, Run, Signal
 from kbs_process.stages.motion import Motion
 
 _POINTS = 300  # of a recording at which the cords' uncertainty is computed, linear in between
@@ -32,21 +32,24 @@ def forces_in(campaign: Campaign, entry: RecordingEntry) -> tuple[Effect, ...]:
 def relieved(campaign: Campaign, entry: RecordingEntry, run: Run, motion: Motion) -> Run:
     """Return the run less the static wrench of the laboratory's forces at the measured angles."""
     forces = forces_in(campaign, entry)
-    if run.wrench is None or not forces:
-        return run
-    return replace(run, wrench=without_forces(run.wrench, campaign.rig, forces, motion.q))
+
+    def less(signal: Signal | None) -> Signal | None:
+        return None if signal is None else without_forces(signal, campaign.rig, forces, motion.q)
+
+    return replace(run, wrench=less(run.wrench), effort=less(run.effort)) if forces else run
 
 
-def without_forces(wrench: Signal, rig: Rig, forces: tuple[Effect, ...], q: Array) -> Signal:
-    """Return a wrench less the static one of `forces` at angles q (n, joints)."""
+def without_forces(loads: Signal, rig: Rig, forces: tuple[Effect, ...], q: Array) -> Signal:
+    """Return loads (wrench, efforts) less the static ones of `forces` at angles q (n, joints)."""
     if not forces:
-        return wrench
+        return loads
     names = ", ".join(effect.name for effect in forces)
-    load = external_wrench(rig, forces, q)[:, _columns(wrench)]
-    return wrench.derive(wrench.values - load, f"static wrench of {names} removed")
+    return loads.derive(
+        loads.values - _pull(rig, forces, q, loads.channels), f"static wrench of {names} removed"
+    )
 
 
-def errors(wrench: Signal, rig: Rig, forces: tuple[Effect, ...], q: Array) -> Iterator[Signal]:
+def errors(loads: Signal, rig: Rig, forces: tuple[Effect, ...], q: Array) -> Iterator[Signal]:
     """Yield the histories of one-sigma errors of `forces`, one for each uncertain number that they depend on.
 
     These are their own, where the joints are, and how the plate gives way. Histories are about their mean: a
@@ -56,7 +59,7 @@ def errors(wrench: Signal, rig: Rig, forces: tuple[Effect, ...], q: Array) -> It
         return
     at = np.unique(np.linspace(0, len(q) - 1, min(len(q), _POINTS)).astype(np.int64))
     own = tuple(f"external.{effect.name}." for effect in forces)
-    nominal = external_wrench(rig, forces, q[at])
+    nominal = _pull(rig, forces, q[at], loads.channels)
     for name, quantity in rig.quantities().items():
         if not name.startswith(own) and not name.endswith(_SHARED):
             continue
@@ -65,12 +68,14 @@ def errors(wrench: Signal, rig: Rig, forces: tuple[Effect, ...], q: Array) -> It
                 continue
             moved = quantity.value.copy()
             moved[element] += quantity.sigma[element]
-            change = (external_wrench(substitute(rig, {name: moved}), forces, q[at]) - nominal)[
-                :, _columns(wrench)
-            ]
+            change = _pull(substitute(rig, {name: moved}), forces, q[at], loads.channels) - nominal
             history = np.stack([np.interp(np.arange(len(q)), at, column) for column in change.T], axis=1)
-            yield wrench.derive(history - history.mean(axis=0), f"error of {name}")
+            yield loads.derive(history - history.mean(axis=0), f"error of {name}")
 
 
-def _columns(wrench: Signal) -> list[int]:
-    return [WRENCH_CHANNELS.index(channel) for channel in wrench.channels]
+def _pull(rig: Rig, forces: tuple[Effect, ...], q: Array, channels: Sequence[str]) -> Array:
+    """(n, channels) what forces add to the loads at rest: the wrench, and the efforts of joints as these are read."""
+    efforts = external_efforts(rig, forces, q, np.zeros_like(q))
+    gains = [1.0 if joint.effort is None else float(joint.effort.gain) for joint in rig.joints]
+    whole = np.hstack([external_wrench(rig, forces, q), efforts / np.array(gains)])
+    return np.asarray(whole[:, rig.loads.index(channels)], dtype=np.float64)

@@ -33,7 +33,7 @@ def simulate_commands(
     """Simulate the commands of a CSV or Parquet file through the controller; return `target`."""
     _require_commands(campaign)
     schedule = read_commands(commands, campaign.rig.joint_names)
-    schedule = replace(schedule, t=schedule.t - schedule.t[0])
+    schedule = approached(replace(schedule, t=schedule.t - schedule.t[0]))
     with progress.task(f"Simulating {commands.name}") as task:
         streams = _command_driven(
             campaign, campaign.effects, schedule, rate_Hz, rate_Hz, float(schedule.t[-1]), task.update
@@ -54,7 +54,7 @@ def simulate_trajectory(
         )
     run = _read(campaign, first[name], progress)
     # Before a test nobody knows what field and encoders will do: the controller is simulated too.
-    schedule = replace(schedule_of(run, campaign.rig), field=None, encoder=None)
+    schedule = approached(replace(schedule_of(run, campaign.rig), field=None, encoder=None))
     with progress.task(f"Simulating {name}") as task:
         rates = rate_Hz or run.rates["wrench"], run.rates.get("angle", run.rates["wrench"])
         streams = _command_driven(campaign, campaign.effects, schedule, *rates, _duration(run), task.update)

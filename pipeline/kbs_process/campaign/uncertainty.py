@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
-from kbs_process.campaign.analysis import Analysis, bands_of, passband
+from kbs_process.campaign.analysis import Analysis, bands_of, passband, select
 from kbs_process.campaign.config import Campaign
 from kbs_process.campaign.relief import errors, forces_in
 from kbs_process.report import results
@@ -45,14 +45,16 @@ def budgets(
             )
             frame: Frame = "joint" if own == "joint" else "T"
             yield from _rows(entries, frame, band.name, analysis.entry.name, measured)
-            if spacecraft is not None and measured.channels == WRENCH_CHANNELS:
+            if spacecraft is not None and set(WRENCH_CHANNELS) <= set(measured.channels):
+                whole = select(measured, WRENCH_CHANNELS)
+                six = [measured.channels.index(channel) for channel in WRENCH_CHANNELS]
                 moved = [
-                    budget.Entry(entry.stage, entry.source, sigma_at_spacecraft(entry.sigma, spacecraft))
+                    budget.Entry(entry.stage, entry.source, sigma_at_spacecraft(entry.sigma[six], spacecraft))
                     for entry in entries
                 ]
-                pose = sigma_of_pose(measured, spacecraft)
+                pose = sigma_of_pose(whole, spacecraft)
                 moved.append(budget.Entry("to the spacecraft", "position and attitude of S in T", pose))
-                yield from _rows(moved, "S", band.name, analysis.entry.name, measured)
+                yield from _rows(moved, "S", band.name, analysis.entry.name, whole)
 
 
 def _entries(

@@ -115,7 +115,7 @@ class Container:
             return
         opcode, length = mcap.RECORD_HEAD.unpack_from(head)
         end = self._at + mcap.RECORD_HEAD.size + length
-        if end > self.size or (opcode == mcap.MESSAGE_OP and length < 22):
+        if opcode == 0 or end > self.size or (opcode == mcap.MESSAGE_OP and length < 22):
             self._resume(file, head)
         elif stop == len(self._buffer) and length <= LARGEST:
             self._buffer = np.zeros(mcap.RECORD_HEAD.size + length, dtype=np.uint8)

@@ -63,10 +63,15 @@ def _visit(node: object, path: str, named: bool, depth: int, found: dict[str, Fi
                 _visit(value, f"{path}.{key}" if path else key, named, depth - 1, found)
     elif not path:
         return
-    elif isinstance(node, list) and all(isinstance(item, int | float) or item is None for item in node):
+    elif isinstance(node, list) and all(map(_number, node)):
         found.setdefault(path, Field(path, -1, named))
-    elif isinstance(node, int | float) or node is None:
+    elif _number(node):
         found.setdefault(path, Field(path))
+
+
+def _number(node: object) -> bool:
+    """Whether a node is a number, or one that is missing; true and false are none."""
+    return node is None or (isinstance(node, int | float) and not isinstance(node, bool))
 
 
 class JsonDecoder:

@@ -86,7 +86,9 @@ def walk(buffer: Bytes, stop: np.uint64, chunk: bool) -> Words:
     while at + U(RECORD_HEAD) <= stop:
         opcode = U(buffer[at])
         length = _inner_word(buffer, at + U(1)) if at < whole else _word(buffer, at + U(1))
-        if length > stop - at - U(RECORD_HEAD) or (opcode == MESSAGE and length < U(MESSAGE_HEAD)):
+        if opcode == U(0) or length > stop - at - U(RECORD_HEAD):
+            break  # no record begins with a zero: what was preallocated and not written does
+        if opcode == MESSAGE and length < U(MESSAGE_HEAD):
             break
         if chunk and not (SCHEMA <= opcode <= MESSAGE and length >= U(SHORTEST)):
             break
@@ -241,8 +243,12 @@ def decode(
         if clocks.shape[1] == 2:
             time = np.int64(0)
             for c in range(2):
-                part = _load(buffer, at[i] + clocks[found, c, 0], clocks[found, c, 1], clocks[found, c, 2])
-                time = time * 1_000_000_000 + _signed(part, clocks[found, c, 1], clocks[found, c, 2])
+                time = time * 1_000_000_000
+                if clocks[found, c, 2] != ZERO:
+                    part = _load(
+                        buffer, at[i] + clocks[found, c, 0], clocks[found, c, 1], clocks[found, c, 2]
+                    )
+                    time += _signed(part, clocks[found, c, 1], clocks[found, c, 2])
             stamp[i] = time
         if plain[found]:
             for c in range(cells.shape[1]):

@@ -173,6 +173,7 @@ class Parameter:
     role: Literal["amplitude", "shape", "shared"] = "shape"
     grid: tuple[float, ...] = ()
     over: str = ""
+    dry: bool = False  # an amplitude of friction or cogging: its slope at rest does not last
 
 
 @dataclass(frozen=True, slots=True)

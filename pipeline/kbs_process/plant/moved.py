@@ -49,8 +49,8 @@ def added_loads(rig: Rig, effects: Sequence[Effect], q: Array, qd: Array, dt: fl
             continue
         known = {name: float(quantity) for name, quantity in joint.drive.parameters.items()}
         for effect in effects:
-            if not all(entry.name in known for entry in effect.parameters):
-                continue
+            if "field" in effect.arguments or not all(entry.name in known for entry in effect.parameters):
+                continue  # no field turns what a measured motion turns
             if effect.port is Port.GROUND_TORQUE or (effect.port in RIGID and joint.effort is not None):
                 other = q[:, rig.joint_names.index(other_joint(rig, joint.name))]
                 units = unit_torques(effect, joint, q[:, index], known, dt, other)

@@ -161,7 +161,10 @@ def _own_source(data: ClockData, otherwise: str) -> str:
 def _place(data: ClockData, streams: dict[str, ClockData], clocks: dict[str, Clock], reference: str) -> Clock:
     base = streams[reference]
     if data.line is None or base.line is None:
-        start = (data.first_stamp - base.first_stamp) * 1e-9
+        # A recorder's time is compared with a recorder's.
+        logged = data.by_recorder != base.by_recorder
+        begins = (data.first_log, base.first_log) if logged else (data.first_stamp, base.first_stamp)
+        start = (begins[0] - begins[1]) * 1e-9
         return Clock(
             start, 0.0, float("nan"), float("nan"), float("nan"), _own_source(data, "not comparable")
         )

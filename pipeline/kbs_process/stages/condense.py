@@ -8,7 +8,7 @@ sample at the full rate is ever kept, and a clock's offset and skew cost no seco
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,6 +35,7 @@ Progress = Callable[[str, int], None]  # stream, samples just taken
 # Brought to the working rate; the first one present is the reference.
 SAMPLED = ("wrench", "effort", "angle", "rate", "pointing")
 LOADS = ("wrench", "effort")  # the first one present has spectrum and envelope
+TURNING = ("angle", "pointing")  # of joints, where they turn
 SLOW = ("command", "field", "temperature")  # kept sample by sample: one a control cycle, or slower
 DOUBT = 1e-3  # largest weight of invented samples in a valid one
 
@@ -70,7 +71,8 @@ def condense(
     """
     load = next((key for key in LOADS if key in channels), None)
     streams: dict[str, Uniform | Collected] = {
-        key: _stream(name, key, columns, settings, is_load=key == load) for key, columns in channels.items()
+        key: _stream(name, key, columns, settings, (units or {}).get(key), is_load=key == load)
+        for key, columns in channels.items()
     }
     for key, block in blocks:
         if len(block):
@@ -138,7 +140,13 @@ def _missing(line: Timeline) -> Loss:
 
 
 def _stream(
-    name: str, key: str, columns: tuple[str, ...], settings: CondenseSettings, *, is_load: bool
+    name: str,
+    key: str,
+    columns: tuple[str, ...],
+    settings: CondenseSettings,
+    units: Sequence[str] | None,
+    *,
+    is_load: bool,
 ) -> Uniform | Collected:
     where = f"{name}: {key}"
     if key in SLOW:
@@ -158,7 +166,7 @@ def _stream(
         where,
         columns,
         settings.working_rate_Hz,
-        unwrap=key in ("angle", "pointing"),
+        turning=[unit == "rad" for unit in units or ["rad"] * len(columns)] if key in TURNING else (),
         keep_below=settings.encoder_limit_Hz if angle else 0.0,
     )
 

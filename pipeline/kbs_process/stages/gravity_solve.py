@@ -151,6 +151,8 @@ def refuse_uninformed(
     equation: Equation, prepared: Sequence[Prepared], sigmas: Sequence[Array], theta: Array
 ) -> None:
     """Refuse data whose strongest message about the rig, zero and drift aside, is weaker than the prior."""
+    if equation.size == 0:
+        return  # the files know the rig exactly
     blocks = []
     for p, sigma in zip(prepared, sigmas, strict=True):
         J = equation.jacobian(theta, p).reshape(len(p.q), len(equation.channels), -1)

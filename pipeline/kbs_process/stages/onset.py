@@ -7,6 +7,7 @@ it is that of the linearised plant; with them it depends on the kick, and limit 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
@@ -14,11 +15,13 @@ import numpy as np
 from scipy.signal import detrend, periodogram
 
 from kbs_process.errors import SimulationError
+from kbs_process.plant.effect import ACTION
+from kbs_process.plant.effects import CATALOGUE
+from kbs_process.plant.effects.measured_law import MEASURED
 from kbs_process.plant.predict import Schedule, predict
 from kbs_process.rig.model import Controller, Rig, substitute
 from kbs_process.signals.records import Array, Block
 
-FRICTION = ("tcog", "d0", "d1", "Ts0")  # amplitudes of cogging and friction, whose slopes do not last
 KICK = 1e-3  # rad
 DURATION = 40.0  # s
 _WINDOW = 10.0  # s, of which the second and the last are compared
@@ -56,7 +59,14 @@ def smooth_rig(rig: Rig) -> Rig:
     """Return the rig with encoders that do not round, and without friction and cogging."""
     steps = [joint.encoder.step.name for joint in rig.joints if joint.encoder is not None]
     drives = [joint.drive.parameters for joint in rig.joints if joint.drive is not None]
-    amplitudes = [drive[name].name for drive in drives for name in FRICTION if name in drive]
+    effects = (*CATALOGUE, *(law.effect for law in MEASURED))
+    dry = {entry.name for effect in effects for entry in effect.parameters if entry.dry}
+    amplitudes = [
+        quantity.name
+        for drive in drives
+        for name, quantity in drive.items()
+        if re.sub(f"{ACTION}$", "", name) in dry
+    ]
     return substitute(rig, dict.fromkeys([*steps, *amplitudes], 0.0))
 
 

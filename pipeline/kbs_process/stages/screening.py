@@ -197,6 +197,8 @@ def starts(
     indices = range(len(experiment.recordings))
     found = evaluate([(index, point, spectra[index]) for point in points for index in indices])
     rows = [np.concatenate(found[k : k + len(indices)]) for k in range(0, len(found), len(indices))]
+    if not known:
+        return (Start(values, float(rows[0] @ rows[0])),)
     A = np.column_stack(rows[1:]) - rows[0][:, None]
     # What no plant can run with is no place to start at.
     A[:, ~np.isfinite(A).all(axis=0)] = 0.0

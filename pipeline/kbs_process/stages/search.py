@@ -87,6 +87,8 @@ def follow(
             theta = moved
         if arrived and searched:
             break
+    if not objective.columns:
+        objective.difference(theta)  # the last round leapt
     r = objective.residual(theta)
     excess = (theta - parameters.value) / parameters.sigma
     R = triangle(objective.assembled(theta)[:, : len(experiment.free)])

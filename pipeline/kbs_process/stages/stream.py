@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -197,12 +198,14 @@ class Uniform:
         channels: tuple[str, ...],
         working_rate: float,
         *,
-        unwrap: bool = False,
+        turning: Sequence[bool] = (),
         spectrum: tuple[float, float] | None = None,
         stretches: int = 0,
         keep_below: float = 0.0,
     ) -> None:
-        """`spectrum`: (resolution, limit), Hz; below a rate of `keep_below`, Hz, samples are kept as such."""
+        """`turning` channels are angles, which go on through full turns; `spectrum`: (resolution, limit), Hz; below a
+        rate of `keep_below`, Hz, samples are kept as such.
+        """
         self.line = Timeline(where)
         self.welch: Welch | None = None
         self.envelope = MinMax(len(channels), stretches) if stretches else None
@@ -210,7 +213,8 @@ class Uniform:
         self._working_rate = working_rate
         self._spectrum = spectrum
         self._keep_below = keep_below
-        self._turns = np.zeros(len(channels)) if unwrap else None
+        self._turning = np.array(turning, dtype=np.float64)
+        self._turns = np.zeros(len(channels)) if any(turning) else None
         self._before: Array | None = None
         self._regrid: Regridder | None = None
         self._reduce: Reducer | None = None
@@ -270,7 +274,7 @@ class Uniform:
         first = values[:1] if self._before is None else self._before
         whole = np.concatenate((first, values))
         self._before = values[-1:].copy()
-        jumps = -np.rint(np.diff(whole, axis=0) / (2.0 * np.pi))
+        jumps = -np.rint(np.diff(whole, axis=0) / (2.0 * np.pi)) * self._turning
         if not jumps.any() and not turned.any():
             return values
         turns = turned + np.cumsum(jumps, axis=0)

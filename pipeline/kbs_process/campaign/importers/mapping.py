@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping as MappingOf
 from datetime import datetime
 from pathlib import Path
@@ -77,7 +78,7 @@ class Channel(msgspec.Struct, frozen=True):
     unit: str  # SI
     gain: float
     offset: float = 0.0
-    unwrap: bool = False
+    turn: float = 0.0  # what a full turn is in `unit`, of an angle that is to be unwrapped
 
 
 class StreamMap(msgspec.Struct, frozen=True):
@@ -224,7 +225,8 @@ def _channel(
             gain = factor(unit, si) if radius is None else factor(unit, si.replace("rad", "m")) / radius
         except UnitMismatchError as error:
             problems.add(document.place((*key, "unit")), str(error), error.remedy)
-    return Channel(field, cell["column"], si, gain * scale, offset, bool(cell.get("unwrap", False)))
+    turn = 2.0 * math.pi * abs(scale) if cell.get("unwrap", False) else 0.0
+    return Channel(field, cell["column"], si, gain * scale, offset, turn)
 
 
 def _time(document: Document, key: str, problems: Problems) -> Time | None:
@@ -281,13 +283,18 @@ def _check_turn(document: Document, turn: Turn, streams: tuple[StreamMap, ...], 
     mapped = {stream.key: stream for stream in streams}
     angles = mapped.get("encoder")
     fields = [channel.field for channel in angles.channels] if angles else []
+    if "wrench" not in mapped:
+        problems.add(
+            document.place(("turn",)), "no wrench is mapped, and only that is turned", "delete [turn]"
+        )
+        return
     if f"position[{turn.joint}]" not in fields:
         problems.add(
             document.place(("turn", "joint")),
             f"no angle of '{turn.joint}' is mapped",
             did_you_mean(turn.joint, document.tree.get("encoder", {})),
         )
-    elif angles and angles.time != mapped["wrench"].time:
+    elif angles and (angles.time is None or angles.time != mapped["wrench"].time):
         problems.add(
             document.place(("turn",)), "needs wrench and angle row by row", "give both the same time column"
         )

@@ -183,12 +183,12 @@ def _si(cells: Cells, channel: Channel, carry: dict[str, float]) -> Array:
     values = numbers(cells)
     if channel.gain != 1.0 or channel.offset != 0.0:  # not a sum with zero, which would change -0.0
         values = values * channel.gain + channel.offset
-    if channel.unwrap:
+    if channel.turn:
         finite = np.isfinite(values)
         if finite.any():
             known = values[finite]
             before = carry.get(channel.field, float(known[0]))
-            values[finite] = np.unwrap(np.concatenate(([before], known)))[1:]
+            values[finite] = np.unwrap(np.concatenate(([before], known)), period=channel.turn)[1:]
             carry[channel.field] = float(values[finite][-1])
     return values
 

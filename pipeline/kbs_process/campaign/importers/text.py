@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import csv
 import itertools
+import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -15,6 +17,7 @@ from kbs_process.errors import RecordingError
 
 DELIMITERS = "\t;,|"
 _HEAD_LINES = 32
+_DATE = re.compile(r"\d{4}-\d\d-\d\d([T ]\d\d:\d\d.*)?")
 
 
 class TextTable:
@@ -23,11 +26,14 @@ class TextTable:
     def __init__(self, path: Path, options: Text) -> None:
         self.path = path
         self._options = options
-        head = self._head()
-        self._delimiter = options.delimiter or sniff_delimiter(head)
+        numbered = self._head()
+        head = [line for _, line in numbered]
+        self._delimiter = options.delimiter or sniff_delimiter(head, options.decimal)
         cells = [_split(line, self._delimiter) for line in head]
         named = not all(map(self._is_number, cells[0])) if options.header is None else options.header
-        self._first_data_row = options.skip_rows + named + options.units_row
+        # What is read later counts every line of the file, comments and blank ones too.
+        told = named + options.units_row
+        self._first_data_row = numbered[told][0] if told < len(numbered) else numbered[-1][0] + 1
         # Rows may end with a delimiter where the line of names does not.
         width = max(len(cells[0]), len(cells[min(named + options.units_row, len(cells) - 1)]))
         names = _unique(_widened(cells[0] if named else [], width))
@@ -53,7 +59,7 @@ class TextTable:
                 skipinitialspace=True,
             ) as reader:
                 for frame in reader:
-                    yield tuple(_cells(frame[name]) for name in names)
+                    yield tuple(_cells(frame[name], self._options.decimal) for name in names)
         except pd.errors.EmptyDataError:
             return
         except (pd.errors.ParserError, UnicodeDecodeError) as error:
@@ -63,15 +69,17 @@ class TextTable:
                 remedy="check delimiter, skip_rows and encoding in the mapping's [text]",
             ) from error
 
-    def _head(self) -> list[str]:
-        """Return the first lines that hold data or names."""
+    def _head(self) -> list[tuple[int, str]]:
+        """Return the first lines that hold data or names, with their places in the file."""
         comment = self._options.comment
         try:
             with self.path.open(encoding=self._options.encoding, newline=None) as file:
-                lines = itertools.islice(file, self._options.skip_rows, None)
-                bounded = (line.rstrip("\n")[:1_000_000] for line in lines)
+                lines = itertools.islice(enumerate(file), self._options.skip_rows, None)
+                bounded = ((place, line.rstrip("\n")[:1_000_000]) for place, line in lines)
                 kept = (
-                    line for line in bounded if line.strip() and not (comment and line.startswith(comment))
+                    (place, line)
+                    for place, line in bounded
+                    if line.strip() and not (comment and line.startswith(comment))
                 )
                 head = list(itertools.islice(kept, _HEAD_LINES))
         except (UnicodeDecodeError, LookupError) as error:
@@ -85,7 +93,8 @@ class TextTable:
         return head
 
     def _is_number(self, cell: str) -> bool:
-        if not cell:
+        """Whether a cell is no name: a number, a date, or nothing."""
+        if not cell or _DATE.fullmatch(cell):
             return True
         try:
             float(cell.replace(self._options.decimal, "."))
@@ -94,16 +103,24 @@ class TextTable:
         return True
 
 
-def sniff_delimiter(lines: Sequence[str]) -> str:
-    """Return the delimiter that splits all `lines` into most columns; "," where none does, " " for blanks."""
-    best = max(DELIMITERS, key=lambda delimiter: min(line.count(delimiter) for line in lines))
+def sniff_delimiter(lines: Sequence[str], decimal: str = ".") -> str:
+    """Return the delimiter that splits all `lines` into most columns; "," where none does, " " for blanks.
+
+    The `decimal` mark splits numbers, and no columns.
+    """
+    able = DELIMITERS.replace(decimal, "")
+    best = max(able, key=lambda delimiter: min(line.count(delimiter) for line in lines))
     if min(line.count(best) for line in lines):
         return best
     return " " if min(len(line.split()) for line in lines) > 1 else ","
 
 
 def _split(line: str, delimiter: str) -> list[str]:
-    cells = line.split() if delimiter == " " else line.split(delimiter)
+    cells = (
+        line.split()
+        if delimiter == " "
+        else next(csv.reader([line], delimiter=delimiter, skipinitialspace=True))
+    )
     return [cell.strip().strip('"') for cell in cells]
 
 
@@ -122,8 +139,10 @@ def _unique(names: Sequence[str]) -> tuple[str, ...]:
     return tuple(unique)
 
 
-def _cells(series: pd.Series[float]) -> Cells:
-    """Return a parsed column as numbers where pandas found nothing else in this piece, else as text."""
+def _cells(series: pd.Series[float], decimal: str) -> Cells:
+    """Return a parsed column as numbers where pandas found nothing else in this piece, else as text with points."""
     if series.dtype.kind in "iuf":
         return series.to_numpy()
-    return np.array(["" if pd.isna(cell) else str(cell) for cell in series], dtype=np.str_)
+    return np.array(
+        ["" if pd.isna(cell) else str(cell).replace(decimal, ".") for cell in series], dtype=np.str_
+    )

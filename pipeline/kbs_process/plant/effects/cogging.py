@@ -30,6 +30,7 @@ COGGING = Effect(
             "amplitude of the cogging torque",
             bounds=(0.0, 1.0),
             role="amplitude",
+            dry=True,
         ),
         Parameter(
             "phi_cog",

@@ -23,7 +23,9 @@ DAHL = Effect(
     port=Port.JOINT_TORQUE,
     equation=torque,
     parameters=(
-        Parameter("dahl", "N m", Normal(0.0, 0.5), "friction torque", (-100.0, 100.0), role="amplitude"),
+        Parameter(
+            "dahl", "N m", Normal(0.0, 0.5), "friction torque", (-100.0, 100.0), role="amplitude", dry=True
+        ),
         Parameter(
             "dahl_displacement",
             "rad",

@@ -28,7 +28,13 @@ DYNAMIC_FRICTION = Effect(
     equation=torque,
     parameters=(
         Parameter(
-            "d0", "N m", LogNormal(0.012, 0.25), "mean resistance torque", bounds=(0.0, 1.0), role="amplitude"
+            "d0",
+            "N m",
+            LogNormal(0.012, 0.25),
+            "mean resistance torque",
+            bounds=(0.0, 1.0),
+            role="amplitude",
+            dry=True,
         ),
         Parameter(
             "d1",
@@ -37,6 +43,7 @@ DYNAMIC_FRICTION = Effect(
             "its twice-a-turn fluctuation",
             bounds=(0.0, 1.0),
             role="amplitude",
+            dry=True,
         ),
         Parameter(
             "phi_dyn",

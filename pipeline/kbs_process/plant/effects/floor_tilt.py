@@ -18,7 +18,7 @@ def acceleration(time: float, tilt_x: float, tilt_y: float, tilt_time: float) ->
         and +y they let weight pull that way. Each recording settles by an amount of its own.
     Source: A. Einstein, Jahrbuch der Radioaktivitaet und Elektronik 4 (1907) 411, section 17: weight and acceleration.
     """
-    settled = -GRAVITY * (1.0 - math.exp(-time / tilt_time))
+    settled = -GRAVITY * (1.0 - math.exp(-max(time, 0.0) / tilt_time))
     return tilt_x * settled, tilt_y * settled, 0.0
 
 

@@ -34,9 +34,23 @@ FRICTION_RIPPLE = Effect(
     port=Port.MOTOR_TORQUE,
     equation=torque,
     parameters=(
-        Parameter("ripple_sin", "N m", Normal(0.0, 3e-3), "sine of the order", (-1.0, 1.0), role="amplitude"),
         Parameter(
-            "ripple_cos", "N m", Normal(0.0, 3e-3), "cosine of the order", (-1.0, 1.0), role="amplitude"
+            "ripple_sin",
+            "N m",
+            Normal(0.0, 3e-3),
+            "sine of the order",
+            (-1.0, 1.0),
+            role="amplitude",
+            dry=True,
+        ),
+        Parameter(
+            "ripple_cos",
+            "N m",
+            Normal(0.0, 3e-3),
+            "cosine of the order",
+            (-1.0, 1.0),
+            role="amplitude",
+            dry=True,
         ),
         Parameter(
             "ripple_order",

@@ -16,7 +16,7 @@ def torque(rotor_rate: float, time: float, warmup: float, warmup_time: float) ->
     Source: A. C. Bittencourt, S. Gunnarsson, Static friction in a robot joint: modeling and identification of load and
         temperature effects, J. Dynamic Systems, Measurement, and Control 134 (2012) 051013.
     """
-    return -warmup * math.exp(-time / warmup_time) * rotor_rate
+    return -warmup * math.exp(-max(time, 0.0) / warmup_time) * rotor_rate
 
 
 FRICTION_WARMUP = Effect(

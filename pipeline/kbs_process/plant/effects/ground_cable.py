@@ -54,7 +54,13 @@ GROUND_CABLE = Effect(
             "cable_taut", "N m", Normal(0.0, 1.0), "at which it yields", (-100.0, 100.0), role="amplitude"
         ),
         Parameter(
-            "cable_friction", "N m", Normal(0.0, 0.5), "between its wires", (-100.0, 100.0), role="amplitude"
+            "cable_friction",
+            "N m",
+            Normal(0.0, 0.5),
+            "between its wires",
+            (-100.0, 100.0),
+            role="amplitude",
+            dry=True,
         ),
         Parameter(
             "cable_middle",

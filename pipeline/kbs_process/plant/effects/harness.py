@@ -66,6 +66,7 @@ HARNESS = Effect(
             "between its wires",
             (-100.0, 100.0),
             role="amplitude",
+            dry=True,
         ),
         Parameter(
             "harness_middle",

@@ -35,7 +35,9 @@ LUGRE = Effect(
     port=Port.JOINT_TORQUE,
     equation=torque,
     parameters=(
-        Parameter("lugre", "N m", Normal(0.0, 0.5), "Coulomb torque", (-100.0, 100.0), role="amplitude"),
+        Parameter(
+            "lugre", "N m", Normal(0.0, 0.5), "Coulomb torque", (-100.0, 100.0), role="amplitude", dry=True
+        ),
         Parameter(
             "lugre_displacement",
             "rad",

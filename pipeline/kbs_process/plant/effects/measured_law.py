@@ -183,6 +183,7 @@ def _over(regressor: str, port: Port, law: str, opposed: str = "") -> Measured:
             "about the torque at that node of the table, the first and the last one outside it",
             (-1e4, 1e4),
             role="amplitude",
+            dry=bool(opposed),
         )
         for k in range(COEFFICIENTS)
     )

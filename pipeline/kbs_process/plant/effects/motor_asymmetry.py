@@ -25,7 +25,13 @@ MOTOR_ASYMMETRY = Effect(
     equation=torque,
     parameters=(
         Parameter(
-            "sense_level", "N m", Normal(0.0, 5e-3), "of Coulomb friction", (-1.0, 1.0), role="amplitude"
+            "sense_level",
+            "N m",
+            Normal(0.0, 5e-3),
+            "of Coulomb friction",
+            (-1.0, 1.0),
+            role="amplitude",
+            dry=True,
         ),
         Parameter(
             "sense_slope",

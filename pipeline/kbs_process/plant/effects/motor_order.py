@@ -24,9 +24,23 @@ MOTOR_ORDER = Effect(
     port=Port.MOTOR_TORQUE,
     equation=torque,
     parameters=(
-        Parameter("order_sin", "N m", Normal(0.0, 5e-3), "sine of the order", (-1.0, 1.0), role="amplitude"),
         Parameter(
-            "order_cos", "N m", Normal(0.0, 5e-3), "cosine of the order", (-1.0, 1.0), role="amplitude"
+            "order_sin",
+            "N m",
+            Normal(0.0, 5e-3),
+            "sine of the order",
+            (-1.0, 1.0),
+            role="amplitude",
+            dry=True,
+        ),
+        Parameter(
+            "order_cos",
+            "N m",
+            Normal(0.0, 5e-3),
+            "cosine of the order",
+            (-1.0, 1.0),
+            role="amplitude",
+            dry=True,
         ),
         Parameter(
             "order",

@@ -26,7 +26,13 @@ MOTOR_STRIBECK = Effect(
     equation=torque,
     parameters=(
         Parameter(
-            "breakaway", "N m", Normal(0.0, 0.01), "excess at breakaway", (-1.0, 1.0), role="amplitude"
+            "breakaway",
+            "N m",
+            Normal(0.0, 0.01),
+            "excess at breakaway",
+            (-1.0, 1.0),
+            role="amplitude",
+            dry=True,
         ),
         Parameter(
             "breakaway_rate",

@@ -33,7 +33,13 @@ STRIBECK = Effect(
     equation=torque,
     parameters=(
         Parameter(
-            "stribeck_level", "N m", Normal(0.0, 0.5), "Coulomb torque", (-100.0, 100.0), role="amplitude"
+            "stribeck_level",
+            "N m",
+            Normal(0.0, 0.5),
+            "Coulomb torque",
+            (-100.0, 100.0),
+            role="amplitude",
+            dry=True,
         ),
         Parameter(
             "stribeck_excess",
@@ -42,6 +48,7 @@ STRIBECK = Effect(
             "excess at breakaway",
             (-100.0, 100.0),
             role="amplitude",
+            dry=True,
         ),
         Parameter(
             "stribeck_rate",

@@ -45,6 +45,7 @@ TOOTH_STICTION = Effect(
             "Coulomb torque while a tooth passes",
             bounds=(0.0, 1.0),
             role="amplitude",
+            dry=True,
         ),
         Parameter(
             "delta",
