@@ -5,15 +5,19 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 from campaign_folder import CampaignFolder, make_folder
 
 from kbs_process.campaign.corrected_model import write_model
 from kbs_process.campaign.importers.mapping import PRESETS
 from kbs_process.campaign.load import load_campaign
+from kbs_process.campaign.relief import in_motion, without_effects
 from kbs_process.errors import ConfigError
 from kbs_process.plant.attach import attach
 from kbs_process.plant.effects import select
+from kbs_process.signals.records import Signal
+from kbs_process.stages.motion import Motion
 
 RECORDING = """
 [[recording]]
@@ -107,3 +111,26 @@ def test_a_corrected_model_of_a_slide_has_newtons_and_metres_and_loads(
     (folder / "campaign.toml").write_text(text)
     with pytest.raises(ConfigError, match="a rotor of its own"):
         load_campaign(folder, recordings=False)
+
+
+def test_effects_of_the_model_act_along_a_measured_motion(axis: CampaignFolder, tmp_path: Path) -> None:
+    """What a corrected model says of friction is predicted, and is not fitted as weight or inertia."""
+    campaign = load_campaign(axis.path)
+    (coulomb,) = select(["coulomb"])
+    rig = attach(campaign.rig, coulomb, {"coulomb": 3.0})
+    folder = tmp_path / "corrected"
+    write_model(campaign, rig, ("coulomb",), {}, folder, "by a test")
+    corrected = load_campaign(folder, recordings=False)
+    t = 0.01 * np.arange(1000)
+    q = 0.1 * np.sin(t)[:, None]
+    still = np.zeros_like(q)
+    motion = Motion(
+        0.0, 0.01, q, 0.1 * np.cos(t)[:, None], still, still, still[None], np.zeros(1), np.zeros(1), t >= 0.0
+    )
+    entry = campaign.recordings[0]
+    friction = in_motion(corrected, entry, motion, rig.channels)[:, 0]
+    moving = np.abs(np.cos(t)) > 0.2
+    np.testing.assert_allclose(friction[moving], 3.0 * np.sign(np.cos(t))[moving], rtol=0.02)
+    effort = Signal(0.0, 0.01, friction[:, None], rig.channels, ("N",), "joint", t >= 0.0)
+    assert not without_effects(corrected, entry, motion, effort).values.any()
+    assert not in_motion(campaign, entry, motion, rig.channels).any()

@@ -9,7 +9,7 @@ import numpy as np
 
 from kbs_process.campaign.config import Bands, Campaign, RecordingEntry
 from kbs_process.campaign.predicting import predict_run
-from kbs_process.campaign.relief import errors, forces_in, without_forces
+from kbs_process.campaign.relief import errors, forces_in, in_motion, without_effects, without_forces
 from kbs_process.campaign.settings import motion_settings
 from kbs_process.plant.rigid import static_wrench
 from kbs_process.signals.records import WRENCH_CHANNELS, Array, Run, Signal
@@ -67,7 +67,7 @@ def analyse(
 ) -> Analysis:
     """Remove gravity from measurement and prediction alike, cut the bands, move them to the spacecraft."""
     wrench = _loads(run)
-    sample = Sample(entry.name, motion, wrench)
+    sample = Sample(entry.name, motion, without_effects(campaign, entry, motion, wrench))
     taring = gravity.tare(sample, model)
     static = gravity.apply(_at_rest(motion), model, taring)
     residual = wrench.derive(
@@ -102,14 +102,15 @@ def _predict(
     """Return the predicted run (of a plant with drives) and its wrench without gravity.
 
     The plant has the masses and CoGs that the gravity fit found. Its static wrench, and that of the rig's cords, is
-    taken at its own angles, as the measurement's is. A rig that is driven by its motion has no drives to predict:
-    inertia is all there is.
+    taken at its own angles, as the measurement's is. A rig that is driven by its motion has no drives to predict: there
+    is inertia, and what the model's effects add.
     """
     if campaign.drive == "motion":
         moving = gravity.apply(motion, model).wrench
         inertia = moving.values - gravity.apply(_at_rest(motion), model).wrench.values
+        added = in_motion(campaign, entry, motion, moving.channels)
         # The measurement's residual had the fitted rest of the cross-coupling undone as well.
-        return None, moving.derive(model.without_coupling(inertia), "inertia")
+        return None, moving.derive(model.without_coupling(inertia) + added, "inertia and effects")
     settings = CondenseSettings(working_rate_Hz=campaign.bands.working_rate)
     predicted = predict_run(model.rig, campaign.acting(entry), run, settings, update)
     angles = estimate(predicted, model.rig, motion_settings(campaign))

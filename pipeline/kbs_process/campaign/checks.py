@@ -23,7 +23,7 @@ def check_campaign(
     campaign: Campaign, document: Document, tables: Merged, problems: Problems, *, checksums: bool
 ) -> None:
     """Note everything in which the campaign contradicts itself or the files on disk."""
-    _check_effects(document, problems)
+    _check_effects(campaign, document, problems)
     _check_drive(campaign, document, tables, problems)
     _check_loads(campaign, document, tables, problems)
     _check_external(campaign, tables, problems)
@@ -36,12 +36,16 @@ def check_campaign(
             _check_checksum(index, entry, document, problems)
 
 
-def _check_effects(document: Document, problems: Problems) -> None:
+def _check_effects(campaign: Campaign, document: Document, problems: Problems) -> None:
     known = {effect.name for effect in (*CATALOGUE, *MEASURED)}
     for index, name in enumerate(document.tree.get("model", {}).get("effects", [])):
-        if find(name) is None:
+        found = find(name)
+        if found is None:
             place = document.place(("model", "effects", index))
             problems.add(place, f"there is no effect '{name}'", did_you_mean(name, known))
+        elif found.crossed and len(campaign.rig.joints) < 2:
+            place = document.place(("model", "effects", index))
+            problems.add(place, f"'{name}' depends on another joint, and there is one alone", "leave it out")
 
 
 def _check_drive(campaign: Campaign, document: Document, tables: Merged, problems: Problems) -> None:

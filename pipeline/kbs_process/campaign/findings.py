@@ -91,7 +91,10 @@ def _repeatability(runs: Sequence[Analysis], bands: Sequence[Band]) -> Iterable[
             continue
         for frame, band in group[0].pairs:
             signals = [group[index].pairs[frame, band].measured for index in lags]
-            found = repeatability.fit(repeatability.on_common_axis(signals, list(lags.values())))
+            common = repeatability.on_common_axis(signals, list(lags.values()))
+            if repeatability.in_common(common) < 2:
+                continue  # a band whose edges take all of so short a recording
+            found = repeatability.fit(common)
             for index, channel in enumerate(found.channels):
                 yield results.Repeatability(
                     trajectory=trajectory,

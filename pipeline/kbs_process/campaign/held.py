@@ -7,14 +7,15 @@ not looked at.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from kbs_process.campaign.config import RecordingEntry
+from kbs_process.campaign.config import Campaign, RecordingEntry
+from kbs_process.campaign.reading import read_run
 from kbs_process.errors import RecordingError
 from kbs_process.rig.model import Rig
-from kbs_process.signals.records import Array, Block, Loss, Mask
+from kbs_process.signals.records import Array, Block, Loss, Mask, Run
 from kbs_process.stages.ordering import concatenate, select
 
 HELD_S = (
@@ -51,6 +52,13 @@ class Alive:
     @property
     def losses(self) -> tuple[Loss, ...]:
         return tuple(self._stream.losses())
+
+
+def read_alive(campaign: Campaign, entry: RecordingEntry) -> Run:
+    """Read a recording without what its channels were held in; what that was is among its losses."""
+    alive = Alive(campaign.rig, entry)
+    run = read_run(campaign, entry, alive)
+    return replace(run, losses=(*run.losses, *alive.losses))
 
 
 @dataclass(slots=True)

@@ -58,6 +58,12 @@ def judged(
             remedy="give [spacecraft] in the parameter files and all six channels, or frame = 'T'",
         )
     channels = [channel for channel in pairs[0][1].measured.channels if channel.startswith(prefix)]
+    if not channels:
+        raise ConfigError(
+            f"no {requirement.quantity} was measured in frame {requirement.frame}",
+            where=requirement.name,
+            remedy=f"state a requirement on what is: {', '.join(pairs[0][1].measured.channels)}",
+        )
     below = coverage_below(requirement.statistic, [pair.measured for _, pair in pairs], band)
     sigmas = {
         (entry.recording, entry.channel): entry.total for entry in budgets if (entry.frame, entry.band) == key
@@ -68,6 +74,13 @@ def judged(
             [(name, pair.measured) for name, pair in pairs], channels, requirement.statistic
         )
     ]
+    if not measured:
+        raise ConfigError(
+            f"no sample of {band.name} is known: near a recording's ends and gaps, to some periods of its lower "
+            "edge, none is",
+            where=requirement.name,
+            remedy="record longer, or raise the band's lower edge",
+        )
     predicted = extremes(
         [(name, pair.predicted) for name, pair in pairs if pair.predicted is not None],
         channels,

@@ -11,6 +11,7 @@ from kbs_process.campaign.config import Campaign, RecordingEntry
 from kbs_process.plant.effect import Effect
 from kbs_process.plant.effects import select
 from kbs_process.plant.external import external_efforts, external_wrench, pulls_at_rest
+from kbs_process.plant.moved import added_loads
 from kbs_process.rig.model import Rig, substitute
 from kbs_process.signals.records import Array, Run, Signal
 from kbs_process.stages.motion import Motion
@@ -37,6 +38,25 @@ def relieved(campaign: Campaign, entry: RecordingEntry, run: Run, motion: Motion
         return None if signal is None else without_forces(signal, campaign.rig, forces, motion.q)
 
     return replace(run, wrench=less(run.wrench), effort=less(run.effort)) if forces else run
+
+
+def in_motion(campaign: Campaign, entry: RecordingEntry, motion: Motion, channels: Sequence[str]) -> Array:
+    """(n, channels) what the model's effects add to the loads of a rig that its motion drives.
+
+    Without what forces of the laboratory exert at rest, which is taken from its recordings; zero of any other rig.
+    """
+    rig, effects = campaign.rig, select(campaign.acting(entry))
+    if campaign.drive != "motion" or not effects:
+        return np.zeros((len(motion), len(channels)))
+    added = added_loads(rig, effects, motion.q, motion.qd, motion.dt)[:, rig.loads.index(channels)]
+    forces = forces_in(campaign, entry)
+    return added - _pull(rig, forces, motion.q, channels) if forces else added
+
+
+def without_effects(campaign: Campaign, entry: RecordingEntry, motion: Motion, loads: Signal) -> Signal:
+    """Return loads less what the model's effects add to them along a measured motion."""
+    added = in_motion(campaign, entry, motion, loads.channels)
+    return loads.derive(loads.values - added, "effects of the model removed") if added.any() else loads
 
 
 def without_forces(loads: Signal, rig: Rig, forces: tuple[Effect, ...], q: Array) -> Signal:

@@ -8,10 +8,10 @@ from pathlib import Path
 from kbs_process.campaign.analysis import Analysis, analyse
 from kbs_process.campaign.config import Campaign, RecordingEntry
 from kbs_process.campaign.findings import find
+from kbs_process.campaign.held import read_alive
 from kbs_process.campaign.output import write_results
 from kbs_process.campaign.progress import Progress
-from kbs_process.campaign.reading import read_run
-from kbs_process.campaign.relief import forces_in, relieved
+from kbs_process.campaign.relief import forces_in, relieved, without_effects
 from kbs_process.campaign.settings import gravity_settings, motion_settings
 from kbs_process.campaign.store import writing
 from kbs_process.campaign.summary import summarise
@@ -66,7 +66,7 @@ def _prepare(
     campaign: Campaign, entry: RecordingEntry, decoupling: Decoupling, progress: Progress
 ) -> Prepared:
     with progress.task(f"Reading {entry.name}"):
-        run = read_run(campaign, entry)
+        run = read_alive(campaign, entry)
         if run.loads is None:
             raise RecordingError(
                 "there is neither wrench nor effort in this recording", where=str(entry.path)
@@ -90,7 +90,12 @@ def _fit_gravity(campaign: Campaign, prepared: list[Prepared], progress: Progres
         fitted = [one for one in prepared if one.entry.role != "held-out"]
         free = [one for one in fitted if not forces_in(campaign, one.entry)]
         samples = [
-            Sample(one.entry.name, one.motion, loads, calibration=one.entry.role == "calibration")
+            Sample(
+                one.entry.name,
+                one.motion,
+                without_effects(campaign, one.entry, one.motion, loads),
+                calibration=one.entry.role == "calibration",
+            )
             for one in free or fitted
             if (loads := relieved(campaign, one.entry, one.run, one.motion).loads) is not None
         ]

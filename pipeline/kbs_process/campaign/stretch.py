@@ -11,10 +11,9 @@ from dataclasses import replace
 import numpy as np
 
 from kbs_process.campaign.config import Campaign, RecordingEntry
-from kbs_process.campaign.held import Alive
+from kbs_process.campaign.held import read_alive
 from kbs_process.campaign.predicting import AT_REST
 from kbs_process.campaign.progress import Progress
-from kbs_process.campaign.reading import read_run
 from kbs_process.signals.records import Loss, Run
 from kbs_process.stages.repeats import motion_of
 
@@ -24,7 +23,7 @@ LONGEST_S = 600.0
 def read_stretch(campaign: Campaign, entry: RecordingEntry, progress: Progress) -> Run:
     """Read a recording without what its channels were held in, or the busiest `LONGEST_S` of one that is longer."""
     with progress.task(f"Reading {entry.name}"):
-        run = _alive(campaign, entry)
+        run = read_alive(campaign, entry)
     span = busiest(run)
     if span is None:
         return run
@@ -33,7 +32,7 @@ def read_stretch(campaign: Campaign, entry: RecordingEntry, progress: Progress) 
         f"Reading {entry.name}: of its {whole:.0f} s the {LONGEST_S:.0f} s from {span[0]:.0f} s on, which move most"
     ):
         begin = entry.start or 0.0
-        part = _alive(campaign, replace(entry, start=begin + span[0], end=begin + span[1]))
+        part = read_alive(campaign, replace(entry, start=begin + span[0], end=begin + span[1]))
     left = Loss(
         "not looked at", "wrench", round((whole - LONGEST_S) * run.load_rates[0]), detail="long recording"
     )
@@ -53,12 +52,6 @@ def busiest(run: Run) -> tuple[float, float] | None:
     gone = gone[: len(rests)]
     start = int(np.argmax(np.where(rests, gone, -1.0) if rests.any() else gone)) * moved.dt + moved.t0
     return start, start + LONGEST_S
-
-
-def _alive(campaign: Campaign, entry: RecordingEntry) -> Run:
-    alive = Alive(campaign.rig, entry)
-    run = read_run(campaign, entry, alive)
-    return replace(run, losses=(*run.losses, *alive.losses))
 
 
 def _seconds(run: Run) -> float:

@@ -6,8 +6,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 from kbs_process.campaign.config import Campaign
+from kbs_process.campaign.held import read_alive
 from kbs_process.campaign.progress import Progress
-from kbs_process.campaign.reading import read_run
 from kbs_process.errors import RecordingError
 from kbs_process.signals.records import Loss
 
@@ -29,7 +29,7 @@ def read_through(campaign: Campaign, progress: Progress) -> list[Finding]:
     for entry in campaign.recordings:
         with progress.task(f"Reading {entry.name}"):
             try:
-                run = read_run(campaign, entry)
+                run = read_alive(campaign, entry)
                 findings.append(Finding(entry.name, entry.role, dict(run.rates), run.losses))
             except RecordingError as error:
                 findings.append(Finding(entry.name, entry.role, error=str(error)))

@@ -102,7 +102,9 @@ def linearise(rig: Rig, effects: Sequence[Effect], q: Array) -> Linear:
         stiffness, damping, B[[out, rotor], index] = drive_slopes(joint.drive, effects)
         K[pair] += stiffness
         C[pair] += damping
-        grounded = ground_slopes(joint.drive, effects)
+        grounded = ground_slopes(
+            joint.drive, effects, {"joint_angle": float(q[rig.joint_names.index(joint.name)])}
+        )
         for matrix, external, slope in zip((K, C), (gravity, drag), grounded, strict=True):
             inboard = [i for i in range(out) if joint.name in freedoms[i].carries]
             matrix[inboard, out] -= slope * np.array([freedoms[i].axis @ axis for i in inboard])

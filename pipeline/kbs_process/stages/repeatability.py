@@ -68,6 +68,12 @@ def _shifted(run: Signal, t: Array, shift: float) -> Signal:
     )
 
 
+def in_common(runs: Sequence[Signal]) -> int:
+    """Return how many samples are valid in all repeats."""
+    n = min(len(run) for run in runs)
+    return int(np.count_nonzero(np.logical_and.reduce([run.valid[:n] for run in runs])))
+
+
 def fit(runs: Sequence[Signal]) -> Repeatability:
     """Compare repeats on the same axis, over their common length and samples valid in all.
 
@@ -80,7 +86,7 @@ def fit(runs: Sequence[Signal]) -> Repeatability:
     _same_axis(runs)
     n = min(len(run) for run in runs)
     valid = np.logical_and.reduce([run.valid[:n] for run in runs])
-    samples = int(np.count_nonzero(valid))
+    samples = in_common(runs)
     if samples < 2:
         raise RecordingError(
             "the repeats have no valid sample in common", remedy="check gaps and the band's edges"
