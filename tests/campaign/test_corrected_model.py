@@ -103,8 +103,7 @@ def test_a_diagnosis_that_went_round_a_phase_and_found_a_gain_leaves_a_model_tha
     standing = SimpleNamespace(known=known, hypothesis=known.hypothesis, laws={name: {}})
     found = SimpleNamespace(
         identity=Identity("transducer", "", ("Ty",), "gain", "channel_gain"),
-        estimates=(Estimate("gain", "1", 0.03, 0.002),),
-        curve=None,
+        actions=((Estimate("gain", "1", 0.03, 0.002),),),
     )
     outcome = SimpleNamespace(standing=standing, finds=(found,))
     write_corrected(campaign, outcome, tmp_path / "corrected")  # type: ignore[arg-type]

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from kbs_process.campaign.transducer import rigid_base
+from kbs_process.plant.attach import attach
 from kbs_process.plant.compile import compiled_plant
-from kbs_process.plant.effects import select
+from kbs_process.plant.effects import CATALOGUE, select
 from kbs_process.plant.equilibrium import at_rest
 from kbs_process.plant.generate import state_layout
 from kbs_process.plant.linear import linearise
@@ -163,3 +164,15 @@ def test_amplification_has_the_sigma_of_its_mode() -> None:
     assert entry.gain[1] == pytest.approx(1.0 / (1.0 - 0.25), rel=1e-3)
     assert entry.sigma[1] == pytest.approx(0.1 * 2.0 * 0.25 / 4.0 / 0.75**2, rel=0.06)
     assert entry.gain[0] == pytest.approx(1.0)
+
+
+def test_a_cable_that_stiffens_is_as_stiff_as_at_the_pose() -> None:
+    effect = next(one for one in CATALOGUE if one.name == "ground_cable")
+    rig = attach(two_axis(), effect, {"cable_cubic": 10.0, "cable_middle": 0.0}, joints=["el"])
+    plain, q = two_axis(), np.radians([0.0, 80.0])
+    bare, hung = linearise(plain, select(NOMINAL), q), linearise(rig, select([*NOMINAL, "ground_cable"]), q)
+    added = hung.K - bare.K
+    expected = 3.0 * 10.0 * q[1] ** 2
+    assert added[bare.output("el"), bare.output("el")] == pytest.approx(expected, rel=1e-4)
+    axis = (hung.gravity - bare.gravity)[3:, bare.output("el")]
+    assert np.linalg.norm(axis) == pytest.approx(expected, rel=1e-4)

@@ -116,3 +116,12 @@ def test_tooth_stiction_over_a_travel_is_the_mean_of_that_at_instants() -> None:
         within = angle + travel * (np.arange(4000) / 4000.0 - 0.5 + 0.5 / 4000.0)
         mean = np.mean([tooth_stiction(x, 0.0, 1.0, delta, phase) for x in within])
         assert tooth_stiction(angle, travel, 1.0, delta, phase) == pytest.approx(mean, abs=2e-3)
+
+
+@pytest.mark.parametrize("name", ["floor_tilt", "friction_warmup"])
+def test_what_settles_has_not_begun_before_a_recording_does(name: str) -> None:
+    """A start in motion is led into from negative times, where a decay would grow without bounds."""
+    effect = next(one for one in CATALOGUE if one.name == name)
+    known = dict.fromkeys(effect.arguments, 1.0) | {entry.name: 0.5 for entry in effect.parameters}
+    assert effect.value({**known, "time": -20.0}) == effect.value({**known, "time": 0.0})
+    assert effect.value({**known, "time": 2.0}) != effect.value({**known, "time": 0.0})
