@@ -84,7 +84,10 @@ def judge(work: Work, methods: tuple[str, ...], target: Path, *, command: str, t
     rows = score(truths, answers)
     bench = Bench(
         split=work.plan.split,
-        seed=str(work.plan.seed),
+        # Trials that are not scored could be drawn again from it.
+        seed=str(work.plan.seed)
+        if len(truths) == len(work.plan.names)
+        else "withheld: others drawn with it are sealed",
         command=command,
         isolation=work.isolation,
         rows=rows,
