@@ -128,9 +128,9 @@ def test_effects_of_the_model_act_along_a_measured_motion(axis: CampaignFolder, 
         0.0, 0.01, q, 0.1 * np.cos(t)[:, None], still, still, still[None], np.zeros(1), np.zeros(1), t >= 0.0
     )
     entry = campaign.recordings[0]
-    friction = in_motion(corrected, entry, motion, rig.channels)[:, 0]
+    friction = in_motion(corrected, entry, motion, rig.channels, corrected.rig)[:, 0]
     moving = np.abs(np.cos(t)) > 0.2
     np.testing.assert_allclose(friction[moving], 3.0 * np.sign(np.cos(t))[moving], rtol=0.02)
     effort = Signal(0.0, 0.01, friction[:, None], rig.channels, ("N",), "joint", t >= 0.0)
-    assert not without_effects(corrected, entry, motion, effort).values.any()
-    assert not in_motion(campaign, entry, motion, rig.channels).any()
+    assert not without_effects(corrected, entry, motion, effort, corrected.rig).values.any()
+    assert not in_motion(campaign, entry, motion, rig.channels, campaign.rig).any()

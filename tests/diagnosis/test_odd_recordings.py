@@ -49,9 +49,11 @@ def wrench() -> Array:
     return np.asarray(sizes * np.round(2.0 * rng.standard_normal((2000, 6))), dtype=np.float64)
 
 
-def passed(values: Array, rig: Rig = RIG, chunk: int = 37) -> tuple[Array, tuple[Loss, ...]]:
+def passed(
+    values: Array, rig: Rig = RIG, chunk: int = 37, *, keep: bool = False, apart: int = 10_000_000
+) -> tuple[Array, tuple[Loss, ...]]:
     """What is left of readings that come in small pieces, and what is told of them."""
-    alive, stamp = Alive(rig, ENTRY), np.arange(len(values)) * 10_000_000
+    alive, stamp = Alive(rig, ENTRY, keep=keep), np.arange(len(values)) * 10_000_000 // apart * apart
     pieces = (slice(start, start + chunk) for start in range(0, len(values), chunk))
     blocks = alive(("wrench", Block(stamp[own], stamp[own], values[own])) for own in pieces)
     return np.concatenate([block.stamp for _, block in blocks]), alive.losses
@@ -96,6 +98,17 @@ def test_stretches_in_which_a_channel_is_saturated_are_left_out_and_told(chunk: 
     assert set(np.arange(2000)) - set(stamps // 10_000_000) == set(range(600, 740))
     assert (loss.kind, loss.where, loss.count) == ("held", "Ty", 140)
     assert (loss.start_s, loss.end_s) == pytest.approx((6.0, 7.39))
+
+
+@pytest.mark.parametrize("apart", [10_000_000, 50_000_000])
+def test_what_is_judged_keeps_what_was_cut_off_and_tells_of_it(apart: int) -> None:
+    """Also where stamps are those of packets of five."""
+    values = wrench()
+    values[600:740, 4] = 50.0
+    stamps, (loss,) = passed(values, keep=True, apart=apart)
+    assert len(stamps) == 2000
+    assert (loss.kind, loss.where) == ("held", "Ty")
+    assert loss.count == pytest.approx(140, abs=2)
 
 
 def test_a_channel_whose_resolution_hides_its_noise_may_stand_still() -> None:

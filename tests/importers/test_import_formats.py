@@ -169,7 +169,7 @@ def test_a_motor_s_angle_is_unwrapped_before_it_is_geared_down(tmp_path: Path) -
     degrees = 50.0 + 250.0 * t
     zero = 0.0 * t
     write_csv(tmp_path / "run.csv", {"t": t, "Fx": zero, "Fy": zero, "Fz": zero, "angle": degrees % 360.0})
-    mapping = MAPPING.replace('unit = "rad"', 'unit = "deg", scale = 0.01, unwrap = true')
+    mapping = MAPPING.replace('unit = "rad"', 'unit = "deg", scale = 0.01, unwrap = 360')
     folder = importers.import_recordings(
         write_mapping(tmp_path, "run.csv", mapping), tmp_path, tmp_path / "c"
     )

@@ -12,6 +12,7 @@ from scipy.integrate import solve_ivp
 from kbs_process.plant.attach import attach
 from kbs_process.plant.effect import instance
 from kbs_process.plant.effects import CATALOGUE, select
+from kbs_process.plant.effects.measured_law import MEASURED
 from kbs_process.plant.linear import Linear, linearise
 from kbs_process.rig.model import Controller, Quantity
 from kbs_process.stages import onset, stability
@@ -55,12 +56,15 @@ def test_what_is_without_friction_has_none_of_any_law() -> None:
         shape = {entry.name: entry.prior.middle for entry in effect.parameters if entry.role == "shape"}
         zeros = {entry.name: 0.0 for entry in effect.parameters if entry.role == "amplitude"}
         rig = attach(rig, effect, shape | zeros | values, joints=["el"])
+    law = next(one.effect for one in MEASURED if one.opposed)
+    coefficients = [entry.name for entry in law.parameters if entry.role == "amplitude"]
+    rig = attach(rig, law, dict.fromkeys(coefficients, 0.1), joints=["el"])
     again = instance(next(one for one in CATALOGUE if one.name == "coulomb"), 2)
     rig = attach(rig, again, {entry.name: 1e-3 for entry in again.parameters}, joints=["el"])
     joint = onset.smooth_rig(rig).joint("el")
     assert joint.drive is not None
     found = joint.drive.parameters
-    gone = ("tcog", "d0", "Ts0", "coulomb", "coulomb_2", "order_sin")
+    gone = ("tcog", "d0", "Ts0", "coulomb", "coulomb_2", "order_sin", *coefficients)
     assert [float(found[name]) for name in gone] == [0.0] * len(gone)
     assert float(found["joint_viscous"]) == 3.0
     assert float(found["Ka"]) > 0.0

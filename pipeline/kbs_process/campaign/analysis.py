@@ -67,7 +67,7 @@ def analyse(
 ) -> Analysis:
     """Remove gravity from measurement and prediction alike, cut the bands, move them to the spacecraft."""
     wrench = _loads(run)
-    sample = Sample(entry.name, motion, without_effects(campaign, entry, motion, wrench))
+    sample = Sample(entry.name, motion, without_effects(campaign, entry, motion, wrench, model.rig))
     taring = gravity.tare(sample, model)
     static = gravity.apply(_at_rest(motion), model, taring)
     residual = wrench.derive(
@@ -108,7 +108,7 @@ def _predict(
     if campaign.drive == "motion":
         moving = gravity.apply(motion, model).wrench
         inertia = moving.values - gravity.apply(_at_rest(motion), model).wrench.values
-        added = in_motion(campaign, entry, motion, moving.channels)
+        added = in_motion(campaign, entry, motion, moving.channels, model.rig)
         # The measurement's residual had the fitted rest of the cross-coupling undone as well.
         return None, moving.derive(model.without_coupling(inertia) + added, "inertia and effects")
     settings = CondenseSettings(working_rate_Hz=campaign.bands.working_rate)

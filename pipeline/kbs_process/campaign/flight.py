@@ -226,7 +226,7 @@ def _commanded(
     """Return the trajectory's name and commands, from time zero on, and the file that they come from."""
     if commands is not None:
         schedule = read_commands(commands, campaign.rig.joint_names)
-        return commands.stem, approached(replace(schedule, t=schedule.t - schedule.t[0])), (commands,)
+        return commands.stem, replace(schedule, t=schedule.t - schedule.t[0]), (commands,)
     first = {entry.trajectory: entry for entry in reversed(campaign.recordings)}
     name = trajectory or campaign.recordings[-1].trajectory
     if name not in first:

@@ -32,19 +32,23 @@ def noisy(rig: Rig) -> dict[str, bool]:
 
 
 class Alive:
-    """Passes the blocks of a recording on, without rows in which a channel is held; tells what it has left out."""
+    """Passes the blocks of a recording on, without rows in which a channel is held; tells what it has left out.
 
-    def __init__(self, rig: Rig, entry: RecordingEntry) -> None:
+    With `keep` it leaves nothing out and tells all the same: a peak that was cut off was no smaller.
+    """
+
+    def __init__(self, rig: Rig, entry: RecordingEntry, *, keep: bool = False) -> None:
         able = noisy(rig)
         self._entry = entry
         self._stream = _Stream(
-            {place: name for place, name in enumerate(rig.transducer.channels) if able[name]}
+            {place: name for place, name in enumerate(rig.transducer.channels) if able[name]}, keep
         )
 
     def __call__(self, blocks: Iterator[tuple[str, Block]]) -> Iterator[tuple[str, Block]]:
         """Yield the blocks; raises RecordingError at the end where a channel was held for most of the time."""
         for key, block in blocks:
-            yield key, self._stream.push(block) if key == "wrench" else block
+            watched = key == "wrench" and self._stream.channels and len(block)
+            yield key, self._stream.push(block) if watched else block
         if (last := self._stream.flush()) is not None:
             yield "wrench", last
         self._stream.check(self._entry)
@@ -54,9 +58,12 @@ class Alive:
         return tuple(self._stream.losses())
 
 
-def read_alive(campaign: Campaign, entry: RecordingEntry) -> Run:
-    """Read a recording without what its channels were held in; what that was is among its losses."""
-    alive = Alive(campaign.rig, entry)
+def read_alive(campaign: Campaign, entry: RecordingEntry, *, keep: bool = False) -> Run:
+    """Read a recording without what its channels were held in, or with it (`keep`); its losses tell of that.
+
+    Raises RecordingError where a channel was held most of the time.
+    """
+    alive = Alive(campaign.rig, entry, keep=keep)
     run = read_run(campaign, entry, alive)
     return replace(run, losses=(*run.losses, *alive.losses))
 
@@ -66,6 +73,7 @@ class _Stream:
     """Rows wait until those of `HELD_S` behind them are there, and stay for as long to be looked at with later ones."""
 
     channels: Mapping[int, str]  # by column
+    keep: bool = False
     rows: int = 0
     first: int = 0  # ns
     counts: dict[int, int] = field(default_factory=dict)
@@ -98,7 +106,7 @@ class _Stream:
         start = max(0, end - kept)
         ready = select(block, part)
         self._block, self._done = select(block, slice(start, None)), end - start
-        return select(ready, ~gone) if gone.any() else ready
+        return select(ready, ~gone) if gone.any() and not self.keep else ready
 
     def _note(self, column: int, block: Block, held: Mask) -> None:
         stamps = block.stamp[held]
@@ -129,6 +137,9 @@ def _least(block: Block) -> int:
     if len(block) < 2:
         return 2
     period = float(np.median(np.diff(block.stamp))) * 1e-9
+    if period == 0.0:  # stamps of packets, or none
+        spans = (float(times[-1] - times[0]) for times in (block.stamp, block.log))
+        period = next((span for span in spans if span > 0.0), 0.0) * 1e-9 / (len(block) - 1)
     return max(2, int(np.ceil(HELD_S / period))) if period > 0.0 else len(block)
 
 

@@ -40,12 +40,14 @@ def relieved(campaign: Campaign, entry: RecordingEntry, run: Run, motion: Motion
     return replace(run, wrench=less(run.wrench), effort=less(run.effort)) if forces else run
 
 
-def in_motion(campaign: Campaign, entry: RecordingEntry, motion: Motion, channels: Sequence[str]) -> Array:
+def in_motion(
+    campaign: Campaign, entry: RecordingEntry, motion: Motion, channels: Sequence[str], rig: Rig
+) -> Array:
     """(n, channels) what the model's effects add to the loads of a rig that its motion drives.
 
     Without what forces of the laboratory exert at rest, which is taken from its recordings; zero of any other rig.
     """
-    rig, effects = campaign.rig, select(campaign.acting(entry))
+    effects = select(campaign.acting(entry))
     if campaign.drive != "motion" or not effects:
         return np.zeros((len(motion), len(channels)))
     added = added_loads(rig, effects, motion.q, motion.qd, motion.dt)[:, rig.loads.index(channels)]
@@ -53,9 +55,11 @@ def in_motion(campaign: Campaign, entry: RecordingEntry, motion: Motion, channel
     return added - _pull(rig, forces, motion.q, channels) if forces else added
 
 
-def without_effects(campaign: Campaign, entry: RecordingEntry, motion: Motion, loads: Signal) -> Signal:
-    """Return loads less what the model's effects add to them along a measured motion."""
-    added = in_motion(campaign, entry, motion, loads.channels)
+def without_effects(
+    campaign: Campaign, entry: RecordingEntry, motion: Motion, loads: Signal, rig: Rig
+) -> Signal:
+    """Return loads less what the model's effects add to them along a measured motion, as a rig reads it."""
+    added = in_motion(campaign, entry, motion, loads.channels, rig)
     return loads.derive(loads.values - added, "effects of the model removed") if added.any() else loads
 
 

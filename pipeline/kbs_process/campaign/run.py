@@ -66,7 +66,7 @@ def _prepare(
     campaign: Campaign, entry: RecordingEntry, decoupling: Decoupling, progress: Progress
 ) -> Prepared:
     with progress.task(f"Reading {entry.name}"):
-        run = read_alive(campaign, entry)
+        run = read_alive(campaign, entry, keep=True)
         if run.loads is None:
             raise RecordingError(
                 "there is neither wrench nor effort in this recording", where=str(entry.path)
@@ -93,7 +93,7 @@ def _fit_gravity(campaign: Campaign, prepared: list[Prepared], progress: Progres
             Sample(
                 one.entry.name,
                 one.motion,
-                without_effects(campaign, one.entry, one.motion, loads),
+                without_effects(campaign, one.entry, one.motion, loads, campaign.rig),
                 calibration=one.entry.role == "calibration",
             )
             for one in free or fitted

@@ -33,7 +33,7 @@ def simulate_commands(
     """Simulate the commands of a CSV or Parquet file through the controller; return `target`."""
     _require_commands(campaign)
     schedule = read_commands(commands, campaign.rig.joint_names)
-    schedule = approached(replace(schedule, t=schedule.t - schedule.t[0]))
+    schedule = replace(schedule, t=schedule.t - schedule.t[0])
     with progress.task(f"Simulating {commands.name}") as task:
         streams = _command_driven(
             campaign, campaign.effects, schedule, rate_Hz, rate_Hz, float(schedule.t[-1]), task.update

@@ -29,7 +29,7 @@ def read_through(campaign: Campaign, progress: Progress) -> list[Finding]:
     for entry in campaign.recordings:
         with progress.task(f"Reading {entry.name}"):
             try:
-                run = read_alive(campaign, entry)
+                run = read_alive(campaign, entry, keep=True)
                 findings.append(Finding(entry.name, entry.role, dict(run.rates), run.losses))
             except RecordingError as error:
                 findings.append(Finding(entry.name, entry.role, error=str(error)))

@@ -65,7 +65,7 @@ def smooth_rig(rig: Rig) -> Rig:
         quantity.name
         for drive in drives
         for name, quantity in drive.items()
-        if re.sub(f"{ACTION}$", "", name) in dry
+        if name in dry or re.sub(f"{ACTION}$", "", name) in dry
     ]
     return substitute(rig, dict.fromkeys([*steps, *amplitudes], 0.0))
 

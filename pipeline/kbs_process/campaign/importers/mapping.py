@@ -78,7 +78,7 @@ class Channel(msgspec.Struct, frozen=True):
     unit: str  # SI
     gain: float
     offset: float = 0.0
-    turn: float = 0.0  # what a full turn is in `unit`, of an angle that is to be unwrapped
+    turn: float = 0.0  # at which an angle that is to be unwrapped starts again, in `unit`
 
 
 class StreamMap(msgspec.Struct, frozen=True):
@@ -225,7 +225,8 @@ def _channel(
             gain = factor(unit, si) if radius is None else factor(unit, si.replace("rad", "m")) / radius
         except UnitMismatchError as error:
             problems.add(document.place((*key, "unit")), str(error), error.remedy)
-    turn = 2.0 * math.pi * abs(scale) if cell.get("unwrap", False) else 0.0
+    again = cell.get("unwrap", False)
+    turn = 2.0 * math.pi * again if isinstance(again, bool) else abs(float(again) * gain * scale)
     return Channel(field, cell["column"], si, gain * scale, offset, turn)
 
 

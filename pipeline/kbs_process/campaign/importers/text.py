@@ -112,15 +112,17 @@ def sniff_delimiter(lines: Sequence[str], decimal: str = ".") -> str:
     best = max(able, key=lambda delimiter: min(line.count(delimiter) for line in lines))
     if min(line.count(best) for line in lines):
         return best
-    return " " if min(len(line.split()) for line in lines) > 1 else ","
+    return " " if min(len(line.split()) for line in lines) > 1 else able.strip("\t|")[-1]
 
 
 def _split(line: str, delimiter: str) -> list[str]:
-    cells = (
-        line.split()
-        if delimiter == " "
-        else next(csv.reader([line], delimiter=delimiter, skipinitialspace=True))
-    )
+    if delimiter == " ":
+        cells = line.split()
+    else:
+        try:
+            cells = next(csv.reader([line], delimiter=delimiter, skipinitialspace=True))
+        except csv.Error:  # no line of a table
+            cells = line.split(delimiter)
     return [cell.strip().strip('"') for cell in cells]
 
 
