@@ -194,7 +194,7 @@ def test_a_curve_s_signature_is_what_it_adds_to_the_loads(law: Measured, geared:
     told = {"experiment": experiment, "hypothesis": hypothesis, "signals": {0: tapped}, "paths": {}}
     for name, value in told.items():
         object.__setattr__(scene, name, value)
-    if law.effect.port is not Port.MOTOR_TORQUE:
+    if geared and law.effect.port is not Port.MOTOR_TORQUE:
         assert {one.joint for one in curves(scene) if one.law is law} == set(here.joint_names)
     for site in here.joint_names:
         swept = series(scene, 0, site, law.regressor)

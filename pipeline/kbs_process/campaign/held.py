@@ -45,13 +45,17 @@ class Alive:
         )
 
     def __call__(self, blocks: Iterator[tuple[str, Block]]) -> Iterator[tuple[str, Block]]:
-        """Yield the blocks; raises RecordingError at the end where a channel was held for most of the time."""
+        """Yield the blocks; raises RecordingError at the end where a channel was held for most of the time.
+
+        Nothing is raised of what is kept: simulated recordings may have no noise.
+        """
         for key, block in blocks:
             watched = key == "wrench" and self._stream.channels and len(block)
             yield key, self._stream.push(block) if watched else block
         if (last := self._stream.flush()) is not None:
             yield "wrench", last
-        self._stream.check(self._entry)
+        if not self._stream.keep:
+            self._stream.check(self._entry)
 
     @property
     def losses(self) -> tuple[Loss, ...]:
@@ -61,7 +65,7 @@ class Alive:
 def read_alive(campaign: Campaign, entry: RecordingEntry, *, keep: bool = False) -> Run:
     """Read a recording without what its channels were held in, or with it (`keep`); its losses tell of that.
 
-    Raises RecordingError where a channel was held most of the time.
+    Raises RecordingError where a channel was held most of the time, and that is not kept.
     """
     alive = Alive(campaign.rig, entry, keep=keep)
     run = read_run(campaign, entry, alive)

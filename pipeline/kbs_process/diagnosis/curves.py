@@ -115,11 +115,13 @@ def _slope(scene: Scene, drive: int, signal: str, joint: str) -> Array:
 
 
 def curves(scene: Scene) -> tuple[CurveSuspect, ...]:
-    """Every measured law at every joint where its regressor moves."""
+    """Every measured law at every joint whose drive is described, where its regressor moves."""
     found = []
     rig = scene.experiment.rig
     reached = felt_from_the_ground(rig)
     for joint in rig.joints:
+        if joint.drive is None:
+            continue  # a curve would take the place of the friction that a direct drive has
         for law in MEASURED:
             if law.effect.port is Port.GROUND_TORQUE and joint.name not in reached:
                 continue

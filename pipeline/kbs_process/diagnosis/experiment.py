@@ -191,10 +191,11 @@ def _seen(one: Recorded, channels: Sequence[str]) -> Mask:
         seen = seen & angle.valid
     if one.motion is not None:
         moved = one.motion
-        reach = 2 * round(moved.reach / moved.dt) + 1
-        gone = maximum_filter1d((~moved.valid).astype(np.float64), reach, mode="nearest")
-        known = np.interp(loads.t, moved.t0 + moved.dt * np.arange(len(gone)), 1.0 - gone, 0.0, 0.0) > _THERE
-        seen = seen & known
+        own = moved.t0 + moved.dt * np.arange(len(moved))
+        known = np.interp(loads.t, own, moved.valid, 0.0, 0.0) > _THERE
+        # Angles alone are missing: beside what was made up for them they are wrong, too.
+        invented = (loads.valid & ~known).astype(np.float64)
+        seen = seen & known & ~(maximum_filter1d(invented, 2 * round(moved.reach / loads.dt) + 1) > 0.0)
     return np.asarray(seen, dtype=np.bool_)
 
 
