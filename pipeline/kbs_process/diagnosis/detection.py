@@ -170,9 +170,9 @@ def _cells(floor: Floor, one: _Mean, taken: Array) -> list[tuple[Cell, float, fl
     b = len(one.f)
     z2 = np.sum((one.z.reshape(2, b, -1)) ** 2, axis=(0, 2))
     lost = np.sum(taken.reshape(2, b, -1), axis=(0, 2))
-    edges, seen = floor.edges, one.share[one.share > 0.0]
+    seen = one.share[one.share > 0.0]
     found = []
-    for low, high in itertools.pairwise(edges):
+    for low, high in itertools.pairwise(floor.edges):
         inside = (one.f > low) & (one.f <= high)
         B = int(inside.sum())
         if B == 0:

@@ -15,7 +15,7 @@ from scipy.interpolate import CubicSpline
 from scipy.stats import chi2
 
 from kbs_process.errors import RecordingError
-from kbs_process.signals.records import Array, Signal
+from kbs_process.signals.records import Array, Mask, Signal
 
 CONFIDENCE = 0.95
 
@@ -70,8 +70,13 @@ def _shifted(run: Signal, t: Array, shift: float) -> Signal:
 
 def in_common(runs: Sequence[Signal]) -> int:
     """Return how many samples are valid in all repeats."""
+    return int(np.count_nonzero(_valid(runs)))
+
+
+def _valid(runs: Sequence[Signal]) -> Mask:
+    """(n,) where all repeats are valid, over their common length."""
     n = min(len(run) for run in runs)
-    return int(np.count_nonzero(np.logical_and.reduce([run.valid[:n] for run in runs])))
+    return np.asarray(np.logical_and.reduce([run.valid[:n] for run in runs]), dtype=np.bool_)
 
 
 def fit(runs: Sequence[Signal]) -> Repeatability:
@@ -85,8 +90,8 @@ def fit(runs: Sequence[Signal]) -> Repeatability:
     """
     _same_axis(runs)
     n = min(len(run) for run in runs)
-    valid = np.logical_and.reduce([run.valid[:n] for run in runs])
-    samples = in_common(runs)
+    valid = _valid(runs)
+    samples = int(np.count_nonzero(valid))
     if samples < 2:
         raise RecordingError(
             "the repeats have no valid sample in common", remedy="check gaps and the band's edges"
