@@ -15,7 +15,7 @@ from kbs_process.diagnosis.hypothesis import Tapped
 from kbs_process.diagnosis.inlets import Inlet
 from kbs_process.diagnosis.places import half_lengths, point_of
 from kbs_process.diagnosis.ranges import Ranges, ranges_of
-from kbs_process.diagnosis.signature import inputs, port_inputs, sensed
+from kbs_process.diagnosis.signature import inputs, port_inputs, reduced, sensed
 from kbs_process.diagnosis.suspects import Candidate, candidates
 from kbs_process.diagnosis.transfer import follow, respond
 from kbs_process.plant.attach import attach
@@ -242,6 +242,53 @@ def test_a_sensor_changes_its_own_channels(name: str, site: str, touched: set[in
         np.testing.assert_array_equal(change[:, 3, 0], prediction()[:, 2])
     if name == "clock_offset":
         np.testing.assert_allclose(change[:, 1, 0], -0.8 * np.cos(0.4 * t + 1.0), atol=1e-3)
+
+
+def test_vibration_beyond_the_working_band_takes_a_play_to_and_fro() -> None:
+    """Vibration of twice the play's width leaves little of the loop that the slow load makes (dither)."""
+    play, n = one("channel_hysteresis", "Ty"), len(prediction())
+    small = replace(play, shape=(("loop_memory", 0.3),))
+    t = np.arange(n * 5) / RATE
+    slow = np.zeros((len(t), len(CHANNELS)))
+    slow[:, 4] = 5.0 * np.sin(0.4 * t)
+    shaken = slow.copy()
+    shaken[:, 4] += 1.2 * np.sin(2.0 * np.pi * 30.0 * t)
+
+    def loop(readings: Array) -> float:
+        along = Tapped(RATE, tapped().columns, tapped().values, readings)
+        change = reduced(small, along, CHANNELS, rig(), DT, n)
+        assert change.shape == (n, len(CHANNELS), 1)
+        assert set(np.flatnonzero(np.abs(change).max(axis=(0, 2)))) == {4}
+        return float(-change[:, 4, 0] @ np.gradient(slow[::5, 4]))
+
+    assert loop(shaken) < 0.5 * loop(slow)
+    # At rest beyond the working band it is what it is at the working rate.
+    plain = sensed(small, np.arange(n) * DT, slow[::5], CHANNELS, rig())[:, 4, 0]
+    at_rate = reduced(small, Tapped(RATE, (), slow, slow), CHANNELS, rig(), DT, n)[:, 4, 0]
+    assert np.abs(plain - at_rate)[5:-5].max() < 0.12
+
+
+def test_spans_of_what_sensors_read_are_those_of_the_whole_band() -> None:
+    fast = np.repeat(prediction(), 5, axis=0)
+    fast[::2, 4] += 3.0
+    found = ranges_of([replace(tapped(), readings=fast)], [prediction()], CHANNELS, DT).spans
+    without = ranges().spans
+    assert found["Ty", "reading"][1] == pytest.approx(without["Ty", "reading"][1] + 3.0)
+    assert found["Tx", "reading"] == without["Tx", "reading"]
+
+
+def test_a_clock_that_wanders_with_any_period_is_near_one_that_is_tried() -> None:
+    law = next(law for law in SENSING if law.name == "clock_wander")
+    entry = next(entry for entry in law.parameters if entry.name == "wander_period")
+    periods, t = ranges().choices(entry, "encoder", None), np.arange(400) * DT
+    for turns in np.linspace(0.75, 13.5, 40):  # over the recording
+        tone = np.sin(2.0 * np.pi * turns * t / t[-1] + turns)
+        shares = []
+        for period in periods:
+            pair = np.stack([np.sin(2.0 * np.pi * t / period), np.cos(2.0 * np.pi * t / period)], axis=1)
+            left = tone - pair @ np.linalg.lstsq(pair, tone, rcond=None)[0]
+            shares.append(1.0 - (left @ left) / (tone @ tone))
+        assert max(shares) > 0.7, turns
 
 
 def test_every_law_has_a_family_and_a_port_in_words() -> None:

@@ -174,6 +174,25 @@ def test_hysteresis_gives_a_loop_and_takes_energy() -> None:
         assert friction @ moved < -0.5 * 2.0 * np.ptp(ANGLE)
 
 
+def test_joint_hysteresis_is_elastic_after_a_reversal_and_a_single_stop_if_sharp() -> None:
+    effect = find("joint_hysteresis")
+    assert effect is not None
+    soft, sharp = (
+        along(effect, {"joint_angle": ANGLE}, {"slip_angle": 0.02, "slip_power": n}, DT)[:, 0, 0]
+        for n in (1.0, 5.0)
+    )
+    until = T < 7.4  # the first reversal is at 7.5 s
+    np.testing.assert_allclose(soft[until], -(1.0 - np.exp(-ANGLE[until] / 0.02)), atol=2e-3)
+    # n = 1 never quite yields, and unloads at the slope that it began with, as a spring does.
+    turned, angle = (T > 7.6) & (T < 9.0), ANGLE.max()
+    np.testing.assert_allclose(soft[turned] - soft[T <= 7.5][-1], (angle - ANGLE[turned]) / 0.02, atol=4e-3)
+    stop = np.clip(ANGLE / 0.02, 0.0, 1.0)
+    assert np.abs(sharp[until] + stop[until]).max() < 0.2
+    assert np.abs(sharp[until] + stop[until]).max() < 0.6 * np.abs(soft[until] + stop[until]).max()
+    for torque in (soft, sharp):
+        assert torque @ np.diff(ANGLE, append=ANGLE[-1]) < 0.0
+
+
 def test_appendage_is_an_inertia_below_its_frequency_and_rings_at_it() -> None:
     effect = find("appendage")
     assert effect is not None

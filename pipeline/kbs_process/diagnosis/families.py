@@ -49,6 +49,7 @@ FAMILIES: dict[str, str] = {
     "dahl": "friction",
     "lugre": "friction",
     "harness": "harness",
+    "joint_hysteresis": "hysteresis",
     "joint_order": "local torque",
     "local_torque": "local torque",
     "ground_cable": "cable",

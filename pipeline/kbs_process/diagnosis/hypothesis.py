@@ -71,6 +71,9 @@ class Tapped:
     rate: float  # Hz
     columns: tuple[str, ...]  # as `plant.predict.tap_columns`
     values: Array  # (m, k)
+    readings: Array | None = (
+        None  # (m, c) what the experiment's channels show of it, in the amplifier's whole band
+    )
 
 
 class _Rates(TypedDict):
@@ -178,8 +181,12 @@ def tapped(hypothesis: Hypothesis, experiment: Experiment, drive: int) -> Tapped
     if driven.motion is not None:
         return _motion_tapped(hypothesis.rig, driven.motion)
     rate = max(_simulated(driven.wrench_rate), SLOWEST_TAP)
-    blocks = _streams(hypothesis, experiment, driven, rate, rate, taps=True)["state"]
-    return Tapped(rate, tap_columns(hypothesis.rig), np.concatenate(blocks))
+    streams = _streams(hypothesis, experiment, driven, rate, rate, taps=True)
+    wrench, angle, state = (np.concatenate(streams[name]) for name in ("wrench", "angle", "state"))
+    m = min(len(wrench), len(angle))
+    rest = angle[:m, list(experiment.angle_joints)]
+    readings = np.hstack([coupled(hypothesis.rig, experiment, wrench[:m]), rest])
+    return Tapped(rate, tap_columns(hypothesis.rig), state, readings)
 
 
 def _motion_tapped(rig: Rig, motion: Motion) -> Tapped:

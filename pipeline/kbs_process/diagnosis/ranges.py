@@ -67,7 +67,8 @@ def ranges_of(
         for k, column in enumerate(one.columns):
             signal, _, joint = column.partition(".")
             extend(joint, signal, one.values[:, k])
-    for prediction in predictions:
+    whole = [one.readings for one in tapped if one.readings is not None]
+    for prediction in (*predictions, *whole):
         for k, channel in enumerate(channels):
             extend(channel, "reading", prediction[:, k])
     longest = max(len(prediction) for prediction in predictions) * dt

@@ -22,7 +22,7 @@ from kbs_process.diagnosis.inlets import Inlet
 from kbs_process.diagnosis.known import Known
 from kbs_process.diagnosis.scene import Scene
 from kbs_process.diagnosis.side_by_side import side_by_side
-from kbs_process.diagnosis.signature import inputs, sensed
+from kbs_process.diagnosis.signature import inputs, reduced, sensed
 from kbs_process.diagnosis.suspects import Candidate
 from kbs_process.diagnosis.tails import log_tail
 from kbs_process.diagnosis.thresholds import ABSORBED, FALSE_ALARM, LEAST_RHO
@@ -84,14 +84,15 @@ class Catalogued:
         ]
 
     def outputs(self, drive: int) -> Array:
-        experiment = self.scene.experiment
+        experiment, rig = self.scene.experiment, self.scene.hypothesis.rig
         prediction = self.scene.predicted[drive].values
+        law, tapped = self.candidate.effect, self.scene.signals[drive]
+        if isinstance(law, Sensing) and law.whole_band and tapped.readings is not None:
+            return reduced(self.candidate, tapped, experiment.channels, rig, experiment.dt, len(prediction))
         t = np.asarray(np.arange(len(prediction)) * experiment.dt, dtype=np.float64)
         own = [one for one in experiment.trials if one.drive == drive]
         temperature = min(own, key=lambda one: one.role == "held-out").temperature  # the first that is fitted
-        return sensed(
-            self.candidate, t, prediction, experiment.channels, self.scene.hypothesis.rig, temperature
-        )
+        return sensed(self.candidate, t, prediction, experiment.channels, rig, temperature)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -25,6 +25,7 @@ from kbs_process.plant.sensing import Sensing, SensingPort
 from kbs_process.rig.model import TRANSDUCER, Rig
 from kbs_process.signals.frames import rotate
 from kbs_process.signals.records import WRENCH_CHANNELS, Array
+from kbs_process.stages.resample import resample
 
 _POSITION = ("x", "y", "z")  # signals of an effect at a point; its velocity is their slopes
 
@@ -109,9 +110,40 @@ def sensed(
     temperature: Array | None = None,
 ) -> Array:
     """Change of a prediction (n, c) by a unit of each amplitude of a suspect of the sensing, (n, c, amplitudes)."""
+    out = np.zeros((*prediction.shape, len(candidate.amplitudes)))
+    for k, change in _by_channel(candidate, t, prediction, channels, rig, temperature).items():
+        out[:, k] = change
+    return out
+
+
+def reduced(
+    candidate: Candidate, tapped: Tapped, channels: Sequence[str], rig: Rig, dt: float, n: int
+) -> Array:
+    """As `sensed` at the working rate, (n, c, amplitudes), of what a sensor does to all that it reads.
+
+    Vibration beyond the working band takes a play to and fro and rounds a step off: a sensor that is not linear shows
+    otherwise than it would without.
+    """
+    assert tapped.readings is not None
+    t = np.arange(len(tapped.readings)) / tapped.rate
+    out = np.zeros((n, len(channels), len(candidate.amplitudes)))
+    for k, change in _by_channel(candidate, t, tapped.readings, channels, rig, None).items():
+        slow = resample(change, tapped.rate, 1.0 / dt)[:n]
+        out[: len(slow), k] = slow
+    return out
+
+
+def _by_channel(
+    candidate: Candidate,
+    t: Array,
+    prediction: Array,
+    channels: Sequence[str],
+    rig: Rig,
+    temperature: Array | None,
+) -> dict[int, Array]:
+    """Change by a unit of each amplitude, (n, amplitudes), of the channels (by index) at which a suspect acts."""
     law, site = candidate.effect, candidate.site
     assert isinstance(law, Sensing)
-    out = np.zeros((*prediction.shape, len(candidate.amplitudes)))
     given: dict[str, Array | float] = {}
     if temperature is not None:
         given["temperature"] = temperature
@@ -128,9 +160,7 @@ def sensed(
     if "code" in law.arguments:
         encoder = rig.joint(site).encoder
         given["code"] = float(encoder.step) if encoder is not None and float(encoder.step) > 0.0 else np.nan
-    for k in acted:
-        out[:, k] = _changes(candidate, t, prediction[:, k], given)
-    return out
+    return {k: _changes(candidate, t, prediction[:, k], given) for k in acted}
 
 
 def _changes(candidate: Candidate, t: Array, reading: Array, given: Mapping[str, Array | float]) -> Array:

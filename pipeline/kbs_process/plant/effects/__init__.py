@@ -33,6 +33,7 @@ from kbs_process.plant.effects.friction_warmup import FRICTION_WARMUP
 from kbs_process.plant.effects.ground_bump import GROUND_BUMP
 from kbs_process.plant.effects.ground_cable import GROUND_CABLE
 from kbs_process.plant.effects.harness import HARNESS
+from kbs_process.plant.effects.joint_hysteresis import JOINT_HYSTERESIS
 from kbs_process.plant.effects.joint_order import JOINT_ORDER
 from kbs_process.plant.effects.joint_viscous import JOINT_VISCOUS
 from kbs_process.plant.effects.kinematic_error import KINEMATIC_ERROR
@@ -91,6 +92,7 @@ CATALOGUE: tuple[Effect, ...] = (
     DAHL,
     LUGRE,
     HARNESS,
+    JOINT_HYSTERESIS,
     JOINT_ORDER,
     LOCAL_TORQUE,
     # from outside

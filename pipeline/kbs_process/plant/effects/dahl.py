@@ -12,7 +12,8 @@ def torque(
 
     Equation: $T = -T_c z$, $\dot z = (\omega_l - |\omega_l| z) / x_0$.
     Units: rad/s, 1, N m, rad -> N m, 1/s.
-    Validity: does not depend on rate; |z| <= 1. The greatest rate in a step has to stay below x0.
+    Validity: does not depend on rate; |z| <= 1. Bearings roll within 0.3 deg of a reversal; what slides later is
+        `joint_hysteresis`. The greatest rate in a step has to stay below x0.
     Source: P. R. Dahl, A solid friction model, Aerospace Corp. TOR-0158(3107-18)-1 (1968).
     """
     return -dahl * dahl_strain, (joint_rate - abs(joint_rate) * dahl_strain) / dahl_displacement
@@ -31,8 +32,8 @@ DAHL = Effect(
             "rad",
             LogNormal(1e-3, 1.0),
             "angle after a reversal over which it builds up",
-            (1e-5, 1.0),
-            grid=(2e-4, 1e-3, 5e-3),
+            (1e-5, 5e-3),
+            grid=(2e-4, 1e-3),
         ),
     ),
     reference="P. R. Dahl, A solid friction model, Aerospace Corp. TOR-0158(3107-18)-1 (1968)",

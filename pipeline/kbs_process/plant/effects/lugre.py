@@ -43,8 +43,8 @@ LUGRE = Effect(
             "rad",
             LogNormal(1e-3, 1.0),
             "bristles' deflection under the Coulomb torque",
-            (1e-5, 1.0),
-            grid=(2e-4, 1e-3, 5e-3),
+            (1e-5, 5e-3),
+            grid=(2e-4, 1e-3),
         ),
         Parameter(
             "lugre_excess",

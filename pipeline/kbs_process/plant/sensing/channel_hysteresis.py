@@ -43,4 +43,5 @@ CHANNEL_HYSTERESIS = Sensing(
         ),
     ),
     reference="VDI/VDE 2638, Characteristics of force transducers (2008)",
+    whole_band=True,
 )

@@ -35,4 +35,5 @@ CHANNEL_INTERACTION = Sensing(
     ),
     reference="AIAA R-091A-2020, Calibration and use of internal strain-gage balances with application to wind tunnel "
     "testing",
+    whole_band=True,
 )

@@ -65,4 +65,5 @@ CHANNEL_NONLINEARITY = Sensing(
         ),
     ),
     reference="VDI/VDE 2638, Characteristics of force transducers (2008)",
+    whole_band=True,
 )

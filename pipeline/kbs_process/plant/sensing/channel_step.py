@@ -54,4 +54,5 @@ CHANNEL_STEP = Sensing(
         ),
     ),
     reference="IEEE Std 1241-2010, Terminology and test methods for analog-to-digital converters",
+    whole_band=True,
 )

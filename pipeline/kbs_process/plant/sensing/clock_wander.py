@@ -36,7 +36,9 @@ CLOCK_WANDER = Sensing(
             LogNormal(25.0, 0.5),
             "of the deviation",
             (0.1, 1e6),
-            grid=(8.0, 12.0, 18.0, 27.0, 40.0, 60.0, 90.0),
+            # Half a turn more over the longest recording, one after the other: between two, phases run apart.
+            grid=tuple(2.0 / halves for halves in range(1, 29)),
+            over="time.span",
         ),
     ),
     reference="D. W. Allan, N. Ashby, C. C. Hodge, The science of timekeeping, Hewlett-Packard AN 1289 (1997)",

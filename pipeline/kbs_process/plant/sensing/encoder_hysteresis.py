@@ -37,4 +37,5 @@ ENCODER_HYSTERESIS = Sensing(
     ),
     reference="L. M. Sanchez-Brea, T. Morlanes, Metrological errors in optical encoders, Measurement Science and "
     "Technology 19 (2008) 115104",
+    whole_band=True,
 )

@@ -38,4 +38,5 @@ ENCODER_QUANTISATION = Sensing(
         ),
     ),
     reference="IEEE Std 1241-2010, Terminology and test methods for analog-to-digital converters",
+    whole_band=True,
 )

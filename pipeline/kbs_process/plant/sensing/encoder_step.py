@@ -37,4 +37,5 @@ ENCODER_STEP = Sensing(
         ),
     ),
     reference="IEEE Std 1241-2010, Terminology and test methods for analog-to-digital converters",
+    whole_band=True,
 )

@@ -45,4 +45,5 @@ ENCODER_SWITCHING = Sensing(
         ),
     ),
     reference="IEEE Std 1241-2010, Terminology and test methods for analog-to-digital converters",
+    whole_band=True,
 )

@@ -39,7 +39,8 @@ class SensingPort(Enum):
 class Sensing:
     """An equation, the port at which its value is added, and its parameters.
 
-    `each_trial`: its amplitudes belong to a recording, as of what drifts or hums.
+    `each_trial`: its amplitudes belong to a recording, as of what drifts or hums. `whole_band`: vibration beyond the
+    working band changes what it does within, as it is not linear in what it reads.
     """
 
     name: str
@@ -48,6 +49,7 @@ class Sensing:
     parameters: tuple[Parameter, ...]
     reference: str
     each_trial: bool = False
+    whole_band: bool = False
 
     def __post_init__(self) -> None:
         where = f"sensing effect '{self.name}'"
