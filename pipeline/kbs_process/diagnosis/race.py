@@ -21,7 +21,7 @@ from kbs_process.diagnosis.remains import detected
 from kbs_process.diagnosis.screen import Found
 from kbs_process.diagnosis.settling import released
 from kbs_process.diagnosis.side_by_side import side_by_side
-from kbs_process.diagnosis.thresholds import FAR_BEHIND, FIRST, MOST, SETTLED_TIMES, TOLERATED
+from kbs_process.diagnosis.thresholds import FAR_BEHIND, FIRST, MOST, SETTLED_TIMES, TOLERATED, WAYS
 from kbs_process.diagnosis.tryout import extra_of
 from kbs_process.diagnosis.view import View
 
@@ -70,7 +70,9 @@ def raced(chosen: Sequence[Found], view: View, floor: Floor, simulate: Simulate)
     runners.sort(key=lambda one: one.cost)
     near = [one for one in runners if _near(one, runners[0])]
     behind = [one for one in runners if one not in near]
-    while near and not near[0].leapt and not _at_floor(near[0], floor):
+    for _ in range(WAYS):
+        if not near or near[0].leapt or _at_floor(near[0], floor):
+            break
         first = replace(near[0], standing=moved_on(near[0].standing, simulate), leapt=True)
         way = bare(first.standing, own_of(first.found, view.standing, first.standing), simulate)
         near = [first, *side_by_side(partial(led, way), near[1:])]

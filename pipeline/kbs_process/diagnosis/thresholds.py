@@ -89,6 +89,9 @@ REREAD: Final = 2
 SECOND: Final = 2
 # Leaders are refitted to the end if their first steps leave no more than some times what the best one's leave.
 SETTLED_TIMES: Final = 3.0
+# Leaders of a race, one after the other, beside which better phases are looked for: what two did not find, a third has
+# not found either. It was set on no case.
+WAYS: Final = 2
 # Share that a law has to take of what exceeds the floor, after all numbers were refitted with it: one that takes little
 # and leaves the rest follows what something else does.
 TAKEN: Final = 0.25
@@ -96,8 +99,9 @@ TAKEN: Final = 0.25
 # taken 0.08 of one, those that may be right 0.12 and more.
 TAKEN_UNUSED: Final = 0.1
 # Share of an earlier find's distance, at the same joint or channel, below which a law may as well be what the earlier
-# one's formula lacks of nature's: splines and catalogue laws have left 0.02 of effects made by other formulas.
-SHADE: Final = 0.03
+# one's formula lacks of nature's: splines and catalogue laws have left 0.02 of effects made by other formulas, and the
+# loop of Bouc and Wen 0.07 of three stops (development).
+SHADE: Final = 0.08
 # Share of the time in which an earlier law does MOSTLY of what it does, below which one that gains more than WHILE of
 # what it gains just then is what the earlier one's formula lacks. A bump in a sector that is seldom passed had been
 # given a stiffening gear beside it (development).
