@@ -39,20 +39,21 @@ class Compiled:
 @cache
 def compiled_plant(structure: Structure) -> Compiled:
     """Return the compiled plant of `structure`, from this process, from the cache, or made now."""
-    module = compiled_module("plant", module_text(structure), _modules(structure))
+    module = _plant(structure)
     return Compiled(Path(str(module.__file__)), module.balance, module.advance, module.tap)
 
 
 @cache
 def compiled_lanes(structure: Structure) -> Callable[..., Any]:
     """Return the time loop of several plants of `structure` side by side, likewise."""
-    text = f"{module_text(structure)}\n\n{lanes_text(structure)}"
-    return cast(Callable[..., Any], compiled_module("lanes", text, _modules(structure)).advance_lanes)
+    return cast(Callable[..., Any], _plant(structure).advance_lanes)
 
 
-def _modules(structure: Structure) -> list[ModuleType | None]:
+def _plant(structure: Structure) -> ModuleType:
+    """One module for a plant alone and for several: what both call is compiled once, and nothing before it is called."""
     effects = [*structure.effects, *(load.effect for load in structure.loads)]
-    return [inspect.getmodule(effect.equation) for effect in effects]
+    called = [inspect.getmodule(effect.equation) for effect in effects]
+    return compiled_module("plant", f"{module_text(structure)}\n\n{lanes_text(structure)}", called)
 
 
 def compiled_module(kind: str, text: str, modules: Iterable[ModuleType | None]) -> ModuleType:
