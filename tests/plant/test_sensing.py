@@ -97,6 +97,17 @@ def test_a_channel_steps_where_its_load_passes() -> None:
     np.testing.assert_allclose(there, 0.25, rtol=1e-12)
 
 
+def test_an_s_shaped_channel_has_another_gain_about_one_load_and_is_odd_there() -> None:
+    shape, ends = law("channel_s_shape").equation, np.array([-1e9, 1e9])
+    given = {"swing": 0.5, "swing_load": 0.3, "swing_width": 0.2}
+    np.testing.assert_allclose(shape(reading=0.3 + ends, **given), [-0.5, 0.5], rtol=1e-6)
+    np.testing.assert_allclose(
+        shape(reading=np.array([0.1]), **given), -shape(reading=np.array([0.5]), **given)
+    )
+    slope = np.diff(shape(reading=np.array([0.3 - 1e-6, 0.3 + 1e-6]), **given)) / 2e-6
+    np.testing.assert_allclose(slope, 0.5 / 0.2, rtol=1e-6)
+
+
 def test_a_coarse_encoder_reads_whole_coarse_codes() -> None:
     coarse = READING + changed(law("encoder_quantisation"), coarse_share=1.0, coarse_codes=8.0)
     codes = coarse / (8.0 * float(np.asarray(KNOWN["code"])))

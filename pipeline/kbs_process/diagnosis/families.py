@@ -65,6 +65,7 @@ FAMILIES: dict[str, str] = {
     "cross_coupling": "cross-coupling",
     "channel_interaction": "non-linearity",
     "channel_nonlinearity": "non-linearity",
+    "channel_s_shape": "non-linearity",
     "channel_step": "converter",
     "channel_hysteresis": "sensor hysteresis",
     "channel_lag": "lag",

@@ -50,7 +50,7 @@ def compiled_lanes(structure: Structure) -> Callable[..., Any]:
 
 
 def _plant(structure: Structure) -> ModuleType:
-    """One module for a plant alone and for several: what both call is compiled once, and nothing before it is called."""
+    """One module for a plant alone and for several: what both call is compiled once, when it is called first."""
     effects = [*structure.effects, *(load.effect for load in structure.loads)]
     called = [inspect.getmodule(effect.equation) for effect in effects]
     return compiled_module("plant", f"{module_text(structure)}\n\n{lanes_text(structure)}", called)

@@ -46,10 +46,10 @@ CHANNEL_STEP = Sensing(
         Parameter(
             "jump_width",
             "1",
-            LogNormal(1.0, 1.0),
+            LogNormal(1.0, 0.5),
             "load over which it switches, in the channel's unit",
             (1e-9, 1e6),
-            grid=(0.01, 0.03),
+            grid=(0.005, 0.02),
             over="reading.span",
         ),
     ),

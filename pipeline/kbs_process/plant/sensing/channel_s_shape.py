@@ -1,0 +1,58 @@
+"""An S-shaped characteristic of a channel: its gain about one load is not that on either side."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kbs_process.plant.effect import LogNormal, Normal, Parameter
+from kbs_process.plant.sensing.sensing import Sensing, SensingPort
+from kbs_process.signals.records import Array
+
+
+def change(reading: Array, swing: float, swing_load: float, swing_width: float) -> Array:
+    r"""Change of a channel of which the gain is higher, or lower, about one load.
+
+    Equation: $\Delta y = \frac{2 s}{\pi} \arctan \frac{\pi (y - y_0)}{2 w}$.
+    Units: the channel's, the channel's, the channel's, the channel's -> the channel's.
+    Validity: one load, about which gain changes by s / w over 2 w, a twentieth of the range and more: what is
+        narrower switches (`channel_step`), what is nowhere in particular is curved (`channel_nonlinearity`).
+    Source: VDI/VDE 2638, Characteristics of force transducers: terms and definitions (2008).
+    """
+    return np.asarray(swing * 2.0 / np.pi * np.arctan(0.5 * np.pi * (reading - swing_load) / swing_width))
+
+
+CHANNEL_S_SHAPE = Sensing(
+    name="channel_s_shape",
+    port=SensingPort.CHANNEL,
+    equation=change,
+    parameters=(
+        Parameter(
+            "swing",
+            "1",
+            Normal(0.0, 0.5),
+            "half of the change from far below to far above",
+            (-1e3, 1e3),
+            role="amplitude",
+        ),
+        Parameter(
+            "swing_load",
+            "1",
+            Normal(0.0, 1e3),
+            "its middle, in the channel's unit",
+            (-1e6, 1e6),
+            grid=tuple((i + 0.5) / 8.0 for i in range(8)),
+            over="reading",
+        ),
+        Parameter(
+            "swing_width",
+            "1",
+            LogNormal(1.0, 0.5),
+            "load over which the gain is otherwise, in the channel's unit",
+            (1e-9, 1e6),
+            grid=(0.05, 0.15, 0.4),
+            over="reading.span",
+        ),
+    ),
+    reference="VDI/VDE 2638, Characteristics of force transducers (2008)",
+    whole_band=True,
+)
