@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import bench
 import numpy as np
 import pytest
 
-from kbs_process.diagnosis.proposals import _along
+from kbs_process.diagnosis.proposals import _along, proposed
+from kbs_process.diagnosis.scene import Scene
+from kbs_process.signals.records import Array
+from kbs_process.stages.output_error import Scalar
 
 
 @pytest.mark.parametrize(
@@ -33,3 +39,25 @@ def test_a_slow_and_a_fast_half_count_alike() -> None:
     orders = np.arange(1.0, 30.0)
     expected = np.abs(np.exp(-1j * np.outer(orders, angle)) @ (series[:, 0] / series.std())) ** 2 / len(angle)
     np.testing.assert_allclose(_along(orders, angle, series), expected, rtol=0.1, atol=0.01 * expected.max())
+
+
+@pytest.mark.parametrize("bare", [False, True])
+def test_lines_of_a_disc_are_its_shape_s_if_few_to_a_turn_and_else_its_grating_s(bare: bool) -> None:
+    """What repeats 600 times in a turn is no eccentricity, unless nobody says how fine the code is."""
+    made = bench.experiment(bench.rig(), ("fit",), 1, seconds=60.0, bare_encoders=bare)
+    trial = made.trials[0]
+    el = made.channels.index("el")
+    line: Array = np.zeros_like(trial.measured)
+    line[:, el] = 2e-5 * np.sin(600.0 * trial.measured[:, el])
+    shown = replace(trial, measured=trial.measured + line * trial.valid[:, None])
+    held = bench.standing(replace(made, trials=(shown,)), (Scalar("joint.el.drive.Ka"),))
+    found = proposed(held.known, Scene.of(held.known.experiment, held.hypothesis, held.predicted))
+    if bare:
+        assert found["eccentric_order.el"] == pytest.approx([600.0], rel=0.02)
+        assert "interpolation_bits.el" not in found
+    else:
+        encoder = bench.rig().joint("el").encoder
+        assert encoder is not None
+        lines = [2.0 * np.pi / (float(encoder.step) * 2.0**bits) for bits in found["interpolation_bits.el"]]
+        assert lines == pytest.approx([600.0], rel=0.02)  # a turn over the range that is swept
+        assert "eccentric_order.el" not in found

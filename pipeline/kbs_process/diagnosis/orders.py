@@ -15,7 +15,7 @@ from kbs_process.diagnosis.gls import Score, Sums, score
 from kbs_process.diagnosis.screen import Bench, Catalogued, Found
 from kbs_process.diagnosis.suspects import Candidate, free_actions
 from kbs_process.diagnosis.tails import log_tail
-from kbs_process.diagnosis.thresholds import FALSE_ALARM, ITS_OWN, LEAST_RHO, SHADE
+from kbs_process.diagnosis.thresholds import FALSE_ALARM, ITS_OWN, LEAST_RHO, ORDERS_SHARE
 from kbs_process.diagnosis.view import View
 from kbs_process.plant.effect import Effect
 from kbs_process.plant.effects import find
@@ -93,7 +93,7 @@ def _added(
         chance = log_tail(max(gained, 0.0), max(rank, 1)) + np.log(len(left))
         # What is left beside all others counts as noise: it has some of every order.
         level = max(1.0, whole - tried[place].gain / rows)
-        least = max(level * LEAST_RHO**2, SHADE**2 * first.gain)
+        least = max(level * LEAST_RHO**2, ORDERS_SHARE**2 * first.gain)
         if rank < 1 or not gained > least or chance > np.log(FALSE_ALARM):
             break
         chosen.append(left[place])

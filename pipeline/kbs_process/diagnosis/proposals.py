@@ -26,7 +26,7 @@ _CELLS = 20  # of an angle to a turn of the highest order
 _MOVING = 1e-3  # rad/s of a motor
 _PASSING = 1e-5  # rad/s of a joint
 _BY_ORDER = ("order", "ripple_order")
-_BY_DISC = ("eccentric_order",)
+_OF_ITS_SHAPE = 8.0  # periods in a disc's turn: more of them are lines of its grating, read between
 _BY_PLACE = ("local", "touch", "shift")  # with _angle and _width
 _PLACES = 400  # that a joint's range is divided into
 _WIDEST = 0.1  # of the range, of what has a place
@@ -38,7 +38,7 @@ def proposed(known: Known, scene: Scene) -> dict[str, tuple[float, ...]]:
     """Values to try beside the grids: parameter name, of one site "name.site" -> values that residuals propose."""
     lines = _frequencies(known)
     found = dict.fromkeys(_BY_FREQUENCY, lines)
-    found |= dict.fromkeys(_BY_ORDER, _orders(known, scene)) | dict.fromkeys(_BY_DISC, _of_discs(known))
+    found |= dict.fromkeys(_BY_ORDER, _orders(known, scene)) | _between_lines(known, _of_discs(known))
     found |= {f"joint_order.{joint}": lines for joint, lines in _of_joints(known, scene).items()}
     for joint, (angle, width) in _local(known, scene).items():
         for name in _BY_PLACE:
@@ -216,6 +216,22 @@ def _of_discs(known: Known) -> tuple[float, ...]:
             if power[peak] > -np.log(LINE_ALPHA / (len(orders) * len(experiment.fit))):
                 found.append((float(power[peak]), float(orders[peak])))
     return _apart([value for _, value in sorted(found, reverse=True)], 0.5)
+
+
+def _between_lines(known: Known, orders: tuple[float, ...]) -> dict[str, tuple[float, ...]]:
+    """Orders of discs as what they are of: low ones of the disc's shape, high ones of its grating's interpolation.
+
+    Without a known code it cannot be said how many of them a line of the grating is.
+    """
+    found: dict[str, tuple[float, ...]] = {}
+    for joint in known.experiment.rig.joints:
+        code = 0.0 if joint.encoder is None else float(joint.encoder.step)
+        fine = [order for order in orders if code > 0.0 and order > _OF_ITS_SHAPE]
+        found[f"interpolation_bits.{joint.name}"] = tuple(
+            float(np.log2(2.0 * np.pi / (code * order))) for order in fine
+        )
+        found[f"eccentric_order.{joint.name}"] = tuple(order for order in orders if order not in fine)
+    return found
 
 
 def _along(orders: Array, angle: Array, series: Array) -> Array:

@@ -102,6 +102,7 @@ TAKEN_UNUSED: Final = 0.1
 # one's formula lacks of nature's: splines and catalogue laws have left 0.02 of effects made by other formulas, and the
 # loop of Bouc and Wen 0.07 of three stops (development).
 SHADE: Final = 0.08
+ORDERS_SHARE: Final = 0.03  # likewise of one order of a law, beside its first
 # Share of the time in which an earlier law does MOSTLY of what it does, below which one that gains more than WHILE of
 # what it gains just then is what the earlier one's formula lacks. A bump in a sector that is seldom passed had been
 # given a stiffening gear beside it (development).

@@ -12,13 +12,14 @@ from kbs_process.signals.records import Array
 def change(reading: Array, swing: float, swing_load: float, swing_width: float) -> Array:
     r"""Change of a channel of which the gain is higher, or lower, about one load.
 
-    Equation: $\Delta y = \frac{2 s}{\pi} \arctan \frac{\pi (y - y_0)}{2 w}$.
+    Equation: $\Delta y = s \tanh \frac{y - y_0}{w}$.
     Units: the channel's, the channel's, the channel's, the channel's -> the channel's.
-    Validity: one load, about which gain changes by s / w over 2 w, a twentieth of the range and more: what is
-        narrower switches (`channel_step`), what is nowhere in particular is curved (`channel_nonlinearity`).
-    Source: VDI/VDE 2638, Characteristics of force transducers: terms and definitions (2008).
+    Validity: one load, about which the gain changes by s / w over 2 w, some hundredths of the range and more. What is
+        narrower switches (`channel_step`), and between both recordings do not tell which it is.
+    Source: VDI/VDE 2638, Characteristics of force transducers: terms and definitions (2008); as a differential
+        amplifier saturates.
     """
-    return np.asarray(swing * 2.0 / np.pi * np.arctan(0.5 * np.pi * (reading - swing_load) / swing_width))
+    return np.asarray(swing * np.tanh((reading - swing_load) / swing_width))
 
 
 CHANNEL_S_SHAPE = Sensing(
@@ -40,7 +41,7 @@ CHANNEL_S_SHAPE = Sensing(
             Normal(0.0, 1e3),
             "its middle, in the channel's unit",
             (-1e6, 1e6),
-            grid=tuple((i + 0.5) / 8.0 for i in range(8)),
+            grid=tuple((i + 0.5) / 12.0 for i in range(12)),
             over="reading",
         ),
         Parameter(
@@ -49,7 +50,7 @@ CHANNEL_S_SHAPE = Sensing(
             LogNormal(1.0, 0.5),
             "load over which the gain is otherwise, in the channel's unit",
             (1e-9, 1e6),
-            grid=(0.05, 0.15, 0.4),
+            grid=(0.03, 0.1, 0.3),
             over="reading.span",
         ),
     ),

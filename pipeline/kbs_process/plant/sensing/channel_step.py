@@ -49,7 +49,7 @@ CHANNEL_STEP = Sensing(
             LogNormal(1.0, 0.5),
             "load over which it switches, in the channel's unit",
             (1e-9, 1e6),
-            grid=(0.005, 0.02),
+            grid=(0.004, 0.01),
             over="reading.span",
         ),
     ),
