@@ -14,13 +14,14 @@ from kbs_process.campaign.corrected_model import write_model
 from kbs_process.campaign.load import load_campaign
 from kbs_process.diagnosis.curves import CurveSuspect, along, basis, curves
 from kbs_process.diagnosis.dissipation import pushes
-from kbs_process.diagnosis.gls import Sums, score
+from kbs_process.diagnosis.gls import Score, Sums, score
 from kbs_process.diagnosis.hypothesis import Hypothesis, predict
-from kbs_process.diagnosis.joint import with_extra
+from kbs_process.diagnosis.joint import Own, with_extra
 from kbs_process.diagnosis.known import Known
+from kbs_process.diagnosis.leaders import gated
 from kbs_process.diagnosis.measured import extra, inserted
 from kbs_process.diagnosis.scene import Scene
-from kbs_process.diagnosis.screen import Bench
+from kbs_process.diagnosis.screen import Bench, Found
 from kbs_process.plant.effect import Port
 from kbs_process.plant.effects.measured_law import COEFFICIENTS, MEASURED, Measured, torque, torque_over_rate
 
@@ -179,3 +180,21 @@ def test_a_curve_is_refitted_inside_the_plant() -> None:
     # Any constant is a bias of the transducer.
     meant, shown = basis(law, x, *ends) @ BUMP, curve.basis(x) @ after.known.value[begin:]
     np.testing.assert_allclose(shown - shown.mean(), meant - meant.mean(), atol=0.02)
+
+
+@pytest.mark.parametrize("excess", [False, True])
+def test_a_curve_is_none_that_recordings_held_out_have_nothing_to_show_of(excess: bool) -> None:
+    made = bench.experiment(bench.rig(), ("fit", "held-out"), 1)
+    if excess:
+        louder = made.trials[1].measured + 3.0 * bench.noise(
+            np.random.default_rng(2), *made.trials[1].measured.shape
+        )
+        made = replace(made, trials=(made.trials[0], replace(made.trials[1], measured=louder)))
+    there = standing(made)
+    of = Scene.of(made, there.hypothesis, there.predicted, linear=False)
+    nothing = Score(0.0, 1, np.zeros(1), np.eye(1), 0.0, 0.0, np.zeros(1), 0.0, 1)
+    found = Found(suspect(of, OVER_ANGLE), nothing, 0.0, 0.0, 1, ())
+    names = there.known.names
+    reasons = gated(found, there, there, Own(names, names)).reasons
+    assert ("recordings that were held out leave nothing that would show a curve" in reasons) != excess
+    assert any("of the held-out excess is no law" in reason for reason in reasons) == excess

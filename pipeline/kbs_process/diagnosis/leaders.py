@@ -119,10 +119,11 @@ def gated(found: Found, before: Standing, after: Standing, own: Own) -> Gate:
     verdict = gate(before.known, known, places, shapes)
     # What minima of the known parameters leave differs, and is no law's.
     share = explained_share(before.known, known, beyond=TOLERATED)
-    share = explained_share(before.known, known) if share is None else share
     index = np.array(places)
     a, C = known.value[index], known.covariance[np.ix_(index, index)]
     if isinstance(found.suspect, CurveSuspect):
+        if share is None and known.experiment.held_out:
+            verdict = verdict.but("recordings that were held out leave nothing that would show a curve")
         if share is not None and not share >= LAW_VARIANCE:
             verdict = verdict.but(
                 f"a curve that explains {100.0 * share:.0f} % of the held-out excess is no law"
