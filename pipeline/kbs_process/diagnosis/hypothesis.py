@@ -71,9 +71,8 @@ class Tapped:
     rate: float  # Hz
     columns: tuple[str, ...]  # as `plant.predict.tap_columns`
     values: Array  # (m, k)
-    readings: Array | None = (
-        None  # (m, c) what the experiment's channels show of it, in the amplifier's whole band
-    )
+    # (m, c) what the experiment's channels show of it, in the amplifier's whole band
+    readings: Array | None = None
 
 
 class _Rates(TypedDict):
