@@ -82,6 +82,18 @@ def test_known_parameters_are_absorbed_and_what_is_beyond_is_not() -> None:
         assert found.rho > 5.0 and found.kappa > 0.9, name
 
 
+def test_an_inertia_changes_how_the_whole_rings() -> None:
+    """Along smooth motion alone an inertia hardly shows; its column is what a simulation with another one does."""
+    setting, name = bench().settings[0], ("body.antenna.inertia", 1)
+    sigma = float(HARDWARE.sigmas[name[0]][name[1]])
+    moved = sensitivity.perturbed(HARDWARE, name, 0.1 * sigma)
+    change = setting.whiten(setting.motion.observed(moved) - bench().readings[0]) / 0.1
+    column = setting.whiten(bench().columns[0][name])
+    assert np.linalg.norm(change - column) < 0.2 * np.linalg.norm(column)
+    above_2_Hz = column.reshape(2, -1, 8)[:, 20:]  # entries are 0.1 Hz apart
+    assert np.linalg.norm(above_2_Hz) > 0.9 * np.linalg.norm(column) > 1.0
+
+
 def test_the_engines_own_error_is_far_below_the_weakest_effect() -> None:
     setting = bench().settings[0]
     coarse, fine = (

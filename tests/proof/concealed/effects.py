@@ -136,8 +136,8 @@ PHYSICS: tuple[Physics, ...] = (
                 Shape("point z", "m", Range(-0.3, 0.3, log=False))),
     ),
     Physics(
-        "mass that slides", family="unnamed", port="mass properties", law=Law.SHIFTING_MASS, places=("el",),
-        unit="kg m", first=2e-3, most=0.3, catalogued=False,
+        "mass that slides", family="mass", port="mass properties", law=Law.SHIFTING_MASS, places=("el",),
+        unit="kg m", first=2e-3, most=0.3,
         shapes=(Shape("fall", "1", Range(0.03, 0.2)), Shape("along", "1", Choice((0.0, 2.0), (1.0, 2.0))),
                 Shape("", "1", 0.0), _SIGMOID),
     ),
@@ -158,8 +158,8 @@ PHYSICS: tuple[Physics, ...] = (
         shapes=(Shape("about", "1", Choice((0.0, 1.0), (0.0, 1.0))), Shape("travel", "rad", Range(2e-6, 4e-5))),
     ),
     Physics(
-        "floor that settles", family="unnamed", law=Law.FLOOR_TILT, **_BASE, unit="rad", first=2e-5, most=5e-3,
-        catalogued=False, shapes=(Shape("time", "s", Range(5.0, 25.0)), Shape("towards", "rad", Phase())),
+        "floor that settles", family="tilt", law=Law.FLOOR_TILT, **_BASE, unit="rad", first=2e-5, most=5e-3,
+        shapes=(Shape("time", "s", Range(5.0, 25.0)), Shape("towards", "rad", Phase())),
     ),
     Physics(
         "mass on a spring", family="appendage", port="appendage", comparable=True, law=Law.APPENDAGE, places=("el",),
@@ -197,13 +197,12 @@ PHYSICS: tuple[Physics, ...] = (
         shapes=(Shape("time", "s", Range(0.5, 12.0)),),
     ),
     Physics(
-        "product of channels", family="unnamed", port="transducer", law=Sense.PRODUCT,
+        "product of channels", family="non-linearity", port="transducer", law=Sense.PRODUCT,
         places=("Fx<-Tx", "Fy<-Ty", "Tz<-Ty", "Tx<-Ty", "Ty<-Tx"), unit="sigma", first=1.0, most=500.0,
-        catalogued=False,
     ),
     Physics(
-        "converter with a step", family="unnamed", port="transducer", law=Sense.STEP,
-        places=("Fx", "Fy", "Tx", "Ty"), unit="sigma", first=1.0, most=100.0, catalogued=False,
+        "converter with a step", family="converter", port="transducer", law=Sense.STEP,
+        places=("Fx", "Fy", "Tx", "Ty"), unit="sigma", first=1.0, most=100.0,
         shapes=(Shape("where", "span", Range(0.3, 0.7, log=False)),),
     ),
     Physics(
@@ -230,8 +229,8 @@ PHYSICS: tuple[Physics, ...] = (
         first=0.02, most=1.0, shapes=(Shape("when", "1", Range(0.3, 0.7, log=False)),),
     ),
     Physics(
-        "clock that wanders", family="unnamed", port="clock", law=Sense.WANDER, places=("wrench", "encoder"), unit="s",
-        first=0.02, most=1.0, catalogued=False, shapes=(Shape("period", "s", Range(12.0, 50.0)), _PHASE),
+        "clock that wanders", family="wander", port="clock", law=Sense.WANDER, places=("wrench", "encoder"), unit="s",
+        first=0.02, most=1.0, shapes=(Shape("period", "s", Range(12.0, 50.0)), _PHASE),
     ),
     Physics(
         "clock that warms up", family="skew", port="clock", law=Sense.CLOCK_WARMING, places=("wrench", "encoder"),

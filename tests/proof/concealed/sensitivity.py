@@ -1,20 +1,15 @@
 """What known parameters change in the readings: finite differences by the engine, times the campaign's sigmas.
 
-Drives and the transducer's springs are simulated (coarse step, the field of the first run). Masses, centres, inertias,
-origins, misalignments and the inclination go through MuJoCo's inverse dynamics along the motion, with the sag that the
-change of static torque makes; what they do to the windup of the drives is left out (a part in 1e4 of the angles).
-Cross-coupling and encoder offsets are exact.
+Drives, bodies, joints and the transducer's springs are simulated (coarse step, the field of the first run), for most of
+what an inertia changes is how the whole rings. Cross-coupling and encoder offsets are exact.
 """
 
 from __future__ import annotations
 
-import mujoco
 import numpy as np
 
 from engine.hardware import AXES, BODIES, Array, Hardware
-from engine.rigid import build
-from engine.simulation import at
-from proof.concealed.observed import FINE_HZ, WORKING_HZ, Motion, to_working_rate
+from proof.concealed.observed import Motion
 from proof.concealed.ranges import RUN_TO_RUN
 
 DRIVE = (
@@ -35,7 +30,6 @@ def columns(motion: Motion) -> tuple[dict[Named, Array], Array]:
     """Sensitivities (n, 8) times sigma by parameter; and what differs from run to run, (n, 8, m)."""
     readings = motion.observed()
     simulated = _simulated(motion, readings)
-    rigid = _rigid(motion)
     coupling = _coupling(motion.hardware, readings)
     hardware = motion.hardware
     own: list[Array] = []
@@ -48,8 +42,8 @@ def columns(motion: Motion) -> tuple[dict[Named, Array], Array]:
     ]
     own.append(np.sum(warmth, axis=0) * RUN_TO_RUN["temperature"])
     tilt = hardware.sigmas["transducer.tilt"]
-    own += [rigid["transducer.tilt", k] * (RUN_TO_RUN["tilt"] / tilt[k]) for k in (0, 1)]
-    return simulated | rigid | coupling, np.stack(own, axis=2)
+    own += [simulated["transducer.tilt", k] * (RUN_TO_RUN["tilt"] / tilt[k]) for k in (0, 1)]
+    return simulated | coupling, np.stack(own, axis=2)
 
 
 def _relative(hardware: Hardware, simulated: dict[Named, Array], key: str) -> Array:
@@ -72,7 +66,7 @@ def uncertain(hardware: Hardware, key: str) -> list[tuple[Named, float]]:
 
 def _simulated(motion: Motion, readings: Array) -> dict[Named, Array]:
     keys = [f"joint.{axis}.drive.{name}" for axis in AXES for name in DRIVE]
-    keys += ["transducer.stiffness", "transducer.damping"]
+    keys += ["transducer.stiffness", "transducer.damping", *_RIGID]
     out: dict[Named, Array] = {}
     for key in keys:
         for name, sigma in uncertain(motion.hardware, key):
@@ -80,42 +74,6 @@ def _simulated(motion: Motion, readings: Array) -> dict[Named, Array]:
             moved = motion.observed(perturbed(motion.hardware, name, step))
             out[name] = (moved - readings) * (sigma / step)
     return out
-
-
-def _rigid(motion: Motion) -> dict[Named, Array]:
-    """Rigid bodies and inclination, by inverse dynamics along the motion without its vibration."""
-    q, v, a = _smooth(motion)
-    hardware = motion.hardware
-    coupling = (np.eye(6) + hardware["transducer.cross_coupling"]).T
-    base = _inverse(hardware, q, v, a)
-    out: dict[Named, Array] = {}
-    for key in _RIGID:
-        for name, sigma in uncertain(hardware, key):
-            change = _inverse(perturbed(hardware, name, sigma), q, v, a) - base
-            sag = change[:, 3:] / hardware["transducer.stiffness"]
-            change = change - np.hstack([np.cross(sag, base[:, :3]), np.cross(sag, base[:, 3:])])
-            out[name] = np.hstack([change @ coupling, np.zeros((len(change), 2))])
-    return out
-
-
-def _smooth(motion: Motion) -> tuple[Array, Array, Array]:
-    t = np.arange(0.0, motion.dense.field_t[-1] + 1e-9, 1.0 / FINE_HZ)
-    q = to_working_rate(at(motion.dense.t, motion.dense.q, t))
-    v = np.gradient(q, 1 / WORKING_HZ, axis=0)
-    a = np.gradient(v, 1 / WORKING_HZ, axis=0)
-    return q, v, a
-
-
-def _inverse(hardware: Hardware, q: Array, v: Array, a: Array) -> Array:
-    """Wrench (n, 6) on the transducer that a motion takes."""
-    rigid = build(hardware, 1e-4)
-    model, data = rigid.model, rigid.data
-    wrench = np.empty((len(q), 6))
-    for k in range(len(q)):
-        data.qpos[:], data.qvel[:], data.qacc[:] = q[k], v[k], a[k]
-        mujoco.mj_inverse(model, data)
-        wrench[k] = data.sensordata
-    return -wrench
 
 
 def _coupling(hardware: Hardware, readings: Array) -> dict[Named, Array]:
