@@ -15,13 +15,13 @@ from proof.words import METHODS, OURS
 from proof.work import BenchError, Work
 
 CHECKOUT = Path(__file__).resolve().parents[2]
-SMALL, FULL = 6, 200
+SMALL, FULL = 6, 20
 
 
 def parser() -> argparse.ArgumentParser:
     """The command's options."""
     options = argparse.ArgumentParser(prog="kbs-process prove", description=__doc__)
-    options.add_argument("--full", action="store_true", help=f"{FULL} validation trials, and all rivals")
+    options.add_argument("--full", action="store_true", help=f"a set of {FULL} validation trials, and all rivals")
     options.add_argument("--trials", type=int, metavar="N", help=f"how many [default: {SMALL}]")
     options.add_argument("--split", choices=("development", "validation"), help="[default: development]")
     options.add_argument("--seed", type=int, help="of the trials [default: secret until seals are broken]")
