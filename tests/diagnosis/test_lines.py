@@ -8,6 +8,7 @@ import bench
 import numpy as np
 import pytest
 
+from kbs_process.diagnosis.experiment import Experiment
 from kbs_process.diagnosis.proposals import _along, proposed
 from kbs_process.diagnosis.scene import Scene
 from kbs_process.signals.records import Array
@@ -61,3 +62,52 @@ def test_lines_of_a_disc_are_its_shape_s_if_few_to_a_turn_and_else_its_grating_s
         lines = [2.0 * np.pi / (float(encoder.step) * 2.0**bits) for bits in found["interpolation_bits.el"]]
         assert lines == pytest.approx([600.0], rel=0.02)  # a turn over the range that is swept
         assert "eccentric_order.el" not in found
+
+
+def proposals(shown: Array, made: Experiment) -> dict[str, tuple[float, ...]]:
+    """What is proposed where the only trial has `shown` beside what the plant predicts."""
+    (trial,) = made.trials
+    wrong = replace(trial, measured=trial.measured + shown * trial.valid[:, None])
+    held = bench.standing(replace(made, trials=(wrong,)), (Scalar("joint.el.drive.Ka"),))
+    return proposed(held.known, Scene.of(held.known.experiment, held.hypothesis, held.predicted))
+
+
+@pytest.fixture(scope="module")
+def made() -> Experiment:
+    return bench.experiment(bench.rig(), ("fit",), 1, seconds=60.0)
+
+
+def test_a_tone_between_two_bins_is_put_there(made: Experiment) -> None:
+    n = len(made.trials[0].measured)
+    apart = 1.0 / (n * made.dt)
+    tone = (round(1.3 / apart) + 0.5) * apart
+    line = np.zeros_like(made.trials[0].measured)
+    line[:, 0] = 0.5 * np.sin(2.0 * np.pi * tone * np.arange(n) * made.dt + 0.3)
+    found = proposals(line, made)
+    assert found["floor_frequency"][0] == pytest.approx(tone, abs=0.1 * apart)
+
+
+def test_orders_of_a_motor_are_proposed_for_its_gear_and_its_microsteps_too(made: Experiment) -> None:
+    drive = made.rig.joint("az").drive
+    assert drive is not None
+    cycles, ratio = float(drive.parameters["Kangle"]), float(drive.ratio)
+    begun = bench.standing(made, (Scalar("joint.el.drive.Ka"),))
+    angle = ratio * begun.predicted[0].values[:, made.channels.index("az")]
+    line = np.zeros_like(made.trials[0].measured)
+    line[:, made.channels.index("Tz")] = 3.0 * (np.sin(5.0 * angle) + np.sin(cycles * angle))
+    found = proposals(line, made)
+    assert {5.0, cycles} <= set(found["kinematic_order.az"])
+    assert found["order.az"] == found["ripple_order.az"] == found["kinematic_order.az"]
+    assert found["microstep_order.az"] == (1.0,)
+    assert "order.el" not in found  # it turns its motor by less than two turns
+
+
+@pytest.mark.parametrize("stream", ["wrench", "encoder"])
+def test_the_time_at_which_a_clock_jumps_is_proposed(made: Experiment, stream: str) -> None:
+    measured = made.trials[0].measured
+    late = np.arange(len(measured)) * made.dt > 23.7
+    channels = slice(0, 6) if stream == "wrench" else slice(made.loads, None)
+    shift = np.zeros_like(measured)
+    shift[:, channels] = -0.3 * (np.gradient(measured, made.dt, axis=0) * late[:, None])[:, channels]
+    found = proposals(shift, made)
+    assert found[f"drop_time.{stream}"] == pytest.approx((23.7,), abs=0.5)

@@ -13,7 +13,7 @@ from kbs_process.diagnosis.experiment import Experiment
 from kbs_process.diagnosis.finding import Tried
 from kbs_process.diagnosis.floor import declared
 from kbs_process.diagnosis.gate import Gate
-from kbs_process.diagnosis.joint import Standing, with_extra, without
+from kbs_process.diagnosis.joint import Own, Standing, with_extra, without
 from kbs_process.diagnosis.known import Known
 from kbs_process.diagnosis.needed import Accepted, in_the_shade, needed
 from kbs_process.diagnosis.outcome import Find
@@ -166,3 +166,17 @@ def test_a_small_gain_that_numbers_alone_could_have_had_is_no_find() -> None:
     kept, left, fallen = needed([replace(cable, before=before)], after, declared(plain), bench.serial(plain))
     assert kept == [] and left.known.names == begun.known.names
     assert fallen[0].identity == cable.find.identity
+
+
+def test_a_law_with_the_right_one_between_its_parts_has_not_gained_what_that_did(made: Experiment) -> None:
+    begun = standing(made)
+    first, lag = joined(made, begun, LAG)
+    both, cable = joined(made, first, CABLE)
+    clear = tuple(z * np.sqrt(1.5 * len(z) / (z @ z)) for z in begun.known.residual)
+    before = replace(lag.before, known=replace(begun.known, residual=clear))
+    assert not before.known.gross and before.known.cost - both.known.cost > CLEAR * before.known.fit_rows
+    part = replace(lag, before=before)
+    more = replace(part, tried=replace(part.tried, own=Own((), ())))
+    kept, _, fallen = needed([part, cable, more], both, declared(made), bench.serial(made))
+    assert {one.identity for one in fallen} == {lag.find.identity}
+    assert [one.find.identity.law for one in kept] == ["ground_cable"]

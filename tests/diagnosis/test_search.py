@@ -105,3 +105,15 @@ def test_what_is_left_is_more_than_chance_and_more_than_the_search_is_good_for(
     log_p: float, ratio: float, left: bool
 ) -> None:
     assert Detection((), log_p, ratio).left is left
+
+
+def test_a_leap_that_ends_higher_is_taken_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    search = searching(bench.experiment(bench.rig(), ("fit",), seed=3))
+    theta = search.hypothesis.values(search.free)
+    here, there = search.begin(theta), search.begin(theta + 0.3 * np.minimum(search.spread, 1.0))
+    low, high = sorted((here, there), key=search.height)
+    assert search.height(high) > search.height(low) + 100.0
+    monkeypatch.setattr(search, "descend", lambda found, *_, **__: found)
+    for begun, leads_to in ((low, high), (high, low)):
+        monkeypatch.setattr(search, "leapt", lambda _, *, smooth, to=leads_to: to)
+        assert search.run(begun, leaps=1) is low

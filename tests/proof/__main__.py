@@ -21,7 +21,9 @@ SMALL, FULL = 6, 20
 def parser() -> argparse.ArgumentParser:
     """The command's options."""
     options = argparse.ArgumentParser(prog="kbs-process prove", description=__doc__)
-    options.add_argument("--full", action="store_true", help=f"a set of {FULL} validation trials, and all rivals")
+    options.add_argument(
+        "--full", action="store_true", help=f"a set of {FULL} validation trials, and all rivals"
+    )
     options.add_argument("--trials", type=int, metavar="N", help=f"how many [default: {SMALL}]")
     options.add_argument("--split", choices=("development", "validation"), help="[default: development]")
     options.add_argument("--seed", type=int, help="of the trials [default: secret until seals are broken]")

@@ -48,8 +48,12 @@ def find_of(
     chances: Array,
     before: Standing,
     place: Place | None,
+    refused: Sequence[Identity] = (),
 ) -> Find:
-    """The find of the `best` of some laws that passed, each right with a chance; `before` stood without it."""
+    """The find of the `best` of some laws that passed, each right with a chance; `before` stood without it.
+
+    Those that were `refused` in the plant are none that it cannot be told from, whatever the linear plant says of them.
+    """
     taken = tried[best]
     suspect, own = taken.found.suspect, identity(taken.found.suspect)
     equivalent = _equivalents(suspect, taken.standing.known.experiment.rig)
@@ -67,6 +71,8 @@ def find_of(
     simulated = {one.found.suspect.family for one in tried}
     for found in taken.screening.candidates:
         if found.suspect.family in simulated or found.absorbed or len(alternatives) >= 5:
+            continue
+        if identity(found.suspect) in refused:
             continue
         # Along the linear plant the distance is what the best leaves of the other's lack of gain.
         rho = float(np.sqrt(max(taken.found.score.gain - found.score.gain, 0.0)))

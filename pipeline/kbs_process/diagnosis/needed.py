@@ -64,8 +64,9 @@ def needed(
             if not own.names:
                 judged += group
                 continue
-            # Nothing has changed since it was found, and what was believed then was all that could be.
-            last = not fallen and group[-1] is kept[-1] and not group[0].before.known.gross
+            # Nothing has changed since it was found, and what was believed then was all that could be. With another
+            # law between its parts it has not gained all that was gained since.
+            last = not fallen and kept[-len(group) :] == group and not group[0].before.known.gross
             if last and _clear(group[0].before.known, standing.known):
                 told, reasons = group, missed(group[0].before.known, standing.known)
                 rest = without(standing, own, simulate) if reasons else standing

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.fft import fft, next_fast_len
 
+from kbs_process.diagnosis.jumps import jumps
 from kbs_process.diagnosis.known import Known
 from kbs_process.diagnosis.scene import Scene
 from kbs_process.diagnosis.side_by_side import side_by_side
@@ -25,8 +26,10 @@ _TURNS = 10.0  # of a tone in a recording, fewer of which are drift, or the moti
 _CELLS = 20  # of an angle to a turn of the highest order
 _MOVING = 1e-3  # rad/s of a motor
 _PASSING = 1e-5  # rad/s of a joint
-_BY_ORDER = ("order", "ripple_order")
+_BY_ORDER = ("order", "ripple_order", "kinematic_order")
+_NEAR_WHOLE = 0.02  # of a number of periods in an electrical cycle
 _OF_ITS_SHAPE = 8.0  # periods in a disc's turn: more of them are lines of its grating, read between
+_BETWEEN = 33  # frequencies in two bins
 _BY_PLACE = ("local", "touch", "shift")  # with _angle and _width
 _PLACES = 400  # that a joint's range is divided into
 _WIDEST = 0.1  # of the range, of what has a place
@@ -38,7 +41,11 @@ def proposed(known: Known, scene: Scene) -> dict[str, tuple[float, ...]]:
     """Values to try beside the grids: parameter name, of one site "name.site" -> values that residuals propose."""
     lines = _frequencies(known)
     found = dict.fromkeys(_BY_FREQUENCY, lines)
-    found |= dict.fromkeys(_BY_ORDER, _orders(known, scene)) | _between_lines(known, _of_discs(known))
+    for joint, orders in _orders(known, scene).items():
+        found |= {f"{name}.{joint}": orders for name in _BY_ORDER}
+        found[f"microstep_order.{joint}"] = _of_cycles(known, joint, orders)
+    found |= _between_lines(known, _of_discs(known))
+    found |= {f"drop_time.{stream}": (time,) for stream, time in jumps(known).items()}
     found |= {f"joint_order.{joint}": lines for joint, lines in _of_joints(known, scene).items()}
     for joint, (angle, width) in _local(known, scene).items():
         for name in _BY_PLACE:
@@ -75,23 +82,39 @@ def _frequencies(known: Known) -> tuple[float, ...]:
         total[k] = f, best
     shortest = min(len(known.experiment.trials[k].valid) for k in total) * known.experiment.dt
     found: list[tuple[float, float]] = []
-    for f, best in total.values():
+    for k, (f, best) in total.items():
         bound = -2.0 * np.log(LINE_ALPHA / (len(f) * len(total)))
         peaks = (
             np.flatnonzero((best[1:-1] >= best[:-2]) & (best[1:-1] >= best[2:]) & (best[1:-1] > bound)) + 1
         )
-        found += [(float(best[i]), float(f[i])) for i in peaks if f[i] * shortest > _TURNS]
+        series = _in_time(known, k)
+        found += [
+            (float(best[i]), _between_bins(series, known.experiment.dt, float(f[i])))
+            for i in sorted(peaks, key=lambda i: -best[i])[:LINES]
+            if f[i] * shortest > _TURNS
+        ]
     return _apart([value for _, value in sorted(found, reverse=True)], 0.05)
 
 
-def _orders(known: Known, scene: Scene) -> tuple[float, ...]:
-    """Orders of motor turns at which the whitened residual stands out, whichever joint's.
+def _between_bins(series: Array, dt: float, f: float) -> float:
+    """Frequency of the line nearest to f, Hz, at which a series (n, c) has most power: between its bins, too.
+
+    Half a bin beside a tone more than half of its power is lost.
+    """
+    n = len(series)
+    near = f + np.linspace(-1.0, 1.0, _BETWEEN) / (n * dt)
+    turned = np.exp(-2j * np.pi * np.outer(near, np.arange(n) * dt)) @ series
+    return float(near[np.argmax(np.max(np.abs(turned), axis=1))])
+
+
+def _orders(known: Known, scene: Scene) -> dict[str, tuple[float, ...]]:
+    """Orders of each joint's motor turns at which the whitened residual stands out.
 
     The residual in time, white, against exp(i order theta): a line's power is chi-square with two degrees of freedom.
     """
     experiment = known.experiment
     orders = np.arange(_ORDER_STEP, _HIGHEST_ORDER, _ORDER_STEP)
-    found: list[tuple[float, float]] = []
+    found: dict[str, list[tuple[float, float]]] = {joint: [] for joint in experiment.rig.joint_names}
     for k in experiment.fit:
         trial = experiment.trials[k]
         drive = experiment.reference(trial.trajectory)
@@ -113,8 +136,20 @@ def _orders(known: Known, scene: Scene) -> tuple[float, ...]:
             bound = -np.log(LINE_ALPHA / (len(orders) * series.shape[1] * len(experiment.fit)))
             inner = power[1:-1]
             peaks = np.flatnonzero((inner >= power[:-2]) & (inner >= power[2:]) & (inner > bound)) + 1
-            found += [(float(power[i]), float(np.round(orders[i] * 2.0) / 2.0)) for i in peaks]
-    return _apart([value for _, value in sorted(found, reverse=True)], 0.5)
+            found[joint] += [(float(power[i]), float(np.round(orders[i] * 2.0) / 2.0)) for i in peaks]
+    return {
+        joint: _apart([value for _, value in sorted(lines, reverse=True)], 0.5)
+        for joint, lines in found.items()
+    }
+
+
+def _of_cycles(known: Known, joint: str, orders: tuple[float, ...]) -> tuple[float, ...]:
+    """Those orders of a motor that are whole numbers of periods in its electrical cycle, as such."""
+    drive = known.experiment.rig.joint(joint).drive
+    cycles = 0.0 if drive is None else float(drive.parameters.get("Kangle", 0.0))
+    periods = [order / cycles for order in orders if cycles > 0.0]
+    whole = [float(round(one)) for one in periods if abs(one - round(one)) < _NEAR_WHOLE]
+    return tuple(dict.fromkeys(one for one in whole if one > 0.0))
 
 
 def _of_joints(known: Known, scene: Scene) -> dict[str, tuple[float, ...]]:

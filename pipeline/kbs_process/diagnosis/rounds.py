@@ -33,7 +33,7 @@ from kbs_process.diagnosis.rivals import probabilities
 from kbs_process.diagnosis.scene import Scene
 from kbs_process.diagnosis.screen import Catalogued, Screening
 from kbs_process.diagnosis.settling import released, resettled
-from kbs_process.diagnosis.thresholds import LEAST_RHO, MOST, ROUNDS, TOLERATED
+from kbs_process.diagnosis.thresholds import LEAST_RHO, MOST, ROUNDS, SECOND, SETTLED, TOLERATED
 from kbs_process.diagnosis.tryout import identity
 from kbs_process.diagnosis.view import View
 
@@ -147,26 +147,42 @@ def _round(standing: Standing, floor: Floor, simulate: Simulate, accepted: Seque
     passed = continued(named_first(passed), [one.find.identity for one in accepted])
     fitted = [_each_time(one) for one in passed]
     chances = probabilities([one.standing.known for one in passed], view.bench.background.rows, fitted)
-    best = int(np.argmax(chances))
-    settled = passed[best].standing
-    if not passed[best].leapt:
+    order = [int(k) for k in np.argsort(-chances, kind="stable")]
+    for number, best in enumerate(order[:SETTLED]):
+        told = _settled(passed[best], standing, floor, simulate)
+        if reasons := told.gate.reasons or _stands_in(told, standing, floor, simulate, accepted):
+            refused.append(Refused(_law(told), told.found.score.rho_eff, reasons))
+            continue
+        # Told anew, it may be what another was: their chances are one then.
+        others = [k for k in order[number + 1 :] if _law(passed[k]) != _law(told)]
+        chance = chances[others] / float(chances[order[number:]].sum())
+        find = find_of(
+            [told, *(passed[k] for k in others)], 0, np.array([1.0 - float(chance.sum()), *chance]), standing,
+            place, [one.identity for one in refused],
+        )  # fmt: skip
+        return _Round(Accepted(told, find, standing), told.standing, view.screening, tuple(refused), place)
+    return _Round(None, standing, view.screening, tuple(refused), place)
+
+
+def _settled(one: Tried, before: Standing, floor: Floor, simulate: Simulate) -> Tried:
+    """A law that passed, with all numbers settled beside it, told anew and judged again."""
+    settled = one.standing
+    if not one.leapt:
         settled = resettled(settled, floor, simulate, leaps=1)
-    if settled.known.excess < MOST * standing.known.excess:
+    if settled.known.excess < MOST * before.known.excess:
         settled = released(settled, floor, simulate)
-    told = reread(replace(passed[best], standing=settled), standing, floor, simulate)
-    told = _judged_again(told, standing)
-    # One more action of a law at the same place is part of the find.
+    return _judged_again(reread(replace(one, standing=settled), before, floor, simulate), before)
+
+
+def _stands_in(
+    told: Tried, standing: Standing, floor: Floor, simulate: Simulate, accepted: Sequence[Accepted]
+) -> tuple[str, ...]:
+    """Why a law that has settled stands in for something else, or for what an earlier one lacks; nothing, if not."""
     earlier = [(one.find.identity.law, one.tried.own) for one in accepted if one.find.identity != _law(told)]
+    # One more action of a law at the same place is part of the find.
     more = any(one.find.identity == _law(told) for one in accepted)
     little = too_little(standing, told.standing, floor, more=more)
-    if reasons := told.gate.reasons or little or only_while(earlier, standing, told.standing.known, simulate):
-        refused.append(Refused(_law(told), told.found.score.rho_eff, reasons))
-        return _Round(None, standing, view.screening, tuple(refused), place)
-    # Told anew, it may be what another was: their chances are one then.
-    others = [k for k, one in enumerate(passed) if k != best and _law(one) != _law(told)]
-    chance = [1.0 - float(chances[others].sum()), *chances[others]]
-    find = find_of([told, *(passed[k] for k in others)], 0, np.array(chance), standing, place)
-    return _Round(Accepted(told, find, standing), told.standing, view.screening, tuple(refused), place)
+    return little or only_while(earlier, standing, told.standing.known, simulate)
 
 
 def _each_time(one: Tried) -> int:
@@ -235,6 +251,10 @@ def _passed(
         passed, refused = [*passed, *more], [*refused, *less]
         if passed:
             break
+    if not passed and (chosen := view.unrepeated[:SECOND]):
+        # What seemed to do nearly as well and to come again did not stand.
+        passed, less = tried(chosen, view, view.standing, floor, simulate)
+        refused = [*refused, *less]
     return passed, refused
 
 

@@ -218,16 +218,23 @@ class Search:
     def run(self, found: Found, *, leaps: int) -> Found:
         """Descend; leap to better phases and edges while there are any, at most `leaps` times, and descend again.
 
-        The first leap is made early: what is left out, or a wrong phase, has not yet pulled the others far then.
+        The first leap is made early: what is left out, or a wrong phase, has not yet pulled the others far then. One
+        that ends higher than where it left from is taken back.
         """
+        left: list[Found] = []
         for number in range(leaps):
             found = self.descend(found, EARLY if number == 0 else _ROUNDS)
             moved = self.leapt(found, smooth=number == 0)
             if moved is not None:
+                left.append(found)
                 found = moved
             elif number > 0:
                 break
-        return self.descend(found, giving_up=True)
+        ended = self.descend(found, giving_up=True)
+        before = min(left, key=self.height, default=ended)
+        if not self.height(ended) > self.height(before):
+            return ended
+        return min(ended, self.descend(before, giving_up=True), key=self.height)
 
     def descend(
         self, found: Found, rounds: int = _ROUNDS, *, most: int = ALL, giving_up: bool = False
@@ -281,6 +288,10 @@ class Search:
         if found.due == _OLD:
             return found
         return replace(found, gradients=self.slopes(found.theta, found.gradients, found.due), due=_OLD)
+
+    def height(self, found: Found) -> float:
+        """-2 log posterior, but for a constant."""
+        return sum(self.cost(found.theta, found.predicted))
 
     def left(self, found: Found) -> float:
         """-2 log likelihood beyond that of noise."""

@@ -89,6 +89,9 @@ REREAD: Final = 2
 SECOND: Final = 2
 # Leaders are refitted to the end if their first steps leave no more than some times what the best one's leave.
 SETTLED_TIMES: Final = 3.0
+# Laws that passed, likeliest first, beside each of which all numbers settle until one passes then, too. It was set on
+# no case.
+SETTLED: Final = 2
 # Leaders of a race, one after the other, beside which better phases are looked for: what two did not find, a third has
 # not found either. It was set on no case.
 WAYS: Final = 2

@@ -43,11 +43,20 @@ class View:
         A law that repeats predicts what was not recorded; one whose size and phase are each recording's own does not.
         It leads only where none that repeats does half of what it does.
         """
-        able = [found for found in self.screening.candidates if found.significant and not found.absorbed]
+        able = self._shown
         repeating = [found for found in able if not found.suspect.each_trial]
         if repeating and 2.0 * repeating[0].score.gain >= able[0].score.gain:
             return repeating
         return able
+
+    @property
+    def unrepeated(self) -> list[Found]:
+        """Suspects that do not lead because one that repeats does half of what they do, best first."""
+        return [found for found in self._shown if found.suspect.each_trial and found not in self.able]
+
+    @property
+    def _shown(self) -> list[Found]:
+        return [found for found in self.screening.candidates if found.significant and not found.absorbed]
 
     @property
     def ordered(self) -> bool:
