@@ -20,7 +20,7 @@ SMALL, FULL = 6, 20
 
 def parser() -> argparse.ArgumentParser:
     """The command's options."""
-    options = argparse.ArgumentParser(prog="kbs-process prove", description=__doc__)
+    options = argparse.ArgumentParser(prog="python -m proof", description=__doc__)
     options.add_argument(
         "--full", action="store_true", help=f"a set of {FULL} validation trials, and all rivals"
     )
@@ -31,7 +31,7 @@ def parser() -> argparse.ArgumentParser:
         "--method", action="append", choices=METHODS, help="repeatable [default: ours; all with --full]"
     )
     options.add_argument("--work", type=Path, help="working folder; a bench begun there goes on")
-    options.add_argument("--output", "-o", type=Path, help="where score and page go [default: reports/proof]")
+    options.add_argument("--output", "-o", type=Path, help="where score and page go [default: reports/proof/small; full with --full]")
     options.add_argument("--jobs", type=int, default=len(os.sched_getaffinity(0)), help="processes")
     options.add_argument(
         "--answered",
