@@ -83,3 +83,19 @@ def test_a_recorded_field_has_the_gain_in_it_already() -> None:
     lagging, _ = shown(attach(rig, late, {"field_latency": LATE}), [*NOMINAL, late.name], recorded)
     np.testing.assert_array_equal(gained, plain)
     assert np.abs(lagging - plain).max() > 1e-4  # the driver comes after the record
+
+
+@pytest.mark.parametrize("late", [0.18, 0.03])
+def test_a_field_that_is_late_by_cycles_is_the_field_of_then(late: float) -> None:
+    """Exactly, through corners where the rate changes: no jump of the field where a cycle ends."""
+    t = np.arange(-1.0, SECONDS + 0.5, CYCLE)
+    rig = two_axis(loop="open")
+    ratio = np.array([float(joint.drive.ratio) for joint in rig.joints if joint.drive is not None])
+    (effect,) = select(["controller_latency"])
+    with_effect = attach(rig, effect, {"field_latency": late}, joints=[rig.joint_names[1]])
+    _, field = shown(with_effect, [*NOMINAL, effect.name], schedule(way(t), t))
+    samples = np.arange(len(field)) / 100.0
+    microstep = 2.0 * np.pi / 12800.0
+    for joint, when in ((0, samples), (1, samples - late)):
+        expected = np.interp(when, t, way(t)[:, joint]) * ratio[joint]
+        np.testing.assert_allclose(field[:, joint], expected, atol=0.51 * microstep)

@@ -31,7 +31,12 @@ def parser() -> argparse.ArgumentParser:
         "--method", action="append", choices=METHODS, help="repeatable [default: ours; all with --full]"
     )
     options.add_argument("--work", type=Path, help="working folder; a bench begun there goes on")
-    options.add_argument("--output", "-o", type=Path, help="where score and page go [default: reports/proof/small; full with --full]")
+    options.add_argument(
+        "--output",
+        "-o",
+        type=Path,
+        help="where score and page go [default: reports/proof/small; full with --full]",
+    )
     options.add_argument("--jobs", type=int, default=len(os.sched_getaffinity(0)), help="processes")
     options.add_argument(
         "--answered",

@@ -96,7 +96,9 @@ def diagnose(campaign: str, output: Path | None, pdf: bool | None, quiet: bool) 
     "a concealed effect, or a trial without an answer."
 )
 @click.option(
-    "--full", is_flag=True, help="A set of validation trials and all rivals: two hours, to reports/proof/full."
+    "--full",
+    is_flag=True,
+    help="A set of validation trials and all rivals: two hours, to reports/proof/full.",
 )
 @click.option("--trials", type=click.IntRange(1), metavar="N", help="How many [default: 6; 20 with --full].")
 @click.option(

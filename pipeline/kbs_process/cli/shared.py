@@ -17,7 +17,11 @@ FOLDER = click.Path(path_type=Path, file_okay=False)
 
 campaign_argument = click.argument("campaign")
 output_option = click.option(
-    "--output", "-o", type=FOLDER, metavar="FOLDER", help="Where results go [default: reports/NAME, of other verbs reports/NAME-VERB]."
+    "--output",
+    "-o",
+    type=FOLDER,
+    metavar="FOLDER",
+    help="Where results go [default: reports/NAME, of other verbs reports/NAME-VERB].",
 )
 quiet_option = click.option("--quiet", "-q", is_flag=True, help="No progress.")
 pdf_option = click.option(

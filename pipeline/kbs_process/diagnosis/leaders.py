@@ -64,7 +64,8 @@ def leaders(view: View, among: Callable[[Found], bool] = lambda _: True) -> tupl
     if not able:
         return [], []
     bound = (1.0 - LEAD) * able[0].score.gain if view.ordered else 0.0
-    first = various([found for found in able if found.score.gain >= bound or found is able[0]])[:LEADERS]
+    count = SHAPED if view.standing.known.gross else LEADERS
+    first = various([found for found in able if found.score.gain >= bound or found is able[0]])[:count]
     return first, [found for found in able if found not in first][:SECOND]
 
 

@@ -46,7 +46,9 @@ ORDERED: Final = 0.5  # share of the residual's excess that the best has to do f
 # Sigmas of their priors within which numbers are drawn back once a law is in the plant, before they are let go again:
 # one in twenty is beyond.
 CLOSE: Final = 2.0
-# Candidates that are simulated. A field that lags was the fifth where friction of the joint did nearly as well.
+# Candidates that are simulated. A field that lags was the fifth where friction of the joint did nearly as well. Where
+# so much is left that the known numbers have been pulled, all whose shapes were looked for are: one that lags by two
+# cycles was the eighth (spent).
 LEADERS: Final = 6
 # A leader's gain is wrong by about twice, at worst three times, the transfer's error of itself; candidates within that
 # are not yet ordered.

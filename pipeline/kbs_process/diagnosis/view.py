@@ -62,10 +62,11 @@ class View:
     def ordered(self) -> bool:
         """Whether the best does enough of what there is to do for the order of the others to count.
 
-        Where it does not, the plant is far from linear, or known numbers have taken up what was left out.
+        Where it does not, the plant is far from linear, or known numbers have taken up what was left out. Where much is
+        left, they have been pulled, whatever the best does.
         """
-        able = self.able
-        return bool(able and able[0].score.gain >= ORDERED * self.standing.known.excess)
+        able, known = self.able, self.standing.known
+        return bool(able and able[0].score.gain >= ORDERED * known.excess and not known.gross)
 
 
 def suspects_of(standing: Standing, scene: Scene) -> list[Suspect]:

@@ -196,8 +196,9 @@ class Effect:
     `passive` claims that it never does positive work; the conformance test holds it to that. What comes from outside
     has amplitudes of its own in `each_trial`. A force `anywhere` is tied to no place of its link that a drawing shows:
     a search looks for its point, too. A moment `of_weight` acts about no axis that is along gravity. What is `recorded`
-    is in the record of the field, and leaves nothing to find where there is one. An effect can act several times: see
-    `instance`. Effects that share an equation say with `wires` what its arguments are for each.
+    is in the record of the field, and leaves nothing to find where there is one. A `delay` of the field is exact in the
+    plant. An effect can act several times: see `instance`. Effects that share an equation say with `wires` what its
+    arguments are for each.
     """
 
     name: str
@@ -212,6 +213,7 @@ class Effect:
     anywhere: bool = False  # a force whose point on its link is not known
     of_weight: bool = False  # a moment of weight about a joint's axis
     recorded: bool = False  # a change of the field before that is recorded
+    delay: str = ""  # the parameter by which the field comes late, s: its equation is that to first order
     tag: str = ""  # what `instance` has added to the names of parameters and states
     wires: tuple[
         tuple[str, str], ...

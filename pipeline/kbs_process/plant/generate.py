@@ -19,6 +19,7 @@ def module_text(structure: Structure) -> str:
             *_head(structure),
             *_drive(structure),
             *_arriving(structure),
+            *_late(structure),
             *multibody_text(structure),
             *stepping_text(structure),
             *_balance(structure),
@@ -104,10 +105,24 @@ def _arriving(structure: Structure) -> list[str]:
         "    change = 0.0",
     ]
     for effect, wires in _wired(structure):
-        if effect.port is Port.FIELD:
+        if effect.port is Port.FIELD and not effect.delay:
             call = f"effect_{effect.name}({', '.join(wires.get(name, name) for name in effect.arguments)})"
             lines.append(f"    change += {call}")
     return [*lines, "    return field_0 + microsteps * change", "", ""]
+
+
+def _late(structure: Structure) -> list[str]:
+    """Emit by how much a field comes late."""
+    late = [wires[effect.delay] for effect, wires in _wired(structure) if effect.delay]
+    return [
+        "@compiled",
+        "def late(joint, p):",
+        '    """How long a field takes to its motor, s."""',
+        f"    k = {JOINTS + DRIVE} + joint * {structure.stride}",
+        f"    return {' + '.join(late) or '0.0'}",
+        "",
+        "",
+    ]
 
 
 def _balance(structure: Structure) -> list[str]:

@@ -143,6 +143,7 @@ def lanes_text(structure: Structure) -> str:
     ]
     numbers = {
         "LANES": LANES,
+        "SIZE": structure.size,
         "Q": rows.q,
         "QD": rows.qd,
         "FIELD_0": rows.field_0,
@@ -170,6 +171,7 @@ def advance_lanes(
     """As `advance`, of all lanes: what belongs to one has the lane for its first axis; held is (6, lanes)."""
     n = angle.shape[2]
     order = drive_in.shape[1]
+    parameters = carray(address(s), (<SIZE>, <LANES>))
     now = np.empty(n)
     before = np.empty((n, <LANES>))
     old = np.empty(order)
@@ -189,14 +191,11 @@ def advance_lanes(
                 )
             cursor[1] += 1
         ahead = follow(time, end, cursor, knots)
-        share_0 = (time - knots[cursor[0]]) / (knots[cursor[0] + 1] - knots[cursor[0]])
-        share_1 = (end - knots[ahead]) / (knots[ahead + 1] - knots[ahead])
         for l in range(<LANES>):
+            p = parameters[:, l]
             for j in range(n):
-                a, b = fields[l, cursor[0], j], fields[l, cursor[0] + 1, j]
-                s[(<FIELD_0> + j) * <LANES> + l] = a + share_0 * (b - a)
-                a, b = fields[l, ahead, j], fields[l, ahead + 1, j]
-                s[(<FIELD_1> + j) * <LANES> + l] = a + share_1 * (b - a)
+                s[(<FIELD_0> + j) * <LANES> + l] = field_late(time, cursor[0], cursor[1], knots, fields[l], j, p)
+                s[(<FIELD_1> + j) * <LANES> + l] = field_late(end, ahead, cursor[1], knots, fields[l], j, p)
                 before[j, l] = s[(<Q> + j) * <LANES> + l]
         sampling = i % per_sample == 0
         if sampling and order > 0:

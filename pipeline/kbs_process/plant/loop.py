@@ -8,6 +8,23 @@ def field_at(time, cycle, knots, fields, joint):
 
 
 @compiled
+def cycle_of(time, cycle, known, knots):
+    """The cycle that a time is in, of those whose fields are known; `cycle` is one nearby."""
+    while cycle > 0 and knots[cycle] > time:
+        cycle -= 1
+    while cycle < known - 1 and knots[cycle + 1] <= time:
+        cycle += 1
+    return cycle
+
+
+@compiled
+def field_late(time, cycle, known, knots, fields, joint, p):
+    """Field position of a motor, in microsteps, as it arrives there; `cycle` is that of the time itself."""
+    began = time - late(joint, p)
+    return field_at(began, cycle_of(began, cycle, known, knots), knots, fields, joint)
+
+
+@compiled
 def follow(time, end, cursor, knots):
     """Move the cursor to the cycle of a step's beginning; return the cycle of its end."""
     while cursor[0] < cursor[1] - 1 and knots[cursor[0] + 1] <= time:
@@ -74,8 +91,8 @@ def advance(
             cursor[1] += 1
         ahead = follow(time, end, cursor, knots)
         for j in range(n):
-            field_0[j] = field_at(time, cursor[0], knots, fields, j)
-            field_1[j] = field_at(end, ahead, knots, fields, j)
+            field_0[j] = field_late(time, cursor[0], cursor[1], knots, fields, j, p)
+            field_1[j] = field_late(end, ahead, cursor[1], knots, fields, j, p)
             now[j] = x[q + j]
         # Samples fall on step ends to within rounding; half a nanosecond decides.
         sampling = i % per_sample == 0
