@@ -32,6 +32,7 @@ def module_text(structure: Structure) -> str:
 def _head(structure: Structure) -> list[str]:
     shape = f"parents {structure.parents}, {'elastic' if structure.elastic else 'rigid'} base"
     every = [*structure.effects, *(load.effect for load in structure.loads)]
+    called = [effect for effect in every if not effect.delay]
     return [
         f'"""Generated: plant with {shape}, effects {", ".join(e.name for e in every)}."""',
         "import numpy as np",
@@ -41,9 +42,9 @@ def _head(structure: Structure) -> list[str]:
         "    drift, floor, force_at, from_plate, in_plate, inertia, joint_rotation, mean_rounded, momentum, placed,",
         "    plate_moment, plate_rates, rotate, rotor_moment, screw, triple, velocity_at, yielding,",
         ")",
-        *[f"from {e.equation.__module__} import {e.equation.__qualname__} as _{e.name}" for e in every],
+        *[f"from {e.equation.__module__} import {e.equation.__qualname__} as _{e.name}" for e in called],
         "",
-        *[f"effect_{e.name} = compiled_effect(_{e.name})" for e in every],
+        *[f"effect_{e.name} = compiled_effect(_{e.name})" for e in called],
         "",
         "",
     ]
