@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import bench
 import numpy as np
@@ -10,12 +11,14 @@ import pytest
 
 from kbs_process.diagnosis import rounds
 from kbs_process.diagnosis.experiment import Experiment
-from kbs_process.diagnosis.finding import Tried
+from kbs_process.diagnosis.finding import Tried, find_of
+from kbs_process.diagnosis.floor import declared
 from kbs_process.diagnosis.gate import gate
 from kbs_process.diagnosis.gls import Sums, score
 from kbs_process.diagnosis.hypothesis import Hypothesis, predict
 from kbs_process.diagnosis.joint import Own, Standing, with_extra
 from kbs_process.diagnosis.leaders import gated
+from kbs_process.diagnosis.outcome import Identity
 from kbs_process.diagnosis.race import own_of
 from kbs_process.diagnosis.rivals import probabilities, rivalry
 from kbs_process.diagnosis.scene import Scene
@@ -188,3 +191,48 @@ def test_a_law_of_the_readings_needs_no_plant_and_its_rival_is_told_apart(made: 
     apart = rivalry(right.known, wrong.known)
     assert apart.rho_delta > 20.0 and not apart.indistinguishable and apart.p_wrong < 1e-20
     assert rivalry(right.known, right.known).indistinguishable
+
+
+def passed(here: Standing, tried: Bench, scene: Scene, found: Screening, law: str) -> Tried:
+    """A law at elevation as it is after its refit."""
+    one = next(one for one in found.candidates if one.suspect.family == (law, "el"))
+    after = with_extra(here, extra_of(one, here, tried, scene), bench.serial(here.known.experiment))
+    own = own_of(one, here, after)
+    return Tried(one, after, gated(one, here, after, own), found, own)
+
+
+def test_a_law_that_fell_in_the_plant_is_none_that_the_find_cannot_be_told_from(cable: Standing) -> None:
+    tried, scene, found = screened(cable)
+    told = passed(cable, tried, scene, found, "ground_cable")
+    fell = Identity("joint torque", "el", (), "harness", "harness")
+    with_it, without_it = (
+        find_of([told], 0, np.ones(1), cable, None, refused).alternatives for refused in ((), (fell,))
+    )
+    assert fell in {one.identity for one in with_it}
+    assert {one.identity for one in with_it} - {one.identity for one in without_it} >= {fell}
+
+
+def test_the_second_law_that_passed_is_believed_where_the_first_falls(
+    cable: Standing, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tried, scene, found = screened(cable)
+    first, second = (passed(cable, tried, scene, found, law) for law in ("ground_cable", "harness"))
+    assert first.standing.known.cost < second.standing.known.cost
+    seen = SimpleNamespace(scene=scene, bench=tried, screening=found)
+    monkeypatch.setattr(rounds.View, "of", lambda _: seen)
+    monkeypatch.setattr(rounds, "_place", lambda *_: None)
+    monkeypatch.setattr(rounds, "named_first", list)
+    monkeypatch.setattr(rounds, "_passed", lambda *_: ([first, second], []))
+    monkeypatch.setattr(rounds, "_settled", lambda one, *_: replace(one, gate=replace(one.gate, reasons=())))
+    floor, simulate = declared(cable.known.experiment), bench.serial(cable.known.experiment)
+    for fallen, kept in ((("harness",), "ground_cable"), (("ground_cable",), "harness")):
+        monkeypatch.setattr(
+            rounds,
+            "_stands_in",
+            lambda told, *_, no=fallen: ("falls",) if rounds._law(told).law in no else (),
+        )
+        done = rounds._round(cable, floor, simulate, [])
+        assert done.accepted is not None and done.accepted.find.identity.law == kept
+        assert [one.identity.law for one in done.refused] == ([] if kept == "ground_cable" else list(fallen))
+    monkeypatch.setattr(rounds, "_stands_in", lambda *_: ("falls",))
+    assert rounds._round(cable, floor, simulate, []).accepted is None
