@@ -139,7 +139,8 @@ def test_simulation_loses_stability_where_the_linear_loop_does(integral: float, 
     predicted = stability.critical(system, rig.controller, integral=integral)
     found = onset.onset(rig, effects, POSE, predicted.factor, integral=integral, tolerance=5e-3)
     assert found is not None
-    assert found.factor == pytest.approx(predicted.factor, rel=0.01)
+    # The linear loop takes a latency to first order, by which it loses stability a little earlier.
+    assert 0.99 < found.factor / predicted.factor < (1.01 if lag == 0.0 else 1.06)
     assert found.frequency == pytest.approx(predicted.frequency, abs=0.11)
 
 

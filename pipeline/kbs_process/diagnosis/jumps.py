@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
+from kbs_process.diagnosis.hypothesis import Prediction
 from kbs_process.diagnosis.known import Known
 from kbs_process.signals.records import Array, Mask
 
@@ -11,8 +14,10 @@ _PLACES = 400  # that the longest recording is divided into
 _EDGE = 0.02  # of a recording, at either end, in which a jump shows too little
 
 
-def jumps(known: Known) -> dict[str, float]:
+def jumps(known: Known, predicted: Mapping[int, Prediction]) -> dict[str, float]:
     """Return the likeliest time of one jump, s, of the streams of wrench and encoders; none where they do not move.
+
+    `predicted` are the readings by drive.
 
     What is left of a reading y that is late by tau is -tau dy/dt. With one tau before t0 and another after it,
 
@@ -29,7 +34,7 @@ def jumps(known: Known) -> dict[str, float]:
         gain = np.zeros(_PLACES)
         for k in experiment.fit:
             trial = experiment.trials[k]
-            shown = known.shown[trial.drive].values[:, channels]
+            shown = predicted[trial.drive].values[:, channels]
             gain += _gain(trial.measured[:, channels] - shown, shown, trial.valid, times / experiment.dt)
         if gain.max() > 0.0:
             found[stream] = float(times[np.argmax(gain)])
