@@ -102,7 +102,7 @@ def loop(system: Linear, controller: Controller, *, proportional: float = 1.0, i
 def discretised(system: Linear, cycle: float) -> tuple[Array, Array, Array]:
     """Return Phi (2c, 2c), G_u (2c, n) and G_v (2c, n) of one cycle, exact for a field that moves linearly in it.
 
-    What becomes of the field on its way to the motor is in G_u and G_v.
+    What becomes of the field on its way to the motor is in G_u and G_v, a lag to first order.
     """
     c, n = len(system.M), len(system.joints)
     of_field, of_rate = np.array(system.arriving or [(1.0, 0.0)] * n).T
