@@ -48,7 +48,7 @@ def test_module_is_readable_python_that_calls_each_effect() -> None:
         assert (f"= effect_{effect.name}(" in text) is not bool(effect.delay)
     (late,) = (effect for effect in TWO.effects if effect.delay)
     place = [p.name for effect in TWO.effects for p in effect.parameters].index(late.delay)
-    assert f"return p[k + {place}]" in text
+    assert f"time - (p[k + {place}])" in text
 
 
 def test_file_is_written_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

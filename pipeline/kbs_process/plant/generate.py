@@ -113,14 +113,19 @@ def _arriving(structure: Structure) -> list[str]:
 
 
 def _late(structure: Structure) -> list[str]:
-    """Emit by how much a field comes late."""
+    """Emit where a field is as it arrives at its motor, which costs nothing where none comes late."""
     late = [wires[effect.delay] for effect, wires in _wired(structure) if effect.delay]
+    began = [
+        f"    k = {JOINTS + DRIVE} + joint * {structure.stride}",
+        f"    time = time - ({' + '.join(late)})",
+        "    cycle = cycle_of(time, cycle, known, knots)",
+    ]
     return [
         "@compiled",
-        "def late(joint, p):",
-        '    """How long a field takes to its motor, s."""',
-        f"    k = {JOINTS + DRIVE} + joint * {structure.stride}",
-        f"    return {' + '.join(late) or '0.0'}",
+        "def field_late(time, cycle, known, knots, fields, joint, p):",
+        '    """Field position of a motor, in microsteps, as it arrives there; `cycle` is that of the time itself."""',
+        *(began if late else []),
+        "    return field_at(time, cycle, knots, fields, joint)",
         "",
         "",
     ]

@@ -18,13 +18,6 @@ def cycle_of(time, cycle, known, knots):
 
 
 @compiled
-def field_late(time, cycle, known, knots, fields, joint, p):
-    """Field position of a motor, in microsteps, as it arrives there; `cycle` is that of the time itself."""
-    began = time - late(joint, p)
-    return field_at(began, cycle_of(began, cycle, known, knots), knots, fields, joint)
-
-
-@compiled
 def follow(time, end, cursor, knots):
     """Move the cursor to the cycle of a step's beginning; return the cycle of its end."""
     while cursor[0] < cursor[1] - 1 and knots[cursor[0] + 1] <= time:
