@@ -14,7 +14,7 @@ from kbs_process.diagnosis.joint import with_extra
 from kbs_process.diagnosis.orders import _of_order, _others, with_orders
 from kbs_process.diagnosis.outcome import Estimate, Find
 from kbs_process.diagnosis.scene import Scene
-from kbs_process.diagnosis.screen import Bench, Catalogued, screen
+from kbs_process.diagnosis.screen import Bench, Catalogued, Found, screen
 from kbs_process.diagnosis.suspects import Candidate
 from kbs_process.diagnosis.tryout import extra_of, identity
 from kbs_process.diagnosis.view import View
@@ -52,12 +52,21 @@ def test_all_orders_are_found_and_no_other(view: View) -> None:
     whole = with_orders(view, alone)
     assert isinstance(whole.suspect, Catalogued)
     print(view.standing.known.level, alone.score.gain, whole.score.gain)
-    found = [value for action in whole.suspect.candidate.actions for _, value in action.shape]
-    assert sorted(found) == sorted(RIPPLE)
+    assert orders_of(whole) == sorted(RIPPLE)
     assert whole.score.gain > 1.2 * alone.score.gain
     assert whole.log_evidence > alone.log_evidence
     assert identity(whole.suspect) == identity(alone.suspect)
-    assert with_orders(replace(view, suspects=view.suspects[:1]), alone) is alone
+
+
+def test_harmonics_of_an_order_are_found_that_residuals_did_not_propose(view: View) -> None:
+    (alone,) = view.screening.candidates
+    assert orders_of(alone) == [750.0]
+    assert orders_of(with_orders(replace(view, suspects=(alone.suspect,)), alone)) == sorted(RIPPLE)
+
+
+def orders_of(found: Found) -> list[float]:
+    assert isinstance(found.suspect, Catalogued)
+    return sorted(value for action in found.suspect.candidate.actions for _, value in action.shape)
 
 
 def test_in_the_plant_each_has_its_size(view: View) -> None:

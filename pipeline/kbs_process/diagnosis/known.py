@@ -19,6 +19,7 @@ from kbs_process.diagnosis.hypothesis import Hypothesis, Prediction, Simulate
 from kbs_process.diagnosis.metric import Metric, metrics
 from kbs_process.diagnosis.parameters import Slopes, known_parameters, prior, within
 from kbs_process.diagnosis.search import ALL, EARLY, GROSS, Found, Laws, Search
+from kbs_process.diagnosis.softened import softened
 from kbs_process.estimation.fit import Check, Parameters
 from kbs_process.signals.records import Array, Mask
 from kbs_process.stages.output_error import Scalar
@@ -28,7 +29,7 @@ MOVED = 4.0
 # Chance below which all together are said to be off: no single one need be, where many make up for what was left out.
 STRAINED = 1e-3
 CONVERGED = "converged"  # name of the check
-CONFINED = 6  # steps of a refit that is looked at, or gone on from
+CONFINED = 8  # steps of a refit that is looked at, or gone on from
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -190,18 +191,24 @@ def as_it_is(known: Known, simulate: Simulate, *, laws: Laws | None = None) -> K
 def confined(known: Known, simulate: Simulate, reach: float, *, laws: Laws | None = None) -> Known:
     """Refit all numbers of `known`, those with a stated prior no farther than `reach` sigmas from it, along new slopes.
 
-    What is left out shows there, before they take it up. The bounds of what is returned are those of `known`.
+    In the metric that takes what is left for noise (`softened`): what is left out shows there, before numbers take it
+    up. What is returned has the metric and the bounds of `known`.
     """
-    parameters = known.parameters
-    limits = within(parameters, reach, known.stated)
-    search = Search(
-        known.experiment, known.metric, simulate, known.hypothesis, known.free, limits, laws, known.scale
+    experiment = known.experiment
+
+    def search(metric: tuple[Metric, ...], limits: Parameters) -> Search:
+        return Search(experiment, metric, simulate, known.hypothesis, known.free, limits, laws, known.scale)
+
+    plain = search(known.metric, known.parameters)
+    begun = plain.begin(known.value, known.slopes, known.shown)
+    left = {k: plain.residual(k, begun.predicted) for k in experiment.fit}
+    soft = search(
+        softened(experiment, known.metric, left, begun.predicted, known.hypothesis),
+        within(known.parameters, reach, known.stated),
     )
-    theta = search.clipped(known.value)
-    begun = search.begin(theta, search.slopes(theta, known.slopes, ALL))
-    found = search.descend(begun, CONFINED)
-    freed = replace(known_of(search, found, known.chi2_before), parameters=parameters)
-    return replace(freed, checks=_checks(freed, found))
+    theta = soft.clipped(known.value)
+    found = soft.descend(soft.begin(theta, soft.slopes(theta, known.slopes, ALL)), CONFINED)
+    return known_of(plain, replace(found, converged=False), known.chi2_before)
 
 
 def resumed(known: Known, simulate: Simulate, *, laws: Laws | None = None) -> Known:

@@ -1,7 +1,7 @@
 """All orders of a law that has orders: a ripple is seldom one sine, and what is left of it would hide what is not.
 
 Along the linear plant the orders of a law's grid, those that residuals proposed among them, are added one by one to the
-best: that one next which, all amplitudes fitted anew, gains most.
+best, and harmonics of it: that one next which, all amplitudes fitted anew, gains most.
 """
 
 from __future__ import annotations
@@ -20,6 +20,9 @@ from kbs_process.diagnosis.view import View
 from kbs_process.plant.effect import Effect
 from kbs_process.plant.effects import find
 from kbs_process.signals.records import Array
+
+_PARTS = (1, 2, 3)  # of a series, which comes once a turn at least, that an order may be
+_HARMONICS = 12  # of an order that are tried
 
 
 def with_orders(view: View, found: Found) -> Found:
@@ -47,14 +50,24 @@ def with_orders(view: View, found: Found) -> Found:
 
 
 def _others(view: View, suspect: Catalogued) -> list[float]:
-    """Orders of a suspect's law that the screen has tried, but for its own; none of a law without."""
+    """Orders of a suspect's law that the screen has tried, and harmonics of its own; none of a law without.
+
+    What comes again with a turn is seldom a sine. A residual shows few of its harmonics, and those not in their order:
+    its own may be the second or the third of a series.
+    """
     tried = [
         value
         for one in view.suspects
         if isinstance(one, Catalogued) and one.family == suspect.family
         for value in _orders(one)
     ]
-    return [value for value in dict.fromkeys(tried) if value not in _orders(suspect)]
+    own = _orders(suspect)
+    series = [(order / part, part) for order in own for part in _PARTS if order >= part]
+    highest = max([*tried, *own], default=0.0)
+    harmonics = [
+        k * first for first, part in series for k in range(1, part * _HARMONICS + 1) if k * first <= highest
+    ]
+    return [value for value in dict.fromkeys([*tried, *harmonics]) if value not in own]
 
 
 def _orders(suspect: Catalogued) -> list[float]:

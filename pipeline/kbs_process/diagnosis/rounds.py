@@ -32,7 +32,7 @@ from kbs_process.diagnosis.remains import detected, promises_little, too_little
 from kbs_process.diagnosis.rivals import probabilities
 from kbs_process.diagnosis.scene import Scene
 from kbs_process.diagnosis.screen import Catalogued, Screening
-from kbs_process.diagnosis.settling import released, resettled
+from kbs_process.diagnosis.settling import drawn_back, released, resettled
 from kbs_process.diagnosis.thresholds import LEAST_RHO, MOST, ROUNDS, SECOND, SETTLED, TOLERATED
 from kbs_process.diagnosis.tryout import identity
 from kbs_process.diagnosis.view import View
@@ -139,9 +139,11 @@ def _mismatch(before: Detection, first: Screening, kept: Sequence[Accepted]) -> 
 
 
 def _round(standing: Standing, floor: Floor, simulate: Simulate, accepted: Sequence[Accepted]) -> _Round:
-    view = View.of(standing)
-    place = _place(standing, floor, view.scene)
-    passed, refused = _passed(view, floor, simulate, accepted)
+    seen = drawn_back(standing, simulate)
+    standing = min(standing, seen, key=lambda one: one.known.cost)
+    view = View.of(seen)
+    place = _place(seen, floor, view.scene)
+    passed, refused = _passed(view, standing, floor, simulate, accepted)
     if not passed:
         return _Round(None, standing, view.screening, tuple(refused), place)
     passed = continued(named_first(passed), [one.find.identity for one in accepted])
@@ -233,12 +235,12 @@ def _law(one: Tried) -> Identity:
 
 
 def _passed(
-    view: View, floor: Floor, simulate: Simulate, accepted: Sequence[Accepted]
+    view: View, before: Standing, floor: Floor, simulate: Simulate, accepted: Sequence[Accepted]
 ) -> tuple[list[Tried], list[Refused]]:
-    """Suspects that passed the gate, and those that did not."""
+    """Suspects of a view that passed the gate after what was believed `before`, and those that did not."""
     passed: list[Tried] = []
     refused: list[Refused] = []
-    there = detected(view.standing, floor, view.standing.known.experiment.fit)
+    there = detected(before, floor, before.known.experiment.fit)
     if reason := promises_little(view, there):
         found = view.able[0]
         return [], [Refused(identity(found.suspect), found.score.rho_eff, (reason,))]
@@ -247,13 +249,13 @@ def _passed(
             refused.append(Refused(identity(found.suspect), found.score.rho_eff, reasons))
     first, others = leaders(view, lambda found: not in_the_shade(found, accepted))
     for chosen in (first, *([found] for found in others)):
-        more, less = tried(chosen, view, view.standing, floor, simulate)
+        more, less = tried(chosen, view, before, floor, simulate)
         passed, refused = [*passed, *more], [*refused, *less]
         if passed:
             break
     if not passed and (chosen := view.unrepeated[:SECOND]):
         # What seemed to do nearly as well and to come again did not stand.
-        passed, less = tried(chosen, view, view.standing, floor, simulate)
+        passed, less = tried(chosen, view, before, floor, simulate)
         refused = [*refused, *less]
     return passed, refused
 

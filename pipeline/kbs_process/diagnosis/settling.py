@@ -7,7 +7,7 @@ from kbs_process.diagnosis.hypothesis import Simulate
 from kbs_process.diagnosis.joint import Standing, standing_of
 from kbs_process.diagnosis.known import confined, settled
 from kbs_process.diagnosis.remains import detected, searched
-from kbs_process.diagnosis.thresholds import CLOSE
+from kbs_process.diagnosis.thresholds import CLOSE, MOST
 
 
 def resettled(standing: Standing, floor: Floor, simulate: Simulate, *, leaps: int) -> Standing:
@@ -18,6 +18,19 @@ def resettled(standing: Standing, floor: Floor, simulate: Simulate, *, leaps: in
         return standing
     moved = settled(known, simulate, leaps=leaps, laws=standing.laws)
     return standing_of(moved, standing.laws) if moved.cost < known.cost else standing
+
+
+def drawn_back(standing: Standing, simulate: Simulate) -> Standing:
+    """Known numbers nearer to their priors, where something by far is missing and has pulled them.
+
+    Laws are looked for from there, if about as much is left: they act on the plant that is, and numbers that made up
+    for one of them have made it another.
+    """
+    known = standing.known
+    if not (searched(known.experiment) and known.gross and known.strained):
+        return standing
+    held = confined(known, simulate, CLOSE, laws=standing.laws)
+    return standing_of(held, standing.laws) if MOST * held.excess < known.excess else standing
 
 
 def released(standing: Standing, floor: Floor, simulate: Simulate) -> Standing:
