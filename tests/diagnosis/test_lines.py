@@ -87,6 +87,18 @@ def test_a_tone_between_two_bins_is_put_there(made: Experiment) -> None:
     assert found["floor_frequency"][0] == pytest.approx(tone, abs=0.1 * apart)
 
 
+def test_a_line_beside_a_beat_of_the_controller_is_one(made: Experiment) -> None:
+    n = len(made.trials[0].measured)
+    apart = 1.0 / (n * made.dt)
+    assert made.rig.controller is not None
+    beat = 3.0 / (16.0 * float(made.rig.controller.cycle))
+    line = np.zeros_like(made.trials[0].measured)
+    line[:, 0] = 0.5 * np.sin(2.0 * np.pi * (beat + 0.4 * apart) * np.arange(n) * made.dt)
+    found = proposals(line, made)
+    assert found["jitter_frequency"][0] == pytest.approx(beat, rel=1e-12)
+    assert found["floor_frequency"][0] == pytest.approx(beat + 0.4 * apart, abs=0.1 * apart)
+
+
 def test_orders_of_a_motor_are_proposed_for_its_gear_and_its_microsteps_too(made: Experiment) -> None:
     drive = made.rig.joint("az").drive
     assert drive is not None

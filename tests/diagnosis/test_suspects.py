@@ -30,7 +30,7 @@ from kbs_process.stages.resample import resample
 CHANNELS = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz", "az", "el")
 NOMINAL = tuple(effect.name for effect in CATALOGUE[:6])
 RATE, DT = 100.0, 0.05
-TONES = {"floor_frequency": (2.3,), "mains_frequency": (0.7, 1.1)}
+TONES = {"floor_frequency": (2.3,), "mains_frequency": (0.7, 1.1), "jitter_frequency": (1.7,)}
 
 
 @cache

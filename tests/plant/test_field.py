@@ -85,6 +85,25 @@ def test_a_recorded_field_has_the_gain_in_it_already() -> None:
     assert np.abs(lagging - plain).max() > 1e-4  # the driver comes after the record
 
 
+def test_cycles_that_are_late_in_turn_are_those_of_a_schedule_that_is() -> None:
+    t = np.arange(-1.0, SECONDS + 0.2, CYCLE)
+    rig = two_axis(loop="open")
+    ratio = np.array([float(joint.drive.ratio) for joint in rig.joints if joint.drive is not None])
+    (effect,) = select(["controller_jitter"])
+    numbers = {"jitter_sin": 4e-3, "jitter_cos": 3e-3, "jitter_frequency": 1.3}
+    with_effect = attach(rig, effect, numbers, joints=[rig.joint_names[1]])
+    _, field = shown(with_effect, [*NOMINAL, effect.name], schedule(way(t), t))
+    samples = np.arange(len(field)) / 100.0
+    late = 4e-3 * np.sin(2.0 * np.pi * 1.3 * samples) + 3e-3 * np.cos(2.0 * np.pi * 1.3 * samples)
+    microstep = 2.0 * np.pi / 12800.0
+    expected = np.interp(samples - late, t, way(t)[:, 1]) * ratio[1]
+    plain = np.interp(samples, t, way(t)[:, 1]) * ratio[1]
+    assert np.abs(expected - plain).max() > 20.0 * microstep
+    np.testing.assert_allclose(
+        field[:, 1], expected, atol=0.05 * np.abs(expected - plain).max() + 0.51 * microstep
+    )
+
+
 @pytest.mark.parametrize("late", [0.18, 0.03])
 def test_a_field_that_is_late_by_cycles_is_the_field_of_then(late: float) -> None:
     """Exactly, through corners where the rate changes: no jump of the field where a cycle ends."""

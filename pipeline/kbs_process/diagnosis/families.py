@@ -84,6 +84,7 @@ FAMILIES: dict[str, str] = {
     "clock_drops": "drops",
     "clock_wander": "wander",
     "controller_gain": "gain",
+    "controller_jitter": "jitter",
     "controller_latency": "latency",
 }
 

@@ -30,6 +30,7 @@ _BY_ORDER = ("order", "ripple_order", "kinematic_order")
 _NEAR_WHOLE = 0.02  # of a number of periods in an electrical cycle
 _OF_ITS_SHAPE = 8.0  # periods in a disc's turn: more of them are lines of its grating, read between
 _BETWEEN = 33  # frequencies in two bins
+_LONGEST_BEAT = 32  # cycles of a controller, after which what comes late comes late again
 _BY_PLACE = ("local", "touch", "shift")  # with _angle and _width
 _PLACES = 400  # that a joint's range is divided into
 _WIDEST = 0.1  # of the range, of what has a place
@@ -40,7 +41,7 @@ _BY_FREQUENCY = ("floor_frequency", "mains_frequency")
 def proposed(known: Known, scene: Scene) -> dict[str, tuple[float, ...]]:
     """Values to try beside the grids: parameter name, of one site "name.site" -> values that residuals propose."""
     lines = _frequencies(known)
-    found = dict.fromkeys(_BY_FREQUENCY, lines)
+    found = dict.fromkeys(_BY_FREQUENCY, lines) | {"jitter_frequency": _beats(known, lines)}
     for joint, orders in _orders(known, scene).items():
         found |= {f"{name}.{joint}": orders for name in _BY_ORDER}
         found[f"microstep_order.{joint}"] = _of_cycles(known, joint, orders)
@@ -94,6 +95,24 @@ def _frequencies(known: Known) -> tuple[float, ...]:
             if f[i] * shortest > _TURNS
         ]
     return _apart([value for _, value in sorted(found, reverse=True)], 0.05)
+
+
+def _beats(known: Known, lines: tuple[float, ...]) -> tuple[float, ...]:
+    """Lines, each at the nearest beat of the controller's cycles that the recordings do not tell from it.
+
+    The motion widens such a line, or splits it: it is not where most power is.
+    """
+    experiment = known.experiment
+    if experiment.rig.controller is None:
+        return lines
+    cycle = float(experiment.rig.controller.cycle)
+    apart = 1.0 / (min(len(experiment.trials[k].valid) for k in experiment.fit) * experiment.dt)
+    found = []
+    for line in lines:
+        beats = [round(line * n * cycle) / (n * cycle) for n in range(1, _LONGEST_BEAT + 1)]
+        # The shortest beat that comes so near.
+        found.append(next((beat for beat in beats if beat > 0.0 and abs(beat - line) < apart), line))
+    return tuple(dict.fromkeys(found))
 
 
 def _between_bins(series: Array, dt: float, f: float) -> float:
