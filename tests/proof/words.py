@@ -57,6 +57,7 @@ Family = Literal[
     "drops",
     "wander",
     "latency",
+    "jitter",
     "unnamed",
 ]
 

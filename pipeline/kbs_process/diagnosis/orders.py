@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kbs_process.diagnosis.gls import Score, Sums, score
+from kbs_process.diagnosis.ranges import SPECTRUM
 from kbs_process.diagnosis.screen import Bench, Catalogued, Found
 from kbs_process.diagnosis.suspects import Candidate, free_actions
 from kbs_process.diagnosis.tails import log_tail
@@ -71,12 +72,24 @@ def _others(view: View, suspect: Catalogued) -> list[float]:
 
 
 def _orders(suspect: Catalogued) -> list[float]:
-    return [value for name, value in suspect.candidate.shape if "order" in name]
+    names = _of_lines(suspect.candidate)
+    return [value for name, value in suspect.candidate.shape if name in names]
+
+
+def _of_lines(candidate: Candidate) -> set[str]:
+    """Names of a law's orders, or of its tones, where these come again in all recordings."""
+    effect = candidate.effect
+    return {
+        entry.name
+        for entry in effect.parameters
+        if "order" in entry.name or (entry.over == SPECTRUM and not effect.each_trial)
+    }
 
 
 def _of_order(suspect: Catalogued, order: float) -> Catalogued:
     """A suspect with another order, and the rest of its shape."""
-    shape = tuple((name, order if "order" in name else value) for name, value in suspect.candidate.shape)
+    names = _of_lines(suspect.candidate)
+    shape = tuple((name, order if name in names else value) for name, value in suspect.candidate.shape)
     return replace(suspect, candidate=replace(suspect.candidate, shape=shape))
 
 

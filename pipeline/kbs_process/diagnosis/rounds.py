@@ -143,7 +143,8 @@ def _round(standing: Standing, floor: Floor, simulate: Simulate, accepted: Seque
     standing = min(standing, seen, key=lambda one: one.known.cost)
     view = View.of(seen)
     place = _place(seen, floor, view.scene)
-    passed, refused = _passed(view, standing, floor, simulate, accepted)
+    # Beside the numbers that it was looked for from first; once all have settled, beside those that leave least.
+    passed, refused = _passed(view, floor, simulate, accepted)
     if not passed:
         return _Round(None, standing, view.screening, tuple(refused), place)
     passed = continued(named_first(passed), [one.find.identity for one in accepted])
@@ -235,9 +236,10 @@ def _law(one: Tried) -> Identity:
 
 
 def _passed(
-    view: View, before: Standing, floor: Floor, simulate: Simulate, accepted: Sequence[Accepted]
+    view: View, floor: Floor, simulate: Simulate, accepted: Sequence[Accepted]
 ) -> tuple[list[Tried], list[Refused]]:
-    """Suspects of a view that passed the gate after what was believed `before`, and those that did not."""
+    """Suspects of a view that passed the gate, and those that did not."""
+    before = view.standing
     passed: list[Tried] = []
     refused: list[Refused] = []
     there = detected(before, floor, before.known.experiment.fit)

@@ -174,8 +174,8 @@ PHYSICS: tuple[Physics, ...] = (
         first=2e-3, most=0.2, comparable=True,
     ),
     Physics(
-        "cycles that come late", family="latency", port="controller", law=Sense.LATE_CYCLES, places=AXES, unit="1",
-        first=0.2, most=1.0, shapes=(Shape("every", "1", Choice((7.0, 16.0), (5.0, 23.0))),), catalogued=False,
+        "cycles that come late", family="jitter", port="controller", law=Sense.LATE_CYCLES, places=AXES, unit="1",
+        first=0.2, most=1.0, shapes=(Shape("every", "1", Choice((7.0, 16.0), (5.0, 23.0))),),
     ),
     Physics(
         "S-shaped channel", family="non-linearity", port="transducer", law=Sense.S_SHAPE,
