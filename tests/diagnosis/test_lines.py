@@ -97,6 +97,7 @@ def test_a_line_beside_a_beat_of_the_controller_is_one(made: Experiment) -> None
     found = proposals(line, made)
     assert found["jitter_frequency"][0] == pytest.approx(beat, rel=1e-12)
     assert found["floor_frequency"][0] == pytest.approx(beat + 0.4 * apart, abs=0.1 * apart)
+    assert found["jitter_frequency"][1] == found["floor_frequency"][0]  # which may be no beat
 
 
 def test_orders_of_a_motor_are_proposed_for_its_gear_and_its_microsteps_too(made: Experiment) -> None:

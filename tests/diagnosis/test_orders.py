@@ -64,6 +64,19 @@ def test_harmonics_of_an_order_are_found_that_residuals_did_not_propose(view: Vi
     assert orders_of(with_orders(replace(view, suspects=(alone.suspect,)), alone)) == sorted(RIPPLE)
 
 
+def test_a_tone_has_harmonics_up_to_what_is_looked_at(view: View) -> None:
+    law = find("controller_jitter")
+    assert law is not None
+    own = Catalogued(Candidate(law, "el", (("jitter_frequency", 0.9),)), view.scene)
+    found = sorted(_others(replace(view, suspects=(own,)), own))
+    assert {0.45, 1.8, 2.7} <= {round(value, 9) for value in found}
+    assert 7.0 < found[-1] <= view.standing.known.experiment.highest_Hz
+    vibration = find("floor_vibration")
+    assert vibration is not None  # its tone is each recording's own
+    tone = Candidate(vibration, "", (("floor_frequency", 0.9), ("floor_sweep", 0.0)))
+    assert _others(view, Catalogued(tone, view.scene)) == []
+
+
 def orders_of(found: Found) -> list[float]:
     assert isinstance(found.suspect, Catalogued)
     return sorted(value for action in found.suspect.candidate.actions for _, value in action.shape)

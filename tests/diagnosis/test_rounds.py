@@ -18,8 +18,9 @@ from kbs_process.diagnosis.gls import Sums, score
 from kbs_process.diagnosis.hypothesis import Hypothesis, predict
 from kbs_process.diagnosis.joint import Own, Standing, with_extra
 from kbs_process.diagnosis.leaders import gated
-from kbs_process.diagnosis.outcome import Identity
+from kbs_process.diagnosis.outcome import Identity, Refused
 from kbs_process.diagnosis.race import own_of
+from kbs_process.diagnosis.remains import detected
 from kbs_process.diagnosis.rivals import probabilities, rivalry
 from kbs_process.diagnosis.scene import Scene
 from kbs_process.diagnosis.screen import Bench, Catalogued, Found, Screening, screen
@@ -236,3 +237,52 @@ def test_the_second_law_that_passed_is_believed_where_the_first_falls(
         assert [one.identity.law for one in done.refused] == ([] if kept == "ground_cable" else list(fallen))
     monkeypatch.setattr(rounds, "_stands_in", lambda *_: ("falls",))
     assert rounds._round(cable, floor, simulate, []).accepted is None
+
+
+def test_what_numbers_gain_where_they_were_drawn_back_is_no_law_s(
+    cable: Standing, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """They are believed once they have settled, law or none; laws are looked for from where they were drawn back."""
+    tried, scene, found = screened(cable)
+    back, alone = (_lower(cable, share) for share in (0.9, 0.6))
+    asked: list[tuple[Standing, Standing]] = []
+
+    def none_passed(view: SimpleNamespace, before: Standing, *_: object) -> tuple[list[Tried], list[Refused]]:
+        asked.append((view.standing, before))
+        return [], []
+
+    monkeypatch.setattr(rounds, "drawn_back", lambda *_: back)
+    monkeypatch.setattr(rounds, "resettled", lambda one, *_, leaps: alone if one is back else one)
+    monkeypatch.setattr(
+        rounds.View,
+        "of",
+        lambda one: SimpleNamespace(standing=one, scene=scene, bench=tried, screening=found),
+    )
+    monkeypatch.setattr(rounds, "_place", lambda *_: None)
+    monkeypatch.setattr(rounds, "_passed", none_passed)
+    experiment = cable.known.experiment
+    floor, simulate = declared(experiment), bench.serial(experiment)
+    done = rounds._round(cable, floor, simulate, [])
+    assert (done.seen, done.standing) == (back, alone)
+    assert asked == [(back, alone)]
+    told = rounds._diagnosed(cable.known, floor, simulate, detected(cable, floor, experiment.fit))
+    assert told.standing is alone
+    assert told.after.ratio < told.before.ratio
+
+
+def _lower(standing: Standing, share: float) -> Standing:
+    """Some numbers that leave less, in the readings too."""
+    known = standing.known
+    shown = standing.predicted[0].values
+    trials = tuple(
+        replace(one, measured=(shown + np.sqrt(share) * (one.measured - shown)) * one.valid[:, None])
+        for one in known.experiment.trials
+    )
+    return replace(
+        standing,
+        known=replace(
+            known,
+            experiment=replace(known.experiment, trials=trials),
+            residual=tuple(np.sqrt(share) * z for z in known.residual),
+        ),
+    )

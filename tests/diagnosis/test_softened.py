@@ -55,6 +55,9 @@ def test_the_residual_of_a_line_is_noise_there_and_nothing_else_changes() -> Non
     assert v[near, CHANNEL].min() > 50.0
     away = (np.abs(f - HZ) > 0.5) & (f > 1.0)
     assert np.median(v[away]) < 1.3  # of noise, never below 1
+    blind = metric[0], replace(metric[1], share=np.zeros(len(made.channels)))
+    seen = excess_density(blind, {0: residual[0], 1: 0.0 * residual[1]})[1]
+    assert seen == pytest.approx(excess_density(metric, {0: residual[0]})[1])
     soft = softened(made, metric, residual, shown, here)
     z = soft[0].layout(soft[0](left(0, 1.0)))
     assert np.mean(z[:, near, CHANNEL] ** 2) < 2.0

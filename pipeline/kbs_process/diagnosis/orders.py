@@ -22,7 +22,7 @@ from kbs_process.plant.effect import Effect
 from kbs_process.plant.effects import find
 from kbs_process.signals.records import Array
 
-_PARTS = (1, 2, 3)  # of a series, which comes once a turn at least, that an order may be
+_PARTS = (1, 2, 3)  # of a series, which comes once a turn at least, that an order may be; or a tone
 _HARMONICS = 12  # of an order that are tried
 
 
@@ -63,8 +63,9 @@ def _others(view: View, suspect: Catalogued) -> list[float]:
         for value in _orders(one)
     ]
     own = _orders(suspect)
-    series = [(order / part, part) for order in own for part in _PARTS if order >= part]
-    highest = max([*tried, *own], default=0.0)
+    tones = any(entry.over == SPECTRUM for entry in suspect.candidate.effect.parameters)
+    series = [(order / part, part) for order in own for part in _PARTS if tones or order >= part]
+    highest = view.standing.known.experiment.highest_Hz if tones else max([*tried, *own], default=0.0)
     harmonics = [
         k * first for first, part in series for k in range(1, part * _HARMONICS + 1) if k * first <= highest
     ]

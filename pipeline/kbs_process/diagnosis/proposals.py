@@ -98,7 +98,7 @@ def _frequencies(known: Known) -> tuple[float, ...]:
 
 
 def _beats(known: Known, lines: tuple[float, ...]) -> tuple[float, ...]:
-    """Lines, each at the nearest beat of the controller's cycles that the recordings do not tell from it.
+    """Lines, each after the shortest beat of the controller's cycles that lies within a bin of it.
 
     The motion widens such a line, or splits it: it is not where most power is.
     """
@@ -106,12 +106,12 @@ def _beats(known: Known, lines: tuple[float, ...]) -> tuple[float, ...]:
     if experiment.rig.controller is None:
         return lines
     cycle = float(experiment.rig.controller.cycle)
-    apart = 1.0 / (min(len(experiment.trials[k].valid) for k in experiment.fit) * experiment.dt)
+    apart = 1.0 / (max(len(experiment.trials[k].valid) for k in experiment.fit) * experiment.dt)
     found = []
     for line in lines:
         beats = [round(line * n * cycle) / (n * cycle) for n in range(1, _LONGEST_BEAT + 1)]
-        # The shortest beat that comes so near.
-        found.append(next((beat for beat in beats if beat > 0.0 and abs(beat - line) < apart), line))
+        near = [beat for beat in beats if beat > 0.0 and abs(beat - line) < apart]
+        found += [*near[:1], line]
     return tuple(dict.fromkeys(found))
 
 

@@ -65,7 +65,7 @@ def raced(chosen: Sequence[Found], view: View, floor: Floor, simulate: Simulate)
     ahead = side_by_side(gone_on, heat)
     runners = [Runner(found, one.standing) for found, one in zip(chosen, ahead, strict=True)]
     runners.sort(key=lambda one: -one.found.score.gain)
-    if runners and _stuck(runners[0], view.standing):
+    if runners and _stuck(runners[0], view):
         runners[0] = replace(runners[0], standing=released(runners[0].standing, floor, simulate))
     runners.sort(key=lambda one: one.cost)
     near = [one for one in runners if _near(one, runners[0])]
@@ -86,13 +86,16 @@ def own_of(found: Found, before: Standing, after: Standing) -> Own:
     return Own(names, names[: len(found.suspect.amplitudes)])
 
 
-def _stuck(runner: Runner, before: Standing) -> bool:
+def _stuck(runner: Runner, view: View) -> bool:
     """Whether it does less than half of what the screen promised, beside numbers that something had pulled.
 
-    They stand where they made up for what was left out, and a few steps do not bring them back.
+    They stand where they made up for what was left out, and a few steps do not bring them back. What they gain without
+    it, as they do where they were drawn back, is not its own.
     """
-    gained = before.known.cost - runner.cost
-    return before.known.strained and gained < MOST * runner.found.score.gain
+    bounded = view.bench.background.bounded
+    alone = 0.0 if bounded is None else bounded.alone
+    gained = view.standing.known.cost - alone - runner.cost
+    return runner.standing.known.strained and gained < MOST * runner.found.score.gain
 
 
 def _near(one: Runner, best: Runner) -> bool:

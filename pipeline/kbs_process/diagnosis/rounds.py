@@ -42,6 +42,7 @@ from kbs_process.diagnosis.view import View
 class _Round:
     accepted: Accepted | None
     standing: Standing
+    seen: Standing  # from where laws were looked for, and `place` is
     screening: Screening
     refused: tuple[Refused, ...]
     place: Place | None
@@ -101,13 +102,14 @@ def _diagnosed(known: Known, floor: Floor, simulate: Simulate, before: Detection
     kept, standing, fallen = needed(accepted, standing, floor, simulate)
     finds = [as_it_stands(one.find, one.tried.own, standing.known) for one in kept]
     left = last.place
-    if last.accepted is not None or len(kept) < len(accepted):
+    if standing is not last.seen:
         left = _place(standing, floor, Scene.of(known.experiment, standing.hypothesis, standing.predicted))
-    after = detected(standing, floor, known.experiment.fit) if accepted else before
+    same = standing is begun
+    after = before if same else detected(standing, floor, known.experiment.fit)
     held_out = None
     if known.experiment.held_out:
         unseen = detected(begun, floor, known.experiment.held_out)
-        held_out = unseen, detected(standing, floor, known.experiment.held_out) if accepted else unseen
+        held_out = unseen, unseen if same else detected(standing, floor, known.experiment.held_out)
     moved = _moved(standing.known)
     return Outcome(
         verdict=_verdict(finds, moved, after, held_out),
@@ -140,13 +142,15 @@ def _mismatch(before: Detection, first: Screening, kept: Sequence[Accepted]) -> 
 
 def _round(standing: Standing, floor: Floor, simulate: Simulate, accepted: Sequence[Accepted]) -> _Round:
     seen = drawn_back(standing, simulate)
-    standing = min(standing, seen, key=lambda one: one.known.cost)
+    if seen.known.cost < standing.known.cost:
+        # Numbers had ended in a worse place: what they do alone, once they have settled, is no law's.
+        standing = resettled(seen, floor, simulate, leaps=1)
     view = View.of(seen)
     place = _place(seen, floor, view.scene)
     # Beside the numbers that it was looked for from first; once all have settled, beside those that leave least.
-    passed, refused = _passed(view, floor, simulate, accepted)
+    passed, refused = _passed(view, standing, floor, simulate, accepted)
     if not passed:
-        return _Round(None, standing, view.screening, tuple(refused), place)
+        return _Round(None, standing, seen, view.screening, tuple(refused), place)
     passed = continued(named_first(passed), [one.find.identity for one in accepted])
     fitted = [_each_time(one) for one in passed]
     chances = probabilities([one.standing.known for one in passed], view.bench.background.rows, fitted)
@@ -163,8 +167,10 @@ def _round(standing: Standing, floor: Floor, simulate: Simulate, accepted: Seque
             [told, *(passed[k] for k in others)], 0, np.array([1.0 - float(chance.sum()), *chance]), standing,
             place, [one.identity for one in refused],
         )  # fmt: skip
-        return _Round(Accepted(told, find, standing), told.standing, view.screening, tuple(refused), place)
-    return _Round(None, standing, view.screening, tuple(refused), place)
+        return _Round(
+            Accepted(told, find, standing), told.standing, seen, view.screening, tuple(refused), place
+        )
+    return _Round(None, standing, seen, view.screening, tuple(refused), place)
 
 
 def _settled(one: Tried, before: Standing, floor: Floor, simulate: Simulate) -> Tried:
@@ -236,10 +242,12 @@ def _law(one: Tried) -> Identity:
 
 
 def _passed(
-    view: View, floor: Floor, simulate: Simulate, accepted: Sequence[Accepted]
+    view: View, before: Standing, floor: Floor, simulate: Simulate, accepted: Sequence[Accepted]
 ) -> tuple[list[Tried], list[Refused]]:
-    """Suspects of a view that passed the gate, and those that did not."""
-    before = view.standing
+    """Suspects of a view that passed the gate, and those that did not.
+
+    Of those that passed, the ones that leave less already than what was believed `before`, if there are any.
+    """
     passed: list[Tried] = []
     refused: list[Refused] = []
     there = detected(before, floor, before.known.experiment.fit)
@@ -251,13 +259,13 @@ def _passed(
             refused.append(Refused(identity(found.suspect), found.score.rho_eff, reasons))
     first, others = leaders(view, lambda found: not in_the_shade(found, accepted))
     for chosen in (first, *([found] for found in others)):
-        more, less = tried(chosen, view, before, floor, simulate)
+        more, less = tried(chosen, view, view.standing, floor, simulate)
         passed, refused = [*passed, *more], [*refused, *less]
-        if passed:
-            break
+        if less_is_left := [one for one in passed if one.standing.known.cost < before.known.cost]:
+            return less_is_left, refused
     if not passed and (chosen := view.unrepeated[:SECOND]):
         # What seemed to do nearly as well and to come again did not stand.
-        passed, less = tried(chosen, view, before, floor, simulate)
+        passed, less = tried(chosen, view, view.standing, floor, simulate)
         refused = [*refused, *less]
     return passed, refused
 

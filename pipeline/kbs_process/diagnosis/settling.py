@@ -23,8 +23,8 @@ def resettled(standing: Standing, floor: Floor, simulate: Simulate, *, leaps: in
 def drawn_back(standing: Standing, simulate: Simulate) -> Standing:
     """Known numbers nearer to their priors, where something by far is missing and has pulled them.
 
-    Laws are looked for from there, if about as much is left: they act on the plant that is, and numbers that made up
-    for one of them have made it another.
+    Laws are looked for from there, if less than twice as much is left: they act on the plant that is, and numbers that
+    made up for one of them have made it another.
     """
     known = standing.known
     if not (searched(known.experiment) and known.gross and known.strained):

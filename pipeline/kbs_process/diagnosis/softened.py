@@ -1,11 +1,12 @@
 r"""The metric of a model that lacks something: by the noise, and by the spectrum of what is left over.
 
 In the noise's metric alone, physics that was left out pulls known numbers as far as that lowers what it leaves, at a
-resonance most of all. If what is left over is taken for one more noise of its own density, maximum likelihood weighs
+resonance most of all. If what some numbers leave over is taken for one more noise of its own density, likelihood weighs
 
-    W' = diag(max(1, v(f)))^(-1/2) W,   v(f) = mean over neighbouring frequencies and all trials of |z|^2 / 2,
+    W' = diag(max(1, v(f)))^(-1/2) W,   v(f) = mean over neighbouring frequencies and the trials fitted of |z|^2 / 2,
 
-z whitened by the floor, of unit variance where nothing is missing. There the metric is the floor's.
+z whitened by the floor, of unit variance where nothing is missing. There the metric is the floor's, nearly. It is taken
+once: what pulled numbers leave is about as large, and as wide, as what those leave that were not.
 Source: P. Whittle, Estimation and information in stationary time series, Arkiv foer Matematik 2 (1953) 423: the
     likelihood of what is left, by its own spectrum.
 Validity: to begin a search for what is missing. What is left is no noise, and nothing is judged by this metric.
@@ -55,10 +56,11 @@ def excess_density(metric: Sequence[Metric], residual: Mapping[int, Array]) -> t
     """Frequencies (b,), Hz, and density (b, c) of whitened residuals there, 1 where no more than noise is left."""
     f = max((metric[k].whiten.f for k in residual), key=len)
     total = np.zeros((len(f), metric[0].whiten.shape[2]))
+    counted_for = sum((metric[k].share for k in residual), np.zeros(total.shape[1]))
     for k, z in residual.items():
         own = metric[k].whiten.f
         power = 0.5 * np.sum(metric[k].layout(z) ** 2, axis=0)
         apart = float(own[1] - own[0]) if len(own) > 1 else _WIDTH_HZ
         smooth = uniform_filter1d(power, max(_LEAST, round(_WIDTH_HZ / apart)), axis=0, mode="nearest")
-        total += np.stack([np.interp(f, own, channel) for channel in smooth.T], axis=1)
-    return f, np.maximum(total / len(residual), 1.0)
+        total += metric[k].share * np.stack([np.interp(f, own, channel) for channel in smooth.T], axis=1)
+    return f, np.maximum(total / np.where(counted_for > 0.0, counted_for, 1.0), 1.0)

@@ -116,7 +116,11 @@ def linearise(rig: Rig, effects: Sequence[Effect], q: Array) -> Linear:
 
 
 def field_slopes(drive: Drive, effects: Sequence[Effect]) -> tuple[float, float]:
-    """Return how the field that a motor has answers to the commanded one: to itself (1), and to its rate (s)."""
+    """Return how the field that a motor has answers to the commanded one: to itself (1), and to its rate (s).
+
+    Without what changes with time: a delay that beats has no part in a plant that does not.
+    """
+    effects = [effect for effect in effects if not (effect.port is Port.FIELD and "time" in effect.arguments)]
     known = dict.fromkeys(FIELD_SIGNALS, 0.0) | {"ratio": float(drive.ratio)}
     known |= {name: float(quantity) for name, quantity in drive.parameters.items()}
     of_field, of_rate = _port_slopes(effects, Port.FIELD, known, ("field_travel", "field_rate"))

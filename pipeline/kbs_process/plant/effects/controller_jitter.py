@@ -27,8 +27,10 @@ CONTROLLER_JITTER = Effect(
     port=Port.FIELD,
     equation=change,
     parameters=(
-        Parameter("jitter_sin", "s", Normal(0.0, 1e-3), "sine of the delay", (-0.1, 0.1), role="amplitude"),
-        Parameter("jitter_cos", "s", Normal(0.0, 1e-3), "cosine of the delay", (-0.1, 0.1), role="amplitude"),
+        Parameter("jitter_sin", "s", Normal(0.0, 1e-3), "sine of the delay", (-0.05, 0.05), role="amplitude"),
+        Parameter(
+            "jitter_cos", "s", Normal(0.0, 1e-3), "cosine of the delay", (-0.05, 0.05), role="amplitude"
+        ),
         Parameter(
             "jitter_frequency",
             "Hz",
