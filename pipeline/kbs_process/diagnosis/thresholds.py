@@ -43,8 +43,8 @@ CLEAR: Final = 3.0 * TOLERATED
 # Likewise of recordings that nothing was fitted to: nulls have left 1.15 of the floor's power.
 UNFORESEEN: Final = 0.5
 ORDERED: Final = 0.5  # share of the residual's excess that the best has to do for the screen's order to count
-# Sigmas of their priors within which numbers are drawn back once a law is in the plant, before they are let go again:
-# one in twenty is beyond.
+# Sigmas of their priors within which numbers that were pulled are drawn back, before a law is looked for, or they are
+# let go again beside one: one in twenty is beyond.
 CLOSE: Final = 2.0
 # Candidates that are simulated. A field that lags was the fifth where friction of the joint did nearly as well. Where
 # so much is left that the known numbers have been pulled, all whose shapes were looked for are: one that lags by two
