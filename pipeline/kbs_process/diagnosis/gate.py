@@ -2,7 +2,8 @@
 
 No held-out trial's whitened residual may become worse, beyond chance, and all together have to improve, by as much as
 chance does not and as what was fitted, or what the law changes there, lets expect; the interval of the law's
-coefficients has to exclude zero, and the residual's power has to be no less even along frequency. Where nothing was
+coefficients has to exclude zero, by the noise and by the scatter of what parts of the recordings ask for, and the
+residual's power has to be no less even along frequency. Where nothing was
 held out, each fit trial is left out in turn, to first order.
 """
 
@@ -15,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
 
+from kbs_process.diagnosis.evenness import scatter
 from kbs_process.diagnosis.gls import Background
 from kbs_process.diagnosis.known import Known
 from kbs_process.diagnosis.tails import log_tail
@@ -48,7 +50,8 @@ class Gate:
     passed: bool
     folds: tuple[Fold, ...]
     held_out: bool  # folds are recordings set apart; else fit trials left out in turn
-    sigmas: float  # by which the coefficients are off zero, as one normal number's
+    # By which the coefficients are off zero, as one normal number's: by the noise, or by the scatter of parts.
+    sigmas: float
     whiteness: tuple[float, float]  # before and after, see `whiteness`
     reasons: tuple[str, ...]  # of a refusal
 
@@ -67,7 +70,10 @@ def gate(before: Known, after: Known, coefficients: Sequence[int], shapes: Seque
     held_out = bool(experiment.held_out)
     folds = _held_out(before, after) if held_out else _left_out(before, after)
     index = np.asarray(coefficients)
-    sigmas = _sigmas(after.value[index], _beside(after.covariance, index, np.asarray(shapes, dtype=np.intp)))
+    held = _beside(after.covariance, np.asarray(shapes, dtype=np.intp))
+    sigmas = _sigmas(after.value[index], held[np.ix_(index, index)])
+    if np.isfinite(sigmas):
+        sigmas = float(np.minimum(sigmas, _sigmas(after.value[index], _scattered(after, held[:, index]))))
     white = whiteness(before), whiteness(after)
     reasons = []
     # Written so that what is no number, of a plant that diverged, is refused.
@@ -95,27 +101,43 @@ def worsened(folds: Sequence[Fold]) -> list[str]:
     return [fold.trial for fold in folds if not fold.gain > -allowed]
 
 
-def _beside(C: Array, index: NDArray[np.intp], held: NDArray[np.intp]) -> Array:
-    """Covariance of some numbers where others are `held`: C_ii - C_ih C_hh^+ C_hi, all other numbers free."""
-    own, across = C[np.ix_(index, index)], C[np.ix_(index, held)]
+def _beside(C: Array, held: NDArray[np.intp]) -> Array:
+    """Covariance of all numbers where some are `held`: C - C_h C_hh^+ C_h^T."""
     if not len(held) or not np.isfinite(C).all():
-        return np.asarray(own)
+        return C
+    across = C[:, held]
     size = 1.0 / np.sqrt(np.maximum(np.diag(C)[held], 1e-300))
     scaled = C[np.ix_(held, held)] * np.outer(size, size)
-    left = own - (across * size) @ np.linalg.lstsq(scaled, (across * size).T, rcond=1e-10)[0]
-    return np.asarray(left + _ROUNDING * np.diag(np.diag(own)))
+    left = C - (across * size) @ np.linalg.lstsq(scaled, (across * size).T, rcond=1e-10)[0]
+    return np.asarray(left + _ROUNDING * np.diag(np.diag(C)))
+
+
+def _scattered(known: Known, C: Array) -> Array:
+    """Covariance (m, m) by what parts of the recordings ask for (`evenness`), C (p, m) being that by the noise."""
+    parts = [
+        scatter(known.experiment, k, known.metric[k], known.residual[k], known.along(k, C))
+        for k in known.experiment.fit
+    ]
+    return np.asarray(np.sum(parts, axis=0), dtype=np.float64)
 
 
 def _sigmas(a: Array, C: Array) -> float:
     """By how many sigmas of one normal number amplitudes with covariance C are off zero; nan where C is none."""
+    square = wald(a, C)
+    if np.isnan(square):
+        return square
+    far = log_tail(square, len(a))
+    # As far out as a normal number of that two-sided chance; beyond its range the chi-square's own root.
+    return float(norm.isf(np.exp(far) / 2.0)) if far > -600.0 else float(np.sqrt(square))
+
+
+def wald(a: Array, C: Array) -> float:
+    """Squared sigmas that amplitudes (m,) of covariance C are off zero; nan where C is none."""
     variance = np.diag(C)
     if not (np.isfinite(C).all() and (variance > 0.0).all()):
         return float("nan")
     size = 1.0 / np.sqrt(variance)
-    wald = float(size * a @ np.linalg.lstsq(C * np.outer(size, size), size * a, rcond=1e-10)[0])
-    far = log_tail(wald, len(a))
-    # As far out as a normal number of that two-sided chance; beyond its range the chi-square's own root.
-    return float(norm.isf(np.exp(far) / 2.0)) if far > -600.0 else float(np.sqrt(wald))
+    return float(size * a @ np.linalg.lstsq(C * np.outer(size, size), size * a, rcond=1e-10)[0])
 
 
 def _promised(before: Known, after: Known) -> float:

@@ -139,8 +139,15 @@ class Known:
 
     def jacobian(self, trial: int) -> Array:
         """(rows, p) by which a trial's prediction answers to the parameters, whitened as its residual is."""
+        return self.metric[trial](np.moveaxis(self._columns(trial), 0, 2))
+
+    def along(self, trial: int, steps: Array) -> Array:
+        """(rows, m) the same to `steps` (p, m) of the parameters."""
+        return self.metric[trial](np.tensordot(self._columns(trial), steps, axes=(0, 0)))
+
+    def _columns(self, trial: int) -> Array:
         reference = self.experiment.reference(self.experiment.trials[trial].trajectory)
-        return self.metric[trial](np.moveaxis(self.slopes[reference].columns, 0, 2))
+        return self.slopes[reference].columns
 
 
 def refit(

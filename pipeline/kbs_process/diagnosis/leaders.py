@@ -7,16 +7,19 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
+from scipy.linalg import cho_solve
 from scipy.stats import chi2
 
 from kbs_process.diagnosis.curves import CurveSuspect
 from kbs_process.diagnosis.dissipation import drives, pushes
+from kbs_process.diagnosis.evenness import scatter
 from kbs_process.diagnosis.finding import Tried, explained_share
 from kbs_process.diagnosis.floor import Floor
-from kbs_process.diagnosis.gate import Fold, Gate, gate, whiteness
-from kbs_process.diagnosis.gls import Background, Sums, score
+from kbs_process.diagnosis.gate import Fold, Gate, gate, wald, whiteness
+from kbs_process.diagnosis.gls import Background, Score, Sums, score
 from kbs_process.diagnosis.hypothesis import Simulate
 from kbs_process.diagnosis.joint import Own, Standing, bare, with_extra
+from kbs_process.diagnosis.known import Known
 from kbs_process.diagnosis.orders import with_orders
 from kbs_process.diagnosis.outcome import Refused
 from kbs_process.diagnosis.plausible import implausible
@@ -40,6 +43,7 @@ from kbs_process.diagnosis.thresholds import (
 )
 from kbs_process.diagnosis.tryout import extra_of, identity, in_plant
 from kbs_process.diagnosis.view import View
+from kbs_process.signals.records import Array
 
 
 def leaders(view: View, among: Callable[[Found], bool] = lambda _: True) -> tuple[list[Found], list[Found]]:
@@ -147,7 +151,7 @@ def _oversized(suspect: Suspect, values: Iterable[float], sigmas: Iterable[float
 
 
 def _trial_by_trial(suspect: Suspect, standing: Standing, bench: Bench) -> tuple[Standing, Gate]:
-    """A law whose size and phase are each recording's own is taken off each; every one set apart has to show it."""
+    """A law whose size and phase are each recording's own is taken off each; every one has to show it all through."""
     known, experiment = standing.known, standing.known.experiment
     precision = np.where(np.isfinite(known.parameters.sigma), known.sigma, np.inf) ** -2.0
     plain = {experiment.reference(k): np.zeros(0) for k in range(len(experiment.repeats))}
@@ -169,13 +173,14 @@ def _trial_by_trial(suspect: Suspect, standing: Standing, bench: Bench) -> tuple
             for one, other in zip(greatest, zip(own.amplitude, sigma, strict=True), strict=True)
         ]
         if trial.role != "calibration":
-            strengths.append(own.gain)
+            gained = min(own.gain, _evenly(background, k, whitened, own, known))
+            strengths.append(gained)
             rows = float(known.rows[k])
             before, after = (float(z @ z) / rows for z in (known.residual[k], residual[k]))
             bound = float(chi2.isf(FALSE_ALARM, max(own.rank, 1)))
-            folds.append(Fold(trial.name, before, after, own.gain - bound))
+            folds.append(Fold(trial.name, before, after, gained - bound))
     worse = tuple(fold.trial for fold in folds if fold.gain <= 0.0)
-    reasons = (f"{', '.join(worse)} do not show it",) if worse else ()
+    reasons = (f"{', '.join(worse)} do not show it, all through",) if worse else ()
     if len(folds) < 2:
         reasons = (*reasons, "one recording alone cannot show that it comes again")
     white = whiteness(known), whiteness(replace(known, residual=tuple(residual)))
@@ -189,6 +194,16 @@ def _trial_by_trial(suspect: Suspect, standing: Standing, bench: Bench) -> tuple
         reasons,
     )
     return replace(standing, known=changed), verdict.but(*_oversized(suspect, *zip(*greatest, strict=True)))
+
+
+def _evenly(background: Background, trial: int, columns: Array, own: Score, known: Known) -> float:
+    """Wald statistic of a law's amplitudes in one trial, by the scatter of its parts: a gain where noise is left."""
+    J = background.J[trial] * background.scale
+    signature = columns - J @ cho_solve(background.factor, J.T @ columns)
+    left = background.z[trial] - J @ background.shift - signature @ own.amplitude
+    C = scatter(known.experiment, trial, known.metric[trial], left, signature @ own.covariance)
+    # What a law does that shows nothing there scatters by nothing.
+    return float(np.nan_to_num(wald(own.amplitude, C)))
 
 
 def reread(chosen: Tried, before: Standing, floor: Floor, simulate: Simulate) -> Tried:

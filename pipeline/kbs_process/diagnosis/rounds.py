@@ -58,7 +58,7 @@ def diagnose(
     """
     if near is not None:
         left = detected(standing_of(near, {}), floor, near.experiment.fit)
-        instead = _diagnosed(near, floor, simulate, left)
+        instead = _diagnosed(near, floor, simulate, left, at_once=True)
         if instead.finds:
             alone = _alone(known, near, instead.standing.known, floor, simulate)
             if instead.standing.known.cost < alone.cost - LEAST_RHO**2:
@@ -84,8 +84,14 @@ def _alone(known: Known, near: Known, beside: Known, floor: Floor, simulate: Sim
     return replace(again, chi2_before=known.chi2_before) if better else known
 
 
-def _diagnosed(known: Known, floor: Floor, simulate: Simulate, before: Detection) -> Outcome:
-    """Find what one refit of the known parameters leaves out."""
+def _diagnosed(
+    known: Known, floor: Floor, simulate: Simulate, before: Detection, *, at_once: bool = False
+) -> Outcome:
+    """Find what one refit of the known parameters leaves out.
+
+    What numbers alone explain, far from their priors, one law has to explain `at_once`, but for what may be another's:
+    laws that leave much are not looked beyond.
+    """
     begun = Standing(known, known.shown, {})
     standing = begun
     accepted: list[Accepted] = []
@@ -96,7 +102,7 @@ def _diagnosed(known: Known, floor: Floor, simulate: Simulate, before: Detection
         if found is None:
             break
         accepted.append(found)
-        if not detected(standing, floor, known.experiment.fit).left:
+        if (at_once and standing.known.gross) or not detected(standing, floor, known.experiment.fit).left:
             break
     last = rounds[-1]
     kept, standing, fallen = needed(accepted, standing, floor, simulate)

@@ -1,0 +1,91 @@
+"""Amplitudes known by the scatter of what parts of a recording ask for: noise as noise, a stand-in as none."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import cast
+
+import numpy as np
+import pytest
+
+from kbs_process.diagnosis.evenness import scatter
+from kbs_process.diagnosis.experiment import Experiment
+from kbs_process.diagnosis.gate import wald
+from kbs_process.diagnosis.metric import Metric
+from kbs_process.diagnosis.whiten import Projector, whitener
+from kbs_process.signals.records import Array
+
+DT, N, CHANNELS = 0.02, 12000, 3  # 240 s: 15 windows
+SIGMA = 0.3
+
+
+@dataclass(frozen=True)
+class Trial:
+    measured: Array
+
+
+@dataclass(frozen=True)
+class Recordings:
+    trials: tuple[Trial, ...]
+    dt: float
+
+
+EXPERIMENT = cast(Experiment, Recordings((Trial(np.zeros((N, CHANNELS))),), DT))
+
+
+def metric() -> Metric:
+    """Of white noise of SIGMA in each of three channels, all of which count whole."""
+    windows = np.ones((N, CHANNELS))
+    density = np.tile(2.0 * DT * SIGMA**2 * np.eye(CHANNELS), (N // 2 - 1, 1, 1)).astype(complex)
+    whiten = whitener(windows, DT, (0.0, 0.5 / DT - 1e-9), density)
+    rows = 2 * len(whiten.f) * CHANNELS
+    return Metric(whiten, np.ones(CHANNELS), Projector.of(np.zeros((rows, 0)), np.zeros(0)))
+
+
+def sigmas(law: Array, recorded: Array) -> tuple[float, float]:
+    """By how many sigmas the law's one amplitude is off zero: by the noise, and by the scatter of parts."""
+    of = metric()
+    S, z = of(law)[:, None], of(recorded)
+    C = np.linalg.inv(S.T @ S)
+    a = C @ S.T @ z
+    even = scatter(EXPERIMENT, 0, of, z - S @ a, S @ C)
+    return float(np.sqrt(wald(a, C))), float(np.sqrt(wald(a, even)))
+
+
+def law_and_noise() -> tuple[Array, Array]:
+    rng = np.random.default_rng(3)
+    t = DT * np.arange(N)
+    law = np.stack([np.sin(2 * np.pi * 0.4 * t), 0.5 * np.sin(2 * np.pi * 0.9 * t), np.cos(t)], axis=1)
+    return law, SIGMA * rng.standard_normal((N, CHANNELS))
+
+
+def test_a_law_that_is_there_in_noise_is_known_as_well_as_the_noise_says() -> None:
+    law, noise = law_and_noise()
+    by_noise, by_scatter = sigmas(law, 0.2 * law + noise)
+    assert by_scatter == pytest.approx(by_noise, rel=0.3)
+    assert by_noise > 40.0
+
+
+def test_parts_are_of_the_whole_length_of_the_products() -> None:
+    """Where every part asks for as much, their sum is the whole product: Parseval, channel by channel."""
+    law, noise = law_and_noise()
+    of = metric()
+    S, z = of(law)[:, None], of(noise)
+    e, D = of.in_time(z, N), of.in_time(S[:, 0], N)
+    assert np.sum(e * D) == pytest.approx(float(z @ S[:, 0]), rel=1e-6)
+
+
+def test_what_asks_for_more_here_and_for_less_there_is_not_there() -> None:
+    """A law of other sizes in every window and channel, of which a mean is left, many sigmas of the noise off zero."""
+    law, noise = law_and_noise()
+    rng = np.random.default_rng(4)
+    sizes = np.repeat(rng.normal(0.3, 1.5, (15, CHANNELS)), N // 15, axis=0)
+    by_noise, by_scatter = sigmas(law, sizes * law + noise)
+    assert by_noise > 40.0
+    assert by_scatter < 8.0
+
+
+def test_sigmas_do_not_depend_on_the_units_of_the_law() -> None:
+    law, noise = law_and_noise()
+    recorded = 0.2 * law + noise
+    assert sigmas(1e-6 * law, recorded) == pytest.approx(sigmas(law, recorded), rel=1e-9)
