@@ -1,4 +1,4 @@
-"""Amplitudes known by the scatter of what parts of a recording ask for: noise as noise, a stand-in as none."""
+"""Amplitudes known by how they change where a part is left out: by noise as noise says, of a stand-in not at all."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def sigmas(law: Array, recorded: Array) -> tuple[float, float]:
     S, z = of(law)[:, None], of(recorded)
     C = np.linalg.inv(S.T @ S)
     a = C @ S.T @ z
-    even = scatter(EXPERIMENT, 0, of, z - S @ a, S @ C)
+    even = scatter(EXPERIMENT, 0, of, z - S @ a, S @ C, C)
     return float(np.sqrt(wald(a, C))), float(np.sqrt(wald(a, even)))
 
 
@@ -81,6 +81,16 @@ def test_what_asks_for_more_here_and_for_less_there_is_not_there() -> None:
     rng = np.random.default_rng(4)
     sizes = np.repeat(rng.normal(0.3, 1.5, (15, CHANNELS)), N // 15, axis=0)
     by_noise, by_scatter = sigmas(law, sizes * law + noise)
+    assert by_noise > 40.0
+    assert by_scatter < 8.0
+
+
+def test_what_one_part_alone_shows_is_known_by_nothing() -> None:
+    """A law that acts for some seconds in one channel, and follows exactly what is there."""
+    law, noise = law_and_noise()
+    short = np.zeros_like(law)
+    short[5200:5400, 1] = law[5200:5400, 1]
+    by_noise, by_scatter = sigmas(short, 5.0 * short + noise)
     assert by_noise > 40.0
     assert by_scatter < 8.0
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from kbs_process.diagnosis.experiment import Experiment
+from kbs_process.diagnosis.jumps import jump
 from kbs_process.diagnosis.proposals import _along, proposed
 from kbs_process.diagnosis.scene import Scene
 from kbs_process.signals.records import Array
@@ -116,11 +117,19 @@ def test_orders_of_a_motor_are_proposed_for_its_gear_and_its_microsteps_too(made
 
 
 @pytest.mark.parametrize("stream", ["wrench", "encoder"])
-def test_the_time_at_which_a_clock_jumps_is_proposed(made: Experiment, stream: str) -> None:
-    measured = made.trials[0].measured
-    late = np.arange(len(measured)) * made.dt > 23.7
+def test_the_time_at_which_a_clock_jumps_is_each_trajectory_s_own(stream: str) -> None:
+    made = bench.experiment(bench.rig(), ("fit", "fit", "held-out"), 1, seconds=60.0)
+    apart = tuple(replace(one, trajectory=min(k, 1)) for k, one in enumerate(made.trials))
+    made = replace(made, trials=apart)
+    begun = bench.standing(made, (Scalar("joint.el.drive.Ka"),))
     channels = slice(0, 6) if stream == "wrench" else slice(made.loads, None)
-    shift = np.zeros_like(measured)
-    shift[:, channels] = -0.3 * (np.gradient(measured, made.dt, axis=0) * late[:, None])[:, channels]
-    found = proposals(shift, made)
-    assert found[f"drop_time.{stream}"] == pytest.approx((23.7,), abs=0.5)
+    for trial, when in ((0, 23.7), (1, 41.2)):
+        measured = made.trials[trial].measured
+        late = np.arange(len(measured)) * made.dt > when
+        shift = np.zeros_like(measured)
+        shift[:, channels] = -0.3 * (np.gradient(measured, made.dt, axis=0) * late[:, None])[:, channels]
+        trials = list(made.trials)
+        trials[trial] = replace(trials[trial], measured=measured + shift)
+        made = replace(made, trials=tuple(trials))
+    assert jump(made, begun.predicted, 0, stream) == pytest.approx(23.7, abs=0.5)
+    assert jump(made, begun.predicted, 1, stream) == pytest.approx(41.2, abs=0.5)

@@ -21,6 +21,7 @@ KNOWN: dict[str, Array | float] = {
     "time": T,
     "temperature": 20.0 + 0.01 * T,
     "code": 2.0 * np.pi / 2**14,
+    "drop_time": 60.0,
 }
 
 

@@ -74,7 +74,8 @@ def readings(
         shape = tuple((name, value) for name, value in numbers.items() if name not in amplitudes)
         if "temperature" in law.arguments and warmth is None:
             continue
-        units = sensed(Candidate(law, entry.site, shape), t, values, names, rig, warmth)
+        known = {} if warmth is None else {"temperature": warmth}
+        units = sensed(Candidate(law, entry.site, shape), t, values, names, rig, known)
         read += units @ np.array([numbers[name] for name in amplitudes])
     return read
 

@@ -13,6 +13,7 @@ from kbs_process.diagnosis.curves import CurveSuspect, along, basis
 from kbs_process.diagnosis.families import family
 from kbs_process.diagnosis.gate import Gate
 from kbs_process.diagnosis.joint import Own, Standing
+from kbs_process.diagnosis.jumps import jump
 from kbs_process.diagnosis.known import Known
 from kbs_process.diagnosis.outcome import Alternative, Curve, Estimate, Find, Identity, Place
 from kbs_process.diagnosis.places import POINT
@@ -153,6 +154,7 @@ def _estimates(taken: Tried, before: Standing) -> tuple[Estimate, ...]:
             Estimate(name, units.get(name, ""), float(value), float(sigma))
             for name, value, sigma in zip(names, taken.found.score.amplitude, spread, strict=False)
         ]
+        fitted += _drops(suspect)
     else:
         fitted = []
         for scalar, value, sigma in zip(
@@ -165,6 +167,18 @@ def _estimates(taken: Tried, before: Standing) -> tuple[Estimate, ...]:
             fitted.append(Estimate(name, units.get(plain, ""), about + value, sigma, about))
     done = {one.name for one in fitted}
     return (*fitted, *(Estimate(n, units.get(n, ""), v, 0.0) for n, v in fixed.items() if n not in done))
+
+
+def _drops(suspect: Suspect) -> list[Estimate]:
+    """When a clock seems to jump, along each trajectory that is fitted; nothing of another law."""
+    if not (isinstance(suspect, Catalogued) and "drop_time" in suspect.candidate.effect.arguments):
+        return []
+    experiment, shown, stream = suspect.scene.experiment, suspect.scene.predicted, suspect.candidate.site
+    first = {experiment.trials[k].trajectory: experiment.trials[k].name for k in reversed(experiment.fit)}
+    return [
+        Estimate(f"drop_time {name}", "s", jump(experiment, shown, trajectory, stream), 0.0)
+        for trajectory, name in sorted(first.items())
+    ]
 
 
 def _short(name: str, plant: bool) -> str:

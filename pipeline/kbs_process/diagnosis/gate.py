@@ -73,7 +73,7 @@ def gate(before: Known, after: Known, coefficients: Sequence[int], shapes: Seque
     held = _beside(after.covariance, np.asarray(shapes, dtype=np.intp))
     sigmas = _sigmas(after.value[index], held[np.ix_(index, index)])
     if np.isfinite(sigmas):
-        sigmas = float(np.minimum(sigmas, _sigmas(after.value[index], _scattered(after, held[:, index]))))
+        sigmas = float(np.minimum(sigmas, _sigmas(after.value[index], _scattered(after, held, index))))
     white = whiteness(before), whiteness(after)
     reasons = []
     # Written so that what is no number, of a plant that diverged, is refused.
@@ -112,10 +112,11 @@ def _beside(C: Array, held: NDArray[np.intp]) -> Array:
     return np.asarray(left + _ROUNDING * np.diag(np.diag(C)))
 
 
-def _scattered(known: Known, C: Array) -> Array:
-    """Covariance (m, m) by what parts of the recordings ask for (`evenness`), C (p, m) being that by the noise."""
+def _scattered(known: Known, C: Array, index: NDArray[np.intp]) -> Array:
+    """Covariance of some numbers by what parts of the recordings ask for (`evenness`), C (p, p) that by the noise."""
+    own, steps = C[np.ix_(index, index)], C[:, index]
     parts = [
-        scatter(known.experiment, k, known.metric[k], known.residual[k], known.along(k, C))
+        scatter(known.experiment, k, known.metric[k], known.residual[k], known.along(k, steps), own)
         for k in known.experiment.fit
     ]
     return np.asarray(np.sum(parts, axis=0), dtype=np.float64)

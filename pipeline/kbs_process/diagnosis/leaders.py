@@ -201,9 +201,11 @@ def _evenly(background: Background, trial: int, columns: Array, own: Score, know
     J = background.J[trial] * background.scale
     signature = columns - J @ cho_solve(background.factor, J.T @ columns)
     left = background.z[trial] - J @ background.shift - signature @ own.amplitude
-    C = scatter(known.experiment, trial, known.metric[trial], left, signature @ own.covariance)
-    # What a law does that shows nothing there scatters by nothing.
-    return float(np.nan_to_num(wald(own.amplitude, C)))
+    if not own.rank:
+        return 0.0
+    C = own.covariance
+    V = scatter(known.experiment, trial, known.metric[trial], left, signature @ C, C)
+    return float(np.nan_to_num(wald(own.amplitude, V)))
 
 
 def reread(chosen: Tried, before: Standing, floor: Floor, simulate: Simulate) -> Tried:

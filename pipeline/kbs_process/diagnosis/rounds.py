@@ -168,7 +168,7 @@ def _round(standing: Standing, floor: Floor, simulate: Simulate, accepted: Seque
             continue
         # Told anew, it may be what another was: their chances are one then.
         others = [k for k in order[number + 1 :] if _law(passed[k]) != _law(told)]
-        chance = chances[others] / float(chances[order[number:]].sum())
+        chance = chances[others] / max(float(chances[order[number:]].sum()), np.finfo(np.float64).tiny)
         find = find_of(
             [told, *(passed[k] for k in others)], 0, np.array([1.0 - float(chance.sum()), *chance]), standing,
             place, [one.identity for one in refused],

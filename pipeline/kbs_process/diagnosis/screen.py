@@ -19,6 +19,7 @@ from kbs_process.diagnosis import direct
 from kbs_process.diagnosis.gls import Background, Score, Sums, absorbing, per_trial, score
 from kbs_process.diagnosis.hypothesis import coupled
 from kbs_process.diagnosis.inlets import Inlet
+from kbs_process.diagnosis.jumps import jump
 from kbs_process.diagnosis.known import Known
 from kbs_process.diagnosis.scene import Scene
 from kbs_process.diagnosis.side_by_side import side_by_side
@@ -91,8 +92,13 @@ class Catalogued:
             return reduced(self.candidate, tapped, experiment.channels, rig, experiment.dt, len(prediction))
         t = np.asarray(np.arange(len(prediction)) * experiment.dt, dtype=np.float64)
         own = [one for one in experiment.trials if one.drive == drive]
-        temperature = min(own, key=lambda one: one.role == "held-out").temperature  # the first that is fitted
-        return sensed(self.candidate, t, prediction, experiment.channels, rig, temperature)
+        first = min(own, key=lambda one: one.role == "held-out")  # the first that is fitted
+        known: dict[str, Array | float] = {}
+        if first.temperature is not None:
+            known["temperature"] = first.temperature
+        if "drop_time" in law.arguments:
+            known["drop_time"] = jump(experiment, self.scene.predicted, first.trajectory, self.candidate.site)
+        return sensed(self.candidate, t, prediction, experiment.channels, rig, known)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -107,11 +107,14 @@ def sensed(
     prediction: Array,
     channels: Sequence[str],
     rig: Rig,
-    temperature: Array | None = None,
+    known: Mapping[str, Array | float] | None = None,
 ) -> Array:
-    """Change of a prediction (n, c) by a unit of each amplitude of a suspect of the sensing, (n, c, amplitudes)."""
+    """Change of a prediction (n, c) by a unit of each amplitude of a suspect of the sensing, (n, c, amplitudes).
+
+    `known` is what else is known of the recording that its equation may ask for.
+    """
     out = np.zeros((*prediction.shape, len(candidate.amplitudes)))
-    for k, change in _by_channel(candidate, t, prediction, channels, rig, temperature).items():
+    for k, change in _by_channel(candidate, t, prediction, channels, rig, known or {}).items():
         out[:, k] = change
     return out
 
@@ -127,7 +130,7 @@ def reduced(
     assert tapped.readings is not None
     t = np.arange(len(tapped.readings)) / tapped.rate
     out = np.zeros((n, len(channels), len(candidate.amplitudes)))
-    for k, change in _by_channel(candidate, t, tapped.readings, channels, rig, None).items():
+    for k, change in _by_channel(candidate, t, tapped.readings, channels, rig, {}).items():
         slow = resample(change, tapped.rate, 1.0 / dt)[:n]
         out[: len(slow), k] = slow
     return out
@@ -139,14 +142,12 @@ def _by_channel(
     prediction: Array,
     channels: Sequence[str],
     rig: Rig,
-    temperature: Array | None,
+    recorded: Mapping[str, Array | float],
 ) -> dict[int, Array]:
     """Change by a unit of each amplitude, (n, amplitudes), of the channels (by index) at which a suspect acts."""
     law, site = candidate.effect, candidate.site
     assert isinstance(law, Sensing)
-    given: dict[str, Array | float] = {}
-    if temperature is not None:
-        given["temperature"] = temperature
+    given = dict(recorded)
     match law.port:
         case SensingPort.STREAM:
             joints = rig.joint_names

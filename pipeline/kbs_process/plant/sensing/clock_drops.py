@@ -12,7 +12,7 @@ def change(rate: Array, time: Array, dropped: float, drop_time: float) -> Array:
 
     Equation: $\Delta y = \tau \dot y$ where $t > t_0$, else 0.
     Units: the channel's a second, s, s, s -> the channel's.
-    Validity: one loss, at a time of its own in every recording; to first order in its length.
+    Validity: one loss, at a time of its own along every trajectory; to first order in its length.
     Source: D. W. Allan, N. Ashby, C. C. Hodge, The science of timekeeping, Hewlett-Packard AN 1289 (1997).
     """
     return dropped * (time > drop_time) * rate
@@ -22,18 +22,7 @@ CLOCK_DROPS = Sensing(
     name="clock_drops",
     port=SensingPort.STREAM,
     equation=change,
-    parameters=(
-        Parameter("dropped", "s", Normal(0.0, 0.05), "time lost", (-10.0, 10.0), role="amplitude"),
-        Parameter(
-            "drop_time",
-            "s",
-            Normal(0.0, 1e3),
-            "when",
-            (-1e6, 1e6),
-            grid=tuple((i + 0.5) / 12.0 for i in range(12)),
-            over="time",
-        ),
-    ),
+    parameters=(Parameter("dropped", "s", Normal(0.0, 0.05), "time lost", (-10.0, 10.0), role="amplitude"),),
     reference="D. W. Allan, N. Ashby, C. C. Hodge, The science of timekeeping, Hewlett-Packard AN 1289 (1997)",
     each_trial=True,
 )

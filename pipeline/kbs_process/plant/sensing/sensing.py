@@ -22,7 +22,10 @@ READINGS = {
     "time": "s, on the recording's time axis",
     "temperature": "degC, of the transducer",
 }
-SCALARS = {"code": "rad, one code of the encoder"}
+SCALARS = {
+    "code": "rad, one code of the encoder",
+    "drop_time": "s, when the clock of this recording's stream seems to jump",
+}
 
 
 class SensingPort(Enum):
