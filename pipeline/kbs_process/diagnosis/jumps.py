@@ -20,11 +20,9 @@ def jump(experiment: Experiment, predicted: Mapping[int, Prediction], trajectory
     `predicted` are the readings by drive; recordings that are held out say nothing, where others are not. Amid a
     trajectory along which nothing moves.
 
-    What is left of a reading y that is late by tau is -tau dy/dt. With one tau before t0 and another after it,
-
-        gain(t0) = N1^2/D1 + N2^2/D2 - (N1 + N2)^2/(D1 + D2),   N = sum e y', D = sum y'^2
-
-    over the samples of either side, channels weighted by their noise, summed over the recordings of the trajectory.
+    What is left of a reading y that is late by tau is b - tau dy/dt, b the channel's bias. The gain of t0 is what one
+    tau before it and another after it take of the squares of what is left beyond what one tau for all takes: least
+    squares, the biases taken out, channels weighted by their noise, summed over the recordings of the trajectory.
     """
     own = [trial for trial in experiment.trials if trial.trajectory == trajectory]
     own = [trial for trial in own if trial.role != "held-out"] or own
@@ -40,15 +38,22 @@ def jump(experiment: Experiment, predicted: Mapping[int, Prediction], trajectory
 
 def _gain(error: Array, shown: Array, valid: Mask, places: Array) -> Array:
     """(m,) what a jump at each of some places, in samples, takes of an error (n, c) of readings as they are `shown`."""
-    if shown.shape[1] == 0:
+    e, rate = error[valid], np.gradient(shown, axis=0)[valid]
+    if shown.shape[1] == 0 or len(e) < 2:
         return np.zeros(len(places))
-    weight = 1.0 / np.maximum(np.var(np.diff(error[valid], axis=0), axis=0), 1e-300)
-    rate = np.gradient(shown, axis=0) * valid[:, None]
-    N = np.concatenate([[0.0], np.cumsum((error * rate) @ weight)])
-    D = np.concatenate([[0.0], np.cumsum(rate**2 @ weight)])
-    if not D[-1] > 0.0:
+    weight = 1.0 / np.maximum(np.var(np.diff(e, axis=0), axis=0), 1e-300)
+    at = np.searchsorted(np.flatnonzero(valid), places)
+    N, D, mean = (
+        np.vstack([np.zeros(rate.shape[1]), np.cumsum(one, axis=0)])
+        for one in ((e - e.mean(axis=0)) * rate, rate**2, rate)
+    )
+    before, after = mean[at], mean[-1] - mean[at]
+    n1, n2 = N[at] @ weight, (N[-1] - N[at]) @ weight
+    d1, d2 = (D[at] - before**2 / len(e)) @ weight, (D[-1] - D[at] - after**2 / len(e)) @ weight
+    across = -(before * after / len(e)) @ weight
+    least = 1e-9 * float(D[-1] @ weight)
+    if not least > 0.0:
         return np.zeros(len(places))
-    at = places.astype(np.intp)
-    least = 1e-9 * D[-1]
-    before, after = np.maximum(D[at], least), np.maximum(D[-1] - D[at], least)
-    return np.asarray(N[at] ** 2 / before + (N[-1] - N[at]) ** 2 / after - N[-1] ** 2 / D[-1])
+    d1, d2 = np.maximum(d1, least), np.maximum(d2, least)
+    two = (n1**2 * d2 - 2.0 * n1 * n2 * across + n2**2 * d1) / np.maximum(d1 * d2 - across**2, least**2)
+    return np.asarray(two - (n1 + n2) ** 2 / np.maximum(d1 + 2.0 * across + d2, least))
