@@ -8,9 +8,8 @@ from typing import cast
 import numpy as np
 import pytest
 
-from kbs_process.diagnosis.evenness import scatter
+from kbs_process.diagnosis.evenness import evenly, parts
 from kbs_process.diagnosis.experiment import Experiment
-from kbs_process.diagnosis.gate import wald
 from kbs_process.diagnosis.metric import Metric
 from kbs_process.diagnosis.whiten import Projector, whitener
 from kbs_process.signals.records import Array
@@ -43,13 +42,11 @@ def metric() -> Metric:
 
 
 def sigmas(law: Array, recorded: Array) -> tuple[float, float]:
-    """By how many sigmas the law's one amplitude is off zero: by the noise, and by the scatter of parts."""
+    """By how many sigmas the law's one amplitude is off zero: by the noise, and by what parts ask for."""
     of = metric()
-    S, z = of(law)[:, None], of(recorded)
-    C = np.linalg.inv(S.T @ S)
-    a = C @ S.T @ z
-    even = scatter(EXPERIMENT, 0, of, z - S @ a, S @ C, C)
-    return float(np.sqrt(wald(a, C))), float(np.sqrt(wald(a, even)))
+    S, z = of(law), of(recorded)
+    a = float(S @ z / (S @ S))
+    return abs(a) * float(np.linalg.norm(S)), evenly([parts(EXPERIMENT, 0, of, a * S, z - a * S)])
 
 
 def law_and_noise() -> tuple[Array, Array]:
@@ -66,13 +63,15 @@ def test_a_law_that_is_there_in_noise_is_known_as_well_as_the_noise_says() -> No
     assert by_noise > 40.0
 
 
-def test_parts_are_of_the_whole_length_of_the_products() -> None:
-    """Where every part asks for as much, their sum is the whole product: Parseval, channel by channel."""
+def test_parts_add_up_to_the_whole_product() -> None:
+    """Parseval, channel by channel."""
     law, noise = law_and_noise()
     of = metric()
-    S, z = of(law)[:, None], of(noise)
-    e, D = of.in_time(z, N), of.in_time(S[:, 0], N)
-    assert np.sum(e * D) == pytest.approx(float(z @ S[:, 0]), rel=1e-6)
+    S, z = of(law), of(noise)
+    pull, done = parts(EXPERIMENT, 0, of, S, z)
+    assert len(pull) == 15 * CHANNELS
+    assert pull.sum() == pytest.approx(float(S @ z), rel=1e-6)
+    assert done.sum() == pytest.approx(float(S @ S), rel=1e-6)
 
 
 def test_what_asks_for_more_here_and_for_less_there_is_not_there() -> None:

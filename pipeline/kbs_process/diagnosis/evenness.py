@@ -1,20 +1,24 @@
-r"""How well amplitudes are known where more is left over than noise: by the scatter of what each part asks for.
+r"""How well a law's size is known where more is left over than noise: by the scatter of what each part asks for.
 
 A law with free amplitudes follows whatever was left out of the plant: a clock that jumps does, for a while and in some
 channels, what a friction does. By the noise such amplitudes are thousands of sigmas off zero. But a law that is there
 asks for the same size in every window of every channel, and what stands in asks for as much more here as for less
-there. With S the whitened signature, less what all other numbers take up of it, C = (S^T S)^{-1}, e what is left over,
-and parts b = windows x channels, amplitudes change by leaving a part out, and vary, by
+there. With d what the law does, whitened, less what all other numbers take up of it, e what is left over, and parts
+b = windows x channels, the size s of the law, 1 as it was fitted, changes by leaving a part out, and varies, by
 
-    a - a_b = (C^{-1} - S_b^T S_b)^{-1} S_b^T e_b,   V = sum_b (a - a_b) (a - a_b)^T.
+    s - s_b = d_b^T e_b / (d^T d - d_b^T d_b),   sigma^2 = sum_b (s - s_b)^2.
 
-Where e is noise, V is C, as far as there are parts enough to tell. What lies within a single part is known by nothing.
+Where e is noise, sigma^-2 is d^T d, as far as there are parts enough to tell: the square of the law's distance. What
+lies within a single part is known by nothing.
 Source: B. Efron, The jackknife, the bootstrap and other resampling plans (SIAM, 1982), chapter 3; J. G. MacKinnon, H.
     White, Some heteroskedasticity-consistent covariance matrix estimators, J. Econometrics 29 (1985) 305.
-Validity: windows longer than what is left over is correlated for: a resonance's ringing decays in 3 s.
+Validity: windows longer than what is left over is correlated for: a resonance's ringing decays in 3 s. Those of
+    recordings of less than two minutes are shorter than that of the port test.
 """
 
 from __future__ import annotations
+
+from collections.abc import Iterable
 
 import numpy as np
 
@@ -23,30 +27,25 @@ from kbs_process.diagnosis.metric import Metric
 from kbs_process.diagnosis.thresholds import WINDOW_S
 from kbs_process.signals.records import Array
 
-_ALIKE = 1e-9  # of correlations: combinations of amplitudes that are one and the same
+_FEWEST = 8  # windows of a recording, however short
+_LEAST = 1e-12  # of what a law does, that the other parts show
 
 
-def scatter(
-    experiment: Experiment, trial: int, metric: Metric, left: Array, directions: Array, C: Array
-) -> Array:
-    """(m, m) sum over a trial's parts of squares of (a - a_b), of whitened e (rows,) `left` and S C (rows, m).
-
-    C (m, m) is the covariance by the noise, over all trials from which amplitudes are.
-    """
+def parts(experiment: Experiment, trial: int, metric: Metric, done: Array, left: Array) -> Array:
+    """(2, parts) d_b^T e_b and d_b^T d_b of one trial, of whitened d (rows,) `done` by a law and e (rows,) `left`."""
     n = len(experiment.trials[trial].measured)
-    count = max(1, round(n * experiment.dt / WINDOW_S))
+    count = min(n, max(_FEWEST, round(n * experiment.dt / WINDOW_S)))
     starts = np.linspace(0, n, count, endpoint=False).astype(np.intp)
-    size = 1.0 / np.sqrt(np.maximum(np.diag(C), 1e-300))  # amplitudes come in units of any size
-    e = metric.share * metric.in_time(left, n)
-    D = np.stack([metric.in_time(one, n) for one in (directions * size).T], axis=2)
-    pulls = np.add.reduceat(e[:, :, None] * D, starts, axis=0).reshape(-1, len(C))
-    D *= np.sqrt(metric.share)[:, None]
-    products = np.stack(
-        [np.add.reduceat(D * D[:, :, k, None], starts, axis=0) for k in range(len(C))], axis=3
-    )
-    inverse = np.linalg.pinv(C * np.outer(size, size), rcond=_ALIKE, hermitian=True)
-    others = np.eye(len(C)) - products.reshape(-1, len(C), len(C)) @ inverse
-    # A direction that one part alone shows is known by no other.
-    others += _ALIKE * np.eye(len(C))
-    moved = np.linalg.solve(others, pulls[:, :, None])[:, :, 0] / size
-    return np.asarray(moved.T @ moved, dtype=np.float64)
+    d, e = metric.in_time(done, n), metric.in_time(left, n)
+    products = [np.add.reduceat(metric.share * d * one, starts, axis=0).ravel() for one in (e, d)]
+    return np.asarray(products, dtype=np.float64)
+
+
+def evenly(of_trials: Iterable[Array]) -> float:
+    """By how many sigmas of a law's size, as the `parts` of all trials have it, it is off zero."""
+    pull, done = np.concatenate(list(of_trials), axis=1)
+    total = float(done.sum())
+    if not total > 0.0:
+        return 0.0
+    moved = pull / np.maximum(total - done, _LEAST * total)
+    return float(1.0 / np.sqrt(np.maximum(moved @ moved, 1e-300)))

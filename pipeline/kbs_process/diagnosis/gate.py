@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
 
-from kbs_process.diagnosis.evenness import scatter
+from kbs_process.diagnosis.evenness import evenly, parts
 from kbs_process.diagnosis.gls import Background
 from kbs_process.diagnosis.known import Known
 from kbs_process.diagnosis.tails import log_tail
@@ -73,7 +73,7 @@ def gate(before: Known, after: Known, coefficients: Sequence[int], shapes: Seque
     held = _beside(after.covariance, np.asarray(shapes, dtype=np.intp))
     sigmas = _sigmas(after.value[index], held[np.ix_(index, index)])
     if np.isfinite(sigmas):
-        sigmas = float(np.minimum(sigmas, _sigmas(after.value[index], _scattered(after, held, index))))
+        sigmas = float(np.minimum(sigmas, _evenly(after, held, index)))
     white = whiteness(before), whiteness(after)
     reasons = []
     # Written so that what is no number, of a plant that diverged, is refused.
@@ -112,33 +112,31 @@ def _beside(C: Array, held: NDArray[np.intp]) -> Array:
     return np.asarray(left + _ROUNDING * np.diag(np.diag(C)))
 
 
-def _scattered(known: Known, C: Array, index: NDArray[np.intp]) -> Array:
-    """Covariance of some numbers by what parts of the recordings ask for (`evenness`), C (p, p) that by the noise."""
-    own, steps = C[np.ix_(index, index)], C[:, index]
-    parts = [
-        scatter(known.experiment, k, known.metric[k], known.residual[k], known.along(k, steps), own)
+def _evenly(known: Known, C: Array, index: NDArray[np.intp]) -> float:
+    """By how many sigmas the amplitudes `index` together are off zero, by what parts of the recordings ask for.
+
+    C (p, p) is the covariance by the noise: what they do that no other number takes up is J C_i C_ii^-1 a.
+    """
+    own = C[np.ix_(index, index)]
+    size = 1.0 / np.sqrt(np.maximum(np.diag(own), 1e-300))
+    a = size * np.linalg.lstsq(own * np.outer(size, size), size * known.value[index], rcond=1e-10)[0]
+    steps = (C[:, index] @ a)[:, None]
+    return evenly(
+        parts(known.experiment, k, known.metric[k], known.along(k, steps)[:, 0], known.residual[k])
         for k in known.experiment.fit
-    ]
-    return np.asarray(np.sum(parts, axis=0), dtype=np.float64)
+    )
 
 
 def _sigmas(a: Array, C: Array) -> float:
     """By how many sigmas of one normal number amplitudes with covariance C are off zero; nan where C is none."""
-    square = wald(a, C)
-    if np.isnan(square):
-        return square
-    far = log_tail(square, len(a))
-    # As far out as a normal number of that two-sided chance; beyond its range the chi-square's own root.
-    return float(norm.isf(np.exp(far) / 2.0)) if far > -600.0 else float(np.sqrt(square))
-
-
-def wald(a: Array, C: Array) -> float:
-    """Squared sigmas that amplitudes (m,) of covariance C are off zero; nan where C is none."""
     variance = np.diag(C)
     if not (np.isfinite(C).all() and (variance > 0.0).all()):
         return float("nan")
     size = 1.0 / np.sqrt(variance)
-    return float(size * a @ np.linalg.lstsq(C * np.outer(size, size), size * a, rcond=1e-10)[0])
+    wald = float(size * a @ np.linalg.lstsq(C * np.outer(size, size), size * a, rcond=1e-10)[0])
+    far = log_tail(wald, len(a))
+    # As far out as a normal number of that two-sided chance; beyond its range the chi-square's own root.
+    return float(norm.isf(np.exp(far) / 2.0)) if far > -600.0 else float(np.sqrt(wald))
 
 
 def _promised(before: Known, after: Known) -> float:

@@ -12,10 +12,10 @@ from scipy.stats import chi2
 
 from kbs_process.diagnosis.curves import CurveSuspect
 from kbs_process.diagnosis.dissipation import drives, pushes
-from kbs_process.diagnosis.evenness import scatter
+from kbs_process.diagnosis.evenness import evenly, parts
 from kbs_process.diagnosis.finding import Tried, explained_share
 from kbs_process.diagnosis.floor import Floor
-from kbs_process.diagnosis.gate import Fold, Gate, gate, wald, whiteness
+from kbs_process.diagnosis.gate import Fold, Gate, gate, whiteness
 from kbs_process.diagnosis.gls import Background, Score, Sums, score
 from kbs_process.diagnosis.hypothesis import Simulate
 from kbs_process.diagnosis.joint import Own, Standing, bare, with_extra
@@ -173,7 +173,7 @@ def _trial_by_trial(suspect: Suspect, standing: Standing, bench: Bench) -> tuple
             for one, other in zip(greatest, zip(own.amplitude, sigma, strict=True), strict=True)
         ]
         if trial.role != "calibration":
-            gained = min(own.gain, _evenly(background, k, whitened, own, known))
+            gained = _even_gain(background, k, whitened, own, known)
             strengths.append(gained)
             rows = float(known.rows[k])
             before, after = (float(z @ z) / rows for z in (known.residual[k], residual[k]))
@@ -196,16 +196,13 @@ def _trial_by_trial(suspect: Suspect, standing: Standing, bench: Bench) -> tuple
     return replace(standing, known=changed), verdict.but(*_oversized(suspect, *zip(*greatest, strict=True)))
 
 
-def _evenly(background: Background, trial: int, columns: Array, own: Score, known: Known) -> float:
-    """Wald statistic of a law's amplitudes in one trial, by the scatter of its parts: a gain where noise is left."""
+def _even_gain(background: Background, trial: int, columns: Array, own: Score, known: Known) -> float:
+    """Gain of a law in one trial, or the square of its sigmas off zero by what parts of it ask for, if that is less."""
     J = background.J[trial] * background.scale
-    signature = columns - J @ cho_solve(background.factor, J.T @ columns)
-    left = background.z[trial] - J @ background.shift - signature @ own.amplitude
-    if not own.rank:
-        return 0.0
-    C = own.covariance
-    V = scatter(known.experiment, trial, known.metric[trial], left, signature @ C, C)
-    return float(np.nan_to_num(wald(own.amplitude, V)))
+    done = (columns - J @ cho_solve(background.factor, J.T @ columns)) @ own.amplitude
+    left = background.z[trial] - J @ background.shift - done
+    even = evenly([parts(known.experiment, trial, known.metric[trial], done, left)])
+    return min(own.gain, even**2)
 
 
 def reread(chosen: Tried, before: Standing, floor: Floor, simulate: Simulate) -> Tried:
