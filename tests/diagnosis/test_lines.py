@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from kbs_process.diagnosis.experiment import Experiment
-from kbs_process.diagnosis.jumps import jump
+from kbs_process.diagnosis.jumps import _gain, jump
 from kbs_process.diagnosis.proposals import _along, proposed
 from kbs_process.diagnosis.scene import Scene
 from kbs_process.signals.records import Array
@@ -128,8 +128,26 @@ def test_the_time_at_which_a_clock_jumps_is_each_trajectory_s_own(stream: str) -
         late = np.arange(len(measured)) * made.dt > when
         shift = np.zeros_like(measured)
         shift[:, channels] = -0.3 * (np.gradient(measured, made.dt, axis=0) * late[:, None])[:, channels]
+        if stream == "wrench":  # whose zeros drift, too
+            shift[:, channels] += np.linspace(0.0, 0.3, len(measured))[:, None]
         trials = list(made.trials)
         trials[trial] = replace(trials[trial], measured=measured + shift)
         made = replace(made, trials=tuple(trials))
     assert jump(made, begun.predicted, 0, stream) == pytest.approx(23.7, abs=0.5)
     assert jump(made, begun.predicted, 1, stream) == pytest.approx(41.2, abs=0.5)
+
+
+def test_a_clock_that_jumps_while_a_joint_turns_at_one_rate_is_a_step_of_its_angle() -> None:
+    rng = np.random.default_rng(8)
+    shown = 0.01 * np.arange(2000.0)[:, None]
+    error = -0.05 * (np.arange(2000) > 1200)[:, None] + 1e-3 * rng.standard_normal((2000, 1))
+    places = np.arange(50.0, 1950.0, 10.0)
+    gain = _gain(error, shown, np.ones((2000, 1), dtype=np.bool_), places)
+    assert places[np.argmax(gain)] == pytest.approx(1200.0, abs=10.0)
+
+
+@pytest.mark.parametrize("there", [True, False])
+def test_no_jump_is_seen_where_nothing_is_left_or_nothing_is_there(there: bool) -> None:
+    shown = np.sin(0.01 * np.arange(500.0))[:, None]
+    gain = _gain(np.zeros((500, 1)), shown, np.full((500, 1), there), np.arange(50.0, 450.0))
+    np.testing.assert_array_equal(gain, 0.0)

@@ -49,6 +49,10 @@ class CurveSuspect:
     def each_trial(self) -> bool:
         return False
 
+    @property
+    def places(self) -> int:
+        return 1
+
     def inputs(self, drive: int) -> Sequence[Mapping[Inlet, Array]]:
         """Splines along the taps, of a friction against the rate: the mean over each interval."""
         means = self.basis(series(self.scene, drive, self.joint, self.law.regressor))

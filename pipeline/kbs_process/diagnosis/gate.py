@@ -40,7 +40,7 @@ class Fold:
     trial: str
     before: float  # whitened sum of squares over its expectation
     after: float
-    gain: float  # -2 log likelihood
+    gain: float  # -2 log likelihood; of a law of each recording's own, beyond what chance could give, see `evenness`
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +73,8 @@ def gate(before: Known, after: Known, coefficients: Sequence[int], shapes: Seque
     held = _beside(after.covariance, np.asarray(shapes, dtype=np.intp))
     sigmas = _sigmas(after.value[index], held[np.ix_(index, index)])
     if np.isfinite(sigmas):
-        sigmas = float(np.minimum(sigmas, _evenly(after, held, index)))
+        even = _evenly(after, held, index)
+        sigmas = float(np.minimum(sigmas, as_one(max(even, 0.0) ** 2, len(index))))
     white = whiteness(before), whiteness(after)
     reasons = []
     # Written so that what is no number, of a plant that diverged, is refused.
@@ -121,10 +122,12 @@ def _evenly(known: Known, C: Array, index: NDArray[np.intp]) -> float:
     size = 1.0 / np.sqrt(np.maximum(np.diag(own), 1e-300))
     a = size * np.linalg.lstsq(own * np.outer(size, size), size * known.value[index], rcond=1e-10)[0]
     steps = (C[:, index] @ a)[:, None]
-    return evenly(
-        parts(known.experiment, k, known.metric[k], known.along(k, steps)[:, 0], known.residual[k])
-        for k in known.experiment.fit
-    )
+    experiment = known.experiment
+    of_trials = {
+        k: parts(experiment, k, known.metric[k], known.along(k, steps)[:, 0], known.residual[k])
+        for k in experiment.fit
+    }
+    return evenly(experiment, of_trials)
 
 
 def _sigmas(a: Array, C: Array) -> float:
@@ -134,9 +137,14 @@ def _sigmas(a: Array, C: Array) -> float:
         return float("nan")
     size = 1.0 / np.sqrt(variance)
     wald = float(size * a @ np.linalg.lstsq(C * np.outer(size, size), size * a, rcond=1e-10)[0])
-    far = log_tail(wald, len(a))
-    # As far out as a normal number of that two-sided chance; beyond its range the chi-square's own root.
-    return float(norm.isf(np.exp(far) / 2.0)) if far > -600.0 else float(np.sqrt(wald))
+    return as_one(wald, len(a))
+
+
+def as_one(square: float, count: int) -> float:
+    """Sigmas of one normal number that is as far out as the sum of squares of `count` of them."""
+    far = log_tail(square, count)
+    # Of that two-sided chance; beyond its range the chi-square's own root.
+    return float(norm.isf(np.exp(far) / 2.0)) if far > -600.0 else float(np.sqrt(square))
 
 
 def _promised(before: Known, after: Known) -> float:

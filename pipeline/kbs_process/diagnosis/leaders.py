@@ -177,7 +177,7 @@ def _trial_by_trial(suspect: Suspect, standing: Standing, bench: Bench) -> tuple
             strengths.append(gained)
             rows = float(known.rows[k])
             before, after = (float(z @ z) / rows for z in (known.residual[k], residual[k]))
-            bound = float(chi2.isf(FALSE_ALARM, max(own.rank, 1)))
+            bound = float(chi2.isf(FALSE_ALARM / suspect.places, max(own.rank, 1)))
             folds.append(Fold(trial.name, before, after, gained - bound))
     worse = tuple(fold.trial for fold in folds if fold.gain <= 0.0)
     reasons = (f"{', '.join(worse)} do not show it, all through",) if worse else ()
@@ -201,8 +201,8 @@ def _even_gain(background: Background, trial: int, columns: Array, own: Score, k
     J = background.J[trial] * background.scale
     done = (columns - J @ cho_solve(background.factor, J.T @ columns)) @ own.amplitude
     left = background.z[trial] - J @ background.shift - done
-    even = evenly([parts(known.experiment, trial, known.metric[trial], done, left)])
-    return min(own.gain, even**2)
+    own_parts = parts(known.experiment, trial, known.metric[trial], done, left)
+    return min(own.gain, max(evenly(known.experiment, {trial: own_parts}), 0.0) ** 2)
 
 
 def reread(chosen: Tried, before: Standing, floor: Floor, simulate: Simulate) -> Tried:

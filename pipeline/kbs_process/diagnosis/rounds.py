@@ -202,8 +202,11 @@ def _stands_in(
 
 def _each_time(one: Tried) -> int:
     """Numbers that a law brought which are each recording's own, and no free ones of the model."""
-    suspect, known = one.found.suspect, one.standing.known
-    return len(suspect.amplitudes) * len(known.experiment.fit) if suspect.each_trial else 0
+    suspect, experiment = one.found.suspect, one.standing.known.experiment
+    if not suspect.each_trial:
+        return 0
+    trajectories = {experiment.trials[k].trajectory for k in experiment.fit}
+    return len(suspect.amplitudes) * len(experiment.fit) + (suspect.places > 1) * len(trajectories)
 
 
 def _judged_again(told: Tried, before: Standing) -> Tried:

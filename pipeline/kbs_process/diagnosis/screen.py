@@ -19,7 +19,7 @@ from kbs_process.diagnosis import direct
 from kbs_process.diagnosis.gls import Background, Score, Sums, absorbing, per_trial, score
 from kbs_process.diagnosis.hypothesis import coupled
 from kbs_process.diagnosis.inlets import Inlet
-from kbs_process.diagnosis.jumps import jump
+from kbs_process.diagnosis.jumps import PLACES, jump
 from kbs_process.diagnosis.known import Known
 from kbs_process.diagnosis.scene import Scene
 from kbs_process.diagnosis.side_by_side import side_by_side
@@ -48,6 +48,10 @@ class Suspect(Protocol):
     def each_trial(self) -> bool:
         """Whether size and phase belong to a recording."""
 
+    @property
+    def places(self) -> int:
+        """Among how many its place along each trajectory was looked for; 1 where all have one shape."""
+
     def inputs(self, drive: int) -> Sequence[Mapping[Inlet, Array]] | None:
         """For each amplitude what enters where, means over the path's steps; None where nothing goes through."""
 
@@ -73,6 +77,10 @@ class Catalogued:
     @property
     def each_trial(self) -> bool:
         return self.candidate.effect.each_trial
+
+    @property
+    def places(self) -> int:
+        return PLACES if "drop_time" in self.candidate.effect.arguments else 1
 
     def inputs(self, drive: int) -> Sequence[Mapping[Inlet, Array]] | None:
         if isinstance(self.candidate.effect, Sensing):
@@ -218,14 +226,16 @@ def screen(bench: Bench, suspects: Sequence[Suspect]) -> Screening:
             scores.setdefault(one[0].family, []).append(one)
     looked_at = sum(len(grid) for grid in scores.values())
     rows = bench.background.rows
+    experiment = bench.known.experiment
+    trajectories = len({experiment.trials[k].trajectory for k in bench.background.z})
     candidates = []
     for grid in scores.values():
         best = max(grid, key=lambda entry: _evidence(entry[1], rows))
         mean = float(logsumexp([_evidence(entry[1], rows) for entry in grid]) - np.log(len(grid)))
         lowest = min(entry[1].log_p for entry in grid)
-        candidates.append(
-            Found(best[0], best[1], mean, min(0.0, lowest + np.log(looked_at)), len(grid), best[2])
-        )
+        places = trajectories * np.log(best[0].places)
+        log_p = min(0.0, lowest + np.log(looked_at) + places)
+        candidates.append(Found(best[0], best[1], mean - places, log_p, len(grid), best[2]))
     candidates.sort(key=lambda candidate: -candidate.log_evidence)
     return Screening(tuple(candidates), looked_at)
 
