@@ -16,7 +16,7 @@ from kbs_process.diagnosis.gate import Gate
 from kbs_process.diagnosis.joint import Own, with_extra
 from kbs_process.diagnosis.leaders import various
 from kbs_process.diagnosis.race import Runner, raced
-from kbs_process.diagnosis.rounds import continued, named_first
+from kbs_process.diagnosis.rounds import continued, named_first, unnamed
 from kbs_process.diagnosis.screen import Found
 from kbs_process.diagnosis.thresholds import FIRST, TOLERATED
 from kbs_process.diagnosis.tryout import extra_of, identity
@@ -75,6 +75,10 @@ def test_a_law_keeps_its_name_beside_a_curve_that_does_a_little_more(
     law, curve = tried(RIGHT, known), tried(CURVE, less)
     assert identity(law.found.suspect).port == identity(curve.found.suspect).port
     assert [one.found.suspect.family for one in named_first([curve, law])] == names[::-1]
+    # Where the curve alone passed, laws whose place it took are tried, too, but for those that were.
+    assert [one.suspect.family for one in unnamed([curve], [], view)] == [RIGHT, KIN]
+    assert [one.suspect.family for one in unnamed([curve], [identity(law.found.suspect)], view)] == [KIN]
+    assert unnamed([law], [], view) == []
     # One more action of a law that was found goes before another law likewise.
     found = [identity(law.found.suspect)]
     assert continued([curve, law], found) == ([law] if better < 1.0 else [curve, law])

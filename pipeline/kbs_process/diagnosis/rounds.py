@@ -31,8 +31,9 @@ from kbs_process.diagnosis.ports import port_test
 from kbs_process.diagnosis.remains import detected, promises_little, too_little
 from kbs_process.diagnosis.rivals import probabilities
 from kbs_process.diagnosis.scene import Scene
-from kbs_process.diagnosis.screen import Catalogued, Screening
+from kbs_process.diagnosis.screen import Catalogued, Found, Screening
 from kbs_process.diagnosis.settling import drawn_back, released, resettled
+from kbs_process.diagnosis.shapes import bettered
 from kbs_process.diagnosis.thresholds import LEAST_RHO, MOST, ROUNDS, SECOND, SETTLED, TOLERATED
 from kbs_process.diagnosis.tryout import identity
 from kbs_process.diagnosis.view import View
@@ -157,6 +158,9 @@ def _round(standing: Standing, floor: Floor, simulate: Simulate, accepted: Seque
     passed, refused = _passed(view, standing, floor, simulate, accepted)
     if not passed:
         return _Round(None, standing, seen, view.screening, tuple(refused), place)
+    if names := unnamed(passed, [one.identity for one in refused], view):
+        more, less = tried(names, view, view.standing, floor, simulate)
+        passed, refused = [*passed, *more], [*refused, *less]
     passed = continued(named_first(passed), [one.find.identity for one in accepted])
     fitted = [_each_time(one) for one in passed]
     chances = probabilities([one.standing.known for one in passed], view.bench.background.rows, fitted)
@@ -229,6 +233,23 @@ def named_first(passed: Sequence[Tried]) -> list[Tried]:
         return any((_law(one).port, _law(one).axis) == where and _as_good(one, curve) for one in named)
 
     return [one for one in passed if one in named or not told(one)]
+
+
+def unnamed(passed: Sequence[Tried], refused: Sequence[Identity], view: View) -> list[Found]:
+    """Laws of the catalogue to try at the place of a curve that leaves least, if the screen had others before them.
+
+    A curve takes the lead from the very law that it follows.
+    """
+    first = min(passed, key=lambda one: one.standing.known.cost)
+    if isinstance(first.found.suspect, Catalogued):
+        return []
+    where, done = _law(first), {*map(_law, passed), *refused}
+    best: dict[Identity, Found] = {}
+    for found in view.able:
+        own = identity(found.suspect)
+        if isinstance(found.suspect, Catalogued) and (own.port, own.axis) == (where.port, where.axis):
+            best.setdefault(own, found)
+    return [bettered(view.bench, found) for own, found in best.items() if own not in done][:SECOND]
 
 
 def continued(passed: Sequence[Tried], accepted: Sequence[Identity]) -> list[Tried]:
