@@ -14,6 +14,7 @@ import pytest
 from kbs_process.diagnosis import proposals
 from kbs_process.diagnosis.hypothesis import Hypothesis, predict
 from kbs_process.diagnosis.joint import Standing, with_extra
+from kbs_process.diagnosis.plausible import implausible, undone
 from kbs_process.diagnosis.proposals import proposed
 from kbs_process.diagnosis.ranges import Ranges
 from kbs_process.diagnosis.scene import Scene
@@ -97,6 +98,44 @@ def test_a_spring_that_yields_away_from_the_middle_is_followed_there(rest: float
     print(found, best.score.gain, here.known.excess)
     assert abs(found["harness_middle"] - rest) < 1e-3
     assert best.score.gain > 0.95 * here.known.excess
+
+
+def test_a_bump_is_found_from_a_place_where_it_does_nothing() -> None:
+    """Between the places of a grid a narrow law is out of a descent's sight: all of what a joint sweeps is tried."""
+    here = with_bump()
+    scene = Scene.of(here.known.experiment, here.hypothesis, here.predicted)
+    tried = Bench.of(here.known, scene)
+
+    def bump(angle: float, width: float) -> Catalogued:
+        shape = (("local_angle", angle), ("local_width", width))
+        return Catalogued(Candidate(LOCAL_TORQUE, "el", shape), scene)
+
+    true = screen(tried, [bump(ANGLE, WIDTH)]).candidates[0].score.gain
+    begun = screen(tried, [bump(1.257, WIDTH)]).candidates[0]
+    best = bettered(tried, begun)
+    found = dict(best.suspect.candidate.shape)
+    print(found, begun.score.gain, best.score.gain, true)
+    assert begun.score.gain < 0.1 * true
+    assert abs(found["local_angle"] - ANGLE) < WIDTH
+    assert best.score.gain > 0.95 * true
+
+
+def test_amplitudes_that_undo_each_other_are_judged_by_what_they_do_together() -> None:
+    values = {"harness_taut": 0.5, "harness_middle": 1.28, "harness_reach": 4e-3, "harness_memory": 0.01}
+    here = with_law(HARNESS, values)
+    scene = Scene.of(here.known.experiment, here.hypothesis, here.predicted)
+    # Where it yields lies far beyond the swing: the tail is a constant there, which the offset takes away.
+    shape = {"harness_middle": 1.9, "harness_reach": 0.1, "harness_memory": 0.01}
+    suspect = Catalogued(Candidate(HARNESS, "el", tuple(shape.items())), scene)
+    nothing = dict.fromkeys(suspect.amplitudes, 0.0)
+    tail = nothing | {"harness_offset": -5e3, "harness_taut": 5e3}
+    free = undone(suspect, tail)
+    assert {"harness_offset", "harness_taut"} <= free
+    known = {name: (value, 1.0) for name, value in tail.items()}
+    assert implausible(HARNESS, known, free) == ()
+    assert len(implausible(HARNESS, known)) == 2
+    alone = nothing | {"harness_offset": -5e3}
+    assert "harness_offset" not in undone(suspect, alone)
 
 
 def test_place_and_width_of_a_bump_are_found_in_the_plant() -> None:

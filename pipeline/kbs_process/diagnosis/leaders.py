@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -22,12 +22,12 @@ from kbs_process.diagnosis.joint import Own, Standing, bare, with_extra
 from kbs_process.diagnosis.known import Known
 from kbs_process.diagnosis.orders import with_orders
 from kbs_process.diagnosis.outcome import Refused
-from kbs_process.diagnosis.plausible import implausible
+from kbs_process.diagnosis.plausible import implausible, undone
 from kbs_process.diagnosis.race import own_of, raced
 from kbs_process.diagnosis.rivals import probabilities
 from kbs_process.diagnosis.screen import Bench, Catalogued, Found, Suspect
 from kbs_process.diagnosis.settling import resettled
-from kbs_process.diagnosis.shapes import bettered, possible
+from kbs_process.diagnosis.shapes import bettered, fitted, possible
 from kbs_process.diagnosis.side_by_side import side_by_side
 from kbs_process.diagnosis.suspects import BY
 from kbs_process.diagnosis.thresholds import (
@@ -136,17 +136,31 @@ def gated(found: Found, before: Standing, after: Standing, own: Own) -> Gate:
         return verdict.but(*pushes(found.suspect, a, C))
     if not isinstance(found.suspect, Catalogued):
         return verdict
-    return verdict.but(*_oversized(found.suspect, a, np.sqrt(np.diag(C))), *drives(found.suspect, a, C))
+    free = _undone(found.suspect, a, known.value[shapes])
+    return verdict.but(*_oversized(found.suspect, a, np.sqrt(np.diag(C)), free), *drives(found.suspect, a, C))
 
 
-def _oversized(suspect: Suspect, values: Iterable[float], sigmas: Iterable[float]) -> tuple[str, ...]:
-    """Why a law of the catalogue does not have amplitudes of such values and sigmas; nothing, if it may."""
+def _undone(suspect: Catalogued, values: Array, shapes: Array) -> frozenset[str]:
+    """Amplitudes of a law of some shape in the plant that others of it undo."""
+    if not in_plant(suspect):
+        return frozenset()
+    amplitudes = dict(zip(suspect.amplitudes, map(float, values), strict=True))
+    return undone(fitted(suspect, shapes.tolist()), amplitudes)
+
+
+def _oversized(
+    suspect: Suspect, values: Iterable[float], sigmas: Iterable[float], free: Collection[str] = ()
+) -> tuple[str, ...]:
+    """Why a law of the catalogue does not have amplitudes of such values and sigmas; nothing, if it may.
+
+    Those that are `free` may have any.
+    """
     if not isinstance(suspect, Catalogued):
         return ()
     numbers = zip(map(float, values), map(float, sigmas), strict=True)
     named = dict(zip(suspect.amplitudes, numbers, strict=False))
     return tuple(
-        reason for action in suspect.candidate.actions for reason in implausible(action.effect, named)
+        reason for action in suspect.candidate.actions for reason in implausible(action.effect, named, free)
     )
 
 

@@ -6,10 +6,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from kbs_process.diagnosis.hypothesis import Tapped
+from kbs_process.diagnosis.scene import Scene
 from kbs_process.plant.effect import Parameter
 from kbs_process.signals.records import Array
 
 SPECTRUM = "spectrum"  # grid of a parameter that only tones of a residual give
+
+
+def is_place(entry: Parameter) -> bool:
+    """Whether a shape is a place in what a signal sweeps."""
+    return entry.over not in ("", SPECTRUM) and "." not in entry.over
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,6 +29,10 @@ class Ranges:
     spans: Mapping[tuple[str, str], tuple[float, float]]
     proposed: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     temperature: bool = False  # whether it was recorded
+
+    def within(self, entry: Parameter, site: str) -> tuple[float, float]:
+        """Between which values what a shape is a place or a width of goes at a site; (0, 0) where nobody knows it."""
+        return self.spans.get((site, entry.over.partition(".")[0]), (0.0, 0.0))
 
     def choices(self, entry: Parameter, site: str, own: float | None) -> tuple[float, ...]:
         """Return the values of a shape parameter that are tried at a site, least first.
@@ -45,6 +55,22 @@ class Ranges:
         least, most = entry.bounds
         places = {*(start + share * (high - low) for share in entry.grid), *proposed} if high > low else set()
         return tuple(sorted(place for place in places if least <= place <= most))
+
+
+def swept(
+    scene: Scene, *, proposed: Mapping[str, tuple[float, ...]] | None = None, temperature: bool = False
+) -> Ranges:
+    """Return what a scene sweeps, over all of its trajectories."""
+    experiment = scene.experiment
+    references = sorted({experiment.reference(k) for k in range(len(experiment.repeats))})
+    return ranges_of(
+        [scene.signals[drive] for drive in references if drive in scene.signals],
+        [scene.predicted[drive].values for drive in references],
+        experiment.channels,
+        experiment.dt,
+        proposed=proposed,
+        temperature=temperature,
+    )
 
 
 def ranges_of(

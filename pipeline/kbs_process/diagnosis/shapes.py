@@ -10,8 +10,8 @@ from scipy.optimize import minimize
 
 from kbs_process.diagnosis.gls import Score, Sums, per_trial, score
 from kbs_process.diagnosis.places import half_lengths
-from kbs_process.diagnosis.ranges import SPECTRUM
-from kbs_process.diagnosis.screen import Bench, Catalogued, Found
+from kbs_process.diagnosis.ranges import SPECTRUM, is_place, swept
+from kbs_process.diagnosis.screen import Bench, Catalogued, Found, screen
 from kbs_process.diagnosis.suspects import Candidate
 from kbs_process.plant.effect import Effect, LogNormal, Parameter, Uniform
 from kbs_process.rig.model import Rig
@@ -23,6 +23,7 @@ _STEPS = 6.0  # as many of its steps
 _NEAR = 0.05  # m: steps of a search for a point are no less
 _WHOLE = ("order", "bit")  # in names of numbers that are whole, or ratios of teeth
 _DIFFERENCE = 0.02  # steps
+_PLACES = 24  # of a law that is somewhere, at most, for each width that it may have
 _DESCENTS = 12  # of the search along the linear plant
 
 
@@ -93,12 +94,18 @@ def _step(entry: Parameter, candidate: Candidate) -> float:
     put = entry.over == SPECTRUM or (entry.over and len(entry.grid) == 1)
     if put or isinstance(entry.prior, Uniform) or any(word in entry.name for word in _WHOLE):
         return 0.0
-    if entry.over and not entry.over.endswith(".span"):
-        wide = [other.name for other in candidate.effect.parameters if other.over == f"{entry.over}.span"]
-        return dict(candidate.shape)[wide[0]] if wide else 0.0
+    if is_place(entry):
+        wide = _width(entry, candidate)
+        return 0.0 if wide is None else dict(candidate.shape)[wide.name]
     if isinstance(entry.prior, LogNormal):
         return entry.prior.sigma
     return entry.prior.spread
+
+
+def _width(place: Parameter, candidate: Candidate) -> Parameter | None:
+    """Over how much a law goes at its place, if it is a number of it."""
+    every = candidate.effect.parameters
+    return next((entry for entry in every if entry.over == f"{place.over}.span"), None)
 
 
 def _bend(entry: Parameter, value: float, step: float) -> Bend:
@@ -111,23 +118,47 @@ def _bend(entry: Parameter, value: float, step: float) -> Bend:
 
 
 def bettered(bench: Bench, found: Found) -> Found:
-    """A suspect of the screen with the shape, near that of the grid, with which it does most along the linear plant."""
+    """A suspect of the screen with the shape, near the best of many, with which it does most along the linear plant."""
     suspect = found.suspect
-    if not isinstance(suspect, Catalogued):
+    if not isinstance(suspect, Catalogued) or not bends(suspect.candidate, suspect.scene.hypothesis.rig):
         return found
-    free = bends(suspect.candidate, suspect.scene.hypothesis.rig)
-    if not free:
-        return found
-    best = found.suspect, found.score
+    start = screen(bench, [suspect, *_everywhere(suspect)]).candidates[0].suspect
+    assert isinstance(start, Catalogued)
+    best, own = _descended(bench, start)
+    gained = own.gain - found.score.gain
+    return replace(found, suspect=best, score=own, log_evidence=found.log_evidence + 0.5 * gained)
+
+
+def _everywhere(suspect: Catalogued) -> list[Catalogued]:
+    """A law that is somewhere all through what its signal sweeps: between places a width apart it does little."""
+    candidate = suspect.candidate
+    place = next(filter(is_place, candidate.effect.parameters), None)
+    wide = None if place is None else _width(place, candidate)
+    if place is None or wide is None:
+        return []
+    ranges = swept(suspect.scene)
+    low, high = ranges.within(place, candidate.site)
+    every = []
+    for width in ranges.choices(wide, candidate.site, None):
+        count = min(int(np.ceil((high - low) / width)), _PLACES)
+        for share in (np.arange(count) + 0.5) / count:
+            moved = {place.name: low + float(share) * (high - low), wide.name: width}
+            shape = tuple((name, moved.get(name, value)) for name, value in candidate.shape)
+            every.append(replace(suspect, candidate=replace(candidate, shape=shape)))
+    return every
+
+
+def _descended(bench: Bench, start: Catalogued) -> tuple[Catalogued, Score]:
+    """The best shape of a descent, and what it does."""
+    free = bends(start.candidate, start.scene.hypothesis.rig)
+    seen: list[tuple[Catalogued, Score]] = []
 
     def fall(u: Array) -> tuple[float, Array]:
-        nonlocal best
         around = u + np.vstack([np.zeros(len(u)), _DIFFERENCE * np.eye(len(u))])
-        tried = [_at(suspect, free, one) for one in around]
-        scores = _scores(bench, tried)
-        gains = np.array([_gain(suspect, one) for one in scores])
-        if gains[0] > _gain(suspect, best[1]):
-            best = tried[0], scores[0]
+        tried = [_at(start, free, one) for one in around]
+        ends = list(zip(tried, _scores(bench, tried), strict=True))
+        seen.append(ends[0])
+        gains = np.array([_gain(*end) for end in ends])
         return -float(gains[0]), (gains[0] - gains[1:]) / _DIFFERENCE
 
     minimize(
@@ -138,8 +169,7 @@ def bettered(bench: Bench, found: Found) -> Found:
         bounds=[one.room for one in free],
         options={"maxiter": _DESCENTS, "maxfun": 2 * _DESCENTS},
     )
-    gained = best[1].gain - found.score.gain
-    return replace(found, suspect=best[0], score=best[1], log_evidence=found.log_evidence + 0.5 * gained)
+    return max(seen, key=lambda end: _gain(*end))
 
 
 def along(bench: Bench, suspect: Catalogued, amplitude: Array, drive: int) -> Array:
@@ -173,10 +203,18 @@ def possible(found: Found) -> bool:
 
 def _at(suspect: Catalogued, free: Sequence[Bend], steps: Array) -> Catalogued:
     """The suspect with its shape some steps away."""
-    values = [one.moved(float(step)) for one, step in zip(free, steps, strict=True)]
+    return _with(suspect, free, [one.moved(float(step)) for one, step in zip(free, steps, strict=True)])
+
+
+def fitted(suspect: Catalogued, values: Sequence[float]) -> Catalogued:
+    """The suspect with the shape that a fit has: a value for each of its `bends`."""
+    return _with(suspect, bends(suspect.candidate, suspect.scene.hypothesis.rig), values)
+
+
+def _with(suspect: Catalogued, free: Sequence[Bend], values: Sequence[float]) -> Catalogued:
     moved = {one.name: value for one, value in zip(free, values, strict=True) if not one.element}
     candidate, point = suspect.candidate, suspect.candidate.point
-    if free[-1].element:
+    if free and free[-1].element:
         x, y, z = values[-3:]
         point = x, y, z
     shape = tuple((name, moved.get(name, value)) for name, value in candidate.shape)

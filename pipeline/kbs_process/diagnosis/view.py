@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from kbs_process.diagnosis.curves import curves
 from kbs_process.diagnosis.joint import Standing
 from kbs_process.diagnosis.proposals import proposed
-from kbs_process.diagnosis.ranges import ranges_of
+from kbs_process.diagnosis.ranges import swept
 from kbs_process.diagnosis.scene import Scene
 from kbs_process.diagnosis.screen import Bench, Catalogued, Found, Screening, Suspect, screen
 from kbs_process.diagnosis.suspects import candidates
@@ -72,12 +72,8 @@ class View:
 def suspects_of(standing: Standing, scene: Scene) -> list[Suspect]:
     """The catalogue at every site with every shape, then curves that no law of it has."""
     experiment, rig = scene.experiment, standing.hypothesis.rig
-    references = sorted({experiment.reference(k) for k in range(len(experiment.repeats))})
-    ranges = ranges_of(
-        [scene.signals[drive] for drive in references if drive in scene.signals],
-        [standing.predicted[drive].values for drive in references],
-        experiment.channels,
-        experiment.dt,
+    ranges = swept(
+        scene,
         proposed=proposed(standing.known, scene),
         temperature=all(trial.temperature is not None for trial in experiment.trials),
     )
