@@ -12,7 +12,7 @@ from kbs_process.diagnosis.as_suspect import suspect_of
 from kbs_process.diagnosis.hypothesis import Hypothesis, predict
 from kbs_process.diagnosis.joint import with_extra
 from kbs_process.diagnosis.orders import _of_order, _others, with_orders
-from kbs_process.diagnosis.outcome import Estimate, Find
+from kbs_process.diagnosis.outcome import Estimate, Find, Identity
 from kbs_process.diagnosis.scene import Scene
 from kbs_process.diagnosis.screen import Bench, Catalogued, Found, screen
 from kbs_process.diagnosis.suspects import Candidate
@@ -148,3 +148,21 @@ def test_a_find_of_several_orders_is_such_a_suspect_again(view: View, first: int
     assert [one.shape[0][1] for one in again.candidate.actions] == [one.shape[0][1] for one in actions]
     assert len(again.amplitudes) == 2 * len(actions)
     assert amplitude == pytest.approx(np.repeat([0.01 * one.shape[0][1] for one in actions], 2))
+
+
+def test_orders_that_come_with_electrical_cycles_are_the_motor_s_own(view: View) -> None:
+    """A hybrid stepper's poles and teeth make such a ripple, its rotor's eccentricity or a gear any other."""
+    law = find("motor_order")
+
+    def of(*orders: float) -> Identity:
+        first, *more = [Candidate(law, "el", (("order", order),)) for order in orders]
+        return identity(Catalogued(replace(first, again=tuple(more)), view.scene))
+
+    drive = view.scene.hypothesis.rig.joint("el").drive
+    assert drive is not None
+    cycles = float(drive.parameters["Kangle"])
+    assert of(cycles).family == of(2.0 * cycles, 3.0 * cycles).family == "cogging"
+    for others in ((1.0,), (0.5 * cycles,), (cycles + 0.25,), (4.0 * cycles + 0.25,), (cycles, 7.0)):
+        assert of(*others).family == "motor order"
+    # They are one law all the same, of which one may be found after the other.
+    assert of(cycles) == of(7.0)

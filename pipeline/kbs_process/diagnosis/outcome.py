@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 from kbs_process.diagnosis.detection import Detection
@@ -24,7 +24,8 @@ class Identity:
     port: str
     axis: str  # joint, link or stream; "" for base and transducer
     channels: tuple[str, ...]  # that it touches directly, of a transducer; else empty
-    family: str  # of physics; "unnamed" for a measured law
+    # Of physics, "unnamed" for a measured law; by it alone laws do not differ: orders of one motor may be of two.
+    family: str = field(compare=False)
     law: str  # name in the catalogue, or what the measured law is a function of
 
 

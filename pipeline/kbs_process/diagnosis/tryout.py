@@ -22,11 +22,14 @@ from kbs_process.diagnosis.suspects import BY, Candidate
 from kbs_process.plant.attach import attach
 from kbs_process.plant.effect import Effect, Port
 from kbs_process.plant.effects import select
+from kbs_process.plant.effects.motor_order import MOTOR_ORDER
 from kbs_process.plant.sensing import SensingPort
+from kbs_process.rig.model import Rig
 from kbs_process.signals.records import Array
 from kbs_process.stages.output_error import Scalar
 
 UNNAMED = "unnamed"
+_WHOLE_CYCLES = 1e-3  # from a whole number of them: less than lines of a residual are apart
 
 
 def identity(suspect: Suspect) -> Identity:
@@ -40,7 +43,21 @@ def identity(suspect: Suspect) -> Identity:
     of_channel = candidate.port in (SensingPort.CHANNEL, SensingPort.COUPLING, SensingPort.PRODUCT)
     channels = tuple(candidate.site.split(BY)) if of_channel else ()
     axis = "" if of_channel or candidate.port is Port.BASE_ACCELERATION else candidate.site
-    return Identity(port, axis, channels, family(candidate.name), candidate.name)
+    own = "cogging" if _with_cycles(candidate, suspect.scene.hypothesis.rig) else family(candidate.name)
+    return Identity(port, axis, channels, own, candidate.name)
+
+
+def _with_cycles(candidate: Candidate, rig: Rig) -> bool:
+    """Whether orders of a motor all come with whole electrical cycles of it: then its own poles and teeth make them."""
+    if candidate.name != MOTOR_ORDER.name:
+        return False
+    drive = rig.joint(candidate.site).drive
+    if drive is None or "Kangle" not in drive.parameters:
+        return False
+    orders = np.array([action.shape[0][1] for action in candidate.actions])
+    cycles = orders / float(drive.parameters["Kangle"])
+    whole = np.rint(cycles)
+    return bool(np.all((whole > 0.0) & (np.abs(cycles - whole) < _WHOLE_CYCLES)))
 
 
 def port_label(suspect: Suspect) -> str:
