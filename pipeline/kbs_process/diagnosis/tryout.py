@@ -39,7 +39,7 @@ def identity(suspect: Suspect) -> Identity:
     port = port_word(candidate.name, candidate.port)
     of_channel = candidate.port in (SensingPort.CHANNEL, SensingPort.COUPLING, SensingPort.PRODUCT)
     channels = tuple(candidate.site.split(BY)) if of_channel else ()
-    axis = "" if of_channel or candidate.port is Port.BASE_ACCELERATION else candidate.site
+    axis = "" if of_channel or port == PORTS[Port.BASE_ACCELERATION] else candidate.site
     return Identity(port, axis, channels, family(candidate.name), candidate.name)
 
 
@@ -53,6 +53,8 @@ def port_label(suspect: Suspect) -> str:
         return PortName("ground torque", candidate.site).label
     if candidate.port is Port.BASE_ACCELERATION:
         return PortName("base").label
+    if candidate.port is Port.BASE_TORQUE:
+        return PortName("base torque").label
     return PortName(own.port, own.axis, own.channels[:1]).label
 
 

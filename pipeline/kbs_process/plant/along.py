@@ -27,6 +27,9 @@ SLOPES = {
     "vx": "x",
     "vy": "y",
     "vz": "z",
+    "base_rate_x": "base_x",
+    "base_rate_y": "base_y",
+    "base_rate_z": "base_z",
 }
 TRAVELS = {"rotor_travel": "rotor_angle", "field_travel": "field"}
 SLIDING = 1e-3  # rad/s of the rotor at which a Coulomb friction along given signals is full
@@ -60,7 +63,7 @@ def along(effect: Effect, signals: Mapping[str, Array], values: Mapping[str, flo
     module = _module(effect)
     columns = np.ascontiguousarray(np.stack([signals[name] for name in signals_of(effect)], axis=1))
     given = np.array([values[name] for name in _given(effect)], dtype=float)
-    shape = (len(columns), len(_amplitudes(effect)), 1 if effect.port.of_drive else 3)
+    shape = (len(columns), len(_amplitudes(effect)), effect.port.components)
 
     def at(parts: int) -> Array:
         out = np.zeros(shape)
@@ -150,7 +153,7 @@ def along_text(effect: Effect) -> str:
             "@compiled",
             f"def rates(signals, values, dt, i, share, parts, {', '.join(states)}):",
             *[f"    {line}" for line in signals],
-            f"    _, {derivative} = {call(None)}",
+            f"    {'_, ' * effect.port.components}{derivative} = {call(None)}",
             f"    return {derivative},",
             "",
             "",
@@ -171,7 +174,7 @@ def along_text(effect: Effect) -> str:
         *[f"            {line}" for line in signals],
     ]
     for index, amplitude in enumerate(amplitudes):
-        value = f"{call(amplitude)}[0]" if states else call(amplitude)
+        value = f"{call(amplitude)}[0]" if states and effect.port.of_drive else call(amplitude)
         if effect.port is Port.MOTOR_FRICTION:
             value = f"-max(-1.0, min(1.0, rotor_rate / {SLIDING!r})) * {value}"
         if effect.port.of_drive:
