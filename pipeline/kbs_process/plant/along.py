@@ -8,7 +8,7 @@ the same signals.
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from typing import Any
 
@@ -165,7 +165,7 @@ def along_text(effect: Effect) -> str:
         "    n = signals.shape[0]",
         "    fastest = 0.0",
         *[f"    {state.name} = {state.initial!r}" for state in effect.states],
-        *(_fastest(states) if states else []),
+        *(_fastest(effect.states) if states else []),
         "    h = dt / max(parts, 1)",
         "    for i in range(n - 1):",
         "        for part in range(parts):",
@@ -186,23 +186,25 @@ def along_text(effect: Effect) -> str:
     return "\n".join([*lines, "    out[n - 1] = out[n - 2]", "    return fastest", ""])
 
 
-def _fastest(states: list[str]) -> list[str]:
+def _fastest(states: Sequence[State]) -> list[str]:
     """Emit a bound on the states' rates of decay and pulsations, along all samples.
 
-    The root of the largest sum of a row of the Jacobian's square: for an oscillator its pulsation.
+    The root of the largest sum of a row of the Jacobian's square: for an oscillator its pulsation. A state that is a
+    share of the most that it may be settles there, if anywhere, and not where it begins.
     """
-    lines = ["    if parts == 0:", "        for i in range(n - 1):"]
+    lines = ["    if parts == 0:", "        for i in range(n - 1):", "            for most in (0.0, 1.0):"]
     given = "signals, values, dt, i, 0.0, 1"
-    lines.append(f"            base = rates({given}, {', '.join(states)})")
+    at = [f"{state.name} + most" if state.unit == "1" else state.name for state in states]
+    lines.append(f"                base = rates({given}, {', '.join(at)})")
     every = range(len(states))
     for moved in every:
-        nudged = ", ".join(f"{name} + 1e-6" if j == moved else name for j, name in enumerate(states))
-        lines.append(f"            moved = rates({given}, {nudged})")
-        lines += [f"            j{row}{moved} = (moved[{row}] - base[{row}]) / 1e-6" for row in every]
+        nudged = ", ".join(f"{name} + 1e-6" if j == moved else name for j, name in enumerate(at))
+        lines.append(f"                moved = rates({given}, {nudged})")
+        lines += [f"                j{row}{moved} = (moved[{row}] - base[{row}]) / 1e-6" for row in every]
     for row in every:
         squared = [" + ".join(f"j{row}{m} * j{m}{column}" for m in every) for column in every]
         total = " + ".join(f"abs({entry})" for entry in squared)
-        lines.append(f"            fastest = max(fastest, ({total}) ** 0.5)")
+        lines.append(f"                fastest = max(fastest, ({total}) ** 0.5)")
     return [*lines, "        return fastest"]
 
 

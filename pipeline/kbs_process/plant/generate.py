@@ -44,7 +44,6 @@ def _head(structure: Structure) -> list[str]:
         "    drift, floor, force_at, from_plate, in_plate, inertia, joint_rotation, mean_rounded, momentum, placed,",
         "    plate_moment, plate_rates, rotate, rotor_moment, screw, triple, velocity_at, yielding,",
         ")",
-        *["from kbs_process.plant.kernels import settling"] * bool(structure.mounts),
         *[f"from {e.equation.__module__} import {e.equation.__qualname__} as _{e.name}" for e in called],
         "",
         *[f"effect_{e.name} = compiled_effect(_{e.name})" for e in called],

@@ -15,7 +15,7 @@ from numba import types
 from numba.extending import intrinsic
 
 from kbs_process.plant import elementary
-from kbs_process.plant.elementary import F, compiled, cos, expm1, floor, linked, sin
+from kbs_process.plant.elementary import F, compiled, cos, floor, linked, sin
 from kbs_process.signals.records import Array
 
 Vector = tuple[float, float, float]
@@ -324,13 +324,6 @@ def yielding(change: float, drop: float) -> float:
     """
     square = change * change + 1e-60
     return square / (square - 0.5 * change * drop + drop * drop / 12.0)
-
-
-@compiled
-def settling(x: float) -> float:
-    """(exp(x) - 1) / x: what a rate that changes by x times what it has moved by is on the mean, of its first value."""
-    moved = x if abs(x) > 1e-12 else 1e-12
-    return expm1(moved) / moved
 
 
 @compiled

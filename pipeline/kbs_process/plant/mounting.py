@@ -1,9 +1,9 @@
 """Write what the mounting does beyond the transducer's linear springs: moments that may have states of their own.
 
 In position Verlet the plate's angles in the middle of the steps follow each other by the rates at their ends. States
-go along, from one middle to the next, exactly where each of them settles by itself (Certaine's exponential step): a
-slip angle that is turned through within a step bounds it by accuracy, not by stability. Stoermer and Cowell's method
-wants the moment a little ahead (see `stepping`), and how it yields: with the states that would be there.
+go along, from one middle to the next, exponentially, along the secant to where they would go without settling: a slip
+angle that is turned through within a step bounds it by accuracy, not by stability. Stoermer and Cowell's method wants
+the moment a little ahead (see `stepping`), and how it yields: with the states that would be there.
 """
 
 from __future__ import annotations
@@ -56,8 +56,8 @@ def _mounting(structure: Structure) -> list[str]:
 
 def _mount(states: int) -> list[str]:
     every = range(states)
-    nudged = vector_of([f"y[{i}] + {NUDGE}" for i in every])
-    after = vector_of([f"y[{i}] + H * d[{i}] * settling(H * (e[{i}] - d[{i}]) / {NUDGE})" for i in every])
+    ahead = vector_of([f"y[{i}] + H * d[{i}]" for i in every])
+    after = vector_of([f"y[{i}] + H * d[{i}] * yielding(d[{i}], e[{i}] - d[{i}])" for i in every])
     led = vector_of([f"y[{i}] + H * (e[{i}] - d[{i}])" for i in every])
     yields = [
         f"max(0.0, ahead * (moment[{i}] - turned[{i}]) + half * (moment[{i}] - faster[{i}])) / {NUDGE}"
@@ -75,7 +75,7 @@ def _mount(states: int) -> list[str]:
         f"    apart = ({NUDGE}, {NUDGE}, {NUDGE})",
         "    between = plate_rates(alpha_0, omega_0)",
         "    _, d = mounting(alpha_0, between, y, time, p)",
-        f"    _, e = mounting(alpha_0, between, {nudged}, time, p)",
+        f"    _, e = mounting(alpha_0, between, {ahead}, time, p)",
         f"    y = {after}",
         "    rates = plate_rates(alpha, omega)",
         "    led = drift(rates, omegad, H / 12.0)",
