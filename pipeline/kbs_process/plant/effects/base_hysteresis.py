@@ -76,7 +76,7 @@ BASE_HYSTERESIS = Effect(
             grid=tuple(3e-6 * 2.4**i for i in range(5)),
         ),
         Parameter(
-            "base_slip_power", "1", LogNormal(1.5, 0.3), "sharpness of yielding", (1.0, 5.0), grid=(1.5,)
+            "base_slip_power", "1", LogNormal(1.5, 0.3), "sharpness of yielding", (1.0, 5.0), grid=(1.5, 3.0)
         ),
     ),
     reference="Y. K. Wen, Method for random vibration of hysteretic systems, J. Engineering Mechanics Division ASCE "
