@@ -47,6 +47,32 @@ def test_it_does_not_fly(folder: CampaignFolder) -> None:
     assert not flown.rig.external
 
 
+MOUNTING = """
+[external.base_hysteresis]
+on = "T"
+
+[external.base_hysteresis.parameters]
+base_loop_x = { value = 20, unit = "mN m", sigma = 1, source = "diagnosis" }
+base_loop_y = { value = 0.0, unit = "N m", sigma = 0, source = "diagnosis" }
+base_loop_z = { value = 0.0, unit = "N m", sigma = 0, source = "diagnosis" }
+base_slip_angle = { value = 20, unit = "urad", sigma = 1, source = "diagnosis" }
+base_slip_power = { value = 1.5, unit = "1", sigma = 0, source = "diagnosis" }
+"""
+
+
+def test_a_mounting_is_read_and_asks_for_a_plate_that_turns(folder: CampaignFolder) -> None:
+    folder.append(RIG, MOUNTING)
+    folder.replace("campaign.toml", '"flexspline",', '"flexspline",\n    "base_hysteresis",')
+    campaign = load_campaign(folder.path)
+    (mounting,) = campaign.rig.external
+    assert (mounting.on, mounting.point) == ("T", None)
+    assert float(mounting.parameters["base_loop_x"]) == 0.02
+    assert "base_hysteresis" not in load_campaign(folder.path, flight=True).effects
+    for key in ("stiffness", "damping"):
+        folder.replace(RIG, f"\n{key} =", f"\n# {key} =")
+    assert "acts on the angles of a plate that turns" in str(folder.refusal())
+
+
 FAULTS = {
     "no table": (CORD, "", ["external.bungee", "is missing, although"]),
     "unknown effect": ("external.bungee", "external.bunge", ["external.bunge", "did you mean 'bungee'"]),

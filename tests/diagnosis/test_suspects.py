@@ -81,6 +81,7 @@ def test_every_law_that_the_model_leaves_out_is_a_suspect_once_a_site_and_shape(
     assert len(set(every)) == len(every)
     assert {s.site for s in every if s.name == "harness"} == {"az", "el"}
     assert {s.site for s in every if s.name == "floor_vibration"} == {"floor"}
+    assert {s.site for s in every if s.name == "base_hysteresis"} == {"T"}
     assert len({s.site for s in every if s.name == "cross_coupling"}) == 30
     assert len({s.site for s in every if s.name == "channel_interaction"}) == 6 * 21 - 6
     for suspect in every:
@@ -107,6 +108,23 @@ def test_what_nobody_recorded_is_no_suspect() -> None:
     )
     names = {suspect.name for suspect in suspects(gearless)}
     assert "kinematic_error" not in names and "backlash" in names  # fsv is missing, Ka is there
+
+
+def test_a_plate_that_does_not_turn_has_no_mounting_to_suspect() -> None:
+    stiff = replace(rig(), transducer=replace(rig().transducer, stiffness=None, damping=None))
+    assert not {"base_hardening", "base_hysteresis"} & {suspect.name for suspect in suspects(stiff)}
+
+
+def test_a_mounting_is_moved_by_the_plate_about_each_axis_alone() -> None:
+    turned = Tapped(RATE, tapped().columns, np.zeros((2000, len(tapped().columns))))
+    angle = 1e-3 * np.sin(np.arange(2000) / RATE)
+    turned.values[:, turned.columns.index("angle.Ty")] = angle
+    columns = inputs(one("base_hardening", "T", base_hardening_power=3.0), turned, rig(), NOMINAL)
+    shown = np.stack([[column[Inlet("base_torque", "", a)] for a in "xyz"] for column in columns])
+    middle = 0.5 * (angle[1:] + angle[:-1])
+    np.testing.assert_allclose(shown[1, 1, :-1], -((middle / 1e-3) ** 3), atol=1e-3)
+    shown[1, 1] = 0.0
+    assert not shown.any()
 
 
 def test_places_lie_where_the_joint_has_been() -> None:

@@ -33,6 +33,10 @@ CASES = [
     ("ground_cable", "el", {}, "cable_spring", 0.5, 0.06),
     ("bungee", "el", {"anchor_x": 0.1, "anchor_y": 0.0, "anchor_z": 2.0, "free_length": 1.2}, "stiffness", 0.5, 0.03),
     ("air_drag", "el", {}, "air_drag", 0.5, 0.15),
+    ("base_hardening", "T", {"base_hardening_power": 2.0}, "base_hardening_y", 3e-3, 0.15),
+    ("base_hardening", "T", {"base_hardening_power": 4.0}, "base_hardening_x", 3e-4, 0.15),
+    ("base_hysteresis", "T", {"base_slip_angle": 3e-5}, "base_loop_y", 4e-4, 0.15),
+    ("base_hysteresis", "T", {"base_slip_angle": 7e-6}, "base_loop_x", 5e-5, 0.2),
 ]  # fmt: skip
 
 

@@ -25,13 +25,15 @@ def amplitudes(effect: Effect) -> list[str]:
 
 
 def around(effect: Effect) -> dict[str, float]:
-    """Signals of a drive that turns, or of a point that moves; shapes in the middle of their priors."""
+    """Signals of a drive that turns, of a point or of a plate that moves; shapes in the middle of their priors."""
     signals = {
         "field": 3.02, "field_travel": 0.7, "field_rate": 0.4,
         "rotor_angle": 3.0, "rotor_rate": 0.5, "rotor_travel": 0.0, "ratio": 100.0,
         "joint_angle": 0.0291, "joint_rate": 0.004, "time": 2.5,
         "other_angle": 0.3, "other_rate": 0.004,
         "x": 0.1, "y": -0.2, "z": 0.4, "vx": 0.01, "vy": 0.02, "vz": -0.01,
+        "base_x": 1e-3, "base_y": -4e-4, "base_z": 2e-4,
+        "base_rate_x": 1e-5, "base_rate_y": -2e-5, "base_rate_z": 1e-5,
     }  # fmt: skip
     shapes = {entry.name: entry.prior.middle for entry in effect.parameters if entry.role != "amplitude"}
     return signals | {state.name: 0.3 for state in effect.states} | shapes
@@ -45,7 +47,7 @@ def value(effect: Effect, values: dict[str, float], **given: float) -> Array:
 class TestSuspects:
     def test_is_absent_without_amplitude_and_linear_in_it(self, effect: Effect) -> None:
         names, values = amplitudes(effect), around(effect)
-        size = 1 if effect.port.of_drive else 3
+        size = effect.port.components
         none = value(effect, values, **dict.fromkeys(names, 0.0))
         assert not none[:size].any()
         units = [value(effect, values, **dict.fromkeys(names, 0.0) | {name: 1.0}) for name in names]
@@ -78,13 +80,13 @@ class TestSuspects:
         """One interval in one part: the equation at its middle, rates the slopes, states after half their step."""
         dt, values = 1e-3, around(effect)
         travel = {"field": 5e-4, "rotor_angle": 5e-4, "joint_angle": 4e-6, "other_angle": 4e-6, "time": dt}
-        travel |= {"x": 1e-5, "y": 2e-5, "z": -1e-5}
+        travel |= {"x": 1e-5, "y": 2e-5, "z": -1e-5, "base_x": 1e-8, "base_y": -2e-8, "base_z": 1e-8}
         base = signals_of(effect)
         columns = np.array([[values[name] + k * travel[name] for name in base] for k in range(2)])
         given = [entry.name for entry in effect.parameters if entry.role != "amplitude"]
         given += ["ratio"] * ("ratio" in effect.arguments)
         names = amplitudes(effect)
-        out = np.zeros((2, len(names), 1 if effect.port.of_drive else 3))
+        out = np.zeros((2, len(names), effect.port.components))
         _module(effect)(columns, np.array([values[name] for name in given]), dt, 1, out)
         middle = values | {name: values[name] + 0.5 * travel[name] for name in base} | {"rotor_travel": 5e-4}
         middle |= {
@@ -98,7 +100,7 @@ class TestSuspects:
         middle |= {"field_rate": 0.5, "field_travel": 2.5e-4}
         start = {state.name: state.initial for state in effect.states}
         zero = dict.fromkeys(names, 0.0)
-        rates = value(effect, middle | start, **zero)[1 if effect.port.of_drive else 3 :]
+        rates = value(effect, middle | start, **zero)[effect.port.components :]
         half = {s.name: s.initial + 0.5 * dt * rate for s, rate in zip(effect.states, rates, strict=True)}
         for index, name in enumerate(names):
             expected = value(effect, middle | half, **zero | {name: 1.0})[: out.shape[2]]

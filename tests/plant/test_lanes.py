@@ -21,6 +21,7 @@ SECONDS = 6.0
 RATES: dict[str, Any] = {"rate_Hz": 100.0, "angle_rate_Hz": 40.0, "duration_s": SECONDS}
 BEFORE = 0.73  # s, that commands begin before the recording
 CROSSING = "joint_other_rate_law"
+MOUNTING = ["base_hardening", "base_hysteresis"]
 WITH_STATES = [*NOMINAL, "controller_latency", "ground_cable", "bungee"]
 
 
@@ -48,6 +49,13 @@ def crossed() -> Rig:
     return attach(
         two_axis(), law, bent | {"other_rate_law_low": -0.05, "other_rate_law_high": 0.05}, joints=["el"]
     )
+
+
+def mounted() -> Rig:
+    """With a mounting that stiffens and slips: its states are the rig's."""
+    hardening, hysteresis = select(MOUNTING)
+    rig = attach(two_axis(), hardening, {"base_hardening_x": 0.5, "base_hardening_y": 0.5})
+    return attach(rig, hysteresis, {"base_loop_x": 0.1, "base_loop_y": 0.1, "base_loop_z": 0.1})
 
 
 def test_a_joint_has_another_one_to_depend_on() -> None:
@@ -94,8 +102,15 @@ def alone(rig: Rig, effects: list[str]) -> tuple[Array, Array]:
         (loaded("closed"), WITH_STATES),
         (one_axis(stiffness=None, amplifier=None), list(NOMINAL)),
         (crossed(), [*NOMINAL, CROSSING]),
+        (mounted(), [*NOMINAL, *MOUNTING]),
     ],
-    ids=["open loop", "closed loop", "rigid base, no amplifier", "one axis acts on the other"],
+    ids=[
+        "open loop",
+        "closed loop",
+        "rigid base, no amplifier",
+        "one axis acts on the other",
+        "a mounting with states",
+    ],
 )
 def test_each_shows_what_it_shows_alone(rig: Rig, effects: list[str]) -> None:
     rigs = varied(rig, 3)
@@ -109,12 +124,17 @@ def test_each_shows_what_it_shows_alone(rig: Rig, effects: list[str]) -> None:
         np.testing.assert_allclose(angle, turned, atol=1e-10)
 
 
-def test_no_bit_depends_on_what_runs_beside_it() -> None:
-    rigs = varied(loaded("open"), LANES + 3)
-    several = together(rigs, WITH_STATES)
+@pytest.mark.parametrize(
+    ("rig", "effects"),
+    [(loaded("open"), WITH_STATES), (mounted(), [*NOMINAL, *MOUNTING])],
+    ids=["loads", "mounting"],
+)
+def test_no_bit_depends_on_what_runs_beside_it(rig: Rig, effects: list[str]) -> None:
+    rigs = varied(rig, LANES + 3)
+    several = together(rigs, effects)
     assert len(several) == LANES + 3
     for k in (0, LANES - 1, LANES + 2):
-        ((wrench, angle),) = together([rigs[k]], WITH_STATES)
+        ((wrench, angle),) = together([rigs[k]], effects)
         np.testing.assert_array_equal(wrench, several[k][0])
         np.testing.assert_array_equal(angle, several[k][1])
 

@@ -143,6 +143,10 @@ def _check_external(campaign: Campaign, tables: Merged, problems: Problems) -> N
             if external.point is None:
                 remedy = "give the place where it pulls, (x, y, z) in the link's axes"
                 problems.add(tables.place((*key, "point")), "is missing", remedy)
+        if effect.port is Port.BASE_TORQUE and named and campaign.rig.transducer.stiffness is None:
+            what = f"is missing, and '{effect.name}' acts on the angles of a plate that turns"
+            remedy = "give the transducer's stiffness, or leave the effect out"
+            problems.add(tables.place(("transducer", "stiffness")), what, remedy)
         _check_parameters(effect, external.parameters, named, (*key, "parameters"), tables, problems)
 
 

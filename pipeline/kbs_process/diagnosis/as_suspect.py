@@ -13,9 +13,10 @@ from kbs_process.diagnosis.places import POINT, Place
 from kbs_process.diagnosis.scene import Scene
 from kbs_process.diagnosis.screen import Catalogued, Suspect
 from kbs_process.diagnosis.suspects import BY, Candidate
-from kbs_process.plant.effect import ACTION, ACTIONS, Effect, instance
+from kbs_process.plant.effect import ACTION, ACTIONS, Effect, Port, instance
 from kbs_process.plant.effects import CATALOGUE
 from kbs_process.plant.sensing import SENSING, Sensing
+from kbs_process.rig.model import TRANSDUCER
 from kbs_process.signals.records import Array
 
 _EVERY: tuple[Effect | Sensing, ...] = (*CATALOGUE, *SENSING)
@@ -31,7 +32,8 @@ def suspect_of(find: Find, scene: Scene) -> tuple[Suspect, Array] | None:
         coefficients = np.linalg.lstsq(basis(over, x, *ends), find.curve.value, rcond=None)[0]
         return CurveSuspect(scene, over, own.axis, ends), np.asarray(coefficients)
     law = _LAWS.get(own.law)
-    site = BY.join(own.channels) or own.axis
+    mounting = isinstance(law, Effect) and law.port is Port.BASE_TORQUE
+    site = TRANSDUCER if mounting else BY.join(own.channels) or own.axis
     if law is None or law.each_trial or not site:
         return None
     # Of a sensor's law that was found more than once, the action that was found first.

@@ -9,12 +9,13 @@ import numpy as np
 
 from kbs_process.plant.linear import Freedom, Linear
 from kbs_process.plant.rigid import LinkMotion, kinematics, links_beyond
-from kbs_process.rig.model import TRANSDUCER, Rig
+from kbs_process.rig.model import LAB, TRANSDUCER, Rig
 from kbs_process.signals.frames import rotate
 from kbs_process.signals.records import WRENCH_CHANNELS, Array
 
 DRIVE_PORTS = ("motor_torque", "motor_friction", "transmission", "joint_torque")
 GROUND_PORT, WRENCH_PORT, BASE_PORT = "ground_torque", "external_wrench", "base_acceleration"
+MOUNTING_PORT = "base_torque"
 _BASE_AXES = ("x", "y", "z")
 
 
@@ -25,7 +26,8 @@ class Inlet:
     A drive's: `where` is its joint, N m with the sign of `plant.effect.Port` (friction: as a torque on the rotor).
     "ground_torque": on the output of joint `where` about its axis, N m, reacted by the laboratory.
     "external_wrench": from the laboratory on link `where`, `axis` one of Fx .. Tz, N or N m, about T's origin in the
-    undeflected T's axes. "base_acceleration": of the floor along T's axes, x .. z, m/s^2.
+    undeflected T's axes. "base_acceleration": of the floor along T's axes, x .. z, m/s^2. "base_torque": moment of the
+    mounting on an elastic transducer's plate about T's axes, x .. z, N m.
     """
 
     port: str
@@ -34,14 +36,20 @@ class Inlet:
 
 
 def inlets_of(rig: Rig) -> tuple[Inlet, ...]:
-    """Every inlet of a rig: drives, wrenches on each link beyond T, the floor."""
+    """Every inlet of a rig: drives, wrenches on each link beyond T, the floor, the mounting of a plate that turns."""
     drives = [
         Inlet(port, joint.name) for joint in rig.joints if joint.drive is not None for port in DRIVE_PORTS
     ]
     grounds = [Inlet(GROUND_PORT, joint.name) for joint in rig.joints if joint.drive is not None]
     links = [name for name in (TRANSDUCER, *rig.joint_names) if name in links_beyond(rig)]
     wrenches = [Inlet(WRENCH_PORT, link, axis) for link in links for axis in WRENCH_CHANNELS]
-    return (*drives, *grounds, *wrenches, *(Inlet(BASE_PORT, "", axis) for axis in _BASE_AXES))
+    beneath = (BASE_PORT, MOUNTING_PORT) if plate_turns(rig) else (BASE_PORT,)
+    return (*drives, *grounds, *wrenches, *(Inlet(port, "", axis) for port in beneath for axis in _BASE_AXES))
+
+
+def plate_turns(rig: Rig) -> bool:
+    """Whether the transducer's plate turns on springs in the laboratory."""
+    return rig.transducer.stiffness is not None and rig.transducer.on == LAB
 
 
 def generalised(rig: Rig, system: Linear, inlets: Sequence[Inlet], q: Array) -> tuple[Array, Array]:
@@ -49,7 +57,8 @@ def generalised(rig: Rig, system: Linear, inlets: Sequence[Inlet], q: Array) -> 
 
     Equation: virtual work. A wrench (F, M) about T's origin on a link works
         $M \cdot a_i + F \cdot a_i \times (o - p_i)$ in a unit turn about axis $a_i$ through $p_i$ that carries the
-        link; an acceleration of the floor acts like one of all masses the other way: minus the momentum's rows.
+        link; an acceleration of the floor acts like one of all masses the other way: minus the momentum's rows. A
+        moment of the mounting turns the plate, and is none of what the unit exerts on it.
     Units: rad of the output for rotors, hence `ratio` times the motor's torque.
     """
     pose = np.asarray(q, dtype=float)[None, :]
@@ -81,6 +90,8 @@ def generalised(rig: Rig, system: Linear, inlets: Sequence[Inlet], q: Array) -> 
             for row, (freedom, reach) in enumerate(zip(system.freedoms, reaching, strict=True)):
                 if inlet.where in freedom.carries:
                     force[row, column] = wrench @ reach
+        elif inlet.port == MOUNTING_PORT:
+            force[_BASE_AXES.index(inlet.axis), column] = 1.0
         else:
             axis = _BASE_AXES.index(inlet.axis)
             direct[:, column] = -rigid[:, axis]

@@ -10,7 +10,14 @@ from numpy.typing import NDArray
 
 from kbs_process.diagnosis.floor import Floor, channel_windows
 from kbs_process.diagnosis.hypothesis import coupled
-from kbs_process.diagnosis.inlets import BASE_PORT, GROUND_PORT, WRENCH_PORT, Inlet
+from kbs_process.diagnosis.inlets import (
+    BASE_PORT,
+    GROUND_PORT,
+    MOUNTING_PORT,
+    WRENCH_PORT,
+    Inlet,
+    plate_turns,
+)
 from kbs_process.diagnosis.joint import Standing
 from kbs_process.diagnosis.known import Known
 from kbs_process.diagnosis.ports import Cells, Complex, PortModel, sine_window
@@ -130,6 +137,7 @@ def _ports(rig: Rig, channels: Sequence[str], wrench: int) -> tuple[PortName, ..
     grounds = [PortName("ground torque", name) for name in driven]
     links = [name for name in (TRANSDUCER, *rig.joint_names) if name in links_beyond(rig)]
     outside = [PortName("external wrench", link) for link in links] + [PortName("base")] * bool(links)
+    outside += [PortName("base torque")] * plate_turns(rig)
     sensors = [PortName("transducer", "", (name,)) for name in channels[:wrench]]
     encoders = [PortName("encoder", name) for name in channels[wrench:]]
     clocks = [PortName("clock", "wrench")] + [PortName("clock", "encoder")] * bool(encoders)
@@ -142,6 +150,8 @@ def _inlets(name: PortName) -> tuple[Inlet, ...]:
             return tuple(Inlet(WRENCH_PORT, name.axis, axis) for axis in WRENCH_CHANNELS)
         case "base":
             return tuple(Inlet(BASE_PORT, "", axis) for axis in "xyz")
+        case "base torque":
+            return tuple(Inlet(MOUNTING_PORT, "", axis) for axis in "xyz")
         case "ground torque":
             return (Inlet(GROUND_PORT, name.axis),)
         case _:

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from kbs_process.diagnosis.hypothesis import Tapped
-from kbs_process.diagnosis.inlets import BASE_PORT, WRENCH_PORT, Inlet
+from kbs_process.diagnosis.inlets import BASE_PORT, MOUNTING_PORT, WRENCH_PORT, Inlet
 from kbs_process.diagnosis.places import point_of
 from kbs_process.diagnosis.suspects import BY, Candidate, own_values
 from kbs_process.plant.along import along, signals_of
@@ -22,19 +22,21 @@ from kbs_process.plant.effects import select
 from kbs_process.plant.linear import drive_slopes
 from kbs_process.plant.rigid import kinematics
 from kbs_process.plant.sensing import Sensing, SensingPort
+from kbs_process.plant.taps import plate_column
 from kbs_process.rig.model import TRANSDUCER, Rig
 from kbs_process.signals.frames import rotate
 from kbs_process.signals.records import WRENCH_CHANNELS, Array
 from kbs_process.stages.resample import resample
 
 _POSITION = ("x", "y", "z")  # signals of an effect at a point; its velocity is their slopes
+_BENEATH = {Port.BASE_ACCELERATION: BASE_PORT, Port.BASE_TORQUE: MOUNTING_PORT}
 
 
 def port_inputs(candidate: Candidate, tapped: Tapped, rig: Rig) -> Array:
     """What a suspect of the plant puts in at its port, for a unit of each amplitude, (m, amplitudes, components).
 
-    Components: one at a drive (N m, of its field rad), three at a point of a link (N) or the floor (m/s^2), along the
-    undeflected T's axes. Each row is the mean from one tap to the next.
+    Components: one at a drive (N m, of its field rad), three at a point of a link (N), the floor (m/s^2) or the
+    mounting (N m), along the undeflected T's axes. Each row is the mean from one tap to the next.
     """
     effect = candidate.effect
     assert isinstance(effect, Effect)
@@ -42,6 +44,8 @@ def port_inputs(candidate: Candidate, tapped: Tapped, rig: Rig) -> Array:
     signals: dict[str, Array] = {"time": np.arange(len(tapped.values)) / tapped.rate}
     if effect.port is Port.EXTERNAL_FORCE:
         signals |= dict(zip(_POSITION, _way(rig, candidate, tapped).T, strict=True))
+    elif effect.port is Port.BASE_TORQUE:
+        signals |= {f"base_{axis}": tapped.values[:, columns[plate_column(axis)]] for axis in _POSITION}
     elif effect.port.of_drive:
         needed = [name for name in signals_of(effect) if name != "time"]
         signals |= {name: tapped.values[:, columns[f"{name}.{candidate.site}"]] for name in needed}
@@ -84,9 +88,9 @@ def inputs(
         # Both are meant at the output: the rotor's torque is `ratio` times the motor's, the field's angle a `ratio`-th.
         torque = values[:, :, 0] * by_field[1] / float(drive.ratio) ** 2
         return [{Inlet("motor_torque", site): column} for column in torque.T]
-    if candidate.port is Port.BASE_ACCELERATION:
+    if candidate.port in _BENEATH:
         return [
-            {Inlet(BASE_PORT, "", axis): values[:, a, k] for k, axis in enumerate(_POSITION)}
+            {Inlet(_BENEATH[candidate.port], "", axis): values[:, a, k] for k, axis in enumerate(_POSITION)}
             for a in range(values.shape[1])
         ]
     if candidate.port is Port.EXTERNAL_FORCE:

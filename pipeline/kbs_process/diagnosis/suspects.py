@@ -8,6 +8,7 @@ from itertools import combinations_with_replacement, product
 
 import numpy as np
 
+from kbs_process.diagnosis.inlets import plate_turns
 from kbs_process.diagnosis.places import Place, points_of
 from kbs_process.diagnosis.ranges import Ranges
 from kbs_process.plant.along import signals_of
@@ -16,7 +17,8 @@ from kbs_process.plant.effects import CATALOGUE
 from kbs_process.plant.effects.joint_order import JOINT_ORDER
 from kbs_process.plant.rigid import kinematics, links_beyond
 from kbs_process.plant.sensing import SENSING, Sensing, SensingPort
-from kbs_process.rig.model import LAB, Joint, Rig
+from kbs_process.plant.taps import plate_column
+from kbs_process.rig.model import LAB, TRANSDUCER, Joint, Rig
 from kbs_process.signals.frames import rotate
 from kbs_process.signals.records import WRENCH_CHANNELS
 
@@ -29,7 +31,7 @@ BY = "<-"  # in the site of a coupling: channel that reads, channel that acts, o
 class Candidate:
     """One suspect at one site with one choice of its shape.
 
-    `site` is a joint (drives, encoders), a link (forces of the laboratory), the floor, a channel,
+    `site` is a joint (drives, encoders), a link (forces of the laboratory), the floor, T (its mounting), a channel,
     "Tx", two or three of them ("Tx<-Fz", "Tx<-Fy<-Fz"), or a stream ("wrench", "encoder").
     """
 
@@ -105,6 +107,8 @@ def candidates(
 def _sites(effect: Effect, rig: Rig, columns: Sequence[str]) -> list[str]:
     if effect.port is Port.BASE_ACCELERATION:
         return [FLOOR] if rig.transducer.channels else []
+    if effect.port is Port.BASE_TORQUE:
+        return [TRANSDUCER] if plate_turns(rig) and plate_column("x") in columns else []
     if effect.port is Port.EXTERNAL_FORCE:
         # A screen has velocities as T sees them.
         blind = rig.transducer.on != LAB and bool(VELOCITIES & set(effect.arguments))

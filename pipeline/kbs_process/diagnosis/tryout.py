@@ -42,7 +42,7 @@ def identity(suspect: Suspect) -> Identity:
     port = port_word(candidate.name, candidate.port)
     of_channel = candidate.port in (SensingPort.CHANNEL, SensingPort.COUPLING, SensingPort.PRODUCT)
     channels = tuple(candidate.site.split(BY)) if of_channel else ()
-    axis = "" if of_channel or candidate.port is Port.BASE_ACCELERATION else candidate.site
+    axis = "" if of_channel or port == PORTS[Port.BASE_ACCELERATION] else candidate.site
     own = "cogging" if _with_cycles(candidate, suspect.scene.hypothesis.rig) else family(candidate.name)
     return Identity(port, axis, channels, own, candidate.name)
 
@@ -70,6 +70,8 @@ def port_label(suspect: Suspect) -> str:
         return PortName("ground torque", candidate.site).label
     if candidate.port is Port.BASE_ACCELERATION:
         return PortName("base").label
+    if candidate.port is Port.BASE_TORQUE:
+        return PortName("base torque").label
     return PortName(own.port, own.axis, own.channels[:1]).label
 
 

@@ -8,7 +8,7 @@ the same signals.
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from typing import Any
 
@@ -27,6 +27,9 @@ SLOPES = {
     "vx": "x",
     "vy": "y",
     "vz": "z",
+    "base_rate_x": "base_x",
+    "base_rate_y": "base_y",
+    "base_rate_z": "base_z",
 }
 TRAVELS = {"rotor_travel": "rotor_angle", "field_travel": "field"}
 SLIDING = 1e-3  # rad/s of the rotor at which a Coulomb friction along given signals is full
@@ -60,7 +63,7 @@ def along(effect: Effect, signals: Mapping[str, Array], values: Mapping[str, flo
     module = _module(effect)
     columns = np.ascontiguousarray(np.stack([signals[name] for name in signals_of(effect)], axis=1))
     given = np.array([values[name] for name in _given(effect)], dtype=float)
-    shape = (len(columns), len(_amplitudes(effect)), 1 if effect.port.of_drive else 3)
+    shape = (len(columns), len(_amplitudes(effect)), effect.port.components)
 
     def at(parts: int) -> Array:
         out = np.zeros(shape)
@@ -150,7 +153,7 @@ def along_text(effect: Effect) -> str:
             "@compiled",
             f"def rates(signals, values, dt, i, share, parts, {', '.join(states)}):",
             *[f"    {line}" for line in signals],
-            f"    _, {derivative} = {call(None)}",
+            f"    {'_, ' * effect.port.components}{derivative} = {call(None)}",
             f"    return {derivative},",
             "",
             "",
@@ -162,7 +165,7 @@ def along_text(effect: Effect) -> str:
         "    n = signals.shape[0]",
         "    fastest = 0.0",
         *[f"    {state.name} = {state.initial!r}" for state in effect.states],
-        *(_fastest(states) if states else []),
+        *(_fastest(effect.states) if states else []),
         "    h = dt / max(parts, 1)",
         "    for i in range(n - 1):",
         "        for part in range(parts):",
@@ -171,7 +174,7 @@ def along_text(effect: Effect) -> str:
         *[f"            {line}" for line in signals],
     ]
     for index, amplitude in enumerate(amplitudes):
-        value = f"{call(amplitude)}[0]" if states else call(amplitude)
+        value = f"{call(amplitude)}[0]" if states and effect.port.of_drive else call(amplitude)
         if effect.port is Port.MOTOR_FRICTION:
             value = f"-max(-1.0, min(1.0, rotor_rate / {SLIDING!r})) * {value}"
         if effect.port.of_drive:
@@ -183,23 +186,25 @@ def along_text(effect: Effect) -> str:
     return "\n".join([*lines, "    out[n - 1] = out[n - 2]", "    return fastest", ""])
 
 
-def _fastest(states: list[str]) -> list[str]:
+def _fastest(states: Sequence[State]) -> list[str]:
     """Emit a bound on the states' rates of decay and pulsations, along all samples.
 
-    The root of the largest sum of a row of the Jacobian's square: for an oscillator its pulsation.
+    The root of the largest sum of a row of the Jacobian's square: for an oscillator its pulsation. A state that is a
+    share of the most that it may be settles there, if anywhere, and not where it begins.
     """
-    lines = ["    if parts == 0:", "        for i in range(n - 1):"]
+    lines = ["    if parts == 0:", "        for i in range(n - 1):", "            for most in (0.0, 1.0):"]
     given = "signals, values, dt, i, 0.0, 1"
-    lines.append(f"            base = rates({given}, {', '.join(states)})")
+    at = [f"{state.name} + most" if state.unit == "1" else state.name for state in states]
+    lines.append(f"                base = rates({given}, {', '.join(at)})")
     every = range(len(states))
     for moved in every:
-        nudged = ", ".join(f"{name} + 1e-6" if j == moved else name for j, name in enumerate(states))
-        lines.append(f"            moved = rates({given}, {nudged})")
-        lines += [f"            j{row}{moved} = (moved[{row}] - base[{row}]) / 1e-6" for row in every]
+        nudged = ", ".join(f"{name} + 1e-6" if j == moved else name for j, name in enumerate(at))
+        lines.append(f"                moved = rates({given}, {nudged})")
+        lines += [f"                j{row}{moved} = (moved[{row}] - base[{row}]) / 1e-6" for row in every]
     for row in every:
         squared = [" + ".join(f"j{row}{m} * j{m}{column}" for m in every) for column in every]
         total = " + ".join(f"abs({entry})" for entry in squared)
-        lines.append(f"            fastest = max(fastest, ({total}) ** 0.5)")
+        lines.append(f"                fastest = max(fastest, ({total}) ** 0.5)")
     return [*lines, "        return fastest"]
 
 

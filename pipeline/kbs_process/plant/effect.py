@@ -50,6 +50,17 @@ POINT_SIGNALS = {
 VELOCITIES = frozenset(("vx", "vy", "vz"))
 FLOOR_SIGNALS = {"time": SIGNALS["time"]}
 
+# What the equation of the mounting can ask for: how the plate stands on it.
+MOUNTING_SIGNALS = {
+    "base_x": "rad, angle of the plate about T's x, then y, then z, off the unloaded position",
+    "base_y": "rad, about y",
+    "base_z": "rad, about z",
+    "base_rate_x": "rad/s, of base_x",
+    "base_rate_y": "rad/s",
+    "base_rate_z": "rad/s",
+    "time": SIGNALS["time"],
+}
+
 # What a change of the field can ask for: the field as it is commanded, as an angle of the motor.
 FIELD_SIGNALS = {
     "field_travel": "rad, turned by the field since the first command",
@@ -64,7 +75,8 @@ class Port(Enum):
 
     The field is what a driver makes of the controller's command. Motor torque, friction, transmission and joint torque
     act between a joint's output, its rotor and the body that carries the motor: what they do is internal. The others
-    come from the laboratory, and the transducer feels them.
+    come from the laboratory, and the transducer feels them; the base's torque is what carries the transducer, and it
+    feels of that what becomes of the motion.
     Ports of a drive have their parameters at every joint, the others once in the rig (`rig.model.External`).
     """
 
@@ -80,11 +92,25 @@ class Port(Enum):
     BASE_ACCELERATION = (
         "acceleration (x, y, z) of the laboratory's floor, m/s^2, along the undeflected T's axes"
     )
+    BASE_TORQUE = (
+        "moment (x, y, z) of the mounting on the plate about the axes of the base's angles, N m, beyond the "
+        "transducer's stiffness and damping"
+    )
 
     @property
     def of_drive(self) -> bool:
         """Whether it is a port of every driven joint, and not one of the rig."""
-        return self not in (Port.EXTERNAL_FORCE, Port.BASE_ACCELERATION)
+        return self not in (Port.EXTERNAL_FORCE, Port.BASE_ACCELERATION, Port.BASE_TORQUE)
+
+    @property
+    def components(self) -> int:
+        """Numbers that an equation at this port returns before the derivatives of its states."""
+        return 1 if self.of_drive else 3
+
+    @property
+    def stateful(self) -> bool:
+        """Whether an equation at this port may have states of its own: what integrates them is the plant's."""
+        return self is Port.BASE_TORQUE or (self.of_drive and self is not Port.FIELD)
 
     @property
     def signals(self) -> dict[str, str]:
@@ -96,6 +122,8 @@ class Port(Enum):
                 return POINT_SIGNALS
             case Port.BASE_ACCELERATION:
                 return FLOOR_SIGNALS
+            case Port.BASE_TORQUE:
+                return MOUNTING_SIGNALS
             case _:
                 return SIGNALS
 
@@ -191,7 +219,7 @@ class Effect:
     """An equation, the port at which its value acts, and what it is wired to.
 
     An effect with n states returns a tuple: its value, then the n time derivatives in their order. At a port of the
-    rig, an equation returns three components.
+    rig, an equation returns three components. A state of the base's depends on itself and on the motion alone.
     What acts at the ground's port belongs to the test, unless it is part `of_article`.
     `passive` claims that it never does positive work; the conformance test holds it to that. What comes from outside
     has amplitudes of its own in `each_trial`. A force `anywhere` is tied to no place of its link that a drawing shows:
@@ -233,17 +261,14 @@ class Effect:
             )
         if unused := set(own) - set(self.arguments):
             raise TypeError(f"{where}: {sorted(unused)} is declared, but not an argument of the equation")
-        if self.states and not self.port.of_drive:
-            raise TypeError(f"{where}: states of its own belong to a drive")
-        if self.states and self.port is Port.FIELD:
-            raise TypeError(f"{where}: a field has no states of its own")
+        if self.states and not self.port.stateful:
+            raise TypeError(f"{where}: what acts at this port has no states of its own")
         hints = get_type_hints(self.equation)
         untyped = [
             name for name in inspect.signature(self.equation).parameters if hints.get(name) is not float
         ]
-        returns: Any = float if self.port.of_drive else tuple[float, float, float]
-        if self.states:
-            returns = tuple[(float,) * (1 + len(self.states))]  # type: ignore[misc]
+        count = self.port.components + len(self.states)
+        returns: Any = float if count == 1 else tuple[(float,) * count]  # type: ignore[misc]
         if untyped or hints.get("return") != returns:
             raise TypeError(f"{where}: arguments {untyped} are not float, or the result is not {returns}")
 
@@ -270,9 +295,8 @@ class Effect:
         """Return the equation's components for numbers by name; its own states are at their initial values."""
         wired = {state.name: state.initial for state in self.states} | dict(known)
         result = self.equation(*(wired[name] for name in self.arguments))
-        if self.states:
-            return (result[0],)
-        return (result,) if self.port.of_drive else tuple(result)
+        whole = result if isinstance(result, tuple) else (result,)
+        return whole[: self.port.components]
 
 
 @cache

@@ -37,6 +37,7 @@ def at_rest(plant: Compiled, structure: Structure, p: Array, field: Array) -> tu
     x[layout["theta"]] = np.floor(field + 0.5) / p[offsets + MICROSTEP]
     x[layout["q"]] = x[layout["theta"]] / p[offsets + RATIO]
     x[layout["z"]] = np.tile(structure.states, structure.joints)
+    x[layout["y"]] = structure.mounted
     free = np.concatenate(
         [
             np.arange(x.size)[layout[name]]

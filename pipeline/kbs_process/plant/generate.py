@@ -6,8 +6,9 @@ from collections.abc import Iterator
 
 from kbs_process.plant.effect import Effect, Port
 from kbs_process.plant.loop import LOOP
+from kbs_process.plant.mounting import mounting_text, vector_of
 from kbs_process.plant.multibody import joint_offset, multibody_text, placing, unrolled
-from kbs_process.plant.stepping import accelerated, state_layout, stepping_text, tuple_of
+from kbs_process.plant.stepping import accelerated, state_layout, stepping_text
 from kbs_process.plant.structure import DRIVE, FIRST, JOINTS, MICROSTEP, RATIO, ROTOR, Structure
 from kbs_process.plant.taps import taps_text
 
@@ -21,6 +22,7 @@ def module_text(structure: Structure) -> str:
             *_arriving(structure),
             *_late(structure),
             *multibody_text(structure),
+            *mounting_text(structure),
             *stepping_text(structure),
             *_balance(structure),
             *taps_text(structure),
@@ -145,11 +147,12 @@ def _balance(structure: Structure) -> list[str]:
         f"    {placing(structure)} = place({unrolled('q_#', n)}, p)",
         *["    instant = 0.0"] * bool(structure.forces),
         *["    shaken = (0.0, 0.0, 0.0)"] * bool(structure.shakes),
+        *_held(structure),
     ]
     for j in range(n):
         k = joint_offset(structure, j)
         earth = [f"ground_{j}"] * structure.grounded
-        states = tuple_of([f"x[{layout['z'].start + i}]" for i in range(j * z, (j + 1) * z)])
+        states = vector_of([f"x[{layout['z'].start + i}]" for i in range(j * z, (j + 1) * z)])
         rotor = f"x[{layout['theta'].start + j}]"
         other = f"q_{structure.other(j)}, 0.0, " * structure.crossed
         lines += [
@@ -168,3 +171,12 @@ def _balance(structure: Structure) -> list[str]:
     names += [f"drag_{j} / p[{joint_offset(structure, j) + ROTOR}]" for j in range(n)]
     lines += [f"    acceleration[{i}] = {name}" for i, name in enumerate(names)]
     return [*lines, "    return wrench", "", ""]
+
+
+def _held(structure: Structure) -> list[str]:
+    """Emit the mounting's moment at rest."""
+    if not structure.mounts:
+        return []
+    first = state_layout(structure)["y"].start
+    y = vector_of([f"x[{first + i}]" for i in range(len(structure.mounted))])
+    return [f"    mounted, _ = mounting(alpha, omega, {y}, 0.0, p)"]

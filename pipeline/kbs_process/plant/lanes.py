@@ -8,6 +8,7 @@ lanes, without a branch.
 
 from __future__ import annotations
 
+from kbs_process.plant.mounting import vector_of
 from kbs_process.plant.stepping import (
     ROTOR_STEPS,
     InVector,
@@ -16,7 +17,6 @@ from kbs_process.plant.stepping import (
     kicked,
     prepared,
     state_layout,
-    tuple_of,
     turned,
 )
 from kbs_process.plant.structure import Structure
@@ -86,7 +86,7 @@ class Rows:
         for name in names:
             row, size = self._rows[name]
             of = [f"s[{LANES * (row + i)} + l]" for i in range(size)]
-            lines.append(f"    {name} = {tuple_of(of) if self._is_tuple(name) else of[0]}")
+            lines.append(f"    {name} = {vector_of(of) if self._is_tuple(name) else of[0]}")
         return lines
 
     @property
@@ -108,7 +108,7 @@ def lanes_text(structure: Structure) -> str:
     ends = [
         "    p = parameters[:, l]",
         *[
-            f"    field_{end} = {tuple_of([f's[{LANES * (row + j)} + l]' for j in range(n)])}"
+            f"    field_{end} = {vector_of([f's[{LANES * (row + j)} + l]' for j in range(n)])}"
             for end, row in enumerate((rows.field_0, rows.field_1))
         ],
     ]

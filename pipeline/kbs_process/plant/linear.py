@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kbs_process.plant.effect import FIELD_SIGNALS, POINT_SIGNALS, SIGNALS, Effect, Port
+from kbs_process.plant.mounted import mounted_sag, mounted_slopes
 from kbs_process.plant.rigid import LinkMotion, inertia_matrix, kinematics, links_beyond
 from kbs_process.plant.structure import external_of
 from kbs_process.rig.model import LAB, TRANSDUCER, Drive, Joint, Rig
@@ -63,11 +64,12 @@ def linearise(rig: Rig, effects: Sequence[Effect], q: Array) -> Linear:
         inboard of j, the Hessian of its potential.
         A force $f(x, v)$ of the laboratory adds $-v_i \cdot f_x v_j - f \cdot (a_i \times v_j)$ to $K_{ij}$ and
         $-v_i \cdot f_v v_j$ to $C_{ij}$, $v_i$ being its point's; a torque of its the slopes, for all that carry it.
+        A moment of the mounting adds its slopes at the plate's sag (`mounted`).
     Units: kg, m, rad, s.
     Validity: small motions about rest, at time 0. Slopes are those of the equations at rest, of a drive's without load:
         at a fifth of Tmax a motor's is 2 % less, in series with a gear that is 35 times as soft. Coulomb friction has
         no slope and is left out, effects' own states are held, the ground's torques count with their slopes alone, and
-        the pose is the one without sag.
+        the pose is the one without sag but for the mounting.
     Source: R. Featherstone, Rigid Body Dynamics Algorithms (2008), chapters 3 and 6.
     """
     pose = np.asarray(q, dtype=float)[None, :]
@@ -88,6 +90,9 @@ def linearise(rig: Rig, effects: Sequence[Effect], q: Array) -> Linear:
         K[:3, :3] += np.diag(rig.transducer.stiffness.value)
         if rig.transducer.damping is not None:
             C[:3, :3] += np.diag(rig.transducer.damping.value)
+        stiffness, damping = mounted_slopes(rig, effects, mounted_sag(rig, effects, q))
+        K[:3, :3] += stiffness
+        C[:3, :3] += damping
     R_TL = links[TRANSDUCER].R[0].T
     for index, joint in enumerate(driven):
         assert joint.drive is not None

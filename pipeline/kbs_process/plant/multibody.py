@@ -39,7 +39,8 @@ def unrolled(pattern: str, count: int) -> str:
 
 def multibody_text(structure: Structure) -> list[str]:
     """Return `place` (where the links are) and `accelerate` (what they do)."""
-    parts = [_place(structure), _base(structure), *map(partial(_load, structure), structure.loads)]
+    loads = [load for load in structure.loads if load not in structure.mounts]
+    parts = [_place(structure), _base(structure), *map(partial(_load, structure), loads)]
     return [line for part in [*parts, _accelerate(structure)] for line in [*part, "", ""]]
 
 
@@ -52,8 +53,8 @@ def placing(structure: Structure) -> str:
 def given(structure: Structure) -> list[str]:
     """Return what `accelerate` is given beside the base's angles and rates, as lines of names."""
     patterns = ["qd_#", "out_#", "drag_#", "momentum_#", *["ground_#"] * structure.grounded]
-    extra = [["instant"], ["shaken"]]
-    wanted = [bool(structure.forces), bool(structure.shakes)]
+    extra = [["instant"], ["shaken"], ["mounted"]]
+    wanted = [bool(structure.forces), bool(structure.shakes), bool(structure.mounts)]
     names = [name for part, needed in zip(extra, wanted, strict=True) if needed for name in part]
     return [placing(structure), *(unrolled(pattern, structure.joints) for pattern in patterns), *names]
 
@@ -121,20 +122,27 @@ def _load(structure: Structure, load: Load) -> list[str]:
 
 
 def _base(structure: Structure) -> list[str]:
-    """Emit gravity in the plate's axes and the moment of the transducer's elasticity on the plate."""
+    """Emit gravity in the plate's axes and the moment of transducer and mounting on the plate."""
     field = f"triple(p, int({GRAVITY}))"
-    shaken = ", shaken" * bool(structure.shakes)
+    beneath = _beneath(structure)
     if structure.shakes:  # on a floor that accelerates, everything falls the other way
         field = f"drift({field}, shaken, -1.0)"
     springs = [f"-p[{STIFFNESS + i}] * alpha[{i}] - p[{DAMPING + i}] * rates[{i}]" for i in range(3)]
+    if structure.mounts:
+        springs = [f"{spring} + mounted[{i}]" for i, spring in enumerate(springs)]
     return [
         "@compiled",
-        f"def base(alpha, omega{shaken}, p):",
+        f"def base(alpha, omega{beneath}, p):",
         '    """Gravity (m/s^2) and the moment of stiffness and damping on the plate (N m), in its axes."""',
         "    rates = plate_rates(alpha, omega)",
         f"    moment = plate_moment(alpha, ({', '.join(springs)}))",
         f"    return in_plate(alpha, {field}), moment",
     ]
+
+
+def _beneath(structure: Structure) -> str:
+    """Return what `base` is given of the laboratory."""
+    return ", shaken" * bool(structure.shakes) + ", mounted" * bool(structure.mounts)
 
 
 def _accelerate(structure: Structure) -> list[str]:
@@ -151,7 +159,7 @@ def _accelerate(structure: Structure) -> list[str]:
         "    `out` is the torque on a joint's output, `drag` the rate of its rotor's momentum. `out` and `alpha` go",
         "    with the accelerations `guess`; the torques fall by `yields` for each unit that the true ones are above.",
         '    """',
-        f"    g, moment = base(alpha, omega{', shaken' * bool(structure.shakes)}, p)",
+        f"    g, moment = base(alpha, omega{_beneath(structure)}, p)",
         f"    I_T = inertia(p, int({PLATE}))",
         "    V_T = (omega[0], omega[1], omega[2], 0.0, 0.0, 0.0)",
         "    A_T = (0.0, 0.0, 0.0, -g[0], -g[1], -g[2])",

@@ -15,6 +15,7 @@ The carriers get the change of the rotors' momenta to the last bit, the outputs 
 
 from __future__ import annotations
 
+from kbs_process.plant.mounting import vector_of
 from kbs_process.plant.multibody import carrier, given, joint_offset, placing, shaking, unrolled
 from kbs_process.plant.structure import DAMPING, DRIVE, MICROSTEP, RATIO, ROTOR, STIFFNESS, Structure
 
@@ -36,6 +37,7 @@ def state_layout(structure: Structure) -> dict[str, slice]:
         "qdd": n,
         "z": n * z,  # the effects' own states, drive by drive
         "zd": n * z,
+        "y": len(structure.mounted),  # the mounting's own states, in the middle of the step before
     }
     layout, start = {}, 0
     for name, size in sizes.items():
@@ -56,16 +58,11 @@ class InVector:
 
     def vector(self, name: str) -> str:
         """Three numbers of a part."""
-        return tuple_of([self.at(name, i) for i in range(3)])
+        return vector_of([self.at(name, i) for i in range(3)])
 
     def place(self, i: int) -> str:
         """Number `i` of all."""
         return f"x[{i}]"
-
-
-def tuple_of(names: list[str]) -> str:
-    """Return a tuple of some expressions; the compiler wants one that is not empty."""
-    return "(" + ", ".join(names or ["0.0"]) + ",)"
 
 
 def stepping_text(structure: Structure) -> list[str]:
@@ -92,8 +89,8 @@ def _rotor(structure: Structure) -> list[str]:
     other = "other_angle, other_rate, " * structure.crossed
     ground, ground_1 = (["ground"], ["ground_1"]) if structure.grounded else ([], [])
     earth = ", 0.5 * (ground + ground_1)" * structure.grounded
-    state = tuple_of([f"z[{i}] + 0.5 * h * zd[{i}]" for i in range(z)])
-    after = tuple_of([f"z[{i}] + h * d{i}" for i in range(z)])
+    state = vector_of([f"z[{i}] + 0.5 * h * zd[{i}]" for i in range(z)])
+    after = vector_of([f"z[{i}] + h * d{i}" for i in range(z)])
 
     def drive(results: list[str], w: str) -> str:
         given = f"field, middle, {w}, h * w, angle, rate, {other}ratio, time, state, p, k + {DRIVE}"
@@ -125,7 +122,7 @@ def _rotor(structure: Structure) -> list[str]:
         *secant,
         *secant[:-1],
         "    output = 0.5 * (gear + joint + gear_1 + joint_1)",
-        f"    return middle + 0.5 * h * w_1, w_1, output, {after}, {tuple_of(rates)}{earth}",
+        f"    return middle + 0.5 * h * w_1, w_1, output, {after}, {vector_of(rates)}{earth}",
     ]
 
 
@@ -189,8 +186,8 @@ def prepared(structure: Structure, state: InVector) -> list[str]:
             f"    spin_{j} = {state.at('spin', j)}",
             f"    theta_{j} = {state.at('theta', j)}",
             f"    w_{j} = spin_{j} - (carrier_{j} - half * turning_{j})",
-            f"    z_{j} = {tuple_of([state.at('z', i) for i in own])}",
-            f"    zd_{j} = {tuple_of([state.at('zd', i) for i in own])}",
+            f"    z_{j} = {vector_of([state.at('z', i) for i in own])}",
+            f"    zd_{j} = {vector_of([state.at('zd', i) for i in own])}",
             f"    share_{j} = (field_1[{j}] - field_0[{j}]) / {ROTOR_STEPS}",
             f"    inverse_{j} = 1.0 / share_{j}",
             f"    begin_{j} = arriving({j}, field_0[{j}], field_1[{j}], time, H, p)",
@@ -263,6 +260,9 @@ def kicked(structure: Structure, state: InVector) -> list[str]:
             f"    yields_{j} = max(0.0, ahead * stiffness + half * damping) / {NUDGE}",
         ]
     base = [f"ahead * p[{STIFFNESS + i}] + half * p[{DAMPING + i}]" for i in range(3)]
+    if structure.mounts:
+        lines += _mounted(structure, state)
+        base = [f"{spring} + yielding_T[{i}]" for i, spring in enumerate(base)]
     lines.append(f"    yields = ({', '.join(base)}, {unrolled('yields_#', n)})")
     lines += ["    instant = time + half"] * bool(structure.loads)
     lines += [*shaking(structure, "instant"), *accelerated(structure)]
@@ -281,3 +281,15 @@ def kicked(structure: Structure, state: InVector) -> list[str]:
             f"    {state.at('q', j)} = drifted_{j} + half * {state.at('qd', j)}",
         ]
     return lines
+
+
+def _mounted(structure: Structure, state: InVector) -> list[str]:
+    """Emit the mounting's moment, and its states in the middle of the step."""
+    own = range(len(structure.mounted))
+    at_start = f"{state.vector('alpha')}, {state.vector('omega')}"
+    lines = [
+        f"    y = {vector_of([state.at('y', i) for i in own])}",
+        "    leading = (guess[0], guess[1], guess[2])",
+        f"    mounted, yielding_T, y = mount({at_start}, alpha, omega, leading, y, time, H, p)",
+    ]
+    return lines + [f"    {state.at('y', i)} = y[{i}]" for i in own]

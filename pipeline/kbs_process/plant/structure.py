@@ -25,7 +25,7 @@ class Load:
     """An effect of the laboratory on the rig."""
 
     effect: Effect
-    link: int  # joint whose link it acts on; -1 is the top plate, and where the floor moves
+    link: int  # joint whose link it acts on; -1 is the top plate, and what is beneath it
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,6 +81,16 @@ class Structure:
         """What moves the laboratory's floor."""
         return tuple(load for load in self.loads if load.effect.port is Port.BASE_ACCELERATION)
 
+    @property
+    def mounts(self) -> tuple[Load, ...]:
+        """What the mounting does beyond the transducer's springs."""
+        return tuple(load for load in self.loads if load.effect.port is Port.BASE_TORQUE)
+
+    @property
+    def mounted(self) -> tuple[float, ...]:
+        """Initial values of the mounting's own states."""
+        return tuple(state.initial for load in self.mounts for state in load.effect.states)
+
     def offset(self, load: Load) -> int:
         """Return where the numbers of a load begin in the parameter vector: its point, then its parameters."""
         before = self.loads[: self.loads.index(load)]
@@ -128,13 +138,21 @@ def structure_of(rig: Rig, effects: Sequence[Effect]) -> Structure:
             where="[model] effects",
             remedy="leave it out",
         )
+    elastic = rig.transducer.stiffness is not None
+    mounted = next((effect.name for effect in effects if effect.port is Port.BASE_TORQUE), None)
+    if mounted is not None and not elastic:
+        raise ConfigError(
+            f"'{mounted}' acts on the angles of the base, and the transducer is rigid",
+            where="[transducer] stiffness",
+            remedy="give the transducer's stiffness, or leave the effect out",
+        )
     loads = tuple(
         Load(effect, links.get(external_of(rig, effect).on, -1))
         for effect in effects
         if not effect.port.of_drive
     )
     of_drives = tuple(effect for effect in effects if effect.port.of_drive)
-    return Structure(tuple(parents), rig.transducer.stiffness is not None, of_drives, loads)
+    return Structure(tuple(parents), elastic, of_drives, loads)
 
 
 def external_of(rig: Rig, effect: Effect) -> External:

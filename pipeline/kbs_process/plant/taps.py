@@ -10,9 +10,14 @@ from kbs_process.rig.model import TRANSDUCER, Rig
 OF_JOINTS = ("field", "rotor_angle", "rotor_rate", "joint_angle", "joint_rate")  # as in `effect.SIGNALS`
 
 
+def plate_column(axis: str, signal: str = "angle") -> str:
+    """Return the name of a tap's column: the plate's angle, or rate, about one of T's axes."""
+    return f"{signal}.{TRANSDUCER}{axis}"
+
+
 def tap_columns(rig: Rig) -> tuple[str, ...]:
     """Return the names of a tap's columns: SIGNAL.JOINT, signal by signal, then the plate's angles and rates."""
-    plate = [f"{signal}.{TRANSDUCER}{axis}" for signal in ("angle", "rate") for axis in "xyz"]
+    plate = [plate_column(axis, signal) for signal in ("angle", "rate") for axis in "xyz"]
     return (*(f"{signal}.{joint}" for signal in OF_JOINTS for joint in rig.joint_names), *plate)
 
 
@@ -23,7 +28,7 @@ def taps_text(structure: Structure) -> list[str]:
     def part(name: str, i: int) -> str:
         return f"x[{layout[name].start + i}]"
 
-    behind = layout["zd"].stop
+    behind = max(part.stop for part in layout.values())
     lines = [
         '@njit(cache=True, nogil=True, error_model="numpy")',
         "def tap(states, p, out):",

@@ -58,13 +58,14 @@ class Onset:
 def smooth_rig(rig: Rig) -> Rig:
     """Return the rig with encoders that do not round, and without friction and cogging."""
     steps = [joint.encoder.step.name for joint in rig.joints if joint.encoder is not None]
-    drives = [joint.drive.parameters for joint in rig.joints if joint.drive is not None]
+    holders = [joint.drive.parameters for joint in rig.joints if joint.drive is not None]
+    holders += [external.parameters for external in rig.external]
     effects = (*CATALOGUE, *(law.effect for law in MEASURED))
     dry = {entry.name for effect in effects for entry in effect.parameters if entry.dry}
     amplitudes = [
         quantity.name
-        for drive in drives
-        for name, quantity in drive.items()
+        for holder in holders
+        for name, quantity in holder.items()
         if name in dry or re.sub(f"{ACTION}$", "", name) in dry
     ]
     return substitute(rig, dict.fromkeys([*steps, *amplitudes], 0.0))

@@ -148,13 +148,12 @@ PHYSICS: tuple[Physics, ...] = (
                 Shape("z", "1", Range(-0.4, 0.4, log=False))),
     ),
     Physics(
-        "exponential stiffening of the base", family="unnamed", law=Law.PLATE_STIFFENING, **_BASE, unit="N m/rad",
-        first=200.0, most=2e4, catalogued=False,
+        "exponential stiffening of the base", family="stiffness", law=Law.PLATE_STIFFENING, **_BASE, unit="N m/rad",
+        first=200.0, most=2e4,
         shapes=(Shape("about", "1", Choice((0.0, 1.0), (0.0, 1.0))), Shape("angle", "rad", Range(5e-4, 2e-3))),
     ),
     Physics(
-        "stops in the base", family="unnamed", law=Law.PLATE_STOPS, **_BASE, unit="N m", first=0.02, most=2.0,
-        catalogued=False,
+        "stops in the base", family="hysteresis", law=Law.PLATE_STOPS, **_BASE, unit="N m", first=0.02, most=2.0,
         shapes=(Shape("about", "1", Choice((0.0, 1.0), (0.0, 1.0))), Shape("travel", "rad", Range(2e-6, 4e-5))),
     ),
     Physics(

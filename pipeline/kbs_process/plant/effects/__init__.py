@@ -18,6 +18,8 @@ from kbs_process.plant.effects.appendage import APPENDAGE
 from kbs_process.plant.effects.asymmetric_coulomb import ASYMMETRIC_COULOMB
 from kbs_process.plant.effects.asymmetric_viscous import ASYMMETRIC_VISCOUS
 from kbs_process.plant.effects.backlash import BACKLASH
+from kbs_process.plant.effects.base_hardening import BASE_HARDENING
+from kbs_process.plant.effects.base_hysteresis import BASE_HYSTERESIS
 from kbs_process.plant.effects.bungee import BUNGEE
 from kbs_process.plant.effects.cogging import COGGING
 from kbs_process.plant.effects.controller_gain import CONTROLLER_GAIN
@@ -107,6 +109,8 @@ CATALOGUE: tuple[Effect, ...] = (
     TETHER,
     FLOOR_VIBRATION,
     FLOOR_TILT,
+    BASE_HARDENING,
+    BASE_HYSTERESIS,
 )
 
 # Measured laws, which have no name: a model can contain them, and no search tries them as suspects.
