@@ -14,11 +14,11 @@ from kbs_process.diagnosis.finding import Tried
 from kbs_process.diagnosis.floor import declared
 from kbs_process.diagnosis.gate import Gate
 from kbs_process.diagnosis.joint import Own, with_extra
-from kbs_process.diagnosis.leaders import various
+from kbs_process.diagnosis.leaders import leaders, various
 from kbs_process.diagnosis.race import Runner, raced
 from kbs_process.diagnosis.rounds import continued, named_first, unnamed
 from kbs_process.diagnosis.screen import Found
-from kbs_process.diagnosis.thresholds import FIRST, TOLERATED
+from kbs_process.diagnosis.thresholds import FIRST, MOSTLY_DONE, TOLERATED
 from kbs_process.diagnosis.tryout import extra_of, identity
 from kbs_process.diagnosis.view import View
 
@@ -113,3 +113,28 @@ def test_pulled_numbers_are_drawn_back_beside_a_promising_law_that_does_little(
     monkeypatch.setattr(race, "released", lambda standing, *_: seen.append(standing) or standing)
     raced([chosen], replace(view, standing=pulled), declared(standing.known.experiment), simulate)
     assert len(seen) == drawn
+
+
+@pytest.mark.parametrize(("left", "first"), [(1.1, [RIGHT]), (3.0, [RIGHT, CURVE, WRONG, KIN])])
+def test_where_much_is_left_all_are_raced_unless_one_does_nearly_all(
+    view: View, left: float, first: list[tuple[str, str]]
+) -> None:
+    """In either case none is out of reach: those that do not run at once come one after the other."""
+    best = view.able[0]
+    assert best.suspect.family == RIGHT
+    known = view.standing.known
+    # As many numbers of noise as make what is left gross, and the best do a share of it.
+    excess = left * best.score.gain
+    level = excess / known.fit_rows + 1.0
+    residual = tuple(
+        np.sqrt(level * n / (z @ z)) * z for n, z in zip(known.rows, known.residual, strict=True)
+    )
+    here = replace(view.standing, known=replace(known, residual=residual))
+    assert here.known.excess == pytest.approx(excess, rel=1e-6)
+    seen = replace(view, standing=here)
+    if not here.known.gross:
+        pytest.skip("the law is too weak on this rig")
+    ahead, others = leaders(seen)
+    assert [one.suspect.family for one in ahead][: len(first)] == first[: len(ahead)]
+    assert (len(ahead) < len(view.able)) == (left < 1.0 / MOSTLY_DONE)
+    assert {one.suspect.family for one in (*ahead, *others)} == {one.suspect.family for one in view.able}

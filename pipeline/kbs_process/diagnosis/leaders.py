@@ -68,9 +68,10 @@ def leaders(view: View, among: Callable[[Found], bool] = lambda _: True) -> tupl
     if not able:
         return [], []
     bound = (1.0 - LEAD) * able[0].score.gain if view.ordered else 0.0
-    count = SHAPED if view.standing.known.gross else LEADERS
-    first = various([found for found in able if found.score.gain >= bound or found is able[0]])[:count]
-    return first, [found for found in able if found not in first][:SECOND]
+    gross = view.standing.known.gross
+    first = various([found for found in able if found.score.gain >= bound or found is able[0]])
+    first = first[: SHAPED if gross else LEADERS]
+    return first, [found for found in able if found not in first][: SHAPED if gross else SECOND]
 
 
 def various(chosen: Sequence[Found]) -> list[Found]:

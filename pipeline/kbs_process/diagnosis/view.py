@@ -12,7 +12,7 @@ from kbs_process.diagnosis.ranges import swept
 from kbs_process.diagnosis.scene import Scene
 from kbs_process.diagnosis.screen import Bench, Catalogued, Found, Screening, Suspect, screen
 from kbs_process.diagnosis.suspects import candidates
-from kbs_process.diagnosis.thresholds import ORDERED
+from kbs_process.diagnosis.thresholds import MOSTLY_DONE, ORDERED
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,10 +63,11 @@ class View:
         """Whether the best does enough of what there is to do for the order of the others to count.
 
         Where it does not, the plant is far from linear, or known numbers have taken up what was left out. Where much is
-        left, they have been pulled, whatever the best does.
+        left, they have been pulled, and a law that stands in for another does much, too: it has to be nearly all.
         """
         able, known = self.able, self.standing.known
-        return bool(able and able[0].score.gain >= ORDERED * known.excess and not known.gross)
+        share = MOSTLY_DONE if known.gross else ORDERED
+        return bool(able and able[0].score.gain >= share * known.excess)
 
 
 def suspects_of(standing: Standing, scene: Scene) -> list[Suspect]:
