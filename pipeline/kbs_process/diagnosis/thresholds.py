@@ -43,8 +43,8 @@ CLEAR: Final = 3.0 * TOLERATED
 # Likewise of recordings that nothing was fitted to: nulls have left 1.15 of the floor's power.
 UNFORESEEN: Final = 0.5
 ORDERED: Final = 0.5  # share of the residual's excess that the best has to do for the screen's order to count
-# Likewise where so much is left that known numbers have been pulled: there stand-ins, too, do half. Two strong laws beside
-# each other (development) left 0.98 to the second once the first was in the plant, and ten were simulated for it.
+# Likewise where so much is left that known numbers have been pulled: there stand-ins, too, do half. Of two strong laws
+# (development) the second had 0.98 of it once the first was in the plant, and ten were simulated for it.
 MOSTLY_DONE: Final = 0.8
 # Sigmas of their priors within which numbers that were pulled are drawn back, before a law is looked for, or they are
 # let go again beside one: one in twenty is beyond.
