@@ -17,6 +17,7 @@ from kbs_process.plant.effects.base_hardening import BASE_HARDENING, moment
 from kbs_process.plant.effects.base_hysteresis import BASE_HYSTERESIS
 from kbs_process.plant.linear import linearise
 from kbs_process.plant.mounted import mounted_sag
+from kbs_process.plant.predict import DEFAULT_STEP, SLIPPING_STEP
 from kbs_process.plant.schedule import Schedule
 from kbs_process.plant.simulation import Simulation
 from kbs_process.rig.model import Rig, substitute
@@ -144,22 +145,25 @@ def holding(base_x: float, hold: float) -> tuple[float, float, float]:
     return 0.0 * base_x, hold, 0.0
 
 
-@pytest.mark.parametrize(("effect", "given"), [(BASE_HARDENING, HARD), (BASE_HYSTERESIS, LOOP)])
-def test_halving_the_step_moves_nothing_much(effect: Effect, given: dict[str, float]) -> None:
+@pytest.mark.parametrize(
+    ("effect", "given", "begun"), [(BASE_HARDENING, HARD, DEFAULT_STEP), (BASE_HYSTERESIS, LOOP, SLIPPING_STEP)]
+)
+def test_halving_the_step_moves_less_than_a_tenth_of_the_noise(
+    effect: Effect, given: dict[str, float], begun: float
+) -> None:
     of = attach(two_axis(), effect, given)
 
-    def run(step: float) -> dict[str, Array]:
+    def run(step: float | None) -> dict[str, Array]:
         return streams(
             of, [*NOMINAL, effect.name], moving(6.0), rate_Hz=100.0, angle_rate_Hz=20.0, duration_s=6.0,
             step_s=step, quantise=False,
         )  # fmt: skip
 
-    steps = [run(step) for step in (2e-3, 1e-3, 5e-4)]
-    for coarse, fine, bound in zip(steps, steps[1:], (0.4, 0.06), strict=False):
-        moved = np.sqrt(np.mean((coarse["wrench"] - fine["wrench"]) ** 2, axis=0)) / NOISE
-        print("moved, in noise:", moved)
-        assert moved.max() < bound
-        assert np.abs(coarse["angle"] - fine["angle"]).max() < 0.01 * CODE
+    coarse, fine = run(None), run(0.5 * begun)
+    moved = np.sqrt(np.mean((coarse["wrench"] - fine["wrench"]) ** 2, axis=0)) / NOISE
+    print("moved, in noise:", moved)
+    assert 0.0 < moved.max() < 0.1
+    assert np.abs(coarse["angle"] - fine["angle"]).max() < 0.01 * CODE
 
 
 def test_a_slip_angle_passed_within_a_step_bounds_no_stability() -> None:

@@ -26,6 +26,7 @@ DEFAULT_STEP = 2e-3  # s; tests/plant/test_convergence.py shows what it costs in
 FINEST_STEP = 2.5e-4  # s; nothing in the plant asks for less
 # The amplifier, which passes up to some fifth of the sampling rate, is fed with the mean wrench of each step.
 STEPS_PER_SAMPLE = 4
+SLIPPING_STEP = 1e-3  # s, of a mounting with states: its slope changes at each reversal of the plate
 # rad of the fastest multibody mode, rotors held, in a step: stable up to 2.4, 1.3 in the paper's mechanism.
 TURN_PER_STEP = 1.5
 BLOCK_S = 10.0
@@ -120,18 +121,20 @@ def predict_together(
 
 
 def step_for(rig: Rig, effects: Sequence[Effect], q: Array, rate_Hz: float) -> float:
-    """Return the step, s: the default, or less for fast sampling or stiff and light mechanisms.
+    """Return the step, s: the default, or less for fast sampling, stiff and light mechanisms, mountings that slip.
 
     `q` (joints,) is the pose at which the fastest mode of base and outputs is taken; its change over a run is
     what `TURN_PER_STEP` has to spare.
     """
-    parameters(rig, structure_of(rig, effects))  # says what is missing
+    structure = structure_of(rig, effects)
+    parameters(rig, structure)  # says what is missing
     pose = np.where(np.isfinite(q), q, 0.0)
     system = linearise(rig, effects, pose)
     held = system.plate + len(system.joints)
     fastest = np.sqrt(eigh(system.K[:held, :held], system.M[:held, :held], eigvals_only=True)[-1])
     wanted = min(1.0 / (STEPS_PER_SAMPLE * rate_Hz), TURN_PER_STEP / fastest)
-    return float(min(DEFAULT_STEP, max(FINEST_STEP, wanted)))
+    most = SLIPPING_STEP if structure.mounted else DEFAULT_STEP
+    return float(min(most, max(FINEST_STEP, wanted)))
 
 
 def _blocks(
