@@ -146,7 +146,8 @@ def holding(base_x: float, hold: float) -> tuple[float, float, float]:
 
 
 @pytest.mark.parametrize(
-    ("effect", "given", "begun"), [(BASE_HARDENING, HARD, DEFAULT_STEP), (BASE_HYSTERESIS, LOOP, SLIPPING_STEP)]
+    ("effect", "given", "begun"),
+    [(BASE_HARDENING, HARD, DEFAULT_STEP), (BASE_HYSTERESIS, LOOP, SLIPPING_STEP)],
 )
 def test_halving_the_step_moves_less_than_a_tenth_of_the_noise(
     effect: Effect, given: dict[str, float], begun: float
