@@ -14,7 +14,7 @@ import msgspec
 
 from proof import seal
 from proof.bundle import pack
-from proof.concealed.trials import Spec, make, single
+from proof.concealed.trials import Spec, chosen, make
 from proof.trials import add_seal
 from proof.truth import Truth
 
@@ -28,7 +28,7 @@ _KEPT = (
 )  # role and repeat, of the first trajectory
 _SPECIFICATIONS = {
     "T00000000A1": Spec("development", 7, 1, "within"),
-    "T00000000B7": single("development", 7, 0, "rounded triangle of transmission error", 300.0),
+    "T00000000B7": chosen("development", 7, 0, ["rounded triangle of transmission error"], 300.0),
 }
 
 

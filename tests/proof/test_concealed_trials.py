@@ -59,7 +59,7 @@ def files(folder: Path) -> dict[str, bytes]:
 
 def test_a_trial_comes_out_the_same_and_says_nothing_of_what_it_conceals(short: None, tmp_path: Path) -> None:
     within = trials.make(Spec("development", 3, 1, "within"), tmp_path / "a" / "x")
-    spec = trials.single("development", 3, 1, "channel that creeps", 40.0)
+    spec = trials.chosen("development", 3, 1, ["channel that creeps"], 40.0)
     hidden = trials.make(spec, tmp_path / "b" / "x")
     again = trials.make(spec, tmp_path / "c" / "x")
     assert hidden == again and files(tmp_path / "b") == files(tmp_path / "c")

@@ -25,14 +25,16 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--truth", type=Path, help="folder for what is concealed; default: OUT-truth")
     parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--only", help="conceal this physics alone")
+    parser.add_argument(
+        "--only", action="append", help="conceal this physics alone; repeated: these together"
+    )
     parser.add_argument("--null", choices=("nothing", "within", "beyond"), help="conceal nothing")
-    parser.add_argument("--level", type=float, default=300.0, help="with --only: rho_eff")
+    parser.add_argument("--level", type=float, default=300.0, help="with --only: rho_eff of each")
     parser.add_argument("--first", type=int, default=0, help="number of the first trial")
     asked = parser.parse_args(arguments)
     split, numbers = _SPLITS[asked.set], range(asked.first, asked.first + asked.count)
     if asked.only:
-        specs = [trials.single(split, asked.seed, k, asked.only, asked.level) for k in numbers]
+        specs = [trials.chosen(split, asked.seed, k, asked.only, asked.level) for k in numbers]
     elif asked.null:
         specs = [Spec(split, asked.seed, k, asked.null) for k in numbers]
     else:

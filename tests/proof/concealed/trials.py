@@ -89,9 +89,10 @@ def draw(split: Split, count: int, seed: int) -> list[Spec]:
     return specs
 
 
-def single(split: Split, seed: int, index: int, physics: str, level: float) -> Spec:
-    """One trial with one physics at one level."""
-    return Spec(split, seed, index, "concealed", (physics,), 1, (level,))
+def chosen(split: Split, seed: int, index: int, physics: Sequence[str], level: float) -> Spec:
+    """One trial with these physics, each at one level."""
+    count = len(physics)
+    return Spec(split, seed, index, "concealed", tuple(physics), count, (level,) * count)
 
 
 def _generators(spec: Spec) -> list[np.random.SeedSequence]:
