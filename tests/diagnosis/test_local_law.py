@@ -11,7 +11,7 @@ import bench
 import numpy as np
 import pytest
 
-from kbs_process.diagnosis import proposals
+from kbs_process.diagnosis import leaders, proposals
 from kbs_process.diagnosis.hypothesis import Hypothesis, predict
 from kbs_process.diagnosis.joint import Standing, with_extra
 from kbs_process.diagnosis.plausible import implausible, undone
@@ -136,6 +136,9 @@ def test_amplitudes_that_undo_each_other_are_judged_by_what_they_do_together() -
     assert len(implausible(HARNESS, known)) == 2
     alone = nothing | {"harness_offset": -5e3}
     assert "harness_offset" not in undone(suspect, alone)
+    # Two finds that are one law together: the second's numbers follow.
+    values, shapes = (np.array([*own.values()] * 2, dtype=float) for own in (tail, shape))
+    assert leaders._undone(suspect, values, shapes) == free
 
 
 def test_place_and_width_of_a_bump_are_found_in_the_plant() -> None:

@@ -27,7 +27,7 @@ from kbs_process.diagnosis.race import own_of, raced
 from kbs_process.diagnosis.rivals import probabilities
 from kbs_process.diagnosis.screen import Bench, Catalogued, Found, Suspect
 from kbs_process.diagnosis.settling import resettled
-from kbs_process.diagnosis.shapes import bettered, fitted, possible
+from kbs_process.diagnosis.shapes import bends, bettered, fitted, possible
 from kbs_process.diagnosis.side_by_side import side_by_side
 from kbs_process.diagnosis.suspects import BY
 from kbs_process.diagnosis.thresholds import (
@@ -142,11 +142,15 @@ def gated(found: Found, before: Standing, after: Standing, own: Own) -> Gate:
 
 
 def _undone(suspect: Catalogued, values: Array, shapes: Array) -> frozenset[str]:
-    """Amplitudes of a law of some shape in the plant that others of it undo."""
+    """Amplitudes of a law of some shape in the plant that others of it undo.
+
+    Of finds that are one law together, the first one's come first.
+    """
     if not in_plant(suspect):
         return frozenset()
-    amplitudes = dict(zip(suspect.amplitudes, map(float, values), strict=True))
-    return undone(fitted(suspect, shapes.tolist()), amplitudes)
+    amplitudes = dict(zip(suspect.amplitudes, map(float, values), strict=False))
+    own = len(bends(suspect.candidate, suspect.scene.hypothesis.rig))
+    return undone(fitted(suspect, shapes[:own].tolist()), amplitudes)
 
 
 def _oversized(
