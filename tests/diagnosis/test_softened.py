@@ -14,7 +14,8 @@ from kbs_process.diagnosis.hypothesis import Hypothesis, predict
 from kbs_process.diagnosis.joint import Standing, standing_of
 from kbs_process.diagnosis.known import Known, as_it_is, refit
 from kbs_process.diagnosis.metric import metrics
-from kbs_process.diagnosis.settling import drawn_back
+from kbs_process.diagnosis.remains import detected
+from kbs_process.diagnosis.settling import bent, drawn_back
 from kbs_process.diagnosis.softened import excess_density, softened
 from kbs_process.signals.records import Array
 
@@ -68,12 +69,31 @@ def test_the_residual_of_a_line_is_noise_there_and_nothing_else_changes() -> Non
 def test_laws_are_looked_for_from_numbers_that_were_drawn_back(pulled: Known) -> None:
     assert pulled.gross and pulled.strained
     simulate = bench.serial(pulled.experiment)
+    floor = declared(pulled.experiment)
     standing = standing_of(pulled, {})
-    back = drawn_back(standing, simulate).known
+    back = drawn_back(standing, floor, simulate).known
     assert back.strain < 0.3 * pulled.strain
     assert back.gross and back.excess < pulled.excess  # the tone is no number's
     assert back.metric is pulled.metric
     calm = Standing(
         replace(pulled, residual=tuple(0.01 * z for z in pulled.residual)), standing.predicted, {}
     )
-    assert drawn_back(calm, simulate) is calm
+    assert drawn_back(calm, floor, simulate) is calm
+
+
+def test_numbers_that_leave_nothing_are_drawn_back_if_chance_has_them_elsewhere() -> None:
+    made = bench.experiment(bench.rig(), ("fit", "fit"), 8)
+    floor, simulate = declared(made), bench.serial(made)
+    found = refit(made, Hypothesis(made.rig, made.effects), floor, simulate, reach=NEAR, leaps=0)
+    assert not bent(standing_of(found, {}), floor)
+    assert drawn_back(standing_of(found, {}), floor, simulate).known is found
+    # Had the files said other numbers, the recordings would have pulled them to these.
+    prior = found.parameters
+    apart = np.where(found.stated, 3.0 * np.where(found.stated, prior.sigma, 0.0), 0.0)
+    pulled = standing_of(replace(found, parameters=replace(prior, value=found.value - apart)), {})
+    assert bent(pulled, floor)
+    back = drawn_back(pulled, floor, simulate).known
+    assert back.strain < 0.5 * pulled.known.strain
+    assert detected(standing_of(back, {}), floor, made.fit).left  # what they had taken up
+    off = replace(prior, value=found.value - 2.0 * apart)
+    assert not bent(standing_of(replace(found, parameters=off), {}), floor)  # parameters are off, and told

@@ -46,10 +46,12 @@ class Estimate(Part, frozen=True, kw_only=True):
 class Claim(Candidate, frozen=True, kw_only=True):
     """A find that the method stands for: in a trial without concealed effects it is a false one.
 
-    `named` is False for a law that was measured and that no effect of the method's library fits.
+    `named` is False for a law that was measured and that no effect of the method's library fits; `law` is what the
+    method itself calls it, of which nothing is scored.
     """
 
     named: bool = True
+    law: str = ""
     parameters: tuple[Estimate, ...] = ()
     alternatives: tuple[Candidate, ...] = ()  # the next best, best first
     indistinguishable_from: tuple[Suspect, ...] = ()

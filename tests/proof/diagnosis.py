@@ -54,6 +54,7 @@ def _claim(find: Find) -> Claim:
     return Claim(
         **_suspect(find.place, find.family if find.named else "unnamed"),
         named=find.named,
+        law=find.name,
         probability=find.probability,
         parameters=tuple(_estimate(entry) for entry in find.parameters),
         alternatives=tuple(

@@ -240,8 +240,8 @@ def _made(bench: Bench) -> tuple[Block, ...]:
             (
                 f"Each method runs in {bench.isolation}.",
                 "What is concealed was sealed when the trial was made (X25519, AES-256-GCM, padded), "
-                "with the seal's SHA-256 in the trial. Seals were broken when all answers were written and their "
-                "digests in ledger.json.",
+                "with the seal's SHA-256 in the trial. Seals were broken when all answers, or those before the "
+                "first that is missing, were written and their digests in ledger.json.",
                 f"Trials carry random names; their specifications come from the seed {bench.seed}, which was not "
                 "told to any method.",
             ),

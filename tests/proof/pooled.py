@@ -23,6 +23,7 @@ from proof.score import Bench, score
 from proof.truth import Truth
 from proof.words import METHODS, OURS
 
+_CHANGED = "Code and bench were frozen for each set, and changed from one to the next."
 K = TypeVar("K")
 V = TypeVar("V", Truth, Answer)
 
@@ -70,7 +71,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     try:
         sets = [msgspec.json.decode(path.read_bytes(), type=Bench) for path in asked.score]
         named = [*map(str, asked.score), "--output", str(asked.output), *(f"--method '{m}'" for m in methods)]
-        bench = pooled(sets, methods, " ".join(["python -m proof.pooled", *named]))
+        bench = pooled(sets, methods, f"{' '.join(['python -m proof.pooled', *named])}. {_CHANGED}")
     except (OSError, ValueError, msgspec.ValidationError) as error:
         parser.error(str(error))
     asked.output.mkdir(parents=True, exist_ok=True)

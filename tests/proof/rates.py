@@ -9,6 +9,8 @@ import numpy as np
 from scipy.special import ndtri_exp
 from scipy.stats import beta, binom
 
+LEAST_LOG10_P = -43429.0  # 1e5 e-folds: where answers cut off their p-values, at a z of 447
+
 
 def clopper_pearson(k: int, n: int, level: float = 0.95) -> tuple[float, float]:
     """Exact interval of a share of which k of n were seen (Clopper & Pearson, Biometrika 26, 1934).

@@ -12,7 +12,7 @@ from typing import Literal
 
 from proof.answer import Answer, Part
 from proof.match import Judged, covered, error_over_bound, match, superfluous
-from proof.rates import clopper_pearson, decibels_from_clairvoyant, median_interval
+from proof.rates import LEAST_LOG10_P, clopper_pearson, decibels_from_clairvoyant, median_interval
 from proof.truth import Truth
 from proof.words import NULLS, Split
 
@@ -149,8 +149,10 @@ SHARES: Mapping[str, Tally] = {
 
 
 def _decibels(trial: Trial) -> Iterable[float]:
-    if trial.truth.kind == "concealed" and trial.answer.log10_p is not None:
-        yield decibels_from_clairvoyant(trial.truth.rho_eff, trial.answer.log10_p)
+    """Of answers whose p-value is a number: one at the least that answers give says no more than that it is less."""
+    given = trial.answer.log10_p
+    if trial.truth.kind == "concealed" and given is not None and given > LEAST_LOG10_P:
+        yield decibels_from_clairvoyant(trial.truth.rho_eff, given)
 
 
 def _before(trial: Trial) -> Iterable[float]:

@@ -219,6 +219,8 @@ def test_detection_strength_and_residual_are_grouped() -> None:
     rows = score(truths, given)
     assert value(rows, "mismatch detected", "40") == 0.0 and value(rows, "mismatch detected", "1000") == 1.0
     assert value(rows, "decibels from the clairvoyant", "40") == pytest.approx(6.02, abs=0.01)
+    # A p-value that was cut off says that the effect was seen, and not how well.
+    assert find(rows, "kbs-process", "decibels from the clairvoyant", "1000") is None
     assert value(rows, "held-out residual over floor, after", ">=300") == 1.05
 
 

@@ -46,6 +46,7 @@ Family = Literal[
     "cross-coupling",
     "drift",
     "non-linearity",
+    "product",
     "sensor hysteresis",
     "lag",
     "mains",

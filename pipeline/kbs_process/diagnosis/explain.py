@@ -69,7 +69,9 @@ def explain(experiment: Experiment, simulate: Simulate, task: Task) -> Explained
                 # Phases were looked for beside numbers that were wrong.
                 start = phasing.begin(experiment, free.hypothesis, floor, simulate)
                 free = refit(experiment, start, floor, simulate, leaps=1)
-            freed = _moved_on(_stood(free, floor), floor, simulate, LEAPS)
+            # Better phases are a part of what is left; numbers that are off have done most of theirs by now.
+            hopeful = free.excess < MOST * known.excess
+            freed = _moved_on(_stood(free, floor), floor, simulate, LEAPS if hopeful else 0)
         settled = not freed.after.left
         explained = settled or freed.after.ratio - 1.0 < EXPLAINED * (stood.after.ratio - 1.0)
         # Numbers that are off are off in every recording.

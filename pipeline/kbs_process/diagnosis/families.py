@@ -66,7 +66,7 @@ FAMILIES: dict[str, str] = {
     "base_hysteresis": "hysteresis",
     "channel_gain": "gain",
     "cross_coupling": "cross-coupling",
-    "channel_interaction": "non-linearity",
+    "channel_interaction": "product",
     "channel_nonlinearity": "non-linearity",
     "channel_s_shape": "non-linearity",
     "channel_step": "converter",

@@ -17,6 +17,7 @@ from kbs_process.diagnosis.leaders import gated
 from kbs_process.diagnosis.outcome import Find, Identity, Refused
 from kbs_process.diagnosis.remains import detected, missed, searched, too_little
 from kbs_process.diagnosis.screen import Found
+from kbs_process.diagnosis.settling import bent
 from kbs_process.diagnosis.thresholds import CLEAR, SHADE
 from kbs_process.diagnosis.tryout import identity
 
@@ -73,7 +74,8 @@ def needed(
             else:
                 rest = without(standing, own, simulate)
                 told, reasons = _again(group, own, rest, standing, floor)
-                if not last and not detected(rest, floor, standing.known.experiment.fit).left:
+                there = detected(rest, floor, standing.known.experiment.fit)
+                if not (last or there.left or bent(rest, floor)):
                     reasons = (*reasons, "later finds do what it did")
             if reasons:
                 fallen.append(Refused(group[0].find.identity, group[0].find.rho_eff, reasons))

@@ -32,7 +32,7 @@ from kbs_process.diagnosis.remains import detected, promises_little, too_little
 from kbs_process.diagnosis.rivals import probabilities
 from kbs_process.diagnosis.scene import Scene
 from kbs_process.diagnosis.screen import Catalogued, Found, Screening
-from kbs_process.diagnosis.settling import drawn_back, released, resettled
+from kbs_process.diagnosis.settling import bent, drawn_back, released, resettled
 from kbs_process.diagnosis.shapes import bettered
 from kbs_process.diagnosis.thresholds import LEAST_RHO, MOST, ROUNDS, SECOND, SETTLED, TOLERATED
 from kbs_process.diagnosis.tryout import identity
@@ -103,7 +103,8 @@ def _diagnosed(
         if found is None:
             break
         accepted.append(found)
-        if (at_once and standing.known.gross) or not detected(standing, floor, known.experiment.fit).left:
+        there = detected(standing, floor, known.experiment.fit)
+        if (at_once and standing.known.gross) or not (there.left or bent(standing, floor)):
             break
     last = rounds[-1]
     kept, standing, fallen = needed(accepted, standing, floor, simulate)
@@ -148,7 +149,7 @@ def _mismatch(before: Detection, first: Screening, kept: Sequence[Accepted]) -> 
 
 
 def _round(standing: Standing, floor: Floor, simulate: Simulate, accepted: Sequence[Accepted]) -> _Round:
-    seen = drawn_back(standing, simulate)
+    seen = drawn_back(standing, floor, simulate)
     if seen.known.cost < standing.known.cost:
         # Numbers had ended in a worse place: what they do alone, once they have settled, is no law's.
         standing = resettled(seen, floor, simulate, leaps=1)

@@ -196,7 +196,7 @@ PHYSICS: tuple[Physics, ...] = (
         shapes=(Shape("time", "s", Range(0.5, 12.0)),),
     ),
     Physics(
-        "product of channels", family="non-linearity", port="transducer", law=Sense.PRODUCT,
+        "product of channels", family="product", port="transducer", law=Sense.PRODUCT,
         places=("Fx<-Tx", "Fy<-Ty", "Tz<-Ty", "Tx<-Ty", "Ty<-Tx"), unit="sigma", first=1.0, most=500.0,
     ),
     Physics(

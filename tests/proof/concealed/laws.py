@@ -1,8 +1,9 @@
 """Laws of concealed physics on the mechanism, compiled: what acts at the engine's ports in one step.
 
-None of these formulas is one of a plant's catalogue: friction is smooth or elastoplastic, hysteresis is Bouc-Wen's or a
-sum of stops, backlash has rounded corners and compliance, springs are exponential. Each row of `numbers` is one
-effect: law, axis (0 az, 1 el), amplitude, R, Ka, fsv, Tmax, Kangle, then shapes from SHAPES on. SI.
+What stands for friction, hysteresis, backlash and springs has other formulas than a plant's catalogue: friction is
+smooth or elastoplastic, hysteresis is Bouc-Wen's or a sum of stops, backlash has rounded corners and compliance,
+springs are exponential. Drag of the air, creep, tilt and tones are what they are in any engine. Each row of `numbers`
+is one effect: law, axis (0 az, 1 el), amplitude, R, Ka, fsv, Tmax, Kangle, then shapes from SHAPES on. SI.
 """
 
 from __future__ import annotations

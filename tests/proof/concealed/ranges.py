@@ -1,7 +1,8 @@
 """All that is drawn, and where from: one table a kind, one rule for both splits.
 
-Development draws from the middle of a range, validation from its two outer parts: no number that thresholds were chosen
-on comes again, and validation has to extrapolate. Choices are stated for each split. Phases are unknown in both.
+Development draws from the middle of a range, validation from its two outer parts, so that it has to extrapolate from
+development. Validation trials that were spent have been developed on, too, and the next ones come from their ranges.
+Choices are stated for each split. Phases are unknown in both.
 """
 
 from __future__ import annotations
