@@ -25,6 +25,7 @@ from kbs_process.diagnosis.rivals import probabilities, rivalry
 from kbs_process.diagnosis.scene import Scene
 from kbs_process.diagnosis.screen import Bench, Catalogued, Found, Screening, screen
 from kbs_process.diagnosis.suspects import Candidate
+from kbs_process.diagnosis.thresholds import told_apart
 from kbs_process.diagnosis.tryout import extra_of, identity
 from kbs_process.plant.attach import attach
 from kbs_process.plant.effects import CATALOGUE, select
@@ -190,8 +191,8 @@ def test_a_law_of_the_readings_needs_no_plant_and_its_rival_is_told_apart(made: 
     assert right.known.sigma[-2:] == pytest.approx(np.sqrt(np.diag(alone)), rel=0.15)
     assert np.allclose(right.shown(0) - right.predicted[0].values, share * moves + time * slower)
     apart = rivalry(right.known, wrong.known)
-    assert apart.rho_delta > 20.0 and not apart.indistinguishable and apart.p_wrong < 1e-20
-    assert rivalry(right.known, right.known).indistinguishable
+    assert apart.rho_delta > 20.0 and apart.rho_delta > told_apart(300.0) and apart.p_wrong < 1e-20
+    assert rivalry(right.known, right.known).rho_delta < told_apart(0.0)
 
 
 def passed(here: Standing, tried: Bench, scene: Scene, found: Screening, law: str) -> Tried:

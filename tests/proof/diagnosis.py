@@ -15,6 +15,7 @@ from proof.words import OURS
 
 _OFF = 4.0  # sigmas by which a known parameter has to move to be called off
 _DISTANCE = 4.65  # of two laws' predictions, below which one in a hundred decisions would be wrong
+_FORMULA = 0.08  # of a find's distance, by which its formula may be from nature's
 _WITHOUT_AXIS = ("transducer", "base")
 
 
@@ -50,7 +51,12 @@ def _answer(said: DiagnosisResults, trial: str, seconds: float) -> Answer:
 
 def _claim(find: Find) -> Claim:
     rivals = sorted(find.rivals, key=lambda rival: -rival.probability)
-    alike = [rival for rival in rivals if rival.distance is not None and rival.distance < _DISTANCE]
+    near = max(_DISTANCE, _FORMULA * find.distance)
+    alike = [
+        rival
+        for rival in rivals
+        if rival.distance is not None and rival.distance < (near if rival.simulated else _DISTANCE)
+    ]
     return Claim(
         **_suspect(find.place, find.family if find.named else "unnamed"),
         named=find.named,

@@ -44,7 +44,7 @@ def diagnose_results(
     return (
         *told,
         f"With the parameter files' numbers, prediction and recordings differ by {ratio}.",
-        f"These refitted within their uncertainties: {outcome.verdict_lines[0]}",
+        f"With known numbers refitted within their uncertainties: {outcome.verdict_lines[0]}",
         f"Diagnosis: {results / FOLDER / outcome.report.name}",
     )
 

@@ -16,7 +16,7 @@ from kbs_process.diagnosis.floor import Floor
 from kbs_process.diagnosis.known import Known
 from kbs_process.diagnosis.next_test import Proposal
 from kbs_process.diagnosis.outcome import Curve, Find, Identity, Outcome
-from kbs_process.diagnosis.thresholds import RIVALS
+from kbs_process.diagnosis.thresholds import RIVALS, told_apart
 from kbs_process.plant.effects.measured_law import unit_of
 from kbs_process.plant.structure import other_joint
 from kbs_process.report.records import diagnosis as records
@@ -158,7 +158,10 @@ def _paragraph(
     ]
     for find in finds:
         numbers = _curve_in_words(find.curve) if find.curve else _numbers_in_words(find.parameters)
-        apart = [_words(rival.name) for rival in find.rivals if rival.distance < RIVALS]
+        near = told_apart(find.distance)
+        apart = [
+            _words(one.name) for one in find.rivals if one.distance < (near if one.simulated else RIVALS)
+        ]
         begin = "Left out was" if find.named else "No law of the catalogue passes; measured was a"
         parts.append(
             f"{begin} {_words(find.name)} ({_where(find.place)}): {numbers}; probability {find.probability:.2f} among "

@@ -26,7 +26,14 @@ from kbs_process.errors import OutputError
 RESULTS = "results.json"  # a folder that holds this file is one that may be replaced
 
 _FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
-_REFUSED = {errno.EACCES, errno.EPERM, errno.EROFS, errno.EEXIST, errno.ENOTDIR}  # the last two: below a file
+_REFUSED = {
+    errno.EACCES,
+    errno.EPERM,
+    errno.EROFS,
+    errno.EEXIST,
+    errno.ENOTDIR,
+    errno.ENOENT,
+}  # the last three: below a file, or where no folder can be
 
 
 @contextmanager

@@ -21,7 +21,8 @@ output_option = click.option(
     "-o",
     type=FOLDER,
     metavar="FOLDER",
-    help="Where results go [default: reports/NAME, of other verbs reports/NAME-VERB].",
+    help="Where results go: a folder that is replaced whole [default: reports/NAME, of other verbs with what they make "
+    "behind it, as reports/NAME-diagnosis].",
 )
 quiet_option = click.option("--quiet", "-q", is_flag=True, help="No progress.")
 pdf_option = click.option(

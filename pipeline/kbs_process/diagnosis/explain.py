@@ -22,13 +22,15 @@ from kbs_process.diagnosis.detection import Detection, detect
 from kbs_process.diagnosis.experiment import Experiment
 from kbs_process.diagnosis.floor import Floor, estimate, smaller
 from kbs_process.diagnosis.hypothesis import Hypothesis, Prediction, Simulate
-from kbs_process.diagnosis.known import MOVED, Known, leapt, refit
+from kbs_process.diagnosis.known import MOVED, Known, confined, leapt, refit
+from kbs_process.diagnosis.parameters import prior
 from kbs_process.diagnosis.search import LITTLE, SLIGHT
 from kbs_process.diagnosis.thresholds import EXPLAINED, LEAST_RHO, MOST
 from kbs_process.signals.records import Array
 
 NEAR = 0.99 * MOVED  # sigmas
 LEAPS = 4  # after a descent
+EASED = 4  # passes in a metric that takes what is left for noise
 Task = Callable[[str], AbstractContextManager[object]]  # shows that something of some length is done
 
 
@@ -64,7 +66,8 @@ def explain(experiment: Experiment, simulate: Simulate, task: Task) -> Explained
     if stood.after.left and (stood.known.gross or _may_be_off(stood.known)):
         with task("Refitting the known parameters, free"):
             known = stood.known
-            free = refit(experiment, known.hypothesis, floor, simulate, leaps=0)
+            start = _eased(known, simulate) if known.gross else known.hypothesis
+            free = refit(experiment, start, floor, simulate, leaps=0)
             if free.excess < MOST * known.excess:
                 # Phases were looked for beside numbers that were wrong.
                 start = phasing.begin(experiment, free.hypothesis, floor, simulate)
@@ -88,6 +91,25 @@ def explain(experiment: Experiment, simulate: Simulate, task: Task) -> Explained
             stood = freed
     known = replace(stood.known, chi2_before=_squares(stood.known, begun))
     return Explained(floor, known, near, stood.after)
+
+
+def _eased(known: Known, simulate: Simulate) -> Hypothesis:
+    """Where numbers that are set free go in the metric that takes what is left for noise, as long as that halves it.
+
+    In the noise's metric a resonance that is elsewhere than it was drags whatever makes it weaker, and a descent ends
+    there. The metric is taken again from what each pass leaves.
+    """
+    experiment, here = known.experiment, known.hypothesis
+    free = replace(known, parameters=prior(here.rig, experiment.rig, here.effects, known.free))
+    for _ in range(EASED):
+        gone = confined(free, simulate, np.inf)
+        if not gone.excess < free.excess:
+            break
+        halved = gone.excess < MOST * free.excess
+        free = gone
+        if not halved:
+            break
+    return free.hypothesis
 
 
 def _squares(known: Known, predicted: Mapping[int, Prediction]) -> Array:

@@ -20,7 +20,7 @@ from kbs_process.diagnosis.places import POINT
 from kbs_process.diagnosis.rivals import rivalry
 from kbs_process.diagnosis.screen import Catalogued, Found, Screening, Suspect
 from kbs_process.diagnosis.suspects import weighed
-from kbs_process.diagnosis.thresholds import RIVALS
+from kbs_process.diagnosis.thresholds import RIVALS, told_apart
 from kbs_process.diagnosis.tryout import UNNAMED, identity, in_plant, port_label
 from kbs_process.plant.effect import ACTION, ACTIONS, Effect
 from kbs_process.plant.effects.measured_law import Measured
@@ -66,7 +66,7 @@ def find_of(
             alternatives.append(
                 Alternative(
                     identity(other.found.suspect), float(chances[index]), apart.rho_delta, apart.p_wrong,
-                    apart.indistinguishable, True,
+                    apart.rho_delta < told_apart(taken.found.score.rho_eff), True,
                 )
             )  # fmt: skip
     simulated = {one.found.suspect.family for one in tried}

@@ -107,9 +107,9 @@ def port_test(cells: Cells, ports: Sequence[PortModel], transfer_error: float = 
     verdicts = []
     for port in ports:
         p, left = _left_over(cells, port, transfer_error)
-        # Power of the noise taken off, what remains after the port over what there was.
-        before = max(nothing_left - 1.0, 1e-300)
-        verdicts.append((port, p, left, 1.0 - max(left - 1.0, 0.0) / before))
+        # Power of the noise taken off, what remains after the port over what there was; of nothing it takes nothing.
+        before = nothing_left - 1.0
+        verdicts.append((port, p, left, 1.0 - max(left - 1.0, 0.0) / before if before > 0.0 else 0.0))
     logs = np.array([fisher(p) for _, p, _, _ in verdicts])
     # Holm: a port is refused if its p-value, times how many are no better refused, is small. The rest suffice.
     order = np.argsort(logs)

@@ -11,7 +11,6 @@ from scipy.special import logsumexp
 from scipy.stats import norm
 
 from kbs_process.diagnosis.known import Known
-from kbs_process.diagnosis.thresholds import RIVALS
 from kbs_process.signals.records import Array
 
 
@@ -21,10 +20,6 @@ class Rivalry:
 
     rho_delta: float  # whitened distance of the predictions after the rival is refitted
     p_wrong: float  # that the likelier is the wrong one, Q(rho_delta / 2)
-
-    @property
-    def indistinguishable(self) -> bool:
-        return self.rho_delta < RIVALS
 
 
 def rivalry(accepted: Known, rival: Known) -> Rivalry:

@@ -128,3 +128,11 @@ RIVALS: Final = 4.65  # rho_delta: P(wrong) = Q(rho_delta / 2) = 1 %
 # Share of the residual's excess on trials not used that a curve has to explain, TOLERATED aside. On a development case
 # (friction by the other axis' rate) the right one explained 0.46, a wrong one 0.28.
 LAW_VARIANCE: Final = 0.4
+
+
+def told_apart(rho_eff: float) -> float:
+    """Distance from which on two laws are told apart, one of which is `rho_eff` from none.
+
+    By the noise, and by how far its formula may be from nature's: a rival that is nearer than that may be the law.
+    """
+    return max(RIVALS, SHADE * rho_eff)

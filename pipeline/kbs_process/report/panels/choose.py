@@ -42,7 +42,7 @@ def band_range(band: Band) -> str:
 
 def frame_label(frame: str) -> str:
     """Return a frame in words."""
-    names = {"S": "spacecraft (S)", "T": "transducer (T)", "joint": "effort of the joints"}
+    names = {"S": "spacecraft (S)", "T": "transducer (T)", "joint": "the joints"}
     return names.get(frame, frame)
 
 

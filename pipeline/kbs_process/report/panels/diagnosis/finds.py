@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from kbs_process.diagnosis.thresholds import RIVALS, SHADE, told_apart
 from kbs_process.report.figures import diagnosis as figures
 from kbs_process.report.figures.formula import equation
 from kbs_process.report.panel import Block, Caption, Cell, Figure, Grid, Panel, Text
 from kbs_process.report.panels.diagnosis.answer import where
-from kbs_process.report.records.diagnosis import DiagnosisResults, Find
+from kbs_process.report.records.diagnosis import DiagnosisResults, Find, Rival
 from kbs_process.report.tables import Tables
 from kbs_process.report.text import number, percent, unit
 
@@ -19,8 +20,6 @@ _LAW = Caption(
     bad="A stretch of the band that the law leaves: it holds elsewhere only.",
     do="Take the measured curve there, or widen the motion.",
 )
-
-INDISTINGUISHABLE = 4.65  # sigma: the wrong one of two laws is taken in 1 of 100 cases
 
 
 def panel(results: DiagnosisResults, tables: Tables) -> Panel:
@@ -80,11 +79,17 @@ def _find(find: Find) -> Iterator[Block]:
                     rival.family,
                     where(rival.place),
                     "yes" if rival.simulated else "no",
-                    Cell(number(rival.distance), "undecided" if rival.distance < INDISTINGUISHABLE else ""),
+                    Cell(number(rival.distance), "undecided" if _alike(find, rival) else ""),
                     number(rival.probability, 2),
                 )
                 for rival in find.rivals
             ),
             "kllcrr",
-            f"Laws nearer than {INDISTINGUISHABLE} sigma cannot be told apart by these recordings.",
+            "Laws that are marked cannot be told from it by these recordings: they are nearer than "
+            f"{RIVALS} sigma, or than {SHADE} of what it does (those simulated): nature's formula is neither's.",
         )
+
+
+def _alike(find: Find, rival: Rival) -> bool:
+    """Whether a law cannot be told from a find."""
+    return rival.distance < (told_apart(find.distance) if rival.simulated else RIVALS)
