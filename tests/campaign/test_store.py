@@ -304,3 +304,8 @@ def test_results_are_as_readable_as_any_folder(tmp_path: Path) -> None:
     write(target, "new")
     other.mkdir()
     assert target.stat().st_mode == other.stat().st_mode
+
+
+def test_a_place_where_no_folder_can_be() -> None:
+    with pytest.raises(OutputError, match="cannot be written"):
+        write(Path("/proc/no-such-folder"), "new")

@@ -113,6 +113,14 @@ def test_no_input_at_all_is_told() -> None:
     assert found.log_p > np.log(1e-3) and not found.significant.any()
 
 
+def test_of_nothing_no_port_takes_a_share() -> None:
+    cells, ports = experiment(np.random.default_rng(6), 0.0)
+    quiet = Cells(
+        0.5 * cells.z, cells.J, cells.seen, cells.precision, cells.nu, cells.t, cells.f, cells.trajectory
+    )
+    assert all(verdict.explained == 0.0 for verdict in port_test(quiet, ports, 0.0).ports)
+
+
 def test_cells_two_bins_apart_are_uncorrelated() -> None:
     taper = sine_window(400)
     spectrum = np.fft.fft(taper**2)

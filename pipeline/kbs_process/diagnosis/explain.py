@@ -66,7 +66,7 @@ def explain(experiment: Experiment, simulate: Simulate, task: Task) -> Explained
     if stood.after.left and (stood.known.gross or _may_be_off(stood.known)):
         with task("Refitting the known parameters, free"):
             known = stood.known
-            start = _eased(known, simulate) if known.gross else known.hypothesis
+            start = eased(known, simulate) if known.gross else known.hypothesis
             free = refit(experiment, start, floor, simulate, leaps=0)
             if free.excess < MOST * known.excess:
                 # Phases were looked for beside numbers that were wrong.
@@ -93,7 +93,7 @@ def explain(experiment: Experiment, simulate: Simulate, task: Task) -> Explained
     return Explained(floor, known, near, stood.after)
 
 
-def _eased(known: Known, simulate: Simulate) -> Hypothesis:
+def eased(known: Known, simulate: Simulate) -> Hypothesis:
     """Where numbers that are set free go in the metric that takes what is left for noise, as long as that halves it.
 
     In the noise's metric a resonance that is elsewhere than it was drags whatever makes it weaker, and a descent ends
