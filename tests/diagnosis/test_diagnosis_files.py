@@ -117,7 +117,10 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     told_off = write_diagnosis(campaign, declared(experiment), off, target, False, None)
     assert "would look the same" in told_off.verdict_lines[0] and "{" not in told_off.verdict_lines[0]
     told = write_diagnosis(campaign, declared(experiment), outcome, target, False, proposal)
-    assert told.verdict_lines[0] == "The model lacks: curve over joint angle (external wrench, el)."
+    assert (
+        told.verdict_lines[0]
+        == "The model lacks: curve over joint angle or ground cable (external wrench, el)."
+    )
     more = write_diagnosis(
         campaign,
         declared(experiment),

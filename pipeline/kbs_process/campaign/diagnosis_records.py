@@ -101,10 +101,17 @@ def _where(place: records.Place) -> str:
     return ", ".join(part for part in (place.port, place.site or "/".join(place.channels)) if part)
 
 
+def _law_in_words(find: Find) -> str:
+    """A law with those that were simulated beside it and cannot be told from it, at the same place."""
+    alike = [one.identity for one in find.alternatives if one.refitted and one.indistinguishable]
+    here = [one.law for one in alike if place_of(one) == place_of(find.identity)]
+    return " or ".join(_words(law) for law in (find.identity.law, *here))
+
+
 def _sentence(outcome: Outcome, trials: Sequence[records.Trial], floor: Floor) -> str:
     if not outcome.finds:
         return _unnamed(outcome, trials, floor) + _located(outcome)
-    told = [f"{_words(find.identity.law)} ({_where(place_of(find.identity))})" for find in outcome.finds]
+    told = [f"{_law_in_words(find)} ({_where(place_of(find.identity))})" for find in outcome.finds]
     return f"The model lacks: {'; '.join(told)}.{_reserve(outcome)}"
 
 
