@@ -29,14 +29,11 @@ def drawn_back(standing: Standing, floor: Floor, simulate: Simulate) -> Standing
     it another. Where much is left, the numbers are drawn back if less than twice as much is left then.
     """
     known = standing.known
-    if not (searched(known.experiment) and known.strained):
+    if not (searched(known.experiment) and known.strained and (known.gross or bent(standing, floor))):
         return standing
-    if known.gross:
-        held = confined(known, simulate, CLOSE, laws=standing.laws)
-        return standing_of(held, standing.laws) if MOST * held.excess < known.excess else standing
-    if not bent(standing, floor):
-        return standing
-    return standing_of(confined(known, simulate, CLOSE, laws=standing.laws), standing.laws)
+    held = confined(known, simulate, CLOSE, laws=standing.laws)
+    kept = known.gross and not MOST * held.excess < known.excess
+    return standing if kept else standing_of(held, standing.laws)
 
 
 def bent(standing: Standing, floor: Floor) -> bool:
