@@ -14,6 +14,7 @@ from kbs_process.campaign.commands import read_commands
 from kbs_process.campaign.corrected_diagnosis import write_corrected
 from kbs_process.campaign.diagnosis_files import write_diagnosis
 from kbs_process.campaign.load import load_campaign
+from kbs_process.diagnosis.curves import basis
 from kbs_process.diagnosis.detection import Detection
 from kbs_process.diagnosis.finding import merged
 from kbs_process.diagnosis.floor import declared
@@ -88,7 +89,9 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
         alternatives=(Alternative(CABLE, 0.1, 2.0, 0.16, True, True),),
         ports_alike=(),
         held_out_variance=0.95,
-        curve=Curve(OVER_ANGLE, x, np.linspace(0.6, 0.4, 101), np.full(101, 0.01)),
+        curve=Curve(
+            OVER_ANGLE, x, basis(OVER_ANGLE, x, *ends), np.linspace(0.6, 0.4, 101), np.full(101, 0.01)
+        ),
     )
     outcome = Outcome(
         verdict="physics",

@@ -116,6 +116,20 @@ def test_orders_of_a_motor_are_proposed_for_its_gear_and_its_microsteps_too(made
     assert "order.el" not in found  # it turns its motor by less than two turns
 
 
+def test_the_period_of_a_sawtooth_of_a_disc_is_found_by_folding(made: Experiment) -> None:
+    """It has no line of its own in so short a range, but folds into one period, a whole part of a turn."""
+    el = made.channels.index("el")
+    angle = made.trials[0].measured[:, el]
+    turns = np.ptp(angle[made.trials[0].valid]) / (2.0 * np.pi)
+    order = np.ceil(3.0 / turns)
+    line = np.zeros_like(made.trials[0].measured)
+    line[:, el] = 2e-4 * ((order * angle / (2.0 * np.pi) + 0.3) % 1.0 - 0.5)
+    found = 2.0 * np.pi / np.array(proposals(line, made)["profile_period.el"])
+    assert np.min(np.abs(found - order)) < 0.1 / turns
+    np.testing.assert_allclose(found, np.rint(found), rtol=1e-9)
+    assert (found * turns >= 1.9).all()  # two periods at least, and the next order
+
+
 @pytest.mark.parametrize("stream", ["wrench", "encoder"])
 def test_the_time_at_which_a_clock_jumps_is_each_trajectory_s_own(stream: str) -> None:
     made = bench.experiment(bench.rig(), ("fit", "fit", "held-out"), 1, seconds=60.0)

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from kbs_process.diagnosis import rounds
+from kbs_process.diagnosis.as_suspect import sigma_of, suspect_of
 from kbs_process.diagnosis.experiment import Experiment
-from kbs_process.diagnosis.finding import Tried, find_of
+from kbs_process.diagnosis.finding import Tried, as_it_stands, find_of
 from kbs_process.diagnosis.floor import declared
 from kbs_process.diagnosis.gate import gate
 from kbs_process.diagnosis.gls import Sums, score
@@ -30,6 +31,7 @@ from kbs_process.diagnosis.tryout import extra_of, identity
 from kbs_process.plant.attach import attach
 from kbs_process.plant.effects import CATALOGUE, select
 from kbs_process.plant.sensing import SENSING
+from kbs_process.signals.records import Array
 from kbs_process.stages.output_error import Scalar
 
 FREE = (
@@ -201,6 +203,49 @@ def passed(here: Standing, tried: Bench, scene: Scene, found: Screening, law: st
     after = with_extra(here, extra_of(one, here, tried, scene), bench.serial(here.known.experiment))
     own = own_of(one, here, after)
     return Tried(one, after, gated(one, here, after, own), found, own)
+
+
+def test_an_error_of_an_encoder_that_no_law_has_is_measured_with_a_band(made: Experiment) -> None:
+    """A sawtooth of its disc, on recordings that were not used, too; its curve is the sawtooth's."""
+    el, order = made.channels.index("el"), 180.0
+    height = 4e-4
+
+    def sawtooth(angle: Array) -> Array:
+        return np.asarray(height * ((order * angle / (2.0 * np.pi)) % 1.0 - 0.5))
+
+    trials = []
+    for trial in made.trials:
+        shown = np.zeros_like(trial.measured)
+        shown[:, el] = sawtooth(trial.measured[:, el])
+        trials.append(replace(trial, measured=trial.measured + shown * trial.valid[:, None]))
+    here = standing(replace(made, trials=tuple(trials)))
+    scene = Scene.of(here.known.experiment, here.hypothesis, here.predicted)
+    tried = Bench.of(here.known, scene)
+    period = 2.0 * np.pi / order
+    some = (candidate("encoder_profile", "el", profile_period=period), candidate("encoder_step", "el"))
+    found = screen(tried, [Catalogued(one, scene) for one in some])
+    told = passed(here, tried, scene, found, "encoder_profile")
+    assert told.gate.passed, told.gate.reasons
+    find = find_of([told], 0, np.ones(1), here, None)
+    assert not find.named and (find.identity.port, find.identity.axis) == ("encoder", "el")
+    assert find.held_out_variance is not None and find.held_out_variance > 0.9
+    assert find.curve is not None
+    assert np.ptp(find.curve.x) <= period * (1.0 + 1e-9)
+    away = find.curve.value - sawtooth(find.curve.x)
+    # A spline rounds the jump off, and its mean is the encoder's offset.
+    between = np.abs((order * find.curve.x / (2.0 * np.pi) + 0.5) % 1.0 - 0.5) > 0.15
+    assert np.std(away[between]) < 0.1 * height
+    again = as_it_stands(find, told.own, told.standing.known)
+    assert again.curve is not None
+    np.testing.assert_array_equal(again.curve.value, find.curve.value)
+    taken = suspect_of(find, scene)
+    assert taken is not None
+    suspect, amplitude = taken
+    np.testing.assert_allclose(
+        suspect.outputs(0)[:, el] @ amplitude, tried.signatures([suspect], 0)[:, el] @ amplitude
+    )
+    sigma = sigma_of(find, suspect, amplitude)
+    assert sigma.shape == amplitude.shape and (sigma > 0.0).all()
 
 
 def test_a_law_that_fell_in_the_plant_is_none_that_the_find_cannot_be_told_from(cable: Standing) -> None:

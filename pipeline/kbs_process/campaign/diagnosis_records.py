@@ -17,7 +17,7 @@ from kbs_process.diagnosis.known import Known
 from kbs_process.diagnosis.next_test import Proposal
 from kbs_process.diagnosis.outcome import Curve, Find, Identity, Outcome
 from kbs_process.diagnosis.thresholds import RIVALS, told_apart
-from kbs_process.plant.effects.measured_law import unit_of
+from kbs_process.plant.effects.measured_law import Measured, unit_of
 from kbs_process.plant.structure import other_joint
 from kbs_process.report.records import diagnosis as records
 from kbs_process.report.records.common import Check, Conclusion, Notice
@@ -267,13 +267,15 @@ def _unit(turning: str, joint: Joint | None) -> str:
 
 
 def _curve(curve: Curve, rig: Rig, joint: Joint | None) -> records.Curve:
-    over = joint
-    if joint is not None and curve.law.effect.crossed:
-        over = rig.joint(other_joint(rig, joint.name))
+    over, regressor, own = joint, "joint_angle", "rad"
+    if isinstance(curve.law, Measured):
+        regressor, own = curve.law.regressor, "N m"
+        if joint is not None and curve.law.effect.crossed:
+            over = rig.joint(other_joint(rig, joint.name))
     return records.Curve(
-        regressor=curve.law.regressor.replace("_", " "),
-        x_unit=_unit(unit_of(curve.law.regressor), over),
-        y_unit=_unit("N m", joint),
+        regressor=regressor.replace("_", " "),
+        x_unit=_unit(unit_of(regressor), over),
+        y_unit=_unit(own, joint),
         x=tuple(curve.x.tolist()),
         y=tuple(curve.value.tolist()),
         sigma=tuple(curve.sigma.tolist()),

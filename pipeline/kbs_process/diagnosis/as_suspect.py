@@ -15,6 +15,7 @@ from kbs_process.diagnosis.screen import Catalogued, Suspect
 from kbs_process.diagnosis.suspects import BY, Candidate
 from kbs_process.plant.effect import ACTION, ACTIONS, Effect, Port, instance
 from kbs_process.plant.effects import CATALOGUE
+from kbs_process.plant.effects.measured_law import Measured
 from kbs_process.plant.sensing import SENSING, Sensing
 from kbs_process.rig.model import TRANSDUCER
 from kbs_process.signals.records import Array
@@ -26,7 +27,7 @@ _LAWS = {law.name: law for law in _EVERY}
 def suspect_of(find: Find, scene: Scene) -> tuple[Suspect, Array] | None:
     """Return a find as a suspect of a scene, with its amplitudes; None for what is each recording's own."""
     own = find.identity
-    if find.curve is not None:
+    if find.curve is not None and isinstance(find.curve.law, Measured):
         over, x = find.curve.law, find.curve.x
         ends = float(x[0]), float(x[-1])
         coefficients = np.linalg.lstsq(basis(over, x, *ends), find.curve.value, rcond=None)[0]
@@ -83,7 +84,7 @@ def _point(numbers: Mapping[str, Estimate]) -> Place | None:
 
 def sigma_of(find: Find, suspect: Suspect, amplitude: Array) -> Array:
     """Return the amplitudes' present standard deviations (m,); of a curve its band, at the coefficients' nodes."""
-    if find.curve is not None:
+    if find.curve is not None and isinstance(find.curve.law, Measured):
         nodes = np.linspace(0.0, len(find.curve.x) - 1.0, len(amplitude)).round().astype(int)
         return np.asarray(find.curve.sigma[nodes])
     numbers = _numbers(find.actions[0] if isinstance(_LAWS[find.identity.law], Sensing) else find.estimates)

@@ -24,6 +24,8 @@ PORTS: dict[Port | SensingPort, str] = {
 # Laws that are at a port of their own, wherever their equations act.
 _APART = {"appendage": "appendage", "mass_shift": "mass properties"}
 
+UNNAMED = "unnamed"  # of laws that are measured
+
 FAMILIES: dict[str, str] = {
     "cogging": "cogging",
     "motor_viscous": "viscous",
@@ -82,6 +84,7 @@ FAMILIES: dict[str, str] = {
     "encoder_step": "converter",
     "encoder_quantisation": "quantisation",
     "encoder_hysteresis": "sensor hysteresis",
+    "encoder_profile": UNNAMED,
     "clock_offset": "offset",
     "clock_skew": "skew",
     "clock_drops": "drops",

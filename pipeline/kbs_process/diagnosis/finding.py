@@ -10,18 +10,20 @@ import numpy as np
 from scipy.stats import chi2
 
 from kbs_process.diagnosis.curves import CurveSuspect, along, basis
-from kbs_process.diagnosis.families import family
+from kbs_process.diagnosis.families import UNNAMED, family
 from kbs_process.diagnosis.gate import Gate
 from kbs_process.diagnosis.joint import Own, Standing
 from kbs_process.diagnosis.jumps import jump
 from kbs_process.diagnosis.known import Known
 from kbs_process.diagnosis.outcome import Alternative, Curve, Estimate, Find, Identity, Place
 from kbs_process.diagnosis.places import POINT
+from kbs_process.diagnosis.ranges import swept
 from kbs_process.diagnosis.rivals import rivalry
 from kbs_process.diagnosis.screen import Catalogued, Found, Screening, Suspect
+from kbs_process.diagnosis.signature import per_unit
 from kbs_process.diagnosis.suspects import weighed
 from kbs_process.diagnosis.thresholds import RIVALS, told_apart
-from kbs_process.diagnosis.tryout import UNNAMED, identity, in_plant, port_label
+from kbs_process.diagnosis.tryout import identity, in_plant, port_label
 from kbs_process.plant.effect import ACTION, ACTIONS, Effect
 from kbs_process.plant.effects.measured_law import Measured
 from kbs_process.plant.sensing import Sensing
@@ -101,7 +103,7 @@ def find_of(
         alternatives=tuple(alternatives),
         ports_alike=alike,
         held_out_variance=explained_share(before.known, taken.standing.known),
-        curve=_curve(suspect, taken, before) if isinstance(suspect, CurveSuspect) else None,
+        curve=_curve(suspect, taken, before) if own.family == UNNAMED else None,
     )
 
 
@@ -200,23 +202,28 @@ def explained_share(before: Known, after: Known, beyond: float = 0.0) -> float |
     return float(min(1.0, gained / excess)) if excess > 0.0 else None
 
 
-def _curve(suspect: CurveSuspect, taken: Tried, before: Standing) -> Curve:
+def _curve(suspect: Suspect, taken: Tried, before: Standing) -> Curve:
+    """A measured law over what its regressor sweeps, of what comes again over one period of it."""
+    law: Measured | Sensing
+    if isinstance(suspect, CurveSuspect):
+        law, x = suspect.law, along(suspect.law, *suspect.ends)
+        columns = basis(law, x, float(x[0]), float(x[-1]))
+    else:
+        assert isinstance(suspect, Catalogued) and isinstance(suspect.candidate.effect, Sensing)
+        law = suspect.candidate.effect
+        low, high = swept(suspect.scene).spans[suspect.candidate.site, "reading"]
+        x = np.linspace(low, min(high, low + dict(suspect.candidate.shape)["profile_period"]), 101)
+        columns = per_unit(suspect.candidate, np.arange(101.0), x, {})
     known = taken.standing.known
-    return _drawn(
-        suspect.law,
-        along(suspect.law, *suspect.ends),
-        known,
-        range(len(before.known.value), len(known.value)),
-    )
+    return _drawn(law, x, columns, known, range(len(before.known.value), len(known.value)))
 
 
-def _drawn(law: Measured, x: Array, known: Known, own: Sequence[int]) -> Curve:
-    """The curve whose coefficients are some numbers, `own`, over x from end to end."""
-    columns = basis(law, x, float(x[0]), float(x[-1]))
+def _drawn(law: Measured | Sensing, x: Array, columns: Array, known: Known, own: Sequence[int]) -> Curve:
+    """The curve whose coefficients are some numbers, `own`, over x."""
     index = np.asarray(own)
     C = known.covariance[np.ix_(index, index)]
     spread = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", columns, C, columns), 0.0))
-    return Curve(law, x, columns @ known.value[index], spread)
+    return Curve(law, x, columns, columns @ known.value[index], spread)
 
 
 def as_it_stands(find: Find, law: Own, known: Known) -> Find:
@@ -226,7 +233,7 @@ def as_it_stands(find: Find, law: Own, known: Known) -> Find:
         replace(one, value=one.about + float(known.value[k]), sigma=float(known.sigma[k]))
         for one, k in zip(find.estimates, own, strict=False)
     ]
-    curve = find.curve and _drawn(find.curve.law, find.curve.x, known, own)
+    curve = find.curve and _drawn(find.curve.law, find.curve.x, find.curve.columns, known, own)
     return replace(find, estimates=(*fitted, *find.estimates[len(own) :]), curve=curve)
 
 

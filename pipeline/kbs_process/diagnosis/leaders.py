@@ -13,6 +13,7 @@ from scipy.stats import chi2
 from kbs_process.diagnosis.curves import CurveSuspect
 from kbs_process.diagnosis.dissipation import drives, pushes
 from kbs_process.diagnosis.evenness import evenly, parts
+from kbs_process.diagnosis.families import UNNAMED
 from kbs_process.diagnosis.finding import Tried, explained_share
 from kbs_process.diagnosis.floor import Floor
 from kbs_process.diagnosis.gate import Fold, Gate, gate, whiteness
@@ -127,13 +128,14 @@ def gated(found: Found, before: Standing, after: Standing, own: Own) -> Gate:
     share = explained_share(before.known, known, beyond=TOLERATED)
     index = np.array(places)
     a, C = known.value[index], known.covariance[np.ix_(index, index)]
-    if isinstance(found.suspect, CurveSuspect):
+    if identity(found.suspect).family == UNNAMED:
         if share is None and known.experiment.held_out:
             verdict = verdict.but("recordings that were held out leave nothing that would show a curve")
         if share is not None and not share >= LAW_VARIANCE:
             verdict = verdict.but(
                 f"a curve that explains {100.0 * share:.0f} % of the held-out excess is no law"
             )
+    if isinstance(found.suspect, CurveSuspect):
         return verdict.but(*pushes(found.suspect, a, C))
     if not isinstance(found.suspect, Catalogued):
         return verdict

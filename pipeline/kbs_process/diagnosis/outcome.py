@@ -12,6 +12,7 @@ from kbs_process.diagnosis.known import Known
 from kbs_process.diagnosis.localise import PortName
 from kbs_process.diagnosis.ports import Cells, PortTest
 from kbs_process.plant.effects.measured_law import Measured
+from kbs_process.plant.sensing import Sensing
 from kbs_process.signals.records import Array
 
 Verdict = Literal["none", "parameters off", "physics", "undecided"]
@@ -64,9 +65,10 @@ class Alternative:
 class Curve:
     """A measured law: value over its regressor with one standard deviation."""
 
-    law: Measured
+    law: Measured | Sensing
     x: Array  # (m,)
-    value: Array  # (m,) at the port: N m
+    columns: Array  # (m, coefficients): what a unit of each is there
+    value: Array  # (m,) at the port: N m, or rad of an encoder
     sigma: Array  # (m,)
 
 

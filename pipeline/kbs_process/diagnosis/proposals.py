@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.fft import fft, next_fast_len
 
+from kbs_process.diagnosis.folding import periods
 from kbs_process.diagnosis.known import Known
 from kbs_process.diagnosis.scene import Scene
 from kbs_process.diagnosis.side_by_side import side_by_side
@@ -45,6 +46,7 @@ def proposed(known: Known, scene: Scene) -> dict[str, tuple[float, ...]]:
         found |= {f"{name}.{joint}": orders for name in _BY_ORDER}
         found[f"microstep_order.{joint}"] = _of_cycles(known, joint, orders)
     found |= _between_lines(known, _of_discs(known))
+    found |= {f"profile_period.{joint}": periods for joint, periods in periods(known, scene).items()}
     found |= {f"joint_order.{joint}": lines for joint, lines in _of_joints(known, scene).items()}
     for joint, (angle, width) in _local(known, scene).items():
         for name in _BY_PLACE:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kbs_process.diagnosis.detection import Detection
+from kbs_process.diagnosis.families import UNNAMED
 from kbs_process.diagnosis.finding import Tried, as_it_stands, find_of, merged
 from kbs_process.diagnosis.floor import Floor
 from kbs_process.diagnosis.hypothesis import Simulate
@@ -31,7 +32,7 @@ from kbs_process.diagnosis.ports import port_test
 from kbs_process.diagnosis.remains import detected, promises_little, too_little
 from kbs_process.diagnosis.rivals import probabilities
 from kbs_process.diagnosis.scene import Scene
-from kbs_process.diagnosis.screen import Catalogued, Found, Screening
+from kbs_process.diagnosis.screen import Found, Screening
 from kbs_process.diagnosis.settling import bent, drawn_back, released, resettled
 from kbs_process.diagnosis.shapes import bettered
 from kbs_process.diagnosis.thresholds import LEAST_RHO, MOST, ROUNDS, SECOND, SETTLED, TOLERATED
@@ -227,7 +228,7 @@ def named_first(passed: Sequence[Tried]) -> list[Tried]:
     A curve follows what a formula has differently from nature, too: as far as the plant is not exact, that is no reason
     to leave a law without its name.
     """
-    named = [one for one in passed if isinstance(one.found.suspect, Catalogued)]
+    named = [one for one in passed if _law(one).family != UNNAMED]
 
     def told(curve: Tried) -> bool:
         where = _law(curve).port, _law(curve).axis
@@ -242,13 +243,13 @@ def unnamed(passed: Sequence[Tried], refused: Sequence[Identity], view: View) ->
     A curve takes the lead from the very law that it follows.
     """
     first = min(passed, key=lambda one: one.standing.known.cost)
-    if isinstance(first.found.suspect, Catalogued):
+    if _law(first).family != UNNAMED:
         return []
     where, done = _law(first), {*map(_law, passed), *refused}
     best: dict[Identity, Found] = {}
     for found in view.able:
         own = identity(found.suspect)
-        if isinstance(found.suspect, Catalogued) and (own.port, own.axis) == (where.port, where.axis):
+        if own.family != UNNAMED and (own.port, own.axis) == (where.port, where.axis):
             best.setdefault(own, found)
     return [bettered(view.bench, found) for own, found in best.items() if own not in done][:SECOND]
 

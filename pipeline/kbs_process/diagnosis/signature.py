@@ -165,10 +165,11 @@ def _by_channel(
     if "code" in law.arguments:
         encoder = rig.joint(site).encoder
         given["code"] = float(encoder.step) if encoder is not None and float(encoder.step) > 0.0 else np.nan
-    return {k: _changes(candidate, t, prediction[:, k], given) for k in acted}
+    return {k: per_unit(candidate, t, prediction[:, k], given) for k in acted}
 
 
-def _changes(candidate: Candidate, t: Array, reading: Array, given: Mapping[str, Array | float]) -> Array:
+def per_unit(candidate: Candidate, t: Array, reading: Array, given: Mapping[str, Array | float]) -> Array:
+    """Change (n, amplitudes) of a reading (n,) by a unit of each amplitude of a suspect of the sensing."""
     law = candidate.effect
     assert isinstance(law, Sensing)
     known: dict[str, Array | float] = {"time": t, "reading": reading, **given, **dict(candidate.shape)}

@@ -9,7 +9,7 @@ import numpy as np
 
 from kbs_process.diagnosis import measured
 from kbs_process.diagnosis.curves import CurveSuspect
-from kbs_process.diagnosis.families import PORTS, family, port_word
+from kbs_process.diagnosis.families import PORTS, UNNAMED, family, port_word
 from kbs_process.diagnosis.hypothesis import Hypothesis
 from kbs_process.diagnosis.joint import Extra, Standing
 from kbs_process.diagnosis.localise import PortName
@@ -28,7 +28,6 @@ from kbs_process.rig.model import Rig
 from kbs_process.signals.records import Array
 from kbs_process.stages.output_error import Scalar
 
-UNNAMED = "unnamed"
 _WHOLE_CYCLES = 1e-3  # from a whole number of them: less than lines of a residual are apart
 
 

@@ -20,6 +20,7 @@ from kbs_process.plant.sensing.drift_temperature import DRIFT_TEMPERATURE
 from kbs_process.plant.sensing.encoder_eccentricity import ENCODER_ECCENTRICITY
 from kbs_process.plant.sensing.encoder_hysteresis import ENCODER_HYSTERESIS
 from kbs_process.plant.sensing.encoder_interpolation import ENCODER_INTERPOLATION
+from kbs_process.plant.sensing.encoder_profile import ENCODER_PROFILE
 from kbs_process.plant.sensing.encoder_quantisation import ENCODER_QUANTISATION
 from kbs_process.plant.sensing.encoder_step import ENCODER_STEP
 from kbs_process.plant.sensing.encoder_switching import ENCODER_SWITCHING
@@ -47,6 +48,7 @@ SENSING: tuple[Sensing, ...] = (
     ENCODER_STEP,
     ENCODER_QUANTISATION,
     ENCODER_HYSTERESIS,
+    ENCODER_PROFILE,
     CLOCK_OFFSET,
     CLOCK_SKEW,
     CLOCK_DROPS,
