@@ -180,3 +180,12 @@ def test_where_the_residual_lives_is_a_map_of_each_trajectory(tmp_path: Path) ->
     told = page(tmp_path, results(find()))
     assert "Where the residual lives" in told
     assert "before at most 10" in told.replace("\u00a0", " ")
+
+
+def test_a_report_tells_of_a_diagnosis_by_another_version(tmp_path: Path) -> None:
+    folder = sample.one_channel(tmp_path / "out")
+    made = msgspec.structs.replace(sample.PROVENANCE, commit="0123456")
+    other = "by another version of kbs-process"
+    for provenance, said in ((sample.PROVENANCE, False), (made, True)):
+        page(folder / "diagnosis", msgspec.structs.replace(results(), provenance=provenance))
+        assert (other in build(folder, pdf=False).read_text().replace("\u00a0", " ")) is said

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from kbs_process.campaign.analysis import Analysis, analyse
 from kbs_process.campaign.config import Campaign, RecordingEntry
+from kbs_process.campaign.earlier_diagnosis import keep_diagnosis
 from kbs_process.campaign.findings import find
 from kbs_process.campaign.held import read_alive
 from kbs_process.campaign.output import write_results
@@ -45,7 +46,10 @@ class Prepared:
 
 
 def process(campaign: Campaign, target: Path, *, progress: Progress, pdf: bool | None = None) -> Outcome:
-    """Process a campaign and put its results in `target`, in one step, when all is done."""
+    """Process a campaign and put its results in `target`, in one step, when all is done.
+
+    A diagnosis of the same inputs that is there already stays.
+    """
     with writing(target) as folder:
         decoupling = decouple.fit(campaign.rig)
         prepared = [_prepare(campaign, entry, decoupling, progress) for entry in campaign.recordings]
@@ -58,6 +62,7 @@ def process(campaign: Campaign, target: Path, *, progress: Progress, pdf: bool |
             on_transducer = study(campaign, analyses, model.rig, task.update)
         with progress.task("Writing the report"):
             write_results(folder, campaign, analyses, summary, on_transducer)
+            keep_diagnosis(campaign, target, folder)
             page = build.build(folder, pdf)
     return _outcome(summary, target / page.name)
 

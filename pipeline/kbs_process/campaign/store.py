@@ -72,16 +72,19 @@ def revising(target: Path, *, without: Collection[str] = (), marker: str = RESUL
             f"holds no results (no {marker})", where=str(target), remedy="process the campaign first"
         )
     with writing(target, marker=marker) as private:
-        shutil.copytree(
-            target,
-            private,
-            copy_function=_link,
-            dirs_exist_ok=True,
-            ignore=lambda folder, names: [
-                name for name in names if name in without and Path(folder) == target
-            ],
-        )
+        link_tree(target, private, without=without)
         yield private
+
+
+def link_tree(source: Path, target: Path, *, without: Collection[str] = ()) -> None:
+    """Let `target` have the files of `source`, save entries `without`: links, where the file system can."""
+    shutil.copytree(
+        source,
+        target,
+        copy_function=_link,
+        dirs_exist_ok=True,
+        ignore=lambda folder, names: [name for name in names if name in without and Path(folder) == source],
+    )
 
 
 def _link(source: str, target: str) -> None:

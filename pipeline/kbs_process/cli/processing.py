@@ -45,14 +45,19 @@ def process(
 ) -> None:
     """Process CAMPAIGN: fit, compare with the prediction, and write the report.
 
-    Where the two differ by more than repeats of one trajectory do, a diagnosis follows.
+    Where the two differ by more than repeats of one trajectory do, a diagnosis follows. One of the same inputs that
+    is in the results already stays until a new one replaces it.
     """
+    from kbs_process.campaign.earlier_diagnosis import earlier_diagnosis
     from kbs_process.campaign.load import load_campaign
     from kbs_process.campaign.locate import find_campaign, results_folder
 
     folder = find_campaign(campaign)
     target = results_folder(folder, output)
     loaded = load_campaign(folder)
+    before = earlier_diagnosis(loaded, target)
+    if before is not None and before.outdated:
+        complain(before.warning)  # now, as long as it is there
     # Bad input is told before all that computes is imported.
     from kbs_process.campaign.run import process as run
 
@@ -61,10 +66,12 @@ def process(
         for line in outcome.verdict_lines:
             click.echo(line)
         click.echo(f"Report: {outcome.report}")
+        if why is False and before is not None and not before.outdated:
+            click.echo(f"Diagnosis, of the same inputs, kept from before: {before.folder}")
         if why is not False:
             _diagnose(loaded, target, progress=progress(quiet), pdf=pdf, wanted=why is True)
     except KeyboardInterrupt:
-        complain("interrupted: the report is written, a diagnosis is not")
+        complain("interrupted: the report is written, a new diagnosis is not")
         sys.exit(INTERRUPTED)
     if check and outcome.requirement_met is False:
         sys.exit(NOT_MET)

@@ -8,6 +8,7 @@ from kbs_process.report.records.diagnosis import DiagnosisResults
 from kbs_process.report.tables import Tables
 
 FOLDER = "diagnosis"  # inside the results that it belongs to
+_OTHER = "It was made before these results, of the same inputs, by another version of kbs-process: see its provenance."
 
 
 def panel(results: Record, tables: Tables) -> Panel | None:
@@ -16,9 +17,12 @@ def panel(results: Record, tables: Tables) -> Panel | None:
     if not (folder / FILE).is_file():
         return None
     diagnosis = load(folder, DiagnosisResults)
+    made, here = diagnosis.provenance, getattr(results, "provenance", diagnosis.provenance)
+    other = (made.version, made.commit) != (here.version, here.commit)
     blocks = (
         Text(diagnosis.verdict.sentence),
         Text(diagnosis.paragraph),
+        *((Text(_OTHER),) if other else ()),
         Link("The diagnosis: where it enters, what law it is, what remains", f"{FOLDER}/index.html"),
     )
     return Panel(FOLDER, "Diagnosis", "Why do prediction and recordings differ?", blocks)
