@@ -17,6 +17,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from campaign.campaign_folder import EXAMPLE, CampaignFolder, make_folder
+from end_to_end import short_campaign
 from kbs_process import cli
 from kbs_process.errors import RecordingError
 from kbs_process.ingest.encoding import OutStream
@@ -204,10 +205,19 @@ def test_wrong_words_are_status_2(
     assert "Traceback" not in message
 
 
+@pytest.fixture
+def processable(tmp_path: Path) -> CampaignFolder:
+    """The example's description with recordings that are long enough for the gravity fit."""
+    folder = make_folder(tmp_path / "campaigns" / "EL089")
+    for number, path in enumerate(sorted((folder.path / "recordings").iterdir())):
+        short_campaign.record(path, noise=0.01, seed=number)
+    return folder
+
+
 def test_validate_finds_sound_recordings_clean(
-    folder: CampaignFolder, capsys: pytest.CaptureFixture[str]
+    processable: CampaignFolder, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert run("validate", str(folder.path), "--check") == 0
+    assert run("validate", str(processable.path), "--check") == 0
     out = capsys.readouterr().out
     assert "EL089P00_1  fit          clean" in out
     assert "wrench 100 Hz" in out
@@ -215,11 +225,11 @@ def test_validate_finds_sound_recordings_clean(
 
 
 def test_validate_tells_losses_and_fails_only_when_asked(
-    folder: CampaignFolder, capsys: pytest.CaptureFixture[str]
+    processable: CampaignFolder, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    record(folder.path / "recordings" / "EL089P00_2.mcap", nan=True)
-    assert run("validate", str(folder.path)) == 0
-    assert run("validate", str(folder.path), "--check") == 1
+    short_campaign.record(processable.path / "recordings" / "EL089P00_2.mcap", noise=0.01, seed=5, nan=True)
+    assert run("validate", str(processable.path)) == 0
+    assert run("validate", str(processable.path), "--check") == 1
     out = capsys.readouterr().out
     assert "EL089P00_2  held-out     lossy" in out
     assert "EL089P00_3  held-out     clean" in out
@@ -235,6 +245,23 @@ def test_validate_refuses_what_it_cannot_read(
     assert "the file is empty" in out
     assert "did you mean '/transducer/wrench'?" in out
     assert "4 unreadable" in out
+    assert "cannot be processed" not in out
+
+
+@pytest.mark.parametrize("fault", ["two channels of a force", "too short"])
+def test_validate_tells_what_processing_refuses_in_the_same_words(
+    folder: CampaignFolder, capsys: pytest.CaptureFixture[str], fault: str
+) -> None:
+    if fault != "too short":
+        folder.replace("parameters/rig.toml", '["Fx", "Fy", "Fz", "Tx", "Ty", "Tz"]', '["Fx", "Fy"]')
+    assert run("validate", str(folder.path), "-q") == 2
+    listed = capsys.readouterr().out
+    target = folder.path.parents[1] / "out"
+    assert run(str(folder.path), "-o", str(target), "--no-diagnose", "--no-pdf", "-q") == 2
+    refused = capsys.readouterr().err.removeprefix("error: ")
+    assert f"cannot be processed: {refused}" in listed
+    assert ("nothing was measured in frame S" if fault != "too short" else "too short") in refused
+    assert not target.exists()
 
 
 def test_inspect_shows_what_is_in_a_recording(

@@ -21,8 +21,11 @@ def short_campaign(target: Path) -> CampaignFolder:
     return folder
 
 
-def record(path: Path, *, moving: bool = True, noise: float = 0.0, seed: int = 1) -> None:
-    """Write twenty seconds: elevation at rest, or swinging; a wrench that is constant, but for noise (N, N m)."""
+def record(path: Path, *, moving: bool = True, noise: float = 0.0, seed: int = 1, nan: bool = False) -> None:
+    """Write twenty seconds: elevation at rest, or swinging; a wrench that is constant, but for noise (N, N m).
+
+    With `nan` ten readings of Fz are no numbers.
+    """
     stamp = np.arange(2000) * 10_000_000
     cycle = stamp[::10]
     swing = 0.1 * np.sin(0.5 * stamp * 1e-9) if moving else np.zeros(len(stamp))
@@ -30,6 +33,8 @@ def record(path: Path, *, moving: bool = True, noise: float = 0.0, seed: int = 1
     command = np.concatenate([angle[::10], np.gradient(angle[::10], 0.1, axis=0)], axis=1)
     wrench = np.tile([0.0, 0.0, -274.0, -6.0, 5.0, 0.0], (len(stamp), 1))
     wrench += noise * np.random.default_rng(seed).standard_normal(wrench.shape)
+    if nan:
+        wrench[200:210, 2] = np.nan
     write_mcap(
         path,
         [

@@ -9,6 +9,7 @@ import numpy as np
 
 from kbs_process.campaign.analysis import Analysis, bands_of
 from kbs_process.campaign.config import Campaign, Requirement
+from kbs_process.campaign.measurable import judged_channels
 from kbs_process.errors import ConfigError
 from kbs_process.report import results
 from kbs_process.signals.records import Signal
@@ -49,21 +50,8 @@ def judged(
     """Judge a requirement by the channel and recording that are closest to failing it."""
     band = band_of(requirement, bands_of(campaign.bands))
     key = (requirement.frame, band.name)
-    prefix = "T" if requirement.quantity == "torque" else "F"
-    pairs = [(analysis.entry.name, analysis.pairs[key]) for analysis in runs if key in analysis.pairs]
-    if not pairs:
-        raise ConfigError(
-            f"nothing was measured in frame {requirement.frame}",
-            where=requirement.name,
-            remedy="give [spacecraft] in the parameter files and all six channels, or frame = 'T'",
-        )
-    channels = [channel for channel in pairs[0][1].measured.channels if channel.startswith(prefix)]
-    if not channels:
-        raise ConfigError(
-            f"no {requirement.quantity} was measured in frame {requirement.frame}",
-            where=requirement.name,
-            remedy=f"state a requirement on what is: {', '.join(pairs[0][1].measured.channels)}",
-        )
+    channels = judged_channels(requirement, campaign.rig)
+    pairs = [(analysis.entry.name, analysis.pairs[key]) for analysis in runs]
     below = coverage_below(requirement.statistic, [pair.measured for _, pair in pairs], band)
     sigmas = {
         (entry.recording, entry.channel): entry.total for entry in budgets if (entry.frame, entry.band) == key

@@ -1,15 +1,17 @@
-"""Are a campaign's recordings sound? Each is read as processing reads it, and what that finds is listed."""
+"""Can a campaign be processed? It is read and fitted as processing does it, and what that finds is listed."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from kbs_process.campaign.config import Campaign
-from kbs_process.campaign.held import read_alive
+from kbs_process.campaign.measurable import check_requirements
+from kbs_process.campaign.preparing import Prepared, fit_gravity, prepare
 from kbs_process.campaign.progress import Progress
-from kbs_process.errors import RecordingError
+from kbs_process.errors import KbsError, RecordingError
 from kbs_process.signals.records import Loss
+from kbs_process.stages import decouple
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,21 +25,43 @@ class Finding:
     error: str = ""
 
 
-def read_through(campaign: Campaign, progress: Progress) -> list[Finding]:
-    """Read every recording of the campaign to its end."""
-    findings = []
+@dataclass(frozen=True, slots=True)
+class Validation:
+    """What was found, recording by recording, and why processing would refuse them all together."""
+
+    findings: tuple[Finding, ...]
+    refusal: str = ""
+
+    @property
+    def refused(self) -> bool:
+        return bool(self.refusal) or any(finding.error for finding in self.findings)
+
+
+def validate(campaign: Campaign, progress: Progress) -> Validation:
+    """Read every recording of the campaign to its end, and fit gravity to them if all can be read."""
+    decoupling = decouple.fit(campaign.rig)
+    findings: list[Finding] = []
+    prepared: list[Prepared] = []
     for entry in campaign.recordings:
-        with progress.task(f"Reading {entry.name}"):
-            try:
-                run = read_alive(campaign, entry, keep=True)
-                findings.append(Finding(entry.name, entry.role, dict(run.rates), run.losses))
-            except RecordingError as error:
-                findings.append(Finding(entry.name, entry.role, error=str(error)))
-    return findings
+        try:
+            one = prepare(campaign, entry, decoupling, progress)
+        except RecordingError as error:
+            findings.append(Finding(entry.name, entry.role, error=str(error)))
+        else:
+            prepared.append(one)
+            findings.append(Finding(entry.name, entry.role, dict(one.run.rates), one.run.losses))
+    try:
+        check_requirements(campaign)
+        if len(prepared) == len(findings):
+            fit_gravity(campaign, prepared, progress)
+    except KbsError as error:
+        return Validation(tuple(findings), str(error))
+    return Validation(tuple(findings))
 
 
-def describe(campaign: Campaign, findings: Sequence[Finding]) -> Iterator[str]:
+def describe(campaign: Campaign, validation: Validation) -> Iterator[str]:
     """Yield the lines of the listing: a table, then losses and errors, then a summary."""
+    findings = validation.findings
     rig = campaign.rig
     yield f"{campaign.name}: {campaign.title}"
     yield (
@@ -57,6 +81,8 @@ def describe(campaign: Campaign, findings: Sequence[Finding]) -> Iterator[str]:
     lossy = sum(bool(finding.losses) for finding in findings)
     recordings = "recording" if len(findings) == 1 else "recordings"
     yield f"{len(findings)} {recordings}: {bad} unreadable, {lossy} with losses"
+    if validation.refusal:
+        yield f"cannot be processed: {validation.refusal}"
 
 
 def in_words(loss: Loss) -> str:

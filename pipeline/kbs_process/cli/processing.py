@@ -100,20 +100,21 @@ def _diagnose(
 @click.option("--check", is_flag=True, help="Exit with 1 when a recording has losses.")
 @quiet_option
 def validate(campaign: str, check: bool, quiet: bool) -> None:
-    """Check CAMPAIGN's description, and read all its recordings through.
+    """Check CAMPAIGN's description, read all its recordings through, and fit gravity to them.
 
-    Exits with 0 if all is well or can be processed, with 2 if something cannot be read.
+    Exits with 0 if all is well or can be processed, with 2 if something cannot be read, or processing would refuse it.
     """
     from kbs_process.campaign.load import load_campaign
     from kbs_process.campaign.locate import find_campaign
-    from kbs_process.campaign.validate import describe, read_through
+    from kbs_process.campaign.validate import describe
+    from kbs_process.campaign.validate import validate as run
 
     loaded = load_campaign(find_campaign(campaign))
-    findings = read_through(loaded, progress(quiet))
-    click.echo("\n".join(describe(loaded, findings)))
-    if any(finding.error for finding in findings):
+    found = run(loaded, progress(quiet))
+    click.echo("\n".join(describe(loaded, found)))
+    if found.refused:
         sys.exit(BAD_INPUT)
-    if check and any(finding.losses for finding in findings):
+    if check and any(finding.losses for finding in found.findings):
         sys.exit(NOT_MET)
 
 
