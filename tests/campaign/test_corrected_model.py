@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from campaign.campaign_folder import make_folder
 from kbs_process.campaign.config import SensingLaw
 from kbs_process.campaign.corrected_diagnosis import write_corrected
 from kbs_process.campaign.corrected_model import write_model
 from kbs_process.campaign.load import load_campaign
+from kbs_process.campaign.mission import load_day
 from kbs_process.campaign.reading_laws import readings
 from kbs_process.diagnosis.hypothesis import Hypothesis
 from kbs_process.diagnosis.outcome import Estimate, Identity
@@ -114,3 +117,35 @@ def test_a_diagnosis_that_went_round_a_phase_and_found_a_gain_leaves_a_model_tha
     (law,) = corrected.sensing
     assert float(law.parameters["gain"]) == 0.03
     assert float(law.parameters["gain"].sigma) == 0.002
+
+
+def test_it_is_whole_wherever_it_is_taken(tmp_path: Path) -> None:
+    """Matrices in CSV files, the flight model's files and a mission come with it; the campaign may be gone."""
+    folder = make_folder(tmp_path / "campaigns" / "EL089")
+    (folder.path / "tilt.csv").write_text("0.5, -0.25\n")
+    folder.replace("parameters/rig.toml", "tilt = { value = [0.0, 0.0]", 'tilt = { value = "tilt.csv"')
+    (folder.path / "parameters" / "orbit").mkdir()
+    shutil.copy(folder.path / "parameters" / "flight.toml", folder.path / "parameters" / "orbit")
+    (folder.path / "orbit.csv").write_text("0.125, -0.375\n")
+    folder.append(
+        "parameters/orbit/flight.toml",
+        '[transducer]\ntilt = { value = "orbit.csv", unit = "mrad", sigma = 1.0, source = "a test" }\n',
+    )
+    both = 'substitute = ["parameters/flight.toml", "parameters/orbit/flight.toml"]'
+    folder.replace("campaign.toml", 'substitute = ["parameters/flight.toml"]', both)
+    shutil.copy(CAMPAIGN.parent / "REFDAY" / "mission.toml", folder.path / "day.toml")
+    folder.append("campaign.toml", '\n[mission]\nfile = "day.toml"\n')
+
+    campaign = load_campaign(folder.path)
+    files = write_model(campaign, campaign.rig, campaign.effects, {}, tmp_path / "made", "by a test")
+    assert all(path.is_file() and path.is_relative_to(tmp_path / "made") for path in files)
+    shutil.move(tmp_path / "made", tmp_path / "far" / "away" / "corrected")
+    shutil.rmtree(folder.path)
+
+    moved = load_campaign(tmp_path / "far" / "away" / "corrected", recordings=False)
+    assert moved.rig.transducer.tilt.value.tolist() == [5e-4, -2.5e-4]
+    flown = load_campaign(tmp_path / "far" / "away" / "corrected", flight=True, recordings=False)
+    assert flown.rig.transducer.tilt.value.tolist() == [1.25e-4, -3.75e-4]
+    assert load_day(moved).mission.duration > 0.0
+    with pytest.raises(ConfigError, match=r"AZPS_ATA\.mcap"):
+        load_campaign(tmp_path / "far" / "away" / "corrected")

@@ -85,6 +85,19 @@ def test_commands_of_a_table(folder: Path) -> None:
     assert (folder / "slew" / "simulated.mcap").is_file()
 
 
+@pytest.mark.parametrize("verb", ["simulate", "flight"])
+def test_other_verbs_need_no_recordings_where_commands_are_given(folder: Path, verb: str) -> None:
+    t = np.arange(0.0, 12.01, 0.1)
+    rows = [f"{time:.1f},0.0,{1.3 + 1e-3 * max(0.0, time - 1.0):.6f}" for time in t]
+    (folder / "long.csv").write_text("t,az,el\n" + "\n".join(rows) + "\n")
+    model, out = str(folder / "elsewhere" / "deeper" / "corrected"), folder / verb
+    options = ["--samples", "2", "--no-pdf"] if verb == "flight" else []
+    assert run(verb, model, "--command", str(folder / "long.csv"), "-o", str(out), *options) == 0
+    if verb == "flight":
+        inputs = json.loads((out / "results.json").read_text())["provenance"]["inputs"]
+        assert not [entry["file"] for entry in inputs if entry["file"].endswith(".mcap")]
+
+
 def test_what_is_wrong_is_told(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     model = str(folder / "elsewhere" / "deeper" / "corrected")
     assert run("predict", "--model", model, "nowhere.mcap") == 2

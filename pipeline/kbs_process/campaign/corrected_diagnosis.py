@@ -39,8 +39,7 @@ def write_corrected(campaign: Campaign, outcome: Outcome, folder: Path) -> tuple
     source = "by diagnosis of " + ", ".join(known.experiment.trials[k].name for k in known.experiment.fit)
     hypothesis = _within_a_turn(outcome.standing.hypothesis)
     quantities = hypothesis.rig.quantities()
-    # Matrices may lie in files of their own, which the corrected model would not find.
-    changed: dict[str, Quantity] = {name: q for name, q in quantities.items() if q.value.ndim > 1}
+    changed: dict[str, Quantity] = {}
     for index, scalar in enumerate(known.free):
         if scalar.quantity in quantities:
             quantity = changed.get(scalar.quantity, quantities[scalar.quantity])

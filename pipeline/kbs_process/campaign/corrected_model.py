@@ -1,9 +1,12 @@
-"""A corrected model on disk: a folder that loads as a campaign of the same recordings, and predicts any other."""
+"""A corrected model on disk: a folder that loads as a campaign, predicts any recording, and goes anywhere.
+
+All that it is made of is in it. The recordings that it came from are not, and stay where they are.
+"""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,11 +16,14 @@ import numpy as np
 from kbs_process.campaign.config import Campaign, SensingLaw
 from kbs_process.campaign.documents import Tree, read
 from kbs_process.campaign.locate import CAMPAIGN_FILE
-from kbs_process.campaign.parameter_files import corrected, entry, text_of, write_parameters
+from kbs_process.campaign.parameter_files import corrected, entry, text_of, whole, write_parameters
 from kbs_process.campaign.sensing_laws import table_of
 from kbs_process.rig.model import Quantity, Rig
 
 FOUND = "found.toml"  # numbers that the campaign's parameter files do not have
+FLIGHT = "flight"  # folder of those of the flight model, in that of the parameter files
+MISSION = "mission.toml"
+_REMEDY = "keep the campaign as it is meanwhile"
 _OF_DRIVE = ("ratio", "rotor_inertia", "steps_per_turn")
 
 
@@ -46,8 +52,37 @@ def write_model(
         written = (*written, path)
     description = folder / CAMPAIGN_FILE
     every = (*campaign.sensing, *sensing)
-    description.write_text(_description(campaign, effects, every, written, source, folder), encoding="utf-8")
-    return (description, *written)
+    tree = _description(campaign, effects, every, written, folder)
+    others = tuple(_brought(campaign, tree, folder))
+    text = f"# {campaign.name}, its model corrected, {source}.\n" + text_of(tree)
+    description.write_text(text, encoding="utf-8")
+    return (description, *written, *others)
+
+
+def _brought(campaign: Campaign, tree: Tree, folder: Path) -> Iterator[Path]:
+    """Copy what else the description `tree` names into `folder`, name the copies in it, and yield them."""
+    if substitutes := tree.get("flight", {}).get("substitute"):
+        copies: list[Path] = []
+        for index, name in enumerate(substitutes):
+            path = campaign.folder / name
+            taken = any(copy.name == path.name for copy in copies)
+            copy = folder / "parameters" / FLIGHT / (f"{index + 1}-{path.name}" if taken else path.name)
+            copies.append(_copied(path, campaign.folder, "the parameter file", copy))
+        named = [copy.relative_to(folder).as_posix() for copy in copies]
+        tree["flight"] = tree["flight"] | {"substitute": named}
+        yield from copies
+    if campaign.mission is not None:
+        yield _copied(campaign.mission, campaign.mission.parent, "the mission file", folder / MISSION)
+        tree["mission"] = tree["mission"] | {"file": MISSION}
+
+
+def _copied(path: Path, beside: Path, role: str, copy: Path) -> Path:
+    """Copy a file as it is, or with the numbers of the CSV files in it that it names relative to `beside`."""
+    document = read(path, role=role, remedy=_REMEDY)
+    inside = whole(document.tree, beside)
+    copy.parent.mkdir(parents=True, exist_ok=True)
+    copy.write_text(document.text if inside == document.tree else text_of(inside), encoding="utf-8")
+    return copy
 
 
 def _added(before: Rig, after: Rig, changed: Mapping[str, Quantity], source: str) -> Tree:
@@ -89,14 +124,10 @@ def _description(
     effects: Sequence[str],
     sensing: Sequence[SensingLaw],
     files: Sequence[Path],
-    source: str,
     folder: Path,
-) -> str:
-    document = read(
-        campaign.folder / CAMPAIGN_FILE,
-        role="the campaign's description",
-        remedy="keep the campaign as it is meanwhile",
-    )
+) -> Tree:
+    """The campaign's description with the corrected model, recordings named from `folder`, all else as it was."""
+    document = read(campaign.folder / CAMPAIGN_FILE, role="the campaign's description", remedy=_REMEDY)
 
     def from_here(name: str) -> str:
         return Path(os.path.relpath(campaign.folder / name, folder)).as_posix()
@@ -109,9 +140,5 @@ def _description(
     tree["recording"] = [
         recording | {"file": from_here(recording["file"])} for recording in tree.get("recording", [])
     ]
-    if "flight" in tree:
-        tree["flight"] = tree["flight"] | {"substitute": [*map(from_here, tree["flight"]["substitute"])]}
-    if "mission" in tree:
-        tree["mission"] = tree["mission"] | {"file": from_here(tree["mission"]["file"])}
     tree["parameters"] = {"files": [f"parameters/{path.name}" for path in files]}
-    return f"# {campaign.name}, its model corrected, {source}.\n" + text_of(tree)
+    return tree

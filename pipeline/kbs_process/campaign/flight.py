@@ -105,6 +105,8 @@ def predict_flight(
     processes: int | None = None,
 ) -> Outcome:
     """Fly `samples` units that the parameters' uncertainties allow along a trajectory."""
+    if commands is not None:
+        campaign = replace(campaign, recordings=())  # none is read: they need not be there
     rig = in_orbit(campaign.rig)
     judged = (
         *(_judged(campaign, requirement) for requirement in campaign.requirements),

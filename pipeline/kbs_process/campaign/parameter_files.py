@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping
+from datetime import date, datetime, time
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from kbs_process.campaign.config import Campaign
-from kbs_process.campaign.documents import Document, Tree, read
+from kbs_process.campaign.documents import Tree, read
+from kbs_process.campaign.quantities import from_csv
 from kbs_process.rig.model import Quantity
 
 _HEAD = "# {name}, with numbers identified from {source}.\n# Everything else is as it was; comments were left out.\n"
@@ -19,18 +21,34 @@ _HEAD = "# {name}, with numbers identified from {source}.\n# Everything else is 
 def corrected(campaign: Campaign, changed: Mapping[str, Quantity], source: str) -> Iterator[tuple[str, str]]:
     """Yield name and text of each parameter file of the campaign with the quantities of `changed` in place.
 
-    New quantities are in SI. Raises ConfigError where a file has gone since the campaign was loaded.
+    New quantities are in SI. What lies in CSV files is in the text: it goes where the text goes. Raises ConfigError
+    where a file has gone since the campaign was loaded.
     """
     for path in campaign.inputs[1:]:
-        if path.suffix == ".toml":
+        if path.suffix == ".toml" and path != campaign.modal:
             document = read(path, role="the parameter file", remedy="keep the campaign as it is meanwhile")
             yield (
                 path.name,
-                _HEAD.format(name=path.name, source=source) + text_of(_replaced(document, changed)),
+                _HEAD.format(name=path.name, source=source)
+                + text_of(_replaced(whole(document.tree, campaign.folder), changed)),
             )
 
 
-def _replaced(document: Document, changed: Mapping[str, Quantity]) -> Tree:
+def whole(tree: Tree, folder: Path) -> Tree:
+    """The tree with the numbers of CSV files that its quantities name, relative to `folder`, in place of the names."""
+    new: Tree = {}
+    for key, child in tree.items():
+        if not isinstance(child, dict):
+            new[key] = child
+        elif "value" in child:
+            named = (part for part in ("value", "sigma") if isinstance(child.get(part), str))
+            new[key] = child | {part: _numbers(from_csv(folder / child[part], part)) for part in named}
+        else:
+            new[key] = whole(child, folder)
+    return new
+
+
+def _replaced(tree: Tree, changed: Mapping[str, Quantity]) -> Tree:
     def walk(node: Tree, path: tuple[str, ...]) -> Tree:
         new: Tree = {}
         for key, child in node.items():
@@ -45,7 +63,7 @@ def _replaced(document: Document, changed: Mapping[str, Quantity]) -> Tree:
                 new[key] = walk(child, here)
         return new
 
-    return walk(document.tree, ())
+    return walk(tree, ())
 
 
 def entry(quantity: Quantity) -> dict[str, Any]:
@@ -89,6 +107,8 @@ def _value(value: Any) -> str:
         return "{ " + ", ".join(f"{_key(key)} = {_value(child)}" for key, child in value.items()) + " }"
     if isinstance(value, list):
         return "[" + ", ".join(map(_value, value)) + "]"
+    if isinstance(value, datetime | date | time):
+        return value.isoformat()
     if isinstance(value, bool | str | int):
         return json.dumps(value, ensure_ascii=False)
     return repr(float(value))

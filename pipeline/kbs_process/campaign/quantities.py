@@ -48,7 +48,7 @@ def read_quantity(name: str, table: dict[str, Any], kind: Kind, folder: Path) ->
 
 def _array(given: Any, key: str, folder: Path) -> Array:
     if isinstance(given, str):
-        return _from_csv(folder / given, key)
+        return from_csv(folder / given, key)
     try:
         array = np.asarray(given, dtype=np.float64)
     except ValueError as error:
@@ -56,8 +56,8 @@ def _array(given: Any, key: str, folder: Path) -> Array:
     return array
 
 
-def _from_csv(path: Path, key: str) -> Array:
-    """Read a matrix of numbers from a comma-separated file; '#' begins a comment."""
+def from_csv(path: Path, key: str) -> Array:
+    """Read a matrix of numbers from a comma-separated file; '#' begins a comment. One row is an array."""
     try:
         array = np.loadtxt(path, delimiter=",", ndmin=2)
     except FileNotFoundError as error:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -35,6 +35,7 @@ class Flown:
 
 def simulate_day(campaign: Campaign, target: Path, *, progress: Progress, pdf: bool | None = None) -> Outcome:
     """Plan, fly and judge the campaign's reference day; put the results in `target`, in one step."""
+    campaign = replace(campaign, recordings=())  # a day is planned: recordings of a test need not be there
     day = load_day(campaign)
     with writing(target) as folder:
         with progress.task("Planning the trajectory"):

@@ -55,7 +55,7 @@ def flight(
 
     folder = find_campaign(campaign)
     target = results_folder(folder, output, suffix="-flight")
-    loaded = load_campaign(folder, checksums=False, flight=True)
+    loaded = load_campaign(folder, checksums=False, flight=True, recordings=command is None)
     from kbs_process.campaign.flight import predict_flight
 
     outcome = predict_flight(

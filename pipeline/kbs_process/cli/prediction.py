@@ -58,7 +58,7 @@ def simulate(
 
     folder = find_campaign(campaign)
     target = results_folder(folder, output, suffix="-simulated")
-    loaded = load_campaign(folder, checksums=False)
+    loaded = load_campaign(folder, checksums=False, recordings=command is None)
     if command is not None:
         written = simulate_commands(loaded, command, target, rate_Hz=rate or 100.0, progress=progress(quiet))
     else:
