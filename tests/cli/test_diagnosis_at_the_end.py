@@ -60,6 +60,7 @@ def test_a_mismatch_is_diagnosed_and_linked(
 ) -> None:
     def answered(campaign: Campaign, target: Path, **given: Any) -> Outcome:
         assert given["experiment"] == "experiment"
+        assert given["verb"] == "", "the command that was typed has no verb"
         target.mkdir()
         (target / "results.json").write_bytes(encode(results()))
         (target.parent / ".diagnosis.lock").touch()

@@ -117,7 +117,9 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     discs = merged([disc(find, 1.0, ""), disc(find, 2.0, "_2")])
     write_corrected(campaign, replace(outcome, finds=discs), target.parent / "discs")
     off = replace(outcome, finds=(), verdict="parameters off")
-    told_off = write_diagnosis(campaign, declared(experiment), off, target, False, None)
+    told_off = write_diagnosis(campaign, declared(experiment), off, target, False, None, "")
+    command = load(target, DiagnosisResults).provenance.command
+    assert command == "kbs-process campaign/EL089", "of a diagnosis at the end of processing"
     assert "would look the same" in told_off.verdict_lines[0] and "{" not in told_off.verdict_lines[0]
     told = write_diagnosis(campaign, declared(experiment), outcome, target, False, proposal)
     assert (
@@ -139,6 +141,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_results_read_back_and_the_page_tells_them(written: Path) -> None:
     results = load(written, DiagnosisResults)
+    assert results.provenance.command == "kbs-process diagnose campaign/EL089"
     (find,) = results.finds
     assert not find.named
     assert {one.unit for one in find.parameters} == {"N m"}

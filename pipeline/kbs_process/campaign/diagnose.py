@@ -100,8 +100,12 @@ def diagnose(
     progress: Progress,
     pdf: bool | None = None,
     experiment: Experiment | None = None,
+    verb: str = "diagnose",
 ) -> Outcome:
-    """Diagnose a campaign and write the answers to `target`; `experiment` is that of its recordings, if it is there."""
+    """Diagnose a campaign and write the answers to `target`; `experiment` is that of its recordings, if it is there.
+
+    `verb` is that of the command that was given, none of processing: the results name the command.
+    """
     experiment = experiment or experiment_of(campaign, progress)
     with Simulators(experiment) as simulate:
         explained = explain(experiment, simulate, progress.task)
@@ -112,4 +116,4 @@ def diagnose(
     with progress.task("Next test"):
         proposal = proposed(outcome, explained.floor)
     with progress.task("Writing the report"):
-        return write_diagnosis(campaign, explained.floor, outcome, target, pdf, proposal)
+        return write_diagnosis(campaign, explained.floor, outcome, target, pdf, proposal, verb)

@@ -37,7 +37,9 @@ def diagnose_results(
     if found.log_p > np.log(DETECTED):
         return (*told, f"Prediction and recordings differ by {ratio}: there is nothing to diagnose.")
     with revising(results, without=(FOLDER, "index.html", "report.pdf")) as folder:
-        outcome = diagnose(campaign, folder / FOLDER, progress=progress, pdf=pdf, experiment=experiment)
+        outcome = diagnose(
+            campaign, folder / FOLDER, progress=progress, pdf=pdf, experiment=experiment, verb=""
+        )
         # The lock of a folder that nobody else can see.
         (folder / f".{FOLDER}.lock").unlink(missing_ok=True)
         build.build(folder, pdf)

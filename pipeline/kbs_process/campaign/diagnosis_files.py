@@ -34,8 +34,12 @@ def write_diagnosis(
     target: Path,
     pdf: bool | None,
     proposal: Proposal | None = None,
+    verb: str = "diagnose",
 ) -> Told:
-    """Write results, tables, corrected model and report to `target`, and the commands of the next test."""
+    """Write results, tables, corrected model and report to `target`, and the commands of the next test.
+
+    `verb` is that of the command that was given, none of processing.
+    """
     known = outcome.known
     with writing(target) as folder:
         files = write_corrected(campaign, outcome, folder / CORRECTED)
@@ -46,7 +50,12 @@ def write_diagnosis(
             _spectra(folder, known, outcome.standing.known, k)
             _histories(folder, known.experiment, known.shown, outcome.standing, k)
         results = results_of(
-            campaign, floor, outcome, [path.relative_to(folder).as_posix() for path in files], proposal
+            campaign,
+            floor,
+            outcome,
+            [path.relative_to(folder).as_posix() for path in files],
+            proposal,
+            verb,
         )
         (folder / "results.json").write_bytes(encode(results))
         page = build.build(folder, pdf)

@@ -54,7 +54,9 @@ def results_of(
     outcome: Outcome,
     files: Sequence[str],
     proposal: Proposal | None,
+    verb: str = "diagnose",
 ) -> records.DiagnosisResults:
+    """What a diagnosis says; `verb` is that of the command that was given, none of processing."""
     known = outcome.known
     finds = tuple(_find(find, known.experiment) for find in outcome.finds)
     trials = tuple(_trials(known, outcome.standing.known))
@@ -66,7 +68,7 @@ def results_of(
             status="undecided" if outcome.verdict == "undecided" else "none",
             sentence=_sentence(outcome, trials, floor),
         ),
-        provenance=provenance.made("diagnose", campaign),
+        provenance=provenance.made(verb, campaign),
         answer=outcome.verdict,
         paragraph=_paragraph(outcome, finds, trials, floor),
         floor=floor.statement,
