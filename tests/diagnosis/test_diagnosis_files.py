@@ -118,6 +118,9 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     write_corrected(campaign, replace(outcome, finds=discs), target.parent / "discs")
     off = replace(outcome, finds=(), verdict="parameters off")
     told_off = write_diagnosis(campaign, declared(experiment), off, target, False, None, "")
+    nothing = "Model with its known numbers refitted, to which nothing was added"
+    assert told_off.verdict_lines[1] == f"{nothing}: {target / 'corrected'}"
+    assert nothing in (target / "index.html").read_text().replace("\u00a0", " ")
     command = load(target, DiagnosisResults).provenance.command
     assert command == "kbs-process campaign/EL089", "of a diagnosis at the end of processing"
     assert "would look the same" in told_off.verdict_lines[0] and "{" not in told_off.verdict_lines[0]
@@ -126,6 +129,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
         told.verdict_lines[0]
         == "The model lacks: curve over joint angle or ground cable (external wrench, el)."
     )
+    assert told.verdict_lines[1] == f"Corrected model: {target / 'corrected'}"
     more = write_diagnosis(
         campaign,
         declared(experiment),

@@ -59,7 +59,7 @@ def write_diagnosis(
         )
         (folder / "results.json").write_bytes(encode(results))
         page = build.build(folder, pdf)
-    lines = [results.verdict.sentence, f"Corrected model: {target / CORRECTED}"]
+    lines = [results.verdict.sentence, f"{results.model}: {target / CORRECTED}"]
     if proposal is not None:
         lines.append(f"Next test: {target / COMMANDS}")
     return Told(tuple(lines), None, target / page.name)

@@ -179,3 +179,12 @@ class DiagnosisResults(Record, frozen=True, kw_only=True):
     next_test: NextTest | None = None  # where nothing is open, none
     warnings: tuple[Notice, ...] = ()
     notes: tuple[str, ...] = ()
+
+    @property
+    def model(self) -> str:
+        """What the folder of the corrected model holds, in words."""
+        return (
+            "Corrected model"
+            if self.finds
+            else "Model with its known numbers refitted, to which nothing was added"
+        )

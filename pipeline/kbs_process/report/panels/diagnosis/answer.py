@@ -43,7 +43,7 @@ def panel(results: DiagnosisResults, tables: Tables) -> Panel:
     if results.files:
         blocks.append(
             Text(
-                "Corrected model, for kbs-process predict --model and for any campaign's parameter files:",
+                f"{results.model}, for kbs-process predict --model and for any campaign's parameter files:",
                 results.files,
             )
         )
