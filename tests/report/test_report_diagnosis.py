@@ -189,3 +189,9 @@ def test_a_report_tells_of_a_diagnosis_by_another_version(tmp_path: Path) -> Non
     for provenance, said in ((sample.PROVENANCE, False), (made, True)):
         page(folder / "diagnosis", msgspec.structs.replace(results(), provenance=provenance))
         assert (other in build(folder, pdf=False).read_text().replace("\u00a0", " ")) is said
+
+
+def test_code_without_a_commit_is_named_by_its_files(tmp_path: Path) -> None:
+    made = msgspec.structs.replace(sample.PROVENANCE, commit="", source="c0ffee")
+    told = page(tmp_path, msgspec.structs.replace(results(), provenance=made)).replace("\u00a0", " ")
+    assert "source, SHA-256" in told and "c0ffee" in told

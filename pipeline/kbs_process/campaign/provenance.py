@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import platform
-import subprocess
 from collections.abc import Iterable, Sequence
 from functools import lru_cache
 from importlib.metadata import PackageNotFoundError, version
@@ -14,6 +13,7 @@ from typing import Any
 import numpy as np
 
 import kbs_process
+from kbs_process.campaign import code
 from kbs_process.campaign.config import Campaign
 from kbs_process.errors import RecordingError
 from kbs_process.report.records.common import Constant, InputFile, Provenance
@@ -52,10 +52,11 @@ def _sha256(path: Path, size: int, modified_ns: int) -> str:
 
 
 def software() -> dict[str, Any]:
-    """Return the versions of everything that computes, and the commit if this is a checkout."""
+    """Return the versions of everything that computes, and the code's commit or, where that is not all, its SHA-256."""
     return {
         "kbs-process": kbs_process.__version__,
-        "commit": _commit(Path(kbs_process.__file__).parent),
+        "commit": code.commit(),
+        "source": code.source(),
         "python": platform.python_version(),
         "platform": f"{platform.system()} {platform.machine()}",
         "libraries": {name: _version(name) for name in LIBRARIES},
@@ -73,7 +74,8 @@ def made(verb: str, campaign: Campaign, others: Sequence[Path] = (), options: st
         libraries=about["libraries"],
         platform=about["platform"],
         command=" ".join(part for part in ("kbs-process", verb, _named(campaign), options) if part),
-        commit=about["commit"] or "",
+        commit=about["commit"],
+        source=about["source"],
         inputs=tuple(InputFile(file=file, sha256=digest) for file, digest in files.items()),
     )
 
@@ -130,32 +132,6 @@ def _version(library: str) -> str:
         return version(library)
     except PackageNotFoundError:
         return "not installed"
-
-
-def _commit(package: Path) -> str | None:
-    """Return the commit of the package's files, "+" where they differ from it; None outside git."""
-    inside = ["git", "-C", str(package)]
-    try:
-        head = subprocess.run(
-            [*inside, "rev-parse", "HEAD"], capture_output=True, text=True, timeout=10, check=True
-        )
-        # A package installed below someone else's repository is not part of it.
-        subprocess.run(
-            [*inside, "ls-files", "--error-unmatch", "__init__.py"],
-            capture_output=True,
-            timeout=10,
-            check=True,
-        )
-        changed = subprocess.run(
-            [*inside, "status", "--porcelain", "--untracked-files=no", "--", "."],
-            capture_output=True,
-            text=True,
-            timeout=10,
-            check=True,
-        )
-    except (OSError, subprocess.SubprocessError):
-        return None
-    return head.stdout.strip() + ("+" if changed.stdout.strip() else "")
 
 
 def _text(value: float | list[object]) -> float | str:

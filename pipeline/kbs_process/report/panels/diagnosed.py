@@ -18,7 +18,7 @@ def panel(results: Record, tables: Tables) -> Panel | None:
         return None
     diagnosis = load(folder, DiagnosisResults)
     made, here = diagnosis.provenance, getattr(results, "provenance", diagnosis.provenance)
-    other = (made.version, made.commit) != (here.version, here.commit)
+    other = (made.version, made.commit, made.source) != (here.version, here.commit, here.source)
     blocks = (
         Text(diagnosis.verdict.sentence),
         Text(diagnosis.paragraph),

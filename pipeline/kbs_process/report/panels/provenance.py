@@ -20,6 +20,7 @@ def of(made: Provenance, recorded: Mapping[str, str] | None = None) -> Panel:
     software = (
         ("kbs-process", made.version),
         *((("commit", made.commit),) if made.commit else ()),
+        *((("source, SHA-256", made.source),) if made.source else ()),
         ("Python", made.python),
         ("platform", made.platform),
         *made.libraries.items(),

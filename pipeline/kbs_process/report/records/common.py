@@ -72,7 +72,8 @@ class Provenance(Record, frozen=True, kw_only=True):
     libraries: dict[str, str]
     platform: str
     command: str
-    commit: str = ""
+    commit: str = ""  # of the code; "+": its files differ from it
+    source: str = ""  # SHA-256 of the code's files, where no commit says what is in them
     inputs: tuple[InputFile, ...] = ()
 
 
