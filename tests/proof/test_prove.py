@@ -118,8 +118,11 @@ def test_a_cluster_that_is_not_there_is_told(monkeypatch: pytest.MonkeyPatch) ->
 def test_the_verb_needs_a_checkout(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     installed = tmp_path / "site-packages" / "kbs_process" / "__init__.py"
     monkeypatch.setattr(verb.kbs_process, "__file__", str(installed))
-    with pytest.raises(ConfigError, match="clone the repository"):
+    with pytest.raises(ConfigError, match="clone the repository") as caught:
         verb.run_bench([])
+    readme = (Path(__file__).parents[2] / "README.md").read_text()
+    install = caught.value.remedy.partition("with: pip install ")[2]
+    assert install and f"pip install -q {install}" in readme, "as the tests are installed"
 
 
 def test_the_verb_runs_the_bench_of_its_checkout() -> None:

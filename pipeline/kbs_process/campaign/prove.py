@@ -22,7 +22,7 @@ def run_bench(arguments: Sequence[str]) -> int:
         raise ConfigError(
             "the proof bench is part of the source, and this installation holds the package alone",
             where=str(Path(kbs_process.__file__).parent),
-            remedy="clone the repository, and install it with: pip install -e '.[test]'",
+            remedy="clone the repository, and install it with: pip install -c .ci/constraints.txt -e '.[test]'",
         )
     command = [sys.executable, "-m", "proof", *arguments]
     return subprocess.run(command, env={**os.environ, "PYTHONPATH": str(tests)}, check=False).returncode
