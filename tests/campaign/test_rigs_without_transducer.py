@@ -10,7 +10,7 @@ import pytest
 from campaign_folder import CampaignFolder, make_folder
 
 from kbs_process.campaign.corrected_model import write_model
-from kbs_process.campaign.importers.mapping import PRESETS
+from kbs_process.campaign.importers import PRESETS
 from kbs_process.campaign.load import load_campaign
 from kbs_process.campaign.relief import in_motion, without_effects
 from kbs_process.errors import ConfigError

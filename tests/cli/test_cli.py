@@ -19,6 +19,7 @@ import pytest
 from campaign.campaign_folder import EXAMPLE, CampaignFolder, make_folder
 from end_to_end import short_campaign
 from kbs_process import cli
+from kbs_process.campaign.importers import preset_names
 from kbs_process.errors import RecordingError
 from kbs_process.ingest.encoding import OutStream
 from kbs_process.ingest.writer import write_mcap
@@ -109,10 +110,32 @@ def test_help_names_every_verb(capsys: pytest.CaptureFixture[str]) -> None:
     assert all(f"\n  {verb} " in text for verb in VERBS)
 
 
-def test_help_imports_nothing_that_computes() -> None:
+def test_help_is_a_word_too(capsys: pytest.CaptureFixture[str]) -> None:
+    told = []
+    for words in (("help",), ("--help",), ("help", "simulate"), ("simulate", "--help")):
+        assert run(*words) == 0
+        told.append(capsys.readouterr().out)
+    assert told[0] == told[1] and told[2] == told[3] and told[0] != told[2]
+
+
+def test_help_tells_exit_statuses_defaults_and_presets(capsys: pytest.CaptureFixture[str]) -> None:
+    told = {}
+    for verb in ("", "simulate", "flight", "import"):
+        assert run(*filter(None, [verb]), "--help") == 0
+        told[verb] = " ".join(capsys.readouterr().out.split())
+    for status in (cli.NOT_MET, cli.BAD_INPUT, cli.INTERNAL, cli.INTERRUPTED):
+        assert f" {status} " in told[""].partition("Exit status:")[2]
+    for verb, default in (("simulate", "reports/NAME-simulated"), ("flight", "reports/NAME-flight")):
+        assert f"[default: {default}]" in told[verb]
+        assert "the last one listed]" in told[verb]
+    assert all(name in told["import"].partition("Presets")[2] for name in preset_names())
+
+
+@pytest.mark.parametrize("verb", [[], ["import"]])
+def test_help_imports_nothing_that_computes(verb: list[str]) -> None:
     code = (
         "import sys\nfrom kbs_process import cli\n"
-        "try:\n    cli.main(['--help'])\nexcept SystemExit:\n    pass\n"
+        f"try:\n    cli.main([*{verb}, '--help'])\nexcept SystemExit:\n    pass\n"
         "print(sorted({name.split('.')[0] for name in sys.modules}), file=sys.stderr)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -9,7 +9,7 @@ import numpy as np
 import pyarrow.parquet as pq
 
 from kbs_process.campaign import importers
-from kbs_process.campaign.importers.mapping import PRESETS
+from kbs_process.campaign.importers import PRESETS
 from kbs_process.campaign.load import load_campaign
 from kbs_process.campaign.progress import SilentProgress
 from kbs_process.campaign.run import process

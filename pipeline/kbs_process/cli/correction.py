@@ -37,7 +37,7 @@ from kbs_process.cli.shared import (
     metavar="SHARE",
     help="By how much a friction torque differs from run to run, one sigma, of itself.",
 )
-@output_option
+@output_option("reports/NAME-identify")
 @pdf_option
 @quiet_option
 def identify(
@@ -66,7 +66,7 @@ def identify(
 
 @click.command(epilog=examples("diagnose campaign/EL089", "diagnose campaign/EL089 -o /data/why --no-pdf"))
 @campaign_argument
-@output_option
+@output_option("reports/NAME-diagnosis")
 @pdf_option
 @quiet_option
 def diagnose(campaign: str, output: Path | None, pdf: bool | None, quiet: bool) -> None:

@@ -38,6 +38,9 @@ class CampaignGroup(click.Group):
     """A group of verbs; where the first word is none of them, it is a campaign to be processed."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        if args and args[0] == "help" and not Path("help").exists():
+            verbs = [word for word in args[1:2] if word in self.commands]
+            args = [*verbs, "--help"]
         if args and args[0] not in self.commands and args[0] not in ("--help", "-h", "--version"):
             self._refuse_misspelt_verb(args[0], ctx)
             args = ["process", *args]
@@ -55,7 +58,7 @@ class CampaignGroup(click.Group):
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
     epilog=examples("campaign/EL089", "campaign/EL089 --check", "validate campaign/EL089", "VERB --help")
     + "\n\nExit status: 0 done; 1 a requirement is not met, or a recording has losses (only with --check); "
-    "2 bad input. With --debug, any error shows its traceback.",
+    "2 bad input; 70 a fault of kbs-process; 130 interrupted. With --debug, any error shows its traceback.",
     subcommand_metavar="CAMPAIGN | VERB ...",
 )
 @click.version_option(__version__, prog_name="kbs-process")

@@ -23,7 +23,11 @@ from kbs_process.cli.shared import (
     )
 )
 @campaign_argument
-@click.option("--trajectory", metavar="NAME", help="Commands of the first recording of this trajectory.")
+@click.option(
+    "--trajectory",
+    metavar="NAME",
+    help="Commands of the first recording of this trajectory [default, without --command: the last one listed].",
+)
 @click.option(
     "--command",
     type=EXISTING_FILE,
@@ -36,7 +40,7 @@ from kbs_process.cli.shared import (
     metavar="HZ",
     help="Sampling rate of the wrench [default: the recording's; 100 with --command].",
 )
-@output_option
+@output_option("reports/NAME-simulated")
 @quiet_option
 def simulate(
     campaign: str,
@@ -48,7 +52,7 @@ def simulate(
 ) -> None:
     """Run CAMPAIGN's plant on commands alone, through its controller.
 
-    Writes wrench, angles and field as Parquet and as simulated.mcap.
+    Writes wrench, angles and field as Parquet and as simulated.mcap. With --command no recording need be there.
     """
     if trajectory is not None and command is not None:
         raise click.UsageError("Give --trajectory or --command, not both.")
@@ -80,7 +84,7 @@ def simulate(
     metavar="FOLDER",
     help="A corrected model that 'diagnose' wrote, in the place of CAMPAIGN.",
 )
-@output_option
+@output_option("reports/NAME-predicted; with --model, reports/NAME-corrected-predicted")
 @quiet_option
 def predict(words: tuple[str, ...], model: Path | None, output: Path | None, quiet: bool) -> None:
     """Predict one RECORDING: a name from CAMPAIGN, or any MCAP file with the same topics.

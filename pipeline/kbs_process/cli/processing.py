@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 @click.command(epilog=examples("campaign/EL089", "process campaign/EL089 --check --output /data/EL089"))
 @campaign_argument
-@output_option
+@output_option("reports/NAME")
 @pdf_option
 @click.option("--check", is_flag=True, help="Exit with 1 when a requirement is not met.")
 @click.option(

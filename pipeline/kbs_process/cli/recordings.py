@@ -8,6 +8,7 @@ from pathlib import Path
 
 import click
 
+from kbs_process.campaign.importers import preset_names
 from kbs_process.cli.shared import BAD_INPUT, EXISTING_FILE, FOLDER, NOT_MET, examples, progress, quiet_option
 
 
@@ -37,7 +38,8 @@ def inspect(files: tuple[Path, ...], check: bool) -> None:
     "import",
     epilog=examples(
         "import --describe bench.tdms > mapping.toml", "import mapping.toml /data/bench campaigns/BENCH"
-    ),
+    )
+    + f"\n\nPresets, for public recordings of other rigs: {', '.join(preset_names())}.",
 )
 @click.argument("mapping", required=False)
 @click.argument("source", required=False, type=click.Path(path_type=Path, exists=True))
@@ -64,7 +66,7 @@ def import_(
         return
     if mapping is None or source is None or campaign is None:
         raise click.UsageError(
-            f"Give MAPPING, SOURCE and CAMPAIGN, or --describe FILE. Presets: {', '.join(importers.preset_names())}"
+            f"Give MAPPING, SOURCE and CAMPAIGN, or --describe FILE. Presets: {', '.join(preset_names())}"
         )
     notice = functools.partial(click.echo, err=True)
     made = importers.import_recordings(mapping, source, campaign, progress=progress(quiet), notice=notice)

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
 if TYPE_CHECKING:
     from kbs_process.campaign.progress import Progress
+
+_Verb = TypeVar("_Verb", bound=Callable[..., Any])
 
 NOT_MET, BAD_INPUT, INTERNAL, INTERRUPTED = 1, 2, 70, 130
 
@@ -16,18 +19,21 @@ EXISTING_FILE = click.Path(path_type=Path, exists=True, dir_okay=False)
 FOLDER = click.Path(path_type=Path, file_okay=False)
 
 campaign_argument = click.argument("campaign")
-output_option = click.option(
-    "--output",
-    "-o",
-    type=FOLDER,
-    metavar="FOLDER",
-    help="Where results go: a folder that is replaced whole [default: reports/NAME, of other verbs with what they make "
-    "behind it, as reports/NAME-diagnosis].",
-)
 quiet_option = click.option("--quiet", "-q", is_flag=True, help="No progress.")
 pdf_option = click.option(
     "--pdf/--no-pdf", default=None, help="A report.pdf beside the page [default: if WeasyPrint is installed]."
 )
+
+
+def output_option(default: str) -> Callable[[_Verb], _Verb]:
+    """Return the option that says where results go instead of `default`."""
+    return click.option(
+        "--output",
+        "-o",
+        type=FOLDER,
+        metavar="FOLDER",
+        help=f"Where results go: a folder that is replaced whole [default: {default}].",
+    )
 
 
 def examples(*lines: str) -> str:

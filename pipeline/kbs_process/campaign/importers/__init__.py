@@ -9,8 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from kbs_process.campaign.progress import Progress
+if TYPE_CHECKING:
+    from kbs_process.campaign.progress import Progress
+
+PRESETS = Path(__file__).parent / "presets"
 
 
 def import_recordings(
@@ -47,6 +51,4 @@ def describe(source: Path) -> str:
 
 def preset_names() -> tuple[str, ...]:
     """Return the names of the mappings that come with the package."""
-    from kbs_process.campaign.importers import mapping
-
-    return mapping.preset_names()
+    return tuple(sorted(path.stem for path in PRESETS.glob("*.toml")))

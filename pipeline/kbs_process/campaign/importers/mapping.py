@@ -11,13 +11,13 @@ from typing import Any, Literal
 import msgspec
 
 from kbs_process.campaign.documents import Document, Key, read, shown
+from kbs_process.campaign.importers import PRESETS, preset_names
 from kbs_process.campaign.problems import Problems
 from kbs_process.campaign.schema import violations
 from kbs_process.campaign.units import UnitMismatchError, alike, factor
 from kbs_process.errors import ConfigError, did_you_mean
 from kbs_process.signals.records import WRENCH_CHANNELS, WRENCH_UNITS
 
-PRESETS = Path(__file__).parent / "presets"
 KELVIN = 273.15  # 0 degC, K
 
 Format = Literal["text", "parquet", "hdf5", "tdms", "mdf", "matlab", "numpy"]
@@ -124,11 +124,6 @@ JOINT_UNITS = {
     "velocity": ("rad/s", "m/s"),
     "effort": ("N m", "N", "A", "V"),
 }
-
-
-def preset_names() -> tuple[str, ...]:
-    """Return the names of the mappings that come with the package."""
-    return tuple(sorted(path.stem for path in PRESETS.glob("*.toml")))
 
 
 def find_mapping(mapping: Path | str) -> Path:
