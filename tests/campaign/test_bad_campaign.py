@@ -178,6 +178,15 @@ def test_requirement_at_the_spacecraft_needs_a_spacecraft(folder: CampaignFolder
     assert "spacecraft's centre of mass" in str(folder.refusal())
 
 
+def test_a_recording_that_is_listed_already_is_not_proposed_for_one_that_is_missing(
+    folder: CampaignFolder,
+) -> None:
+    (folder.path / "recordings" / "EL089P00_2.mcap").rename(folder.path / "recordings" / "EL089P00_22.mcap")
+    assert "did you mean 'EL089P00_22.mcap'?" in str(folder.refusal())
+    (folder.path / "recordings" / "EL089P00_22.mcap").unlink()
+    assert "known: AZPS_ATA.mcap, EL089P00_1.mcap, EL089P00_3.mcap" in str(folder.refusal())
+
+
 def test_several_faults_are_told_at_once(folder: CampaignFolder) -> None:
     for name in ("base", "azimuth", "antenna"):
         folder.replace(RIG, f"[body.{name}]", f"[body.{name}]\ncolour = 'red'")

@@ -41,6 +41,7 @@ def _import(folder: Path, file: str, mapping: str = MAPPING, notices: list[str] 
     ("old", "new", "said"),
     [
         ("[wrench]", "[wrensh]", "did you mean 'wrench'?"),
+        ("Fz =", "Fq =", "wrench.Fq: is not a key that is known here\n  -> known: Fx, Fy, Fz, Tx, Ty, Tz"),
         ('unit = "rad"', 'unit = "degree"', "did you mean 'deg'?"),
         ('"Fx", unit = "N"', '"Fx", unit = "N m"', "unit of torque"),
         ('role = "fit"', 'role = "fitt"', "did you mean 'fit'?"),

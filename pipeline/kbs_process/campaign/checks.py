@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from math import isclose
 from pathlib import Path
 
@@ -223,7 +223,10 @@ def _check_recording(
             problems.add(document.place((*key, "without", position)), f"the model has no '{name}'", remedy)
     if not entry.path.is_file():
         place = document.place((*key, "file"))
-        problems.add(place, f"the recording '{shown(entry.path)}' does not exist", _neighbour(entry.path))
+        taken = {other.path.resolve() for other in campaign.recordings}
+        problems.add(
+            place, f"the recording '{shown(entry.path)}' does not exist", _neighbour(entry.path, taken)
+        )
     if entry.start is not None and entry.end is not None and entry.end <= entry.start:
         place = document.place((*key, "end_s"))
         problems.add(place, f"{entry.end:g} is not after start_s, {entry.start:g}", "give a later end")
@@ -238,12 +241,18 @@ def _check_recording(
             problems.add(place, what, "number the repeats 1, 2, 3")
 
 
-def _neighbour(missing: Path) -> str:
-    """Return a remedy for a file that is missing: a name like it in its folder, or where to put it."""
+def _neighbour(missing: Path, taken: Collection[Path]) -> str:
+    """Return a remedy for a file that is missing: one in its folder with a like name, not taken; or where to put it."""
     if not missing.parent.is_dir():
         return f"the folder '{shown(missing.parent)}' does not exist either: put the recordings there"
-    others = [path.name for path in missing.parent.iterdir() if path.is_file()]
-    return did_you_mean(missing.name, others) if others else "its folder is empty: put the recordings there"
+    others = [path for path in missing.parent.iterdir() if path.is_file()]
+    listed = [path.name for path in others if path.resolve() in taken]
+    names = [path.name for path in others]
+    return (
+        did_you_mean(missing.name, names, listed)
+        if names
+        else "its folder is empty: put the recordings there"
+    )
 
 
 def _check_checksum(index: int, entry: RecordingEntry, document: Document, problems: Problems) -> None:

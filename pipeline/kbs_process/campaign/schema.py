@@ -59,9 +59,8 @@ def _explain(error: ValidationError) -> Iterator[Violation]:
         case "additionalProperties":
             known = error.schema.get("properties", {}) if isinstance(error.schema, dict) else {}
             for name in sorted(set(found) - set(known)):
-                unused = set(known) - set(found)
                 yield Violation(
-                    (*key, name), "is not a key that is known here", did_you_mean(name, unused or known)
+                    (*key, name), "is not a key that is known here", did_you_mean(name, known, taken=found)
                 )
         case "required":
             for name in sorted(set(rule) - set(found)):
