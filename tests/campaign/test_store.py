@@ -10,6 +10,7 @@ import subprocess
 import sys
 import tempfile
 import threading
+import time
 from pathlib import Path
 
 import pytest
@@ -37,11 +38,7 @@ def whole(text: str) -> dict[str, str]:
 
 
 def leftovers(target: Path) -> list[str]:
-    return [
-        path.name
-        for path in target.parent.iterdir()
-        if path.name not in (target.name, f".{target.name}.lock")
-    ]
+    return sorted(path.name for path in target.parent.iterdir() if path.name != target.name)
 
 
 def child(code: str, target: Path, *, prelude: str = "") -> subprocess.Popen[str]:
@@ -114,7 +111,8 @@ def test_a_kill_leaves_the_old_results_and_the_next_run_cleans_up(tmp_path: Path
     process.send_signal(signal.SIGKILL)
     process.communicate()
     assert content(target) == whole("old")
-    assert len(leftovers(target)) == 1
+    lock, private = leftovers(target)
+    assert lock == ".A.lock" and private.startswith(".A.new-")
     write(target, "new")
     assert content(target) == whole("new")
     assert leftovers(target) == []
@@ -164,6 +162,51 @@ def test_two_at_once(tmp_path: Path) -> None:
         process.communicate()
     write(target, "third")
     assert content(target) == whole("third")
+
+
+def test_a_lock_that_is_removed_and_made_anew_is_never_held_twice(tmp_path: Path) -> None:
+    """Each descriptor of a file is locked by itself: threads stand for processes."""
+    target, inside, together = tmp_path / "A", [], []
+
+    def again_and_again(name: int) -> None:
+        for _ in range(400):
+            try:
+                with store._locked(target):
+                    inside.append(name)
+                    together.append(len(inside))
+                    time.sleep(0)
+                    inside.remove(name)
+            except OutputError:
+                time.sleep(0)
+
+    threads = [threading.Thread(target=again_and_again, args=(name,)) for name in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert set(together) == {1}
+    assert len(together) > 100
+    assert leftovers(target) == []
+
+
+def test_the_lock_of_a_file_that_its_holder_removed_is_asked_for_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One process opens the file, another one ends and removes it, then the first one locks what is gone."""
+    target, lock, flock = tmp_path / "A", tmp_path / ".A.lock", store.fcntl.flock
+    asked = []
+
+    def late(descriptor: int, operation: int) -> None:
+        asked.append(descriptor)
+        if len(asked) == 1:
+            lock.unlink()
+        flock(descriptor, operation)
+
+    monkeypatch.setattr(store.fcntl, "flock", late)
+    with store._locked(target):
+        assert len(asked) == 2
+        assert lock.read_text().startswith(f"process {os.getpid()} on ")
+    assert leftovers(target) == []
 
 
 def test_a_reader_never_sees_half_results(tmp_path: Path) -> None:

@@ -63,7 +63,6 @@ def test_a_mismatch_is_diagnosed_and_linked(
         assert given["verb"] == "", "the command that was typed has no verb"
         target.mkdir()
         (target / "results.json").write_bytes(encode(results()))
-        (target.parent / ".diagnosis.lock").touch()
         return Outcome(("Left out: a harness.",), None, target / "index.html")
 
     detected(monkeypatch, log_p=-50.0)

@@ -40,8 +40,6 @@ def diagnose_results(
         outcome = diagnose(
             campaign, folder / FOLDER, progress=progress, pdf=pdf, experiment=experiment, verb=""
         )
-        # The lock of a folder that nobody else can see.
-        (folder / f".{FOLDER}.lock").unlink(missing_ok=True)
         build.build(folder, pdf)
     return (
         *told,

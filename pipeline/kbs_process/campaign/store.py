@@ -1,10 +1,11 @@
 """Results on disk: written aside, then put in place in one step, by one process at a time.
 
 Beside the target T lie, while its results are written,
-    .T.lock      locked (flock) by the process that writes; stays, empty of meaning once unlocked
+    .T.lock      locked (flock) by the process that writes, which removes it at its end
     .T.new-XXXX  the new results, growing
     .T.old       the old results, where the system cannot exchange two folders in one step
-A process that is killed leaves the last two behind; the next one that holds the lock cleans up.
+A process that is killed leaves some of them behind; the next one that holds the lock, for which a file that nobody has
+locked is none, cleans up.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ import shutil
 import sys
 import tempfile
 from collections.abc import Collection, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from kbs_process import interruption
@@ -99,23 +100,49 @@ def _link(source: str, target: str) -> None:
 def _locked(target: Path) -> Iterator[None]:
     """Hold the lock of `target`, or say who does."""
     target.parent.mkdir(parents=True, exist_ok=True)
-    descriptor = os.open(_beside(target, "lock"), os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+    lock = _beside(target, "lock")
+    while (descriptor := _lock(lock, target)) is None:
+        pass
     try:
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError as error:
-            holder = os.read(descriptor, 200).decode(errors="replace").strip() or "another process"
-            raise OutputError(
-                f"{holder} is writing results there",
-                where=str(target),
-                remedy="wait until it is done, or name another folder with --output",
-            ) from error
-        os.ftruncate(descriptor, 0)
         os.write(descriptor, f"process {os.getpid()} on {os.uname().nodename}".encode())
         yield
-        os.ftruncate(descriptor, 0)
     finally:
+        # While it is locked: who has opened it already finds, once it is his, that it is no longer there (`_lock`).
+        with suppress(OSError):
+            if _is_at(descriptor, lock):
+                lock.unlink()
         os.close(descriptor)
+
+
+def _lock(path: Path, target: Path) -> int | None:
+    """Return a descriptor of the file, locked and empty; None where its holder has removed it meanwhile."""
+    descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        if _is_at(descriptor, path):
+            os.ftruncate(descriptor, 0)
+            return descriptor
+    except BlockingIOError as error:
+        holder = os.read(descriptor, 200).decode(errors="replace").strip() or "another process"
+        os.close(descriptor)
+        raise OutputError(
+            f"{holder} is writing results there",
+            where=str(target),
+            remedy="wait until it is done, or name another folder with --output",
+        ) from error
+    except BaseException:
+        os.close(descriptor)
+        raise
+    os.close(descriptor)
+    return None
+
+
+def _is_at(descriptor: int, path: Path) -> bool:
+    """Whether a file that is open is still the one at `path`."""
+    try:
+        return os.path.samestat(os.fstat(descriptor), path.stat())
+    except FileNotFoundError:
+        return False
 
 
 def _beside(target: Path, suffix: str) -> Path:
