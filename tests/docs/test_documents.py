@@ -9,10 +9,13 @@ import tomllib
 from importlib.metadata import packages_distributions, requires
 from itertools import chain
 from pathlib import Path
+from typing import get_args
 
 import pytest
 
 from kbs_process.cli import cli
+from kbs_process.report.documents.diagnosis import _HEADLINES
+from kbs_process.report.records.diagnosis import Answer
 
 ROOT = Path(__file__).parents[2]
 NOT_OURS = {"build", "node_modules", "reports"}
@@ -99,6 +102,13 @@ def imported(folder: str) -> set[str]:
                 modules.add(node.module.split(".")[0])
     by_module = packages_distributions()
     return {canonical(name) for module in modules for name in by_module.get(module, ())}
+
+
+def test_every_answer_of_a_diagnosis_is_explained() -> None:
+    text = (ROOT / "docs" / "diagnose.md").read_text()
+    told = set(re.findall(r"^\| `([a-z ]+)`, \"([^\"]+)\" \|", text, flags=re.MULTILINE))
+    assert told == set(_HEADLINES.items())
+    assert {answer for answer, _ in told} == set(get_args(Answer))
 
 
 def test_every_dependency_is_justified_and_nothing_else() -> None:

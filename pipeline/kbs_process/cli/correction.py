@@ -46,7 +46,7 @@ def identify(
     """Identify the motor-gears of CAMPAIGN from its recordings with the role "fit".
 
     Writes corrected parameter files (identified/parameters), and a report with intervals, checks, correlations and the
-    prediction of held-out recordings before and after.
+    prediction of held-out recordings before and after. Takes ten minutes or more.
     """
     from kbs_process.campaign.load import load_campaign
     from kbs_process.campaign.locate import find_campaign, results_folder
