@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -149,3 +150,12 @@ def test_it_is_whole_wherever_it_is_taken(tmp_path: Path) -> None:
     assert load_day(moved).mission.duration > 0.0
     with pytest.raises(ConfigError, match=r"AZPS_ATA\.mcap"):
         load_campaign(tmp_path / "far" / "away" / "corrected")
+
+
+def test_modes_of_the_nominal_model_are_no_parameter_file_of_the_corrected_one(tmp_path: Path) -> None:
+    campaign, modes = load_campaign(CAMPAIGN, checksums=False), tmp_path / "modes.toml"
+    modes.write_text('joint = "el"\n')
+    with_modes = replace(campaign, modal=modes, inputs=(*campaign.inputs, modes))
+    write_model(with_modes, campaign.rig, campaign.effects, {}, tmp_path / "made", "by a test")
+    assert load_campaign(tmp_path / "made", checksums=False).modal is None
+    assert not (tmp_path / "made" / "parameters" / "modes.toml").exists()
