@@ -71,6 +71,24 @@ def test_a_law_that_takes_as_much_as_searches_differ_by_is_none(made: Experiment
     assert "of the floor's power" in reason
 
 
+@pytest.mark.parametrize(("gained", "reasons"), [(0.9 * LEAST_RHO**2, 1), (1.1 * LEAST_RHO**2, 0)])
+def test_a_law_that_brings_pulled_numbers_back_has_to_be_likelier_than_they_are(
+    made: Experiment, gained: float, reasons: int
+) -> None:
+    """Where nothing is left, by as much as any law has to bring."""
+    floor, here = declared(made), standing(made)
+    known = here.known
+    prior = known.parameters
+    far = replace(prior, value=prior.value - 8.0 * np.where(known.stated, prior.sigma, 0.0))
+    pulled = replace(here, known=replace(known, parameters=far))
+    assert pulled.known.strained and not detected(pulled, floor, made.fit).left
+    more = pulled.known.cost - known.cost - gained  # is to be left of recordings that are fitted
+    assert more > 0.0
+    times = np.sqrt(1.0 + more / float(known.chi2[list(made.fit)].sum()))
+    with_it = replace(here, known=replace(known, residual=tuple(times * z for z in known.residual)))
+    assert len(too_little(pulled, with_it, floor)) == reasons
+
+
 def test_nothing_is_simulated_that_promises_as_little(cabled: Experiment) -> None:
     view, _ = seen(standing(cabled))
     there = detected(view.standing, declared(cabled), cabled.fit)

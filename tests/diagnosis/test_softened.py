@@ -95,5 +95,6 @@ def test_numbers_that_leave_nothing_are_drawn_back_if_chance_has_them_elsewhere(
     back = drawn_back(pulled, floor, simulate).known
     assert back.strain < 0.5 * pulled.known.strain
     assert detected(standing_of(back, {}), floor, made.fit).left  # what they had taken up
+    # Nor is it looked past that single ones are off, until a law is found to be likelier.
     off = replace(prior, value=found.value - 2.0 * apart)
-    assert not bent(standing_of(replace(found, parameters=off), {}), floor)  # parameters are off, and told
+    assert bent(standing_of(replace(found, parameters=off), {}), floor)

@@ -10,7 +10,7 @@ from kbs_process.diagnosis.experiment import Experiment
 from kbs_process.diagnosis.floor import Floor
 from kbs_process.diagnosis.joint import Standing
 from kbs_process.diagnosis.known import Known
-from kbs_process.diagnosis.thresholds import LEAD, TAKEN, TAKEN_UNUSED, TOLERATED, UNFORESEEN
+from kbs_process.diagnosis.thresholds import LEAD, LEAST_RHO, TAKEN, TAKEN_UNUSED, TOLERATED, UNFORESEEN
 from kbs_process.diagnosis.view import View
 
 
@@ -56,6 +56,8 @@ def too_little(before: Standing, after: Standing, floor: Floor, *, more: bool = 
     relieved = before.known.strained and not after.known.strained
     if searched(experiment) and not (most >= TOLERATED or relieved):
         reasons.append(f"takes {100.0 * most:.1f} % of the floor's power: {_DIFFER}")
+    elif not there.left and not before.known.cost - after.known.cost >= LEAST_RHO**2:
+        reasons.append("known numbers alone are as likely")
     return tuple(reasons)
 
 
