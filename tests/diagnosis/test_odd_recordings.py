@@ -10,12 +10,15 @@ import numpy as np
 import pytest
 from test_experiment import N, made, recording
 
+from kbs_process.campaign import stretch
 from kbs_process.campaign.config import Campaign, RecordingEntry
 from kbs_process.campaign.diagnosable import LEAST_S, check_copies, check_length, check_noise, check_signs
+from kbs_process.campaign.diagnosis_records import passed_over
 from kbs_process.campaign.held import Alive
 from kbs_process.campaign.load import load_campaign
+from kbs_process.campaign.progress import SilentProgress
 from kbs_process.campaign.reading import read_run
-from kbs_process.campaign.stretch import LONGEST_S, busiest
+from kbs_process.campaign.stretch import LONGEST_S, busiest, read_stretch
 from kbs_process.diagnosis import floor
 from kbs_process.diagnosis.experiment import Experiment, Recorded
 from kbs_process.diagnosis.gate import gate
@@ -279,8 +282,8 @@ def test_a_recording_whose_commands_have_a_gap_is_left_out_until_what_was_guesse
     assert experiment.trials[0].valid[(t > 21.0) & (t < 29.0)].all()
 
 
-def test_of_a_long_recording_that_stretch_is_looked_at_in_which_most_moves_from_rest_on() -> None:
-    assert busiest(recording("a", 0.0).run) is None
+def long_run() -> Run:
+    """50 minutes, in which most moves from 1000 s to 1550 s."""
     dt, n = 1.0, 3000
     t = dt * np.arange(n)
     moving = (t > 1000.0) & (t < 1550.0) | (t > 2000.0) & (t < 2100.0)
@@ -289,10 +292,33 @@ def test_of_a_long_recording_that_stretch_is_looked_at_in_which_most_moves_from_
     assert run.wrench is not None
     wrench = replace(run.wrench, dt=dt, values=np.zeros((n, 6)), valid=np.ones(n, dtype=np.bool_))
     command = Events(t, np.hstack([position, 0.0 * position]), ("az", "el", "az.rate", "el.rate"))
-    span = busiest(replace(run, wrench=wrench, command=command))
+    return replace(run, wrench=wrench, command=command)
+
+
+def test_of_a_long_recording_that_stretch_is_looked_at_in_which_most_moves_from_rest_on() -> None:
+    assert busiest(recording("a", 0.0).run) is None
+    span = busiest(long_run())
     assert span is not None
     assert 940.0 <= span[0] <= 1000.0
     assert span[1] == span[0] + LONGEST_S
+
+
+def test_which_part_of_a_long_recording_is_looked_at_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = []
+
+    def read(_: object, entry: RecordingEntry) -> Run:
+        asked.append((entry.start, entry.end))
+        return long_run()
+
+    monkeypatch.setattr(stretch, "read_alive", read)
+    part = read_stretch(campaign(), replace(ENTRY, start=100.0), SilentProgress())
+    (start, _), (begin, end) = asked
+    assert (start, end - begin) == (100.0, LONGEST_S)
+    (loss,) = part.losses
+    assert loss.count == (3000 - LONGEST_S) * long_run().load_rates[0]
+    (notice,) = passed_over(ENTRY, part.losses)
+    assert f"of its 3000 s only those from {begin:.0f} s to {end:.0f} s" in notice.what
+    assert "start_s and end_s" in notice.remedy
 
 
 def test_a_copy_is_no_repeat() -> None:

@@ -7,10 +7,11 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from kbs_process.campaign import provenance
-from kbs_process.campaign.config import Campaign
+from kbs_process.campaign.config import Campaign, RecordingEntry
 from kbs_process.campaign.corrected_diagnosis import left_out
 from kbs_process.campaign.next_test import next_test
 from kbs_process.campaign.notices import lost
+from kbs_process.campaign.stretch import PASSED_OVER
 from kbs_process.diagnosis.experiment import Experiment
 from kbs_process.diagnosis.floor import Floor
 from kbs_process.diagnosis.known import Known
@@ -22,6 +23,7 @@ from kbs_process.plant.structure import other_joint
 from kbs_process.report.records import diagnosis as records
 from kbs_process.report.records.common import Check, Conclusion, Notice
 from kbs_process.rig.model import Joint, Rig
+from kbs_process.signals.records import Loss
 
 CORRECTED = "corrected"  # folder of the corrected model, and
 COMMANDS = "next-test.csv"  # file of the next test's commands, in that of the results
@@ -395,7 +397,20 @@ def _warnings(campaign: Campaign, floor: Floor, outcome: Outcome) -> Iterator[No
     for entry in campaign.recordings:
         for trial in experiment.trials:
             if trial.name == entry.name:
-                yield from lost(entry, trial.losses)
+                yield from lost(entry, [loss for loss in trial.losses if loss.kind != PASSED_OVER])
+                yield from passed_over(entry, trial.losses)
+
+
+def passed_over(entry: RecordingEntry, losses: Sequence[Loss]) -> Iterator[Notice]:
+    """Which part of a long recording all this is of."""
+    for loss in losses:
+        if loss.kind == PASSED_OVER:
+            yield Notice(
+                severity="warning",
+                what=f"looked at is {loss.detail}",
+                where=entry.name,
+                remedy="give its start_s and end_s in campaign.toml to look at another part",
+            )
 
 
 def _other_motions(experiment: Experiment) -> bool:

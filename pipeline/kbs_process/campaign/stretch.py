@@ -18,6 +18,7 @@ from kbs_process.signals.records import Loss, Run
 from kbs_process.stages.repeats import motion_of
 
 LONGEST_S = 600.0
+PASSED_OVER = "not looked at"  # kind of loss: readings outside that part
 
 
 def read_stretch(campaign: Campaign, entry: RecordingEntry, progress: Progress) -> Run:
@@ -33,9 +34,8 @@ def read_stretch(campaign: Campaign, entry: RecordingEntry, progress: Progress) 
     ):
         begin = entry.start or 0.0
         part = read_alive(campaign, replace(entry, start=begin + span[0], end=begin + span[1]))
-    left = Loss(
-        "not looked at", "wrench", round((whole - LONGEST_S) * run.load_rates[0]), detail="long recording"
-    )
+    told = f"of its {whole:.0f} s only those from {begin + span[0]:.0f} s to {begin + span[1]:.0f} s, which move most"
+    left = Loss(PASSED_OVER, "wrench", round((whole - LONGEST_S) * run.load_rates[0]), detail=told)
     return replace(part, losses=(*part.losses, left))
 
 
