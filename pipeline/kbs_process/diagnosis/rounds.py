@@ -121,7 +121,7 @@ def _diagnosed(
         held_out = unseen, unseen if same else detected(standing, floor, known.experiment.held_out)
     moved = _moved(standing.known)
     return Outcome(
-        verdict=_verdict(finds, moved, after, held_out),
+        verdict=verdict_of(finds, standing.known, after, held_out),
         before=before,
         after=after,
         held_out=held_out,
@@ -330,14 +330,15 @@ def _absorbed(screening: Screening) -> tuple[Absorbed, ...]:
     )
 
 
-def _verdict(
+def verdict_of(
     finds: Sequence[Find],
-    moved: Sequence[Moved],
+    known: Known,
     after: Detection,
     held_out: tuple[Detection, Detection] | None,
 ) -> Verdict:
+    """The answer in a word: parameters are off where one is, or all together are farther off than chance has them."""
     if finds:
         return "physics"
     if after.left or (held_out is not None and held_out[1].unforeseen):
         return "undecided"
-    return "parameters off" if moved else "none"
+    return "parameters off" if _moved(known) or known.strained else "none"
