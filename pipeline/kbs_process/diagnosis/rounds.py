@@ -31,6 +31,7 @@ from kbs_process.diagnosis.outcome import (
 from kbs_process.diagnosis.ports import port_test
 from kbs_process.diagnosis.remains import detected, promises_little, too_little
 from kbs_process.diagnosis.rivals import probabilities
+from kbs_process.diagnosis.scatter import scattered
 from kbs_process.diagnosis.scene import Scene
 from kbs_process.diagnosis.screen import Found, Screening
 from kbs_process.diagnosis.settling import bent, drawn_back, released, resettled
@@ -109,7 +110,6 @@ def _diagnosed(
             break
     last = rounds[-1]
     kept, standing, fallen = needed(accepted, standing, floor, simulate)
-    finds = [as_it_stands(one.find, one.tried.own, standing.known) for one in kept]
     left = last.place
     if standing is not last.seen:
         left = _place(standing, floor, Scene.of(known.experiment, standing.hypothesis, standing.predicted))
@@ -119,21 +119,22 @@ def _diagnosed(
     if known.experiment.held_out:
         unseen = detected(begun, floor, known.experiment.held_out)
         held_out = unseen, unseen if same else detected(standing, floor, known.experiment.held_out)
-    moved = _moved(standing.known)
+    told = replace(standing, known=replace(standing.known, covariance=scattered(standing.known)))
+    finds = [as_it_stands(one.find, one.tried.own, told.known) for one in kept]
     return Outcome(
         verdict=verdict_of(finds, standing.known, after, held_out),
         before=before,
         after=after,
         held_out=held_out,
         log_p=_mismatch(before, rounds[0].screening, kept),
-        moved=moved,
+        moved=_moved(told.known),
         finds=merged(finds),
         refused=(*fallen, *last.refused),
         absorbed=_absorbed(last.screening),
         place=rounds[0].place,
         left=left,
         known=known,
-        standing=standing,
+        standing=told,
     )
 
 

@@ -95,14 +95,14 @@ def chosen(split: Split, seed: int, index: int, physics: Sequence[str], level: f
     return Spec(split, seed, index, "concealed", tuple(physics), count, (level,) * count)
 
 
-def _generators(spec: Spec) -> list[np.random.SeedSequence]:
+def streams(spec: Spec) -> list[np.random.SeedSequence]:
     """Streams of random numbers: what is seen of a trial does not depend on what is concealed in it."""
     return np.random.SeedSequence([spec.seed, len(spec.split), 3, spec.index]).spawn(6)
 
 
 def prepare(spec: Spec, folder: Path) -> tuple[Bench, list[dict[str, Any]]]:
     """Write the parameter files; draw hardware and trajectories; work out the metric."""
-    article, drawn, motions, _, runs, off = _generators(spec)
+    article, drawn, motions, _, runs, off = streams(spec)
     rates = describe_article(folder, np.random.default_rng(article), spec.split)
     nominal = Hardware.from_campaign(folder)
     hardware = hardware_of(spec.kind, nominal, np.random.default_rng(drawn))
@@ -171,7 +171,7 @@ def make(spec: Spec, folder: Path) -> dict[str, Any]:
     """Make a trial's campaign in `folder`, which may not exist yet; return its truth."""
     folder.mkdir(parents=True, exist_ok=True)
     bench, moved = prepare(spec, folder)
-    *_, concealing, runs_, _ = _generators(spec)
+    *_, concealing, runs_, _ = streams(spec)
     concealed = conceal(bench, spec, np.random.default_rng(concealing)) if spec.count else []
     hidden = [effect for effect, _, _ in concealed]
     total = bench.strength(hidden).rho_eff if hidden else 0.0
@@ -187,9 +187,14 @@ def make(spec: Spec, folder: Path) -> dict[str, Any]:
     }
 
 
+def name_of(spec: Spec) -> str:
+    """A name that says nothing."""
+    return np.random.default_rng([spec.seed, len(spec.split), 4, spec.index]).bytes(4).hex()
+
+
 def make_named(spec: Spec, out: Path, truths: Path) -> dict[str, Any]:
     """Make a trial in `out` under a name that says nothing, and write its truth into another folder."""
-    name = np.random.default_rng([spec.seed, len(spec.split), 4, spec.index]).bytes(4).hex()
+    name = name_of(spec)
     made = make(spec, out / name)
     (truths / f"{name}.json").write_text(json.dumps(made, indent=1) + "\n")
     return made
