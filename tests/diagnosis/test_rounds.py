@@ -24,6 +24,7 @@ from kbs_process.diagnosis.outcome import Identity, Refused
 from kbs_process.diagnosis.race import own_of
 from kbs_process.diagnosis.remains import detected
 from kbs_process.diagnosis.rivals import probabilities, rivalry
+from kbs_process.diagnosis.scatter import scattered
 from kbs_process.diagnosis.scene import Scene
 from kbs_process.diagnosis.screen import Bench, Catalogued, Found, Screening, screen
 from kbs_process.diagnosis.suspects import Candidate
@@ -327,7 +328,9 @@ def test_what_numbers_gain_where_they_were_drawn_back_is_no_law_s(
     assert (done.seen, done.standing) == (back, alone)
     assert asked == [(back, alone)]
     told = rounds._diagnosed(cable.known, floor, simulate, detected(cable, floor, experiment.fit))
-    assert told.standing is alone
+    assert told.standing.known.residual is alone.known.residual
+    # What they are known to is told by their scatter, too.
+    np.testing.assert_array_equal(told.standing.known.covariance, scattered(alone.known))
     assert told.after.ratio < told.before.ratio
 
 
