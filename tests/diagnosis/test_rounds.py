@@ -11,7 +11,6 @@ import pytest
 
 from kbs_process.diagnosis import rounds
 from kbs_process.diagnosis.as_suspect import sigma_of, suspect_of
-from kbs_process.diagnosis.detection import Detection
 from kbs_process.diagnosis.experiment import Experiment
 from kbs_process.diagnosis.finding import Tried, as_it_stands, find_of
 from kbs_process.diagnosis.floor import declared
@@ -205,20 +204,6 @@ def passed(here: Standing, tried: Bench, scene: Scene, found: Screening, law: st
     after = with_extra(here, extra_of(one, here, tried, scene), bench.serial(here.known.experiment))
     own = own_of(one, here, after)
     return Tried(one, after, gated(one, here, after, own), found, own)
-
-
-def test_numbers_that_are_together_farther_off_than_chance_has_them_are_off(made: Experiment) -> None:
-    here, nothing = standing(made).known, Detection((), -1.0, 1.0)
-    assert rounds.verdict_of((), here, nothing, None) == "none"
-    sigma = np.where(here.stated, here.parameters.sigma, 0.0)
-    together = replace(here, value=here.value + 3.5 * sigma)
-    one = replace(
-        here, value=here.value + 4.1 * sigma * (np.arange(len(sigma)) == int(np.argmax(here.stated)))
-    )
-    assert together.strained and not one.strained
-    for far in (together, one):
-        assert rounds.verdict_of((), far, nothing, None) == "parameters off"
-        assert rounds.verdict_of((), far, Detection((), -9.0, 2.0), None) == "undecided"
 
 
 def test_an_error_of_an_encoder_that_no_law_has_is_measured_with_a_band(made: Experiment) -> None:

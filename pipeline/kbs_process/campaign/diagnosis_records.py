@@ -191,21 +191,7 @@ def _paragraph(
         parts.append(f"Without a law known parameters would have to be off, beyond belief: {numbers}.")
     for moved in outcome.moved[:5]:
         parts.append(f"{moved.name} is off by {moved.sigmas:+.1f} sigma.")
-    if outcome.verdict == "parameters off" and not outcome.moved:
-        parts.append(_together(outcome.standing.known))
     return " ".join(parts)
-
-
-def _together(known: Known) -> str:
-    """How far numbers are off of which no single one is."""
-    sigmas = np.where(known.stated, np.nan_to_num(known.moved), 0.0)
-    farthest = [
-        f"{known.names[k]} by {sigmas[k]:+.1f}" for k in np.argsort(-np.abs(sigmas), kind="stable")[:3]
-    ]
-    return (
-        f"No single one is off beyond doubt, but all together are farther off than chance has them: squared sigmas add "
-        f"up to {known.strain:.0f} for {int(known.stated.sum())} numbers, farthest {', '.join(farthest)} sigma."
-    )
 
 
 def _numbers_in_words(numbers: Sequence[records.Fitted]) -> str:

@@ -121,13 +121,14 @@ def _diagnosed(
         held_out = unseen, unseen if same else detected(standing, floor, known.experiment.held_out)
     told = replace(standing, known=replace(standing.known, covariance=scattered(standing.known)))
     finds = [as_it_stands(one.find, one.tried.own, told.known) for one in kept]
+    moved = _moved(told.known)
     return Outcome(
-        verdict=verdict_of(finds, standing.known, after, held_out),
+        verdict=_verdict(finds, moved, after, held_out),
         before=before,
         after=after,
         held_out=held_out,
         log_p=_mismatch(before, rounds[0].screening, kept),
-        moved=_moved(told.known),
+        moved=moved,
         finds=merged(finds),
         refused=(*fallen, *last.refused),
         absorbed=_absorbed(last.screening),
@@ -331,15 +332,14 @@ def _absorbed(screening: Screening) -> tuple[Absorbed, ...]:
     )
 
 
-def verdict_of(
+def _verdict(
     finds: Sequence[Find],
-    known: Known,
+    moved: Sequence[Moved],
     after: Detection,
     held_out: tuple[Detection, Detection] | None,
 ) -> Verdict:
-    """The answer in a word: parameters are off where one is, or all together are farther off than chance has them."""
     if finds:
         return "physics"
     if after.left or (held_out is not None and held_out[1].unforeseen):
         return "undecided"
-    return "parameters off" if _moved(known) or known.strained else "none"
+    return "parameters off" if moved else "none"
