@@ -8,9 +8,9 @@ covariance by the noise, about which a fit would scatter if it were made of othe
     C + C G C,   G = R / (R - 1) sum_k (g_k - g) (g_k - g)^T,   g their mean.
 
 A search ends in one of many minima of phases and tooth contact, and slopes beside an edge say nothing of the next: all
-deviations count ENDED times. Of the numbers of five development trials that recordings tell, 37 to 68 % of intervals by
-the noise held the truth, 78 to 100 % do now (`tests/proof/coverage.py`). All had a part in setting ENDED; on two that had none
-it is 90 %.
+deviations count ENDED times. Of the numbers of five development trials that recordings tell, 37 to 68 % of intervals
+by the noise held the truth, 78 to 100 % do now (`tests/proof/coverage.py`). All had a part in setting ENDED; on two
+that had none it is 90 %.
 Source: K.-Y. Liang, S. L. Zeger, Longitudinal data analysis using generalized linear models, Biometrika 73 (1986) 13.
 Validity: numbers that are about right; of a minimum that is wrong by far nothing here knows. Of one recording alone
     its scatter is not known, and the noise's counts.
