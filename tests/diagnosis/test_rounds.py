@@ -230,6 +230,7 @@ def test_an_error_of_an_encoder_that_no_law_has_is_measured_with_a_band(made: Ex
     find = find_of([told], 0, np.ones(1), here, None)
     assert not find.named and (find.identity.port, find.identity.axis) == ("encoder", "el")
     assert find.held_out_variance is not None and find.held_out_variance > 0.9
+    assert {one.unit for one in find.estimates} == {"rad"}
     assert find.curve is not None
     assert np.ptp(find.curve.x) <= period * (1.0 + 1e-9)
     away = find.curve.value - sawtooth(find.curve.x)

@@ -223,7 +223,7 @@ def _find(find: Find, experiment: Experiment) -> records.Find:
         parameters=tuple(
             records.Fitted(
                 name=one.name,
-                unit=_unit(one.unit or ("" if find.curve is None else "N m"), joint),
+                unit=_unit(one.unit or _unit_of_nodes(find.curve), joint),
                 value=one.value,
                 sigma=one.sigma,
                 low=one.low,
@@ -259,6 +259,11 @@ def _find(find: Find, experiment: Experiment) -> records.Find:
         curve=None if find.curve is None else _curve(find.curve, experiment.rig, joint),
         held_out_variance=find.held_out_variance,
     )
+
+
+def _unit_of_nodes(curve: Curve | None) -> str:
+    """Unit of a measured torque's coefficients, whose names no law declares."""
+    return "N m" if curve is not None and isinstance(curve.law, Measured) else ""
 
 
 def _joint(find: Find, rig: Rig) -> Joint | None:

@@ -164,7 +164,7 @@ def _estimates(taken: Tried, before: Standing) -> tuple[Estimate, ...]:
         ):
             name = _short(scalar.name, in_plant(suspect))
             # A law of the readings is fitted about the shape that the screen gave it.
-            plain = name if in_plant(suspect) else re.sub(r"_\d+$", "", name)
+            plain = name if in_plant(suspect) or name in units else re.sub(r"_\d+$", "", name)
             about = 0.0 if in_plant(suspect) else fixed.pop(plain, 0.0)
             fitted.append(Estimate(name, units.get(plain, ""), about + value, sigma, about))
     done = {one.name for one in fitted}

@@ -36,20 +36,21 @@ def periods(known: Known, scene: Scene) -> dict[str, tuple[float, ...]]:
             if all(abs(orders[k] - other) >= 0.5 / turns for other in best):
                 best.append(float(orders[k]))
         near = {order + aside for order in best[:_PERIODS] for aside in (-1.0, 0.0, 1.0)}
-        found[experiment.channels[channel]] = tuple(
-            2.0 * np.pi / order for order in sorted(near) if order >= 1.0
-        )
+        found[experiment.channels[channel]] = tuple(2.0 * np.pi / order for order in orders if order in near)
     return found
 
 
 def _errors(known: Known, scene: Scene, channel: int) -> Iterator[tuple[Array, Array]]:
-    """What an encoder is to read (n,), and how far off it is, its mean aside, in every trial that is fitted."""
+    """Angle (n,) at an encoder, and what is left of its reading, mean aside, in every trial that is fitted."""
     experiment = known.experiment
     for k in experiment.fit:
         trial = experiment.trials[k]
-        shown = scene.predicted[experiment.reference(trial.trajectory)].values[: len(trial.valid), channel]
+        reference = experiment.reference(trial.trajectory)
+        angle = scene.predicted[reference].values[: len(trial.valid), channel]
+        # With laws of the readings that were found, which the plant's own angle is without.
+        shown = known.shown.get(reference, scene.predicted[reference]).values[: len(trial.valid), channel]
         off = (trial.measured[:, channel] - shown)[trial.valid]
-        yield shown[trial.valid], off - off.mean()
+        yield angle[trial.valid], off - off.mean()
 
 
 def _folded(phase: Array, error: Array) -> float:
