@@ -237,6 +237,7 @@ def test_an_error_of_an_encoder_that_no_law_has_is_measured_with_a_band(made: Ex
     # A spline rounds the jump off, and its mean is the encoder's offset.
     between = np.abs((order * find.curve.x / (2.0 * np.pi) + 0.5) % 1.0 - 0.5) > 0.15
     assert np.std(away[between]) < 0.1 * height
+    assert find.curve.sigma.max() < 0.1 * height  # not that of an offset, which nothing shows
     again = as_it_stands(find, told.own, told.standing.known)
     assert again.curve is not None
     np.testing.assert_array_equal(again.curve.value, find.curve.value)

@@ -214,6 +214,7 @@ def _curve(suspect: Suspect, taken: Tried, before: Standing) -> Curve:
         low, high = swept(suspect.scene).spans[suspect.candidate.site, "reading"]
         x = np.linspace(low, min(high, low + dict(suspect.candidate.shape)["profile_period"]), 101)
         columns = per_unit(suspect.candidate, np.arange(101.0), x, {})
+        columns = columns - columns.mean(axis=0)  # an offset is the encoder's, and of another size
     known = taken.standing.known
     return _drawn(law, x, columns, known, range(len(before.known.value), len(known.value)))
 

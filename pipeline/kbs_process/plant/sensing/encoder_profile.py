@@ -28,21 +28,23 @@ def change(
     profile_13: float,
     profile_14: float,
     profile_15: float,
-    profile_16: float,
     profile_period: float,
 ) -> Array:
     r"""Change of an angle by a measured error that repeats with a period.
 
-    Equation: $\Delta\theta = \sum_k c_k B(u - k)$, $u = 16 \theta / \theta_p$ modulo 16, $B$ the cubic B-spline.
-    Units: rad, rad (sixteen), rad -> rad.
+    Equation: $\Delta\theta = \sum_k c_k B(u - k)$, $u = 16 \theta / \theta_p$ modulo 16, $B$ the cubic B-spline,
+        $\sum_k c_k = 0$.
+    Units: rad, rad (fifteen), rad -> rad.
     Validity: what jumps is rounded to a sixteenth of the period. With a period longer than what was swept it is any
-        error over the angle, known where the angle has been; equal coefficients are an offset.
+        error over the angle, known where the angle has been. Its mean over a period is zero: an offset is the
+        encoder's own.
     Source: C. de Boor, A Practical Guide to Splines (2001), chapter IX.
     """
-    c = np.array([
+    free = np.array([
         profile_1, profile_2, profile_3, profile_4, profile_5, profile_6, profile_7, profile_8, profile_9,
-        profile_10, profile_11, profile_12, profile_13, profile_14, profile_15, profile_16,
+        profile_10, profile_11, profile_12, profile_13, profile_14, profile_15,
     ])  # fmt: skip
+    c = np.append(free, -free.sum())
     u = NODES * (reading / profile_period)
     first = np.floor(u)
     x, k = u - first, first.astype(np.intp)
@@ -67,7 +69,7 @@ ENCODER_PROFILE = Sensing(
     port=SensingPort.ENCODER,
     equation=change,
     parameters=(
-        *(_at_node(k) for k in range(1, NODES + 1)),
+        *(_at_node(k) for k in range(1, NODES)),
         # A little more than what is swept: its ends are no neighbours.
         Parameter(
             "profile_period",
