@@ -8,9 +8,9 @@ covariance by the noise, about which a fit would scatter if it were made of othe
     C + C G C,   G = R / (R - 1) sum_k (g_k - g) (g_k - g)^T,   g their mean.
 
 A search ends in one of many minima of phases and tooth contact, and slopes beside an edge say nothing of the next: all
-deviations count ENDED times. Of the numbers of five development trials that recordings tell, 37 to 68 % of intervals
-by the noise held the truth, 78 to 100 % do now (`tests/proof/coverage.py`). All had a part in setting ENDED; on two
-that had none it is 90 %.
+deviations count ENDED times. In six states of the searches on four development trials, 37 to 68 % of intervals by the
+noise held the truth, of numbers that recordings tell, and 78 to 100 % of these. All had a part in setting ENDED; on two
+trials that had none it is 90 % (`tests/proof/coverage.py`).
 G holds the noise as well, which so counts twice: where nothing else is, sigmas are 2.8 times the noise's. Its rank is
 R - 1 at most, and what all recordings ask for alike is not in it.
 Source: K.-Y. Liang, S. L. Zeger, Longitudinal data analysis using generalized linear models, Biometrika 73 (1986) 13.
