@@ -124,7 +124,9 @@ def test_the_period_of_a_sawtooth_of_a_disc_is_found_by_folding(made: Experiment
     order = np.ceil(3.0 / turns)
     line = np.zeros_like(made.trials[0].measured)
     line[:, el] = 2e-4 * ((order * angle / (2.0 * np.pi) + 0.3) % 1.0 - 0.5)
-    found = 2.0 * np.pi / np.array(proposals(line, made)["profile_period.el"])
+    periods = proposals(line, made)["profile_period.el"]
+    assert {type(one) for one in periods} == {float}  # records hold no numbers of numpy
+    found = 2.0 * np.pi / np.array(periods)
     assert np.min(np.abs(found - order)) < 0.1 / turns
     np.testing.assert_allclose(found, np.rint(found), rtol=1e-9)
     assert (found * turns >= 2.0).all()  # two periods at least
