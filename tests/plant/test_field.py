@@ -118,3 +118,32 @@ def test_a_field_that_is_late_by_cycles_is_the_field_of_then(late: float) -> Non
     for joint, when in ((0, samples), (1, samples - late)):
         expected = np.interp(when, t, way(t)[:, joint]) * ratio[joint]
         np.testing.assert_allclose(field[:, joint], expected, atol=0.51 * microstep)
+
+
+@pytest.mark.parametrize("late", [0.18, 0.03])
+def test_set_points_that_are_late_are_those_of_then_and_the_field_goes_straight_between(late: float) -> None:
+    """Exactly: a schedule with these set points does the same to the last bit of a microstep."""
+    t = np.arange(-1.0, SECONDS + 0.5, CYCLE)
+    rig = two_axis(loop="open")
+    ratio = np.array([float(joint.drive.ratio) for joint in rig.joints if joint.drive is not None])
+    (effect,) = select(["controller_lag"])
+    with_effect = attach(rig, effect, {"set_point_lag": late}, joints=[rig.joint_names[1]])
+    _, field = shown(with_effect, [*NOMINAL, effect.name], schedule(way(t), t))
+    samples = np.arange(len(field)) / 100.0
+    microstep = 2.0 * np.pi / 12800.0
+    then = np.interp(t - late, t, way(t)[:, 1])
+    for joint, set_points in ((0, way(t)[:, 0]), (1, then)):
+        expected = np.interp(samples, t, set_points) * ratio[joint]
+        np.testing.assert_allclose(field[:, joint], expected, atol=0.51 * microstep)
+
+
+def test_set_points_that_are_late_by_a_part_of_a_cycle_are_means_of_two() -> None:
+    t = np.arange(-1.0, SECONDS + 0.5, CYCLE)
+    rig, part = two_axis(loop="open"), 0.3
+    smoothed = way(t)
+    smoothed[1:, 1] = (1.0 - part) * way(t)[1:, 1] + part * way(t)[:-1, 1]
+    (effect,) = select(["controller_lag"])
+    with_effect = attach(rig, effect, {"set_point_lag": part * CYCLE}, joints=[rig.joint_names[1]])
+    expected, _ = shown(rig, list(NOMINAL), schedule(smoothed, t))
+    found, _ = shown(with_effect, [*NOMINAL, effect.name], schedule(way(t), t))
+    np.testing.assert_allclose(found, expected, atol=1e-9)

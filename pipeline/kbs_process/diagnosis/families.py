@@ -91,6 +91,7 @@ FAMILIES: dict[str, str] = {
     "clock_wander": "wander",
     "controller_gain": "gain",
     "controller_jitter": "jitter",
+    "controller_lag": "latency",
     "controller_latency": "latency",
 }
 

@@ -19,7 +19,7 @@ from kbs_process.diagnosis.floor import Floor
 from kbs_process.diagnosis.gate import Fold, Gate, gate, whiteness
 from kbs_process.diagnosis.gls import Background, Score, Sums, score
 from kbs_process.diagnosis.hypothesis import Simulate
-from kbs_process.diagnosis.joint import Own, Standing, bare, with_extra
+from kbs_process.diagnosis.joint import Own, Standing, bare, moved_on, with_extra
 from kbs_process.diagnosis.known import Known
 from kbs_process.diagnosis.orders import with_orders
 from kbs_process.diagnosis.outcome import Refused
@@ -105,9 +105,14 @@ def tried(
         for found in chosen
         if found.suspect.each_trial
     ]
-    for runner in raced([found for found in chosen if not found.suspect.each_trial], view, floor, simulate):
+    runners = raced([found for found in chosen if not found.suspect.each_trial], view, floor, simulate)
+    for number, runner in enumerate(runners):
         own = own_of(runner.found, before, runner.standing)
         verdict = gated(runner.found, before, runner.standing, own)
+        if number == 0 and not (verdict.passed or runner.leapt):
+            # It left nothing after its first steps. What other numbers lack there may be all that speaks against it.
+            runner = replace(runner, standing=moved_on(runner.standing, simulate), leapt=True)
+            verdict = gated(runner.found, before, runner.standing, own)
         judged.append(Tried(runner.found, runner.standing, verdict, view.screening, own, runner.leapt))
     passed = [one for one in judged if one.gate.passed]
     refused = [

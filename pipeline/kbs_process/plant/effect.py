@@ -242,6 +242,7 @@ class Effect:
     of_weight: bool = False  # a moment of weight about a joint's axis
     recorded: bool = False  # a change of the field before that is recorded
     delay: str = ""  # the parameter by which the field comes late, s: its equation is that to first order
+    of_set_points: bool = False  # a delay of where cycles begin, between which the field goes straight
     tag: str = ""  # what `instance` has added to the names of parameters and states
     wires: tuple[
         tuple[str, str], ...

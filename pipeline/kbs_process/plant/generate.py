@@ -116,18 +116,32 @@ def _arriving(structure: Structure) -> list[str]:
 
 def _late(structure: Structure) -> list[str]:
     """Emit where a field is as it arrives at its motor, which costs nothing where none comes late."""
-    late = [wires[effect.delay] for effect, wires in _wired(structure) if effect.delay]
-    began = [
-        f"    k = {JOINTS + DRIVE} + joint * {structure.stride}",
-        f"    time = time - ({' + '.join(late)})",
-        "    cycle = cycle_of(time, cycle, known, knots)",
+    delays = [
+        (effect.of_set_points, wires[effect.delay]) for effect, wires in _wired(structure) if effect.delay
     ]
+    on_its_way = [wire for set_points, wire in delays if not set_points]
+    set_late = [wire for set_points, wire in delays if set_points]
+    body = [f"    k = {JOINTS + DRIVE} + joint * {structure.stride}"] * bool(delays)
+    if on_its_way:
+        body += [
+            f"    time = time - ({' + '.join(on_its_way)})",
+            "    cycle = cycle_of(time, cycle, known, knots)",
+        ]
+    if set_late:
+        body += [
+            f"    late = {' + '.join(set_late)}",
+            "    began, ends = knots[cycle] - late, knots[cycle + 1] - late",
+            "    before = field_at(began, cycle_of(began, cycle, known, knots), knots, fields, joint)",
+            "    after = field_at(ends, cycle_of(ends, cycle, known, knots), knots, fields, joint)",
+            "    return before + (time - knots[cycle]) / (knots[cycle + 1] - knots[cycle]) * (after - before)",
+        ]
+    else:
+        body += ["    return field_at(time, cycle, knots, fields, joint)"]
     return [
         "@compiled",
         "def field_late(time, cycle, known, knots, fields, joint, p):",
         '    """Field position of a motor, in microsteps, as it arrives there; `cycle` is that of the time itself."""',
-        *(began if late else []),
-        "    return field_at(time, cycle, knots, fields, joint)",
+        *body,
         "",
         "",
     ]

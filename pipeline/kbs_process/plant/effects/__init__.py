@@ -24,6 +24,7 @@ from kbs_process.plant.effects.bungee import BUNGEE
 from kbs_process.plant.effects.cogging import COGGING
 from kbs_process.plant.effects.controller_gain import CONTROLLER_GAIN
 from kbs_process.plant.effects.controller_jitter import CONTROLLER_JITTER
+from kbs_process.plant.effects.controller_lag import CONTROLLER_LAG
 from kbs_process.plant.effects.controller_latency import CONTROLLER_LATENCY
 from kbs_process.plant.effects.coulomb import COULOMB
 from kbs_process.plant.effects.dahl import DAHL
@@ -71,6 +72,7 @@ CATALOGUE: tuple[Effect, ...] = (
     # field
     CONTROLLER_GAIN,
     CONTROLLER_JITTER,
+    CONTROLLER_LAG,
     CONTROLLER_LATENCY,
     # motor
     MOTOR_ORDER,
