@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 from test_rounds import ROLES, standing, with_cable
 
+from kbs_process.diagnosis import leaders as leading
 from kbs_process.diagnosis import race
 from kbs_process.diagnosis.finding import Tried
 from kbs_process.diagnosis.floor import declared
 from kbs_process.diagnosis.gate import Gate
-from kbs_process.diagnosis.joint import Own, with_extra
-from kbs_process.diagnosis.leaders import leaders, various
+from kbs_process.diagnosis.joint import Own, Standing, with_extra
+from kbs_process.diagnosis.leaders import gated, leaders, tried, various
 from kbs_process.diagnosis.race import Runner, raced
 from kbs_process.diagnosis.rounds import continued, named_first, unnamed
 from kbs_process.diagnosis.screen import Found
@@ -137,3 +138,29 @@ def test_where_much_is_left_all_are_raced_unless_one_does_nearly_all(
     assert [one.suspect.family for one in ahead][: len(first)] == first[: len(ahead)]
     assert (len(ahead) < len(view.able)) == (left < 1.0 / MOSTLY_DONE)
     assert {one.suspect.family for one in (*ahead, *others)} == {one.suspect.family for one in view.able}
+
+
+@pytest.mark.parametrize("once", [True, False])
+def test_a_law_that_leaves_nothing_is_judged_once_others_have_settled_beside_it(
+    view: View, by_family: dict[tuple[str, str], Found], monkeypatch: pytest.MonkeyPatch, once: bool
+) -> None:
+    """Refused `once` where its first steps ended, or wherever others settle."""
+    made = view.standing.known.experiment
+    simulate = bench.serial(made)
+    costs = list[float]()
+
+    def strict(found: Found, before: Standing, after: Standing, own: Own) -> Gate:
+        costs.append(after.known.cost)
+        verdict = gated(found, before, after, own)
+        return verdict.but("too early") if len(costs) == 1 or not once else verdict
+
+    monkeypatch.setattr(leading, "gated", strict)
+    passed, refused = tried([by_family[RIGHT]], view, view.standing, declared(made), simulate)
+    assert len(costs) == 2
+    assert costs[1] <= costs[0]
+    if once:
+        assert passed[0].leapt
+        assert passed[0].standing.known.cost == costs[1]
+    else:
+        assert passed == []
+        assert refused[0].reasons[-1] == "too early"
