@@ -105,8 +105,7 @@ def _diagnosed(
         if found is None:
             break
         accepted.append(found)
-        there = detected(standing, floor, known.experiment.fit)
-        if (at_once and standing.known.gross) or not (there.left or bent(standing, floor)):
+        if (at_once and standing.known.gross) or not _goes_on(standing, floor):
             break
     last = rounds[-1]
     kept, standing, fallen = needed(accepted, standing, floor, simulate)
@@ -139,6 +138,11 @@ def _diagnosed(
     )
 
 
+def _goes_on(standing: Standing, floor: Floor) -> bool:
+    """Whether something is left beside laws that were found, or numbers have taken something up."""
+    return detected(standing, floor, standing.known.experiment.fit).left or bent(standing, floor)
+
+
 def _mismatch(before: Detection, first: Screening, kept: Sequence[Accepted]) -> float:
     """The lesser of two p-values, of any mismatch and of the first find, times two (Bonferroni).
 
@@ -153,13 +157,15 @@ def _mismatch(before: Detection, first: Screening, kept: Sequence[Accepted]) -> 
 
 def _round(standing: Standing, floor: Floor, simulate: Simulate, accepted: Sequence[Accepted]) -> _Round:
     seen = drawn_back(standing, floor, simulate)
+    over = False
     if seen.known.cost < standing.known.cost:
         # Numbers had ended in a worse place: what they do alone, once they have settled, is no law's.
         standing = resettled(seen, floor, simulate, leaps=1)
+        over = bool(accepted) and not _goes_on(standing, floor)
     view = View.of(seen)
     place = _place(seen, floor, view.scene)
     # Beside the numbers that it was looked for from first; once all have settled, beside those that leave least.
-    passed, refused = _passed(view, standing, floor, simulate, accepted)
+    passed, refused = ([], []) if over else _passed(view, standing, floor, simulate, accepted)
     if not passed:
         return _Round(None, standing, seen, view.screening, tuple(refused), place)
     if names := unnamed(passed, [one.identity for one in refused], view):
