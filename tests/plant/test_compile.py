@@ -46,9 +46,10 @@ def test_module_is_readable_python_that_calls_each_effect() -> None:
     compile(text, "plant", "exec")
     for effect in TWO.effects:
         assert (f"= effect_{effect.name}(" in text) is not bool(effect.delay)
-    (late,) = (effect for effect in TWO.effects if effect.delay)
-    place = [p.name for effect in TWO.effects for p in effect.parameters].index(late.delay)
-    assert f"time - (p[k + {place}])" in text
+    places = [p.name for effect in TWO.effects for p in effect.parameters]
+    late = {effect.of_set_points: places.index(effect.delay) for effect in TWO.effects if effect.delay}
+    assert f"time - (p[k + {late[False]}])" in text
+    assert f"late = p[k + {late[True]}]" in text
 
 
 def test_file_is_written_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
