@@ -13,7 +13,7 @@ from test_experiment import N, made, recording
 from kbs_process.campaign import stretch
 from kbs_process.campaign.config import Campaign, RecordingEntry
 from kbs_process.campaign.diagnosable import LEAST_S, check_copies, check_length, check_noise, check_signs
-from kbs_process.campaign.diagnosis_records import passed_over
+from kbs_process.campaign.diagnosis_warnings import passed_over
 from kbs_process.campaign.held import Alive
 from kbs_process.campaign.load import load_campaign
 from kbs_process.campaign.progress import SilentProgress

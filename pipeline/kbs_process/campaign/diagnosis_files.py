@@ -9,7 +9,8 @@ import numpy as np
 
 from kbs_process.campaign.config import Campaign
 from kbs_process.campaign.corrected_diagnosis import write_corrected
-from kbs_process.campaign.diagnosis_records import COMMANDS, CORRECTED, results_of, seen_channels
+from kbs_process.campaign.diagnosis_records import results_of, seen_channels
+from kbs_process.campaign.diagnosis_terms import COMMANDS, CORRECTED
 from kbs_process.campaign.next_test import commands_of
 from kbs_process.campaign.residual_maps import write_maps
 from kbs_process.campaign.run import Outcome as Told

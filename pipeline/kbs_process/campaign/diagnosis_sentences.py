@@ -1,0 +1,136 @@
+"""What a diagnosis says in plain words: its verdict, and a paragraph for a test report."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from kbs_process.campaign.diagnosis_terms import place_of, rms
+from kbs_process.diagnosis.floor import Floor
+from kbs_process.diagnosis.outcome import Find, Outcome
+from kbs_process.diagnosis.thresholds import RIVALS, told_apart
+from kbs_process.report.records import diagnosis as records
+
+_FLOOR = {
+    "repeats": "what repeats of one trajectory differ by",
+    "declared": "what their sensors' stated noise explains",
+}
+_WORDS = {
+    "none": "Nothing exceeds {floor}.",
+    "parameters off": "Known parameters are off: moved, they leave nothing that exceeds {floor}. Physics that does "
+    "what they do would look the same; one that is farther off than its file can be wrong stands for such physics.",
+    "undecided": "There is a mismatch, and no law passed the gate.",
+}
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ")
+
+
+def _where(place: records.Place) -> str:
+    return ", ".join(part for part in (place.port, place.site or "/".join(place.channels)) if part)
+
+
+def _law_in_words(find: Find) -> str:
+    """A law with those that were simulated beside it and cannot be told from it, at the same place."""
+    alike = [one.identity for one in find.alternatives if one.refitted and one.indistinguishable]
+    here = [one.law for one in alike if place_of(one) == place_of(find.identity)]
+    return " or ".join(_words(law) for law in (find.identity.law, *here))
+
+
+def sentence(outcome: Outcome, trials: Sequence[records.Trial], floor: Floor) -> str:
+    """The answer, in one sentence or two."""
+    if not outcome.finds:
+        return _unnamed(outcome, trials, floor) + _located(outcome)
+    told = [f"{_law_in_words(find)} ({_where(place_of(find.identity))})" for find in outcome.finds]
+    return f"The model lacks: {'; '.join(told)}.{_reserve(outcome)}"
+
+
+def _reserve(outcome: Outcome) -> str:
+    """What is to be said of finds with which something is left: among known laws they are the nearest ones."""
+    if not outcome.after.left:
+        return ""
+    level = f"{rms(outcome.after.ratio):.3g} times the floor (rms)"
+    return (
+        f" With that in the plant {level} is left: more is missing, or a law found stands in for one like it."
+    )
+
+
+def _unnamed(outcome: Outcome, trials: Sequence[records.Trial], floor: Floor) -> str:
+    """The answer where there is no find."""
+    if not outcome.unforeseen:
+        return _WORDS[outcome.verdict].format(floor=_FLOOR[floor.source])
+    worst = max((trial for trial in trials if trial.role == "held-out"), key=lambda trial: trial.corrected)
+    channel = max(worst.channels, key=lambda name: worst.channels[name])
+    return (
+        f"Recordings that were fitted are predicted, {worst.recording}, which was held out, is not: "
+        f"{channel} differs by {worst.channels[channel]:.3g} times the floor (rms)."
+    )
+
+
+def _located(outcome: Outcome) -> str:
+    """Which ports can explain what no law did, where some cannot."""
+    if outcome.verdict != "undecided" or outcome.unforeseen or outcome.left is None:
+        return ""
+    if outcome.located:
+        names = [port.label for port in outcome.located]
+        apart = ", which these recordings cannot tell apart" * (len(names) > 1)
+        return f" It enters at {' or '.join(names)}{apart}."
+    able = [port.name for port in outcome.left.test.ports if port.sufficient]
+    if not able or len(able) == len(outcome.left.test.ports):
+        return ""
+    return f" An input free to be anything could explain it at {', '.join(able[:4])}{' and others' * (len(able) > 4)}."
+
+
+def paragraph(
+    outcome: Outcome, finds: Sequence[records.Find], trials: Sequence[records.Trial], floor: Floor
+) -> str:
+    """Plain words, to be pasted into a test report."""
+    held_out = [trial for trial in trials if trial.role == "held-out"]
+    judged = held_out or list(trials)
+    which = "recordings that were not used to find it" if held_out else "recordings (none was held out)"
+    known, corrected = (max(getattr(trial, step) for trial in judged) for step in ("known", "corrected"))
+    parts = [
+        f"With all known parameters refitted within their uncertainties, prediction and measurement differ by up to "
+        f"{known:.3g} times (rms) {_FLOOR[floor.source]}, among {which}."
+    ]
+    for find in finds:
+        numbers = _curve_in_words(find.curve) if find.curve else _numbers_in_words(find.parameters)
+        near = told_apart(find.distance)
+        apart = [
+            _words(one.name) for one in find.rivals if one.distance < (near if one.simulated else RIVALS)
+        ]
+        begin = "Left out was" if find.named else "No law of the catalogue passes; measured was a"
+        parts.append(
+            f"{begin} {_words(find.name)} ({_where(find.place)}): {numbers}; probability {find.probability:.2f} among "
+            f"the laws simulated"
+            + (f", not to be told from {', '.join(apart)} by these recordings." if apart else ".")
+        )
+    if finds:
+        parts.append(
+            f"With it in the plant the difference is {corrected:.3g} times the floor.{_reserve(outcome)}"
+        )
+    else:
+        parts.append(_unnamed(outcome, trials, floor) + _located(outcome))
+    if outcome.otherwise:
+        farthest = sorted(outcome.otherwise, key=lambda moved: -abs(moved.sigmas))[:3]
+        numbers = ", ".join(f"{moved.name} by {moved.sigmas:+.1f} sigma" for moved in farthest)
+        parts.append(f"Without a law known parameters would have to be off, beyond belief: {numbers}.")
+    for moved in outcome.moved[:5]:
+        parts.append(f"{moved.name} is off by {moved.sigmas:+.1f} sigma.")
+    return " ".join(parts)
+
+
+def _numbers_in_words(numbers: Sequence[records.Fitted]) -> str:
+    return ", ".join(
+        f"{one.name} = {one.value:.4g} ({one.low:.4g} to {one.high:.4g}) {one.unit}" for one in numbers[:4]
+    )
+
+
+def _curve_in_words(curve: records.Curve) -> str:
+    """Between what a measured law varies, where, and how well that is known."""
+    least, *_, most = sorted(range(len(curve.y)), key=lambda k: curve.y[k])
+    ends = " to ".join(
+        f"{curve.y[k]:.4g} {curve.y_unit} (sigma {curve.sigma[k]:.2g}) at {curve.x[k]:.4g} {curve.x_unit}"
+        for k in (least, most)
+    )
+    return f"from {ends} of the {curve.regressor}"
