@@ -51,10 +51,13 @@ class OutputError(KbsError):
     """Results cannot be written; what was there before is untouched."""
 
 
-def did_you_mean(word: str, known: Iterable[str], taken: Collection[str] = ()) -> str:
-    """Return "did you mean 'x'?" for the closest of `known` that is not `taken`, or all of them where none is close."""
+def did_you_mean(word: str, known: Iterable[str], taken: Collection[str] = (), before: str = "") -> str:
+    """Return "did you mean 'x'?" for the closest of `known` that is not `taken`, or all of them where none is close.
+
+    Each is told with what stands `before` it.
+    """
     names = sorted(known)
     close = get_close_matches(word, [name for name in names if name not in taken], n=1, cutoff=0.6)
     if close:
-        return f"did you mean '{close[0]}'?"
-    return "known: " + ", ".join(names) if names else "nothing is known here"
+        return f"did you mean '{before}{close[0]}'?"
+    return "known: " + ", ".join(before + name for name in names) if names else "nothing is known here"

@@ -38,6 +38,8 @@ def test_a_wrong_name_is_answered_with_a_right_one(root: Path, monkeypatch: pyte
         find_campaign("campaign/EL098")
     with pytest.raises(ConfigError, match="known: campaign/EL089"):
         find_campaign("campaign/somethingelse")
+    with pytest.raises(ConfigError, match="known: campaign/EL089"):  # what it is in, is no likeness
+        find_campaign("campaign/nofile")
 
 
 def test_results_go_beside_the_campaigns(root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

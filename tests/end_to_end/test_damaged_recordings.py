@@ -97,7 +97,8 @@ def test_what_is_whole_has_no_warning(damaged: Damaged) -> None:
 def test_a_recorder_that_lost_power(damaged: Damaged) -> None:
     """What is readable is used: the duration says how much that is, and the warning where the file ends."""
     what = damaged.warning("EL089P00_1")
-    assert "truncated: 1" in what
+    assert "truncated: 1, from" in what
+    assert " s on" in what  # not: to where its last, broken chunk would have ended
     (entry,) = [one for one in damaged.campaign.results["recordings"] if one["name"] == "EL089P00_1"]
     assert 80.0 < entry["duration_s"] < 180.0
     assert times(what)[0] == pytest.approx(entry["duration_s"], abs=1.0)

@@ -87,11 +87,14 @@ def paragraph(
     """Plain words, to be pasted into a test report."""
     held_out = [trial for trial in trials if trial.role == "held-out"]
     judged = held_out or list(trials)
-    which = "recordings that were not used to find it" if held_out else "recordings (none was held out)"
-    known, corrected = (max(getattr(trial, step) for trial in judged) for step in ("known", "corrected"))
+    which = "recordings that nothing was fitted to" if held_out else "all recordings (none was held out)"
+    nominal, known, corrected = (
+        max(getattr(trial, step) for trial in judged) for step in ("nominal", "known", "corrected")
+    )
     parts = [
-        f"With all known parameters refitted within their uncertainties, prediction and measurement differ by up to "
-        f"{known:.3g} times (rms) {_FLOOR[floor.source]}, among {which}."
+        f"With the parameter files' numbers, prediction and measurement differ by up to {nominal:.3g} times (rms) "
+        f"{_FLOOR[floor.source]}, and with all known parameters refitted within their uncertainties by up to "
+        f"{known:.3g} times, among {which}."
     ]
     for find in finds:
         numbers = _curve_in_words(find.curve) if find.curve else _numbers_in_words(find.parameters)

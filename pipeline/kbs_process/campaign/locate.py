@@ -38,7 +38,7 @@ def _remedy(name: str) -> str:
     known = known_campaigns()
     if not known:
         return "name the folder of a campaign, or work where there is a folder campaigns/"
-    return did_you_mean(f"campaign/{PurePath(name).name}", [f"campaign/{entry}" for entry in known])
+    return did_you_mean(PurePath(name).name, known, before="campaign/")
 
 
 def known_campaigns() -> tuple[str, ...]:

@@ -12,7 +12,7 @@ from kbs_process.campaign.config import Campaign, RecordingEntry
 from kbs_process.campaign.findings import Findings
 from kbs_process.campaign.judging import band_of, coverage_below
 from kbs_process.report import results
-from kbs_process.signals.records import Loss
+from kbs_process.signals.records import TRUNCATED, Loss
 from kbs_process.stages.clocks import UNKNOWN_OFFSET_S
 from kbs_process.stages.gravity import GravityModel
 from kbs_process.stages.gravity_quality import Misfit
@@ -117,6 +117,10 @@ def _extent(losses: Sequence[Loss], file: str) -> str:
     if not starts:
         return count
     first, last = min(starts), max([*ends, *starts])
+    if {loss.kind for loss in losses} == {
+        TRUNCATED
+    }:  # how long it would have been, a file that breaks off does not say
+        return f"{count}, from {first:.1f} s on"
     return (
         f"{count}, between {first:.1f} s and {last:.1f} s" if last > first else f"{count}, at {first:.1f} s"
     )
@@ -208,7 +212,9 @@ def _repeats(campaign: Campaign, findings: Findings) -> Iterable[results.Notice]
             noisy[f"{entry.trajectory}, {labels[entry.band]}, frame {entry.frame}"].append(entry)
     for where, entries in noisy.items():
         each = ", ".join(
-            f"{e.channel} {e.noise_rms:.2g} against {e.signal_rms:.2g} {e.unit}" for e in entries
+            f"{e.channel} {e.noise_rms:.2g} {e.unit} against "
+            + (f"{e.signal_rms:.2g} {e.unit}" if e.signal_rms else "nothing that shows")
+            for e in entries
         )
         yield results.Notice(
             severity="warning",

@@ -10,7 +10,7 @@ from kbs_process.campaign.measurable import check_requirements
 from kbs_process.campaign.preparing import Prepared, fit_gravity, prepare
 from kbs_process.campaign.progress import Progress
 from kbs_process.errors import KbsError, RecordingError
-from kbs_process.signals.records import Loss
+from kbs_process.signals.records import TRUNCATED, Loss
 from kbs_process.stages import decouple
 
 
@@ -91,6 +91,8 @@ def in_words(loss: Loss) -> str:
     when = (
         ""
         if start is None
+        else f", from {start:.4f} s on"
+        if loss.kind == TRUNCATED
         else f" at {start:.4f} s"
         if end in (None, start)
         else f", {start:.4f} to {end:.4f} s"

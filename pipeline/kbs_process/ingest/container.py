@@ -20,7 +20,7 @@ from kbs_process.ingest.checksum import crc32
 from kbs_process.ingest.compression import LARGEST, Decompressor
 from kbs_process.ingest.framing import MalformedError
 from kbs_process.ingest.kernels import Bytes, Words, walk
-from kbs_process.signals.records import Loss
+from kbs_process.signals.records import TRUNCATED, Loss
 
 WINDOW = 1 << 20  # bytes read at a time: they stay in the processor's cache until used
 CANDIDATE = re.compile(rb"(?=([\x05\x06]).{5}\x00\x00\x00)", re.DOTALL)  # a chunk or message below 2^40 bytes
@@ -293,11 +293,11 @@ class Container:
 
     def _truncated(self, at: int, head: bytes) -> None:
         """Note that the file ends without its end mark, `self.size - at` bytes of it unread."""
-        if any(loss.kind == "truncated" for loss in self.losses):
+        if any(loss.kind == TRUNCATED for loss in self.losses):
             return
         end = None
         if len(head) >= mcap.RECORD_HEAD.size + mcap.CHUNK_HEAD.size and head[0] == mcap.CHUNK_OP:
             end = mcap.CHUNK_HEAD.unpack_from(head, mcap.RECORD_HEAD.size)[1]
         self.lose(
-            "truncated", f"{self.size - at} bytes unread; the file was not closed", start=self._last, end=end
+            TRUNCATED, f"{self.size - at} bytes unread; the file was not closed", start=self._last, end=end
         )

@@ -15,7 +15,7 @@ from kbs_process.ingest import framing as mcap
 from kbs_process.ingest.ahead import ahead
 from kbs_process.ingest.container import AT, CHANNEL, SIZE, Container, Segment
 from kbs_process.ingest.streams import SAMPLES, Reading, Sample, Stream, payloads, type_of
-from kbs_process.signals.records import Block, Loss, Stamps
+from kbs_process.signals.records import TRUNCATED, Block, Loss, Stamps
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,11 +167,11 @@ class Source:
         """Note what only shows at the end of a pass."""
         if self._damage:
             container.lose("undecodable", f"the summary: {self._damage}")
-        elif self._summary is None and not any(loss.kind == "truncated" for loss in container.losses):
+        elif self._summary is None and not any(loss.kind == TRUNCATED for loss in container.losses):
             with self.path.open("rb") as file:
                 file.seek(max(0, container.size - len(mcap.MAGIC)))
                 if file.read() != mcap.MAGIC or container.size == len(mcap.MAGIC):
-                    container.lose("truncated", "the file ends without its footer")
+                    container.lose(TRUNCATED, "the file ends without its footer")
         if container.dictionary.conflicts:
             conflicts = container.dictionary.conflicts
             container.lose("undecodable", "schemas or channels that contradict others", count=conflicts)

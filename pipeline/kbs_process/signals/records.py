@@ -105,6 +105,9 @@ class Events:
     channels: tuple[str, ...]
 
 
+TRUNCATED = "truncated"  # the loss of a file that breaks off: all that would have followed
+
+
 @dataclass(frozen=True, slots=True)
 class Loss:
     """Something that a recording should hold and does not, or holds twice, or holds damaged."""

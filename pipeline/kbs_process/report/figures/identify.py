@@ -65,8 +65,8 @@ def correlations(found: Correlations) -> Picture:
         return draw.picture(figure, f"Correlations of {len(names)} estimates, at most {number(worst, 2)}")
 
 
-def spectra(table: Table, channels: tuple[str, ...], title: str) -> Picture:
-    """Draw residual spectra before and after, and the sensor's noise."""
+def spectra(table: Table, channels: tuple[str, ...], title: str, *, below: str = "sensor's noise") -> Picture:
+    """Draw residual spectra before and after, and what they are to come down to; of no unit, they are over that."""
     f = table.columns["f"]
     with draw.style():
         figure = Figure(figsize=(draw.WIDTH, 0.3 + 1.35 * math.ceil(len(channels) / 2)), layout="constrained")
@@ -81,13 +81,16 @@ def spectra(table: Table, channels: tuple[str, ...], title: str) -> Picture:
                 color=draw.LIMIT,
                 linewidth=0.8,
                 linestyle="--",
-                label="sensor's noise",
+                label=below,
             )
             shown = np.concatenate([line.get_ydata() for line in axis.lines])
             draw.logarithmic(axis, "x", float(f[0]), float(f[-1]))
             draw.logarithmic(axis, "y", 0.5 * float(shown.min()), 2.0 * float(shown.max()))
             axis.set_title(channel)
-            axis.set_ylabel(unit(table.unit(f"{channel}.after")))
+            name = table.unit(f"{channel}.after")
+            axis.set_ylabel(f"PSD over the {below}" if name == "1" else unit(name))
+        for axis in axes[max(len(channels) - 2, 0) : len(channels)]:
+            axis.set_xlabel("frequency / Hz")
         for axis in axes[len(channels) :]:
             axis.set_axis_off()
         axes[0].legend(fontsize=6)

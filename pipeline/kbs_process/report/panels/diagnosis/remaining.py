@@ -15,15 +15,16 @@ _CHANNELS = Caption(
     do="Look at that channel's spectrum and history below.",
 )
 _SPECTRA = Caption(
-    shown="Power spectral density of what is unexplained: known parameters refitted (before), with the finds (after), "
-    "and the floor (dashed).",
+    shown="Power spectral density of what is unexplained, over that of the floor (dashed): known parameters refitted "
+    "(before), with the finds (after).",
     good="After lies on the floor at all frequencies.",
     bad="A hump above the floor: physics that is still left out.",
     do="Find the motor order or resonance at the hump.",
 )
 _HISTORIES = Caption(
-    shown="The same in time.",
-    good="After looks like noise, whatever the drives do.",
+    shown="The same in time, in the channels' units.",
+    good="After looks like noise, whatever the drives do; what an encoder's code rounds (half a step at most) is the "
+    "floor's, and moves with the drives.",
     bad="Bursts that come again with position, rate or time.",
     do="Compare their instants with the commands.",
 )
@@ -39,7 +40,7 @@ def panel(results: DiagnosisResults, tables: Tables) -> Panel:
     for entry in shown:
         channels = tuple(entry.channels)
         if (table := tables.read("residual_spectrum", entry.recording)) is not None:
-            spectra.append(curves.spectra(table, channels, entry.recording))
+            spectra.append(curves.spectra(table, channels, entry.recording, below="floor"))
         if (table := tables.read("residual", entry.recording)) is not None:
             histories.append(curves.histories(table, channels, entry.recording))
     if spectra:

@@ -28,7 +28,7 @@ def panel(results: DiagnosisResults, tables: Tables) -> Panel:
         blocks.append(_moved(f"Known parameters that moved by more than {_FAR:g} sigma", far))
     if maps := _maps(results, tables):
         blocks.append(Figure("Where the residual lives", maps, _MAPS))
-    if results.ports:
+    if results.ports and results.answer != "none":  # where nothing is left, every port explains that
         blocks.append(_ports(results.ports))
     if results.suspects:
         blocks.append(_suspects(results.suspects))
