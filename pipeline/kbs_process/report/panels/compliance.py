@@ -42,6 +42,11 @@ def panel(results: Results, tables: Tables) -> Panel:
     )
 
 
+def _predicted(entry: Requirement) -> str:
+    value = measure(entry.predicted_value, entry.predicted_sigma, 3)
+    return value if value == MISSING else f"{value} {unit(entry.unit)}"
+
+
 def _table(results: Results) -> Grid:
     rows = tuple(
         (
@@ -52,7 +57,7 @@ def _table(results: Results) -> Grid:
             f"{exact(entry.limit)} {unit(entry.unit)}",
             _margin(entry),
             _where(entry),
-            f"{measure(entry.predicted_value, entry.predicted_sigma, 3)}",
+            _predicted(entry),
             Cell(entry.verdict, entry.verdict),
         )
         for entry in results.requirements
