@@ -125,3 +125,22 @@ def test_what_settles_has_not_begun_before_a_recording_does(name: str) -> None:
     known = dict.fromkeys(effect.arguments, 1.0) | {entry.name: 0.5 for entry in effect.parameters}
     assert effect.value({**known, "time": -20.0}) == effect.value({**known, "time": 0.0})
     assert effect.value({**known, "time": 2.0}) != effect.value({**known, "time": 0.0})
+
+
+def test_friction_that_warms_up_is_dry_and_viscous_and_opposes_the_motion() -> None:
+    (effect,) = select(["friction_warmup"])
+    known = {"warmup": 0.5, "warmup_dry": 0.2, "warmup_time": 40.0, "warmup_rate": 0.1}
+
+    def torque(rate: float, time: float) -> float:
+        return float(effect.value({**known, "rotor_rate": rate, "time": time})[0])
+
+    assert torque(0.05, 0.0) == pytest.approx(-(0.5 * 0.05 + 0.2 * 0.5))
+    assert torque(0.3, 0.0) == pytest.approx(-(0.5 * 0.3 + 0.2))
+    assert torque(-0.3, 0.0) == -torque(0.3, 0.0)
+    assert torque(0.3, 40.0) == pytest.approx(torque(0.3, 0.0) / np.e)
+    assert torque(0.0, 0.0) == 0.0
+
+
+def test_a_second_delay_has_its_own_number() -> None:
+    (late,) = select(["controller_latency_2"])
+    assert late.delay in {entry.name for entry in late.parameters}

@@ -72,16 +72,18 @@ def test_a_changed_field_is_that_of_a_schedule_that_was_changed(name: str, numbe
         np.testing.assert_allclose(got[:, 0], right[:, 0], atol=1e-6)
 
 
-def test_a_recorded_field_has_the_gain_in_it_already() -> None:
+def test_a_recorded_field_has_gain_and_set_points_in_it_already() -> None:
     t = np.arange(-1.0, SECONDS + 0.2, CYCLE)
     rig = two_axis(loop="open")
     ratios = np.array([float(joint.drive.ratio) for joint in rig.joints if joint.drive is not None])
     recorded = Schedule(t, way(t), np.gradient(way(t), t, axis=0), way(t) * ratios)
-    gain, late = select(["controller_gain", "controller_latency"])
+    gain, lag, late = select(["controller_gain", "controller_lag", "controller_latency"])
     plain, _ = shown(rig, list(NOMINAL), recorded)
     gained, _ = shown(attach(rig, gain, {"field_gain": SCALE}), [*NOMINAL, gain.name], recorded)
+    set_late, _ = shown(attach(rig, lag, {"set_point_lag": LATE}), [*NOMINAL, lag.name], recorded)
     lagging, _ = shown(attach(rig, late, {"field_latency": LATE}), [*NOMINAL, late.name], recorded)
     np.testing.assert_array_equal(gained, plain)
+    np.testing.assert_array_equal(set_late, plain)
     assert np.abs(lagging - plain).max() > 1e-4  # the driver comes after the record
 
 
@@ -122,7 +124,7 @@ def test_a_field_that_is_late_by_cycles_is_the_field_of_then(late: float) -> Non
 
 @pytest.mark.parametrize("late", [0.18, 0.03])
 def test_set_points_that_are_late_are_those_of_then_and_the_field_goes_straight_between(late: float) -> None:
-    """Exactly: a schedule with these set points does the same to the last bit of a microstep."""
+    """As exactly as microsteps are rounded; corners stay where cycles begin."""
     t = np.arange(-1.0, SECONDS + 0.5, CYCLE)
     rig = two_axis(loop="open")
     ratio = np.array([float(joint.drive.ratio) for joint in rig.joints if joint.drive is not None])

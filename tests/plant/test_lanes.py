@@ -22,7 +22,7 @@ RATES: dict[str, Any] = {"rate_Hz": 100.0, "angle_rate_Hz": 40.0, "duration_s": 
 BEFORE = 0.73  # s, that commands begin before the recording
 CROSSING = "joint_other_rate_law"
 MOUNTING = ["base_hardening", "base_hysteresis"]
-WITH_STATES = [*NOMINAL, "controller_latency", "ground_cable", "bungee"]
+WITH_STATES = [*NOMINAL, "controller_lag", "controller_latency", "ground_cable", "bungee"]
 
 
 def schedule(joints: int) -> Schedule:
@@ -32,12 +32,13 @@ def schedule(joints: int) -> Schedule:
 
 
 def loaded(loop: str) -> Rig:
-    """With a field that lags, a torque of the laboratory that has a state, and a force that pulls at a link."""
-    late, cable, bungee = select(["controller_latency", "ground_cable", "bungee"])
+    """With two delays of a field, a torque of the laboratory that has a state, and a force that pulls at a link."""
+    lag, late, cable, bungee = select(["controller_lag", "controller_latency", "ground_cable", "bungee"])
     rig = attach(
         two_axis(loop=loop, latency=2), cable, {"cable_spring": 0.3, "cable_friction": 0.2}, joints=["el"]
     )
     rig = attach(rig, late, {"field_latency": 4e-3}, joints=["el"])
+    rig = attach(rig, lag, {"set_point_lag": 0.13}, joints=["el"])
     numbers = {"stiffness": 30.0, "free_length": 0.5, "anchor_z": 1.5}
     return attach(rig, bungee, numbers, on="el", point=np.array([0.1, 0.0, 0.2]))
 

@@ -87,7 +87,7 @@ def paragraph(
     """Plain words, to be pasted into a test report."""
     held_out = [trial for trial in trials if trial.role == "held-out"]
     judged = held_out or list(trials)
-    which = "recordings that nothing was fitted to" if held_out else "all recordings (none was held out)"
+    which = "recordings that were held out" if held_out else "all recordings (none was held out)"
     nominal, known, corrected = (
         max(getattr(trial, step) for trial in judged) for step in ("nominal", "known", "corrected")
     )

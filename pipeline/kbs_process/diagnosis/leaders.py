@@ -24,7 +24,7 @@ from kbs_process.diagnosis.known import Known
 from kbs_process.diagnosis.orders import with_orders
 from kbs_process.diagnosis.outcome import Refused
 from kbs_process.diagnosis.plausible import implausible, undone
-from kbs_process.diagnosis.race import own_of, raced
+from kbs_process.diagnosis.race import at_floor, own_of, raced
 from kbs_process.diagnosis.rivals import probabilities
 from kbs_process.diagnosis.screen import Bench, Catalogued, Found, Suspect
 from kbs_process.diagnosis.settling import resettled
@@ -44,6 +44,7 @@ from kbs_process.diagnosis.thresholds import (
 )
 from kbs_process.diagnosis.tryout import extra_of, identity, in_plant
 from kbs_process.diagnosis.view import View
+from kbs_process.plant.effect import Effect
 from kbs_process.signals.records import Array
 
 
@@ -78,14 +79,21 @@ def leaders(view: View, among: Callable[[Found], bool] = lambda _: True) -> tupl
 def various(chosen: Sequence[Found]) -> list[Found]:
     """The best of each family at each place, then the others; in either part the order is kept.
 
-    Many orders together follow what another law of their family has, and do not stand for it.
+    Many orders together follow what another law of their family has, and do not stand for it. Delays are alike to first
+    order, and the plant alone tells them apart.
     """
     best: dict[tuple[str, ...], Found] = {}
     for found in chosen:
         own = identity(found.suspect)
         several = isinstance(found.suspect, Catalogued) and bool(found.suspect.candidate.again)
-        best.setdefault((own.port, own.axis, own.family, str(several), *own.channels), found)
+        kind = own.law if _delays(found.suspect) else own.family
+        best.setdefault((own.port, own.axis, kind, str(several), *own.channels), found)
     return [*best.values(), *(found for found in chosen if found not in best.values())]
+
+
+def _delays(suspect: Suspect) -> bool:
+    law = suspect.candidate.effect if isinstance(suspect, Catalogued) else None
+    return isinstance(law, Effect) and bool(law.delay)
 
 
 def _way(found: Found) -> tuple[str, ...]:
@@ -109,7 +117,7 @@ def tried(
     for number, runner in enumerate(runners):
         own = own_of(runner.found, before, runner.standing)
         verdict = gated(runner.found, before, runner.standing, own)
-        if number == 0 and not (verdict.passed or runner.leapt):
+        if number == 0 and not (verdict.passed or runner.leapt) and at_floor(runner, floor):
             # It left nothing after its first steps. What other numbers lack there may be all that speaks against it.
             runner = replace(runner, standing=moved_on(runner.standing, simulate), leapt=True)
             verdict = gated(runner.found, before, runner.standing, own)

@@ -71,7 +71,7 @@ def raced(chosen: Sequence[Found], view: View, floor: Floor, simulate: Simulate)
     near = [one for one in runners if _near(one, runners[0])]
     behind = [one for one in runners if one not in near]
     for _ in range(WAYS):
-        if not near or near[0].leapt or _at_floor(near[0], floor):
+        if not near or near[0].leapt or at_floor(near[0], floor):
             break
         first = replace(near[0], standing=moved_on(near[0].standing, simulate), leapt=True)
         way = bare(first.standing, own_of(first.found, view.standing, first.standing), simulate)
@@ -103,6 +103,7 @@ def _near(one: Runner, best: Runner) -> bool:
     return one.standing.known.excess <= SETTLED_TIMES * max(least.excess, TOLERATED * least.fit_rows)
 
 
-def _at_floor(one: Runner, floor: Floor) -> bool:
+def at_floor(one: Runner, floor: Floor) -> bool:
+    """Whether it leaves nothing of the recordings that are fitted."""
     experiment = one.standing.known.experiment
     return not detected(one.standing, floor, experiment.fit).left

@@ -129,7 +129,7 @@ def _diagnosed(
         log_p=_mismatch(before, rounds[0].screening, kept),
         moved=moved,
         finds=merged(finds),
-        refused=(*fallen, *last.refused),
+        refused=(*fallen, *next((one.refused for one in reversed(rounds) if one.refused), ())),
         absorbed=_absorbed(last.screening),
         place=rounds[0].place,
         left=left,

@@ -321,6 +321,7 @@ def instance(effect: Effect, number: int) -> Effect:
             for entry in effect.parameters
         ),
         states=tuple(replace(state, name=state.name + tag) for state in effect.states),
+        delay=effect.delay and effect.delay + tag,
         tag=tag,
     )
 

@@ -13,7 +13,9 @@ def change(field_rate: float, set_point_lag: float) -> float:
     Units: rad/s, s -> rad.
     Validity: the plant delays the set points themselves. With $\tau$ less than a cycle $T$ it is the mean of this set
         point and the last, $(1 - a) \theta_k + a \theta_{k-1}$, $a = \tau / T$: the controller's smoothing, or its
-        computing time made up for by what it knew. A latency of the driver hands on the corners of the command.
+        computing time made up for by what it knew. A record of the field has it in it. A latency of the driver comes
+        after that, and hands on the corners of the command. A lag less than none goes on as the cycle before did,
+        where the next set point is not known yet.
     Source: K. J. Astroem, B. Wittenmark, Computer-Controlled Systems (1997), chapters 3 and 9.
     """
     return -set_point_lag * field_rate
@@ -31,4 +33,5 @@ CONTROLLER_LAG = Effect(
     reference="K. J. Astroem, B. Wittenmark, Computer-Controlled Systems (1997), chapters 3 and 9",
     delay="set_point_lag",
     of_set_points=True,
+    recorded=True,
 )
