@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from kbs_process.campaign.config import Campaign, SensingLaw
 from kbs_process.campaign.sensing_laws import LAWS
-from kbs_process.diagnosis.signature import sensed
+from kbs_process.diagnosis.signature import sensed, unit_values
 from kbs_process.diagnosis.suspects import BY, Candidate
 from kbs_process.plant.sensing import SensingPort
 from kbs_process.rig.model import Rig
@@ -75,8 +76,12 @@ def readings(
         if "temperature" in law.arguments and warmth is None:
             continue
         known = {} if warmth is None else {"temperature": warmth}
-        units = sensed(Candidate(law, entry.site, shape), t, values, names, rig, known)
-        read += units @ np.array([numbers[name] for name in amplitudes])
+        candidate, sizes = Candidate(law, entry.site, shape), np.array([numbers[name] for name in amplitudes])
+        if law.port is SensingPort.STREAM:
+            late = unit_values(candidate, t, known) @ sizes
+            read += CubicSpline(t, values)(np.clip(t - late, t[0], t[-1])) - values
+        else:
+            read += sensed(candidate, t, values, names, rig, known) @ sizes
     return read
 
 

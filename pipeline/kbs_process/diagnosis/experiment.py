@@ -13,14 +13,14 @@ from typing import Literal
 import numpy as np
 from scipy.ndimage import maximum_filter1d
 
+from kbs_process.diagnosis.stamps import between
 from kbs_process.plant.predict import Schedule
 from kbs_process.rig.model import Rig
 from kbs_process.signals.records import Array, Loss, Mask, Run, Signal
 from kbs_process.stages.clocks import offset_sigma
-from kbs_process.stages.condense import DOUBT
 from kbs_process.stages.motion import Motion
 from kbs_process.stages.repeats import lag, motion_of
-from kbs_process.stages.resample import PASS, Reducer, design
+from kbs_process.stages.resample import PASS
 
 Role = Literal["calibration", "fit", "held-out"]
 _SAME_FIELD = 0.5  # microsteps, and _SAME_COMMAND rad: two drives that differ by less move the article alike
@@ -346,11 +346,4 @@ def _moved(values: Array, valid: Mask, dt: float, t0: float, shift: float, n: in
     own = dt * np.arange(n, dtype=np.float64) + (shift - t0)
     if abs(shift - t0) < _ALIKE and len(values) >= n:
         return values[:n], valid[:n]
-    reducer = Reducer(design(1.0 / dt, 1.0 / dt))
-    reducer.push(values, None if valid.all() else ~valid)
-    kept = reducer.finish()
-    if kept is None:
-        raise ValueError(f"{len(values)} samples are too few to be interpolated")
-    moved, doubt = kept.at(own)
-    inside = (own >= 0.0) & (own <= dt * (len(values) - 1)) & (doubt <= DOUBT)
-    return moved, inside
+    return between(values, valid, dt, own)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from kbs_process.diagnosis.experiment import Experiment
 from kbs_process.diagnosis.floor import channel_windows
 from kbs_process.diagnosis.hypothesis import Prediction
+from kbs_process.diagnosis.stamps import slope
 from kbs_process.signals.records import Array, Mask
 
 PLACES = 400  # that a recording is divided into
@@ -36,24 +37,25 @@ def jump(experiment: Experiment, predicted: Mapping[int, Prediction], trajectory
     for trial in own:
         shown = predicted[trial.drive].values[:, channels]
         there = channel_windows(experiment, trial, trial.valid)[:, channels] > 0.0
-        gain += _gain(trial.measured[:, channels] - shown, shown, there, places)
+        rate = slope(shown, experiment.dt)
+        gain += _gain(trial.measured[:, channels] - shown, rate, there, places)
     best = int(np.argmax(gain)) if gain.max() > 0.0 else PLACES // 2
     return float(places[best] * experiment.dt)
 
 
-def _gain(error: Array, shown: Array, there: Mask, places: Array) -> Array:
-    """(m,) what a jump at each of some places, in samples, takes of an error (n, c) of readings as they are `shown`.
+def _gain(error: Array, rates: Array, there: Mask, places: Array) -> Array:
+    """(m,) what a jump at each of some places, in samples, takes of an error (n, c) of readings that change at `rates`.
 
     `there` (n, c) is where a channel says something.
     """
     sums = np.zeros((5, len(places)))
-    for e, y, valid in zip(error.T, shown.T, there.T, strict=True):
+    for e, of_channel, valid in zip(error.T, rates.T, there.T, strict=True):
         at = np.flatnonzero(valid)
         noise = float(np.var(np.diff(e[at]))) if len(at) > _FEWEST else 0.0
         if not noise > 0.0:
             continue
         drift = np.linalg.qr(np.stack([np.ones(len(at)), at - at.mean()], axis=1))[0]
-        rate, left = np.gradient(y)[at], e[at] - drift @ (drift.T @ e[at])
+        rate, left = of_channel[at], e[at] - drift @ (drift.T @ e[at])
         after = np.searchsorted(at, places)
         r2, er, u = (_after(one, after) for one in (rate**2, left * rate, drift * rate[:, None]))
         all_u = drift.T @ rate

@@ -2,41 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from scipy.linalg import cho_solve
-from scipy.stats import chi2
 
 from kbs_process.diagnosis.curves import CurveSuspect
 from kbs_process.diagnosis.dissipation import drives, pushes
-from kbs_process.diagnosis.evenness import evenly, parts
+from kbs_process.diagnosis.each_recording import taken_off, taken_off_again
 from kbs_process.diagnosis.families import UNNAMED
 from kbs_process.diagnosis.finding import Tried, explained_share
 from kbs_process.diagnosis.floor import Floor
-from kbs_process.diagnosis.gate import Fold, Gate, gate, whiteness
-from kbs_process.diagnosis.gls import Background, Score, Sums, score
+from kbs_process.diagnosis.gate import Gate, gate
 from kbs_process.diagnosis.hypothesis import Simulate
 from kbs_process.diagnosis.joint import Own, Standing, bare, moved_on, with_extra
-from kbs_process.diagnosis.known import Known
 from kbs_process.diagnosis.orders import with_orders
 from kbs_process.diagnosis.outcome import Refused
-from kbs_process.diagnosis.plausible import implausible, undone
+from kbs_process.diagnosis.plausible import oversized, undone
 from kbs_process.diagnosis.race import at_floor, own_of, raced
 from kbs_process.diagnosis.rivals import probabilities
-from kbs_process.diagnosis.screen import Bench, Catalogued, Found, Suspect
+from kbs_process.diagnosis.screen import Catalogued, Found, Suspect
 from kbs_process.diagnosis.settling import resettled
-from kbs_process.diagnosis.shapes import bends, bettered, fitted, possible
+from kbs_process.diagnosis.shapes import bends, bettered, fitted, possible, standing_still, uncovered
 from kbs_process.diagnosis.side_by_side import side_by_side
 from kbs_process.diagnosis.suspects import BY
 from kbs_process.diagnosis.thresholds import (
     BENT,
-    FALSE_ALARM,
     LAW_VARIANCE,
     LEAD,
     LEADERS,
+    MOST,
     REREAD,
     SECOND,
     SHAPED,
@@ -64,7 +60,7 @@ def leaders(view: View, among: Callable[[Found], bool] = lambda _: True) -> tupl
         return [], []
     least = (1.0 - LEAD) * max(found.score.gain for found in able) / BENT if view.ordered else 0.0
     worth = [found for found in able if found.score.gain >= least]
-    shaped = side_by_side(partial(bettered, view.bench), worth)
+    shaped = [*side_by_side(partial(bettered, view.bench), worth), *_covered(view, among)]
     able = [*(with_orders(view, one) for one in shaped), *(one for one in able if one not in worth)]
     able = sorted(filter(possible, able), key=lambda found: -found.log_evidence)
     if not able:
@@ -74,6 +70,22 @@ def leaders(view: View, among: Callable[[Found], bool] = lambda _: True) -> tupl
     first = various([found for found in able if found.score.gain >= bound or found is able[0]])
     first = first[: SHAPED if gross else LEADERS]
     return first, [found for found in able if found not in first][: SHAPED if gross else SECOND]
+
+
+def _covered(view: View, among: Callable[[Found], bool]) -> list[Found]:
+    """Forces anywhere that known numbers take up wherever they were tried, and that do more than any able one."""
+    most = max(found.score.gain for found in view.able)
+    hidden = []
+    for found in view.screening.candidates:
+        suspect = found.suspect
+        if not (isinstance(suspect, Catalogued) and found.score.rank == 0 and among(found)):
+            continue
+        if isinstance(suspect.candidate.effect, Effect) and suspect.candidate.effect.anywhere:
+            grid = [
+                one for one in view.suspects if isinstance(one, Catalogued) and one.family == suspect.family
+            ]
+            hidden.append(uncovered(view.bench, found, grid, least=MOST * most))
+    return [one for one in hidden if one is not None and one.score.gain > most]
 
 
 def various(chosen: Sequence[Found]) -> list[Found]:
@@ -108,11 +120,7 @@ def tried(
     not.
     """
 
-    judged = [
-        Tried(found, *_trial_by_trial(found.suspect, view.standing, view.bench), view.screening, Own((), ()))
-        for found in chosen
-        if found.suspect.each_trial
-    ]
+    judged = [taken_off(found, view) for found in chosen if found.suspect.each_trial]
     runners = raced([found for found in chosen if not found.suspect.each_trial], view, floor, simulate)
     for number, runner in enumerate(runners):
         own = own_of(runner.found, before, runner.standing)
@@ -153,7 +161,11 @@ def gated(found: Found, before: Standing, after: Standing, own: Own) -> Gate:
     if not isinstance(found.suspect, Catalogued):
         return verdict
     free = _undone(found.suspect, a, known.value[shapes])
-    return verdict.but(*_oversized(found.suspect, a, np.sqrt(np.diag(C)), free), *drives(found.suspect, a, C))
+    return verdict.but(
+        *oversized(found.suspect, a, np.sqrt(np.diag(C)), free),
+        *drives(found.suspect, a, C),
+        *(standing_still(found.suspect, known.value[shapes].tolist()) if in_plant(found.suspect) else ()),
+    )
 
 
 def _undone(suspect: Catalogued, values: Array, shapes: Array) -> frozenset[str]:
@@ -168,88 +180,25 @@ def _undone(suspect: Catalogued, values: Array, shapes: Array) -> frozenset[str]
     return undone(fitted(suspect, shapes[:own].tolist()), amplitudes)
 
 
-def _oversized(
-    suspect: Suspect, values: Iterable[float], sigmas: Iterable[float], free: Collection[str] = ()
-) -> tuple[str, ...]:
-    """Why a law of the catalogue does not have amplitudes of such values and sigmas; nothing, if it may.
-
-    Those that are `free` may have any.
-    """
-    if not isinstance(suspect, Catalogued):
-        return ()
-    numbers = zip(map(float, values), map(float, sigmas), strict=True)
-    named = dict(zip(suspect.amplitudes, numbers, strict=False))
-    return tuple(
-        reason for action in suspect.candidate.actions for reason in implausible(action.effect, named, free)
-    )
-
-
-def _trial_by_trial(suspect: Suspect, standing: Standing, bench: Bench) -> tuple[Standing, Gate]:
-    """A law whose size and phase are each recording's own is taken off each; every one has to show it all through."""
-    known, experiment = standing.known, standing.known.experiment
-    precision = np.where(np.isfinite(known.parameters.sigma), known.sigma, np.inf) ** -2.0
-    plain = {experiment.reference(k): np.zeros(0) for k in range(len(experiment.repeats))}
-    plain = {drive: bench.signatures([suspect], drive) for drive in plain}
-    trials, residual, folds, strengths = list(experiment.trials), list(known.residual), [], []
-    greatest: list[tuple[float, float]] = [(0.0, 0.0)] * len(suspect.amplitudes)
-    for k, trial in enumerate(experiment.trials):
-        columns = plain[experiment.reference(trial.trajectory)]
-        whitened = known.metric[k](columns)
-        fitted = known.experiment.reference(trial.trajectory) in known.slopes
-        J = known.jacobian(k) if fitted else np.zeros((len(whitened), len(precision)))
-        background = Background.of({k: known.residual[k]}, {k: J}, precision)
-        own = score(background, Sums.over(background, {k: whitened}))
-        trials[k] = replace(trial, measured=trial.measured - (columns @ own.amplitude) * trial.valid[:, None])
-        residual[k] = known.residual[k] - whitened @ own.amplitude
-        sigma = np.sqrt(np.diag(own.covariance))
-        greatest = [
-            max(one, other, key=lambda number: abs(number[0]))
-            for one, other in zip(greatest, zip(own.amplitude, sigma, strict=True), strict=True)
-        ]
-        if trial.role != "calibration":
-            gained = _even_gain(background, k, whitened, own, known)
-            strengths.append(gained)
-            rows = float(known.rows[k])
-            before, after = (float(z @ z) / rows for z in (known.residual[k], residual[k]))
-            bound = float(chi2.isf(FALSE_ALARM / suspect.places, max(own.rank, 1)))
-            folds.append(Fold(trial.name, before, after, gained - bound))
-    worse = tuple(fold.trial for fold in folds if fold.gain <= 0.0)
-    reasons = (f"{', '.join(worse)} do not show it, all through",) if worse else ()
-    if len(folds) < 2:
-        reasons = (*reasons, "one recording alone cannot show that it comes again")
-    white = whiteness(known), whiteness(replace(known, residual=tuple(residual)))
-    changed = replace(known, experiment=replace(experiment, trials=tuple(trials)), residual=tuple(residual))
-    verdict = Gate(
-        not reasons,
-        tuple(folds),
-        bool(experiment.held_out),
-        float(np.sqrt(min(strengths, default=0.0))),
-        white,
-        reasons,
-    )
-    return replace(standing, known=changed), verdict.but(*_oversized(suspect, *zip(*greatest, strict=True)))
-
-
-def _even_gain(background: Background, trial: int, columns: Array, own: Score, known: Known) -> float:
-    """Gain of a law in one trial, or the square of its sigmas off zero by what parts of it ask for, if that is less."""
-    J = background.J[trial] * background.scale
-    done = (columns - J @ cho_solve(background.factor, J.T @ columns)) @ own.amplitude
-    left = background.z[trial] - J @ background.shift - done
-    own_parts = parts(known.experiment, trial, known.metric[trial], done, left)
-    return min(own.gain, max(evenly(known.experiment, {trial: own_parts}), 0.0) ** 2)
-
-
 def reread(chosen: Tried, before: Standing, floor: Floor, simulate: Simulate) -> Tried:
     """A law of the readings told anew among all of its channel, now that the known numbers have settled beside it.
 
     In the plant shapes are fitted; such a law has the one that the screen gave it while numbers were still pulled, and
     goes on from there to first order. So it is told again as long as that changes much.
     """
-    if in_plant(chosen.found.suspect) or not chosen.own.names:
+    suspect = chosen.found.suspect
+    of_clock = isinstance(suspect, Catalogued) and suspect.of_clock
+    if in_plant(suspect) or not (chosen.own.names or of_clock):
         return chosen
     enough = TOLERATED * before.known.fit_rows
     for _ in range(REREAD):
-        told = _told_anew(chosen, before, floor, simulate)
+        if not chosen.own.names:
+            again = taken_off_again(chosen)
+            told = replace(again, standing=resettled(again.standing, floor, simulate, leaps=0))
+        elif of_clock:
+            told = _set_anew(chosen, before, floor, simulate)
+        else:
+            told = _told_anew(chosen, before, floor, simulate)
         gained = chosen.standing.known.cost - told.standing.known.cost
         chosen = told
         if not gained > enough:
@@ -275,6 +224,22 @@ def _told_anew(chosen: Tried, before: Standing, floor: Floor, simulate: Simulate
     told = Tried(found, new, gated(found, before, new, own), view.screening, own)
     chances = probabilities([standing.known, new.known], view.bench.background.rows)
     return told if told.gate.passed and chances[1] > chances[0] else chosen
+
+
+def _set_anew(chosen: Tried, before: Standing, floor: Floor, simulate: Simulate) -> Tried:
+    """The law of a clock with what it does at the size that it was found to have, if that leaves less."""
+    standing, found = chosen.standing, chosen.found
+    assert isinstance(found.suspect, Catalogued)
+    size = standing.known.value[[standing.known.names.index(name) for name in chosen.own.amplitudes]]
+    found = replace(
+        found, suspect=replace(found.suspect, size=float(size[0])), score=replace(found.score, amplitude=size)
+    )
+    view = View.of(bare(standing, chosen.own, simulate), lambda _: False, linear=False)
+    new = with_extra(view.standing, extra_of(found, view.standing, view.bench, view.scene), simulate)
+    new = resettled(new, floor, simulate, leaps=0)
+    own = own_of(found, before, new)
+    told = Tried(found, new, gated(found, before, new, own), chosen.screening, own, chosen.leapt)
+    return told if new.known.cost < standing.known.cost else chosen
 
 
 def _reads(suspect: Suspect) -> str:

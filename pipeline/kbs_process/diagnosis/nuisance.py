@@ -7,6 +7,7 @@ import numpy as np
 from kbs_process.diagnosis.experiment import Experiment, Trial
 from kbs_process.diagnosis.hypothesis import Hypothesis, Prediction
 from kbs_process.diagnosis.ringing import decays
+from kbs_process.diagnosis.stamps import slope
 from kbs_process.signals.records import Array
 
 
@@ -31,7 +32,7 @@ def nuisances(
             column[:, channel] = shape
             columns.append(column)
             precision.append(0.0)
-    late = np.gradient(prediction.values, experiment.dt, axis=0)
+    late = slope(prediction.values, experiment.dt)
     for channels, sigma in (
         (slice(0, wrench), trial.wrench_clock_sigma),
         (slice(wrench, c), trial.angle_clock_sigma),

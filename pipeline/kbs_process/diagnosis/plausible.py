@@ -9,11 +9,11 @@ Those of sensors and clocks, which do not grow with the rig as torques do, have 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 
 import numpy as np
 
-from kbs_process.diagnosis.screen import Catalogued
+from kbs_process.diagnosis.screen import Catalogued, Suspect
 from kbs_process.diagnosis.signature import port_inputs
 from kbs_process.plant.effect import Effect
 from kbs_process.plant.sensing.sensing import Sensing
@@ -66,3 +66,19 @@ def implausible(
                 f"{parameter.name} = {value:.3g}{unit}, and it may be {least:.3g} to {most:.3g}{unit}"
             )
     return tuple(reasons)
+
+
+def oversized(
+    suspect: Suspect, values: Iterable[float], sigmas: Iterable[float], free: Collection[str] = ()
+) -> tuple[str, ...]:
+    """Why a law of the catalogue does not have amplitudes of such values and sigmas; nothing, if it may.
+
+    Those that are `free` may have any.
+    """
+    if not isinstance(suspect, Catalogued):
+        return ()
+    numbers = zip(map(float, values), map(float, sigmas), strict=True)
+    named = dict(zip(suspect.amplitudes, numbers, strict=False))
+    return tuple(
+        reason for action in suspect.candidate.actions for reason in implausible(action.effect, named, free)
+    )

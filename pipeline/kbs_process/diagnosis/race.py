@@ -45,7 +45,9 @@ def raced(chosen: Sequence[Found], view: View, floor: Floor, simulate: Simulate)
 
     def begun(found: Found) -> Entered:
         extra = extra_of(found, view.standing, view.bench, view.scene)
-        return entered(view.standing, extra, simulate).on(1)
+        start = entered(view.standing, extra, simulate)
+        # Where numbers have yet to give way, to a cord that carries weight, it begins worse than nothing.
+        return start.on(1 if start.left < view.standing.known.excess else 2)
 
     def gone_on(of: Entered) -> Entered:
         return of.on(FIRST - 1).ended() if of.left <= far else of

@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from kbs_process.diagnosis.hypothesis import Tapped
 from kbs_process.diagnosis.scene import Scene
 from kbs_process.plant.effect import Parameter
 from kbs_process.signals.records import Array
 
 SPECTRUM = "spectrum"  # grid of a parameter that only tones of a residual give
+WHILE_RECORDED = "time.span"  # that of one which is a time, in lengths of the longest recording
 
 
 def is_place(entry: Parameter) -> bool:
@@ -29,6 +32,7 @@ class Ranges:
     spans: Mapping[tuple[str, str], tuple[float, float]]
     proposed: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     temperature: bool = False  # whether it was recorded
+    longest: float = np.inf  # s, of the trajectories
 
     def within(self, entry: Parameter, site: str) -> tuple[float, float]:
         """Between which values what a shape is a place or a width of goes at a site; (0, 0) where nobody knows it."""
@@ -98,5 +102,6 @@ def ranges_of(
         for k, channel in enumerate(channels):
             extend(channel, "reading", prediction[:, k])
     longest = max(len(prediction) for prediction in predictions) * dt
-    spans |= {(site, "time"): (0.0, longest) for site in ("wrench", "encoder")}
-    return Ranges(spans, dict(proposed or {}), temperature)
+    sites = {site for site, _ in spans} | {"wrench", "encoder"}
+    spans |= {(site, "time"): (0.0, longest) for site in sites}
+    return Ranges(spans, dict(proposed or {}), temperature, longest)

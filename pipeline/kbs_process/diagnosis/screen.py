@@ -23,12 +23,13 @@ from kbs_process.diagnosis.jumps import PLACES, jump
 from kbs_process.diagnosis.known import Known
 from kbs_process.diagnosis.scene import Scene
 from kbs_process.diagnosis.side_by_side import side_by_side
-from kbs_process.diagnosis.signature import inputs, reduced, sensed
+from kbs_process.diagnosis.signature import inputs, reduced, sensed, stamped, unit_values
+from kbs_process.diagnosis.stamps import late_by
 from kbs_process.diagnosis.suspects import Candidate
 from kbs_process.diagnosis.tails import log_tail
 from kbs_process.diagnosis.thresholds import ABSORBED, FALSE_ALARM, LEAST_RHO
 from kbs_process.diagnosis.transfer import BATCH, respond
-from kbs_process.plant.sensing import Sensing
+from kbs_process.plant.sensing import Sensing, SensingPort
 from kbs_process.signals.records import WRENCH_CHANNELS, Array
 
 _RUNAWAY = 1e30  # of a unit amplitude's signature
@@ -65,6 +66,7 @@ class Catalogued:
 
     candidate: Candidate
     scene: Scene
+    size: float = 0.0  # of a clock's lone amplitude, at which what it does is exact; 0: to first order
 
     @property
     def family(self) -> tuple[str, str]:
@@ -98,7 +100,27 @@ class Catalogued:
         law, tapped = self.candidate.effect, self.scene.signals[drive]
         if isinstance(law, Sensing) and law.whole_band and tapped.readings is not None:
             return reduced(self.candidate, tapped, experiment.channels, rig, experiment.dt, len(prediction))
-        t = np.asarray(np.arange(len(prediction)) * experiment.dt, dtype=np.float64)
+        if self.size:
+            late = self.size * self.late(drive)[:, 0]
+            change = np.zeros((*prediction.shape, 1))
+            own = stamped(self.candidate.site, experiment.channels, rig)
+            change[:, own, 0] = late_by(prediction[:, own], experiment.dt, late) / self.size
+            return change
+        t, known = self._recorded(drive)
+        return sensed(self.candidate, t, prediction, experiment.channels, rig, known)
+
+    @property
+    def of_clock(self) -> bool:
+        return self.candidate.port is SensingPort.STREAM
+
+    def late(self, drive: int) -> Array:
+        """(n, amplitudes) by how many s stamps are late, for a unit of each amplitude of a clock's law."""
+        return unit_values(self.candidate, *self._recorded(drive))
+
+    def _recorded(self, drive: int) -> tuple[Array, dict[str, Array | float]]:
+        """Time and what else is known of a drive's recordings that an equation may ask for."""
+        experiment, law = self.scene.experiment, self.candidate.effect
+        t = np.asarray(np.arange(experiment.drives[drive].n) * experiment.dt, dtype=np.float64)
         own = [one for one in experiment.trials if one.drive == drive]
         first = min(own, key=lambda one: one.role == "held-out")  # the first that is fitted
         known: dict[str, Array | float] = {}
@@ -106,7 +128,7 @@ class Catalogued:
             known["temperature"] = first.temperature
         if "drop_time" in law.arguments:
             known["drop_time"] = jump(experiment, self.scene.predicted, first.trajectory, self.candidate.site)
-        return sensed(self.candidate, t, prediction, experiment.channels, rig, known)
+        return t, known
 
 
 @dataclass(frozen=True, slots=True, eq=False)

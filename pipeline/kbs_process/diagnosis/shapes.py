@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,7 +10,7 @@ from scipy.optimize import minimize
 
 from kbs_process.diagnosis.gls import Score, Sums, per_trial, score
 from kbs_process.diagnosis.places import half_lengths
-from kbs_process.diagnosis.ranges import SPECTRUM, is_place, swept
+from kbs_process.diagnosis.ranges import SPECTRUM, WHILE_RECORDED, is_place, swept
 from kbs_process.diagnosis.screen import Bench, Catalogued, Found, screen
 from kbs_process.diagnosis.suspects import Candidate
 from kbs_process.plant.effect import Effect, LogNormal, Parameter, Uniform
@@ -25,6 +25,8 @@ _WHOLE = ("order", "bit")  # in names of numbers that are whole, or ratios of te
 _DIFFERENCE = 0.02  # steps
 _PLACES = 24  # of a law that is somewhere, at most, for each width that it may have
 _DESCENTS = 12  # of the search along the linear plant
+_ENDS = 0.99  # of the longest time that recordings show
+_STARTS = 3  # of a grid, of one that known numbers take up there
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +77,7 @@ def bends(candidate: Candidate, rig: Rig) -> tuple[Bend, ...]:
     """
     shape = dict(candidate.shape)
     own = [
-        _bend(entry, shape[entry.name], step)
+        _bend(entry, shape[entry.name], step, _last(entry, candidate))
         for entry in candidate.effect.parameters
         if entry.role == "shape" and (step := _step(entry, candidate)) > 0.0
     ]
@@ -108,12 +110,17 @@ def _width(place: Parameter, candidate: Candidate) -> Parameter | None:
     return next((entry for entry in every if entry.over == f"{place.over}.span"), None)
 
 
-def _bend(entry: Parameter, value: float, step: float) -> Bend:
+def _last(entry: Parameter, candidate: Candidate) -> float:
+    """The greatest value that recordings show: what takes far longer than they do stands still in them."""
+    return max(entry.grid) * candidate.longest if entry.over == WHILE_RECORDED else np.inf
+
+
+def _bend(entry: Parameter, value: float, step: float, last: float) -> Bend:
     ratio = isinstance(entry.prior, LogNormal)
     low, high = value - _STEPS * step, value + _STEPS * step
     if ratio:
         low, high = value / _FARTHEST, value * _FARTHEST
-    low, high = max(low, entry.bounds[0]), min(high, entry.bounds[1])
+    low, high = max(low, entry.bounds[0]), min(high, entry.bounds[1], last)
     return Bend(entry.name, value, step, low, high, alike=entry.over != "" and not ratio, ratio=ratio)
 
 
@@ -124,9 +131,30 @@ def bettered(bench: Bench, found: Found) -> Found:
         return found
     start = screen(bench, [suspect, *_everywhere(suspect)]).candidates[0].suspect
     assert isinstance(start, Catalogued)
-    best, own = _descended(bench, start)
+    best, own = _descended(bench, start, _gain)
     gained = own.gain - found.score.gain
     return replace(found, suspect=best, score=own, log_evidence=found.log_evidence + 0.5 * gained)
+
+
+def uncovered(bench: Bench, found: Found, grid: Sequence[Catalogued], *, least: float) -> Found | None:
+    """A suspect that known numbers take up on its `grid`, at the shape with which it does most beyond all that they do.
+
+    None, if it does less than the `least` everywhere on its grid.
+
+    Most of what a cord does that carries weight is a weight. What is left, as its pull and its way change, is none, and
+    far less than a hundredth: the linear plant cannot tell it from its own errors. So it is a lead, and the plant's to
+    judge.
+    """
+    scored = zip(grid, _scores(bench, grid), strict=True)
+    starts = sorted(scored, key=lambda end: -_whole(*end))[:_STARTS]
+    if not _whole(*starts[0]) >= least:
+        return None
+    best, own = max((_descended(bench, start, _whole) for start, _ in starts), key=lambda end: _whole(*end))
+    all_of_it = replace(own, gain=own.whole_gain, rank=own.whole_rank, amplitude=own.whole)
+    gained = own.whole_gain - found.score.gain
+    return replace(
+        found, suspect=best, score=all_of_it, log_evidence=found.log_evidence + 0.5 * gained, absorbed_by=()
+    )
 
 
 def _everywhere(suspect: Catalogued) -> list[Catalogued]:
@@ -148,8 +176,10 @@ def _everywhere(suspect: Catalogued) -> list[Catalogued]:
     return every
 
 
-def _descended(bench: Bench, start: Catalogued) -> tuple[Catalogued, Score]:
-    """The best shape of a descent, and what it does."""
+def _descended(
+    bench: Bench, start: Catalogued, worth: Callable[[Catalogued, Score], float]
+) -> tuple[Catalogued, Score]:
+    """The shape at which a suspect is `worth` most of all that a descent saw, and what it does."""
     free = bends(start.candidate, start.scene.hypothesis.rig)
     seen: list[tuple[Catalogued, Score]] = []
 
@@ -158,7 +188,7 @@ def _descended(bench: Bench, start: Catalogued) -> tuple[Catalogued, Score]:
         tried = [_at(start, free, one) for one in around]
         ends = list(zip(tried, _scores(bench, tried), strict=True))
         seen.append(ends[0])
-        gains = np.array([_gain(*end) for end in ends])
+        gains = np.array([worth(*end) for end in ends])
         return -float(gains[0]), (gains[0] - gains[1:]) / _DIFFERENCE
 
     minimize(
@@ -169,7 +199,7 @@ def _descended(bench: Bench, start: Catalogued) -> tuple[Catalogued, Score]:
         bounds=[one.room for one in free],
         options={"maxiter": _DESCENTS, "maxfun": 2 * _DESCENTS},
     )
-    return max(seen, key=lambda end: _gain(*end))
+    return max(seen, key=lambda end: worth(*end))
 
 
 def along(bench: Bench, suspect: Catalogued, amplitude: Array, drive: int) -> Array:
@@ -190,15 +220,39 @@ def _gain(suspect: Catalogued, found: Score) -> float:
     return -found.gain if _reversed(suspect, found) else found.gain
 
 
+def _whole(suspect: Catalogued, found: Score) -> float:
+    """The same with what it has in common with known numbers, as far as these do not do it alone."""
+    return -found.whole_gain if _of_wrong_sign(suspect, found.whole) else found.whole_gain
+
+
 def _reversed(suspect: Catalogued, found: Score) -> bool:
+    return _of_wrong_sign(suspect, found.amplitude)
+
+
+def _of_wrong_sign(suspect: Catalogued, amplitude: Array) -> bool:
     """Whether a lone amplitude has a sign that its law has not: no inertia is less than none."""
-    lone = len(found.amplitude) == 1 and suspect.candidate.amplitudes[0].bounds[0] == 0.0
-    return lone and float(found.amplitude[0]) < 0.0
+    lone = len(amplitude) == 1 and suspect.candidate.amplitudes[0].bounds[0] == 0.0
+    return lone and float(amplitude[0]) < 0.0
 
 
 def possible(found: Found) -> bool:
     """Whether a suspect of the screen has a sign that its law may have."""
     return not (isinstance(found.suspect, Catalogued) and _reversed(found.suspect, found.score))
+
+
+def standing_still(suspect: Catalogued, values: Sequence[float]) -> tuple[str, ...]:
+    """Why a law with a fit's shapes is none that goes on in time: it would take longer than recordings do, if it may.
+
+    Friction that falls hardly at all is friction.
+    """
+    candidate = suspect.candidate
+    entries = {entry.name: entry for entry in candidate.effect.parameters}
+    reasons = []
+    for one, value in zip(bends(candidate, suspect.scene.hypothesis.rig), values, strict=False):
+        last = np.inf if one.element else _last(entries[one.name], candidate)
+        if value >= _ENDS * last:
+            reasons.append(f"{one.name} = {value:.3g} s: what takes as long stands still in these recordings")
+    return tuple(reasons)
 
 
 def _at(suspect: Catalogued, free: Sequence[Bend], steps: Array) -> Catalogued:

@@ -15,6 +15,7 @@ from scipy.interpolate import CubicSpline
 from kbs_process.diagnosis.hypothesis import Tapped
 from kbs_process.diagnosis.inlets import BASE_PORT, MOUNTING_PORT, WRENCH_PORT, Inlet
 from kbs_process.diagnosis.places import point_of
+from kbs_process.diagnosis.stamps import slope
 from kbs_process.diagnosis.suspects import BY, Candidate, own_values
 from kbs_process.plant.along import along, signals_of
 from kbs_process.plant.effect import Effect, Port
@@ -154,8 +155,7 @@ def _by_channel(
     given = dict(recorded)
     match law.port:
         case SensingPort.STREAM:
-            joints = rig.joint_names
-            acted = [k for k, name in enumerate(channels) if (name in joints) == (site == "encoder")]
+            acted = stamped(site, channels, rig)
         case SensingPort.COUPLING | SensingPort.PRODUCT:
             reads, *acts = site.split(BY)
             acted = [channels.index(reads)]
@@ -168,13 +168,33 @@ def _by_channel(
     return {k: per_unit(candidate, t, prediction[:, k], given) for k in acted}
 
 
+def stamped(stream: str, channels: Sequence[str], rig: Rig) -> list[int]:
+    """Places of the channels that a stream's clock stamps."""
+    joints = rig.joint_names
+    return [k for k, name in enumerate(channels) if (name in joints) == (stream == "encoder")]
+
+
 def per_unit(candidate: Candidate, t: Array, reading: Array, given: Mapping[str, Array | float]) -> Array:
-    """Change (n, amplitudes) of a reading (n,) by a unit of each amplitude of a suspect of the sensing."""
+    """Change (n, amplitudes) of a reading (n,) by a unit of each amplitude of a suspect of the sensing.
+
+    Of a clock's to first order in its lateness.
+    """
     law = candidate.effect
     assert isinstance(law, Sensing)
-    known: dict[str, Array | float] = {"time": t, "reading": reading, **given, **dict(candidate.shape)}
+    known: dict[str, Array | float] = {"reading": reading, **given}
     if "rate" in law.arguments:
         known["rate"] = CubicSpline(t, reading)(t, 1)
+    values = unit_values(candidate, t, known)
+    if law.port is SensingPort.STREAM:
+        return -values * slope(reading[:, None], float(t[1] - t[0]))
+    return values
+
+
+def unit_values(candidate: Candidate, t: Array, given: Mapping[str, Array | float]) -> Array:
+    """(n, amplitudes) what the equation of a suspect of the sensing gives for a unit of each amplitude."""
+    law = candidate.effect
+    assert isinstance(law, Sensing)
+    known: dict[str, Array | float] = {"time": t, **given, **dict(candidate.shape)}
     columns = []
     for amplitude in candidate.amplitudes:
         units = {entry.name: float(entry is amplitude) for entry in candidate.amplitudes}

@@ -40,6 +40,7 @@ class Candidate:
     shape: tuple[tuple[str, float], ...]  # every parameter that is neither an amplitude nor shared
     point: Place | None = None  # of a force: where it acts on the link; None is the CoG
     again: tuple[Candidate, ...] = ()  # further actions of the same law there, as of other orders
+    longest: float = np.inf  # s, of the recordings
 
     @property
     def name(self) -> str:
@@ -86,8 +87,9 @@ def candidates(
         for effect in CATALOGUE
         if effect.name not in nominal and not (effect.recorded and (field_recorded or rig.controller is None))
     ]
+    longest = ranges.longest
     plant = [
-        Candidate(effect, site, shape, point)
+        Candidate(effect, site, shape, point, longest=longest)
         for law in left_out
         if any(entry.role == "amplitude" for entry in law.parameters)
         for site in _sites(law, rig, columns)
@@ -96,7 +98,7 @@ def candidates(
         for shape in _grid(effect, site, ranges, own_values(rig, site))
     ]
     sensing = [
-        Candidate(law, site, shape)
+        Candidate(law, site, shape, longest=longest)
         for law in SENSING
         for site in _sensed_sites(law, rig, channels, ranges)
         for shape in _grid(law, site, ranges, {})

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -96,6 +97,8 @@ def extra_of(found: Found, standing: Standing, bench: Bench, scene: Scene) -> Ex
         tag = ".".join(suspect.family)
         first = re.escape(f"law.{tag}.{suspect.amplitudes[0]}")
         used = sum(re.fullmatch(rf"{first}(_\d+)?", name) is not None for name in standing.laws)
+        if isinstance(suspect, Catalogued) and suspect.of_clock:
+            suspect = replace(suspect, size=float(amplitude[0]))
         drives = sorted(_references(standing))
         columns = {drive: bench.signatures([suspect], drive) for drive in drives}
         shaped: tuple[Bend, ...] = ()

@@ -46,7 +46,7 @@ class Law(IntEnum):
     CABLE = 40  # -A S((th - s0)/s1) about the azimuth body's axis, from the laboratory
     CABLE_BOUC_WEN = 41  # -A z/s0 likewise
     CORD = 42  # tension A ln(L/s0) where L > s0, from the antenna's point s4..6 to the anchor s1..3
-    AIR = 43  # -A |v|^0.8 v at the antenna's point s0..2
+    AIR = 43  # -A |v|^0.8 v at the antenna's point s0..2, which turns with plate and joints
     SHIFTING_MASS = (
         50  # static moment A S(f/s0) along the antenna's axis s1, f the specific force along that axis in g
     )
@@ -224,10 +224,12 @@ def _ground(p: Any, z: Any, dt: float, motion: Any, bodies: Any, out: Any) -> No
         w = np.zeros(3)
         for k in range(3):
             w[k] = motion[1, 4] * bodies[0, 5 + 3 * k] - motion[1, 6] * bodies[0, 4 + 3 * k]
+        # The plate's vibration is as fast as a slow motion; it turns about T's origin.
+        x, y, z_ = arm[0] + bodies[1, 0], arm[1] + bodies[1, 1], arm[2] + bodies[1, 2]
         v0, v1, v2 = (
-            w[1] * arm[2] - w[2] * arm[1],
-            w[2] * arm[0] - w[0] * arm[2],
-            w[0] * arm[1] - w[1] * arm[0],
+            w[1] * arm[2] - w[2] * arm[1] + motion[1, 1] * z_ - motion[1, 2] * y,
+            w[2] * arm[0] - w[0] * arm[2] + motion[1, 2] * x - motion[1, 0] * z_,
+            w[0] * arm[1] - w[1] * arm[0] + motion[1, 0] * y - motion[1, 1] * x,
         )
         speed = np.sqrt(v0 * v0 + v1 * v1 + v2 * v2)
         force[0], force[1], force[2] = -A * speed**0.8 * v0, -A * speed**0.8 * v1, -A * speed**0.8 * v2

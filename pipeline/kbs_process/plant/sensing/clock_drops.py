@@ -2,26 +2,28 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from kbs_process.plant.effect import Normal, Parameter
 from kbs_process.plant.sensing.sensing import Sensing, SensingPort
 from kbs_process.signals.records import Array
 
 
-def change(rate: Array, time: Array, dropped: float, drop_time: float) -> Array:
-    r"""Change of a reading after samples were lost: what follows seems to come early.
+def lateness(time: Array, dropped: float, drop_time: float) -> Array:
+    r"""By how much stamps are late after samples were lost: what follows seems to come early.
 
-    Equation: $\Delta y = \tau \dot y$ where $t > t_0$, else 0.
-    Units: the channel's a second, s, s, s -> the channel's.
-    Validity: one loss, at a time of its own along every trajectory; to first order in its length.
+    Equation: $y_\mathrm{read}(t) = y(t + \tau)$ where $t > t_0$, else $y(t)$.
+    Units: s, s, s -> s.
+    Validity: one loss, at a time of its own along every trajectory.
     Source: D. W. Allan, N. Ashby, C. C. Hodge, The science of timekeeping, Hewlett-Packard AN 1289 (1997).
     """
-    return dropped * (time > drop_time) * rate
+    return np.where(time > drop_time, -dropped, 0.0)
 
 
 CLOCK_DROPS = Sensing(
     name="clock_drops",
     port=SensingPort.STREAM,
-    equation=change,
+    equation=lateness,
     parameters=(Parameter("dropped", "s", Normal(0.0, 0.05), "time lost", (-10.0, 10.0), role="amplitude"),),
     reference="D. W. Allan, N. Ashby, C. C. Hodge, The science of timekeeping, Hewlett-Packard AN 1289 (1997)",
     each_trial=True,

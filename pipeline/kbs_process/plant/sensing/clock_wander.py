@@ -9,22 +9,22 @@ from kbs_process.plant.sensing.sensing import Sensing, SensingPort
 from kbs_process.signals.records import Array
 
 
-def change(time: Array, rate: Array, wander_sin: float, wander_cos: float, wander_period: float) -> Array:
-    r"""Change of a reading whose stamps are early and late by turns.
+def lateness(time: Array, wander_sin: float, wander_cos: float, wander_period: float) -> Array:
+    r"""By how much stamps are late that are early and late by turns.
 
-    Equation: $\Delta y = -(a \sin(2 \pi t / P) + b \cos(2 \pi t / P))\, \dot y$.
-    Units: s, the channel's a second, s, s, s -> the channel's.
-    Validity: one period, to first order in the deviation; its phase is a recording's own.
+    Equation: $y_\mathrm{read}(t) = y(t - a \sin(2 \pi t / P) - b \cos(2 \pi t / P))$.
+    Units: s, s, s, s -> s.
+    Validity: one period; its phase is a recording's own.
     Source: D. W. Allan, N. Ashby, C. C. Hodge, The science of timekeeping, Hewlett-Packard AN 1289 (1997).
     """
     phase = 2.0 * np.pi * time / wander_period
-    return -(wander_sin * np.sin(phase) + wander_cos * np.cos(phase)) * rate
+    return np.asarray(wander_sin * np.sin(phase) + wander_cos * np.cos(phase), dtype=np.float64)
 
 
 CLOCK_WANDER = Sensing(
     name="clock_wander",
     port=SensingPort.STREAM,
-    equation=change,
+    equation=lateness,
     parameters=(
         Parameter(
             "wander_sin", "s", Normal(0.0, 0.02), "sine of the deviation", (-10.0, 10.0), role="amplitude"

@@ -1,7 +1,8 @@
 """What a sensor or a clock does to its signal: an equation on whole arrays, and where it acts.
 
 As an effect of the plant, a sensing effect is a plain function whose argument names are its wiring, with its
-declaration beneath. It returns the change of its reading, to be added; it is linear in its amplitudes.
+declaration beneath. It returns the change of its reading, to be added, or by how many s the stamps of a clock are late;
+it is linear in its amplitudes.
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ class SensingPort(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Sensing:
-    """An equation, the port at which its value is added, and its parameters.
+    """An equation, the port at which its value acts, and its parameters.
 
     `each_trial`: its amplitudes belong to a recording, as of what drifts or hums. `whole_band`: vibration beyond the
     working band changes what it does within, as it is not linear in what it reads.

@@ -1,0 +1,190 @@
+"""Laws whose size is each recording's own, as of what drifts, hums or stamps: taken off every one, and judged there.
+
+What a clock does is no small change where vibration is fast. Its correction is made to first order, the recording
+stamped anew by it, and so on from there (Newton's method), while that takes more away.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg import cho_solve
+from scipy.stats import chi2
+
+from kbs_process.diagnosis.evenness import evenly, parts
+from kbs_process.diagnosis.finding import Tried
+from kbs_process.diagnosis.gate import Fold, Gate, whiteness
+from kbs_process.diagnosis.gls import Background, Sums, score
+from kbs_process.diagnosis.joint import Own, Standing
+from kbs_process.diagnosis.known import Known
+from kbs_process.diagnosis.plausible import oversized
+from kbs_process.diagnosis.screen import Catalogued, Found, Suspect
+from kbs_process.diagnosis.signature import stamped
+from kbs_process.diagnosis.stamps import late_by, set_right
+from kbs_process.diagnosis.thresholds import FALSE_ALARM
+from kbs_process.diagnosis.view import View
+from kbs_process.signals.records import Array
+
+_PASSES = 8  # of a clock's correction, at most
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Off:
+    """A law taken off one recording."""
+
+    measured: Array  # (n, c) without it
+    left: Array  # (rows,) whitened, that it leaves
+    amplitude: Array  # (m,)
+    sigma: Array  # (m,)
+    rank: int
+    gain: float  # of -2 log likelihood
+    background: Background  # of the recording with it
+
+
+def taken_off(found: Found, view: View) -> Tried:
+    """A suspect of a view taken off each recording, and the gate's verdict: every one has to show it all through."""
+    suspect, known = found.suspect, view.standing.known
+    experiment = known.experiment
+    references = {experiment.reference(k) for k in range(len(experiment.repeats))}
+    plain = {drive: view.bench.signatures([suspect], drive) for drive in references}
+    off = _each(suspect, known, plain)
+    folds, strengths = [], []
+    for k, one in enumerate(off):
+        if experiment.trials[k].role == "calibration":
+            continue
+        gained = _even_gain(one, k, known)
+        strengths.append(gained)
+        rows = float(known.rows[k])
+        before, after = (float(z @ z) / rows for z in (known.residual[k], one.left))
+        bound = float(chi2.isf(FALSE_ALARM / suspect.places, max(one.rank, 1)))
+        folds.append(Fold(experiment.trials[k].name, before, after, gained - bound))
+    worse = tuple(fold.trial for fold in folds if fold.gain <= 0.0)
+    reasons = (f"{', '.join(worse)} do not show it, all through",) if worse else ()
+    if len(folds) < 2:
+        reasons = (*reasons, "one recording alone cannot show that it comes again")
+    standing = _without(view.standing, off)
+    verdict = Gate(
+        not reasons,
+        tuple(folds),
+        bool(experiment.held_out),
+        float(np.sqrt(min(strengths, default=0.0))),
+        (whiteness(known), whiteness(standing.known)),
+        reasons,
+    )
+    sizes = [
+        max(((one.amplitude[i], one.sigma[i]) for one in off), key=lambda number: abs(number[0]))
+        for i in range(len(suspect.amplitudes))
+    ]
+    told = replace(found.score, amplitude=np.concatenate([off[k].amplitude for k in experiment.fit]))
+    return Tried(
+        replace(found, score=told),
+        standing,
+        verdict.but(*oversized(suspect, *zip(*sizes, strict=True))),
+        view.screening,
+        Own((), ()),
+    )
+
+
+def taken_off_again(chosen: Tried) -> Tried:
+    """The law of a clock, taken off recordings once more: of those that it was taken off, what known numbers leave now.
+
+    They have settled since, and what they had made up for is the clock's.
+    """
+    suspect, known = chosen.found.suspect, chosen.standing.known
+    assert isinstance(suspect, Catalogued)
+    experiment = known.experiment
+    references = {experiment.reference(k) for k in range(len(experiment.repeats))}
+    off = _each(suspect, known, {drive: suspect.outputs(drive) for drive in references})
+    standing = _without(chosen.standing, off)
+    if not standing.known.cost < known.cost:
+        return chosen
+    more = np.concatenate([off[k].amplitude for k in experiment.fit])
+    told = replace(chosen.found.score, amplitude=chosen.found.score.amplitude + more)
+    return replace(chosen, found=replace(chosen.found, score=told), standing=standing)
+
+
+def _each(suspect: Suspect, known: Known, plain: Mapping[int, Array]) -> list[_Off]:
+    """A law taken off every recording; `plain` is what a unit of its amplitudes does, by reference drive."""
+    precision = np.where(np.isfinite(known.parameters.sigma), known.sigma, np.inf) ** -2.0
+    found = []
+    for k, trial in enumerate(known.experiment.trials):
+        reference = known.experiment.reference(trial.trajectory)
+        whitened = known.metric[k](plain[reference])
+        J = known.jacobian(k) if reference in known.slopes else np.zeros((len(whitened), len(precision)))
+        background = Background.of({k: known.residual[k]}, {k: J}, precision)
+        own = score(background, Sums.over(background, {k: whitened}))
+        first = _Off(
+            trial.measured - (plain[reference] @ own.amplitude) * trial.valid[:, None],
+            known.residual[k] - whitened @ own.amplitude,
+            own.amplitude,
+            np.sqrt(np.diag(own.covariance)),
+            own.rank,
+            own.gain,
+            background,
+        )
+        if isinstance(suspect, Catalogued) and suspect.of_clock:
+            first = _by_the_clock(suspect, known, k, whitened, precision, first)
+        found.append(first)
+    return found
+
+
+def _by_the_clock(
+    suspect: Catalogued, known: Known, k: int, whitened: Array, precision: Array, first: _Off
+) -> _Off:
+    """A recording stamped by a clock that is right: `first` to first order, then from where each correction leads."""
+    experiment = known.experiment
+    trial = experiment.trials[k]
+    late = suspect.late(experiment.reference(trial.trajectory))
+    acted = stamped(suspect.candidate.site, experiment.channels, suspect.scene.hypothesis.rig)
+    shown = known.shown[trial.drive].values[:, acted]
+    start, J = first.background.z[k], first.background.J[k]
+    best, amplitude = first, first.amplitude
+    least = np.inf
+    for _ in range(_PASSES):
+        values, there = set_right(trial.measured[:, acted], trial.valid, experiment.dt, late @ amplitude)
+        measured = trial.measured.copy()
+        # Beside what is lost, and at the ends, by what is predicted.
+        instead = measured[:, acted] - late_by(shown, experiment.dt, late @ amplitude)
+        measured[:, acted] = np.where(there[:, None], values, instead) * trial.valid[:, None]
+        left = start + known.metric[k](measured - trial.measured)
+        here = Background.of({k: left}, {k: J}, precision)
+        height = _height(here, k)
+        if not height < least:
+            break
+        gain = _height(first.background, k) - height
+        best, least = replace(best, measured=measured, left=left, amplitude=amplitude, gain=gain), height
+        amplitude = amplitude + score(here, Sums.over(here, {k: whitened})).amplitude
+    return best
+
+
+def _height(background: Background, k: int) -> float:
+    """-2 log likelihood of a recording's residual, known numbers refitted to first order."""
+    z = background.z[k]
+    return float(z @ z - (background.scale * (background.J[k].T @ z)) @ background.shift)
+
+
+def _without(standing: Standing, off: list[_Off]) -> Standing:
+    """What is believed of recordings from which a law was taken off."""
+    known = standing.known
+    trials = [
+        replace(trial, measured=one.measured) for trial, one in zip(known.experiment.trials, off, strict=True)
+    ]
+    changed = replace(
+        known,
+        experiment=replace(known.experiment, trials=tuple(trials)),
+        residual=tuple(one.left for one in off),
+    )
+    return replace(standing, known=changed)
+
+
+def _even_gain(one: _Off, trial: int, known: Known) -> float:
+    """Gain of a law in one trial, or the square of its sigmas off zero by what parts of it ask for, if that is less."""
+    background = one.background
+    J = background.J[trial] * background.scale
+    done = background.z[trial] - one.left
+    done = done - J @ cho_solve(background.factor, J.T @ done)
+    left = background.z[trial] - J @ background.shift - done
+    own_parts = parts(known.experiment, trial, known.metric[trial], done, left)
+    return min(one.gain, max(evenly(known.experiment, {trial: own_parts}), 0.0) ** 2)

@@ -1,0 +1,95 @@
+"""Clocks whose stamps are late: exactly what they read, and back, where vibration is too fast for first order."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import bench
+import numpy as np
+import pytest
+from test_rounds import candidate, standing
+
+from kbs_process.diagnosis.each_recording import taken_off, taken_off_again
+from kbs_process.diagnosis.joint import Standing
+from kbs_process.diagnosis.scene import Scene
+from kbs_process.diagnosis.screen import Bench, Catalogued, screen
+from kbs_process.diagnosis.stamps import late_by, set_right, slope
+from kbs_process.diagnosis.view import View
+from kbs_process.signals.records import Array
+
+DT = 0.05
+T = np.arange(1200) * DT
+INSIDE = slice(60, -60)
+LATE = 0.04 * np.sin(2.0 * np.pi * T / 25.0)
+
+
+def vibration(t: Array) -> Array:
+    """(n, 2) of a transducer's resonance, on a slow load and on none."""
+    fast = np.sin(2.0 * np.pi * 6.3 * t)
+    return np.stack([5.0 * np.sin(0.3 * t) + fast, fast], axis=1)
+
+
+def test_what_is_late_reads_what_was_at_the_resonance_too() -> None:
+    read = vibration(T) + late_by(vibration(T), DT, LATE)
+    np.testing.assert_allclose(read[INSIDE], vibration(T - LATE)[INSIDE], atol=3e-3)
+    first_order = vibration(T) - LATE[:, None] * slope(vibration(T), DT)
+    assert np.abs(first_order - vibration(T - LATE))[INSIDE].max() > 0.5
+
+
+def test_slopes_are_right_up_to_the_end_of_the_band() -> None:
+    fast = 2.0 * np.pi * 6.3 * np.cos(2.0 * np.pi * 6.3 * T)
+    np.testing.assert_allclose(
+        slope(vibration(T), DT)[INSIDE, 1], fast[INSIDE], atol=0.02 * np.abs(fast).max()
+    )
+
+
+@pytest.mark.parametrize("late", [LATE, np.where(T > 31.0, -0.08, 0.0), np.full(len(T), 0.06)])
+def test_a_recording_is_set_right(late: Array) -> None:
+    read = vibration(T) + late_by(vibration(T), DT, late)
+    valid = np.ones(len(T), dtype=np.bool_)
+    valid[300:310] = False
+    right, there = set_right(read * valid[:, None], valid, DT, late)
+    assert not there[301:308].any() and there[320:].mean() > 0.96
+    # Where the clock jumps some of what was due has two stamps, or none.
+    jump = np.abs(T - 31.0) < 0.8 if np.ptp(np.diff(late)) > 0.05 else np.zeros(len(T), dtype=np.bool_)
+    good = there & ~jump
+    good[:60] = good[-60:] = good[290:320] = False
+    np.testing.assert_allclose(right[good], vibration(T)[good], atol=0.02)
+
+
+def test_a_clock_is_taken_off_exactly() -> None:
+    """It wanders by more than a radian of what rings: to first order most of that is left."""
+    made = bench.experiment(bench.rig(), ("fit", "fit", "held-out"), 9, seconds=40.0)
+    t = np.arange(800) * DT
+    ringing = np.sin(2.0 * np.pi * 6.3 * t)[:, None] * np.r_[np.full(6, 0.2), 0.0, 0.0]
+    late = 0.03 * np.sin(2.0 * np.pi * t / 25.0)
+    trials = []
+    for trial in made.trials:
+        whole = trial.measured + ringing
+        whole[:, :6] += late_by(whole[:, :6], DT, late)
+        trials.append(replace(trial, measured=whole * trial.valid[:, None]))
+    # What rings is predicted: the clock alone is wrong.
+    here = standing(replace(made, trials=tuple(trials)))
+    known = here.known
+    rung = {0: replace(here.predicted[0], values=here.predicted[0].values + ringing)}
+    residual = tuple(
+        m(t.measured - rung[0].values) for m, t in zip(known.metric, known.experiment.trials, strict=True)
+    )
+    known = replace(known, shown=rung, residual=residual)
+    here = Standing(known, rung, {})
+    scene = Scene.of(known.experiment, here.hypothesis, rung)
+    suspect = Catalogued(candidate("clock_wander", "wrench", wander_period=25.0), scene)
+    tried = Bench.of(known, scene)
+    screening = screen(tried, [suspect])
+    told = taken_off(screening.candidates[0], View(here, tried, scene, (suspect,), screening))
+    assert told.gate.passed, told.gate.reasons
+    sizes = told.found.score.amplitude.reshape(2, 2)
+    np.testing.assert_allclose(sizes, [[0.03, 0.0]] * 2, atol=3e-4)
+    unit, rows = known.metric[0](tried.signatures([suspect], 0)), np.asarray(known.rows)
+    first_order = known.residual[0] - unit @ screening.candidates[0].score.amplitude[:2]
+    assert first_order @ first_order > 10.0 * told.standing.known.chi2[0]
+    assert all(told.standing.known.chi2 < 1.5 * rows)
+    # What the first correction has left undone is taken off beside numbers as they are then.
+    again = taken_off_again(told)
+    assert again.standing.known.cost <= told.standing.known.cost
+    np.testing.assert_allclose(again.found.score.amplitude.reshape(2, 2), sizes, atol=1e-4)
