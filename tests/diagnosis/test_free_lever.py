@@ -13,6 +13,8 @@ from kbs_process.diagnosis.experiment import Experiment
 from kbs_process.diagnosis.families import port_word
 from kbs_process.diagnosis.hypothesis import Hypothesis, predict
 from kbs_process.diagnosis.joint import Standing, with_extra
+from kbs_process.diagnosis.leaders import leaders
+from kbs_process.diagnosis.parameters import known_parameters, prior
 from kbs_process.diagnosis.places import points_of
 from kbs_process.diagnosis.ranges import Ranges
 from kbs_process.diagnosis.scene import Scene
@@ -20,11 +22,13 @@ from kbs_process.diagnosis.screen import Bench, Catalogued, screen
 from kbs_process.diagnosis.shapes import bettered
 from kbs_process.diagnosis.suspects import Candidate, candidates
 from kbs_process.diagnosis.tryout import extra_of, identity
+from kbs_process.diagnosis.view import View
 from kbs_process.plant.attach import attach
 from kbs_process.plant.effect import Effect
 from kbs_process.plant.effects import select
 from kbs_process.plant.effects.air_drag import AIR_DRAG
 from kbs_process.plant.effects.bungee import BUNGEE
+from kbs_process.plant.predict import Schedule
 from kbs_process.stages.output_error import Scalar
 
 DRAG, POWER, POINT = 0.8, 1.75, np.array([0.3, -0.1, 0.12])  # N at 0.01 m/s, 1, m
@@ -83,3 +87,36 @@ def test_a_cord_that_nobody_stated_is_found_wherever_its_anchor_is() -> None:
     for name, value, sigma in zip(after.names, after.value, after.sigma, strict=True):
         print(f"{name}: {value:.4f} +- {sigma:.4f}")
     assert after.level < 1.1 < 5.0 < here.known.level
+
+
+def wide(seconds: float) -> Schedule:
+    """Both joints swing by half a radian."""
+    t = np.arange(0.0, seconds + 0.1, 0.1)
+    rate = np.stack([0.12 * np.sin(2 * np.pi * t / 16.0), -0.1 * np.sin(2 * np.pi * t / 12.0)], axis=1)
+    position = np.array([-0.1, 1.3]) + 0.1 * np.cumsum(rate, axis=0)
+    return Schedule(t, position, rate, field=100.0 * position)
+
+
+def test_a_cord_whose_pull_is_a_weight_to_known_numbers_is_a_lead(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Wherever its grid has it, more than 99 % of what it does is masses' and levers'; what is left is its way's."""
+    monkeypatch.setattr(bench, "schedule", wide)
+    cord = {"stiffness": 6.0, "free_length": 0.4, "anchor_x": 0.3, "anchor_y": -0.2, "anchor_z": 1.2}
+    made, here = pulled(BUNGEE, cord)
+    known = known_parameters(made.rig, made.effects)
+    stated = np.isfinite(prior(made.rig, made.rig, made.effects, known).sigma)
+    free = tuple(one for one, told in zip(known, stated, strict=True) if told)  # all but phases
+    here = bench.standing(here.known.experiment, free)
+    scene = Scene.of(here.known.experiment, here.hypothesis, here.predicted)
+    tried = Bench.of(here.known, scene)
+    every = tuple(
+        Catalogued(one, scene)
+        for one in candidates(made.rig, made.effects, Ranges({}), (), made.channels)
+        if one.name in ("bungee", "tether", "air_drag")
+    )
+    view = View(here, tried, scene, every, screen(tried, every))
+    covered = next(one for one in view.screening.candidates if one.suspect.family == ("bungee", "el"))
+    assert covered.score.rank == 0 and not covered.significant
+    first, _ = leaders(view)
+    print([(one.suspect.family, one.score.gain) for one in first])
+    assert first[0].suspect.family == ("bungee", "el")
+    assert first[0].score.gain > 2.0 * max(one.score.gain for one in view.able)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -19,7 +20,7 @@ from kbs_process.diagnosis.gls import Sums, score
 from kbs_process.diagnosis.hypothesis import Hypothesis, predict
 from kbs_process.diagnosis.joint import Own, Standing, with_extra
 from kbs_process.diagnosis.leaders import gated
-from kbs_process.diagnosis.outcome import Identity, Refused
+from kbs_process.diagnosis.outcome import Identity
 from kbs_process.diagnosis.race import own_of
 from kbs_process.diagnosis.remains import detected
 from kbs_process.diagnosis.rivals import probabilities, rivalry
@@ -272,7 +273,7 @@ def test_the_second_law_that_passed_is_believed_where_the_first_falls(
     monkeypatch.setattr(rounds.View, "of", lambda _: seen)
     monkeypatch.setattr(rounds, "_place", lambda *_: None)
     monkeypatch.setattr(rounds, "named_first", list)
-    monkeypatch.setattr(rounds, "_passed", lambda *_: ([first, second], []))
+    monkeypatch.setattr(rounds, "_passed", lambda *_: iter([[first, second]]))
     monkeypatch.setattr(rounds, "_settled", lambda one, *_: replace(one, gate=replace(one.gate, reasons=())))
     floor, simulate = declared(cable.known.experiment), bench.serial(cable.known.experiment)
     for fallen, kept in ((("harness",), "ground_cable"), (("ground_cable",), "harness")):
@@ -284,6 +285,10 @@ def test_the_second_law_that_passed_is_believed_where_the_first_falls(
         done = rounds._round(cable, floor, simulate, [])
         assert done.accepted is not None and done.accepted.find.identity.law == kept
         assert [one.identity.law for one in done.refused] == ([] if kept == "ground_cable" else list(fallen))
+    # Those that are each recording's own are looked at where none of the others stands.
+    monkeypatch.setattr(rounds, "_passed", lambda *_: iter([[first], [second]]))
+    done = rounds._round(cable, floor, simulate, [])
+    assert done.accepted is not None and done.accepted.find.identity.law == "harness"
     monkeypatch.setattr(rounds, "_stands_in", lambda *_: ("falls",))
     assert rounds._round(cable, floor, simulate, []).accepted is None
 
@@ -296,9 +301,9 @@ def test_what_numbers_gain_where_they_were_drawn_back_is_no_law_s(
     back, alone = (_lower(cable, share) for share in (0.9, 0.6))
     asked: list[tuple[Standing, Standing]] = []
 
-    def none_passed(view: SimpleNamespace, before: Standing, *_: object) -> tuple[list[Tried], list[Refused]]:
+    def none_passed(view: SimpleNamespace, before: Standing, *_: object) -> Iterator[list[Tried]]:
         asked.append((view.standing, before))
-        return [], []
+        yield from ()
 
     monkeypatch.setattr(rounds, "drawn_back", lambda *_: back)
     monkeypatch.setattr(rounds, "resettled", lambda one, *_, leaps: alone if one is back else one)

@@ -13,6 +13,7 @@ import numpy as np
 from scipy.linalg import cho_solve
 from scipy.stats import chi2
 
+from kbs_process.diagnosis.clocks import by_a_right_clock
 from kbs_process.diagnosis.evenness import evenly, parts
 from kbs_process.diagnosis.finding import Tried
 from kbs_process.diagnosis.gate import Fold, Gate, whiteness
@@ -21,8 +22,6 @@ from kbs_process.diagnosis.joint import Own, Standing
 from kbs_process.diagnosis.known import Known
 from kbs_process.diagnosis.plausible import oversized
 from kbs_process.diagnosis.screen import Catalogued, Found, Suspect
-from kbs_process.diagnosis.signature import stamped
-from kbs_process.diagnosis.stamps import late_by, set_right
 from kbs_process.diagnosis.thresholds import FALSE_ALARM
 from kbs_process.diagnosis.view import View
 from kbs_process.signals.records import Array
@@ -137,18 +136,11 @@ def _by_the_clock(
     experiment = known.experiment
     trial = experiment.trials[k]
     late = suspect.late(experiment.reference(trial.trajectory))
-    acted = stamped(suspect.candidate.site, experiment.channels, suspect.scene.hypothesis.rig)
-    shown = known.shown[trial.drive].values[:, acted]
-    start, J = first.background.z[k], first.background.J[k]
+    J = first.background.J[k]
     best, amplitude = first, first.amplitude
     least = np.inf
     for _ in range(_PASSES):
-        values, there = set_right(trial.measured[:, acted], trial.valid, experiment.dt, late @ amplitude)
-        measured = trial.measured.copy()
-        # Beside what is lost, and at the ends, by what is predicted.
-        instead = measured[:, acted] - late_by(shown, experiment.dt, late @ amplitude)
-        measured[:, acted] = np.where(there[:, None], values, instead) * trial.valid[:, None]
-        left = start + known.metric[k](measured - trial.measured)
+        measured, left = by_a_right_clock(suspect, known, k, late @ amplitude)
         here = Background.of({k: left}, {k: J}, precision)
         height = _height(here, k)
         if not height < least:

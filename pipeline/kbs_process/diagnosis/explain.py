@@ -3,7 +3,8 @@
 Physics that was left out pulls numbers away from where they are, and a search that follows it ends where neither they
 nor what is left are right. So all numbers stay within a few sigmas of their priors at first. If something is left, and
 numbers set free explain it, then parameters are off; else what is left is looked at beside the numbers that stayed.
-Numbers that had to go so far that a law might be likelier are compared with one: those that stayed are kept for it.
+Numbers that had to go so far that a law might be likelier are compared with one: those that stayed are kept for it, or
+those that were found beside the error of a clock.
 
 Repeats that were not driven alike, as in a closed loop, differ by what the model makes of their drives too: their floor
 is estimated again as soon as the model is about right.
@@ -23,7 +24,9 @@ from kbs_process.diagnosis.experiment import Experiment
 from kbs_process.diagnosis.floor import Floor, estimate, smaller
 from kbs_process.diagnosis.hypothesis import Hypothesis, Prediction, Simulate
 from kbs_process.diagnosis.known import MOVED, Known, confined, leapt, refit
+from kbs_process.diagnosis.mistimed import by_another_clock
 from kbs_process.diagnosis.parameters import prior
+from kbs_process.diagnosis.remains import searched
 from kbs_process.diagnosis.search import LITTLE, SLIGHT
 from kbs_process.diagnosis.thresholds import EXPLAINED, LEAST_RHO, MOST
 from kbs_process.signals.records import Array
@@ -40,7 +43,9 @@ class Explained:
 
     floor: Floor
     known: Known
-    near: Known | None  # numbers that stayed near their priors, where `known` are implausibly far from theirs
+    # Numbers that stayed near their priors, where `known` are implausibly far from theirs, or were refitted beside the
+    # error of a clock.
+    near: Known | None
     after: Detection  # with the refitted numbers, over the recordings that these were fitted to
 
 
@@ -90,6 +95,11 @@ def explain(experiment: Experiment, simulate: Simulate, task: Task) -> Explained
         # Without any being off, searches end as far from each other.
         if free.cost < stood.known.cost - LEAST_RHO**2 and not _unseen(freed, floor) > _unseen(stood, floor):
             stood = freed
+    if near is None and stood.after.left and stood.known.gross and searched(experiment):
+        with task("Refitting the known parameters beside a clock that may be wrong"):
+            beside = by_another_clock(stood.known, floor, simulate, NEAR)
+        if beside is not None:
+            near = replace(beside, chi2_before=_squares(beside, begun))
     known = replace(stood.known, chi2_before=_squares(stood.known, begun))
     return Explained(floor, known, near, stood.after)
 

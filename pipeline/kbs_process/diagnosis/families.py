@@ -87,6 +87,7 @@ FAMILIES: dict[str, str] = {
     "encoder_profile": UNNAMED,
     "clock_offset": "offset",
     "clock_skew": "skew",
+    "clock_warmup": "skew",
     "clock_drops": "drops",
     "clock_wander": "wander",
     "controller_gain": "gain",

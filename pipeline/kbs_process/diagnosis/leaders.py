@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
+from typing import TypeGuard
 
 import numpy as np
 
+from kbs_process.diagnosis.clocks import timed
 from kbs_process.diagnosis.curves import CurveSuspect
 from kbs_process.diagnosis.dissipation import drives, pushes
 from kbs_process.diagnosis.each_recording import taken_off, taken_off_again
@@ -32,6 +34,7 @@ from kbs_process.diagnosis.thresholds import (
     LAW_VARIANCE,
     LEAD,
     LEADERS,
+    MISTIMED,
     MOST,
     REREAD,
     SECOND,
@@ -40,7 +43,7 @@ from kbs_process.diagnosis.thresholds import (
 )
 from kbs_process.diagnosis.tryout import extra_of, identity, in_plant
 from kbs_process.diagnosis.view import View
-from kbs_process.plant.effect import Effect
+from kbs_process.plant.effect import Effect, Port
 from kbs_process.signals.records import Array
 
 
@@ -55,12 +58,14 @@ def leaders(view: View, among: Callable[[Found], bool] = lambda _: True) -> tupl
     best: dict[tuple[str, ...], Found] = {}
     for found in filter(among, view.able):
         best.setdefault(_way(found), found)
-    able = list(best.values())[:SHAPED]
-    if not able:
+    every = list(best.values())
+    if not every:
         return [], []
-    least = (1.0 - LEAD) * max(found.score.gain for found in able) / BENT if view.ordered else 0.0
-    worth = [found for found in able if found.score.gain >= least]
-    shaped = [*side_by_side(partial(bettered, view.bench), worth), *_covered(view, among)]
+    most = max(found.score.gain for found in every)
+    able = [*every[:SHAPED], *(one for one in every[SHAPED:] if _mistimed(one, most))]
+    least = (1.0 - LEAD) * most / BENT if view.ordered else 0.0
+    worth = [found for found in able if found.score.gain >= least or _mistimed(found, most)]
+    shaped = [*side_by_side(partial(_shaped, view, most), worth), *_covered(view, among)]
     able = [*(with_orders(view, one) for one in shaped), *(one for one in able if one not in worth)]
     able = sorted(filter(possible, able), key=lambda found: -found.log_evidence)
     if not able:
@@ -72,20 +77,41 @@ def leaders(view: View, among: Callable[[Found], bool] = lambda _: True) -> tupl
     return first, [found for found in able if found not in first][: SHAPED if gross else SECOND]
 
 
+def _shaped(view: View, most: float, found: Found) -> Found:
+    """A suspect at its best shape, or its best size where its signature is another one at every size."""
+    if _mistimed(found, most):
+        return timed(view.bench, found, [one for one in view.suspects if _same(one, found.suspect)])
+    return bettered(view.bench, found)
+
+
+def _mistimed(found: Found, most: float) -> bool:
+    """Whether it is the error of a clock, the same in all recordings, that does some of the `most` that any does."""
+    clock = isinstance(found.suspect, Catalogued) and found.suspect.of_clock and not found.suspect.each_trial
+    return clock and found.score.gain >= MISTIMED * most
+
+
 def _covered(view: View, among: Callable[[Found], bool]) -> list[Found]:
-    """Forces anywhere that known numbers take up wherever they were tried, and that do more than any able one."""
+    """Forces of the laboratory that known numbers take up wherever they were tried, and that do more than any able one.
+
+    They are looked at where such a force does much of what there is to do.
+    """
     most = max(found.score.gain for found in view.able)
-    hidden = []
-    for found in view.screening.candidates:
-        suspect = found.suspect
-        if not (isinstance(suspect, Catalogued) and found.score.rank == 0 and among(found)):
-            continue
-        if isinstance(suspect.candidate.effect, Effect) and suspect.candidate.effect.anywhere:
-            grid = [
-                one for one in view.suspects if isinstance(one, Catalogued) and one.family == suspect.family
-            ]
-            hidden.append(uncovered(view.bench, found, grid, least=MOST * most))
-    return [one for one in hidden if one is not None and one.score.gain > most]
+    if not any(_pulls(found) and found.score.gain >= MOST * most for found in view.able):
+        return []
+    hidden = [
+        uncovered(view.bench, found, [one for one in view.suspects if _same(one, found.suspect)])
+        for found in view.screening.candidates
+        if _pulls(found) and found.score.rank == 0 and among(found)
+    ]
+    return [one for one in hidden if one.score.gain > most]
+
+
+def _pulls(found: Found) -> bool:
+    return isinstance(found.suspect, Catalogued) and found.suspect.candidate.port is Port.EXTERNAL_FORCE
+
+
+def _same(one: Suspect, other: Suspect) -> TypeGuard[Catalogued]:
+    return isinstance(one, Catalogued) and one.family == other.family
 
 
 def various(chosen: Sequence[Found]) -> list[Found]:
@@ -227,14 +253,11 @@ def _told_anew(chosen: Tried, before: Standing, floor: Floor, simulate: Simulate
 
 
 def _set_anew(chosen: Tried, before: Standing, floor: Floor, simulate: Simulate) -> Tried:
-    """The law of a clock with what it does at the size that it was found to have, if that leaves less."""
-    standing, found = chosen.standing, chosen.found
-    assert isinstance(found.suspect, Catalogued)
-    size = standing.known.value[[standing.known.names.index(name) for name in chosen.own.amplitudes]]
-    found = replace(
-        found, suspect=replace(found.suspect, size=float(size[0])), score=replace(found.score, amplitude=size)
-    )
-    view = View.of(bare(standing, chosen.own, simulate), lambda _: False, linear=False)
+    """The law of a clock at the size that it has beside the known numbers as they are, if that leaves less."""
+    standing, suspect = chosen.standing, chosen.found.suspect
+    view = View.of(bare(standing, chosen.own, simulate), lambda one: _same(one, suspect), linear=False)
+    here = next(iter(view.screening.candidates))
+    found = timed(view.bench, here, [one for one in view.suspects if _same(one, suspect)])
     new = with_extra(view.standing, extra_of(found, view.standing, view.bench, view.scene), simulate)
     new = resettled(new, floor, simulate, leaps=0)
     own = own_of(found, before, new)

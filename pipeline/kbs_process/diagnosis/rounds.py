@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -164,13 +164,31 @@ def _round(standing: Standing, floor: Floor, simulate: Simulate, accepted: Seque
         over = bool(accepted) and not _goes_on(standing, floor)
     view = View.of(seen)
     place = _place(seen, floor, view.scene)
-    # Beside the numbers that it was looked for from first; once all have settled, beside those that leave least.
-    passed, refused = ([], []) if over else _passed(view, standing, floor, simulate, accepted)
-    if not passed:
-        return _Round(None, standing, seen, view.screening, tuple(refused), place)
+    refused: list[Refused] = []
+    for passed in () if over else _passed(view, standing, floor, simulate, accepted, refused):
+        if found := _accepted(passed, view, standing, place, floor, simulate, accepted, refused):
+            return _Round(found, found.tried.standing, seen, view.screening, tuple(refused), place)
+    return _Round(None, standing, seen, view.screening, tuple(refused), place)
+
+
+def _accepted(
+    passed: Sequence[Tried],
+    view: View,
+    standing: Standing,
+    place: Place | None,
+    floor: Floor,
+    simulate: Simulate,
+    accepted: Sequence[Accepted],
+    refused: list[Refused],
+) -> Accepted | None:
+    """The likeliest of some laws that passed which passes once more with all numbers settled beside it, if one does.
+
+    Beside the numbers that it was looked for from first; once all have settled, beside those that leave least.
+    """
     if names := unnamed(passed, [one.identity for one in refused], view):
         more, less = tried(names, view, view.standing, floor, simulate)
-        passed, refused = [*passed, *more], [*refused, *less]
+        passed = [*passed, *more]
+        refused += less
     passed = continued(named_first(passed), [one.find.identity for one in accepted])
     fitted = [_each_time(one) for one in passed]
     chances = probabilities([one.standing.known for one in passed], view.bench.background.rows, fitted)
@@ -187,10 +205,8 @@ def _round(standing: Standing, floor: Floor, simulate: Simulate, accepted: Seque
             [told, *(passed[k] for k in others)], 0, np.array([1.0 - float(chance.sum()), *chance]), standing,
             place, [one.identity for one in refused],
         )  # fmt: skip
-        return _Round(
-            Accepted(told, find, standing), told.standing, seen, view.screening, tuple(refused), place
-        )
-    return _Round(None, standing, seen, view.screening, tuple(refused), place)
+        return Accepted(told, find, standing)
+    return None
 
 
 def _settled(one: Tried, before: Standing, floor: Floor, simulate: Simulate) -> Tried:
@@ -282,32 +298,42 @@ def _law(one: Tried) -> Identity:
 
 
 def _passed(
-    view: View, before: Standing, floor: Floor, simulate: Simulate, accepted: Sequence[Accepted]
-) -> tuple[list[Tried], list[Refused]]:
-    """Suspects of a view that passed the gate, and those that did not.
+    view: View,
+    before: Standing,
+    floor: Floor,
+    simulate: Simulate,
+    accepted: Sequence[Accepted],
+    refused: list[Refused],
+) -> Iterator[list[Tried]]:
+    """Suspects of a view that passed the gate; then, if none of these stands, those that are each recording's own.
 
-    Of those that passed, the ones that leave less already than what was believed `before`, if there are any.
+    Of the first the ones that leave less already than what was believed `before`, if there are any. Those that did not
+    pass are noted.
     """
     passed: list[Tried] = []
-    refused: list[Refused] = []
     there = detected(before, floor, before.known.experiment.fit)
     if reason := promises_little(view, there):
-        found = view.able[0]
-        return [], [Refused(identity(found.suspect), found.score.rho_eff, (reason,))]
+        refused.append(Refused(identity(view.able[0].suspect), view.able[0].score.rho_eff, (reason,)))
+        return
     for found in view.able:
         if reasons := in_the_shade(found, accepted):
             refused.append(Refused(identity(found.suspect), found.score.rho_eff, reasons))
     first, others = leaders(view, lambda found: not in_the_shade(found, accepted))
     for chosen in (first, *([found] for found in others)):
         more, less = tried(chosen, view, view.standing, floor, simulate)
-        passed, refused = [*passed, *more], [*refused, *less]
+        passed = [*passed, *more]
+        refused += less
         if less_is_left := [one for one in passed if one.standing.known.cost < before.known.cost]:
-            return less_is_left, refused
-    if not passed and (chosen := view.unrepeated[:SECOND]):
+            passed = less_is_left
+            break
+    if passed:
+        yield passed
+    if chosen := view.unrepeated[:SECOND]:
         # What seemed to do nearly as well and to come again did not stand.
-        passed, less = tried(chosen, view, view.standing, floor, simulate)
-        refused = [*refused, *less]
-    return passed, refused
+        more, less = tried(chosen, view, view.standing, floor, simulate)
+        refused += less
+        if more:
+            yield more
 
 
 def _place(standing: Standing, floor: Floor, scene: Scene) -> Place | None:

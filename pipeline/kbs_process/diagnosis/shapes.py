@@ -136,10 +136,9 @@ def bettered(bench: Bench, found: Found) -> Found:
     return replace(found, suspect=best, score=own, log_evidence=found.log_evidence + 0.5 * gained)
 
 
-def uncovered(bench: Bench, found: Found, grid: Sequence[Catalogued], *, least: float) -> Found | None:
+def uncovered(bench: Bench, found: Found, grid: Sequence[Catalogued]) -> Found:
     """A suspect that known numbers take up on its `grid`, at the shape with which it does most beyond all that they do.
 
-    None, if it does less than the `least` everywhere on its grid.
 
     Most of what a cord does that carries weight is a weight. What is left, as its pull and its way change, is none, and
     far less than a hundredth: the linear plant cannot tell it from its own errors. So it is a lead, and the plant's to
@@ -147,8 +146,6 @@ def uncovered(bench: Bench, found: Found, grid: Sequence[Catalogued], *, least: 
     """
     scored = zip(grid, _scores(bench, grid), strict=True)
     starts = sorted(scored, key=lambda end: -_whole(*end))[:_STARTS]
-    if not _whole(*starts[0]) >= least:
-        return None
     best, own = max((_descended(bench, start, _whole) for start, _ in starts), key=lambda end: _whole(*end))
     all_of_it = replace(own, gain=own.whole_gain, rank=own.whole_rank, amplitude=own.whole)
     gained = own.whole_gain - found.score.gain
@@ -258,6 +255,11 @@ def standing_still(suspect: Catalogued, values: Sequence[float]) -> tuple[str, .
 def _at(suspect: Catalogued, free: Sequence[Bend], steps: Array) -> Catalogued:
     """The suspect with its shape some steps away."""
     return _with(suspect, free, [one.moved(float(step)) for one, step in zip(free, steps, strict=True)])
+
+
+def moved(suspect: Catalogued, steps: Sequence[float]) -> Catalogued:
+    """The suspect with its shape some steps away."""
+    return _at(suspect, bends(suspect.candidate, suspect.scene.hypothesis.rig), np.asarray(steps))
 
 
 def fitted(suspect: Catalogued, values: Sequence[float]) -> Catalogued:

@@ -46,6 +46,9 @@ ORDERED: Final = 0.5  # share of the residual's excess that the best has to do f
 # Likewise where so much is left that known numbers have been pulled: there stand-ins, too, do half. Of two strong laws
 # (development) the second had 0.98 of it once the first was in the plant, and ten were simulated for it.
 MOSTLY_DONE: Final = 0.8
+# Share of what the best suspect does, to first order, from which on the error of a clock is tried at all sizes. It was
+# set on no case.
+MISTIMED: Final = 0.1
 # Sigmas of their priors within which numbers that were pulled are drawn back, before a law is looked for, or they are
 # let go again beside one: one in twenty is beyond.
 CLOSE: Final = 2.0

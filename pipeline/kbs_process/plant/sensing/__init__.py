@@ -13,6 +13,7 @@ from kbs_process.plant.sensing.clock_drops import CLOCK_DROPS
 from kbs_process.plant.sensing.clock_offset import CLOCK_OFFSET
 from kbs_process.plant.sensing.clock_skew import CLOCK_SKEW
 from kbs_process.plant.sensing.clock_wander import CLOCK_WANDER
+from kbs_process.plant.sensing.clock_warmup import CLOCK_WARMUP
 from kbs_process.plant.sensing.cross_coupling import CROSS_COUPLING
 from kbs_process.plant.sensing.drift_exponential import DRIFT_EXPONENTIAL
 from kbs_process.plant.sensing.drift_linear import DRIFT_LINEAR
@@ -51,6 +52,7 @@ SENSING: tuple[Sensing, ...] = (
     ENCODER_PROFILE,
     CLOCK_OFFSET,
     CLOCK_SKEW,
+    CLOCK_WARMUP,
     CLOCK_DROPS,
     CLOCK_WANDER,
 )

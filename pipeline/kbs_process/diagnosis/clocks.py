@@ -1,0 +1,98 @@
+"""Clocks that are wrong by any time: what recordings would be by a right one, and the size of the error that says most.
+
+To first order a clock that is late by more than a period of what rings seems to be late by little, or by nothing. So
+sizes are tried: recordings are stamped anew by each, and what that leaves is looked at beside all known numbers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.linalg import cho_solve
+from scipy.optimize import minimize_scalar
+
+from kbs_process.diagnosis.known import Known
+from kbs_process.diagnosis.screen import Bench, Catalogued, Found
+from kbs_process.diagnosis.shapes import bends, moved
+from kbs_process.diagnosis.signature import stamped
+from kbs_process.diagnosis.stamps import late_by, set_right
+from kbs_process.estimation.bounded import bounded_minimum
+from kbs_process.signals.records import Array
+
+# s, the greatest lateness of a recording: nearer to each other than a third of a period of what rings.
+_TRIED = (0.01, 0.025, 0.045, 0.07, 0.1, 0.14, 0.19, 0.25)
+_NEARER = (0.5, 0.25, 0.25, 0.12)  # steps of a shape, up and down, from the best of its grid
+_STEPS = 10  # of a search between two of them
+
+
+def by_a_right_clock(suspect: Catalogued, known: Known, k: int, late: Array) -> tuple[Array, Array]:
+    """A recording (n, c) stamped by a clock that is right, and what is left (rows,); `late` (n,) s is the clock's."""
+    experiment, trial = known.experiment, known.experiment.trials[k]
+    acted = stamped(suspect.candidate.site, experiment.channels, suspect.scene.hypothesis.rig)
+    values, there = set_right(trial.measured[:, acted], trial.valid, experiment.dt, late)
+    measured = trial.measured.copy()
+    # Beside what is lost, and at the ends, by what is predicted.
+    shown = known.shown[trial.drive].values[:, acted]
+    instead = measured[:, acted] - late_by(shown, experiment.dt, late)
+    measured[:, acted] = np.where(there[:, None], values, instead) * trial.valid[:, None]
+    return measured, known.residual[k] + known.metric[k](measured - trial.measured)
+
+
+def timed(bench: Bench, found: Found, grid: Sequence[Catalogued]) -> Found:
+    """A clock's law of one amplitude, at the shape of its grid and the size that leave least beside known numbers."""
+    nothing = height_of(bench, bench.background.z)
+    suspect, size, height = min((_sized(bench, one) for one in grid), key=lambda one: one[2])
+    for steps in _NEARER if bends(suspect.candidate, suspect.scene.hypothesis.rig) else ():
+        near = [_sized(bench, moved(suspect, [one])) for one in (-steps, steps)]
+        suspect, size, height = min([(suspect, size, height), *near], key=lambda one: one[2])
+    gain = nothing - height
+    if not gain > found.score.gain:
+        return found
+    score = replace(found.score, gain=gain, amplitude=np.array([size]), rank=1)
+    more = 0.5 * (gain - found.score.gain)
+    return replace(
+        found, suspect=replace(suspect, size=size), score=score, log_evidence=found.log_evidence + more
+    )
+
+
+def _sized(bench: Bench, suspect: Catalogued) -> tuple[Catalogued, float, float]:
+    """Size of a law's amplitude that leaves least, and the height that is."""
+    experiment = bench.known.experiment
+    references = {k: experiment.reference(experiment.trials[k].trajectory) for k in bench.background.z}
+    units = {drive: suspect.late(drive)[:, 0] for drive in set(references.values())}
+    most = max(float(np.max(np.abs(unit))) for unit in units.values())
+
+    def height(late: float) -> float:
+        left = {
+            k: by_a_right_clock(suspect, bench.known, k, units[drive] * late / most)[1]
+            for k, drive in references.items()
+        }
+        return height_of(bench, left)
+
+    places = np.array([-one for one in reversed(_TRIED)] + [0.0, *_TRIED])
+    heights = [height(float(place)) for place in places]
+    best = int(np.argmin(heights))
+    low, high = places[max(best - 1, 0)], places[min(best + 1, len(places) - 1)]
+    found = minimize_scalar(height, bounds=(low, high), method="bounded", options={"maxiter": _STEPS})
+    late, least = min(
+        (float(found.x), float(found.fun)), (float(places[best]), heights[best]), key=lambda one: one[1]
+    )
+    return suspect, late / most, least
+
+
+def height_of(bench: Bench, left: Mapping[int, Array]) -> float:
+    """-2 log likelihood of residuals, all known numbers refitted to first order, beyond a constant."""
+    background = bench.background
+    parameters = bench.known.parameters
+    prior = np.where(np.isfinite(parameters.sigma), parameters.sigma, np.inf) ** -2.0
+    pull = np.where(prior > 0.0, prior * (parameters.value - bench.known.value), 0.0)
+    for k, z in left.items():
+        pull = pull + background.J[k].T @ z
+    pull = background.scale * pull
+    squares, bounded = float(sum(z @ z for z in left.values())), background.bounded
+    if bounded is None:
+        return squares - float(pull @ cho_solve(background.factor, pull))
+    x = bounded_minimum(bounded.H, pull, bounded.low, bounded.high)
+    return squares - float(2.0 * pull @ x - x @ bounded.H @ x)
