@@ -282,15 +282,15 @@ def test_the_second_law_that_passed_is_believed_where_the_first_falls(
             "_stands_in",
             lambda told, *_, no=fallen: ("falls",) if rounds._law(told).law in no else (),
         )
-        done = rounds._round(cable, floor, simulate, [])
+        done = rounds._round(cable, cable, floor, simulate, [])
         assert done.accepted is not None and done.accepted.find.identity.law == kept
         assert [one.identity.law for one in done.refused] == ([] if kept == "ground_cable" else list(fallen))
     # Those that are each recording's own are looked at where none of the others stands.
     monkeypatch.setattr(rounds, "_passed", lambda *_: iter([[first], [second]]))
-    done = rounds._round(cable, floor, simulate, [])
+    done = rounds._round(cable, cable, floor, simulate, [])
     assert done.accepted is not None and done.accepted.find.identity.law == "harness"
     monkeypatch.setattr(rounds, "_stands_in", lambda *_: ("falls",))
-    assert rounds._round(cable, floor, simulate, []).accepted is None
+    assert rounds._round(cable, cable, floor, simulate, []).accepted is None
 
 
 def test_what_numbers_gain_where_they_were_drawn_back_is_no_law_s(
@@ -316,7 +316,7 @@ def test_what_numbers_gain_where_they_were_drawn_back_is_no_law_s(
     monkeypatch.setattr(rounds, "_passed", none_passed)
     experiment = cable.known.experiment
     floor, simulate = declared(experiment), bench.serial(experiment)
-    done = rounds._round(cable, floor, simulate, [])
+    done = rounds._round(cable, back, floor, simulate, [])
     assert (done.seen, done.standing) == (back, alone)
     assert asked == [(back, alone)]
     told = rounds._diagnosed(cable.known, floor, simulate, detected(cable, floor, experiment.fit))
@@ -324,6 +324,9 @@ def test_what_numbers_gain_where_they_were_drawn_back_is_no_law_s(
     # What they are known to is told by their scatter, too.
     np.testing.assert_array_equal(told.standing.known.covariance, scattered(alone.known))
     assert told.after.ratio < told.before.ratio
+    # Numbers that nothing has pulled stay where they are.
+    rounds._diagnosed(cable.known, floor, simulate, detected(cable, floor, experiment.fit), pulled=False)
+    assert asked[-1][0].known is cable.known
 
 
 def _lower(standing: Standing, share: float) -> Standing:

@@ -259,7 +259,8 @@ def test_a_sensor_changes_its_own_channels(name: str, site: str, touched: set[in
     if name == "cross_coupling":
         np.testing.assert_array_equal(change[:, 3, 0], prediction()[:, 2])
     if name == "clock_offset":
-        np.testing.assert_allclose(change[:, 1, 0], -0.8 * np.cos(0.4 * t + 1.0), atol=1e-3)
+        away = slice(40, -40)
+        np.testing.assert_allclose(change[away, 1, 0], -0.8 * np.cos(0.4 * t + 1.0)[away], atol=2e-3)
 
 
 def test_vibration_beyond_the_working_band_takes_a_play_to_and_fro() -> None:

@@ -138,14 +138,31 @@ def test_a_coarse_encoder_reads_whole_coarse_codes() -> None:
     np.testing.assert_allclose(codes, np.rint(codes), atol=1e-6)
 
 
-def test_clocks_shift_the_reading() -> None:
-    late = READING + changed(law("clock_offset"), late=0.02)
-    np.testing.assert_allclose(late[1:], np.interp(T - 0.02, T, READING)[1:], atol=1e-4)
-    late = changed(law("clock_wander"), wander_sin=0.01, wander_cos=0.0, wander_period=40.0)
-    stamped = READING - 0.01 * np.sin(2.0 * np.pi * T / 40.0) * KNOWN["rate"]
-    np.testing.assert_allclose(READING + late, stamped, atol=1e-12)
+def test_clocks_are_late() -> None:
+    np.testing.assert_array_equal(changed(law("clock_offset"), late=0.02), 0.02)
+    skew = changed(law("clock_skew"), skew=1e-3)
+    np.testing.assert_allclose(skew, 1e-3 * (T - T.mean()), atol=1e-15)
+    wander = changed(law("clock_wander"), wander_sin=0.01, wander_cos=0.0, wander_period=40.0)
+    np.testing.assert_allclose(wander, 0.01 * np.sin(2.0 * np.pi * T / 40.0), atol=1e-15)
     dropped = changed(law("clock_drops"), dropped=0.02, drop_time=50.0)
-    assert not dropped[T <= 50.0].any() and dropped[T > 50.0].all()
+    np.testing.assert_array_equal(dropped, np.where(T > 50.0, -0.02, 0.0))
+    cold = changed(law("clock_warmup"), cold_skew=1e-3, cold_time=20.0)
+    assert cold[0] == 0.0 and cold[-1] == pytest.approx(0.02, rel=0.01)
+    np.testing.assert_allclose(np.diff(cold)[:3] / np.diff(T)[:3], 1e-3, rtol=0.01)
+    # One that settles at once is set wrong, one that never does runs fast.
+    slow = changed(law("clock_warmup"), cold_skew=1e-3, cold_time=1e5)
+    np.testing.assert_allclose(slow, 1e-3 * T, rtol=1e-3)
+
+
+def test_what_sticks_follows_until_it_slips() -> None:
+    stop = changed(law("channel_play"), sticking=1.0, sticking_travel=0.5)
+    first = np.flatnonzero(np.abs(stop) >= 1.0)[0]
+    np.testing.assert_allclose(stop[:first], -(READING - READING[0])[:first] / 0.5, atol=1e-12)
+    back = np.flatnonzero(np.diff(READING) < 0.0)[0]
+    assert stop[back] == -1.0 and np.abs(stop).max() == 1.0
+    # The whole loop is as wide as twice its half, whatever the rate.
+    again = np.flatnonzero(READING[back:] < READING[back] - 1.0)[0] + back
+    assert stop[again] == 1.0
 
 
 def test_switching_is_a_square_wave_of_the_code() -> None:

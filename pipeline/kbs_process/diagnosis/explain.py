@@ -46,6 +46,7 @@ class Explained:
     # Numbers that stayed near their priors, where `known` are implausibly far from theirs, or were refitted beside the
     # error of a clock.
     near: Known | None
+    beside: bool  # whether `near` are such numbers: they leave much, and nothing has pulled them
     after: Detection  # with the refitted numbers, over the recordings that these were fitted to
 
 
@@ -95,13 +96,14 @@ def explain(experiment: Experiment, simulate: Simulate, task: Task) -> Explained
         # Without any being off, searches end as far from each other.
         if free.cost < stood.known.cost - LEAST_RHO**2 and not _unseen(freed, floor) > _unseen(stood, floor):
             stood = freed
+    beside: Known | None = None
     if near is None and stood.after.left and stood.known.gross and searched(experiment):
         with task("Refitting the known parameters beside a clock that may be wrong"):
             beside = by_another_clock(stood.known, floor, simulate, NEAR)
         if beside is not None:
             near = replace(beside, chi2_before=_squares(beside, begun))
     known = replace(stood.known, chi2_before=_squares(stood.known, begun))
-    return Explained(floor, known, near, stood.after)
+    return Explained(floor, known, near, beside is not None, stood.after)
 
 
 def eased(known: Known, simulate: Simulate) -> Hypothesis:

@@ -73,6 +73,7 @@ FAMILIES: dict[str, str] = {
     "channel_s_shape": "non-linearity",
     "channel_step": "converter",
     "channel_hysteresis": "sensor hysteresis",
+    "channel_play": "sensor hysteresis",
     "channel_lag": "lag",
     "drift_linear": "drift",
     "drift_exponential": "drift",

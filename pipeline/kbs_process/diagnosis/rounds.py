@@ -52,16 +52,23 @@ class _Round:
 
 
 def diagnose(
-    known: Known, floor: Floor, simulate: Simulate, before: Detection, near: Known | None = None
+    known: Known,
+    floor: Floor,
+    simulate: Simulate,
+    before: Detection,
+    near: Known | None = None,
+    *,
+    beside: bool = False,
 ) -> Outcome:
     """Find the laws that the refitted known parameters leave out; `before` is what detection says of these.
 
     Where these explain it, but far from their priors, `near` are numbers that stayed: a law beside them is what was
-    left out, if both together are likelier by as much as a law has to bring.
+    left out, if both together are likelier by as much as a law has to bring. Numbers that were found `beside` the error
+    of a clock have not been pulled by it.
     """
     if near is not None:
         left = detected(standing_of(near, {}), floor, near.experiment.fit)
-        instead = _diagnosed(near, floor, simulate, left, at_once=True)
+        instead = _diagnosed(near, floor, simulate, left, at_once=True, pulled=not beside)
         if instead.finds:
             alone = _alone(known, near, instead.standing.known, floor, simulate)
             if instead.standing.known.cost < alone.cost - LEAST_RHO**2:
@@ -88,7 +95,13 @@ def _alone(known: Known, near: Known, beside: Known, floor: Floor, simulate: Sim
 
 
 def _diagnosed(
-    known: Known, floor: Floor, simulate: Simulate, before: Detection, *, at_once: bool = False
+    known: Known,
+    floor: Floor,
+    simulate: Simulate,
+    before: Detection,
+    *,
+    at_once: bool = False,
+    pulled: bool = True,
 ) -> Outcome:
     """Find what one refit of the known parameters leaves out.
 
@@ -100,7 +113,8 @@ def _diagnosed(
     accepted: list[Accepted] = []
     rounds: list[_Round] = []
     for _ in range(ROUNDS):
-        rounds.append(_round(standing, floor, simulate, accepted))
+        seen = drawn_back(standing, floor, simulate) if pulled or accepted else standing
+        rounds.append(_round(standing, seen, floor, simulate, accepted))
         standing, found = rounds[-1].standing, rounds[-1].accepted
         if found is None:
             break
@@ -155,8 +169,10 @@ def _mismatch(before: Detection, first: Screening, kept: Sequence[Accepted]) -> 
     return float(min(0.0, np.log(2.0) + min([before.log_p, *found])))
 
 
-def _round(standing: Standing, floor: Floor, simulate: Simulate, accepted: Sequence[Accepted]) -> _Round:
-    seen = drawn_back(standing, floor, simulate)
+def _round(
+    standing: Standing, seen: Standing, floor: Floor, simulate: Simulate, accepted: Sequence[Accepted]
+) -> _Round:
+    """Look for one more law from where numbers are `seen` at, which may have been drawn back."""
     over = False
     if seen.known.cost < standing.known.cost:
         # Numbers had ended in a worse place: what they do alone, once they have settled, is no law's.

@@ -7,6 +7,7 @@ from kbs_process.plant.sensing.channel_hysteresis import CHANNEL_HYSTERESIS
 from kbs_process.plant.sensing.channel_interaction import CHANNEL_INTERACTION
 from kbs_process.plant.sensing.channel_lag import CHANNEL_LAG
 from kbs_process.plant.sensing.channel_nonlinearity import CHANNEL_NONLINEARITY
+from kbs_process.plant.sensing.channel_play import CHANNEL_PLAY
 from kbs_process.plant.sensing.channel_s_shape import CHANNEL_S_SHAPE
 from kbs_process.plant.sensing.channel_step import CHANNEL_STEP
 from kbs_process.plant.sensing.clock_drops import CLOCK_DROPS
@@ -38,6 +39,7 @@ SENSING: tuple[Sensing, ...] = (
     CHANNEL_S_SHAPE,
     CHANNEL_STEP,
     CHANNEL_HYSTERESIS,
+    CHANNEL_PLAY,
     CHANNEL_LAG,
     DRIFT_LINEAR,
     DRIFT_EXPONENTIAL,
