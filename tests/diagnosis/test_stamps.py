@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from test_rounds import candidate, standing
 
+from kbs_process.diagnosis.clocks import timed
 from kbs_process.diagnosis.each_recording import taken_off, taken_off_again
 from kbs_process.diagnosis.joint import Standing
 from kbs_process.diagnosis.scene import Scene
@@ -93,3 +94,36 @@ def test_a_clock_is_taken_off_exactly() -> None:
     again = taken_off_again(told)
     assert again.standing.known.cost <= told.standing.known.cost
     np.testing.assert_allclose(again.found.score.amplitude.reshape(2, 2), sizes, atol=1e-4)
+
+
+@pytest.mark.parametrize("late", [0.06, -0.11])
+def test_a_clock_that_is_late_by_half_a_period_is_found_at_its_size(late: float) -> None:
+    made = bench.experiment(bench.rig(), ("fit", "fit"), 9, seconds=40.0)
+    t = DT * np.arange(800)
+    ringing = np.sin(2.0 * np.pi * (4.5 + 0.03 * t) * t)[:, None] * np.r_[np.full(6, 0.2), 0.0, 0.0]
+    trials = []
+    for trial in made.trials:
+        whole = trial.measured + ringing
+        whole[:, :6] += late_by(whole[:, :6], DT, np.full(800, late))
+        trials.append(replace(trial, measured=whole * trial.valid[:, None]))
+    here = standing(replace(made, trials=tuple(trials)))
+    known = here.known
+    rung = {0: replace(here.predicted[0], values=here.predicted[0].values + ringing)}
+    residual = tuple(
+        m(t.measured - rung[0].values) for m, t in zip(known.metric, known.experiment.trials, strict=True)
+    )
+    known = replace(known, shown=rung, residual=residual)
+    scene = Scene.of(known.experiment, here.hypothesis, rung)
+    suspect = Catalogued(candidate("clock_offset", "wrench"), scene)
+    tried = Bench.of(known, scene)
+    linear = screen(tried, [suspect]).candidates[0]
+    assert abs(linear.score.amplitude[0]) < 0.5 * abs(late)
+    found = timed(tried, linear, [suspect])
+    assert found.score.amplitude == pytest.approx([late], abs=5e-4)
+    assert found.score.gain > 1.3 * linear.score.gain
+    # Its columns are exact at that size.
+    assert isinstance(found.suspect, Catalogued)
+    column = tried.signatures([found.suspect], 0)[:, :6, 0] * found.score.amplitude
+    np.testing.assert_allclose(
+        column[60:-60], late_by(rung[0].values[:, :6], DT, np.full(800, late))[60:-60], atol=0.02
+    )
