@@ -64,8 +64,10 @@ def readings(
 ) -> Array:
     """(n, c) values at t (n,) s with the changes by all laws that act on their stream.
 
-    Each law sees the values before any of them: they are small, as the diagnosis that found them had them.
+    Each law sees the values before any of them: they are small, as the diagnosis that found them had them. A clock's
+    stamps are late by what all of its laws make together, and what they stamp is what was read then.
     """
+    late = np.zeros(len(t))
     warmth = None if temperature is None else np.interp(t, temperature.t, temperature.values[:, 0])
     read = values.copy()
     for entry in laws_on(laws, key, names):
@@ -78,11 +80,10 @@ def readings(
         known = {} if warmth is None else {"temperature": warmth}
         candidate, sizes = Candidate(law, entry.site, shape), np.array([numbers[name] for name in amplitudes])
         if law.port is SensingPort.STREAM:
-            late = unit_values(candidate, t, known) @ sizes
-            read += CubicSpline(t, values)(np.clip(t - late, t[0], t[-1])) - values
+            late += unit_values(candidate, t, known) @ sizes
         else:
             read += sensed(candidate, t, values, names, rig, known) @ sizes
-    return read
+    return CubicSpline(t, read)(np.clip(t - late, t[0], t[-1])) if late.any() else read
 
 
 def laws_on(laws: Sequence[SensingLaw], key: str, names: Sequence[str]) -> list[SensingLaw]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -44,7 +45,9 @@ def suspect_of(find: Find, scene: Scene) -> tuple[Suspect, Array] | None:
     if "temperature" in law.arguments and any(one.temperature is None for one in scene.experiment.trials):
         return None
     candidate = Candidate(law, site, _shape(law, numbers), _point(numbers), _again(law, site, find))
-    return Catalogued(candidate, scene), np.array([numbers[e.name].value for e in candidate.amplitudes])
+    sizes = np.array([numbers[e.name].value for e in candidate.amplitudes])
+    told = Catalogued(candidate, scene)
+    return replace(told, size=float(sizes[0])) if told.of_clock else told, sizes
 
 
 def _again(law: Effect | Sensing, site: str, find: Find) -> tuple[Candidate, ...]:

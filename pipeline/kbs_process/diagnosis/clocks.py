@@ -14,7 +14,7 @@ from scipy.linalg import cho_solve
 from scipy.optimize import minimize_scalar
 
 from kbs_process.diagnosis.known import Known
-from kbs_process.diagnosis.screen import Bench, Catalogued, Found
+from kbs_process.diagnosis.screen import Bench, Catalogued, Found, evidence
 from kbs_process.diagnosis.shapes import bends, moved
 from kbs_process.diagnosis.signature import stamped
 from kbs_process.diagnosis.stamps import late_by, set_right
@@ -51,7 +51,7 @@ def timed(bench: Bench, found: Found, grid: Sequence[Catalogued]) -> Found:
     if not gain > found.score.gain:
         return found
     score = replace(found.score, gain=gain, amplitude=np.array([size]), rank=1)
-    more = 0.5 * (gain - found.score.gain)
+    more = evidence(score, bench.background.rows) - evidence(found.score, bench.background.rows)
     return replace(
         found, suspect=replace(suspect, size=size), score=score, log_evidence=found.log_evidence + more
     )

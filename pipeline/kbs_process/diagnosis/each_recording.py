@@ -68,7 +68,7 @@ def taken_off(found: Found, view: View) -> Tried:
         not reasons,
         tuple(folds),
         bool(experiment.held_out),
-        float(np.sqrt(min(strengths, default=0.0))),
+        float(np.sqrt(max(min(strengths, default=0.0), 0.0))),
         (whiteness(known), whiteness(standing.known)),
         reasons,
     )
@@ -100,8 +100,13 @@ def taken_off_again(chosen: Tried) -> Tried:
     if not standing.known.cost < known.cost:
         return chosen
     more = np.concatenate([off[k].amplitude for k in experiment.fit])
-    told = replace(chosen.found.score, amplitude=chosen.found.score.amplitude + more)
-    return replace(chosen, found=replace(chosen.found, score=told), standing=standing)
+    whole = chosen.found.score.amplitude + more
+    told = replace(chosen.found, score=replace(chosen.found.score, amplitude=whole))
+    sizes = np.abs(whole.reshape(-1, len(suspect.amplitudes))).max(axis=0)
+    sigmas = np.max([one.sigma for one in off], axis=0)
+    return replace(
+        chosen, found=told, standing=standing, gate=chosen.gate.but(*oversized(suspect, sizes, sigmas))
+    )
 
 
 def _each(suspect: Suspect, known: Known, plain: Mapping[int, Array]) -> list[_Off]:
@@ -132,22 +137,25 @@ def _each(suspect: Suspect, known: Known, plain: Mapping[int, Array]) -> list[_O
 def _by_the_clock(
     suspect: Catalogued, known: Known, k: int, whitened: Array, precision: Array, first: _Off
 ) -> _Off:
-    """A recording stamped by a clock that is right: `first` to first order, then from where each correction leads."""
+    """A recording stamped by a clock that is right: to first order, then from where each step leads."""
     experiment = known.experiment
     trial = experiment.trials[k]
     late = suspect.late(experiment.reference(trial.trajectory))
     J = first.background.J[k]
-    best, amplitude = first, first.amplitude
-    least = np.inf
+    nothing = _height(first.background, k)
+    zero = np.zeros_like(first.amplitude)
+    best = replace(first, measured=trial.measured, left=first.background.z[k], amplitude=zero, gain=0.0)
+    step = first.amplitude
     for _ in range(_PASSES):
+        amplitude = best.amplitude + step
         measured, left = by_a_right_clock(suspect, known, k, late @ amplitude)
         here = Background.of({k: left}, {k: J}, precision)
-        height = _height(here, k)
-        if not height < least:
-            break
-        gain = _height(first.background, k) - height
-        best, least = replace(best, measured=measured, left=left, amplitude=amplitude, gain=gain), height
-        amplitude = amplitude + score(here, Sums.over(here, {k: whitened})).amplitude
+        gain = nothing - _height(here, k)
+        if gain > best.gain:
+            best = replace(best, measured=measured, left=left, amplitude=amplitude, gain=gain)
+            step = score(here, Sums.over(here, {k: whitened})).amplitude
+        else:
+            step = 0.5 * step  # too far for a slope
     return best
 
 

@@ -75,8 +75,8 @@ def find_of(
     for found in taken.screening.candidates:
         if found.suspect.family in simulated or found.absorbed or len(alternatives) >= 5:
             continue
-        if identity(found.suspect) in refused:
-            continue
+        if identity(found.suspect) in refused or (_of_clock(suspect) and _of_clock(found.suspect)):
+            continue  # what a clock does to first order is nothing to compare with what one does at its size
         # Along the linear plant the distance is what the best leaves of the other's lack of gain.
         rho = float(np.sqrt(max(taken.found.score.gain - found.score.gain, 0.0)))
         alternatives.append(
@@ -105,6 +105,10 @@ def find_of(
         held_out_variance=explained_share(before.known, taken.standing.known),
         curve=_curve(suspect, taken, before) if own.family == UNNAMED else None,
     )
+
+
+def _of_clock(suspect: Suspect) -> bool:
+    return isinstance(suspect, Catalogued) and suspect.of_clock
 
 
 def _equivalents(suspect: Suspect, rig: Rig) -> tuple[Alternative, ...]:

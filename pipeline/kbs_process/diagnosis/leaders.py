@@ -101,13 +101,18 @@ def _covered(view: View, among: Callable[[Found], bool]) -> list[Found]:
     hidden = [
         uncovered(view.bench, found, [one for one in view.suspects if _same(one, found.suspect)])
         for found in view.screening.candidates
-        if _pulls(found) and found.score.rank == 0 and among(found)
+        if _anywhere(found) and found.score.rank == 0 and among(found)
     ]
     return [one for one in hidden if one.score.gain > most]
 
 
 def _pulls(found: Found) -> bool:
     return isinstance(found.suspect, Catalogued) and found.suspect.candidate.port is Port.EXTERNAL_FORCE
+
+
+def _anywhere(found: Found) -> bool:
+    law = found.suspect.candidate.effect if isinstance(found.suspect, Catalogued) else None
+    return _pulls(found) and isinstance(law, Effect) and law.anywhere
 
 
 def _same(one: Suspect, other: Suspect) -> TypeGuard[Catalogued]:
@@ -253,11 +258,20 @@ def _told_anew(chosen: Tried, before: Standing, floor: Floor, simulate: Simulate
 
 
 def _set_anew(chosen: Tried, before: Standing, floor: Floor, simulate: Simulate) -> Tried:
-    """The law of a clock at the size that it has beside the known numbers as they are, if that leaves less."""
-    standing, suspect = chosen.standing, chosen.found.suspect
-    view = View.of(bare(standing, chosen.own, simulate), lambda one: _same(one, suspect), linear=False)
-    here = next(iter(view.screening.candidates))
-    found = timed(view.bench, here, [one for one in view.suspects if _same(one, suspect)])
+    """The error of a clock, of whichever law, at the size that it has beside known numbers as they are, if likelier."""
+    standing, site = chosen.standing, _reads(chosen.found.suspect)
+    view = View.of(
+        bare(standing, chosen.own, simulate),
+        lambda one: (
+            isinstance(one, Catalogued) and one.of_clock and not one.each_trial and _reads(one) == site
+        ),
+        linear=False,
+    )
+    every = [
+        timed(view.bench, one, [other for other in view.suspects if _same(other, one.suspect)])
+        for one in view.screening.candidates
+    ]
+    found = max(every, key=lambda one: one.log_evidence)
     new = with_extra(view.standing, extra_of(found, view.standing, view.bench, view.scene), simulate)
     new = resettled(new, floor, simulate, leaps=0)
     own = own_of(found, before, new)

@@ -29,6 +29,7 @@ def by_another_clock(known: Known, floor: Floor, simulate: Simulate, reach: floa
     They go no farther than `reach` sigmas; what they leave is that of the recordings as they are.
     """
     here, right = confined(known, simulate, CLOSE), None
+    most = MOST * known.excess
     for _ in range(_TIMES):
         found = _clock(here)
         if found is None:
@@ -37,8 +38,9 @@ def by_another_clock(known: Known, floor: Floor, simulate: Simulate, reach: floa
         nominal = Hypothesis(experiment.rig, experiment.effects)
         start = phasing.begin(experiment, nominal, floor, simulate)
         again = refit(experiment, start, floor, simulate, reach=reach, leaps=1)
-        if not again.excess < MOST * known.excess:
+        if not again.excess < most:
             break
+        most = again.excess
         right = as_it_is(replace(again, experiment=known.experiment), simulate)
         if not again.gross:
             break
@@ -55,8 +57,8 @@ def _clock(known: Known) -> Found | None:
     tried = [timed(view.bench, one, _grid(view, one)) for one in candidates]
     best = max(tried, key=lambda one: one.score.gain)
     # Beside numbers refitted to first order, which do a part of what is to be done in any case.
-    alone = height_of(view.bench, view.bench.background.z) - known.fit_rows
-    return best if alone - best.score.gain <= MOST * alone else None
+    alone = height_of(view.bench, view.bench.background.z) + known.prior_chi2 - known.fit_rows
+    return best if alone > 0.0 and alone - best.score.gain <= MOST * alone else None
 
 
 def _grid(view: View, found: Found) -> list[Catalogued]:

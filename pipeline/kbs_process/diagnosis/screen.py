@@ -252,8 +252,8 @@ def screen(bench: Bench, suspects: Sequence[Suspect]) -> Screening:
     trajectories = len({experiment.trials[k].trajectory for k in bench.background.z})
     candidates = []
     for grid in scores.values():
-        best = max(grid, key=lambda entry: _evidence(entry[1], rows))
-        mean = float(logsumexp([_evidence(entry[1], rows) for entry in grid]) - np.log(len(grid)))
+        best = max(grid, key=lambda entry: evidence(entry[1], rows))
+        mean = float(logsumexp([evidence(entry[1], rows) for entry in grid]) - np.log(len(grid)))
         lowest = min(entry[1].log_p for entry in grid)
         places = trajectories * np.log(best[0].places)
         log_p = min(0.0, lowest + np.log(looked_at) + places)
@@ -283,7 +283,7 @@ def _scored(bench: Bench, batch: Sequence[Suspect]) -> list[_Scored]:
     return found
 
 
-def _evidence(found: Score, rows: int) -> float:
+def evidence(found: Score, rows: int) -> float:
     """Schwarz's approximation to the logarithm of the Bayes factor against no effect (Ann. Stat. 6:461, 1978)."""
     return float(0.5 * found.gain - 0.5 * found.rank * np.log(rows))
 

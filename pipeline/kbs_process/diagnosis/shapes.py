@@ -11,7 +11,7 @@ from scipy.optimize import minimize
 from kbs_process.diagnosis.gls import Score, Sums, per_trial, score
 from kbs_process.diagnosis.places import half_lengths
 from kbs_process.diagnosis.ranges import SPECTRUM, WHILE_RECORDED, is_place, swept
-from kbs_process.diagnosis.screen import Bench, Catalogued, Found, screen
+from kbs_process.diagnosis.screen import Bench, Catalogued, Found, evidence, screen
 from kbs_process.diagnosis.suspects import Candidate
 from kbs_process.plant.effect import Effect, LogNormal, Parameter, Uniform
 from kbs_process.rig.model import Rig
@@ -148,9 +148,9 @@ def uncovered(bench: Bench, found: Found, grid: Sequence[Catalogued]) -> Found:
     starts = sorted(scored, key=lambda end: -_whole(*end))[:_STARTS]
     best, own = max((_descended(bench, start, _whole) for start, _ in starts), key=lambda end: _whole(*end))
     all_of_it = replace(own, gain=own.whole_gain, rank=own.whole_rank, amplitude=own.whole)
-    gained = own.whole_gain - found.score.gain
+    more = evidence(all_of_it, bench.background.rows) - evidence(found.score, bench.background.rows)
     return replace(
-        found, suspect=best, score=all_of_it, log_evidence=found.log_evidence + 0.5 * gained, absorbed_by=()
+        found, suspect=best, score=all_of_it, log_evidence=found.log_evidence + more, absorbed_by=()
     )
 
 

@@ -41,8 +41,11 @@ def late_by(reading: Array, dt: float, late: Array) -> Array:
 
 
 def slope(reading: Array, dt: float) -> Array:
-    """(n, c) time derivative of a reading (n, c), exact in the working band."""
-    return late_by(reading, dt, np.full(len(reading), -_DIFFERENCE)) / _DIFFERENCE
+    """(n, c) time derivative of a reading (n, c), right in the working band but for its first and last samples."""
+    t = dt * np.arange(len(reading))
+    at = np.concatenate([t + _DIFFERENCE, t - _DIFFERENCE])
+    after, before = np.split(between(reading, np.ones(len(reading), dtype=np.bool_), dt, at)[0], 2)
+    return np.asarray((after - before) / (2.0 * _DIFFERENCE), dtype=np.float64)
 
 
 def set_right(measured: Array, valid: Mask, dt: float, late: Array) -> tuple[Array, Mask]:
