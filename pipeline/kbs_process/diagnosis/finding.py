@@ -155,10 +155,13 @@ def _estimates(taken: Tried, before: Standing) -> tuple[Estimate, ...]:
             fixed |= dict(action.shape)
     if suspect.each_trial:
         spread = np.sqrt(np.diag(taken.found.score.covariance))
-        names = suspect.amplitudes
+        names, told = suspect.amplitudes, taken.found.score.amplitude
+        # Those of the first recording that is fitted and no calibration, whose motion is another.
+        roles = [known.experiment.trials[k].role for k in known.experiment.fit]
+        own = slice(len(names) * next((i for i, role in enumerate(roles) if role != "calibration"), 0), None)
         fitted = [
             Estimate(name, units.get(name, ""), float(value), float(sigma))
-            for name, value, sigma in zip(names, taken.found.score.amplitude, spread, strict=False)
+            for name, value, sigma in zip(names, told[own], spread[own], strict=False)
         ]
         fitted += _drops(suspect)
     else:
