@@ -34,9 +34,10 @@ def _find(find: Find) -> Iterator[Block]:
     alike = (
         f" These channels cannot tell that port from {', '.join(find.same_ports)}." if find.same_ports else ""
     )
+    digits = 2 if find.absorbed < 0.99 else 4  # what a weight leaves of a cord is not nothing
     yield Text(
         f"{find.name}, {where(find.place)}.{known} Known parameters could have taken up "
-        f"{percent(find.absorbed, 2)} of its signature.{alike}"
+        f"{percent(find.absorbed, digits)} of its signature.{alike}"
     )
     if find.equation:
         yield equation(find.equation)
