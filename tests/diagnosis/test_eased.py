@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from diagnosis import bench
+from kbs_process.diagnosis import explain
 from kbs_process.diagnosis.explain import NEAR, eased
 from kbs_process.diagnosis.floor import declared
 from kbs_process.diagnosis.hypothesis import Hypothesis
@@ -48,3 +51,29 @@ def test_nothing_moves_where_nothing_is_wrong() -> None:
     assert as_it_is(near, simulate).cost == pytest.approx(near.cost, rel=1e-9)
     moved = np.abs(gone.values(near.free) - near.value)[near.stated] / near.parameters.sigma[near.stated]
     assert moved.max() < 0.5
+
+
+def test_phases_are_looked_for_again_beside_numbers_that_were_refitted(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Where the numbers that they were looked for beside first leave much, and only if that halves it."""
+    made = bench.experiment(bench.rig(), ("fit", "fit"), 5)
+    simulate, floor = bench.serial(made), declared(made)
+    right = refit(made, Hypothesis(made.rig, made.effects), floor, simulate, reach=NEAR, leaps=0)
+    worse, little = (
+        replace(right, residual=tuple(z * np.sqrt(share * len(z) / (z @ z)) for z in right.residual))
+        for share in (3.0, 2.2)
+    )
+    assert worse.gross
+    begun = []
+
+    def begin(experiment: object, hypothesis: Hypothesis, *_: object) -> Hypothesis:
+        begun.append(hypothesis)
+        return hypothesis
+
+    monkeypatch.setattr(explain.phasing, "begin", begin)
+    for found, kept in ((right, right), (little, worse)):
+        monkeypatch.setattr(explain, "refit", lambda *_, found=found, **__: found)
+        again = explain._rephased(explain._stood(worse, floor), floor, simulate)
+        assert again.known is kept
+    assert all(one is worse.hypothesis for one in begun) and len(begun) == 2
