@@ -68,9 +68,6 @@ def explain(experiment: Experiment, simulate: Simulate, task: Task) -> Explained
     with task("Refitting the known parameters, near what is known of them"):
         held = refit(experiment, start, floor, simulate, reach=NEAR, slopes=slopes, leaps=leaps)
         stood = _moved_on(_stood(held, floor), floor, simulate, LEAPS)
-    if stood.after.left and stood.known.gross and searched(experiment):
-        with task("Phases again, beside numbers that are about right"):
-            stood = _rephased(stood, floor, simulate)
     near: Known | None = None
     if stood.after.left and (stood.known.gross or _may_be_off(stood.known)):
         with task("Refitting the known parameters, free"):
@@ -99,6 +96,9 @@ def explain(experiment: Experiment, simulate: Simulate, task: Task) -> Explained
         # Without any being off, searches end as far from each other.
         if free.cost < stood.known.cost - LEAST_RHO**2 and not _unseen(freed, floor) > _unseen(stood, floor):
             stood = freed
+    if near is None and stood.after.left and stood.known.gross and searched(experiment):
+        with task("Phases again, beside numbers that are about right"):
+            stood = _rephased(stood, floor, simulate)
     beside: Known | None = None
     if near is None and stood.after.left and stood.known.gross and searched(experiment):
         with task("Refitting the known parameters beside a clock that may be wrong"):
