@@ -14,7 +14,7 @@ from scipy.linalg import cho_solve
 from scipy.optimize import minimize_scalar
 
 from kbs_process.diagnosis.known import Known
-from kbs_process.diagnosis.screen import Bench, Catalogued, Found, evidence
+from kbs_process.diagnosis.screen import Bench, Catalogued, Found, Suspect, evidence
 from kbs_process.diagnosis.shapes import bends, moved
 from kbs_process.diagnosis.signature import stamped
 from kbs_process.diagnosis.stamps import late_by, set_right
@@ -40,8 +40,10 @@ def by_a_right_clock(suspect: Catalogued, known: Known, k: int, late: Array) -> 
     return measured, known.residual[k] + known.metric[k](measured - trial.measured)
 
 
-def timed(bench: Bench, found: Found, grid: Sequence[Catalogued]) -> Found:
-    """A clock's law of one amplitude, at the shape of its grid and the size that leave least beside known numbers."""
+def timed(bench: Bench, found: Found, among: Sequence[Suspect]) -> Found:
+    """A clock's law of one amplitude, at the shape `among` some and the size that leave least beside known numbers."""
+    family = found.suspect.family
+    grid = [one for one in among if isinstance(one, Catalogued) and one.family == family]
     nothing = height_of(bench, bench.background.z)
     suspect, size, height = min((_sized(bench, one) for one in grid), key=lambda one: one[2])
     for steps in _NEARER if bends(suspect.candidate, suspect.scene.hypothesis.rig) else ():

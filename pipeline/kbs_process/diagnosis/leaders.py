@@ -80,13 +80,13 @@ def leaders(view: View, among: Callable[[Found], bool] = lambda _: True) -> tupl
 def _shaped(view: View, most: float, found: Found) -> Found:
     """A suspect at its best shape, or its best size where its signature is another one at every size."""
     if _mistimed(found, most):
-        return timed(view.bench, found, [one for one in view.suspects if _same(one, found.suspect)])
+        return timed(view.bench, found, view.suspects)
     return bettered(view.bench, found)
 
 
 def _mistimed(found: Found, most: float) -> bool:
     """Whether it is the error of a clock, the same in all recordings, that does some of the `most` that any does."""
-    clock = isinstance(found.suspect, Catalogued) and found.suspect.of_clock and not found.suspect.each_trial
+    clock = isinstance(found.suspect, Catalogued) and found.suspect.of_every_clock
     return clock and found.score.gain >= MISTIMED * most
 
 
@@ -262,15 +262,10 @@ def _set_anew(chosen: Tried, before: Standing, floor: Floor, simulate: Simulate)
     standing, site = chosen.standing, _reads(chosen.found.suspect)
     view = View.of(
         bare(standing, chosen.own, simulate),
-        lambda one: (
-            isinstance(one, Catalogued) and one.of_clock and not one.each_trial and _reads(one) == site
-        ),
+        lambda one: isinstance(one, Catalogued) and one.of_every_clock and _reads(one) == site,
         linear=False,
     )
-    every = [
-        timed(view.bench, one, [other for other in view.suspects if _same(other, one.suspect)])
-        for one in view.screening.candidates
-    ]
+    every = [timed(view.bench, one, view.suspects) for one in view.screening.candidates]
     found = max(every, key=lambda one: one.log_evidence)
     new = with_extra(view.standing, extra_of(found, view.standing, view.bench, view.scene), simulate)
     new = resettled(new, floor, simulate, leaps=0)

@@ -54,20 +54,15 @@ def _clock(known: Known) -> Found | None:
     candidates = view.screening.candidates
     if not candidates:
         return None
-    tried = [timed(view.bench, one, _grid(view, one)) for one in candidates]
+    tried = [timed(view.bench, one, view.suspects) for one in candidates]
     best = max(tried, key=lambda one: one.score.gain)
     # Beside numbers refitted to first order, which do a part of what is to be done in any case.
     alone = height_of(view.bench, view.bench.background.z) + known.prior_chi2 - known.fit_rows
     return best if alone > 0.0 and alone - best.score.gain <= MOST * alone else None
 
 
-def _grid(view: View, found: Found) -> list[Catalogued]:
-    family = found.suspect.family
-    return [one for one in view.suspects if isinstance(one, Catalogued) and one.family == family]
-
-
 def _of_all(suspect: Suspect) -> bool:
-    return isinstance(suspect, Catalogued) and suspect.of_clock and not suspect.each_trial
+    return isinstance(suspect, Catalogued) and suspect.of_every_clock
 
 
 def _stamped_anew(known: Known, found: Found) -> Experiment:

@@ -113,6 +113,11 @@ class Catalogued:
     def of_clock(self) -> bool:
         return self.candidate.port is SensingPort.STREAM
 
+    @property
+    def of_every_clock(self) -> bool:
+        """Whether it is the error of a clock, the same in all recordings."""
+        return self.of_clock and not self.each_trial
+
     def late(self, drive: int) -> Array:
         """(n, amplitudes) by how many s stamps are late, for a unit of each amplitude of a clock's law."""
         return unit_values(self.candidate, *self._recorded(drive))
