@@ -163,4 +163,4 @@ def test_a_law_that_leaves_nothing_is_judged_once_others_have_settled_beside_it(
         assert passed[0].standing.known.cost == costs[1]
     else:
         assert passed == []
-        assert refused[0].reasons[-1] == "too early"
+        assert refused[0].gate.reasons[-1] == "too early"

@@ -20,7 +20,6 @@ from kbs_process.diagnosis.gate import Gate, gate
 from kbs_process.diagnosis.hypothesis import Simulate
 from kbs_process.diagnosis.joint import Own, Standing, bare, moved_on, with_extra
 from kbs_process.diagnosis.orders import with_orders
-from kbs_process.diagnosis.outcome import Refused
 from kbs_process.diagnosis.plausible import oversized, undone
 from kbs_process.diagnosis.race import at_floor, own_of, raced
 from kbs_process.diagnosis.rivals import probabilities
@@ -146,11 +145,10 @@ def _way(found: Found) -> tuple[str, ...]:
 
 def tried(
     chosen: Sequence[Found], view: View, before: Standing, floor: Floor, simulate: Simulate
-) -> tuple[list[Tried], list[Refused]]:
+) -> tuple[list[Tried], list[Tried]]:
     """Leaders of a view refitted and gated against what was believed `before`: those that passed, and those that did
     not.
     """
-
     judged = [taken_off(found, view) for found in chosen if found.suspect.each_trial]
     runners = raced([found for found in chosen if not found.suspect.each_trial], view, floor, simulate)
     for number, runner in enumerate(runners):
@@ -161,13 +159,7 @@ def tried(
             runner = replace(runner, standing=moved_on(runner.standing, simulate), leapt=True)
             verdict = gated(runner.found, before, runner.standing, own)
         judged.append(Tried(runner.found, runner.standing, verdict, view.screening, own, runner.leapt))
-    passed = [one for one in judged if one.gate.passed]
-    refused = [
-        Refused(identity(one.found.suspect), one.found.score.rho_eff, one.gate.reasons)
-        for one in judged
-        if not one.gate.passed
-    ]
-    return passed, refused
+    return [one for one in judged if one.gate.passed], [one for one in judged if not one.gate.passed]
 
 
 def gated(found: Found, before: Standing, after: Standing, own: Own) -> Gate:

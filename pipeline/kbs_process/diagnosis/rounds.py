@@ -12,7 +12,7 @@ from kbs_process.diagnosis.families import UNNAMED
 from kbs_process.diagnosis.finding import Tried, as_it_stands, find_of, merged
 from kbs_process.diagnosis.floor import Floor
 from kbs_process.diagnosis.hypothesis import Simulate
-from kbs_process.diagnosis.joint import Standing, standing_of
+from kbs_process.diagnosis.joint import Standing, bare, standing_of, without
 from kbs_process.diagnosis.known import MOVED, Known, refit
 from kbs_process.diagnosis.leaders import gated, leaders, reread, tried
 from kbs_process.diagnosis.localise import cells_and_ports
@@ -36,6 +36,7 @@ from kbs_process.diagnosis.scene import Scene
 from kbs_process.diagnosis.screen import Found, Screening
 from kbs_process.diagnosis.settling import bent, drawn_back, released, resettled
 from kbs_process.diagnosis.shapes import bettered
+from kbs_process.diagnosis.supposed import Noted, enough, supposed
 from kbs_process.diagnosis.thresholds import LEAST_RHO, MOST, ROUNDS, SECOND, SETTLED, TOLERATED
 from kbs_process.diagnosis.tryout import identity
 from kbs_process.diagnosis.view import View
@@ -47,7 +48,7 @@ class _Round:
     standing: Standing
     seen: Standing  # from where laws were looked for, and `place` is
     screening: Screening
-    refused: tuple[Refused, ...]
+    noted: Noted
     place: Place | None
 
 
@@ -114,11 +115,15 @@ def _diagnosed(
     rounds: list[_Round] = []
     for _ in range(ROUNDS):
         seen = drawn_back(standing, floor, simulate) if pulled or accepted else standing
-        rounds.append(_round(standing, seen, floor, simulate, accepted))
-        standing, found = rounds[-1].standing, rounds[-1].accepted
-        if found is None:
+        looked = [_round(standing, seen, floor, simulate, accepted)]
+        if looked[0].accepted is None and not at_once:
+            looked += _pair(looked[0], floor, simulate, accepted)
+        rounds += looked
+        standing = rounds[-1].standing
+        found = [one.accepted for one in looked if one.accepted is not None]
+        if not found:
             break
-        accepted.append(found)
+        accepted += found
         if (at_once and standing.known.gross) or not _goes_on(standing, floor):
             break
     last = rounds[-1]
@@ -143,7 +148,7 @@ def _diagnosed(
         log_p=_mismatch(before, rounds[0].screening, kept),
         moved=moved,
         finds=merged(finds),
-        refused=(*fallen, *next((one.refused for one in reversed(rounds) if one.refused), ())),
+        refused=(*fallen, *next((one.noted.refused for one in reversed(rounds) if one.noted.refused), ())),
         absorbed=_absorbed(last.screening),
         place=rounds[0].place,
         left=left,
@@ -180,11 +185,33 @@ def _round(
         over = bool(accepted) and not _goes_on(standing, floor)
     view = View.of(seen)
     place = _place(seen, floor, view.scene)
-    refused: list[Refused] = []
-    for passed in () if over else _passed(view, standing, floor, simulate, accepted, refused):
-        if found := _accepted(passed, view, standing, place, floor, simulate, accepted, refused):
-            return _Round(found, found.tried.standing, seen, view.screening, tuple(refused), place)
-    return _Round(None, standing, seen, view.screening, tuple(refused), place)
+    noted = Noted()
+    for passed in () if over else _passed(view, standing, floor, simulate, accepted, noted):
+        if found := _accepted(passed, view, standing, place, floor, simulate, accepted, noted):
+            return _Round(found, found.tried.standing, seen, view.screening, noted, place)
+    return _Round(None, standing, seen, view.screening, noted, place)
+
+
+def _pair(last: _Round, floor: Floor, simulate: Simulate, accepted: Sequence[Accepted]) -> tuple[_Round, ...]:
+    """Two rounds that find two laws, of which neither passes without the other, where the `last` one found none.
+
+    One that did not pass is supposed; if another passes beside it, the supposed one is taken out of the plant, and has
+    to be found beside the other like any law.
+    """
+    for one in supposed(last.noted.fallen, last.standing.known):
+        told = find_of([one], 0, np.ones(1), last.standing, None)
+        there = one.standing if one.leapt else resettled(one.standing, floor, simulate, leaps=1)
+        beside = [*accepted, Accepted(one, told, last.standing)]
+        other = _round(there, drawn_back(there, floor, simulate), floor, simulate, beside)
+        if other.accepted is None or not enough(last.standing.known, other.standing.known):
+            continue
+        seen = bare(other.standing, one.own, simulate)
+        again = _round(
+            without(other.standing, one.own, simulate), seen, floor, simulate, [*accepted, other.accepted]
+        )
+        if again.accepted is not None and enough(last.standing.known, again.standing.known):
+            return other, again
+    return ()
 
 
 def _accepted(
@@ -195,16 +222,16 @@ def _accepted(
     floor: Floor,
     simulate: Simulate,
     accepted: Sequence[Accepted],
-    refused: list[Refused],
+    noted: Noted,
 ) -> Accepted | None:
     """The likeliest of some laws that passed which passes once more with all numbers settled beside it, if one does.
 
     Beside the numbers that it was looked for from first; once all have settled, beside those that leave least.
     """
-    if names := unnamed(passed, [one.identity for one in refused], view):
+    if names := unnamed(passed, noted.identities, view):
         more, less = tried(names, view, view.standing, floor, simulate)
         passed = [*passed, *more]
-        refused += less
+        noted.fell(*less)
     passed = continued(named_first(passed), [one.find.identity for one in accepted])
     fitted = [_each_time(one) for one in passed]
     chances = probabilities([one.standing.known for one in passed], view.bench.background.rows, fitted)
@@ -212,14 +239,14 @@ def _accepted(
     for number, best in enumerate(order[:SETTLED]):
         told = _settled(passed[best], standing, floor, simulate)
         if reasons := told.gate.reasons or _stands_in(told, standing, floor, simulate, accepted):
-            refused.append(Refused(_law(told), told.found.score.rho_eff, reasons))
+            noted.fell(replace(told, gate=told.gate.but(*reasons)) if told.gate.passed else told)
             continue
         # Told anew, it may be what another was: their chances are one then.
         others = [k for k in order[number + 1 :] if _law(passed[k]) != _law(told)]
         chance = chances[others] / max(float(chances[order[number:]].sum()), np.finfo(np.float64).tiny)
         find = find_of(
             [told, *(passed[k] for k in others)], 0, np.array([1.0 - float(chance.sum()), *chance]), standing,
-            place, [one.identity for one in refused],
+            place, noted.identities,
         )  # fmt: skip
         return Accepted(told, find, standing)
     return None
@@ -319,7 +346,7 @@ def _passed(
     floor: Floor,
     simulate: Simulate,
     accepted: Sequence[Accepted],
-    refused: list[Refused],
+    noted: Noted,
 ) -> Iterator[list[Tried]]:
     """Suspects of a view that passed the gate; then, if none of these stands, those that are each recording's own.
 
@@ -329,16 +356,16 @@ def _passed(
     passed: list[Tried] = []
     there = detected(before, floor, before.known.experiment.fit)
     if reason := promises_little(view, there):
-        refused.append(Refused(identity(view.able[0].suspect), view.able[0].score.rho_eff, (reason,)))
+        noted.refuse(view.able[0], reason)
         return
     for found in view.able:
         if reasons := in_the_shade(found, accepted):
-            refused.append(Refused(identity(found.suspect), found.score.rho_eff, reasons))
+            noted.refuse(found, *reasons)
     first, others = leaders(view, lambda found: not in_the_shade(found, accepted))
     for chosen in (first, *([found] for found in others)):
         more, less = tried(chosen, view, view.standing, floor, simulate)
         passed = [*passed, *more]
-        refused += less
+        noted.fell(*less)
         if less_is_left := [one for one in passed if one.standing.known.cost < before.known.cost]:
             passed = less_is_left
             break
@@ -347,7 +374,7 @@ def _passed(
     if chosen := view.unrepeated[:SECOND]:
         # What seemed to do nearly as well and to come again did not stand.
         more, less = tried(chosen, view, view.standing, floor, simulate)
-        refused += less
+        noted.fell(*less)
         if more:
             yield more
 

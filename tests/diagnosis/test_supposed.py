@@ -1,0 +1,118 @@
+"""Two laws of which neither passes alone: one is supposed, and both have to pass beside each other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import bench
+import numpy as np
+import pytest
+from test_rounds import ROLES, passed, screened, standing, with_cable
+
+from kbs_process.diagnosis import rounds
+from kbs_process.diagnosis.experiment import Experiment
+from kbs_process.diagnosis.finding import Tried
+from kbs_process.diagnosis.floor import declared
+from kbs_process.diagnosis.joint import Own, Standing
+from kbs_process.diagnosis.known import Known
+from kbs_process.diagnosis.needed import Accepted
+from kbs_process.diagnosis.supposed import Noted, enough, supposed
+from kbs_process.diagnosis.thresholds import MOSTLY_DONE, TAKEN, WAYS
+
+
+def leaving(known: Known, share: float) -> Known:
+    """The same with residuals that leave a share of what it leaves beyond the noise."""
+    left = share * known.excess + known.fit_rows
+    size = np.sqrt(left / (known.excess + known.fit_rows))
+    return replace(known, residual=tuple(size * one for one in known.residual))
+
+
+@pytest.fixture(scope="module")
+def made() -> Experiment:
+    return with_cable(bench.experiment(bench.rig(), ROLES, 3), (0, 1, 2))
+
+
+@pytest.fixture(scope="module")
+def cable(made: Experiment) -> Standing:
+    return standing(made)
+
+
+@pytest.fixture(scope="module")
+def laws(cable: Standing) -> dict[str, Tried]:
+    tried, scene, found = screened(cable)
+    return {law: passed(cable, tried, scene, found, law) for law in ("ground_cable", "harness")}
+
+
+def with_left(one: Tried, before: Known, share: float) -> Tried:
+    known = one.standing.known
+    scaled = leaving(before, share).residual
+    return replace(one, standing=replace(one.standing, known=replace(known, residual=scaled)))
+
+
+def test_those_are_supposed_that_take_some_the_one_that_leaves_least_first(
+    cable: Standing, laws: dict[str, Tried]
+) -> None:
+    known = cable.known
+    assert known.gross
+    more, less = with_left(laws["harness"], known, 0.3), with_left(laws["ground_cable"], known, 0.6)
+    little = with_left(laws["ground_cable"], known, 1.01 - TAKEN)
+    assert supposed([less, more], known) == [more, less]
+    assert supposed([less, more, with_left(laws["harness"], known, 0.4)], known) == [more, less]
+    assert len(supposed([less, more], known)) <= WAYS
+    assert supposed([little], known) == []
+    # What was taken off each recording has no numbers that go on, and where little is left nothing hides another.
+    assert supposed([replace(more, own=Own((), ()))], known) == []
+    assert supposed([less, more], leaving(known, 0.5 * known.fit_rows / known.excess)) == []
+
+
+def test_two_leave_enough_where_they_leave_little(cable: Standing) -> None:
+    known = cable.known
+    assert enough(known, leaving(known, 0.99 - MOSTLY_DONE))
+    assert not enough(known, leaving(known, 1.01 - MOSTLY_DONE))
+
+
+@pytest.mark.parametrize(
+    ("left", "alone"), [((0.15, 0.1), False), ((0.15, 0.3), False), ((0.5, 0.1), False), ((0.15, 0.1), True)]
+)
+def test_each_of_a_pair_has_to_be_found_beside_the_other(
+    cable: Standing,
+    laws: dict[str, Tried],
+    monkeypatch: pytest.MonkeyPatch,
+    left: tuple[float, float],
+    alone: bool,
+) -> None:
+    """`left` by both, in either order; `alone`: the supposed law is not found again beside the other."""
+    known, made = cable.known, cable.known.experiment
+    first, second = laws["ground_cable"], laws["harness"]
+    refused = first.gate.but("predicted worse")
+    noted = Noted()
+    noted.fell(replace(with_left(first, known, 0.5), gate=refused))
+    assert [one.identity.law for one in noted.refused] == ["ground_cable"]
+    asked: list[list[str]] = []
+
+    def look(
+        here: Standing, seen: Standing, _: object, __: object, accepted: Sequence[Accepted]
+    ) -> rounds._Round:
+        asked.append([one.find.identity.law for one in accepted])
+        share = left[len(asked) - 1]
+        one = second if len(asked) == 1 else first
+        there = replace(here, known=leaving(known, share))
+        told = rounds.find_of([one], 0, np.ones(1), cable, None)
+        found = None if alone and len(asked) == 2 else Accepted(replace(one, standing=there), told, here)
+        return rounds._Round(found, there, seen, one.screening, Noted(), None)
+
+    monkeypatch.setattr(rounds, "_round", look)
+    for name in ("without", "bare"):
+        monkeypatch.setattr(rounds, name, lambda here, *_: here)
+    empty = rounds._Round(None, cable, cable, first.screening, noted, None)
+    pair = rounds._pair(empty, declared(made), bench.serial(made), [])
+    assert asked[0] == ["ground_cable"]
+    if left[0] > 1.0 - MOSTLY_DONE:
+        assert len(asked) == 1
+    else:
+        assert asked[1] == ["harness"]
+    if alone or max(left) > 1.0 - MOSTLY_DONE:
+        assert pair == ()
+    else:
+        assert [one.accepted.find.identity.law for one in pair if one.accepted] == ["harness", "ground_cable"]
