@@ -284,7 +284,9 @@ def test_the_second_law_that_passed_is_believed_where_the_first_falls(
         )
         done = rounds._round(cable, cable, floor, simulate, [])
         assert done.accepted is not None and done.accepted.find.identity.law == kept
-        assert [one.identity.law for one in done.noted.refused] == ([] if kept == "ground_cable" else list(fallen))
+        assert [one.identity.law for one in done.noted.refused] == (
+            [] if kept == "ground_cable" else list(fallen)
+        )
     # Those that are each recording's own are looked at where none of the others stands.
     monkeypatch.setattr(rounds, "_passed", lambda *_: iter([[first], [second]]))
     done = rounds._round(cable, cable, floor, simulate, [])

@@ -25,7 +25,6 @@ from kbs_process.diagnosis.outcome import (
     Moved,
     Outcome,
     Place,
-    Refused,
     Verdict,
 )
 from kbs_process.diagnosis.ports import port_test
