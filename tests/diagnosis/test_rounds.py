@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -20,6 +20,7 @@ from kbs_process.diagnosis.gls import Sums, score
 from kbs_process.diagnosis.hypothesis import Hypothesis, predict
 from kbs_process.diagnosis.joint import Own, Standing, with_extra
 from kbs_process.diagnosis.leaders import gated
+from kbs_process.diagnosis.needed import Accepted
 from kbs_process.diagnosis.outcome import Identity
 from kbs_process.diagnosis.race import own_of
 from kbs_process.diagnosis.remains import detected
@@ -27,6 +28,7 @@ from kbs_process.diagnosis.rivals import probabilities, rivalry
 from kbs_process.diagnosis.scatter import scattered
 from kbs_process.diagnosis.scene import Scene
 from kbs_process.diagnosis.screen import Bench, Catalogued, Found, Screening, screen
+from kbs_process.diagnosis.supposed import Noted
 from kbs_process.diagnosis.suspects import Candidate
 from kbs_process.diagnosis.thresholds import told_apart
 from kbs_process.diagnosis.tryout import extra_of, identity
@@ -347,3 +349,40 @@ def _lower(standing: Standing, share: float) -> Standing:
             residual=tuple(np.sqrt(share) * z for z in known.residual),
         ),
     )
+
+
+@pytest.mark.parametrize(
+    ("left", "some", "looked"),
+    [(True, True, True), (True, False, True), (False, False, True), (False, True, False)],
+)
+def test_what_each_recording_has_of_its_own_is_not_looked_for_where_a_law_leaves_nothing(
+    cable: Standing, monkeypatch: pytest.MonkeyPatch, left: bool, some: bool, looked: bool
+) -> None:
+    """`some` law was found before; it would take up what that one's formula lacks."""
+    tried, scene, found = screened(cable)
+    first = passed(cable, tried, scene, found, "ground_cable")
+    told = find_of([first], 0, np.ones(1), cable, None)
+    accepted = [Accepted(first, told, cable)] if some else []
+    own, repeating = (
+        SimpleNamespace(suspect=SimpleNamespace(each_trial=each, family=("drift", str(each))))
+        for each in (True, False)
+    )
+    asked: list[object] = []
+
+    def simulated(chosen: list[object], *_: object) -> tuple[list[Tried], list[Tried]]:
+        asked.extend(chosen)
+        return [], []
+
+    def led(view: SimpleNamespace, among: Callable[[object], bool]) -> tuple[list[object], list[object]]:
+        return [one for one in (repeating, own) if among(one)], []
+
+    monkeypatch.setattr(rounds, "detected", lambda *_: SimpleNamespace(left=left))
+    monkeypatch.setattr(rounds, "promises_little", lambda *_: "")
+    monkeypatch.setattr(rounds, "in_the_shade", lambda *_: ())
+    monkeypatch.setattr(rounds, "leaders", led)
+    monkeypatch.setattr(rounds, "tried", simulated)
+    view = SimpleNamespace(able=[], unrepeated=[own], standing=cable)
+    floor, simulate = declared(cable.known.experiment), bench.serial(cable.known.experiment)
+    assert list(rounds._passed(view, cable, floor, simulate, accepted, Noted())) == []  # type: ignore[arg-type]
+    assert asked[0] is repeating
+    assert (own in asked) == looked

@@ -360,7 +360,11 @@ def _passed(
     for found in view.able:
         if reasons := in_the_shade(found, accepted):
             noted.refuse(found, *reasons)
-    first, others = leaders(view, lambda found: not in_the_shade(found, accepted))
+    # What each recording has of its own predicts none, and beside a law that was found takes up what its formula lacks.
+    own = there.left or not accepted
+    first, others = leaders(
+        view, lambda found: (own or not found.suspect.each_trial) and not in_the_shade(found, accepted)
+    )
     for chosen in (first, *([found] for found in others)):
         more, less = tried(chosen, view, view.standing, floor, simulate)
         passed = [*passed, *more]
@@ -370,7 +374,7 @@ def _passed(
             break
     if passed:
         yield passed
-    if chosen := view.unrepeated[:SECOND]:
+    if own and (chosen := view.unrepeated[:SECOND]):
         # What seemed to do nearly as well and to come again did not stand.
         more, less = tried(chosen, view, view.standing, floor, simulate)
         noted.fell(*less)
