@@ -258,6 +258,19 @@ def test_validate_tells_losses_and_fails_only_when_asked(
     assert "EL089P00_3  held-out     clean" in out
 
 
+def test_validate_tells_a_recording_of_which_nothing_is_whole_long_enough(
+    processable: CampaignFolder, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Gravity is not fitted to a recording that is held out, and processing has to take it off all the same."""
+    path = processable.path / "recordings" / "EL089P00_2.mcap"
+    short_campaign.record(path, noise=0.01, seed=5, nan=slice(0, None, 2))
+    assert run("validate", str(processable.path), "-q") == 2
+    out = capsys.readouterr().out
+    assert "EL089P00_2: wrench (Fz in 1000: interpolated)" in out
+    assert "EL089P00_2: too short or too damaged" in out
+    assert "wrench and angles are whole for 0 s of 20 s" in out
+
+
 def test_validate_refuses_what_it_cannot_read(
     folder: CampaignFolder, capsys: pytest.CaptureFixture[str]
 ) -> None:

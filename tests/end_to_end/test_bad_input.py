@@ -102,6 +102,13 @@ def test_a_recording_that_was_changed(folder: CampaignFolder, refused: Callable[
     assert stated in message
 
 
+def test_a_channel_that_is_no_number(folder: CampaignFolder, refused: Callable[[], str]) -> None:
+    record(folder.path / "recordings" / "EL089P00_2.mcap", nan=slice(None))
+    message = refused()
+    for word in ("recordings/EL089P00_2.mcap: wrench", "Fz in 2000", "transducer.channels"):
+        assert word in message, message
+
+
 def test_a_joint_that_no_encoder_reads(folder: CampaignFolder, refused: Callable[[], str]) -> None:
     record(folder.path / "recordings" / "EL089P00_2.mcap", read=("el",))
     message = refused()

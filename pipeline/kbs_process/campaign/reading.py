@@ -43,6 +43,7 @@ def read_run(campaign: Campaign, entry: RecordingEntry, through: Callable[[Block
         {topic.key: topic.channels for topic in topics},
         CondenseSettings(working_rate_Hz=campaign.bands.working_rate),
         units={topic.key: topic.units for topic in topics},
+        file=str(entry.path),
     )
     late = ((source.start_ns or run.log_epoch_ns) - run.log_epoch_ns) * 1e-9
     return replace(run, losses=(*(_later(loss, late) for loss in source.losses), *run.losses))

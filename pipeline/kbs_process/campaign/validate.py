@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from kbs_process.campaign.config import Campaign
 from kbs_process.campaign.measurable import check_requirements
-from kbs_process.campaign.preparing import Prepared, fit_gravity, prepare
+from kbs_process.campaign.preparing import Prepared, check_taring, fit_gravity, prepare
 from kbs_process.campaign.progress import Progress
 from kbs_process.errors import KbsError, RecordingError
 from kbs_process.signals.records import TRUNCATED, Loss
 from kbs_process.stages import decouple
+from kbs_process.stages.gravity import GravityModel
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,10 +54,23 @@ def validate(campaign: Campaign, progress: Progress) -> Validation:
     try:
         check_requirements(campaign)
         if len(prepared) == len(findings):
-            fit_gravity(campaign, prepared, progress)
+            model = fit_gravity(campaign, prepared, progress)
+            findings = [
+                replace(finding, error=_untared(campaign, one, model))
+                for finding, one in zip(findings, prepared, strict=True)
+            ]
     except KbsError as error:
         return Validation(tuple(findings), str(error))
     return Validation(tuple(findings))
+
+
+def _untared(campaign: Campaign, one: Prepared, model: GravityModel) -> str:
+    """Why gravity cannot be taken off a recording, or nothing."""
+    try:
+        check_taring(campaign, one, model)
+    except RecordingError as error:
+        return str(error)
+    return ""
 
 
 def describe(campaign: Campaign, validation: Validation) -> Iterator[str]:
