@@ -258,6 +258,19 @@ def test_validate_tells_losses_and_fails_only_when_asked(
     assert "EL089P00_3  held-out     clean" in out
 
 
+def test_validate_tells_what_was_put_in_order_and_counts_no_loss(
+    processable: CampaignFolder, capsys: pytest.CaptureFixture[str]
+) -> None:
+    short_campaign.record(
+        processable.path / "recordings" / "EL089P00_2.mcap", noise=0.01, seed=5, swapped=True
+    )
+    assert run("validate", str(processable.path), "--check") == 0
+    out = capsys.readouterr().out
+    assert "EL089P00_2  held-out     clean" in out
+    assert "EL089P00_2: 1 x put in order" in out
+    assert "4 recordings: 0 unreadable, 0 with losses" in out
+
+
 def test_validate_tells_a_recording_of_which_nothing_is_whole_long_enough(
     processable: CampaignFolder, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -103,7 +103,8 @@ def test_losses_are_counted_and_located_and_what_they_touch_is_flagged() -> None
     assert run.wrench is not None
     assert loss(run, "gap") == 35
     assert loss(run, "repeat") == 10
-    assert loss(run, "out of order") == 209  # 200 displaced, and 9 of the 10 repeats come late too
+    assert loss(run, "put in order") == 209  # 200 displaced, and 9 of the 10 repeats come late too
+    assert loss(run, "out of order") == 0
     assert loss(run, "non-finite") == 3
     (told,) = [entry.detail for entry in run.losses if entry.kind == "non-finite"]
     assert told == "Fx in 1, Tx in 1, Tz in 1: interpolated"
@@ -113,6 +114,25 @@ def test_losses_are_counted_and_located_and_what_they_touch_is_flagged() -> None
     assert not valid[(t > 19.9) & (t < 20.1)].any()
     assert valid[(t > 21.5) & (t < 29.0)].all()
     assert error(run).max() < 2e-3  # a flagged share of 0.1 % at most
+
+
+def test_what_is_put_in_order_is_told_and_is_no_loss() -> None:
+    streams = recording()
+    order = np.arange(len(streams["wrench"]))
+    order[[3000, 3001, 40_000, 40_001]] = [3001, 3000, 40_001, 40_000]
+    run = run_of({**streams, "wrench": rows(streams["wrench"], order)})
+    assert [(one.kind, one.count, one.real) for one in run.losses] == [("put in order", 2, False)]
+    np.testing.assert_array_equal(run.wrench.values, run_of(streams).wrench.values)
+
+
+def test_what_comes_too_late_to_be_put_in_order_is_a_loss() -> None:
+    streams = recording()
+    order = np.arange(len(streams["wrench"]))
+    run = run_of({**streams, "wrench": rows(streams["wrench"], np.append(np.delete(order, 1000), 1000))})
+    (late,) = [one for one in run.losses if one.kind == "out of order"]
+    assert (late.count, late.real) == (1, True)
+    assert loss(run, "put in order") == 0
+    assert loss(run, "gap") == 1
 
 
 @pytest.mark.parametrize(

@@ -25,6 +25,10 @@ class Finding:
     losses: tuple[Loss, ...] = ()
     error: str = ""
 
+    @property
+    def lossy(self) -> bool:
+        return any(loss.real for loss in self.losses)
+
 
 @dataclass(frozen=True, slots=True)
 class Validation:
@@ -84,7 +88,7 @@ def describe(campaign: Campaign, validation: Validation) -> Iterator[str]:
     )
     width = max(len(finding.name) for finding in findings)
     for finding in findings:
-        state = "unreadable" if finding.error else "lossy" if finding.losses else "clean"
+        state = "unreadable" if finding.error else "lossy" if finding.lossy else "clean"
         rates = ", ".join(f"{key} {rate:.5g} Hz" for key, rate in sorted(finding.rates.items()))
         yield f"  {finding.name:<{width}}  {finding.role:<11}  {state:<10}  {rates}".rstrip()
     for finding in findings:
@@ -92,7 +96,7 @@ def describe(campaign: Campaign, validation: Validation) -> Iterator[str]:
         if finding.error:
             yield f"  {finding.error}"
     bad = sum(bool(finding.error) for finding in findings)
-    lossy = sum(bool(finding.losses) for finding in findings)
+    lossy = sum(finding.lossy for finding in findings)
     recordings = "recording" if len(findings) == 1 else "recordings"
     yield f"{len(findings)} {recordings}: {bad} unreadable, {lossy} with losses"
     if validation.refusal:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from kbs_process.signals.records import Array, Block, Loss, Mask, Stamps
+from kbs_process.signals.records import PUT_IN_ORDER, Array, Block, Loss, Mask, Stamps
 from kbs_process.stages.clocks import ClockData, LatencyFloor
 from kbs_process.stages.envelope import MinMax
 from kbs_process.stages.grid import AROUND, Grid, Regridder, counted, nominal_grid
@@ -168,13 +168,13 @@ class Timeline:
         found = []
         if orderer.repeats:
             found.append(Loss("repeat", self.where, orderer.repeats, detail="same stamp: the first is kept"))
-        if orderer.displaced:
-            detail = (
-                f"put in order; {orderer.late} too late for that and dropped"
-                if orderer.late
-                else "put in order"
-            )
-            found.append(Loss("out of order", self.where, orderer.displaced, detail=detail))
+        if orderer.late:
+            detail = "too late to be put in order: dropped"
+            found.append(Loss("out of order", self.where, orderer.late, detail=detail))
+        placed = orderer.displaced - orderer.late
+        if placed > 0:
+            detail = "arrived after younger ones: nothing is lost by that"
+            found.append(Loss(PUT_IN_ORDER, self.where, placed, detail=detail))
         if orderer.stray:
             detail = "stamps more than 10 s off the recorder's clock: dropped"
             found.append(Loss("clock", self.where, orderer.stray, detail=detail))
