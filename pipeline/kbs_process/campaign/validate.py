@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
-from kbs_process.campaign.config import Campaign
+from kbs_process.campaign.config import Campaign, RecordingEntry
 from kbs_process.campaign.measurable import check_requirements
 from kbs_process.campaign.preparing import Prepared, check_taring, fit_gravity, prepare
 from kbs_process.campaign.progress import Progress
@@ -101,6 +101,30 @@ def describe(campaign: Campaign, validation: Validation) -> Iterator[str]:
     yield f"{len(findings)} {recordings}: {bad} unreadable, {lossy} with losses"
     if validation.refusal:
         yield f"cannot be processed: {validation.refusal}"
+    if hint := repeatability_hint(campaign):
+        yield f"hint: {hint}"
+
+
+def repeatability_hint(campaign: Campaign) -> str:
+    """Say what a campaign without repeats goes without, and what is taken instead; nothing of one that has some."""
+    judged = [entry for entry in campaign.recordings if entry.role != "calibration"]
+    if not judged or _repeats(judged):
+        return ""
+    # What `diagnosis.floor` and the budget do; a calibration is part of the former alone.
+    floor = (
+        ""
+        if _repeats(campaign.recordings)
+        else ", and diagnose takes what the parameter files say of the sensors' noise and rounding for its floor"
+    )
+    return (
+        "no trajectory is repeated: what differs from run to run is not known, the uncertainty budget has no "
+        f"repeatability{floor}\n  -> record a trajectory two or three times, and list each run with its `repeat`"
+    )
+
+
+def _repeats(entries: Sequence[RecordingEntry]) -> bool:
+    """Whether two recordings are runs of one trajectory."""
+    return len({entry.trajectory for entry in entries}) < len(entries)
 
 
 def in_words(loss: Loss) -> str:
