@@ -62,6 +62,18 @@ FAULTS = {
         'encoder = "/command"',
         ["topics.encoder", "nothing is measured"],
     ),
+    "an encoder on no joint": (
+        CAMPAIGN,
+        'encoder = "/encoder"',
+        'encoder = { topic = "/encoder", joints = ["ell"] }',
+        ["topics.encoder.joints[1]", "no joint 'ell'", "did you mean 'el'"],
+    ),
+    "joints of another topic": (
+        CAMPAIGN,
+        'command = "/command"',
+        'command = { topic = "/command", joints = ["el"] }',
+        ["topics.command.joints"],
+    ),
     "no commands": (CAMPAIGN, 'command = "/command"', "", ["needs commands", "motion"]),
     "one table for a list": (CAMPAIGN, "[[requirement]]", "[requirement]", ["requirement", "write [[requirement]]"]),
     "missing parameter file": (CAMPAIGN, "parameters/rig.toml", "parameters/rg.toml", ["does not exist"]),

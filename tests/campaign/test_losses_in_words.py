@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
+from kbs_process.campaign.config import RecordingEntry
+from kbs_process.campaign.notices import lost
 from kbs_process.campaign.validate import in_words
-from kbs_process.signals.records import TRUNCATED, Loss
+from kbs_process.report import results
+from kbs_process.signals.records import PUT_IN_ORDER, TRUNCATED, Loss
 
 
 @pytest.mark.parametrize(
@@ -20,3 +25,18 @@ from kbs_process.signals.records import TRUNCATED, Loss
 )
 def test_a_loss_is_told_with_its_time(loss: Loss, said: str) -> None:
     assert in_words(loss) == said
+
+
+@pytest.mark.parametrize(("also", "severity"), [((), "info"), (("gap",), "warning")])
+def test_what_was_put_in_order_alone_is_no_warning(also: tuple[str, ...], severity: str) -> None:
+    entry = RecordingEntry("a", Path("a.mcap"), "A", "fit", 1, None, None, None)
+    losses = [Loss(kind, "a: wrench", 3) for kind in (PUT_IN_ORDER, *also)]
+    (notice,) = lost(entry, losses)
+    assert notice.severity == severity
+    assert "put in order: 3" in notice.what
+    listed = tuple(results.LossEntry(kind=one.kind, where=one.where, count=one.count) for one in losses)
+    recording = results.Recording(
+        name="a", file="a.mcap", trajectory="A", role="fit", repeat=1, sha256="0" * 64, duration_s=1.0,
+        losses=listed,
+    )  # fmt: skip
+    assert [one.kind for one in recording.lost] == list(also)

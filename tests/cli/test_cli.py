@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import json
+import re
 import signal
 import subprocess
 import sys
@@ -256,6 +257,60 @@ def test_validate_tells_losses_and_fails_only_when_asked(
     out = capsys.readouterr().out
     assert "EL089P00_2  held-out     lossy" in out
     assert "EL089P00_3  held-out     clean" in out
+
+
+def test_validate_tells_what_was_put_in_order_and_counts_no_loss(
+    processable: CampaignFolder, capsys: pytest.CaptureFixture[str]
+) -> None:
+    short_campaign.record(
+        processable.path / "recordings" / "EL089P00_2.mcap", noise=0.01, seed=5, swapped=True
+    )
+    assert run("validate", str(processable.path), "--check") == 0
+    out = capsys.readouterr().out
+    assert "EL089P00_2  held-out     clean" in out
+    assert "EL089P00_2: 1 x put in order" in out
+    assert "4 recordings: 0 unreadable, 0 with losses" in out
+
+
+def test_validate_tells_a_recording_of_which_nothing_is_whole_long_enough(
+    processable: CampaignFolder, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Gravity is not fitted to a recording that is held out, and processing has to take it off all the same."""
+    path = processable.path / "recordings" / "EL089P00_2.mcap"
+    short_campaign.record(path, noise=0.01, seed=5, nan=slice(0, None, 2))
+    assert run("validate", str(processable.path), "-q") == 2
+    out = capsys.readouterr().out
+    assert "EL089P00_2: wrench (Fz in 1000: interpolated)" in out
+    assert "EL089P00_2: too short or too damaged" in out
+    assert "wrench and angles are whole for 0 s of 20 s" in out
+
+
+@pytest.mark.parametrize(
+    ("trajectories", "hinted"),
+    [
+        ({}, ""),
+        ({"EL089P00_2": "B", "EL089P00_3": "C"}, "no repeatability, and diagnose takes"),
+        # A calibration is in the floor, and in no budget.
+        ({"EL089P00_1": "AZPS_ATA", "EL089P00_2": "B", "EL089P00_3": "C"}, "no repeatability\n"),
+    ],
+)
+def test_validate_hints_at_a_campaign_without_repeats(
+    processable: CampaignFolder,
+    capsys: pytest.CaptureFixture[str],
+    trajectories: dict[str, str],
+    hinted: str,
+) -> None:
+    text = (processable.path / "campaign.toml").read_text()
+    for number, (name, trajectory) in enumerate(trajectories.items(), start=11):
+        head, tail = text.split(f"recordings/{name}.mcap")
+        tail = tail.replace('trajectory = "EL089P00"', f'trajectory = "{trajectory}"', 1)
+        tail = re.sub(r"repeat = \d+", f"repeat = {number}", tail, count=1)
+        text = f"{head}recordings/{name}.mcap{tail}"
+    (processable.path / "campaign.toml").write_text(text)
+    assert run("validate", str(processable.path), "-q") == 0
+    out = capsys.readouterr().out
+    assert ("hint: no trajectory is repeated" in out) == bool(hinted)
+    assert hinted in out
 
 
 def test_validate_refuses_what_it_cannot_read(

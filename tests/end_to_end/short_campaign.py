@@ -21,10 +21,20 @@ def short_campaign(target: Path) -> CampaignFolder:
     return folder
 
 
-def record(path: Path, *, moving: bool = True, noise: float = 0.0, seed: int = 1, nan: bool = False) -> None:
+def record(
+    path: Path,
+    *,
+    moving: bool = True,
+    noise: float = 0.0,
+    seed: int = 1,
+    nan: bool | slice = False,
+    swapped: bool = False,
+    read: tuple[str, ...] = JOINTS,
+) -> None:
     """Write twenty seconds: elevation at rest, or swinging; a wrench that is constant, but for noise (N, N m).
 
-    With `nan` ten readings of Fz are no numbers.
+    With `nan` ten readings of Fz are no numbers, or a slice of them; if `swapped`, two messages are in the other's
+    place. Encoders `read` some joints.
     """
     stamp = np.arange(2000) * 10_000_000
     cycle = stamp[::10]
@@ -34,12 +44,16 @@ def record(path: Path, *, moving: bool = True, noise: float = 0.0, seed: int = 1
     wrench = np.tile([0.0, 0.0, -274.0, -6.0, 5.0, 0.0], (len(stamp), 1))
     wrench += noise * np.random.default_rng(seed).standard_normal(wrench.shape)
     if nan:
-        wrench[200:210, 2] = np.nan
+        wrench[nan if isinstance(nan, slice) else slice(200, 210), 2] = np.nan
+    sensed = stamp.copy()
+    if swapped:
+        sensed[[700, 701]] = stamp[[701, 700]]
+    columns = [JOINTS.index(name) for name in read]
     write_mcap(
         path,
         [
-            OutStream("/transducer/wrench", "wrench", stamp, stamp, wrench),
-            OutStream("/encoder", "joints", stamp, stamp, angle, JOINTS),
+            OutStream("/transducer/wrench", "wrench", sensed, stamp, wrench),
+            OutStream("/encoder", "joints", stamp, stamp, angle[:, columns], read),
             OutStream("/command", "joints", cycle, cycle, command, JOINTS),
         ],
     )

@@ -102,6 +102,25 @@ def test_a_recording_that_was_changed(folder: CampaignFolder, refused: Callable[
     assert stated in message
 
 
+def test_a_channel_that_is_no_number(folder: CampaignFolder, refused: Callable[[], str]) -> None:
+    record(folder.path / "recordings" / "EL089P00_2.mcap", nan=slice(None))
+    message = refused()
+    for word in ("recordings/EL089P00_2.mcap: wrench", "Fz in 2000", "transducer.channels"):
+        assert word in message, message
+
+
+def test_a_joint_that_no_encoder_reads(folder: CampaignFolder, refused: Callable[[], str]) -> None:
+    record(folder.path / "recordings" / "EL089P00_2.mcap", read=("el",))
+    message = refused()
+    for word in (
+        "EL089P00_2.mcap, /encoder",
+        "'az' of position",
+        "known: el",
+        "`joints` of [topics.encoder]",
+    ):
+        assert word in message, message
+
+
 def test_recordings_without_motion(folder: CampaignFolder, refused: Callable[[], str]) -> None:
     """A singular fit: the message names the recordings, and the parameters that they cannot tell apart."""
     for path in (folder.path / "recordings").iterdir():

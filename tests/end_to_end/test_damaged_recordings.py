@@ -133,7 +133,7 @@ def test_a_clock_that_jumps_back(damaged: Damaged) -> None:
     count = damaged.set_back
     assert count > 25
     what = damaged.warning("EL089P00_3")
-    assert f"out of order: {count}" in what
+    assert f"put in order: {count}" in what
     assert f"gap: {count}, between {BACK[0]:.1f} s and {BACK[1]:.1f} s" in what
 
 

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import inspect
+
 import numpy as np
 import pytest
 from plant_rigs import NOMINAL, two_axis
 
 from kbs_process.plant.attach import attach
-from kbs_process.plant.effects import select
+from kbs_process.plant.effects import cogging, select, tooth_stiction
 from kbs_process.plant.predict import predict, tap_columns
 from kbs_process.plant.schedule import Schedule
-from kbs_process.rig.model import Rig
+from kbs_process.rig.model import Rig, substitute
 from kbs_process.signals.records import Array
 
 SECONDS, CYCLE, LATE, SCALE = 8.0, 0.05, 5e-3, 2e-3
@@ -149,3 +151,40 @@ def test_set_points_that_are_late_by_a_part_of_a_cycle_are_means_of_two() -> Non
     expected, _ = shown(rig, list(NOMINAL), schedule(smoothed, t))
     found, _ = shown(with_effect, [*NOMINAL, effect.name], schedule(way(t), t))
     np.testing.assert_allclose(found, expected, atol=1e-9)
+
+
+@pytest.mark.parametrize("steps", [400.0, 12800.0])
+@pytest.mark.parametrize("recorded", [False, True])
+def test_the_field_is_in_whole_microsteps_of_the_drive_s_own(steps: float, recorded: bool) -> None:
+    """Of 2 pi / steps_per_turn, whatever Kangle; a recorded field too."""
+    t = np.arange(-1.0, SECONDS + 0.2, CYCLE)
+    rig = two_axis(loop="open")
+    names = {f"joint.{joint.name}.drive.steps_per_turn": steps for joint in rig.joints}
+    kangle = {f"joint.{joint.name}.drive.parameters.Kangle": 50.0 for joint in rig.joints}
+    ratios = np.array([float(joint.drive.ratio) for joint in rig.joints if joint.drive is not None])
+    driven = schedule(way(t), t)
+    if recorded:
+        driven = Schedule(driven.t, driven.position, driven.rate, driven.position * ratios)
+    _, field = shown(substitute(rig, names | kangle), list(NOMINAL), driven)
+    codes = field * steps / (2.0 * np.pi)
+    np.testing.assert_allclose(codes, np.round(codes), atol=1e-6)
+    assert len(np.unique(np.round(codes[:, 0]))) > 20
+    expected = np.stack(
+        [np.interp(np.arange(len(field)) / 100.0, t, column) for column in (way(t) * ratios).T], axis=1
+    )
+    np.testing.assert_allclose(field, expected, atol=0.501 * 2.0 * np.pi / steps)
+
+
+def test_full_steps_of_cogging_and_tooth_contact_are_no_number_of_the_drive() -> None:
+    """They stay 200 a turn: nothing that is configured enters (docs/equations.md)."""
+    angle = np.linspace(-4.0, 4.0, 401)
+    for name in ("cogging", "tooth_stiction"):
+        (effect,) = select([name])
+        given = set(inspect.signature(effect.equation).parameters)
+        assert not given & {"steps_per_turn", "Kangle"}
+    values = np.array([cogging.torque(one, 6e-3, 0.3) for one in angle])
+    later = np.array([cogging.torque(one + 2.0 * np.pi / 200.0, 6e-3, 0.3) for one in angle])
+    np.testing.assert_allclose(later, values, atol=1e-12)
+    contact = np.array([tooth_stiction.limit(one, 0.0, 6e-3, 0.5, 0.3) for one in angle])
+    after = np.array([tooth_stiction.limit(one + 2.0 * np.pi / 200.0, 0.0, 6e-3, 0.5, 0.3) for one in angle])
+    np.testing.assert_array_equal(after, contact)

@@ -103,14 +103,72 @@ def test_losses_are_counted_and_located_and_what_they_touch_is_flagged() -> None
     assert run.wrench is not None
     assert loss(run, "gap") == 35
     assert loss(run, "repeat") == 10
-    assert loss(run, "out of order") == 209  # 200 displaced, and 9 of the 10 repeats come late too
+    assert loss(run, "put in order") == 209  # 200 displaced, and 9 of the 10 repeats come late too
+    assert loss(run, "out of order") == 0
     assert loss(run, "non-finite") == 3
+    (told,) = [entry.detail for entry in run.losses if entry.kind == "non-finite"]
+    assert told == "Fx in 1, Tx in 1, Tz in 1: interpolated"
     long_gap = next(entry for entry in run.losses if entry.kind == "gap" and entry.count == 30)
     assert long_gap.start_s == pytest.approx(19.999) and long_gap.end_s == pytest.approx(20.03)
     t, valid = run.wrench.t, run.wrench.valid
     assert not valid[(t > 19.9) & (t < 20.1)].any()
     assert valid[(t > 21.5) & (t < 29.0)].all()
     assert error(run).max() < 2e-3  # a flagged share of 0.1 % at most
+
+
+def test_what_is_put_in_order_is_told_and_is_no_loss() -> None:
+    streams = recording()
+    order = np.arange(len(streams["wrench"]))
+    order[[3000, 3001, 40_000, 40_001]] = [3001, 3000, 40_001, 40_000]
+    run = run_of({**streams, "wrench": rows(streams["wrench"], order)})
+    assert [(one.kind, one.count, one.real) for one in run.losses] == [("put in order", 2, False)]
+    np.testing.assert_array_equal(run.wrench.values, run_of(streams).wrench.values)
+
+
+def test_what_comes_too_late_to_be_put_in_order_is_a_loss() -> None:
+    streams = recording()
+    order = np.arange(len(streams["wrench"]))
+    run = run_of({**streams, "wrench": rows(streams["wrench"], np.append(np.delete(order, 1000), 1000))})
+    (late,) = [one for one in run.losses if one.kind == "out of order"]
+    assert (late.count, late.real) == (1, True)
+    assert loss(run, "put in order") == 0
+    assert loss(run, "gap") == 1
+
+
+@pytest.mark.parametrize(
+    ("stream_key", "column", "first", "words"),
+    [
+        (
+            "wrench",
+            2,
+            0,
+            ("run.mcap: wrench: none of 60000 samples", "NaN or infinite: Fz in 60000", "channels"),
+        ),
+        ("wrench", 2, 100, ("100 of 60000 samples", "Fz in 59900", "20 Hz need")),
+        ("angle", 0, 0, ("run.mcap: encoder: none of 6200", "az in 6200", "`joints` of [topics.encoder]")),
+        ("command", 1, 0, ("run.mcap: command: none of 620", "el in 620", "record the commands")),
+    ],
+)
+def test_a_channel_without_numbers_is_named(
+    stream_key: str, column: int, first: int, words: tuple[str, ...]
+) -> None:
+    streams = recording()
+    streams[stream_key].values[first:, column] = np.nan
+    with pytest.raises(RecordingError) as caught:
+        condense(
+            "run", streams.items(), {key: CHANNELS[key] for key in streams}, SETTINGS, file="/data/run.mcap"
+        )
+    for word in words:
+        assert word in str(caught.value)
+    assert "record longer" not in str(caught.value)
+
+
+def test_an_optional_channel_without_numbers_is_lost_and_no_more() -> None:
+    streams = recording()
+    streams["temperature"].values[:] = np.nan
+    run = run_of(streams)
+    assert run.temperature is None
+    assert loss(run, "non-finite") == 62
 
 
 def test_stamps_that_stand_still_are_replaced_by_the_recorder_clock() -> None:

@@ -9,14 +9,15 @@ import numpy as np
 
 from kbs_process.campaign.config import Bands, Campaign, RecordingEntry
 from kbs_process.campaign.predicting import predict_run
-from kbs_process.campaign.relief import errors, forces_in, in_motion, without_effects, without_forces
+from kbs_process.campaign.preparing import tare
+from kbs_process.campaign.relief import errors, forces_in, in_motion, without_forces
 from kbs_process.campaign.settings import motion_settings
 from kbs_process.plant.rigid import static_wrench
 from kbs_process.signals.records import WRENCH_CHANNELS, Array, Run, Signal
 from kbs_process.stages import bandpass, gravity
 from kbs_process.stages.bandpass import UNFILTERED, Band
 from kbs_process.stages.condense import CondenseSettings
-from kbs_process.stages.gravity import GravityModel, Sample, Static
+from kbs_process.stages.gravity import GravityModel, Static
 from kbs_process.stages.gravity_quality import Misfit, misfits
 from kbs_process.stages.motion import Motion, estimate
 from kbs_process.stages.to_cog import to_spacecraft
@@ -67,8 +68,7 @@ def analyse(
 ) -> Analysis:
     """Remove gravity from measurement and prediction alike, cut the bands, move them to the spacecraft."""
     wrench = _loads(run)
-    sample = Sample(entry.name, motion, without_effects(campaign, entry, motion, wrench, model.rig))
-    taring = gravity.tare(sample, model)
+    sample, taring = tare(campaign, entry, run, motion, model)
     static = gravity.apply(_at_rest(motion), model, taring)
     residual = wrench.derive(
         model.without_coupling(wrench.values - static.wrench.values),

@@ -28,6 +28,7 @@ def check_campaign(
     _check_loads(campaign, document, tables, problems)
     _check_external(campaign, tables, problems)
     _check_topics(campaign, document, problems)
+    _check_read(campaign, document, problems)
     _check_bands(campaign, document, problems)
     for index, entry in enumerate(campaign.recordings):
         _check_recording(campaign, index, entry, document, problems)
@@ -179,6 +180,23 @@ def _check_topics(campaign: Campaign, document: Document, problems: Problems) ->
                 f"lists {len(topic.fields)} fields for {len(topic.channels)} channels",
                 f"give one for each of {', '.join(topic.channels)}",
             )
+
+
+def _check_read(campaign: Campaign, document: Document, problems: Problems) -> None:
+    """Joints that encoders read are the rig's; of the others commands say, or measured rates, how they move."""
+    encoder = document.tree["topics"].get("encoder")
+    if not isinstance(encoder, dict) or "joints" not in encoder:
+        return
+    names = campaign.rig.joint_names
+    for index, name in enumerate(encoder["joints"]):
+        if name not in names:
+            place = document.place(("topics", "encoder", "joints", index))
+            problems.add(place, f"there is no joint '{name}'", did_you_mean(name, names))
+    unread = [name for name in names if name not in encoder["joints"]]
+    if unread and campaign.drive == "motion" and campaign.topics.rate is None:
+        what = f"leaves out {', '.join(unread)}, of which no rate is measured either"
+        remedy = 'read every joint, name the topic of their rates under [topics], or set drive = "command"'
+        problems.add(document.place(("topics", "encoder", "joints")), what, remedy)
 
 
 def _check_bands(campaign: Campaign, document: Document, problems: Problems) -> None:

@@ -165,6 +165,9 @@ def _topics(tree: Tree, rig: Rig) -> Topics:
     efforts = {joint.name: joint.effort.unit for joint in rig.joints if joint.effort is not None}
     position = tuple(f"position[{name}]" for name in joints)
     velocity = tuple(f"velocity[{name}]" for name in joints)
+    given = tree.get("encoder")
+    listed = given.get("joints", joints) if isinstance(given, dict) else joints
+    read = {name: unit for name, unit in joints.items() if name in listed}
     components = tuple(
         f"wrench.{'force' if channel[0] == 'F' else 'torque'}.{channel[1]}" for channel in wrench
     )
@@ -186,7 +189,7 @@ def _topics(tree: Tree, rig: Rig) -> Topics:
             tuple(f"effort[{name}]" for name in efforts),
             {f"{name}.effort": unit for name, unit in efforts.items()},
         ),
-        angle=topic("encoder", "angle", position, joints),
+        angle=topic("encoder", "angle", tuple(f"position[{name}]" for name in read), read),
         rate=topic("rate", "rate", velocity, rates),
         command=topic(
             "command",

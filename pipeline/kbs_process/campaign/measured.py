@@ -23,6 +23,14 @@ def measured(run: Run, rig: Rig) -> Measured:
             where=run.name,
             remedy="give this recording another role than 'fit'",
         )
+    unread = [name for name in rig.joint_names if name not in run.angle.channels]
+    if unread:
+        raise RecordingError(
+            f"an identification needs the angle of every joint, and {', '.join(unread)} is not read",
+            where=run.name,
+            remedy="record it, and list it as one of `joints` of [topics.encoder] in campaign.toml; processing and "
+            "diagnose do without",
+        )
     driven = "field" if run.field is not None else "command"
     return Measured(
         name=run.name,

@@ -79,7 +79,7 @@ def lost(entry: RecordingEntry, losses: Sequence[Loss]) -> Iterable[results.Noti
         kinds[loss.kind].append(loss)
     if kinds:
         yield results.Notice(
-            severity="warning",
+            severity="warning" if any(loss.real for loss in losses) else "info",
             what="; ".join(f"{kind}: {_extent(own, entry.path.name)}" for kind, own in kinds.items()),
             where=entry.name,
             remedy=f"kbs-process inspect recordings/{entry.path.name} lists each with its time",

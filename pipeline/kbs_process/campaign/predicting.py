@@ -136,11 +136,14 @@ def _at(events: Events, names: Sequence[str], t: Array) -> Array:
 
 
 def _readings(encoder: Events, names: Sequence[str], t: Array) -> Array | None:
-    """What the controller read at each cycle's start; None where the encoders' recorder sampled at other instants.
+    """What the controller read at each cycle's start; None where the encoders' recorder sampled at other instants, or
+    does not read every joint.
 
     The recorded motion does not answer to the loop that it is fed to: a reading late by some milliseconds of a slew is
     an error that the controller integrates twice, degrees in minutes. A loop closed on its own encoder holds.
     """
+    if not set(names) <= set(encoder.channels):
+        return None
     after = np.clip(np.searchsorted(encoder.t, t), 1, len(encoder.t) - 1)
     nearest = after - (t - encoder.t[after - 1] < encoder.t[after] - t)
     missing = np.abs(encoder.t[nearest] - t) > SAME_INSTANT

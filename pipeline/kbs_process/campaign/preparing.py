@@ -15,6 +15,7 @@ from kbs_process.signals.records import Run, Signal
 from kbs_process.stages import decouple, gravity, motion
 from kbs_process.stages.decouple import Decoupling
 from kbs_process.stages.gravity import GravityModel, Sample
+from kbs_process.stages.gravity_taring import Taring
 from kbs_process.stages.motion import Motion
 
 
@@ -72,3 +73,20 @@ def fit_gravity(campaign: Campaign, prepared: Sequence[Prepared], progress: Prog
             include_inertia=campaign.drive == "motion",
             settings=gravity_settings(campaign),
         )
+
+
+def tare(
+    campaign: Campaign, entry: RecordingEntry, run: Run, motion: Motion, model: GravityModel
+) -> tuple[Sample, Taring]:
+    """Return what gravity is taken off of a recording whose cords are relieved, and its zeros.
+
+    Raises RecordingError where too little of it is whole for that.
+    """
+    assert run.loads is not None  # `prepare` demands them
+    sample = Sample(entry.name, motion, without_effects(campaign, entry, motion, run.loads, model.rig))
+    return sample, gravity.tare(sample, model)
+
+
+def check_taring(campaign: Campaign, one: Prepared, model: GravityModel) -> None:
+    """Raise RecordingError where processing could not take gravity off a recording, in the fit or not."""
+    tare(campaign, one.entry, relieved(campaign, one.entry, one.run, one.motion), one.motion, model)

@@ -12,6 +12,11 @@ from kbs_process.stages.condense import CondenseSettings, condense
 
 # A recorder need not have these; everything else that the campaign names has to be there.
 OPTIONAL_STREAMS = frozenset({"field", "temperature", "pointing"})
+# What to do where messages do not name a joint that they are expected to.
+_OTHERWISE = {
+    "angle": "if encoders do not read every joint, list those that they do as `joints` of [topics.encoder] in "
+    "campaign.toml"
+}
 
 
 Blocks = Iterator[tuple[str, Block]]
@@ -29,13 +34,16 @@ def read_run(campaign: Campaign, entry: RecordingEntry, through: Callable[[Block
         for topic in campaign.topics.present()
         if topic.topic in there or topic.key not in OPTIONAL_STREAMS
     ]
-    blocks = source.read([Stream(topic.key, topic.topic, topic.fields) for topic in topics])
+    blocks = source.read(
+        [Stream(topic.key, topic.topic, topic.fields, _OTHERWISE.get(topic.key, "")) for topic in topics]
+    )
     run = condense(
         entry.name,
         through(_within(blocks, entry.start, entry.end)),
         {topic.key: topic.channels for topic in topics},
         CondenseSettings(working_rate_Hz=campaign.bands.working_rate),
         units={topic.key: topic.units for topic in topics},
+        file=str(entry.path),
     )
     late = ((source.start_ns or run.log_epoch_ns) - run.log_epoch_ns) * 1e-9
     return replace(run, losses=(*(_later(loss, late) for loss in source.losses), *run.losses))

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
 
-from kbs_process.campaign.config import Campaign
+from kbs_process.campaign.config import Campaign, RecordingEntry
 from kbs_process.campaign.measurable import check_requirements
-from kbs_process.campaign.preparing import Prepared, fit_gravity, prepare
+from kbs_process.campaign.preparing import Prepared, check_taring, fit_gravity, prepare
 from kbs_process.campaign.progress import Progress
 from kbs_process.errors import KbsError, RecordingError
 from kbs_process.signals.records import TRUNCATED, Loss
 from kbs_process.stages import decouple
+from kbs_process.stages.gravity import GravityModel
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,6 +24,10 @@ class Finding:
     rates: dict[str, float] = field(default_factory=dict)  # Hz, by stream
     losses: tuple[Loss, ...] = ()
     error: str = ""
+
+    @property
+    def lossy(self) -> bool:
+        return any(loss.real for loss in self.losses)
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,10 +58,23 @@ def validate(campaign: Campaign, progress: Progress) -> Validation:
     try:
         check_requirements(campaign)
         if len(prepared) == len(findings):
-            fit_gravity(campaign, prepared, progress)
+            model = fit_gravity(campaign, prepared, progress)
+            findings = [
+                replace(finding, error=_untared(campaign, one, model))
+                for finding, one in zip(findings, prepared, strict=True)
+            ]
     except KbsError as error:
         return Validation(tuple(findings), str(error))
     return Validation(tuple(findings))
+
+
+def _untared(campaign: Campaign, one: Prepared, model: GravityModel) -> str:
+    """Why gravity cannot be taken off a recording, or nothing."""
+    try:
+        check_taring(campaign, one, model)
+    except RecordingError as error:
+        return str(error)
+    return ""
 
 
 def describe(campaign: Campaign, validation: Validation) -> Iterator[str]:
@@ -70,7 +88,7 @@ def describe(campaign: Campaign, validation: Validation) -> Iterator[str]:
     )
     width = max(len(finding.name) for finding in findings)
     for finding in findings:
-        state = "unreadable" if finding.error else "lossy" if finding.losses else "clean"
+        state = "unreadable" if finding.error else "lossy" if finding.lossy else "clean"
         rates = ", ".join(f"{key} {rate:.5g} Hz" for key, rate in sorted(finding.rates.items()))
         yield f"  {finding.name:<{width}}  {finding.role:<11}  {state:<10}  {rates}".rstrip()
     for finding in findings:
@@ -78,11 +96,35 @@ def describe(campaign: Campaign, validation: Validation) -> Iterator[str]:
         if finding.error:
             yield f"  {finding.error}"
     bad = sum(bool(finding.error) for finding in findings)
-    lossy = sum(bool(finding.losses) for finding in findings)
+    lossy = sum(finding.lossy for finding in findings)
     recordings = "recording" if len(findings) == 1 else "recordings"
     yield f"{len(findings)} {recordings}: {bad} unreadable, {lossy} with losses"
     if validation.refusal:
         yield f"cannot be processed: {validation.refusal}"
+    if hint := repeatability_hint(campaign):
+        yield f"hint: {hint}"
+
+
+def repeatability_hint(campaign: Campaign) -> str:
+    """Say what a campaign without repeats goes without, and what is taken instead; nothing of one that has some."""
+    judged = [entry for entry in campaign.recordings if entry.role != "calibration"]
+    if not judged or _repeats(judged):
+        return ""
+    # What `diagnosis.floor` and the budget do; a calibration is part of the former alone.
+    floor = (
+        ""
+        if _repeats(campaign.recordings)
+        else ", and diagnose takes what the parameter files say of the sensors' noise and rounding for its floor"
+    )
+    return (
+        "no trajectory is repeated: what differs from run to run is not known, the uncertainty budget has no "
+        f"repeatability{floor}\n  -> record a trajectory two or three times, and list each run with its `repeat`"
+    )
+
+
+def _repeats(entries: Sequence[RecordingEntry]) -> bool:
+    """Whether two recordings are runs of one trajectory."""
+    return len({entry.trajectory for entry in entries}) < len(entries)
 
 
 def in_words(loss: Loss) -> str:

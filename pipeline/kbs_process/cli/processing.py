@@ -114,7 +114,7 @@ def validate(campaign: str, check: bool, quiet: bool) -> None:
     click.echo("\n".join(describe(loaded, found)))
     if found.refused:
         sys.exit(BAD_INPUT)
-    if check and any(finding.losses for finding in found.findings):
+    if check and any(finding.lossy for finding in found.findings):
         sys.exit(NOT_MET)
 
 

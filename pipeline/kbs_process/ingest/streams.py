@@ -26,6 +26,7 @@ class Stream:
     key: str
     topic: str
     fields: tuple[str, ...]
+    otherwise: str = ""  # what to do where no message has one of the elements that fields name
 
 
 @dataclass(slots=True, eq=False)
@@ -109,7 +110,7 @@ class Reading:
         good = decoded.good
         if fresh and good.any():
             payload = next(payloads(segment.buffer, at[good], size[good]))
-            _require_names(plan, decoded.present.tolist(), payload, self._where)
+            _require_names(plan, decoded.present.tolist(), payload, self._where, self.stream.otherwise)
         if decoded.flawless:
             return places, Block(decoded.stamp, log, decoded.values)
         self._tally.add("missing field", log[decoded.lacking])
@@ -141,14 +142,15 @@ def payloads(buffer: Bytes, at: Words, size: Words) -> Iterator[bytes]:
         yield buffer[first : first + length].tobytes()
 
 
-def _require_names(plan: _Plan, present: Sequence[bool], payload: bytes, where: str) -> None:
+def _require_names(plan: _Plan, present: Sequence[bool], payload: bytes, where: str, otherwise: str) -> None:
     """Raise an error for a name that no message has; a merely empty array is a loss, not an error."""
     for step, there in zip(plan.steps, present, strict=True):
         if not there and isinstance(step.key, str):
             names = plan.type.elements(payload, step.path).names
             if step.key not in names:
+                remedy = did_you_mean(step.key, names)
                 raise RecordingError(
                     f"no message names an element '{step.key}' of {step.path}",
                     where=where,
-                    remedy=did_you_mean(step.key, names),
+                    remedy=f"{remedy}; {otherwise}" if otherwise else remedy,
                 )

@@ -20,6 +20,7 @@ from kbs_process.report.records.common import Record as Record
 from kbs_process.report.records.common import encode as encode
 from kbs_process.report.records.pointing import RecordedPointing
 from kbs_process.report.records.transducer import OnTransducer
+from kbs_process.signals.records import PUT_IN_ORDER
 
 SCHEMA_VERSION: Literal[1] = 1
 
@@ -112,6 +113,11 @@ class Recording(Record, frozen=True, kw_only=True):
     rates: dict[str, float] = msgspec.field(default_factory=dict)  # Hz, by stream
     losses: tuple[LossEntry, ...] = ()
     clocks: tuple[Clock, ...] = ()
+
+    @property
+    def lost(self) -> tuple[LossEntry, ...]:
+        """Losses without what was merely put in order."""
+        return tuple(loss for loss in self.losses if loss.kind != PUT_IN_ORDER)
 
 
 class Convention(Record, frozen=True, kw_only=True):

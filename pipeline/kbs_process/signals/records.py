@@ -105,12 +105,13 @@ class Events:
     channels: tuple[str, ...]
 
 
+PUT_IN_ORDER = "put in order"  # messages that came after younger ones: told, although nothing is lost by that
 TRUNCATED = "truncated"  # the loss of a file that breaks off: all that would have followed
 
 
 @dataclass(frozen=True, slots=True)
 class Loss:
-    """Something that a recording should hold and does not, or holds twice, or holds damaged."""
+    """Something that a recording should hold and does not, or holds twice, damaged or in another order."""
 
     kind: str  # "gap", "repeat", "out of order", "crc", "truncated", "undecodable", "non-finite", ...
     where: str  # file and topic
@@ -118,6 +119,11 @@ class Loss:
     start_s: float | None = None  # on the recording's own time axis, where known
     end_s: float | None = None
     detail: str = ""
+
+    @property
+    def real(self) -> bool:
+        """Whether anything is missing, doubtful or left out by it."""
+        return self.kind != PUT_IN_ORDER
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -37,6 +37,16 @@ SAMPLED = ("wrench", "effort", "angle", "rate", "pointing")
 LOADS = ("wrench", "effort")  # the first one present has spectrum and envelope
 TURNING = ("angle", "pointing")  # of joints, where they turn
 SLOW = ("command", "field", "temperature")  # kept sample by sample: one a control cycle, or slower
+_OUT = "or leave this recording out of campaign.toml"
+# What to do where a stream holds next to no numbers.
+_NO_NUMBERS = {
+    "wrench": f"take a channel that is dead out of transducer.channels in the parameter files, {_OUT}",
+    "effort": f"leave the effort of a joint whose channel is dead out of the parameter files, {_OUT}",
+    "angle": f"list the joints that are read as `joints` of [topics.encoder] in campaign.toml, {_OUT}",
+    "rate": f"record the rates again, or leave topics.rate out where angles are recorded, {_OUT}",
+    "pointing": f"leave topics.pointing out of campaign.toml, {_OUT}",
+    "command": f"record the commands, {_OUT}",
+}
 DOUBT = 1e-3  # largest weight of invented samples in a valid one
 
 
@@ -58,16 +68,18 @@ def condense(
     settings: CondenseSettings,
     progress: Progress | None = None,
     units: Mapping[str, tuple[str, ...]] | None = None,
+    file: str | None = None,
 ) -> Run:
     """Reduce a recording to a `Run`; `channels` names the columns of every stream that `blocks` brings.
 
-    `units` are those of streams of the joints that are not rad or rad/s throughout.
+    `units` are those of streams of the joints that are not rad or rad/s throughout; `file` is what errors call the
+    recording, its name without it.
 
     Time zero is the reference stream's first sample (the wrench's, where there is one), and the axis covers
     that stream. Samples that lean on invented input (gaps, the ends' continuation, times at which a stream
     had not begun or had ended) by more than `DOUBT` of the filter's weight are flagged.
 
-    Raises RecordingError where a sampled stream is empty or shorter than the filters.
+    Raises RecordingError where a sampled stream is empty or shorter than the filters, or no command is a number.
     """
     load = next((key for key in LOADS if key in channels), None)
     streams: dict[str, Uniform | Collected] = {
@@ -81,8 +93,14 @@ def condense(
                 progress(key, len(block))
     sampled = {key: s for key in SAMPLED if isinstance(s := streams.get(key), Uniform)}
     slow = {key: s for key in SLOW if isinstance(s := streams.get(key), Collected)}
-    kept = {key: _finished(key, stream, settings) for key, stream in sampled.items()}
+    kept = {key: _finished(key, stream, settings, file or name) for key, stream in sampled.items()}
     collected = {key: stream.finish() for key, stream in slow.items()}
+    if "command" in slow and (line := slow["command"].line).samples == line.non_finite > 0:
+        raise RecordingError(
+            f"{_whole(line)}: nothing says what drove the joints",
+            where=_place(file or name, "command"),
+            remedy=_NO_NUMBERS["command"],
+        )
     if not kept:
         raise RecordingError(
             "the recording brings neither wrench nor joint angles, and no effort",
@@ -150,7 +168,7 @@ def _stream(
 ) -> Uniform | Collected:
     where = f"{name}: {key}"
     if key in SLOW:
-        return Collected(where, len(columns))
+        return Collected(where, columns)
     if key not in SAMPLED:
         raise KeyError(f"no stream is called {key!r}")
     if is_load:
@@ -171,7 +189,7 @@ def _stream(
     )
 
 
-def _finished(key: str, stream: Uniform, settings: CondenseSettings) -> Kept:
+def _finished(key: str, stream: Uniform, settings: CondenseSettings, file: str) -> Kept:
     kept = stream.finish()
     if kept is not None:
         return kept
@@ -179,16 +197,27 @@ def _finished(key: str, stream: Uniform, settings: CondenseSettings) -> Kept:
     if line.grid is None:
         raise RecordingError(
             f"{line.samples} samples are no signal",
-            where=line.where,
+            where=_place(file, key),
             remedy=f"check the topic of {key} in campaign.toml, and the file with `kbs-process inspect`",
         )
     least = design(line.grid.rate, settings.working_rate_Hz).extension + 1
-    raise RecordingError(
-        f"{line.samples} samples in {line.span:.3g} s are too few: the filters to"
-        f" {settings.working_rate_Hz:g} Hz need {least} ({least / line.grid.rate:.3g} s)",
-        where=line.where,
-        remedy="record longer, or leave this recording out of campaign.toml",
-    )
+    needed = f"the filters to {settings.working_rate_Hz:g} Hz need {least} ({least / line.grid.rate:.3g} s)"
+    if line.non_finite:
+        what, remedy = f"{_whole(line)}, and {needed}", _NO_NUMBERS[key]
+    else:
+        what = f"{line.samples} samples in {line.span:.3g} s are too few: {needed}"
+        remedy = "record longer, or leave this recording out of campaign.toml"
+    raise RecordingError(what, where=_place(file, key), remedy=remedy)
+
+
+def _place(file: str, key: str) -> str:
+    return f"{file}: {'encoder' if key == 'angle' else key}"  # as in campaign.toml
+
+
+def _whole(line: Timeline) -> str:
+    """How many samples of a stream can be used, and which channels hold NaN or infinity in the others."""
+    left = line.samples - line.non_finite or "none"
+    return f"{left} of {line.samples} samples can be used (NaN or infinite: {line.non_finite_channels})"
 
 
 def _on_axis(own: Array, clock: Clock) -> Array:

@@ -125,7 +125,7 @@ def match_resonances(
             for recording, output, noise in zip(experiment.recordings, outputs, spectra, strict=True):
                 own = [
                     m
-                    for m in modes(rig, select(experiment.effects), recording.angle.mean(axis=0))
+                    for m in modes(rig, select(experiment.effects), _pose(recording, len(rig.joints)))
                     if m.axis == letter
                 ]
                 highest = experiment.bands(recording)[column][1]
@@ -142,6 +142,15 @@ def match_resonances(
             changed[free[scalar]] *= math.exp(2.0 * shift)
         values = changed
     return values
+
+
+def _pose(recording: Measured, joints: int) -> Array:
+    """Mean angles (joints,) of a recording: as read, or as commanded where encoders do not read every joint."""
+    if recording.angle.shape[1] == joints:
+        return np.asarray(recording.angle.mean(axis=0), dtype=np.float64)
+    t, commanded = recording.schedule.t, recording.schedule.position
+    during = commanded[t >= 0.0] if np.any(t >= 0.0) else commanded
+    return np.asarray(during.mean(axis=0), dtype=np.float64)
 
 
 def _likeness(pair: tuple[Array, Array], dt: float, around: float, noise: float) -> Array:

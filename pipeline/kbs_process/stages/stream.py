@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from kbs_process.signals.records import Array, Block, Loss, Mask, Stamps
+from kbs_process.signals.records import PUT_IN_ORDER, Array, Block, Loss, Mask, Stamps
 from kbs_process.stages.clocks import ClockData, LatencyFloor
 from kbs_process.stages.envelope import MinMax
 from kbs_process.stages.grid import AROUND, Grid, Regridder, counted, nominal_grid
@@ -32,13 +32,15 @@ class Timeline:
     """Order, clock, gaps and losses of one stream, common to fast and slow ones."""
 
     where: str
+    channels: tuple[str, ...] = ()
     grid: Grid | None = None
     by_recorder: bool = False
     gaps: list[Gap] = field(default_factory=list)
     gaps_unlisted: int = 0
     missing_unlisted: int = 0
-    non_finite: int = 0
+    non_finite: int = 0  # samples that are NaN or infinite in some channel: all of each is left out
     samples: int = 0
+    _non_finite_in: dict[str, int] = field(default_factory=dict)  # by channel
     _reblock: Reblock = field(default_factory=Reblock)
     _orderer: Orderer | None = None
     _floor: LatencyFloor | None = None
@@ -102,6 +104,25 @@ class Timeline:
         kept = max(judged - AROUND, 0)
         self._near, self._judged = stamp[kept:].copy(), judged - kept
 
+    def finite(self, block: Block) -> tuple[Stamps, Array]:
+        """Return stamps and values of the samples that are numbers in every channel; count the others, by channel."""
+        good = finite_rows(block.values)
+        if good is None:
+            return block.stamp, block.values
+        self.non_finite += len(good) - int(np.count_nonzero(good))
+        bad_in = (~np.isfinite(block.values)).sum(axis=0).tolist()
+        for channel, bad in zip(self.channels, bad_in, strict=True):
+            if bad:
+                self._non_finite_in[channel] = self._non_finite_in.get(channel, 0) + bad
+        return block.stamp[good], block.values[good]
+
+    @property
+    def non_finite_channels(self) -> str:
+        """In which channels how many samples are NaN or infinite: "Fz in 2000, Tx in 3"."""
+        return ", ".join(
+            f"{name} in {self._non_finite_in[name]}" for name in self.channels if name in self._non_finite_in
+        )
+
     def own_one(self, stamp: int) -> float:
         """Time of one stamp, s from the stream's first."""
         return (stamp - self._first) * 1e-9
@@ -134,7 +155,8 @@ class Timeline:
             detail = f"{self.gaps_unlisted} more gaps"
             found.append(Loss("gap", self.where, self.missing_unlisted, detail=detail))
         if self.non_finite:
-            found.append(Loss("non-finite", self.where, self.non_finite, detail="interpolated"))
+            detail = f"{self.non_finite_channels}: interpolated"
+            found.append(Loss("non-finite", self.where, self.non_finite, detail=detail))
         if self.by_recorder:
             detail = "the sensor's stamps do not advance: the recorder's clock is used"
             found.append(Loss("clock", self.where, self.samples, detail=detail))
@@ -146,13 +168,13 @@ class Timeline:
         found = []
         if orderer.repeats:
             found.append(Loss("repeat", self.where, orderer.repeats, detail="same stamp: the first is kept"))
-        if orderer.displaced:
-            detail = (
-                f"put in order; {orderer.late} too late for that and dropped"
-                if orderer.late
-                else "put in order"
-            )
-            found.append(Loss("out of order", self.where, orderer.displaced, detail=detail))
+        if orderer.late:
+            detail = "too late to be put in order: dropped"
+            found.append(Loss("out of order", self.where, orderer.late, detail=detail))
+        placed = orderer.displaced - orderer.late
+        if placed > 0:
+            detail = "arrived after younger ones: nothing is lost by that"
+            found.append(Loss(PUT_IN_ORDER, self.where, placed, detail=detail))
         if orderer.stray:
             detail = "stamps more than 10 s off the recorder's clock: dropped"
             found.append(Loss("clock", self.where, orderer.stray, detail=detail))
@@ -162,9 +184,8 @@ class Timeline:
 class Collected:
     """A slow stream, kept sample by sample."""
 
-    def __init__(self, where: str, width: int) -> None:
-        self.line = Timeline(where)
-        self._width = width
+    def __init__(self, where: str, channels: tuple[str, ...]) -> None:
+        self.line = Timeline(where, channels)
         self._own: list[Array] = []
         self._values: list[Array] = []
 
@@ -175,17 +196,13 @@ class Collected:
         """Return times (n,), s from the stream's first sample, and values (n, c)."""
         self._take(self.line.flush())
         if not self._own:
-            return np.empty(0), np.empty((0, self._width))
+            return np.empty(0), np.empty((0, len(self.line.channels)))
         return np.concatenate(self._own), np.concatenate(self._values)
 
     def _take(self, blocks: list[Block]) -> None:
         for block in blocks:
-            good = finite_rows(block.values)
-            own, values = self.line.own(block.stamp), block.values
-            if good is not None:
-                self.line.non_finite += len(own) - int(np.count_nonzero(good))
-                own, values = own[good], values[good]
-            self._own.append(own)
+            stamp, values = self.line.finite(block)
+            self._own.append(self.line.own(stamp))
             self._values.append(values)
 
 
@@ -206,10 +223,9 @@ class Uniform:
         """`turning` channels are angles, which go on through full turns; `spectrum`: (resolution, limit), Hz; below a
         rate of `keep_below`, Hz, samples are kept as such.
         """
-        self.line = Timeline(where)
+        self.line = Timeline(where, channels)
         self.welch: Welch | None = None
         self.envelope = MinMax(len(channels), stretches) if stretches else None
-        self._channels = channels
         self._working_rate = working_rate
         self._spectrum = spectrum
         self._keep_below = keep_below
@@ -247,12 +263,8 @@ class Uniform:
             self._regrid = Regridder(grid)
             self._reduce = Reducer(design(grid.rate, self._working_rate))
             if self._spectrum:
-                self.welch = Welch(grid.rate, *self._spectrum, self._channels)
-        stamp, values = block.stamp, block.values
-        good = finite_rows(values)
-        if good is not None:
-            self.line.non_finite += len(stamp) - int(np.count_nonzero(good))
-            stamp, values = stamp[good], values[good]
+                self.welch = Welch(grid.rate, *self._spectrum, self.line.channels)
+        stamp, values = self.line.finite(block)
         if self._turns is not None and len(values):
             values = self._unwrapped(values, self._turns)
         if grid.rate <= self._keep_below:

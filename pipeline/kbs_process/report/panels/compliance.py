@@ -103,8 +103,8 @@ def _where(entry: Requirement) -> str:
 
 def _qualified(results: Results) -> Text:
     severities = [notice.severity for notice in results.warnings]
-    lossy = [recording for recording in results.recordings if recording.losses]
-    losses = sum(len(recording.losses) for recording in lossy)
+    lossy = [recording for recording in results.recordings if recording.lost]
+    losses = sum(len(recording.lost) for recording in lossy)
     broken = [convention for convention in results.conventions if not convention.ok]
     parts = [
         count(severities.count("error"), "error"),

@@ -32,7 +32,7 @@ def _recordings(recordings: tuple[Recording, ...]) -> Grid:
             str(entry.repeat),
             f"{entry.duration_s:.1f}\u00a0s",
             ", ".join(f"{stream} {number(rate, 4)}" for stream, rate in entry.rates.items()) or MISSING,
-            Cell(_loss_count(entry), "undecided" if entry.losses else "muted"),
+            Cell(_loss_count(entry), "undecided" if entry.lost else "muted"),
         )
         for entry in recordings
     )
@@ -41,7 +41,7 @@ def _recordings(recordings: tuple[Recording, ...]) -> Grid:
 
 
 def _loss_count(entry: Recording) -> str:
-    return count(len(entry.losses), "entry", "entries") if entry.losses else "none"
+    return count(len(entry.lost), "entry", "entries") if entry.lost else "none"
 
 
 def _losses(recordings: tuple[Recording, ...]) -> Grid:
