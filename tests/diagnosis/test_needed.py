@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from test_rounds import ROLES, screened, standing, with_cable
 
+from kbs_process.diagnosis import needed as needing
 from kbs_process.diagnosis.experiment import Experiment
 from kbs_process.diagnosis.finding import Tried
 from kbs_process.diagnosis.floor import declared
@@ -18,7 +19,7 @@ from kbs_process.diagnosis.known import Known
 from kbs_process.diagnosis.needed import Accepted, in_the_shade, needed
 from kbs_process.diagnosis.outcome import Find
 from kbs_process.diagnosis.race import own_of
-from kbs_process.diagnosis.thresholds import CLEAR
+from kbs_process.diagnosis.thresholds import CLEAR, GATE_SIGMA, STAYS_SIGMA
 from kbs_process.diagnosis.tryout import extra_of, identity
 from kbs_process.plant.effects import CATALOGUE
 
@@ -180,3 +181,29 @@ def test_a_law_with_the_right_one_between_its_parts_has_not_gained_what_that_did
     kept, _, fallen = needed([part, cable, more], both, declared(made), bench.serial(made))
     assert {one.identity for one in fallen} == {lag.find.identity}
     assert [one.find.identity.law for one in kept] == ["ground_cable"]
+
+
+def test_a_law_that_does_what_no_other_does_stays_whatever_recordings_that_it_does_little_in_say(
+    made: Experiment, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun = standing(made)
+    first, lag = joined(made, begun, LAG)
+    both, cable = joined(made, first, CABLE)
+    asked: list[float] = []
+
+    def refuses(*_: object, least: float) -> Gate:
+        asked.append(least)
+        return Gate(False, (), True, 0.0, (1.0, 1.0), ("r2 predicted worse",))
+
+    monkeypatch.setattr(needing, "gated", refuses)
+    simulate = bench.serial(made)
+    _, _, fallen = needed([cable, lag], both, declared(made), simulate)
+    assert fallen[0].identity == lag.find.identity
+    assert set(asked) == {STAYS_SIGMA} and STAYS_SIGMA < GATE_SIGMA
+    rest = without(both, cable.tried.own, simulate)
+    assert needing._vital(rest.known, both.known)
+    assert not needing._vital(both.known, both.known)
+    told, reasons = needing._again([cable], cable.tried.own, rest, both, declared(made), alone=True)
+    assert "r2 predicted worse" in reasons
+    told, reasons = needing._again([cable], cable.tried.own, rest, both, declared(made), alone=False)
+    assert "r2 predicted worse" not in reasons and told[0].find.identity == cable.find.identity

@@ -140,8 +140,11 @@ def test_a_coarse_encoder_reads_whole_coarse_codes() -> None:
 
 def test_clocks_are_late() -> None:
     np.testing.assert_array_equal(changed(law("clock_offset"), late=0.02), 0.02)
-    skew = changed(law("clock_skew"), skew=1e-3)
-    np.testing.assert_allclose(skew, 1e-3 * (T - T.mean()), atol=1e-15)
+    skew = changed(law("clock_skew"), skew=1e-3, set_at=-20.0)
+    np.testing.assert_allclose(skew, 1e-3 * (T + 20.0), atol=1e-15)
+    # One that was set long ago is late by one number.
+    ago = changed(law("clock_skew"), skew=1e-6, set_at=-2e4)
+    np.testing.assert_allclose(ago, changed(law("clock_offset"), late=0.02), rtol=0.01)
     wander = changed(law("clock_wander"), wander_sin=0.01, wander_cos=0.0, wander_period=40.0)
     np.testing.assert_allclose(wander, 0.01 * np.sin(2.0 * np.pi * T / 40.0), atol=1e-15)
     dropped = changed(law("clock_drops"), dropped=0.02, drop_time=50.0)

@@ -60,11 +60,18 @@ class Gate:
         return replace(self, passed=self.passed and not reasons, reasons=(*self.reasons, *reasons))
 
 
-def gate(before: Known, after: Known, coefficients: Sequence[int], shapes: Sequence[int] = ()) -> Gate:
+def gate(
+    before: Known,
+    after: Known,
+    coefficients: Sequence[int],
+    shapes: Sequence[int] = (),
+    *,
+    least: float = GATE_SIGMA,
+) -> Gate:
     """Judge the numbers `coefficients` of `after`, the amplitudes of a law that `before` is without.
 
     Its `shapes` count as they are: what makes up for an amplitude, as the lever of a force does, says nothing against
-    it, and a law of no amplitude has none.
+    it, and a law of no amplitude has none. By `least` sigmas amplitudes have to be off zero.
     """
     experiment = after.experiment
     held_out = bool(experiment.held_out)
@@ -87,7 +94,7 @@ def gate(before: Known, after: Known, coefficients: Sequence[int], shapes: Seque
         gained >= GATE_SHARE * _promised(before, after) or foretold(gained, _changed(before, after))
     ):
         reasons.append("recordings that were not used gain much less than those that it was fitted to")
-    if not sigmas >= GATE_SIGMA:
+    if not sigmas >= least:
         size = f"{sigmas:.1f} sigma off zero" if np.isfinite(sigmas) else "not determined"
         reasons.append(f"its coefficients are {size}")
     # In units of the floor: what is left has more of a colour, the less that is.

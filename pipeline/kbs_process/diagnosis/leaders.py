@@ -30,6 +30,7 @@ from kbs_process.diagnosis.side_by_side import side_by_side
 from kbs_process.diagnosis.suspects import BY
 from kbs_process.diagnosis.thresholds import (
     BENT,
+    GATE_SIGMA,
     LAW_VARIANCE,
     LEAD,
     LEADERS,
@@ -162,12 +163,12 @@ def tried(
     return [one for one in judged if one.gate.passed], [one for one in judged if not one.gate.passed]
 
 
-def gated(found: Found, before: Standing, after: Standing, own: Own) -> Gate:
+def gated(found: Found, before: Standing, after: Standing, own: Own, *, least: float = GATE_SIGMA) -> Gate:
     """The gate's verdict on a law that `after` has and `before` is without; sizes have to be such as it may have."""
     known = after.known
     places = [known.names.index(name) for name in own.amplitudes]
     shapes = [known.names.index(name) for name in own.names if name not in own.amplitudes]
-    verdict = gate(before.known, known, places, shapes)
+    verdict = gate(before.known, known, places, shapes, least=least)
     # What minima of the known parameters leave differs, and is no law's.
     share = explained_share(before.known, known, beyond=TOLERATED)
     index = np.array(places)

@@ -17,8 +17,9 @@ from kbs_process.diagnosis.leaders import gated
 from kbs_process.diagnosis.outcome import Find, Identity, Refused
 from kbs_process.diagnosis.remains import detected, missed, searched, too_little
 from kbs_process.diagnosis.screen import Found
+from kbs_process.diagnosis.search import GROSS
 from kbs_process.diagnosis.settling import bent
-from kbs_process.diagnosis.thresholds import CLEAR, SHADE
+from kbs_process.diagnosis.thresholds import CLEAR, SHADE, STAYS_SIGMA
 from kbs_process.diagnosis.tryout import identity
 
 
@@ -73,7 +74,7 @@ def needed(
                 rest = without(standing, own, simulate) if reasons else standing
             else:
                 rest = without(standing, own, simulate)
-                told, reasons = _again(group, own, rest, standing, floor)
+                told, reasons = _again(group, own, rest, standing, floor, alone=group == kept)
                 there = detected(rest, floor, standing.known.experiment.fit)
                 if not (last or there.left or bent(rest, floor)):
                     reasons = (*reasons, "later finds do what it did")
@@ -95,12 +96,29 @@ def _clear(before: Known, after: Known) -> bool:
     return not searched(before.experiment) or before.cost - after.cost > CLEAR * before.fit_rows
 
 
+def _vital(without: Known, known: Known) -> bool:
+    """Whether a law does what no other find does, by far: without it as much more is left as the floor has.
+
+    It passed when it was found. Recordings that it does little in may be predicted worse with it beside another law,
+    as phases that are not theirs are, and that says nothing against it.
+    """
+    return without.excess - known.excess > GROSS * known.fit_rows
+
+
 def _again(
-    group: Sequence[Accepted], own: Own, rest: Standing, standing: Standing, floor: Floor
+    group: Sequence[Accepted], own: Own, rest: Standing, standing: Standing, floor: Floor, *, alone: bool
 ) -> tuple[list[Accepted], tuple[str, ...]]:
-    """Finds of one law as the last of all, after `rest`, as they are told then; and why they fall, if they do."""
-    verdict = gated(group[0].tried.found, rest, standing, own)
-    reasons = (*verdict.reasons, *too_little(rest, standing, floor), *missed(rest.known, standing.known))
+    """Finds of one law as the last of all, after `rest`, as they are told then; and why they fall, if they do.
+
+    The gate's reasons count for nothing where the law is not `alone` and does what no other does.
+    """
+    verdict = gated(group[0].tried.found, rest, standing, own, least=STAYS_SIGMA)
+    vital = not alone and _vital(rest.known, standing.known)
+    reasons = (
+        *(() if vital else verdict.reasons),
+        *too_little(rest, standing, floor),
+        *missed(rest.known, standing.known),
+    )
     if len(group) > 1:
         return list(group), reasons
     (one,) = group
