@@ -19,7 +19,7 @@ from kbs_process.diagnosis.leaders import gated, leaders, tried, various
 from kbs_process.diagnosis.race import Runner, raced
 from kbs_process.diagnosis.rounds import continued, named_first, unnamed
 from kbs_process.diagnosis.screen import Found
-from kbs_process.diagnosis.thresholds import FIRST, MOSTLY_DONE, TOLERATED
+from kbs_process.diagnosis.thresholds import FIRST, MOSTLY_DONE, TOLERATED, WAYS
 from kbs_process.diagnosis.tryout import extra_of, identity
 from kbs_process.diagnosis.view import View
 
@@ -164,3 +164,24 @@ def test_a_law_that_leaves_nothing_is_judged_once_others_have_settled_beside_it(
     else:
         assert passed == []
         assert refused[0].gate.reasons[-1] == "too early"
+
+
+@pytest.mark.parametrize(("nothing_left", "ways"), [(False, WAYS), (True, 0)])
+def test_the_next_law_looks_for_phases_too_while_something_is_left(
+    view: View, monkeypatch: pytest.MonkeyPatch, nothing_left: bool, ways: int
+) -> None:
+    """A wrong law that leads would show all others a wrong way."""
+    made = view.standing.known.experiment
+    looked: list[float] = []
+
+    def unmoved(standing: Standing, _: object) -> Standing:
+        looked.append(standing.known.cost)
+        return standing
+
+    monkeypatch.setattr(race, "moved_on", unmoved)
+    monkeypatch.setattr(race, "at_floor", lambda *_: nothing_left)
+    monkeypatch.setattr(race, "_near", lambda *_: True)
+    runners = race.raced(view.able[:3], view, declared(made), bench.serial(made))
+    assert len(runners) == 3
+    assert len(looked) == ways == sum(one.leapt for one in runners)
+    assert len(set(looked)) == ways  # each once

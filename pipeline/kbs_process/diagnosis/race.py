@@ -2,8 +2,9 @@
 
 Phases of tooth contact that made up for what was left out are farther away than a descent goes, and to look for better
 ones costs more than all else. Where they are right beside one law, they are about right beside each that does the same.
-So whoever leads looks for them, and the others begin where it has brought the known numbers. Where the most promising
-does not do what the screen promised, known numbers were pulled too far: they are drawn back beside it and let go again.
+So whoever leads looks for them, and the others begin where it has brought the known numbers; then the next one does, as
+a wrong law that leads shows a wrong way. Where the most promising does not do what the screen promised, known numbers
+were pulled too far: they are drawn back beside it and let go again.
 """
 
 from __future__ import annotations
@@ -73,11 +74,13 @@ def raced(chosen: Sequence[Found], view: View, floor: Floor, simulate: Simulate)
     near = [one for one in runners if _near(one, runners[0])]
     behind = [one for one in runners if one not in near]
     for _ in range(WAYS):
-        if not near or near[0].leapt or at_floor(near[0], floor):
+        next_one = next((one for one in near if not one.leapt), None)
+        if next_one is None or at_floor(near[0], floor):
             break
-        first = replace(near[0], standing=moved_on(near[0].standing, simulate), leapt=True)
+        first = replace(next_one, standing=moved_on(next_one.standing, simulate), leapt=True)
         way = bare(first.standing, own_of(first.found, view.standing, first.standing), simulate)
-        near = [first, *side_by_side(partial(led, way), near[1:])]
+        others = [one for one in near if one is not next_one]
+        near = [first, *side_by_side(partial(led, way), others)]
         near.sort(key=lambda one: one.cost)
     return [*near, *behind]
 
