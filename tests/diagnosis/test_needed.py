@@ -203,7 +203,9 @@ def test_a_law_that_does_what_no_other_does_stays_whatever_recordings_that_it_do
     rest = without(both, cable.tried.own, simulate)
     assert needing._vital(rest.known, both.known)
     assert not needing._vital(both.known, both.known)
-    told, reasons = needing._again([cable], cable.tried.own, rest, both, declared(made), alone=True)
+    told, reasons = needing._again([cable], cable.tried.own, rest, both, declared(made), simulate, alone=True)
     assert "r2 predicted worse" in reasons
-    told, reasons = needing._again([cable], cable.tried.own, rest, both, declared(made), alone=False)
+    told, reasons = needing._again(
+        [cable], cable.tried.own, rest, both, declared(made), simulate, alone=False
+    )
     assert "r2 predicted worse" not in reasons and told[0].find.identity == cable.find.identity

@@ -14,6 +14,7 @@ from kbs_process.diagnosis import race
 from kbs_process.diagnosis.finding import Tried
 from kbs_process.diagnosis.floor import declared
 from kbs_process.diagnosis.gate import Gate
+from kbs_process.diagnosis.hypothesis import Simulate
 from kbs_process.diagnosis.joint import Own, Standing, with_extra
 from kbs_process.diagnosis.leaders import gated, leaders, tried, various
 from kbs_process.diagnosis.race import Runner, raced
@@ -149,9 +150,9 @@ def test_a_law_that_leaves_nothing_is_judged_once_others_have_settled_beside_it(
     simulate = bench.serial(made)
     costs = list[float]()
 
-    def strict(found: Found, before: Standing, after: Standing, own: Own) -> Gate:
+    def strict(found: Found, before: Standing, after: Standing, own: Own, simulate: Simulate) -> Gate:
         costs.append(after.known.cost)
-        verdict = gated(found, before, after, own)
+        verdict = gated(found, before, after, own, simulate)
         return verdict.but("too early") if len(costs) == 1 or not once else verdict
 
     monkeypatch.setattr(leading, "gated", strict)

@@ -154,15 +154,21 @@ def test_a_law_is_judged_where_its_numbers_have_settled(made: Experiment, cable:
     best = found.candidates[0]
     after = with_extra(cable, extra_of(best, cable, tried, scene), bench.serial(made))
     begun = Tried(
-        best, after, gated(best, cable, after, own_of(best, cable, after)), found, own_of(best, cable, after)
+        best,
+        after,
+        gated(best, cable, after, own_of(best, cable, after), bench.serial(made)),
+        found,
+        own_of(best, cable, after),
     )
     assert begun.gate.passed
     known = after.known
     worse = replace(known, residual=tuple(5.0 * one for one in known.residual))
-    told = rounds._judged_again(replace(begun, standing=replace(after, known=worse)), cable)
+    told = rounds._judged_again(
+        replace(begun, standing=replace(after, known=worse)), cable, bench.serial(made)
+    )
     assert not told.gate.passed and any("predicted worse" in reason for reason in told.gate.reasons)
     alone = replace(begun, own=Own((), ()))  # of what is each recording's own the verdict stays
-    assert rounds._judged_again(alone, cable) is alone
+    assert rounds._judged_again(alone, cable, bench.serial(made)) is alone
 
 
 def test_a_law_of_the_readings_needs_no_plant_and_its_rival_is_told_apart(made: Experiment) -> None:
@@ -206,7 +212,7 @@ def passed(here: Standing, tried: Bench, scene: Scene, found: Screening, law: st
     one = next(one for one in found.candidates if one.suspect.family == (law, "el"))
     after = with_extra(here, extra_of(one, here, tried, scene), bench.serial(here.known.experiment))
     own = own_of(one, here, after)
-    return Tried(one, after, gated(one, here, after, own), found, own)
+    return Tried(one, after, gated(one, here, after, own, bench.serial(here.known.experiment)), found, own)
 
 
 def test_an_error_of_an_encoder_that_no_law_has_is_measured_with_a_band(made: Experiment) -> None:

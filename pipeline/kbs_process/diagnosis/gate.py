@@ -9,7 +9,7 @@ held out, each fit trial is left out in turn, to first order.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -67,11 +67,13 @@ def gate(
     shapes: Sequence[int] = (),
     *,
     least: float = GATE_SIGMA,
+    blind: Callable[[], Collection[int]] = frozenset,
 ) -> Gate:
     """Judge the numbers `coefficients` of `after`, the amplitudes of a law that `before` is without.
 
     Its `shapes` count as they are: what makes up for an amplitude, as the lever of a force does, says nothing against
     it, and a law of no amplitude has none. By `least` sigmas amplitudes have to be off zero.
+    Held-out trials in which it does nothing (`blind`, asked where they would refuse it) are no witnesses.
     """
     experiment = after.experiment
     held_out = bool(experiment.held_out)
@@ -85,8 +87,12 @@ def gate(
     white = whiteness(before), whiteness(after)
     reasons = []
     # Written so that what is no number, of a plant that diverged, is refused.
-    gained = sum(fold.gain for fold in folds)
-    if worse := worsened(folds):
+    asked = folds
+    if held_out and (worsened(folds) or not sum(fold.gain for fold in folds) >= GATE_GAIN):
+        nothing = blind()
+        asked = tuple(fold for k, fold in zip(experiment.held_out, folds, strict=True) if k not in nothing)
+    gained = sum(fold.gain for fold in asked)
+    if worse := worsened(asked):
         reasons.append(f"{', '.join(worse)} predicted worse")
     if not gained >= GATE_GAIN:
         reasons.append("recordings that were not used gain less than chance could give")

@@ -43,6 +43,7 @@ from kbs_process.diagnosis.thresholds import (
 )
 from kbs_process.diagnosis.tryout import extra_of, identity, in_plant
 from kbs_process.diagnosis.view import View
+from kbs_process.diagnosis.witnesses import blind
 from kbs_process.plant.effect import Effect, Port
 from kbs_process.signals.records import Array
 
@@ -154,21 +155,31 @@ def tried(
     runners = raced([found for found in chosen if not found.suspect.each_trial], view, floor, simulate)
     for number, runner in enumerate(runners):
         own = own_of(runner.found, before, runner.standing)
-        verdict = gated(runner.found, before, runner.standing, own)
+        verdict = gated(runner.found, before, runner.standing, own, simulate)
         if number == 0 and not (verdict.passed or runner.leapt) and at_floor(runner, floor):
             # It left nothing after its first steps. What other numbers lack there may be all that speaks against it.
             runner = replace(runner, standing=moved_on(runner.standing, simulate), leapt=True)
-            verdict = gated(runner.found, before, runner.standing, own)
+            verdict = gated(runner.found, before, runner.standing, own, simulate)
         judged.append(Tried(runner.found, runner.standing, verdict, view.screening, own, runner.leapt))
     return [one for one in judged if one.gate.passed], [one for one in judged if not one.gate.passed]
 
 
-def gated(found: Found, before: Standing, after: Standing, own: Own, *, least: float = GATE_SIGMA) -> Gate:
+def gated(
+    found: Found,
+    before: Standing,
+    after: Standing,
+    own: Own,
+    simulate: Simulate,
+    *,
+    least: float = GATE_SIGMA,
+) -> Gate:
     """The gate's verdict on a law that `after` has and `before` is without; sizes have to be such as it may have."""
     known = after.known
     places = [known.names.index(name) for name in own.amplitudes]
     shapes = [known.names.index(name) for name in own.names if name not in own.amplitudes]
-    verdict = gate(before.known, known, places, shapes, least=least)
+    verdict = gate(
+        before.known, known, places, shapes, least=least, blind=partial(blind, after, own, simulate)
+    )
     # What minima of the known parameters leave differs, and is no law's.
     share = explained_share(before.known, known, beyond=TOLERATED)
     index = np.array(places)
@@ -245,7 +256,7 @@ def _told_anew(chosen: Tried, before: Standing, floor: Floor, simulate: Simulate
     new = with_extra(view.standing, extra_of(found, view.standing, view.bench, view.scene), simulate)
     new = resettled(new, floor, simulate, leaps=0)
     own = own_of(found, before, new)
-    told = Tried(found, new, gated(found, before, new, own), view.screening, own)
+    told = Tried(found, new, gated(found, before, new, own, simulate), view.screening, own)
     chances = probabilities([standing.known, new.known], view.bench.background.rows)
     return told if told.gate.passed and chances[1] > chances[0] else chosen
 
@@ -263,7 +274,7 @@ def _set_anew(chosen: Tried, before: Standing, floor: Floor, simulate: Simulate)
     new = with_extra(view.standing, extra_of(found, view.standing, view.bench, view.scene), simulate)
     new = resettled(new, floor, simulate, leaps=0)
     own = own_of(found, before, new)
-    told = Tried(found, new, gated(found, before, new, own), chosen.screening, own, chosen.leapt)
+    told = Tried(found, new, gated(found, before, new, own, simulate), chosen.screening, own, chosen.leapt)
     return told if new.known.cost < standing.known.cost else chosen
 
 

@@ -21,6 +21,7 @@ from kbs_process.diagnosis.search import GROSS
 from kbs_process.diagnosis.settling import bent
 from kbs_process.diagnosis.thresholds import CLEAR, SHADE, STAYS_SIGMA
 from kbs_process.diagnosis.tryout import identity
+from kbs_process.diagnosis.witnesses import blind
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,11 +71,11 @@ def needed(
             # law between its parts it has not gained all that was gained since.
             last = not fallen and kept[-len(group) :] == group and not group[0].before.known.gross
             if last and _clear(group[0].before.known, standing.known):
-                told, reasons = group, missed(group[0].before.known, standing.known)
+                told, reasons = group, _missed(group[0].before, standing, own, simulate)
                 rest = without(standing, own, simulate) if reasons else standing
             else:
                 rest = without(standing, own, simulate)
-                told, reasons = _again(group, own, rest, standing, floor, alone=group == kept)
+                told, reasons = _again(group, own, rest, standing, floor, simulate, alone=group == kept)
                 there = detected(rest, floor, standing.known.experiment.fit)
                 if not (last or there.left or bent(rest, floor)):
                     reasons = (*reasons, "later finds do what it did")
@@ -96,6 +97,13 @@ def _clear(before: Known, after: Known) -> bool:
     return not searched(before.experiment) or before.cost - after.cost > CLEAR * before.fit_rows
 
 
+def _missed(rest: Standing, standing: Standing, own: Own, simulate: Simulate) -> tuple[str, ...]:
+    """Why recordings that were not used, and in which the law does something, speak against it."""
+    if not missed(rest.known, standing.known):
+        return ()
+    return missed(rest.known, standing.known, blind(standing, own, simulate))
+
+
 def _vital(without: Known, known: Known) -> bool:
     """Whether a law does what no other find does, by far: without it as much more is left as the floor has.
 
@@ -106,18 +114,25 @@ def _vital(without: Known, known: Known) -> bool:
 
 
 def _again(
-    group: Sequence[Accepted], own: Own, rest: Standing, standing: Standing, floor: Floor, *, alone: bool
+    group: Sequence[Accepted],
+    own: Own,
+    rest: Standing,
+    standing: Standing,
+    floor: Floor,
+    simulate: Simulate,
+    *,
+    alone: bool,
 ) -> tuple[list[Accepted], tuple[str, ...]]:
     """Finds of one law as the last of all, after `rest`, as they are told then; and why they fall, if they do.
 
     The gate's reasons count for nothing where the law is not `alone` and does what no other does.
     """
-    verdict = gated(group[0].tried.found, rest, standing, own, least=STAYS_SIGMA)
+    verdict = gated(group[0].tried.found, rest, standing, own, simulate, least=STAYS_SIGMA)
     vital = not alone and _vital(rest.known, standing.known)
     reasons = (
         *(() if vital else verdict.reasons),
         *too_little(rest, standing, floor),
-        *missed(rest.known, standing.known),
+        *_missed(rest, standing, own, simulate),
     )
     if len(group) > 1:
         return list(group), reasons

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 from kbs_process.diagnosis.detection import Detection, detect
@@ -61,14 +61,14 @@ def too_little(before: Standing, after: Standing, floor: Floor, *, more: bool = 
     return tuple(reasons)
 
 
-def missed(before: Known, after: Known) -> tuple[str, ...]:
+def missed(before: Known, after: Known, blind: Collection[int] = ()) -> tuple[str, ...]:
     """Return why recordings that were not used speak against a law, all others being in the plant; nothing, if none do.
 
     Of every held-out recording that is still missed, by more than nulls are, it has to take some, too. Another law may
-    be what that recording shows, so this is asked when no more are found.
+    be what that recording shows, so this is asked when no more are found; those in which it does nothing are `blind`.
     """
     reasons = []
-    for k in after.experiment.held_out:
+    for k in (one for one in after.experiment.held_out if one not in blind):
         left, gained = after.chi2[k] - after.rows[k], before.chi2[k] - after.chi2[k]
         if left > UNFORESEEN * after.rows[k] and not gained >= TAKEN_UNUSED * (left + gained):
             share = 100.0 * gained / (left + gained)

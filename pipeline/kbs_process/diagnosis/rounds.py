@@ -258,7 +258,7 @@ def _settled(one: Tried, before: Standing, floor: Floor, simulate: Simulate) -> 
         settled = resettled(settled, floor, simulate, leaps=1)
     if settled.known.excess < MOST * before.known.excess:
         settled = released(settled, floor, simulate)
-    return _judged_again(reread(replace(one, standing=settled), before, floor, simulate), before)
+    return _judged_again(reread(replace(one, standing=settled), before, floor, simulate), before, simulate)
 
 
 def _stands_in(
@@ -281,11 +281,11 @@ def _each_time(one: Tried) -> int:
     return len(suspect.amplitudes) * len(experiment.fit) + (suspect.places > 1) * len(trajectories)
 
 
-def _judged_again(told: Tried, before: Standing) -> Tried:
+def _judged_again(told: Tried, before: Standing, simulate: Simulate) -> Tried:
     """A law with the gate's verdict on it where its numbers have settled."""
     if not told.own.names:
         return told
-    return replace(told, gate=gated(told.found, before, told.standing, told.own))
+    return replace(told, gate=gated(told.found, before, told.standing, told.own, simulate))
 
 
 def named_first(passed: Sequence[Tried]) -> list[Tried]:
