@@ -17,7 +17,6 @@ from kbs_process.signals.records import Array
 KNOWN_UNITS = {unit for units in DIMENSIONS.values() for unit in units}
 LAWS = (*CATALOGUE, *MEASURED)
 SUSPECTS = [e for e in LAWS if any(p.role == "amplitude" for p in e.parameters)]
-RNG = np.random.default_rng(11)
 
 
 def amplitudes(effect: Effect) -> list[str]:
@@ -51,7 +50,7 @@ class TestSuspects:
         none = value(effect, values, **dict.fromkeys(names, 0.0))
         assert not none[:size].any()
         units = [value(effect, values, **dict.fromkeys(names, 0.0) | {name: 1.0}) for name in names]
-        weights = RNG.uniform(0.1, 2.0, len(names))
+        weights = np.random.default_rng(11).uniform(0.1, 2.0, len(names))
         mixed = value(effect, values, **dict(zip(names, weights, strict=True)))
         expected = np.tensordot(weights, np.stack(units), axes=1)[:size]
         np.testing.assert_allclose(mixed[:size], expected, rtol=1e-12, atol=1e-15)
