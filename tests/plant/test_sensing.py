@@ -132,10 +132,23 @@ def test_an_s_shaped_channel_has_another_gain_about_one_load_and_is_odd_there() 
     np.testing.assert_allclose(slope, 0.5 / 0.2, rtol=1e-6)
 
 
+def rounded(codes: float) -> Array:
+    step = codes * float(np.asarray(KNOWN["code"]))
+    return np.rint(READING / step) * step
+
+
 def test_a_coarse_encoder_reads_whole_coarse_codes() -> None:
-    coarse = READING + changed(law("encoder_quantisation"), coarse_share=1.0, coarse_codes=8.0)
-    codes = coarse / (8.0 * float(np.asarray(KNOWN["code"])))
-    np.testing.assert_allclose(codes, np.rint(codes), atol=1e-6)
+    coarse = rounded(1.0) + changed(law("encoder_quantisation"), coarse_share=1.0, coarse_codes=8.0)
+    np.testing.assert_allclose(coarse, rounded(8.0), atol=1e-9)
+
+
+@pytest.mark.parametrize("codes", [1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 8.0, 16.0])
+def test_an_encoder_that_is_as_declared_is_no_coarse_one(codes: float) -> None:
+    left = rounded(1.0) - READING
+    column = changed(law("encoder_quantisation"), coarse_share=1.0, coarse_codes=codes)
+    share = float(left @ column / (column @ column))
+    taken = share**2 * float(column @ column) / float(left @ left)
+    assert share < 0.0 or taken < 0.01
 
 
 def test_clocks_are_late() -> None:

@@ -10,16 +10,20 @@ from kbs_process.signals.records import Array
 
 
 def change(reading: Array, code: float, coarse_share: float, coarse_codes: float) -> Array:
-    r"""Change of an angle by rounding it to several codes.
+    r"""Change of an angle by rounding it to several codes instead of one.
 
-    Equation: $\Delta\theta = s (\theta_m \lfloor \theta/\theta_m + 1/2 \rfloor - \theta)$,
-        $\theta_m = m \theta_{code}$.
+    Equation: $\Delta\theta = s (r_m(\theta) - r_1(\theta))$,
+        $r_m(\theta) = m \theta_{code} \lfloor \theta/(m \theta_{code}) + 1/2 \rfloor$.
     Units: rad, rad, 1, 1 -> rad.
-    Validity: s = 1 is a coarse encoder; the rounding to its declared code is not in the reading.
+    Validity: s = 1 is a coarse encoder. The rounding to its declared code is not in the reading, but with its noise; as
+        the law is without it, an encoder that is as declared has no positive s at any m.
     Source: IEEE Std 1241-2010, Terminology and test methods for analog-to-digital converters.
     """
-    coarse = coarse_codes * code
-    return coarse_share * (np.floor(reading / coarse + 0.5) * coarse - reading)
+    return coarse_share * (_rounded(reading, coarse_codes * code) - _rounded(reading, code))
+
+
+def _rounded(reading: Array, code: float) -> Array:
+    return np.floor(reading / code + 0.5) * code
 
 
 ENCODER_QUANTISATION = Sensing(
@@ -27,13 +31,13 @@ ENCODER_QUANTISATION = Sensing(
     port=SensingPort.ENCODER,
     equation=change,
     parameters=(
-        Parameter("coarse_share", "1", Normal(0.0, 1.0), "1: all of it", (-10.0, 10.0), role="amplitude"),
+        Parameter("coarse_share", "1", Normal(0.0, 1.0), "1: all of it", (0.0, 2.0), role="amplitude"),
         Parameter(
             "coarse_codes",
             "1",
             LogNormal(4.0, 1.0),
             "declared codes in a coarse one",
-            (1.0, 1e5),
+            (1.5, 1e5),
             grid=(2.0, 4.0, 8.0, 16.0, 32.0),
         ),
     ),
