@@ -121,18 +121,22 @@ def _same(one: Suspect, other: Suspect) -> TypeGuard[Catalogued]:
 
 
 def various(chosen: Sequence[Found]) -> list[Found]:
-    """The best of each family at each place, then the others; in either part the order is kept.
+    """The best at each place, then of each other family there, then the others; in each part the order is kept.
 
-    Many orders together follow what another law of their family has, and do not stand for it. Delays are alike to first
-    order, and the plant alone tells them apart.
+    Laws of one place do nearly the same, and would leave none of another's tried. Many orders together follow what
+    another law of their family has, and do not stand for it. Delays are alike to first order, and the plant alone tells
+    them apart.
     """
+    places: dict[tuple[str, ...], Found] = {}
     best: dict[tuple[str, ...], Found] = {}
     for found in chosen:
         own = identity(found.suspect)
+        places.setdefault((own.port, own.axis, *own.channels), found)
         several = isinstance(found.suspect, Catalogued) and bool(found.suspect.candidate.again)
         kind = own.law if _delays(found.suspect) else own.family
         best.setdefault((own.port, own.axis, kind, str(several), *own.channels), found)
-    return [*best.values(), *(found for found in chosen if found not in best.values())]
+    first = [*places.values(), *(found for found in best.values() if found not in places.values())]
+    return [*first, *(found for found in chosen if found not in first)]
 
 
 def _delays(suspect: Suspect) -> bool:

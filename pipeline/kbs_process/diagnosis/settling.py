@@ -24,13 +24,13 @@ def drawn_back(standing: Standing, floor: Floor, simulate: Simulate) -> Standing
     """Known numbers nearer to their priors, where something that is missing has pulled them.
 
     Laws are looked for from there: they act on the plant that is, and numbers that made up for one of them have made
-    it another. Where much is left, the numbers are drawn back if less than twice as much is left then.
+    it another. Where something is left, the numbers are drawn back if less than twice as much is left then.
     """
     known = standing.known
-    if not (searched(known.experiment) and known.strained and (known.gross or bent(standing, floor))):
+    if not (searched(known.experiment) and known.strained):
         return standing
     held = confined(known, simulate, CLOSE, laws=standing.laws)
-    kept = known.gross and not MOST * held.excess < known.excess
+    kept = not bent(standing, floor) and not MOST * held.excess < known.excess
     return standing if kept else standing_of(held, standing.laws)
 
 
