@@ -265,6 +265,9 @@ def test_a_law_of_a_size_that_none_has_is_refused() -> None:
     cord = next(law for law in CATALOGUE if law.name == "bungee")
     assert implausible(cord, {"stiffness": (-1.0, 0.5)}) == ()
     assert implausible(cord, {"stiffness": (-2.0, 0.5)})  # a cord does not push
+    coarse = next(law for law in SENSING if law.name == "encoder_quantisation")
+    assert implausible(coarse, {"coarse_share": (0.95, 0.02)}) == ()
+    assert implausible(coarse, {"coarse_share": (0.2, 0.02)})  # what is rounded is rounded whole
 
 
 def test_a_signature_of_next_to_no_length_does_nothing() -> None:

@@ -228,7 +228,7 @@ def _reversed(suspect: Catalogued, found: Score) -> bool:
 
 def _of_wrong_sign(suspect: Catalogued, amplitude: Array) -> bool:
     """Whether a lone amplitude has a sign that its law has not: no inertia is less than none."""
-    lone = len(amplitude) == 1 and suspect.candidate.amplitudes[0].bounds[0] == 0.0
+    lone = len(amplitude) == 1 and suspect.candidate.amplitudes[0].bounds[0] >= 0.0
     return lone and float(amplitude[0]) < 0.0
 
 

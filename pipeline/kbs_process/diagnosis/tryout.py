@@ -137,7 +137,7 @@ def extra_of(found: Found, standing: Standing, bench: Bench, scene: Scene) -> Ex
     begin = np.array([one.value for one in shaped])
     any_size = np.full(len(amplitude), np.inf)
     # An amplitude that has one sign keeps it.
-    least = np.array([0.0 if entry.bounds[0] == 0.0 else -np.inf for entry in candidate.amplitudes])
+    least = np.array([0.0 if entry.bounds[0] >= 0.0 else -np.inf for entry in candidate.amplitudes])
     return Extra(
         hypothesis=hypothesis,
         plant=(

@@ -15,8 +15,9 @@ def change(reading: Array, code: float, coarse_share: float, coarse_codes: float
     Equation: $\Delta\theta = s (r_m(\theta) - r_1(\theta))$,
         $r_m(\theta) = m \theta_{code} \lfloor \theta/(m \theta_{code}) + 1/2 \rfloor$.
     Units: rad, rad, 1, 1 -> rad.
-    Validity: s = 1 is a coarse encoder. The rounding to its declared code is not in the reading, but with its noise; as
-        the law is without it, an encoder that is as declared has no positive s at any m.
+    Validity: s = 1 is a coarse encoder, s below a half none. The rounding to its declared code is not in the reading,
+        but with its noise; as the law is without it, an encoder that is as declared has no s above 0, or, where
+        motions pass few codes, hardly any.
     Source: IEEE Std 1241-2010, Terminology and test methods for analog-to-digital converters.
     """
     return coarse_share * (_rounded(reading, coarse_codes * code) - _rounded(reading, code))
@@ -31,7 +32,7 @@ ENCODER_QUANTISATION = Sensing(
     port=SensingPort.ENCODER,
     equation=change,
     parameters=(
-        Parameter("coarse_share", "1", Normal(0.0, 1.0), "1: all of it", (0.0, 2.0), role="amplitude"),
+        Parameter("coarse_share", "1", Normal(1.0, 0.5), "1: all of it", (0.5, 2.0), role="amplitude"),
         Parameter(
             "coarse_codes",
             "1",
