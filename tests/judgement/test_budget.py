@@ -110,7 +110,7 @@ def test_ends_err_by_what_drifts_and_by_what_is_flat(rng):
             errors += budget.rms(wrong) ** 2
             budgeted += budget.total(entries) ** 2
             parts += part / runs
-        assert parts.mean() == pytest.approx(share, abs=0.15)
+        assert parts == pytest.approx(share, abs=0.2)  # every channel: 0.82 to 0.97 over seeds
         assert np.sqrt(errors.sum() / budgeted.sum()) == pytest.approx(1.0, abs=0.3)
 
 
