@@ -128,15 +128,15 @@ def various(chosen: Sequence[Found]) -> list[Found]:
     them apart.
     """
     places: dict[tuple[str, ...], Found] = {}
-    best: dict[tuple[str, ...], Found] = {}
+    families: dict[tuple[str, ...], Found] = {}
     for found in chosen:
         own = identity(found.suspect)
-        places.setdefault((own.port, own.axis, *own.channels), found)
+        place = own.port, own.axis, *own.channels
         several = isinstance(found.suspect, Catalogued) and bool(found.suspect.candidate.again)
         kind = own.law if _delays(found.suspect) else own.family
-        best.setdefault((own.port, own.axis, kind, str(several), *own.channels), found)
-    first = [*places.values(), *(found for found in best.values() if found not in places.values())]
-    return [*first, *(found for found in chosen if found not in first)]
+        places.setdefault(place, found)
+        families.setdefault((*place, kind, str(several)), found)
+    return list(dict.fromkeys([*places.values(), *families.values(), *chosen]))
 
 
 def _delays(suspect: Suspect) -> bool:
