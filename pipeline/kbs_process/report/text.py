@@ -20,7 +20,9 @@ def number(value: float | None, digits: int = 3) -> str:
     exponent = _exponent(value)
     if _readable(exponent):
         return _sign(f"{value:.{max(0, digits - 1 - exponent)}f}")
-    return f"{_sign(f'{value / 10.0**exponent:.{digits - 1}f}')}\u00a0×\u00a010{_raised(exponent)}"
+    # By its digits: the power of ten of a number that is next to nothing is no number.
+    mantissa, power_of_ten = f"{value:.{digits - 1}e}".split("e")
+    return f"{_sign(mantissa)}\u00a0×\u00a010{_raised(int(power_of_ten))}"
 
 
 def measure(value: float | None, sigma: float | None, digits: int = 4) -> str:
