@@ -101,9 +101,16 @@ def test_a_value_is_written_to_its_uncertainty(value: float | None, sigma: float
 
 @pytest.mark.parametrize(
     ("value", "said"),
-    [(0.0, "0"), (12345.6, "12346"), (0.06, "0.0600"), (9.99e6, "9.99 × 10⁶"), (-3.0e-7, "−3.00 × 10⁻⁷")]
-    # Next to nothing, as the probability of a law that is not it: there is no power of ten to divide it by.
-    + [(5e-324, "4.94 × 10⁻³²⁴"), (9.999e6, "1.00 × 10⁷")],
+    [
+        (0.0, "0"),
+        (12345.6, "12346"),
+        (0.06, "0.0600"),
+        (9.99e6, "9.99 × 10⁶"),
+        (-3.0e-7, "−3.00 × 10⁻⁷"),
+        (9.999e6, "1.00 × 10⁷"),
+        # Next to nothing, as the probability of a law that is not it: there is no power of ten to divide it by.
+        (5e-324, "4.94 × 10⁻³²⁴"),
+    ],
 )
 def test_numbers_have_three_digits(value: float, said: str) -> None:
     assert text.number(value).replace("\u00a0", " ") == said
