@@ -29,6 +29,7 @@ from kbs_process.diagnosis.outcome import (
     Estimate,
     Find,
     Identity,
+    Moved,
     Outcome,
     Refused,
 )
@@ -94,7 +95,6 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ),
     )
     outcome = Outcome(
-        verdict="physics",
         before=NOTHING,
         after=NOTHING,
         held_out=None,
@@ -116,7 +116,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     campaign = load_campaign(bench.CAMPAIGN, checksums=False)
     discs = merged([disc(find, 1.0, ""), disc(find, 2.0, "_2")])
     write_corrected(campaign, replace(outcome, finds=discs), target.parent / "discs")
-    off = replace(outcome, finds=(), verdict="parameters off")
+    off = replace(outcome, finds=(), moved=(Moved("joint.el.drive.Ka", 1.0, 0.1, 5.0),))
     told_off = write_diagnosis(campaign, declared(experiment), off, target, False, None, "")
     nothing = "Model with its known numbers refitted, to which nothing was added"
     assert told_off.verdict_lines[1] == f"{nothing}: {target / 'corrected'}"
@@ -124,13 +124,17 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     command = load(target, DiagnosisResults).provenance.command
     assert command == "kbs-process campaign/EL089", "of a diagnosis at the end of processing"
     assert "would look the same" in told_off.verdict_lines[0] and "{" not in told_off.verdict_lines[0]
-    told = write_diagnosis(campaign, declared(experiment), outcome, target, False, proposal)
-    assert (
-        told.verdict_lines[0]
-        == "The model lacks: curve over joint angle or ground cable (external wrench, el)."
-    )
-    assert told.verdict_lines[1] == f"Corrected model: {target / 'corrected'}"
     more = write_diagnosis(
+        campaign,
+        declared(experiment),
+        replace(outcome, after=Detection((), -80.0, 1.44)),
+        target,
+        False,
+        proposal,
+    )
+    assert "The model lacks: curve" in more.verdict_lines[0]
+    assert "1.2 times the floor (rms) is left: more is missing, or" in more.verdict_lines[0]
+    much = write_diagnosis(
         campaign,
         declared(experiment),
         replace(outcome, after=Detection((), -80.0, 2.25)),
@@ -138,7 +142,20 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
         False,
         proposal,
     )
-    assert "1.5 times the floor (rms) is left: more is missing, or" in more.verdict_lines[0]
+    assert much.verdict_lines[0].startswith(
+        "Nearest to what the model lacks, of the laws known: curve over joint angle"
+    )
+    assert "1.5 times the floor (rms) is left: more is missing, or" in much.verdict_lines[0]
+    assert "<strong>Undecided</strong>" in (target / "index.html").read_text()
+    faint = replace(outcome, finds=(), after=Detection((), -80.0, 1.02))
+    (little, *_) = write_diagnosis(campaign, declared(experiment), faint, target, False, None).verdict_lines
+    assert "but by 2 % of its power" in little and "Nearest is ground cable (external wrench, el)" in little
+    told = write_diagnosis(campaign, declared(experiment), outcome, target, False, proposal)
+    assert (
+        told.verdict_lines[0]
+        == "The model lacks: curve over joint angle or ground cable (external wrench, el)."
+    )
+    assert told.verdict_lines[1] == f"Corrected model: {target / 'corrected'}"
     assert told.verdict_lines[-1] == f"Next test: {target / 'next-test.csv'}"
     return target
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from types import SimpleNamespace
 
 import bench
 import numpy as np
@@ -17,8 +18,8 @@ from kbs_process.diagnosis.floor import declared
 from kbs_process.diagnosis.joint import Own, Standing
 from kbs_process.diagnosis.known import Known
 from kbs_process.diagnosis.needed import Accepted
-from kbs_process.diagnosis.supposed import Noted, enough, supposed
-from kbs_process.diagnosis.thresholds import MOSTLY_DONE, TAKEN, WAYS
+from kbs_process.diagnosis.supposed import Noted, enough, supposed, wanting
+from kbs_process.diagnosis.thresholds import MOSTLY_DONE, PROMISED, TAKEN, WAYS
 
 
 def leaving(known: Known, share: float) -> Known:
@@ -70,6 +71,7 @@ def test_two_leave_enough_where_they_leave_little(cable: Standing) -> None:
     known = cable.known
     assert enough(known, leaving(known, 0.99 - MOSTLY_DONE))
     assert not enough(known, leaving(known, 1.01 - MOSTLY_DONE))
+    assert wanting(known, leaving(known, 0.5)) == pytest.approx((0.5 - 1.0 + MOSTLY_DONE) * known.excess)
 
 
 @pytest.mark.parametrize(
@@ -92,9 +94,16 @@ def test_each_of_a_pair_has_to_be_found_beside_the_other(
     asked: list[list[str]] = []
 
     def look(
-        here: Standing, seen: Standing, _: object, __: object, accepted: Sequence[Accepted]
+        here: Standing,
+        seen: Standing,
+        _: object,
+        __: object,
+        accepted: Sequence[Accepted],
+        least: float = 0.0,
     ) -> rounds._Round:
         asked.append([one.find.identity.law for one in accepted])
+        wanted = wanting(known, here.known) if len(asked) == 1 else 0.0
+        assert least == pytest.approx(wanted)
         share = left[len(asked) - 1]
         one = second if len(asked) == 1 else first
         there = replace(here, known=leaving(known, share))
@@ -116,3 +125,22 @@ def test_each_of_a_pair_has_to_be_found_beside_the_other(
         assert pair == ()
     else:
         assert [one.accepted.find.identity.law for one in pair if one.accepted] == ["harness", "ground_cable"]
+
+
+@pytest.mark.parametrize("hopeful", [False, True])
+def test_no_law_is_simulated_where_the_best_would_leave_far_too_much(
+    cable: Standing, monkeypatch: pytest.MonkeyPatch, hopeful: bool
+) -> None:
+    tried, scene, found = screened(cable)
+    law = passed(cable, tried, scene, found, "ground_cable")
+    floor, simulate = declared(cable.known.experiment), bench.serial(cable.known.experiment)
+    view = SimpleNamespace(able=[law.found], unrepeated=[], standing=cable)
+    monkeypatch.setattr(rounds, "leaders", lambda *_: ([law.found], []))
+    monkeypatch.setattr(rounds, "tried", lambda *_: ([law], []))
+    noted = Noted()
+    least = (0.9 if hopeful else 1.1) * PROMISED * law.found.score.gain
+    simulated = list(rounds._passed(view, cable, floor, simulate, [], noted, least))
+    assert simulated == ([[law]] if hopeful else [])
+    assert ["would leave far too much" in "".join(one.reasons) for one in noted.refused] == [True] * (
+        not hopeful
+    )

@@ -12,8 +12,10 @@ from kbs_process.campaign.diagnosis_sentences import paragraph, sentence
 from kbs_process.campaign.diagnosis_terms import COMMANDS, place_of, rms
 from kbs_process.campaign.diagnosis_warnings import warnings
 from kbs_process.campaign.next_test import next_test
+from kbs_process.campaign.unexplained import unexplained
 from kbs_process.diagnosis.experiment import Experiment
 from kbs_process.diagnosis.floor import Floor
+from kbs_process.diagnosis.joint import Standing
 from kbs_process.diagnosis.known import Known
 from kbs_process.diagnosis.next_test import Proposal
 from kbs_process.diagnosis.outcome import Curve, Find, Outcome
@@ -47,22 +49,24 @@ def results_of(
     known = outcome.known
     finds = tuple(_find(find, known.experiment) for find in outcome.finds)
     trials = tuple(_trials(known, outcome.standing.known))
+    requirements = tuple(unexplained(campaign, Standing(known, known.shown, {}), outcome.standing))
     return records.DiagnosisResults(
         name=campaign.name,
         title=campaign.title,
         article=campaign.article,
         verdict=Conclusion(
             status="undecided" if outcome.verdict == "undecided" else "none",
-            sentence=sentence(outcome, trials, floor),
+            sentence=sentence(outcome, trials, requirements, floor),
         ),
         provenance=provenance.made(verb, campaign),
         answer=outcome.verdict,
-        paragraph=paragraph(outcome, finds, trials, floor),
+        paragraph=paragraph(outcome, finds, trials, requirements, floor),
         floor=floor.statement,
         log10_p=outcome.log_p / float(np.log(10.0)),
         moved=tuple(_moved(outcome.standing.known)),
         finds=finds,
         trials=trials,
+        requirements=requirements,
         ports=tuple(_ports(outcome)),
         located=tuple(
             records.Place(port=_PORTS.get(one.port, one.port), site=one.axis, channels=one.channels)

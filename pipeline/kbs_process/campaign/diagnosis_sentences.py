@@ -20,6 +20,19 @@ _WORDS = {
     "what they do would look the same; one that is farther off than its file can be wrong stands for such physics.",
     "undecided": "There is a mismatch, and no law passed the gate.",
 }
+_FAINT = (
+    "Something exceeds {floor}, beyond chance, but by {share:.2g} % of its power: minima of the known parameters "
+    "differ by as much, and no law can be told from that.{near}"
+)
+MATTERS = 0.1  # of a limit: in a sum of squares a tenth is a half percent
+
+
+def _nearest(outcome: Outcome) -> str:
+    """The law that came nearest to be one, of those that were refused."""
+    if not outcome.refused:
+        return ""
+    near = max(outcome.refused, key=lambda one: one.rho_eff)
+    return f" Nearest is {_words(near.identity.law)} ({_where(place_of(near.identity))})."
 
 
 def _words(name: str) -> str:
@@ -37,26 +50,49 @@ def _law_in_words(find: Find) -> str:
     return " or ".join(_words(law) for law in (find.identity.law, *here))
 
 
-def sentence(outcome: Outcome, trials: Sequence[records.Trial], floor: Floor) -> str:
-    """The answer, in one sentence or two."""
+def sentence(
+    outcome: Outcome,
+    trials: Sequence[records.Trial],
+    requirements: Sequence[records.Unexplained],
+    floor: Floor,
+) -> str:
+    """The answer, in one sentence or a few."""
     if not outcome.finds:
-        return _unnamed(outcome, trials, floor) + _located(outcome)
+        return _unnamed(outcome, trials, floor) + _located(outcome) + _matters(outcome, requirements)
     told = [f"{_law_in_words(find)} ({_where(place_of(find.identity))})" for find in outcome.finds]
-    return f"The model lacks: {'; '.join(told)}.{_reserve(outcome)}"
+    begin = "Nearest to what the model lacks, of the laws known" if outcome.much else "The model lacks"
+    return f"{begin}: {'; '.join(told)}.{_reserve(outcome)}{_matters(outcome, requirements)}"
 
 
 def _reserve(outcome: Outcome) -> str:
     """What is to be said of finds with which something is left: among known laws they are the nearest ones."""
-    if not outcome.after.left:
+    if not (outcome.after.left or outcome.much):
         return ""
-    level = f"{rms(outcome.after.ratio):.3g} times the floor (rms)"
+    most = max(one.ratio for one in (outcome.after, *(outcome.held_out or ())[1:]))
+    level = f"{rms(most):.3g} times the floor (rms)"
     return (
         f" With that in the plant {level} is left: more is missing, or a law found stands in for one like it."
     )
 
 
+def _matters(outcome: Outcome, requirements: Sequence[records.Unexplained]) -> str:
+    """What is left, as requirements count it."""
+    if outcome.verdict != "undecided" or not requirements:
+        return ""
+    worst = max(requirements, key=lambda one: one.share)
+    little = ": too little to matter for it" if worst.share < MATTERS else ""
+    return (
+        f" What is left reaches at most {worst.corrected:.2g} {worst.unit} ({worst.statistic}, {worst.channel}), "
+        f"{100.0 * worst.share:.2g} % of the limit of '{worst.name}'{little}."
+    )
+
+
 def _unnamed(outcome: Outcome, trials: Sequence[records.Trial], floor: Floor) -> str:
     """The answer where there is no find."""
+    if outcome.after.faint and not outcome.unforeseen:
+        return _FAINT.format(
+            floor=_FLOOR[floor.source], share=100.0 * (outcome.after.ratio - 1.0), near=_nearest(outcome)
+        )
     if not outcome.unforeseen:
         return _WORDS[outcome.verdict].format(floor=_FLOOR[floor.source])
     worst = max((trial for trial in trials if trial.role == "held-out"), key=lambda trial: trial.corrected)
@@ -82,7 +118,11 @@ def _located(outcome: Outcome) -> str:
 
 
 def paragraph(
-    outcome: Outcome, finds: Sequence[records.Find], trials: Sequence[records.Trial], floor: Floor
+    outcome: Outcome,
+    finds: Sequence[records.Find],
+    trials: Sequence[records.Trial],
+    requirements: Sequence[records.Unexplained],
+    floor: Floor,
 ) -> str:
     """Plain words, to be pasted into a test report."""
     held_out = [trial for trial in trials if trial.role == "held-out"]
@@ -102,10 +142,10 @@ def paragraph(
         apart = [
             _words(one.name) for one in find.rivals if one.distance < (near if one.simulated else RIVALS)
         ]
-        begin = "Left out was" if find.named else "No law of the catalogue passes; measured was a"
+        left_out = "Nearest to what was left out is" if outcome.much else "Left out was"
+        begin = left_out if find.named else "No law of the catalogue passes; measured was a"
         parts.append(
-            f"{begin} {_words(find.name)} ({_where(find.place)}): {numbers}; probability {find.probability:.2f} among "
-            f"the laws simulated"
+            f"{begin} {_words(find.name)} ({_where(find.place)}): {numbers}; probability {find.probability:.2f}"
             + (f", not to be told from {', '.join(apart)} by these recordings." if apart else ".")
         )
     if finds:
@@ -114,13 +154,14 @@ def paragraph(
         )
     else:
         parts.append(_unnamed(outcome, trials, floor) + _located(outcome))
+    parts.append(_matters(outcome, requirements).lstrip())
     if outcome.otherwise:
         farthest = sorted(outcome.otherwise, key=lambda moved: -abs(moved.sigmas))[:3]
         numbers = ", ".join(f"{moved.name} by {moved.sigmas:+.1f} sigma" for moved in farthest)
         parts.append(f"Without a law known parameters would have to be off, beyond belief: {numbers}.")
     for moved in outcome.moved[:5]:
         parts.append(f"{moved.name} is off by {moved.sigmas:+.1f} sigma.")
-    return " ".join(parts)
+    return " ".join(part for part in parts if part)
 
 
 def _numbers_in_words(numbers: Sequence[records.Fitted]) -> str:

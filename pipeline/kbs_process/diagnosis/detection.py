@@ -26,7 +26,7 @@ from kbs_process.diagnosis.hypothesis import Hypothesis, Prediction
 from kbs_process.diagnosis.known import Known
 from kbs_process.diagnosis.metric import counted
 from kbs_process.diagnosis.nuisance import nuisances
-from kbs_process.diagnosis.thresholds import DETECTED, TOLERATED, UNFORESEEN
+from kbs_process.diagnosis.thresholds import DETECTED, FAINT, TOLERATED, UNFORESEEN
 from kbs_process.diagnosis.whiten import Projector, Whitener, independent
 from kbs_process.signals.records import Array
 
@@ -60,9 +60,14 @@ class Detection:
         return bool(self.log_p < np.log(DETECTED) and self.ratio > 1.0 + TOLERATED)
 
     @property
-    def unforeseen(self) -> bool:
-        """Likewise of recordings that nothing was fitted to."""
+    def much(self) -> bool:
+        """Whether so much is left that it is more than recordings which nothing was fitted to are good for."""
         return bool(self.log_p < np.log(DETECTED) and self.ratio > 1.0 + UNFORESEEN)
+
+    @property
+    def faint(self) -> bool:
+        """Whether there is something beyond chance, and less of it than floor and search are good for."""
+        return bool(self.log_p < np.log(FAINT) and 1.0 < self.ratio <= 1.0 + TOLERATED)
 
     @property
     def rows(self) -> dict[int, float]:

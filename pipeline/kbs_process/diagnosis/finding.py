@@ -268,3 +268,20 @@ def merged(finds: Sequence[Find]) -> tuple[Find, ...]:
             rho_eff=float(np.hypot(first.rho_eff, find.rho_eff)),
         )
     return tuple(merged)
+
+
+def trusted(finds: Sequence[Find], share: float) -> tuple[Find, ...]:
+    """Finds with their chances and their rivals' times the share of such finds that were right; the rest is unknown.
+
+    The odds are those of some laws of which one is right, and nature's may be none of them.
+    """
+    return tuple(
+        replace(
+            find,
+            probability=share * find.probability,
+            alternatives=tuple(
+                replace(other, probability=share * other.probability) for other in find.alternatives
+            ),
+        )
+        for find in finds
+    )

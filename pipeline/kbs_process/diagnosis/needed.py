@@ -131,7 +131,7 @@ def _again(
     vital = not alone and _vital(rest.known, standing.known)
     reasons = (
         *(() if vital else verdict.reasons),
-        *too_little(rest, standing, floor),
+        *too_little(rest, standing, floor, sigmas=verdict.sigmas),
         *_missed(rest, standing, own, simulate),
     )
     if len(group) > 1:

@@ -147,7 +147,6 @@ class Place:
 class Outcome:
     """All answers of a diagnosis."""
 
-    verdict: Verdict
     before: Detection  # known parameters refitted, no law added
     after: Detection  # with all finds
     held_out: tuple[Detection, Detection] | None  # before and after, on recordings that were not used
@@ -163,13 +162,27 @@ class Outcome:
     otherwise: tuple[Moved, ...] = ()  # known parameters that would have to be off if there were no law
 
     @property
+    def verdict(self) -> Verdict:
+        """The answer in a word: finds beside which much is left are no more than the nearest that is known."""
+        if self.much or (not self.finds and (self.after.left or self.after.faint)):
+            return "undecided"
+        if self.finds:
+            return "physics"
+        return "parameters off" if self.moved else "none"
+
+    @property
     def located(self) -> tuple[PortName, ...]:
         """Ports, which look the same, of what is left without a law; nothing where other ports may be it as well."""
-        if self.verdict != "undecided" or self.unforeseen or self.left is None:
+        if self.verdict != "undecided" or self.finds or self.unforeseen or self.left is None:
             return ()
         return self.left.only
 
     @property
+    def much(self) -> bool:
+        """Whether much is left, in recordings that were fitted or in those that were held out."""
+        return self.after.much or (self.held_out is not None and self.held_out[1].much)
+
+    @property
     def unforeseen(self) -> bool:
         """Whether recordings that were held out show what those that were fitted do not."""
-        return not self.after.left and self.held_out is not None and self.held_out[1].unforeseen
+        return not self.after.left and self.held_out is not None and self.held_out[1].much

@@ -10,7 +10,15 @@ from kbs_process.diagnosis.experiment import Experiment
 from kbs_process.diagnosis.floor import Floor
 from kbs_process.diagnosis.joint import Standing
 from kbs_process.diagnosis.known import Known
-from kbs_process.diagnosis.thresholds import LEAD, LEAST_RHO, TAKEN, TAKEN_UNUSED, TOLERATED, UNFORESEEN
+from kbs_process.diagnosis.thresholds import (
+    EVERYWHERE,
+    LEAD,
+    LEAST_RHO,
+    TAKEN,
+    TAKEN_UNUSED,
+    TOLERATED,
+    UNFORESEEN,
+)
 from kbs_process.diagnosis.view import View
 
 
@@ -36,11 +44,14 @@ def taken(there: Detection, here: Detection) -> float:
     return 1.0 - max(here.ratio - 1.0, 0.0) / (there.ratio - 1.0) if there.left else 1.0
 
 
-def too_little(before: Standing, after: Standing, floor: Floor, *, more: bool = False) -> tuple[str, ...]:
+def too_little(
+    before: Standing, after: Standing, floor: Floor, *, sigmas: float = 0.0, more: bool = False
+) -> tuple[str, ...]:
     """Return why what a law takes does not tell it from something else; nothing, if it does.
 
     What two minima of phases and tooth contact leave differs, too, and a law with numbers enough follows that. It shows
-    less than that in every trajectory. What is `more` of a law that was found need take no share of all that is left.
+    less than that in every trajectory, unless parts of the recordings all show it, by `sigmas`. What is `more` of a law
+    that was found need take no share of all that is left.
     """
     experiment = before.known.experiment
     there, here = (detected(one, floor, experiment.fit) for one in (before, after))
@@ -54,7 +65,7 @@ def too_little(before: Standing, after: Standing, floor: Floor, *, more: bool = 
     most = max(ratio - left[trajectory] for trajectory, ratio in there.ratios.items())
     # What known numbers had taken up shows where they are.
     relieved = before.known.strained and not after.known.strained
-    if searched(experiment) and not (most >= TOLERATED or relieved):
+    if searched(experiment) and not (most >= TOLERATED or sigmas >= EVERYWHERE or relieved):
         reasons.append(f"takes {100.0 * most:.1f} % of the floor's power: {_DIFFER}")
     elif not there.left and not before.known.cost - after.known.cost >= LEAST_RHO**2:
         reasons.append("known numbers alone are as likely")

@@ -9,7 +9,7 @@ import numpy as np
 
 from kbs_process.diagnosis.detection import Detection
 from kbs_process.diagnosis.families import UNNAMED
-from kbs_process.diagnosis.finding import Tried, as_it_stands, find_of, merged
+from kbs_process.diagnosis.finding import Tried, as_it_stands, find_of, merged, trusted
 from kbs_process.diagnosis.floor import Floor
 from kbs_process.diagnosis.hypothesis import Simulate
 from kbs_process.diagnosis.joint import Standing, bare, standing_of, without
@@ -20,12 +20,10 @@ from kbs_process.diagnosis.moments import only_while
 from kbs_process.diagnosis.needed import Accepted, in_the_shade, needed
 from kbs_process.diagnosis.outcome import (
     Absorbed,
-    Find,
     Identity,
     Moved,
     Outcome,
     Place,
-    Verdict,
 )
 from kbs_process.diagnosis.ports import port_test
 from kbs_process.diagnosis.remains import detected, promises_little, too_little
@@ -35,8 +33,18 @@ from kbs_process.diagnosis.scene import Scene
 from kbs_process.diagnosis.screen import Found, Screening
 from kbs_process.diagnosis.settling import bent, drawn_back, released, resettled
 from kbs_process.diagnosis.shapes import bettered
-from kbs_process.diagnosis.supposed import Noted, enough, supposed
-from kbs_process.diagnosis.thresholds import LEAST_RHO, MOST, ROUNDS, SECOND, SETTLED, TOLERATED
+from kbs_process.diagnosis.supposed import Noted, enough, supposed, wanting
+from kbs_process.diagnosis.thresholds import (
+    LEAST_RHO,
+    MOST,
+    PROMISED,
+    ROUNDS,
+    SECOND,
+    SETTLED,
+    TOLERATED,
+    TRUST,
+    TRUST_PART,
+)
 from kbs_process.diagnosis.tryout import identity
 from kbs_process.diagnosis.view import View
 
@@ -138,15 +146,14 @@ def _diagnosed(
         held_out = unseen, unseen if same else detected(standing, floor, known.experiment.held_out)
     told = replace(standing, known=replace(standing.known, covariance=scattered(standing.known)))
     finds = [as_it_stands(one.find, one.tried.own, told.known) for one in kept]
-    moved = _moved(told.known)
+    much = after.much or (held_out is not None and held_out[1].much)
     return Outcome(
-        verdict=_verdict(finds, moved, after, held_out),
         before=before,
         after=after,
         held_out=held_out,
         log_p=_mismatch(before, rounds[0].screening, kept),
-        moved=moved,
-        finds=merged(finds),
+        moved=_moved(told.known),
+        finds=trusted(merged(finds), TRUST_PART if much else TRUST),
         refused=(*fallen, *next((one.noted.refused for one in reversed(rounds) if one.noted.refused), ())),
         absorbed=_absorbed(last.screening),
         place=rounds[0].place,
@@ -174,9 +181,17 @@ def _mismatch(before: Detection, first: Screening, kept: Sequence[Accepted]) -> 
 
 
 def _round(
-    standing: Standing, seen: Standing, floor: Floor, simulate: Simulate, accepted: Sequence[Accepted]
+    standing: Standing,
+    seen: Standing,
+    floor: Floor,
+    simulate: Simulate,
+    accepted: Sequence[Accepted],
+    least: float = 0.0,
 ) -> _Round:
-    """Look for one more law from where numbers are `seen` at, which may have been drawn back."""
+    """Look for one more law from where numbers are `seen` at, which may have been drawn back.
+
+    The best has to promise to gain `least`, of -2 log likelihood.
+    """
     over = False
     if seen.known.cost < standing.known.cost:
         # Numbers had ended in a worse place: what they do alone, once they have settled, is no law's.
@@ -185,7 +200,7 @@ def _round(
     view = View.of(seen)
     place = _place(seen, floor, view.scene)
     noted = Noted()
-    for passed in () if over else _passed(view, standing, floor, simulate, accepted, noted):
+    for passed in () if over else _passed(view, standing, floor, simulate, accepted, noted, least):
         if found := _accepted(passed, view, standing, place, floor, simulate, accepted, noted):
             return _Round(found, found.tried.standing, seen, view.screening, noted, place)
     return _Round(None, standing, seen, view.screening, noted, place)
@@ -201,7 +216,8 @@ def _pair(last: _Round, floor: Floor, simulate: Simulate, accepted: Sequence[Acc
         told = find_of([one], 0, np.ones(1), last.standing, None)
         there = one.standing if one.leapt else resettled(one.standing, floor, simulate, leaps=1)
         beside = [*accepted, Accepted(one, told, last.standing)]
-        other = _round(there, drawn_back(there, floor, simulate), floor, simulate, beside)
+        least = wanting(last.standing.known, there.known)
+        other = _round(there, drawn_back(there, floor, simulate), floor, simulate, beside, least)
         if other.accepted is None or not enough(last.standing.known, other.standing.known):
             continue
         seen = bare(other.standing, one.own, simulate)
@@ -268,7 +284,7 @@ def _stands_in(
     earlier = [(one.find.identity.law, one.tried.own) for one in accepted if one.find.identity != _law(told)]
     # One more action of a law at the same place is part of the find.
     more = any(one.find.identity == _law(told) for one in accepted)
-    little = too_little(standing, told.standing, floor, more=more)
+    little = too_little(standing, told.standing, floor, sigmas=told.gate.sigmas, more=more)
     return little or only_while(earlier, standing, told.standing.known, simulate)
 
 
@@ -346,6 +362,7 @@ def _passed(
     simulate: Simulate,
     accepted: Sequence[Accepted],
     noted: Noted,
+    least: float = 0.0,
 ) -> Iterator[list[Tried]]:
     """Suspects of a view that passed the gate; then, if none of these stands, those that are each recording's own.
 
@@ -365,6 +382,9 @@ def _passed(
     first, others = leaders(
         view, lambda found: (own or not found.suspect.each_trial) and not in_the_shade(found, accepted)
     )
+    if first and least > 0.0 and PROMISED * max(found.score.gain for found in first) < least:
+        noted.refuse(first[0], "the best beside it would leave far too much")
+        return
     for chosen in (first, *([found] for found in others)):
         more, less = tried(chosen, view, view.standing, floor, simulate)
         passed = [*passed, *more]
@@ -408,16 +428,3 @@ def _absorbed(screening: Screening) -> tuple[Absorbed, ...]:
         for found in screening.candidates
         if found.absorbed
     )
-
-
-def _verdict(
-    finds: Sequence[Find],
-    moved: Sequence[Moved],
-    after: Detection,
-    held_out: tuple[Detection, Detection] | None,
-) -> Verdict:
-    if finds:
-        return "physics"
-    if after.left or (held_out is not None and held_out[1].unforeseen):
-        return "undecided"
-    return "parameters off" if moved else "none"

@@ -109,6 +109,25 @@ class Trial(Record, frozen=True, kw_only=True):
     channels: dict[str, float]  # `corrected`, channel by channel
 
 
+class Unexplained(Record, frozen=True, kw_only=True):
+    """What is left, as a requirement counts it: its statistic of what repeats share, at worst, noise included."""
+
+    name: str
+    statistic: Literal["peak", "rms"]
+    band_Hz: tuple[float, float]
+    limit: float
+    unit: str
+    known: float  # known parameters refitted
+    corrected: float  # with everything that was found
+    channel: str  # of `corrected`, and
+    recording: str  # first of the trajectory
+
+    @property
+    def share(self) -> float:
+        """Of the limit."""
+        return self.corrected / self.limit
+
+
 class PortTest(Record, frozen=True, kw_only=True):
     """Does a free input at one port suffice? And which other ports look the same from these channels?"""
 
@@ -171,6 +190,7 @@ class DiagnosisResults(Record, frozen=True, kw_only=True):
     moved: tuple[Moved, ...]
     finds: tuple[Find, ...]
     trials: tuple[Trial, ...]
+    requirements: tuple[Unexplained, ...] = ()
     ports: tuple[PortTest, ...] = ()
     located: tuple[Place, ...] = ()  # where what no law explains enters: ports that look the same
     suspects: tuple[Suspect, ...] = ()

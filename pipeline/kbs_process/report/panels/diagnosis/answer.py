@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from kbs_process.report.figures import diagnosis as figures
 from kbs_process.report.panel import Block, Caption, Cell, Figure, Grid, Notices, Panel, Text
-from kbs_process.report.records.diagnosis import DiagnosisResults, Find, Place, Trial
+from kbs_process.report.records.diagnosis import DiagnosisResults, Find, Place, Trial, Unexplained
 from kbs_process.report.tables import Tables
 from kbs_process.report.text import MISSING, chance, number, percent
 
@@ -37,6 +37,8 @@ def panel(results: DiagnosisResults, tables: Tables) -> Panel:
         blocks.append(_finds(results.finds))
     blocks.append(Figure("Residual over the floor", (figures.trials(results.trials),), _TRIALS))
     blocks.append(_trials(results.trials))
+    if results.requirements:
+        blocks.append(_requirements(results.requirements))
     blocks.append(
         Text(f"Floor: {results.floor}. Chance of what the known parameters leave: {chance(results.log10_p)}.")
     )
@@ -88,3 +90,20 @@ def _trials(trials: tuple[Trial, ...]) -> Grid:
     )
     head = ("Recording", "Role", "Nominal", "Known refitted", "Corrected")
     return Grid("Residual over the floor, rms", head, rows, "klrrr")
+
+
+def _requirements(requirements: tuple[Unexplained, ...]) -> Grid:
+    rows = tuple(
+        (
+            entry.name,
+            f"{entry.statistic}, {number(entry.band_Hz[0])} to {number(entry.band_Hz[1])} Hz",
+            f"{number(entry.limit)} {entry.unit}",
+            f"{number(entry.known, 2)} {entry.unit}",
+            f"{number(entry.corrected, 2)} {entry.unit}",
+            percent(entry.share, 2),
+            f"{entry.channel}, {entry.recording}",
+        )
+        for entry in requirements
+    )
+    head = ("Requirement", "As", "Limit", "Known refitted", "Corrected", "Of the limit", "Where")
+    return Grid("What is left, noise included, as requirements count it", head, rows, "klrrrrl")

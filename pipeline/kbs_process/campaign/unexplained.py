@@ -1,0 +1,75 @@
+"""What a model leaves of the recordings, as each requirement counts it: does it matter?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from kbs_process.campaign.analysis import bands_of, select
+from kbs_process.campaign.config import Campaign, Requirement
+from kbs_process.campaign.judging import band_of
+from kbs_process.campaign.measurable import judged_channels
+from kbs_process.diagnosis.joint import Standing
+from kbs_process.report.records import diagnosis as records
+from kbs_process.signals.records import WRENCH_CHANNELS, Array, Mask, Signal
+from kbs_process.stages import bandpass
+from kbs_process.stages.to_cog import to_spacecraft
+from kbs_process.stages.verdict import Extreme, extremes
+
+
+def unexplained(campaign: Campaign, known: Standing, corrected: Standing) -> Iterator[records.Unexplained]:
+    """Each requirement's statistic of what is left of a trajectory's mean, at its worst channel and trajectory.
+
+    Noise is in it, less by the root of the number of repeats: no effect that was left out does more than this.
+    """
+    for requirement in campaign.requirements:
+        worst, before = (_worst(campaign, requirement, one) for one in (corrected, known))
+        if worst is not None and before is not None:
+            yield records.Unexplained(
+                name=requirement.name,
+                statistic=requirement.statistic,
+                band_Hz=requirement.band,
+                limit=requirement.limit,
+                unit=requirement.unit,
+                known=before.value,
+                corrected=worst.value,
+                channel=worst.channel,
+                recording=worst.recording,
+            )
+
+
+def _worst(campaign: Campaign, requirement: Requirement, standing: Standing) -> Extreme | None:
+    """The greatest statistic of measured less predicted; None where no sample of the band is known."""
+    experiment = standing.known.experiment
+    band = band_of(requirement, bands_of(campaign.bands))
+    left = []
+    for members in experiment.repeats:
+        trials = [experiment.trials[k] for k in members]
+        valid = np.logical_and.reduce([trial.valid for trial in trials])
+        mean = np.mean([experiment.trials[k].measured - standing.shown(k) for k in members], axis=0)
+        signal = Signal(
+            t0=0.0,
+            dt=experiment.dt,
+            values=_level(mean[:, : experiment.loads], valid),
+            channels=experiment.channels[: experiment.loads],
+            units=experiment.units[: experiment.loads],
+            frame=campaign.rig.frame,
+            valid=valid,
+        )
+        cut = bandpass.apply(signal, band)
+        if requirement.frame != signal.frame:
+            assert campaign.rig.spacecraft is not None  # asked before recordings are read
+            cut = to_spacecraft(select(cut, WRENCH_CHANNELS), campaign.rig.spacecraft)
+        left.append((trials[0].name, cut))
+    found = extremes(left, judged_channels(requirement, campaign.rig), requirement.statistic)
+    return max(found, key=lambda one: one.value, default=None)
+
+
+def _level(values: Array, valid: Mask) -> Array:
+    """Without the constant and the slope that the transducer may have; zero where nothing was recorded."""
+    t = np.linspace(-1.0, 1.0, len(values))
+    A = np.stack([np.ones_like(t), t], axis=1)
+    level: Array = values - A @ np.linalg.lstsq(A[valid], values[valid], rcond=None)[0]
+    level[~valid] = 0.0
+    return level
