@@ -392,3 +392,31 @@ def test_what_each_recording_has_of_its_own_is_not_looked_for_where_a_law_leaves
     assert list(rounds._passed(view, cable, floor, simulate, accepted, Noted())) == []  # type: ignore[arg-type]
     assert asked[0] is repeating
     assert (own in asked) == looked
+
+
+@pytest.mark.parametrize("stands", [False, True])
+def test_a_law_that_leaves_less_and_is_too_uneven_settles_before_another_is_believed(
+    cable: Standing, monkeypatch: pytest.MonkeyPatch, stands: bool
+) -> None:
+    """What passes beside it follows what it does: believed is the one that leaves least, or none."""
+    tried, scene, found = screened(cable)
+    best, other = (passed(cable, tried, scene, found, law) for law in ("ground_cable", "harness"))
+    uneven = replace(best, gate=replace(best.gate, sigmas=5.0).but("its coefficients are 5.0 sigma off zero"))
+    worse = replace(best, gate=best.gate.but("r2 predicted worse"))
+    assert best.gate.passed and uneven.gate.uneven and not worse.gate.uneven and not best.gate.uneven
+    assert rounds.beaten([other], [uneven]) is uneven
+    assert rounds.beaten([other], [worse]) is None
+    assert rounds.beaten([best], [replace(other, gate=uneven.gate)]) is None
+    monkeypatch.setattr(
+        rounds, "_settled", lambda one, *_: best if stands or one is other else replace(one, gate=uneven.gate)
+    )
+    monkeypatch.setattr(rounds, "_stands_in", lambda *_: ())
+    view = SimpleNamespace(scene=scene, bench=tried, screening=found)
+    floor, simulate = declared(cable.known.experiment), bench.serial(cable.known.experiment)
+    noted = Noted()
+    noted.fell(uneven)
+    told = rounds._accepted([other], view, cable, None, floor, simulate, [], noted)
+    assert (told is not None) == stands
+    assert told is None or told.find.identity.law == "ground_cable"
+    refused = [(one.identity.law, *one.reasons[-1:]) for one in noted.refused[1:]]
+    assert refused == ([] if stands else [("harness", "ground_cable leaves less")])

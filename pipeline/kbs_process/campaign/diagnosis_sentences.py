@@ -83,7 +83,7 @@ def _matters(outcome: Outcome, requirements: Sequence[records.Unexplained]) -> s
     little = ": too little to matter for it" if worst.share < MATTERS else ""
     return (
         f" What is left reaches at most {worst.corrected:.2g} {worst.unit} ({worst.statistic}, {worst.channel}), "
-        f"{100.0 * worst.share:.2g} % of the limit of '{worst.name}'{little}."
+        f"{100.0 * worst.share:.3g} % of the limit of '{worst.name}'{little}."
     )
 
 

@@ -55,6 +55,11 @@ class Gate:
     whiteness: tuple[float, float]  # before and after, see `whiteness`
     reasons: tuple[str, ...]  # of a refusal
 
+    @property
+    def uneven(self) -> bool:
+        """Whether all that speaks against it is how near zero its coefficients are, as parts differ by much."""
+        return len(self.reasons) == 1 and not self.sigmas >= GATE_SIGMA
+
     def but(self, *reasons: str) -> Gate:
         """The same with more reasons to refuse; passed still, where there are none."""
         return replace(self, passed=self.passed and not reasons, reasons=(*self.reasons, *reasons))

@@ -248,6 +248,15 @@ def _accepted(
         passed = [*passed, *more]
         noted.fell(*less)
     passed = continued(named_first(passed), [one.find.identity for one in accepted])
+    if (beyond := beaten(passed, noted.fallen)) is not None:
+        # What is missing elsewhere, or numbers that have yet to settle, speaks against it; the others are farther off.
+        told = _settled(beyond, standing, floor, simulate)
+        if not told.gate.passed:
+            noted.fell(
+                *(replace(one, gate=one.gate.but(f"{_law(beyond).law} leaves less")) for one in passed)
+            )
+            return None
+        passed = [told, *passed]
     fitted = [_each_time(one) for one in passed]
     chances = probabilities([one.standing.known for one in passed], view.bench.background.rows, fitted)
     order = [int(k) for k in np.argsort(-chances, kind="stable")]
@@ -343,6 +352,21 @@ def continued(passed: Sequence[Tried], accepted: Sequence[Identity]) -> list[Tri
     """
     more = [one for one in passed if _law(one) in accepted and all(_as_good(one, other) for other in passed)]
     return more or list(passed)
+
+
+def beaten(passed: Sequence[Tried], fallen: Sequence[Tried]) -> Tried | None:
+    """The law of the catalogue that leaves least, less than all that passed, of those that are but too uneven.
+
+    What passes beside it follows what it does.
+    """
+    uneven = [
+        one
+        for one in fallen
+        if one.gate.uneven
+        and _law(one).family != UNNAMED
+        and not any(_as_good(other, one) for other in passed)
+    ]
+    return min(uneven, key=lambda one: one.standing.known.cost, default=None)
 
 
 def _as_good(one: Tried, other: Tried) -> bool:
