@@ -22,6 +22,7 @@ from kbs_process.diagnosis.remains import detected
 from kbs_process.diagnosis.screen import Found
 from kbs_process.diagnosis.settling import released
 from kbs_process.diagnosis.side_by_side import side_by_side
+from kbs_process.diagnosis.sizes import of_mounting, sized
 from kbs_process.diagnosis.thresholds import FAR_BEHIND, FIRST, MOST, SETTLED_TIMES, TOLERATED, WAYS
 from kbs_process.diagnosis.tryout import extra_of
 from kbs_process.diagnosis.view import View
@@ -61,6 +62,10 @@ def raced(chosen: Sequence[Found], view: View, floor: Floor, simulate: Simulate)
         new = replace(runner, standing=with_extra(by, extra, simulate))
         return min(runner, new, key=lambda one: one.cost)
 
+    if view.standing.known.gross:
+        chosen = [
+            sized(view.bench, one, view.suspects, simulate) if of_mounting(one) else one for one in chosen
+        ]
     heat = side_by_side(begun, chosen)
     far = FAR_BEHIND * max(
         min((one.left for one in heat), default=0.0), TOLERATED * view.standing.known.fit_rows

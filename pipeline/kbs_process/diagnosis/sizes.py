@@ -1,0 +1,99 @@
+"""Laws of the mounting at their size: what one does to the plate's own vibration is another thing at every size.
+
+Where the plate slips or stiffens, it rings elsewhere, and longer or shorter than without: along the vibration of a
+plant that has none of it a law promises little, and a search that begins with little creeps. So sizes are tried in the
+plant, and what each leaves is looked at beside all known numbers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from kbs_process.diagnosis.clocks import height_of
+from kbs_process.diagnosis.hypothesis import Hypothesis, Simulate
+from kbs_process.diagnosis.screen import Bench, Catalogued, Found, Suspect, evidence
+from kbs_process.diagnosis.tryout import inserted
+from kbs_process.plant.effect import Port
+from kbs_process.signals.records import Array
+
+# Of the moment that vibrates: what the law makes of the present vibration, rms over rms.
+_TRIED = (0.01, 0.03, 0.1, 0.3, 1.0)
+
+
+def of_mounting(found: Found) -> bool:
+    """Whether it acts on the plate by how the plate itself turns."""
+    return isinstance(found.suspect, Catalogued) and found.suspect.candidate.port is Port.BASE_TORQUE
+
+
+def sized(bench: Bench, found: Found, among: Sequence[Suspect], simulate: Simulate) -> Found:
+    """A law of the mounting about one axis, at the shape `among` some and the size that leave least, if less than it.
+
+    Beside known numbers that are refitted to first order.
+    """
+    family = found.suspect.family
+    grid = [one for one in among if isinstance(one, Catalogued) and one.family == family]
+    tried = [(one, amplitudes) for one in grid for amplitudes in _amplitudes(bench, one)]
+    present = bench.scene.hypothesis
+    models = [
+        inserted(one.candidate, dict(zip(one.amplitudes, map(float, a), strict=True)), present)
+        for one, a in tried
+    ]
+    heights = _heights(bench, models, simulate)
+    nothing = height_of(bench, bench.background.z)
+    best = int(np.argmin(heights))
+    gain = nothing - heights[best]
+    if not gain > found.score.gain:
+        return found
+    suspect, amplitude = tried[best]
+    score = replace(found.score, gain=gain, amplitude=amplitude, rank=1)
+    more = evidence(score, bench.background.rows) - evidence(found.score, bench.background.rows)
+    return replace(found, suspect=suspect, score=score, log_evidence=found.log_evidence + more)
+
+
+def _heights(bench: Bench, models: list[Hypothesis], simulate: Simulate) -> list[float]:
+    """What each model leaves; infinite for a plant that diverged."""
+    experiment, known = bench.known.experiment, bench.known
+    references = {k: experiment.reference(experiment.trials[k].trajectory) for k in bench.background.z}
+    drives = sorted(set(references.values()))
+    shown = iter(simulate([(drive, model) for model in models for drive in drives]))
+    heights = []
+    for _ in models:
+        changes = {drive: next(shown).values - bench.scene.predicted[drive].values for drive in drives}
+        left = {k: bench.background.z[k] - known.metric[k](changes[drive]) for k, drive in references.items()}
+        height = height_of(bench, left) if all(np.isfinite(one).all() for one in changes.values()) else np.inf
+        heights.append(float(np.nan_to_num(height, nan=np.inf)))
+    return heights
+
+
+def _amplitudes(bench: Bench, suspect: Catalogued) -> Iterator[Array]:
+    """(m,) one amplitude after the other at all sizes; either way, where it is none that brakes."""
+    columns = [
+        column for drive in bench.scene.paths for column in [suspect.inputs(drive)] if column is not None
+    ]
+    for index, entry in enumerate(suspect.candidate.amplitudes):
+        units: dict[str, float] = {}
+        for column in columns:
+            for inlet, values in column[index].items():
+                units[inlet.axis] = float(np.hypot(units.get(inlet.axis, 0.0), np.std(values)))
+        axis = max(units, key=lambda one: units[one])
+        moment = _moment(bench, f"T{axis}")
+        if not (units[axis] > 0.0 and moment > 0.0):
+            continue
+        for share in _TRIED:
+            for sign in (1.0,) if entry.dry else (1.0, -1.0):
+                amplitude = np.zeros(len(suspect.amplitudes))
+                amplitude[index] = sign * share * moment / units[axis]
+                yield amplitude
+
+
+def _moment(bench: Bench, channel: str) -> float:
+    """What varies of a channel in all references together, rms; 0 where it is none."""
+    experiment = bench.known.experiment
+    if channel not in experiment.channels:
+        return 0.0
+    place = experiment.channels.index(channel)
+    values = [bench.scene.predicted[drive].values[:, place] for drive in bench.scene.paths]
+    return float(np.sqrt(np.sum([np.var(one) for one in values])))
