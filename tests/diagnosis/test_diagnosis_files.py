@@ -101,7 +101,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
         log_p=-80.0,
         moved=(),
         finds=(find,),
-        refused=(Refused(CABLE, 28.0, ("r1 predicted no better",)),),
+        refused=(Refused(DRAG, 29.0, ("no",)), Refused(CABLE, 28.0, ("r1 predicted no better",), 1.21)),
         absorbed=(Absorbed(DRAG, 0.999, 12.0, ("joint.el.drive.b_m",)),),
         place=None,
         left=None,
@@ -149,7 +149,8 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     assert "<strong>Undecided</strong>" in (target / "index.html").read_text()
     faint = replace(outcome, finds=(), after=Detection((), -80.0, 1.02))
     (little, *_) = write_diagnosis(campaign, declared(experiment), faint, target, False, None).verdict_lines
-    assert "but by 2 % of its power" in little and "Nearest is ground cable (external wrench, el)" in little
+    assert "but by 2 % of its power" in little and "Nearest is ground cable (external wrench, el), which" in little
+    assert "leaves 1.1 times the floor (rms) of what was fitted, but: r1 predicted no better." in little
     told = write_diagnosis(campaign, declared(experiment), outcome, target, False, proposal)
     assert (
         told.verdict_lines[0]
@@ -171,6 +172,7 @@ def test_results_read_back_and_the_page_tells_them(written: Path) -> None:
     assert find.rivals[0].name == "ground_cable"
     assert [(one.name, one.distance, one.absorbed, one.outcome) for one in results.suspects] == [
         ("curve over joint angle", 30.0, 0.1, "accepted"),
+        ("joint_viscous", 29.0, None, "refused: no"),
         ("ground_cable", 28.0, None, "refused: r1 predicted no better"),
         ("joint_viscous", 12.0, 0.999, "absorbed by joint.el.drive.b_m"),
     ]

@@ -18,7 +18,7 @@ _WORDS = {
     "none": "Nothing exceeds {floor}.",
     "parameters off": "Known parameters are off: moved, they leave nothing that exceeds {floor}. Physics that does "
     "what they do would look the same; one that is farther off than its file can be wrong stands for such physics.",
-    "undecided": "There is a mismatch, and no law passed the gate.",
+    "undecided": "There is a mismatch, and no law passed the gate.{near}",
 }
 _FAINT = (
     "Something exceeds {floor}, beyond chance, but by {share:.2g} % of its power: minima of the known parameters "
@@ -28,11 +28,16 @@ MATTERS = 0.1  # of a limit: in a sum of squares a tenth is a half percent
 
 
 def _nearest(outcome: Outcome) -> str:
-    """The law that came nearest to be one, of those that were refused."""
-    if not outcome.refused:
+    """The law that came nearest to be one: of those that were refused in the plant the one that leaves least."""
+    simulated = [one for one in outcome.refused if one.left is not None]
+    if not simulated:
         return ""
-    near = max(outcome.refused, key=lambda one: one.rho_eff)
-    return f" Nearest is {_words(near.identity.law)} ({_where(place_of(near.identity))})."
+    near = min(simulated, key=lambda one: (one.left, one.identity.law))
+    where = f"{_words(near.identity.law)} ({_where(place_of(near.identity))})"
+    return (
+        f" Nearest is {where}, which leaves {rms(near.left or 0.0):.3g} times the floor (rms) of what was fitted, but: "
+        f"{'; '.join(near.reasons)}."
+    )
 
 
 def _words(name: str) -> str:
@@ -94,7 +99,7 @@ def _unnamed(outcome: Outcome, trials: Sequence[records.Trial], floor: Floor) ->
             floor=_FLOOR[floor.source], share=100.0 * (outcome.after.ratio - 1.0), near=_nearest(outcome)
         )
     if not outcome.unforeseen:
-        return _WORDS[outcome.verdict].format(floor=_FLOOR[floor.source])
+        return _WORDS[outcome.verdict].format(floor=_FLOOR[floor.source], near=_nearest(outcome))
     worst = max((trial for trial in trials if trial.role == "held-out"), key=lambda trial: trial.corrected)
     channel = max(worst.channels, key=lambda name: worst.channels[name])
     return (

@@ -111,6 +111,9 @@ class Refused:
     identity: Identity
     rho_eff: float
     reasons: tuple[str, ...]
+    left: float | None = (
+        None  # power over the floor's beside it, of recordings that are fitted; None: not simulated
+    )
 
 
 @dataclass(frozen=True, slots=True)

@@ -30,7 +30,11 @@ class Noted:
     def fell(self, *tried: Tried) -> None:
         """Note laws that were refitted and did not pass."""
         for one in tried:
-            self.refuse(one.found, *one.gate.reasons)
+            known = one.standing.known
+            left = 1.0 + known.excess / known.fit_rows
+            self.refused.append(
+                Refused(identity(one.found.suspect), one.found.score.rho_eff, one.gate.reasons, left)
+            )
             self.fallen.append(one)
 
     @property
