@@ -149,7 +149,10 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     assert "<strong>Undecided</strong>" in (target / "index.html").read_text()
     faint = replace(outcome, finds=(), after=Detection((), -80.0, 1.02))
     (little, *_) = write_diagnosis(campaign, declared(experiment), faint, target, False, None).verdict_lines
-    assert "but by 2 % of its power" in little and "Nearest is ground cable (external wrench, el), which" in little
+    assert (
+        "but all together by 2 % of its power" in little
+        and "Nearest is ground cable (external wrench, el), which" in little
+    )
     assert "leaves 1.1 times the floor (rms) of what was fitted, but: r1 predicted no better." in little
     told = write_diagnosis(campaign, declared(experiment), outcome, target, False, proposal)
     assert (

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from kbs_process.campaign.diagnosis_terms import place_of, rms
+from kbs_process.diagnosis.detection import Detection
 from kbs_process.diagnosis.floor import Floor
 from kbs_process.diagnosis.outcome import Find, Outcome
 from kbs_process.diagnosis.thresholds import RIVALS, told_apart
@@ -21,10 +22,18 @@ _WORDS = {
     "undecided": "There is a mismatch, and no law passed the gate.{near}",
 }
 _FAINT = (
-    "Something exceeds {floor}, beyond chance, but by {share:.2g} % of its power: minima of the known parameters "
-    "differ by as much, and no law can be told from that.{near}"
+    "Something exceeds {floor}, beyond chance, {where}but all together by {share:.2g} % of its power: minima of the "
+    "known parameters differ by as much, and no law can be told from that.{near}"
 )
 MATTERS = 0.1  # of a limit: in a sum of squares a tenth is a half percent
+
+
+def _loudest(left: Detection) -> str:
+    """The band that is farthest beyond chance."""
+    if not left.cells:
+        return ""
+    cell = min(left.cells, key=lambda one: one.log_p)
+    return f"most between {cell.low_Hz:.2g} and {cell.high_Hz:.2g} Hz ({rms(cell.ratio):.3g} times, rms), "
 
 
 def _nearest(outcome: Outcome) -> str:
@@ -95,9 +104,9 @@ def _matters(outcome: Outcome, requirements: Sequence[records.Unexplained]) -> s
 def _unnamed(outcome: Outcome, trials: Sequence[records.Trial], floor: Floor) -> str:
     """The answer where there is no find."""
     if outcome.after.faint and not outcome.unforeseen:
-        return _FAINT.format(
-            floor=_FLOOR[floor.source], share=100.0 * (outcome.after.ratio - 1.0), near=_nearest(outcome)
-        )
+        share = 100.0 * max(outcome.after.ratio - 1.0, 0.0)
+        where, near = _loudest(outcome.after), _nearest(outcome)
+        return _FAINT.format(floor=_FLOOR[floor.source], where=where, share=share, near=near)
     if not outcome.unforeseen:
         return _WORDS[outcome.verdict].format(floor=_FLOOR[floor.source], near=_nearest(outcome))
     worst = max((trial for trial in trials if trial.role == "held-out"), key=lambda trial: trial.corrected)
