@@ -21,12 +21,15 @@ from kbs_process.diagnosis.gls import Background
 from kbs_process.diagnosis.known import Known
 from kbs_process.diagnosis.tails import log_tail
 from kbs_process.diagnosis.thresholds import (
+    GATE_FEW,
     GATE_FORETOLD,
     GATE_GAIN,
     GATE_SHARE,
     GATE_SIGMA,
     GATE_WORSE,
     LEAST_RHO,
+    SHOWN,
+    TOLERATED,
 )
 from kbs_process.signals.records import Array
 
@@ -77,8 +80,9 @@ def gate(
     """Judge the numbers `coefficients` of `after`, the amplitudes of a law that `before` is without.
 
     Its `shapes` count as they are: what makes up for an amplitude, as the lever of a force does, says nothing against
-    it, and a law of no amplitude has none. By `least` sigmas amplitudes have to be off zero.
-    Held-out trials in which it does nothing (`blind`, asked where they would refuse it) are no witnesses.
+    it, and a law of no amplitude has none. By `least` sigmas amplitudes have to be off zero, or by a few where recordings
+    of another motion ask for their size. Held-out trials in which it does nothing (`blind`, asked where they would
+    refuse it) are no witnesses.
     """
     experiment = after.experiment
     held_out = bool(experiment.held_out)
@@ -105,13 +109,30 @@ def gate(
         gained >= GATE_SHARE * _promised(before, after) or foretold(gained, _changed(before, after))
     ):
         reasons.append("recordings that were not used gain much less than those that it was fitted to")
-    if not sigmas >= least:
+    if not (sigmas >= least or (sigmas >= GATE_FEW and _elsewhere(before, after))):
         size = f"{sigmas:.1f} sigma off zero" if np.isfinite(sigmas) else "not determined"
         reasons.append(f"its coefficients are {size}")
     # In units of the floor: what is left has more of a colour, the less that is.
     if not white[1] * after.level <= white[0] * before.level + _spread(after):
         reasons.append("the residual's power is less even with it")
     return Gate(not reasons, folds, held_out, sigmas, white, tuple(reasons))
+
+
+def _elsewhere(before: Known, after: Known) -> bool:
+    """Whether a law that leaves nothing is of the size that recordings ask for which nothing was fitted to.
+
+    All of these that show it gain half at least of the square of what it changes, one of another motion among them:
+    where one window alone shows most of a law, windows that were fitted cannot tell its size from each other.
+    """
+    experiment = after.experiment
+    if after.excess > TOLERATED * after.fit_rows:
+        return False
+    changes = {k: float(np.sum((before.residual[k] - after.residual[k]) ** 2)) for k in experiment.held_out}
+    shown = [k for k, change in changes.items() if change >= SHOWN]
+    fitted = {experiment.trials[k].trajectory for k in experiment.fit}
+    return any(experiment.trials[k].trajectory not in fitted for k in shown) and all(
+        before.chi2[k] - after.chi2[k] >= GATE_FORETOLD * changes[k] for k in shown
+    )
 
 
 def worsened(folds: Sequence[Fold]) -> list[str]:
