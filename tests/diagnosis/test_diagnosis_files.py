@@ -16,7 +16,7 @@ from kbs_process.campaign.diagnosis_files import write_diagnosis
 from kbs_process.campaign.load import load_campaign
 from kbs_process.diagnosis.curves import basis
 from kbs_process.diagnosis.detection import Detection
-from kbs_process.diagnosis.finding import merged
+from kbs_process.diagnosis.finding import merged, trusted
 from kbs_process.diagnosis.floor import declared
 from kbs_process.diagnosis.gate import Fold, Gate
 from kbs_process.diagnosis.joint import standing_of
@@ -55,10 +55,10 @@ def disc(like: Find, order: float, tag: str) -> Find:
 
 
 @pytest.fixture(scope="module")
-def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def outcome() -> Outcome:
     """A curve was found, inside the plant; a cable was not refused by these recordings."""
     before = standing(bench.experiment(bench.rig(), ("fit", "held-out"), 4))
-    known, experiment = before.known, before.known.experiment
+    known = before.known
     ends = (1.25, 1.30)
     hypothesis, scalars = inserted(before.hypothesis, OVER_ANGLE, "el", ends, NODES, SIGMA)
     spread = np.diag(np.concatenate([np.diag(known.covariance), SIGMA**2]))
@@ -94,7 +94,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
             OVER_ANGLE, x, basis(OVER_ANGLE, x, *ends), np.linspace(0.6, 0.4, 101), np.full(101, 0.01)
         ),
     )
-    outcome = Outcome(
+    return Outcome(
         before=NOTHING,
         after=NOTHING,
         held_out=None,
@@ -108,6 +108,11 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
         known=known,
         standing=standing_of(found, before.laws),
     )
+
+
+@pytest.fixture(scope="module")
+def written(outcome: Outcome, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    (find,), experiment = outcome.finds, outcome.known.experiment
     trajectory = family(limits_of(experiment.drives, experiment.dt), ("az", "el"), 60.0, "el")[0]
     proposal = Proposal(
         LAW, (CABLE,), trajectory, 3.0, 0.067, 3, float("nan"), (Tried(trajectory.words, 3.2),)
@@ -150,7 +155,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     faint = replace(outcome, finds=(), after=Detection((), -80.0, 1.02))
     (little, *_) = write_diagnosis(campaign, declared(experiment), faint, target, False, None).verdict_lines
     assert (
-        "but all together by 2 % of its power" in little
+        "all together by 2 % of its power: too little" in little
         and "Nearest is ground cable (external wrench, el), which" in little
     )
     assert "leaves 1.1 times the floor (rms) of what was fitted, but: r1 predicted no better." in little
@@ -215,3 +220,42 @@ def test_a_sensor_s_law_that_was_found_twice_acts_twice_in_the_corrected_model(w
 
 def test_the_next_test_can_be_simulated(written: Path) -> None:
     assert read_commands(written / "next-test.csv", ("az", "el")).t[-1] == pytest.approx(60.0)
+
+
+@pytest.mark.parametrize("share", [0.4, 1.0])
+def test_a_find_is_as_sure_as_such_finds_were(outcome: Outcome, share: float) -> None:
+    """Odds among laws, times the share of finds whose place was right; what is left of one is something else's."""
+    (find,) = outcome.finds
+    (told,) = trusted([find], share)
+    assert told.probability == share * find.probability
+    assert [one.probability for one in told.alternatives] == [
+        share * one.probability for one in find.alternatives
+    ]
+
+
+@pytest.mark.parametrize(
+    ("fit", "unseen", "found", "moved", "verdict"),
+    [
+        (1.0, 1.0, True, False, "physics"),
+        (1.4, 1.4, True, False, "physics"),
+        (1.6, 1.0, True, False, "undecided"),
+        (1.0, 1.6, True, True, "undecided"),
+        (1.0, 1.6, False, False, "undecided"),
+        (1.1, 1.0, False, True, "undecided"),
+        (1.02, 1.0, False, True, "undecided"),
+        (0.9, 0.9, False, False, "undecided"),  # a line below which the floor was too high
+    ],
+)
+def test_what_is_left_decides_what_is_said(
+    outcome: Outcome, fit: float, unseen: float, found: bool, moved: bool, verdict: str
+) -> None:
+    told = replace(
+        outcome,
+        finds=outcome.finds if found else (),
+        after=Detection((), -80.0, fit),
+        held_out=(NOTHING, Detection((), -80.0, unseen)),
+        moved=(Moved("joint.el.drive.Ka", 1.0, 0.1, 5.0),) if moved else (),
+    )
+    assert told.verdict == verdict
+    quiet = replace(told, finds=(), after=NOTHING, held_out=None)
+    assert quiet.verdict == ("parameters off" if moved else "none")

@@ -81,4 +81,7 @@ def test_recordings_of_another_motion_ask_for_a_law_s_size(
             fit_rows=2000,
         )  # fmt: skip
 
-    assert gate._elsewhere(known(False), known(True)) == asked  # type: ignore[arg-type]
+    before, after = known(False), known(True)
+    assert gate._elsewhere(before, after, tuple) == asked  # type: ignore[arg-type]
+    # What changes where the law does nothing is other numbers' doing.
+    assert not gate._elsewhere(before, after, lambda: (2,))  # type: ignore[arg-type]

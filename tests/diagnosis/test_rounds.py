@@ -401,15 +401,20 @@ def test_a_law_that_leaves_less_and_is_too_uneven_settles_before_another_is_beli
     """What passes beside it follows what it does: believed is the one that leaves least, or none."""
     tried, scene, found = screened(cable)
     best, other = (passed(cable, tried, scene, found, law) for law in ("ground_cable", "harness"))
-    uneven = replace(best, gate=replace(best.gate, sigmas=5.0).but("its coefficients are 5.0 sigma off zero"))
+    scattered = replace(best.gate, sigmas=5.0, scattered=True).but("its coefficients are 5.0 sigma off zero")
+    uneven = replace(best, gate=scattered)
     worse = replace(best, gate=best.gate.but("r2 predicted worse"))
     assert best.gate.passed and uneven.gate.uneven and not worse.gate.uneven and not best.gate.uneven
     assert rounds.beaten([other], [uneven]) is uneven
     assert rounds.beaten([other], [worse]) is None
     assert rounds.beaten([best], [replace(other, gate=uneven.gate)]) is None
-    monkeypatch.setattr(
-        rounds, "_settled", lambda one, *_: best if stands or one is other else replace(one, gate=uneven.gate)
-    )
+    settled: list[str] = []
+
+    def settle(one: Tried, *_: object) -> Tried:
+        settled.append(rounds._law(one).law)
+        return best if stands else replace(one, gate=uneven.gate)
+
+    monkeypatch.setattr(rounds, "_settled", settle)
     monkeypatch.setattr(rounds, "_stands_in", lambda *_: ())
     view = SimpleNamespace(scene=scene, bench=tried, screening=found)
     floor, simulate = declared(cable.known.experiment), bench.serial(cable.known.experiment)
@@ -418,5 +423,14 @@ def test_a_law_that_leaves_less_and_is_too_uneven_settles_before_another_is_beli
     told = rounds._accepted([other], view, cable, None, floor, simulate, [], noted)
     assert (told is not None) == stands
     assert told is None or told.find.identity.law == "ground_cable"
-    refused = [(one.identity.law, *one.reasons[-1:]) for one in noted.refused[1:]]
-    assert refused == ([] if stands else [("harness", "ground_cable leaves less")])
+    assert settled == ["ground_cable"]
+    refused = [(one.identity.law, one.reasons[-1]) for one in noted.refused]
+    fell = [("ground_cable", "nor with all numbers settled"), ("harness", "ground_cable leaves less")]
+    assert refused == ([] if stands else fell)
+    assert rounds.beaten([other], noted.fallen) is None
+    if stands:
+        # What stands in for something else is not made good by what follows it.
+        noted.fell(uneven)
+        monkeypatch.setattr(rounds, "_stands_in", lambda *_: ("falls",))
+        assert rounds._accepted([other], view, cable, None, floor, simulate, [], noted) is None
+        assert settled == ["ground_cable"] * 2

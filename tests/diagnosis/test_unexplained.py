@@ -1,4 +1,4 @@
-"""What is left, as requirements count it: statistic, band, frame, and what repeats do not share."""
+"""What is left, as requirements count it: statistic, band, frame, and which recordings."""
 
 from __future__ import annotations
 
@@ -59,15 +59,27 @@ def test_a_wave_in_the_band_counts_by_its_peak_and_its_rms(made: Experiment) -> 
     assert (peak.channel, peak.recording) == ("Ty", "r0") and peak.share == pytest.approx(0.2, rel=0.05)
 
 
-def test_what_is_out_of_the_band_or_not_shared_by_repeats_does_not_count(made: Experiment) -> None:
+def test_the_worst_recording_counts_and_what_is_out_of_the_band_does_not(made: Experiment) -> None:
     campaign = replace(load_campaign(bench.CAMPAIGN, recordings=False), requirements=(PEAK,))
     nothing = left_behind(made, *[wave(0.2, 0.0, 4, made)] * 2)
-    fast = left_behind(made, *[wave(6.0, 0.02, 4, made)] * 2)
-    (one,) = unexplained(campaign, nothing, fast)
+    (one,) = unexplained(campaign, nothing, left_behind(made, *[wave(6.0, 0.02, 4, made)] * 2))
     assert one.corrected < 1e-4
-    opposed = left_behind(made, wave(0.2, 0.02, 4, made), wave(0.2, -0.02, 4, made))
+    opposed = left_behind(made, wave(0.2, 0.01, 4, made), wave(0.2, -0.02, 4, made))
     (one,) = unexplained(campaign, nothing, opposed)
-    assert one.corrected < 1e-12
+    assert one.corrected == pytest.approx(0.02, rel=0.05) and one.recording == "r1"
+
+
+def test_calibrations_and_what_was_not_recorded_are_judged_by_none(made: Experiment) -> None:
+    campaign = load_campaign(bench.CAMPAIGN, recordings=False)
+    strange = replace(PEAK, name="forces of a joint", frame="nowhere")
+    campaign = replace(campaign, requirements=(strange, PEAK))
+    nothing = left_behind(made, *[wave(0.2, 0.0, 4, made)] * 2)
+    loud = left_behind(made, wave(0.2, 0.02, 4, made), wave(0.2, 0.0, 4, made))
+    experiment = loud.known.experiment
+    trials = (replace(experiment.trials[0], role="calibration"), *experiment.trials[1:])
+    loud = replace(loud, known=replace(loud.known, experiment=replace(experiment, trials=trials)))
+    (one,) = unexplained(campaign, nothing, loud)
+    assert one.name == PEAK.name and one.corrected < 1e-9
 
 
 def test_a_force_is_a_torque_at_the_spacecraft(made: Experiment) -> None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from kbs_process.campaign.diagnosis_terms import place_of, rms
 from kbs_process.diagnosis.detection import Detection
 from kbs_process.diagnosis.floor import Floor
@@ -22,8 +24,8 @@ _WORDS = {
     "undecided": "There is a mismatch, and no law passed the gate.{near}",
 }
 _FAINT = (
-    "Something exceeds {floor}, beyond chance, {where}but all together by {share:.2g} % of its power: minima of the "
-    "known parameters differ by as much, and no law can be told from that.{near}"
+    "Something seems to exceed {floor}, {where}all together by {share:.2g} % of its power: too little to tell what it "
+    "is.{moved}{near}"
 )
 MATTERS = 0.1  # of a limit: in a sum of squares a tenth is a half percent
 
@@ -38,7 +40,7 @@ def _loudest(left: Detection) -> str:
 
 def _nearest(outcome: Outcome) -> str:
     """The law that came nearest to be one: of those that were refused in the plant the one that leaves least."""
-    simulated = [one for one in outcome.refused if one.left is not None]
+    simulated = [one for one in outcome.refused if one.left is not None and np.isfinite(one.left)]
     if not simulated:
         return ""
     near = min(simulated, key=lambda one: (one.left, one.identity.law))
@@ -96,7 +98,7 @@ def _matters(outcome: Outcome, requirements: Sequence[records.Unexplained]) -> s
     worst = max(requirements, key=lambda one: one.share)
     little = ": too little to matter for it" if worst.share < MATTERS else ""
     return (
-        f" What is left reaches at most {worst.corrected:.2g} {worst.unit} ({worst.statistic}, {worst.channel}), "
+        f" What is left reaches {worst.corrected:.2g} {worst.unit} ({worst.statistic}, {worst.channel}), "
         f"{100.0 * worst.share:.3g} % of the limit of '{worst.name}'{little}."
     )
 
@@ -105,8 +107,9 @@ def _unnamed(outcome: Outcome, trials: Sequence[records.Trial], floor: Floor) ->
     """The answer where there is no find."""
     if outcome.after.faint and not outcome.unforeseen:
         share = 100.0 * max(outcome.after.ratio - 1.0, 0.0)
+        moved = " Known parameters are off, too." if outcome.moved else ""
         where, near = _loudest(outcome.after), _nearest(outcome)
-        return _FAINT.format(floor=_FLOOR[floor.source], where=where, share=share, near=near)
+        return _FAINT.format(floor=_FLOOR[floor.source], where=where, share=share, moved=moved, near=near)
     if not outcome.unforeseen:
         return _WORDS[outcome.verdict].format(floor=_FLOOR[floor.source], near=_nearest(outcome))
     worst = max((trial for trial in trials if trial.role == "held-out"), key=lambda trial: trial.corrected)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from kbs_process.campaign.config import Campaign, Requirement
 from kbs_process.campaign.judging import band_of
 from kbs_process.campaign.measurable import judged_channels
 from kbs_process.diagnosis.joint import Standing
+from kbs_process.errors import ConfigError
 from kbs_process.report.records import diagnosis as records
 from kbs_process.signals.records import WRENCH_CHANNELS, Array, Mask, Signal
 from kbs_process.stages import bandpass
@@ -19,12 +20,16 @@ from kbs_process.stages.verdict import Extreme, extremes
 
 
 def unexplained(campaign: Campaign, known: Standing, corrected: Standing) -> Iterator[records.Unexplained]:
-    """Each requirement's statistic of what is left of a trajectory's mean, at its worst channel and trajectory.
+    """Each requirement's statistic of what is left, noise included, at its worst channel and recording.
 
-    Noise is in it, less by the root of the number of repeats: no effect that was left out does more than this.
+    Calibrations are judged by none. Of a requirement on what was not recorded nothing is said.
     """
     for requirement in campaign.requirements:
-        worst, before = (_worst(campaign, requirement, one) for one in (corrected, known))
+        try:
+            channels = judged_channels(requirement, campaign.rig)
+        except ConfigError:
+            continue
+        worst, before = (_worst(campaign, requirement, channels, one) for one in (corrected, known))
         if worst is not None and before is not None:
             yield records.Unexplained(
                 name=requirement.name,
@@ -39,31 +44,31 @@ def unexplained(campaign: Campaign, known: Standing, corrected: Standing) -> Ite
             )
 
 
-def _worst(campaign: Campaign, requirement: Requirement, standing: Standing) -> Extreme | None:
+def _worst(
+    campaign: Campaign, requirement: Requirement, channels: Sequence[str], standing: Standing
+) -> Extreme | None:
     """The greatest statistic of measured less predicted; None where no sample of the band is known."""
     experiment = standing.known.experiment
     band = band_of(requirement, bands_of(campaign.bands))
     left = []
-    for members in experiment.repeats:
-        trials = [experiment.trials[k] for k in members]
-        valid = np.logical_and.reduce([trial.valid for trial in trials])
-        mean = np.mean([experiment.trials[k].measured - standing.shown(k) for k in members], axis=0)
+    for k, trial in enumerate(experiment.trials):
+        if trial.role == "calibration":
+            continue
         signal = Signal(
             t0=0.0,
             dt=experiment.dt,
-            values=_level(mean[:, : experiment.loads], valid),
+            values=_level((trial.measured - standing.shown(k))[:, : experiment.loads], trial.valid),
             channels=experiment.channels[: experiment.loads],
             units=experiment.units[: experiment.loads],
             frame=campaign.rig.frame,
-            valid=valid,
+            valid=trial.valid,
         )
         cut = bandpass.apply(signal, band)
         if requirement.frame != signal.frame:
-            assert campaign.rig.spacecraft is not None  # asked before recordings are read
+            assert campaign.rig.spacecraft is not None  # it has channels there
             cut = to_spacecraft(select(cut, WRENCH_CHANNELS), campaign.rig.spacecraft)
-        left.append((trials[0].name, cut))
-    found = extremes(left, judged_channels(requirement, campaign.rig), requirement.statistic)
-    return max(found, key=lambda one: one.value, default=None)
+        left.append((trial.name, cut))
+    return max(extremes(left, channels, requirement.statistic), key=lambda one: one.value, default=None)
 
 
 def _level(values: Array, valid: Mask) -> Array:

@@ -57,11 +57,14 @@ class Gate:
     sigmas: float
     whiteness: tuple[float, float]  # before and after, see `whiteness`
     reasons: tuple[str, ...]  # of a refusal
+    scattered: bool = (
+        False  # whether its coefficients are near zero by the scatter of parts, and not by the noise
+    )
 
     @property
     def uneven(self) -> bool:
-        """Whether all that speaks against it is how near zero its coefficients are, as parts differ by much."""
-        return len(self.reasons) == 1 and not self.sigmas >= GATE_SIGMA
+        """Whether all that speaks against it is how much parts of the recordings differ in what they ask for."""
+        return self.scattered and len(self.reasons) == 1
 
     def but(self, *reasons: str) -> Gate:
         """The same with more reasons to refuse; passed still, where there are none."""
@@ -80,16 +83,16 @@ def gate(
     """Judge the numbers `coefficients` of `after`, the amplitudes of a law that `before` is without.
 
     Its `shapes` count as they are: what makes up for an amplitude, as the lever of a force does, says nothing against
-    it, and a law of no amplitude has none. By `least` sigmas amplitudes have to be off zero, or by a few where recordings
-    of another motion ask for their size. Held-out trials in which it does nothing (`blind`, asked where they would
-    refuse it) are no witnesses.
+    it, and a law of no amplitude has none. By `least` sigmas amplitudes have to be off zero, or by a few where
+    recordings of another motion ask for their size. Held-out trials in which it does nothing (`blind`, asked where
+    they would decide) are no witnesses.
     """
     experiment = after.experiment
     held_out = bool(experiment.held_out)
     folds = _held_out(before, after) if held_out else _left_out(before, after)
     index = np.asarray(coefficients)
     held = _beside(after.covariance, np.asarray(shapes, dtype=np.intp))
-    sigmas = _sigmas(after.value[index], held[np.ix_(index, index)])
+    by_noise = sigmas = _sigmas(after.value[index], held[np.ix_(index, index)])
     if np.isfinite(sigmas):
         even = _evenly(after, held, index)
         sigmas = float(np.minimum(sigmas, as_one(max(even, 0.0) ** 2, len(index))))
@@ -109,30 +112,34 @@ def gate(
         gained >= GATE_SHARE * _promised(before, after) or foretold(gained, _changed(before, after))
     ):
         reasons.append("recordings that were not used gain much less than those that it was fitted to")
-    if not (sigmas >= least or (sigmas >= GATE_FEW and _elsewhere(before, after))):
+    near_zero = not (sigmas >= least or (sigmas >= GATE_FEW and _elsewhere(before, after, blind)))
+    if near_zero:
         size = f"{sigmas:.1f} sigma off zero" if np.isfinite(sigmas) else "not determined"
         reasons.append(f"its coefficients are {size}")
     # In units of the floor: what is left has more of a colour, the less that is.
     if not white[1] * after.level <= white[0] * before.level + _spread(after):
         reasons.append("the residual's power is less even with it")
-    return Gate(not reasons, folds, held_out, sigmas, white, tuple(reasons))
+    scattered = near_zero and by_noise >= least
+    return Gate(not reasons, folds, held_out, sigmas, white, tuple(reasons), scattered)
 
 
-def _elsewhere(before: Known, after: Known) -> bool:
+def _elsewhere(before: Known, after: Known, blind: Callable[[], Collection[int]]) -> bool:
     """Whether a law that leaves nothing is of the size that recordings ask for which nothing was fitted to.
 
-    All of these that show it gain half at least of the square of what it changes, one of another motion among them:
-    where one window alone shows most of a law, windows that were fitted cannot tell its size from each other.
+    All of these that show it gain half at least of the square of what changes in them, one of another motion among
+    them: where one window alone shows most of a law, windows that were fitted cannot tell its size from each other.
+    What changes in those to which it is `blind` is other numbers' doing.
     """
     experiment = after.experiment
     if after.excess > TOLERATED * after.fit_rows:
         return False
     changes = {k: float(np.sum((before.residual[k] - after.residual[k]) ** 2)) for k in experiment.held_out}
     shown = [k for k, change in changes.items() if change >= SHOWN]
+    if not all(before.chi2[k] - after.chi2[k] >= GATE_FORETOLD * changes[k] for k in shown):
+        return False
     fitted = {experiment.trials[k].trajectory for k in experiment.fit}
-    return any(experiment.trials[k].trajectory not in fitted for k in shown) and all(
-        before.chi2[k] - after.chi2[k] >= GATE_FORETOLD * changes[k] for k in shown
-    )
+    other = [k for k in shown if experiment.trials[k].trajectory not in fitted]
+    return bool(other) and not set(other) <= set(blind())
 
 
 def worsened(folds: Sequence[Fold]) -> list[str]:

@@ -33,6 +33,7 @@ from kbs_process.diagnosis.scene import Scene
 from kbs_process.diagnosis.screen import Found, Screening
 from kbs_process.diagnosis.settling import bent, drawn_back, released, resettled
 from kbs_process.diagnosis.shapes import bettered
+from kbs_process.diagnosis.sizes import of_mounting
 from kbs_process.diagnosis.supposed import Noted, enough, supposed, wanting
 from kbs_process.diagnosis.thresholds import (
     LEAST_RHO,
@@ -146,14 +147,13 @@ def _diagnosed(
         held_out = unseen, unseen if same else detected(standing, floor, known.experiment.held_out)
     told = replace(standing, known=replace(standing.known, covariance=scattered(standing.known)))
     finds = [as_it_stands(one.find, one.tried.own, told.known) for one in kept]
-    much = after.much or (held_out is not None and held_out[1].much)
-    return Outcome(
+    outcome = Outcome(
         before=before,
         after=after,
         held_out=held_out,
         log_p=_mismatch(before, rounds[0].screening, kept),
         moved=_moved(told.known),
-        finds=trusted(merged(finds), TRUST_PART if much else TRUST),
+        finds=merged(finds),
         refused=(*fallen, *next((one.noted.refused for one in reversed(rounds) if one.noted.refused), ())),
         absorbed=_absorbed(last.screening),
         place=rounds[0].place,
@@ -161,6 +161,7 @@ def _diagnosed(
         known=known,
         standing=told,
     )
+    return replace(outcome, finds=trusted(outcome.finds, TRUST_PART if outcome.much else TRUST))
 
 
 def _goes_on(standing: Standing, floor: Floor) -> bool:
@@ -250,18 +251,19 @@ def _accepted(
     passed = continued(named_first(passed), [one.find.identity for one in accepted])
     if (beyond := beaten(passed, noted.fallen)) is not None:
         # What is missing elsewhere, or numbers that have yet to settle, speaks against it; the others are farther off.
-        told = _settled(beyond, standing, floor, simulate)
-        if not told.gate.passed:
-            noted.fell(
-                *(replace(one, gate=one.gate.but(f"{_law(beyond).law} leaves less")) for one in passed)
-            )
+        noted.forget(beyond)
+        beyond = _settled(beyond, standing, floor, simulate)
+        if not beyond.gate.passed:
+            follows = f"{_law(beyond).law} leaves less"
+            noted.fell(replace(beyond, gate=beyond.gate.but("nor with all numbers settled")))
+            noted.fell(*(replace(one, gate=one.gate.but(follows)) for one in passed))
             return None
-        passed = [told, *passed]
+        passed = [beyond, *passed]
     fitted = [_each_time(one) for one in passed]
     chances = probabilities([one.standing.known for one in passed], view.bench.background.rows, fitted)
     order = [int(k) for k in np.argsort(-chances, kind="stable")]
-    for number, best in enumerate(order[:SETTLED]):
-        told = _settled(passed[best], standing, floor, simulate)
+    for number, best in enumerate(order[: SETTLED if beyond is None else 1]):
+        told = passed[best] if passed[best] is beyond else _settled(passed[best], standing, floor, simulate)
         if reasons := told.gate.reasons or _stands_in(told, standing, floor, simulate, accepted):
             noted.fell(replace(told, gate=told.gate.but(*reasons)) if told.gate.passed else told)
             continue
@@ -406,7 +408,7 @@ def _passed(
     first, others = leaders(
         view, lambda found: (own or not found.suspect.each_trial) and not in_the_shade(found, accepted)
     )
-    if first and least > 0.0 and PROMISED * max(found.score.gain for found in first) < least:
+    if least > 0.0 and _hopeless(first, least):
         noted.refuse(first[0], "the best beside it would leave far too much")
         return
     for chosen in (first, *([found] for found in others)):
@@ -424,6 +426,12 @@ def _passed(
         noted.fell(*less)
         if more:
             yield more
+
+
+def _hopeless(first: Sequence[Found], least: float) -> bool:
+    """Whether the best of some leaders would gain far less than `least`; of a mounting's law no first order tells."""
+    most = max((found.score.gain for found in first), default=0.0)
+    return PROMISED * most < least and not any(of_mounting(found) for found in first)
 
 
 def _place(standing: Standing, floor: Floor, scene: Scene) -> Place | None:

@@ -19,7 +19,8 @@ from kbs_process.diagnosis.tryout import inserted
 from kbs_process.plant.effect import Port
 from kbs_process.signals.records import Array
 
-# Of the moment that vibrates: what the law makes of the present vibration, rms over rms.
+# Of what the moment about an axis varies by, the weight's along the pose included: what the law makes of the present
+# motion, rms over rms.
 _TRIED = (0.01, 0.03, 0.1, 0.3, 1.0)
 
 
@@ -36,6 +37,8 @@ def sized(bench: Bench, found: Found, among: Sequence[Suspect], simulate: Simula
     family = found.suspect.family
     grid = [one for one in among if isinstance(one, Catalogued) and one.family == family]
     tried = [(one, amplitudes) for one in grid for amplitudes in _amplitudes(bench, one)]
+    if not tried:
+        return found
     present = bench.scene.hypothesis
     models = [
         inserted(one.candidate, dict(zip(one.amplitudes, map(float, a), strict=True)), present)

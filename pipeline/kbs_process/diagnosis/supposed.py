@@ -37,6 +37,12 @@ class Noted:
             )
             self.fallen.append(one)
 
+    def forget(self, tried: Tried) -> None:
+        """Take out a law that is judged again."""
+        self.fallen.remove(tried)
+        own = identity(tried.found.suspect)
+        self.refused = [one for one in self.refused if one.identity != own]
+
     @property
     def identities(self) -> list[Identity]:
         return [one.identity for one in self.refused]

@@ -46,7 +46,8 @@ UNFORESEEN: Final = 0.5
 # P-value below which less than TOLERATED is there all the same, too little to tell what it is: two of 42 nulls were
 # below, and five of seven effects that were called none.
 FAINT: Final = 1e-6
-# Chance that a find is where the effect is, by those shares, where much is left beside it and where not.
+# Chance that a find is at the right place, by those shares, where much is left beside it and where not; a law's is that
+# times its odds.
 TRUST_PART: Final = 0.4
 TRUST: Final = 0.8
 ORDERED: Final = 0.5  # share of the residual's excess that the best has to do for the screen's order to count
@@ -97,8 +98,8 @@ GATE_SHARE: Final = 0.2
 GATE_FORETOLD: Final = 0.5
 # Of what all gain together: by that one that shows little of a law may be worse, for its formula is not nature's.
 GATE_WORSE: Final = 0.02
-# Sigmas by the scatter of parts from which on a law is none that minima of phases and tooth contact differ by, however
-# little it takes. A lag of a channel had 22 with 0.028 of the floor's power (by other hands).
+# Sigmas by the scatter of parts from which on a law is none that minima of phases and tooth contact differ by, though
+# it takes less than TOLERATED. A lag of a channel had 22 with 0.028 of the floor's power (by other hands).
 EVERYWHERE: Final = 2.0 * GATE_SIGMA
 FIRST: Final = 3  # steps of a leader's refit that show whether it is worth the others
 # After one step they go on to these only if it leaves no more than this many times what the best one's leaves: far more
@@ -109,7 +110,8 @@ SHAPED: Final = 10
 # Times what it does at the best place of its grid that a law does between places: 1 to 2 on five
 # screens, one of a spent trial; up to 3.8 where it did little.
 BENT: Final = 2.0
-# Times what it does to first order that a law may do in the plant, beside numbers that another pulled: the same.
+# Times what it does to first order that a law may do in the plant, beside numbers that another pulled: as many as
+# above, where it did little.
 PROMISED: Final = 4.0
 # Times that a law of readings is told anew at most, each time around the shape that it had.
 REREAD: Final = 2

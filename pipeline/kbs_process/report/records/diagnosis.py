@@ -110,7 +110,7 @@ class Trial(Record, frozen=True, kw_only=True):
 
 
 class Unexplained(Record, frozen=True, kw_only=True):
-    """What is left, as a requirement counts it: its statistic of what repeats share, at worst, noise included."""
+    """What is left, as a requirement counts it: its statistic at worst, noise included."""
 
     name: str
     statistic: Literal["peak", "rms"]
@@ -120,7 +120,7 @@ class Unexplained(Record, frozen=True, kw_only=True):
     known: float  # known parameters refitted
     corrected: float  # with everything that was found
     channel: str  # of `corrected`, and
-    recording: str  # first of the trajectory
+    recording: str
 
     @property
     def share(self) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from kbs_process.report.figures import diagnosis as figures
 from kbs_process.report.panel import Block, Caption, Cell, Figure, Grid, Notices, Panel, Text
-from kbs_process.report.records.diagnosis import DiagnosisResults, Find, Place, Trial, Unexplained
+from kbs_process.report.records.diagnosis import Answer, DiagnosisResults, Find, Place, Trial, Unexplained
 from kbs_process.report.tables import Tables
 from kbs_process.report.text import MISSING, chance, number, percent
 
@@ -34,7 +34,7 @@ def panel(results: DiagnosisResults, tables: Tables) -> Panel:
             )
         )
     if results.finds:
-        blocks.append(_finds(results.finds))
+        blocks.append(_finds(results.finds, results.answer))
     blocks.append(Figure("Residual over the floor", (figures.trials(results.trials),), _TRIALS))
     blocks.append(_trials(results.trials))
     if results.requirements:
@@ -52,7 +52,7 @@ def panel(results: DiagnosisResults, tables: Tables) -> Panel:
     return Panel("answer", "Answer", "Is there a mismatch, and what was left out?", tuple(blocks))
 
 
-def _finds(finds: tuple[Find, ...]) -> Grid:
+def _finds(finds: tuple[Find, ...], answer: Answer) -> Grid:
     rows = tuple(
         (
             find.name,
@@ -74,7 +74,8 @@ def _finds(finds: tuple[Find, ...]) -> Grid:
         "Distance / sigma",
         "Of the held-out excess",
     )
-    return Grid("Physics that was left out", head, rows, "klllrrr")
+    title = "Nearest to what was left out" if answer == "undecided" else "Physics that was left out"
+    return Grid(title, head, rows, "klllrrr")
 
 
 def _trials(trials: tuple[Trial, ...]) -> Grid:
