@@ -243,7 +243,7 @@ def test_a_find_is_as_sure_as_such_finds_were(outcome: Outcome, share: float) ->
         (1.0, 1.6, False, False, "undecided"),
         (1.1, 1.0, False, True, "undecided"),
         (1.02, 1.0, False, True, "undecided"),
-        (0.9, 0.9, False, False, "undecided"),  # a line below which the floor was too high
+        (0.9, 0.9, False, False, "none"),  # less than the floor has, all together
     ],
 )
 def test_what_is_left_decides_what_is_said(

@@ -106,7 +106,7 @@ def _matters(outcome: Outcome, requirements: Sequence[records.Unexplained]) -> s
 def _unnamed(outcome: Outcome, trials: Sequence[records.Trial], floor: Floor) -> str:
     """The answer where there is no find."""
     if outcome.after.faint and not outcome.unforeseen:
-        share = 100.0 * max(outcome.after.ratio - 1.0, 0.0)
+        share = 100.0 * (outcome.after.ratio - 1.0)
         moved = " Known parameters are off, too." if outcome.moved else ""
         where, near = _loudest(outcome.after), _nearest(outcome)
         return _FAINT.format(floor=_FLOOR[floor.source], where=where, share=share, moved=moved, near=near)

@@ -67,7 +67,7 @@ class Detection:
     @property
     def faint(self) -> bool:
         """Whether there is something beyond chance, and less of it than floor and search are good for."""
-        return bool(self.log_p < np.log(FAINT) and self.ratio <= 1.0 + TOLERATED)
+        return bool(self.log_p < np.log(FAINT) and 1.0 < self.ratio <= 1.0 + TOLERATED)
 
     @property
     def rows(self) -> dict[int, float]:
