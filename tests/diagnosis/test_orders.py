@@ -77,6 +77,19 @@ def test_a_tone_has_harmonics_up_to_what_is_looked_at(view: View) -> None:
     assert _others(view, Catalogued(tone, view.scene)) == []
 
 
+def test_what_comes_again_after_some_cycles_has_all_harmonics_of_that(view: View) -> None:
+    """One cycle in 23 that comes late has lines at all of these, and the strongest may be the fifth."""
+    law, controller = find("controller_jitter"), view.standing.known.experiment.rig.controller
+    assert law is not None and controller is not None
+    first = 1.0 / (23.0 * float(controller.cycle))
+    own = Catalogued(Candidate(law, "el", (("jitter_frequency", 5.0 * first),)), view.scene)
+    found = _others(replace(view, suspects=(own,)), own)
+    highest = view.standing.known.experiment.highest_Hz
+    wanted = [k * first for k in range(1, 24) if k != 5 and k * first <= highest]
+    assert len(wanted) > 3
+    assert all(min(abs(one - value) for one in found) < 1e-9 for value in wanted)
+
+
 def orders_of(found: Found) -> list[float]:
     assert isinstance(found.suspect, Catalogued)
     return sorted(value for action in found.suspect.candidate.actions for _, value in action.shape)

@@ -36,6 +36,7 @@ from kbs_process.diagnosis.thresholds import (
     LEADERS,
     MISTIMED,
     MOST,
+    PROMISED,
     REREAD,
     SECOND,
     SHAPED,
@@ -92,9 +93,10 @@ def _mistimed(found: Found, most: float) -> bool:
 
 
 def _covered(view: View, among: Callable[[Found], bool]) -> list[Found]:
-    """Forces of the laboratory that known numbers take up wherever they were tried, and that do more than any able one.
+    """Forces of the laboratory that known numbers take up wherever they were tried, and that may do most of all.
 
-    They are looked at where such a force does much of what there is to do.
+    They are looked at where such a force does much of what there is to do. Beside known numbers that were pulled, one
+    does far more in the plant than to first order.
     """
     most = max(found.score.gain for found in view.able)
     if not any(_pulls(found) and found.score.gain >= MOST * most for found in view.able):
@@ -104,7 +106,8 @@ def _covered(view: View, among: Callable[[Found], bool]) -> list[Found]:
         for found in view.screening.candidates
         if _anywhere(found) and found.score.rank == 0 and among(found)
     ]
-    return [one for one in hidden if one.score.gain > most]
+    least = most / PROMISED if view.standing.known.gross else most
+    return [one for one in hidden if one.score.gain > least]
 
 
 def _pulls(found: Found) -> bool:

@@ -7,18 +7,20 @@ best, and harmonics of it: that one next which, all amplitudes fitted anew, gain
 from __future__ import annotations
 
 from dataclasses import replace
+from fractions import Fraction
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kbs_process.diagnosis.gls import Score, Sums, score
+from kbs_process.diagnosis.proposals import LONGEST_BEAT
 from kbs_process.diagnosis.ranges import SPECTRUM
 from kbs_process.diagnosis.screen import Bench, Catalogued, Found
 from kbs_process.diagnosis.suspects import Candidate, free_actions
 from kbs_process.diagnosis.tails import log_tail
 from kbs_process.diagnosis.thresholds import FALSE_ALARM, ITS_OWN, LEAST_RHO, ORDERS_SHARE
 from kbs_process.diagnosis.view import View
-from kbs_process.plant.effect import Effect
+from kbs_process.plant.effect import Effect, Port
 from kbs_process.plant.effects import find
 from kbs_process.signals.records import Array
 
@@ -64,12 +66,27 @@ def _others(view: View, suspect: Catalogued) -> list[float]:
     ]
     own = _orders(suspect)
     tones = any(entry.over == SPECTRUM for entry in suspect.candidate.effect.parameters)
-    series = [(order / part, part) for order in own for part in _PARTS if tones or order >= part]
+    series = [
+        (order / part, part)
+        for order in own
+        for part in _parts(view, suspect, order)
+        if tones or order >= part
+    ]
     highest = view.standing.known.experiment.highest_Hz if tones else max([*tried, *own], default=0.0)
     harmonics = [
         k * first for first, part in series for k in range(1, part * _HARMONICS + 1) if k * first <= highest
     ]
     return [value for value in dict.fromkeys([*tried, *harmonics]) if value not in own]
+
+
+def _parts(view: View, suspect: Catalogued, order: float) -> tuple[int, ...]:
+    """Which of a series an order may be: of cycles of a controller, after which all comes again, the one that it is."""
+    controller = view.standing.known.experiment.rig.controller
+    if suspect.candidate.port is not Port.FIELD or controller is None:
+        return _PARTS
+    return tuple(
+        {*_PARTS, Fraction(order * float(controller.cycle)).limit_denominator(LONGEST_BEAT).numerator} - {0}
+    )
 
 
 def _orders(suspect: Catalogued) -> list[float]:

@@ -30,7 +30,7 @@ _BY_ORDER = ("order", "ripple_order", "kinematic_order")
 _NEAR_WHOLE = 0.02  # of a number of periods in an electrical cycle
 _OF_ITS_SHAPE = 8.0  # periods in a disc's turn: more of them are lines of its grating, read between
 _BETWEEN = 33  # frequencies in two bins
-_LONGEST_BEAT = 32  # cycles of a controller, after which what comes late comes late again
+LONGEST_BEAT = 32  # cycles of a controller, after which what comes late comes late again
 _BY_PLACE = ("local", "touch", "shift")  # with _angle and _width
 _PLACES = 400  # that a joint's range is divided into
 _WIDEST = 0.1  # of the range, of what has a place
@@ -109,7 +109,7 @@ def _beats(known: Known, lines: tuple[float, ...]) -> tuple[float, ...]:
     apart = 1.0 / (max(len(experiment.trials[k].valid) for k in experiment.fit) * experiment.dt)
     found = []
     for line in lines:
-        beats = [round(line * n * cycle) / (n * cycle) for n in range(1, _LONGEST_BEAT + 1)]
+        beats = [round(line * n * cycle) / (n * cycle) for n in range(1, LONGEST_BEAT + 1)]
         near = [beat for beat in beats if beat > 0.0 and abs(beat - line) < apart]
         found += [*near[:1], line]
     return tuple(dict.fromkeys(found))
