@@ -53,6 +53,19 @@ def test_a_law_that_is_right_gains_the_square_of_what_it_changes(
 
 
 @pytest.mark.parametrize(
+    ("gross", "left", "all_of_it"),
+    [
+        (True, 0.0, True),
+        (True, 0.1, False),
+        (False, 0.0, False),
+    ],  # minima of known numbers do differ by little
+)
+def test_a_law_may_leave_nothing_of_much(gross: bool, left: float, all_of_it: bool) -> None:
+    before, after = SimpleNamespace(gross=gross), SimpleNamespace(excess=left * 2000.0, fit_rows=2000)
+    assert gate._all_of_much(before, after) == all_of_it  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
     ("sizes", "motions", "left", "asked"),
     [
         ((1.0, 1.0), (0, 1), 0.0, True),

@@ -18,10 +18,10 @@ from kbs_process.diagnosis.hypothesis import Simulate
 from kbs_process.diagnosis.joint import Own, Standing, with_extra
 from kbs_process.diagnosis.leaders import gated, leaders, tried, various
 from kbs_process.diagnosis.race import Runner, raced
-from kbs_process.diagnosis.rounds import continued, named_first, unnamed
 from kbs_process.diagnosis.screen import Found
 from kbs_process.diagnosis.thresholds import FIRST, MOSTLY_DONE, TOLERATED, WAYS
 from kbs_process.diagnosis.tryout import extra_of, identity
+from kbs_process.diagnosis.verdict import continued, named_first, unnamed
 from kbs_process.diagnosis.view import View
 
 RIGHT, WRONG, CURVE = ("ground_cable", "el"), ("harness", "el"), ("ground_angle_law", "el")

@@ -10,7 +10,7 @@ import bench
 import numpy as np
 import pytest
 
-from kbs_process.diagnosis import rounds
+from kbs_process.diagnosis import rounds, verdict
 from kbs_process.diagnosis.as_suspect import sigma_of, suspect_of
 from kbs_process.diagnosis.experiment import Experiment
 from kbs_process.diagnosis.finding import Tried, as_it_stands, find_of
@@ -163,12 +163,12 @@ def test_a_law_is_judged_where_its_numbers_have_settled(made: Experiment, cable:
     assert begun.gate.passed
     known = after.known
     worse = replace(known, residual=tuple(5.0 * one for one in known.residual))
-    told = rounds._judged_again(
+    told = verdict._judged_again(
         replace(begun, standing=replace(after, known=worse)), cable, bench.serial(made)
     )
     assert not told.gate.passed and any("predicted worse" in reason for reason in told.gate.reasons)
     alone = replace(begun, own=Own((), ()))  # of what is each recording's own the verdict stays
-    assert rounds._judged_again(alone, cable, bench.serial(made)) is alone
+    assert verdict._judged_again(alone, cable, bench.serial(made)) is alone
 
 
 def test_a_law_of_the_readings_needs_no_plant_and_its_rival_is_told_apart(made: Experiment) -> None:
@@ -280,15 +280,15 @@ def test_the_second_law_that_passed_is_believed_where_the_first_falls(
     seen = SimpleNamespace(scene=scene, bench=tried, screening=found)
     monkeypatch.setattr(rounds.View, "of", lambda _: seen)
     monkeypatch.setattr(rounds, "_place", lambda *_: None)
-    monkeypatch.setattr(rounds, "named_first", list)
+    monkeypatch.setattr(verdict, "named_first", list)
     monkeypatch.setattr(rounds, "_passed", lambda *_: iter([[first, second]]))
-    monkeypatch.setattr(rounds, "_settled", lambda one, *_: replace(one, gate=replace(one.gate, reasons=())))
+    monkeypatch.setattr(verdict, "_settled", lambda one, *_: replace(one, gate=replace(one.gate, reasons=())))
     floor, simulate = declared(cable.known.experiment), bench.serial(cable.known.experiment)
     for fallen, kept in ((("harness",), "ground_cable"), (("ground_cable",), "harness")):
         monkeypatch.setattr(
-            rounds,
+            verdict,
             "_stands_in",
-            lambda told, *_, no=fallen: ("falls",) if rounds._law(told).law in no else (),
+            lambda told, *_, no=fallen: ("falls",) if verdict._law(told).law in no else (),
         )
         done = rounds._round(cable, cable, floor, simulate, [])
         assert done.accepted is not None and done.accepted.find.identity.law == kept
@@ -299,7 +299,7 @@ def test_the_second_law_that_passed_is_believed_where_the_first_falls(
     monkeypatch.setattr(rounds, "_passed", lambda *_: iter([[first], [second]]))
     done = rounds._round(cable, cable, floor, simulate, [])
     assert done.accepted is not None and done.accepted.find.identity.law == "harness"
-    monkeypatch.setattr(rounds, "_stands_in", lambda *_: ("falls",))
+    monkeypatch.setattr(verdict, "_stands_in", lambda *_: ("falls",))
     assert rounds._round(cable, cable, floor, simulate, []).accepted is None
 
 
@@ -405,32 +405,32 @@ def test_a_law_that_leaves_less_and_is_too_uneven_settles_before_another_is_beli
     uneven = replace(best, gate=scattered)
     worse = replace(best, gate=best.gate.but("r2 predicted worse"))
     assert best.gate.passed and uneven.gate.uneven and not worse.gate.uneven and not best.gate.uneven
-    assert rounds.beaten([other], [uneven]) is uneven
-    assert rounds.beaten([other], [worse]) is None
-    assert rounds.beaten([best], [replace(other, gate=uneven.gate)]) is None
+    assert verdict.beaten([other], [uneven]) is uneven
+    assert verdict.beaten([other], [worse]) is None
+    assert verdict.beaten([best], [replace(other, gate=uneven.gate)]) is None
     settled: list[str] = []
 
     def settle(one: Tried, *_: object) -> Tried:
-        settled.append(rounds._law(one).law)
+        settled.append(verdict._law(one).law)
         return best if stands else replace(one, gate=uneven.gate)
 
-    monkeypatch.setattr(rounds, "_settled", settle)
-    monkeypatch.setattr(rounds, "_stands_in", lambda *_: ())
+    monkeypatch.setattr(verdict, "_settled", settle)
+    monkeypatch.setattr(verdict, "_stands_in", lambda *_: ())
     view = SimpleNamespace(scene=scene, bench=tried, screening=found)
     floor, simulate = declared(cable.known.experiment), bench.serial(cable.known.experiment)
     noted = Noted()
     noted.fell(uneven)
-    told = rounds._accepted([other], view, cable, None, floor, simulate, [], noted)
+    told = verdict.believed([other], view, cable, None, floor, simulate, [], noted)
     assert (told is not None) == stands
     assert told is None or told.find.identity.law == "ground_cable"
     assert settled == ["ground_cable"]
     refused = [(one.identity.law, one.reasons[-1]) for one in noted.refused]
     fell = [("ground_cable", "nor with all numbers settled"), ("harness", "ground_cable leaves less")]
     assert refused == ([] if stands else fell)
-    assert rounds.beaten([other], noted.fallen) is None
+    assert verdict.beaten([other], noted.fallen) is None
     if stands:
         # What stands in for something else is not made good by what follows it.
         noted.fell(uneven)
-        monkeypatch.setattr(rounds, "_stands_in", lambda *_: ("falls",))
-        assert rounds._accepted([other], view, cable, None, floor, simulate, [], noted) is None
+        monkeypatch.setattr(verdict, "_stands_in", lambda *_: ("falls",))
+        assert verdict.believed([other], view, cable, None, floor, simulate, [], noted) is None
         assert settled == ["ground_cable"] * 2

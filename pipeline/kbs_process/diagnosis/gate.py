@@ -83,9 +83,9 @@ def gate(
     """Judge the numbers `coefficients` of `after`, the amplitudes of a law that `before` is without.
 
     Its `shapes` count as they are: what makes up for an amplitude, as the lever of a force does, says nothing against
-    it, and a law of no amplitude has none. By `least` sigmas amplitudes have to be off zero, or by a few where
-    recordings of another motion ask for their size. Held-out trials in which it does nothing (`blind`, asked where
-    they would decide) are no witnesses.
+    it, and a law of no amplitude has none. By `least` sigmas amplitudes have to be off zero, or by a few where the law
+    leaves nothing, and much was left before or recordings of another motion ask for its size. Held-out trials in which
+    it does nothing (`blind`, asked where they would decide) are no witnesses.
     """
     experiment = after.experiment
     held_out = bool(experiment.held_out)
@@ -112,7 +112,8 @@ def gate(
         gained >= GATE_SHARE * _promised(before, after) or foretold(gained, _changed(before, after))
     ):
         reasons.append("recordings that were not used gain much less than those that it was fitted to")
-    near_zero = not (sigmas >= least or (sigmas >= GATE_FEW and _elsewhere(before, after, blind)))
+    few = sigmas >= GATE_FEW and (_all_of_much(before, after) or _elsewhere(before, after, blind))
+    near_zero = not (sigmas >= least or few)
     if near_zero:
         size = f"{sigmas:.1f} sigma off zero" if np.isfinite(sigmas) else "not determined"
         reasons.append(f"its coefficients are {size}")
@@ -121,6 +122,11 @@ def gate(
         reasons.append("the residual's power is less even with it")
     scattered = near_zero and by_noise >= least
     return Gate(not reasons, folds, held_out, sigmas, white, tuple(reasons), scattered)
+
+
+def _all_of_much(before: Known, after: Known) -> bool:
+    """Whether a law leaves nothing of so much that known numbers had been pulled: no other minimum of theirs does."""
+    return before.gross and after.excess <= TOLERATED * after.fit_rows
 
 
 def _elsewhere(before: Known, after: Known, blind: Callable[[], Collection[int]]) -> bool:

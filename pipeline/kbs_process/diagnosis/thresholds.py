@@ -81,7 +81,8 @@ MOST: Final = 0.5
 # a longer search gains for the known numbers must not be taken for the law's.
 GATE_SIGMA: Final = 8.0
 # Likewise where all recordings that were not used, one of another motion among them, ask for the law's size: of a base
-# that stiffens one window had nearly all (development), so that parts gave 2.2.
+# that stiffens one window had nearly all (development), so that parts gave 2.2. Or where it leaves nothing of so much
+# that numbers had been pulled: of a harness beside a drag (development) two windows had nearly all, and parts gave 5.8.
 GATE_FEW: Final = 2.0
 SHOWN: Final = 100.0  # square of what a law changes in a recording, from which on it shows that
 # Likewise of a law that passed, when it is judged again beside those that were found later: what they make needless

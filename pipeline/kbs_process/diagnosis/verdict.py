@@ -1,0 +1,178 @@
+"""Which of some laws that passed the gate is believed: the likeliest that passes once more with all numbers settled."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from kbs_process.diagnosis.families import UNNAMED
+from kbs_process.diagnosis.finding import Tried, find_of
+from kbs_process.diagnosis.floor import Floor
+from kbs_process.diagnosis.hypothesis import Simulate
+from kbs_process.diagnosis.joint import Standing
+from kbs_process.diagnosis.leaders import gated, reread, tried
+from kbs_process.diagnosis.moments import only_while
+from kbs_process.diagnosis.needed import Accepted
+from kbs_process.diagnosis.outcome import Identity, Place
+from kbs_process.diagnosis.remains import too_little
+from kbs_process.diagnosis.rivals import probabilities
+from kbs_process.diagnosis.screen import Found
+from kbs_process.diagnosis.settling import released, resettled
+from kbs_process.diagnosis.shapes import bettered
+from kbs_process.diagnosis.supposed import Noted
+from kbs_process.diagnosis.thresholds import MOST, SECOND, SETTLED, TOLERATED
+from kbs_process.diagnosis.tryout import identity
+from kbs_process.diagnosis.view import View
+
+
+def believed(
+    passed: Sequence[Tried],
+    view: View,
+    standing: Standing,
+    place: Place | None,
+    floor: Floor,
+    simulate: Simulate,
+    accepted: Sequence[Accepted],
+    noted: Noted,
+) -> Accepted | None:
+    """The likeliest of some laws that passed which passes once more with all numbers settled beside it, if one does.
+
+    Beside the numbers that it was looked for from first; once all have settled, beside those that leave least.
+    """
+    if names := unnamed(passed, noted.identities, view):
+        more, less = tried(names, view, view.standing, floor, simulate)
+        passed = [*passed, *more]
+        noted.fell(*less)
+    passed = continued(named_first(passed), [one.find.identity for one in accepted])
+    if (beyond := beaten(passed, noted.fallen)) is not None:
+        # What is missing elsewhere, or numbers that have yet to settle, speaks against it; the others are farther off.
+        noted.forget(beyond)
+        beyond = _settled(beyond, standing, floor, simulate)
+        if not beyond.gate.passed:
+            follows = f"{_law(beyond).law} leaves less"
+            noted.fell(replace(beyond, gate=beyond.gate.but("nor with all numbers settled")))
+            noted.fell(*(replace(one, gate=one.gate.but(follows)) for one in passed))
+            return None
+        passed = [beyond, *passed]
+    fitted = [_each_time(one) for one in passed]
+    chances = probabilities([one.standing.known for one in passed], view.bench.background.rows, fitted)
+    order = [int(k) for k in np.argsort(-chances, kind="stable")]
+    for number, best in enumerate(order[: SETTLED if beyond is None else 1]):
+        told = passed[best] if passed[best] is beyond else _settled(passed[best], standing, floor, simulate)
+        if reasons := told.gate.reasons or _stands_in(told, standing, floor, simulate, accepted):
+            noted.fell(replace(told, gate=told.gate.but(*reasons)) if told.gate.passed else told)
+            continue
+        # Told anew, it may be what another was: their chances are one then.
+        others = [k for k in order[number + 1 :] if _law(passed[k]) != _law(told)]
+        chance = chances[others] / max(float(chances[order[number:]].sum()), np.finfo(np.float64).tiny)
+        find = find_of(
+            [told, *(passed[k] for k in others)], 0, np.array([1.0 - float(chance.sum()), *chance]), standing,
+            place, noted.identities,
+        )  # fmt: skip
+        return Accepted(told, find, standing)
+    return None
+
+
+def _settled(one: Tried, before: Standing, floor: Floor, simulate: Simulate) -> Tried:
+    """A law that passed, with all numbers settled beside it, told anew and judged again."""
+    settled = one.standing
+    if not one.leapt:
+        settled = resettled(settled, floor, simulate, leaps=1)
+    if settled.known.excess < MOST * before.known.excess:
+        settled = released(settled, floor, simulate)
+    return _judged_again(reread(replace(one, standing=settled), before, floor, simulate), before, simulate)
+
+
+def _stands_in(
+    told: Tried, standing: Standing, floor: Floor, simulate: Simulate, accepted: Sequence[Accepted]
+) -> tuple[str, ...]:
+    """Why a law that has settled stands in for something else, or for what an earlier one lacks; nothing, if not."""
+    earlier = [(one.find.identity.law, one.tried.own) for one in accepted if one.find.identity != _law(told)]
+    # One more action of a law at the same place is part of the find.
+    more = any(one.find.identity == _law(told) for one in accepted)
+    little = too_little(standing, told.standing, floor, sigmas=told.gate.sigmas, more=more)
+    return little or only_while(earlier, standing, told.standing.known, simulate)
+
+
+def _each_time(one: Tried) -> int:
+    """Numbers that a law brought which are each recording's own, and no free ones of the model."""
+    suspect, experiment = one.found.suspect, one.standing.known.experiment
+    if not suspect.each_trial:
+        return 0
+    trajectories = {experiment.trials[k].trajectory for k in experiment.fit}
+    return len(suspect.amplitudes) * len(experiment.fit) + (suspect.places > 1) * len(trajectories)
+
+
+def _judged_again(told: Tried, before: Standing, simulate: Simulate) -> Tried:
+    """A law with the gate's verdict on it where its numbers have settled."""
+    if not told.own.names:
+        return told
+    return replace(told, gate=gated(told.found, before, told.standing, told.own, simulate))
+
+
+def named_first(passed: Sequence[Tried]) -> list[Tried]:
+    """Laws without the curves that a law of the catalogue does as well as, at the same place.
+
+    A curve follows what a formula has differently from nature, too: as far as the plant is not exact, that is no reason
+    to leave a law without its name.
+    """
+    named = [one for one in passed if _law(one).family != UNNAMED]
+
+    def told(curve: Tried) -> bool:
+        where = _law(curve).port, _law(curve).axis
+        return any((_law(one).port, _law(one).axis) == where and _as_good(one, curve) for one in named)
+
+    return [one for one in passed if one in named or not told(one)]
+
+
+def unnamed(passed: Sequence[Tried], refused: Sequence[Identity], view: View) -> list[Found]:
+    """Laws of the catalogue to try at the place of a curve that leaves least, if the screen had others before them.
+
+    A curve takes the lead from the very law that it follows.
+    """
+    first = min(passed, key=lambda one: one.standing.known.cost)
+    if _law(first).family != UNNAMED:
+        return []
+    where, done = _law(first), {*map(_law, passed), *refused}
+    best: dict[Identity, Found] = {}
+    for found in view.able:
+        own = identity(found.suspect)
+        if own.family != UNNAMED and (own.port, own.axis) == (where.port, where.axis):
+            best.setdefault(own, found)
+    return [bettered(view.bench, found) for own, found in best.items() if own not in done][:SECOND]
+
+
+def continued(passed: Sequence[Tried], accepted: Sequence[Identity]) -> list[Tried]:
+    """Laws that were found already, if one more action of one does as well as the best; else all.
+
+    A ripple has more orders than were added at once, and what is left of it has the form of something else, too.
+    """
+    more = [one for one in passed if _law(one) in accepted and all(_as_good(one, other) for other in passed)]
+    return more or list(passed)
+
+
+def beaten(passed: Sequence[Tried], fallen: Sequence[Tried]) -> Tried | None:
+    """The law of the catalogue that leaves least, less than all that passed, of those that are but too uneven.
+
+    What passes beside it follows what it does.
+    """
+    uneven = [
+        one
+        for one in fallen
+        if one.gate.uneven
+        and _law(one).family != UNNAMED
+        and not any(_as_good(other, one) for other in passed)
+    ]
+    return min(uneven, key=lambda one: one.standing.known.cost, default=None)
+
+
+def _as_good(one: Tried, other: Tried) -> bool:
+    """Whether a law leaves no more than another, as far as the plant is exact."""
+    known = other.standing.known
+    return one.standing.known.cost <= known.cost + TOLERATED * known.fit_rows
+
+
+def _law(one: Tried) -> Identity:
+    return identity(one.found.suspect)
