@@ -47,9 +47,11 @@ def test_a_law_that_is_right_gains_the_square_of_what_it_changes(
     rng = np.random.default_rng(5)
     law = np.full(2000, 0.4) / noise
     left = rng.standard_normal(2000)
-    before, after = left + law, left + law - size * law
-    changed = float((size * law) @ (size * law))
-    assert foretold(float(before @ before - after @ after), changed) == enough
+    before, after = (
+        SimpleNamespace(experiment=SimpleNamespace(held_out=(0,)), residual=(z,), chi2=[float(z @ z)])
+        for z in (left + law, left + law - size * law)
+    )
+    assert foretold(before, after) == enough  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(

@@ -109,7 +109,7 @@ def gate(
     if not gained >= GATE_GAIN:
         reasons.append("recordings that were not used gain less than chance could give")
     elif held_out and not (
-        gained >= GATE_SHARE * _promised(before, after) or foretold(gained, _changed(before, after))
+        gained >= GATE_SHARE * _promised(before, after) or _as_foretold(gained, _changed(before, after))
     ):
         reasons.append("recordings that were not used gain much less than those that it was fitted to")
     few = sigmas >= GATE_FEW and (_all_of_much(before, after) or _elsewhere(before, after, blind))
@@ -217,7 +217,13 @@ def _changed(before: Known, after: Known) -> float:
     return sum(float(change @ change) for change in changes)
 
 
-def foretold(gained: float, changed: float) -> bool:
+def foretold(before: Known, after: Known) -> bool:
+    """Whether held-out recordings gain most of what a law that is right gains."""
+    gained = sum(float(before.chi2[k] - after.chi2[k]) for k in after.experiment.held_out)
+    return _as_foretold(gained, _changed(before, after))
+
+
+def _as_foretold(gained: float, changed: float) -> bool:
     """Whether recordings gain most of what a law that is right gains: the square of what it changes.
 
     Motions that excite a law little gain little by it, which is no reason to doubt it.

@@ -16,7 +16,7 @@ from kbs_process.diagnosis.each_recording import taken_off, taken_off_again
 from kbs_process.diagnosis.families import UNNAMED
 from kbs_process.diagnosis.finding import Tried, explained_share
 from kbs_process.diagnosis.floor import Floor
-from kbs_process.diagnosis.gate import Gate, gate
+from kbs_process.diagnosis.gate import Gate, foretold, gate
 from kbs_process.diagnosis.hypothesis import Simulate
 from kbs_process.diagnosis.joint import Own, Standing, bare, moved_on, with_extra
 from kbs_process.diagnosis.orders import with_orders
@@ -192,7 +192,7 @@ def gated(
     index = np.array(places)
     a, C = known.value[index], known.covariance[np.ix_(index, index)]
     if identity(found.suspect).family == UNNAMED:
-        if share is None and known.experiment.held_out:
+        if share is None and known.experiment.held_out and not foretold(before.known, known):
             verdict = verdict.but("recordings that were held out leave nothing that would show a curve")
         if share is not None and not share >= LAW_VARIANCE:
             verdict = verdict.but(
