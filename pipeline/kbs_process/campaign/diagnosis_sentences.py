@@ -60,10 +60,12 @@ def _where(place: records.Place) -> str:
 
 
 def _law_in_words(find: Find) -> str:
-    """A law with those that were simulated beside it and cannot be told from it, at the same place."""
+    """A law and its place, with those that were simulated beside it and cannot be told from it."""
     alike = [one.identity for one in find.alternatives if one.refitted and one.indistinguishable]
-    here = [one.law for one in alike if place_of(one) == place_of(find.identity)]
-    return " or ".join(_words(law) for law in (find.identity.law, *here))
+    laws: dict[str, list[str]] = {}
+    for one in (find.identity, *alike):
+        laws.setdefault(_where(place_of(one)), []).append(_words(one.law))
+    return ", or ".join(f"{' or '.join(names)} ({where})" for where, names in laws.items())
 
 
 def sentence(
@@ -75,7 +77,7 @@ def sentence(
     """The answer, in one sentence or a few."""
     if not outcome.finds:
         return _unnamed(outcome, trials, floor) + _located(outcome) + _matters(outcome, requirements)
-    told = [f"{_law_in_words(find)} ({_where(place_of(find.identity))})" for find in outcome.finds]
+    told = [_law_in_words(find) for find in outcome.finds]
     begin = "Nearest to what the model lacks, of the laws known" if outcome.much else "The model lacks"
     return f"{begin}: {'; '.join(told)}.{_reserve(outcome)}{_matters(outcome, requirements)}"
 

@@ -84,6 +84,7 @@ def find_of(
                 identity(found.suspect), 0.0, rho, float(chi2.sf(0.25 * rho**2, 1) / 2.0), rho < RIVALS, False
             )
         )
+    chance, alternatives = _evenly(chance, alternatives)
     alternatives.sort(key=lambda other: (-other.probability, other.rho_delta))
     alike: tuple[str, ...] = ()
     if place is not None:
@@ -105,6 +106,18 @@ def find_of(
         held_out_variance=explained_share(before.known, taken.standing.known),
         curve=_curve(suspect, taken, before) if own.family == UNNAMED else None,
     )
+
+
+def _evenly(chance: float, others: Sequence[Alternative]) -> tuple[float, list[Alternative]]:
+    """The chance of a law, and `others`, where laws of the catalogue that do the same in the plant are alike likely.
+
+    Schwarz's criterion would tell them apart by how many numbers they have: so it does for formulas that are nature's.
+    """
+    alike = [
+        one for one in others if one.refitted and one.indistinguishable and one.identity.family != UNNAMED
+    ]
+    even = (chance + sum(one.probability for one in alike)) / (1 + len(alike))
+    return even, [replace(one, probability=even) if one in alike else one for one in others]
 
 
 def _of_clock(suspect: Suspect) -> bool:
