@@ -13,10 +13,11 @@ from test_rounds import standing
 from kbs_process.campaign.commands import read_commands
 from kbs_process.campaign.corrected_diagnosis import write_corrected
 from kbs_process.campaign.diagnosis_files import write_diagnosis
+from kbs_process.campaign.diagnosis_sentences import _law_in_words
 from kbs_process.campaign.load import load_campaign
 from kbs_process.diagnosis.curves import basis
 from kbs_process.diagnosis.detection import Detection
-from kbs_process.diagnosis.finding import merged, trusted
+from kbs_process.diagnosis.finding import _alike_likely, merged, trusted
 from kbs_process.diagnosis.floor import declared
 from kbs_process.diagnosis.gate import Fold, Gate
 from kbs_process.diagnosis.joint import standing_of
@@ -220,6 +221,29 @@ def test_a_sensor_s_law_that_was_found_twice_acts_twice_in_the_corrected_model(w
 
 def test_the_next_test_can_be_simulated(written: Path) -> None:
     assert read_commands(written / "next-test.csv", ("az", "el")).t[-1] == pytest.approx(60.0)
+
+
+def test_laws_of_the_catalogue_that_do_the_same_are_alike_likely() -> None:
+    """By odds of formulas that nature need not have; curves, and laws that are told apart, keep theirs."""
+    same = Alternative(DRAG, 0.02, 2.0, 0.16, True, True)
+    apart = Alternative(CABLE, 0.3, 9.0, 1e-6, True, True)
+    curve = Alternative(LAW, 0.08, 1.0, 0.3, True, True)
+    linear = Alternative(CABLE, 0.0, 1.0, 0.3, True, False)  # was not simulated
+    chance, others = _alike_likely(0.6, [same, apart, curve, linear])
+    assert chance == pytest.approx(0.31)
+    assert [one.probability for one in others] == pytest.approx([0.31, 0.3, 0.08, 0.0])
+
+
+def test_what_cannot_be_told_from_a_law_is_told_with_its_place(outcome: Outcome) -> None:
+    cord = replace(CABLE, law="cable", axis="az")
+    same, apart = (Alternative(cord, 0.1, rho, 0.2, True, True) for rho in (2.0, 9.0))
+    spline = Alternative(replace(LAW, axis="az", law="curve"), 0.1, 1.0, 0.2, True, True)
+    here = Alternative(replace(LAW, law="harness"), 0.1, 9.0, 0.2, True, True)
+    (find,) = outcome.finds
+    own = f"{LAW.law} ({LAW.port}, {LAW.axis})".replace("_", " ")
+    assert _law_in_words(replace(find, alternatives=(apart, spline))) == own
+    told = _law_in_words(replace(find, alternatives=(same, here)))
+    assert told == own.replace(" (", " or harness (") + f", or cable ({CABLE.port}, az)"
 
 
 @pytest.mark.parametrize("share", [0.4, 1.0])

@@ -10,6 +10,7 @@ import bench
 import numpy as np
 import pytest
 
+from kbs_process.diagnosis import gate as gate_of
 from kbs_process.diagnosis import rounds, verdict
 from kbs_process.diagnosis.as_suspect import sigma_of, suspect_of
 from kbs_process.diagnosis.experiment import Experiment
@@ -128,6 +129,26 @@ def test_a_law_that_held_out_recordings_do_not_show_is_refused(made: Experiment)
         here.known, after.known, range(len(FREE), len(FREE) + len(found.candidates[0].suspect.amplitudes))
     )
     assert not verdict.passed and "r2 predicted worse" in verdict.reasons
+
+
+@pytest.mark.parametrize("of_much", [True, False])
+def test_a_few_sigmas_of_parts_do_where_nothing_of_much_is_left(
+    made: Experiment, cable: Standing, monkeypatch: pytest.MonkeyPatch, of_much: bool
+) -> None:
+    """By the noise a law has to be off zero as ever."""
+    tried, scene, found = screened(cable)
+    best = found.candidates[0]
+    after = with_extra(cable, extra_of(best, cable, tried, scene), bench.serial(made))
+    places = range(len(FREE), len(FREE) + len(best.suspect.amplitudes))
+    monkeypatch.setattr(gate_of, "_all_of_much", lambda *_: of_much)
+    monkeypatch.setattr(gate_of, "_elsewhere", lambda *_: False)
+    for parts, passes in ((6.0, of_much), (1.0, False)):
+        monkeypatch.setattr(gate_of, "_evenly", lambda *_, it=parts: it)
+        verdict = gate(cable.known, after.known, places)
+        assert verdict.passed == passes and verdict.sigmas < 8.0
+        assert verdict.uneven != passes
+    monkeypatch.setattr(gate_of, "_evenly", lambda *_: 6.0)
+    assert not gate(cable.known, after.known, places, least=1e6).passed
 
 
 def test_without_held_out_recordings_each_is_left_out_in_turn(made: Experiment, cable: Standing) -> None:
@@ -434,3 +455,22 @@ def test_a_law_that_leaves_less_and_is_too_uneven_settles_before_another_is_beli
         monkeypatch.setattr(verdict, "_stands_in", lambda *_: ("falls",))
         assert verdict.believed([other], view, cable, None, floor, simulate, [], noted) is None
         assert settled == ["ground_cable"] * 2
+
+
+def test_a_few_sigmas_place_no_law_where_others_do_as_well_elsewhere(cable: Standing) -> None:
+    """Of what known numbers had taken up nearly all; where much was left no other minimum does it."""
+    tried, scene, found = screened(cable)
+    one = passed(cable, tried, scene, found, "ground_cable")
+    few = replace(one, gate=replace(one.gate, sigmas=3.0))
+    other = passed(cable, tried, scene, found, "harness")
+    as_good = replace(other, standing=one.standing)
+    here = replace(one, found=one.found)
+    little = replace(cable, known=replace(cable.known, residual=one.standing.known.residual))
+    assert not little.known.gross
+    assert verdict._as_well_elsewhere(few, [here, as_good], little)
+    assert not verdict._as_well_elsewhere(few, [here], little)
+    assert not verdict._as_well_elsewhere(one, [here, as_good], little)
+    loud = tuple(5.0 * z for z in cable.known.residual)
+    assert not verdict._as_well_elsewhere(
+        few, [here, as_good], replace(cable, known=replace(cable.known, residual=loud))
+    )

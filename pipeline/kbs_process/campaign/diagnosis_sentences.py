@@ -8,6 +8,7 @@ import numpy as np
 
 from kbs_process.campaign.diagnosis_terms import place_of, rms
 from kbs_process.diagnosis.detection import Detection
+from kbs_process.diagnosis.families import UNNAMED
 from kbs_process.diagnosis.floor import Floor
 from kbs_process.diagnosis.outcome import Find, Outcome
 from kbs_process.diagnosis.thresholds import RIVALS, told_apart
@@ -60,11 +61,14 @@ def _where(place: records.Place) -> str:
 
 
 def _law_in_words(find: Find) -> str:
-    """A law and its place, with those that were simulated beside it and cannot be told from it."""
-    alike = [one.identity for one in find.alternatives if one.refitted and one.indistinguishable]
-    laws: dict[str, list[str]] = {}
-    for one in (find.identity, *alike):
-        laws.setdefault(_where(place_of(one)), []).append(_words(one.law))
+    """A law and its place, with those of its place that cannot be told from it, and of others that do the same."""
+    here = place_of(find.identity)
+    laws = {_where(here): [_words(find.identity.law)]}
+    for one in find.alternatives:
+        there = place_of(one.identity)
+        same = one.rho_delta < RIVALS and one.identity.family != UNNAMED
+        if one.refitted and one.indistinguishable and (there == here or same):
+            laws.setdefault(_where(there), []).append(_words(one.identity.law))
     return ", or ".join(f"{' or '.join(names)} ({where})" for where, names in laws.items())
 
 
@@ -159,7 +163,9 @@ def paragraph(
         numbers = _curve_in_words(find.curve) if find.curve else _numbers_in_words(find.parameters)
         near = told_apart(find.distance)
         apart = [
-            _words(one.name) for one in find.rivals if one.distance < (near if one.simulated else RIVALS)
+            _words(one.name) + ("" if one.place == find.place else f" ({_where(one.place)})")
+            for one in find.rivals
+            if one.distance < (near if one.simulated else RIVALS)
         ]
         left_out = "Nearest to what was left out is" if outcome.much else "Left out was"
         begin = left_out if find.named else "No law of the catalogue passes; measured was a"

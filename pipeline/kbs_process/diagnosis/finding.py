@@ -84,7 +84,8 @@ def find_of(
                 identity(found.suspect), 0.0, rho, float(chi2.sf(0.25 * rho**2, 1) / 2.0), rho < RIVALS, False
             )
         )
-    chance, alternatives = _evenly(chance, alternatives)
+    if own.family != UNNAMED:
+        chance, alternatives = _alike_likely(chance, alternatives)
     alternatives.sort(key=lambda other: (-other.probability, other.rho_delta))
     alike: tuple[str, ...] = ()
     if place is not None:
@@ -108,13 +109,13 @@ def find_of(
     )
 
 
-def _evenly(chance: float, others: Sequence[Alternative]) -> tuple[float, list[Alternative]]:
+def _alike_likely(chance: float, others: Sequence[Alternative]) -> tuple[float, list[Alternative]]:
     """The chance of a law, and `others`, where laws of the catalogue that do the same in the plant are alike likely.
 
     Schwarz's criterion would tell them apart by how many numbers they have: so it does for formulas that are nature's.
     """
     alike = [
-        one for one in others if one.refitted and one.indistinguishable and one.identity.family != UNNAMED
+        one for one in others if one.refitted and one.rho_delta < RIVALS and one.identity.family != UNNAMED
     ]
     even = (chance + sum(one.probability for one in alike)) / (1 + len(alike))
     return even, [replace(one, probability=even) if one in alike else one for one in others]

@@ -28,6 +28,7 @@ from kbs_process.diagnosis.thresholds import (
     GATE_SIGMA,
     GATE_WORSE,
     LEAST_RHO,
+    SHOWN,
     TOLERATED,
 )
 from kbs_process.signals.records import Array
@@ -82,9 +83,9 @@ def gate(
     """Judge the numbers `coefficients` of `after`, the amplitudes of a law that `before` is without.
 
     Its `shapes` count as they are: what makes up for an amplitude, as the lever of a force does, says nothing against
-    it, and a law of no amplitude has none. By `least` sigmas amplitudes have to be off zero, or by a few where the law
-    leaves nothing of much. Held-out trials in which it does nothing (`blind`, asked where they would decide) are no
-    witnesses.
+    it, and a law of no amplitude has none. By `least` sigmas amplitudes have to be off zero, or by a few of the
+    scatter where the law leaves nothing, and much was left before or recordings of another motion ask for its size.
+    Held-out trials in which it does nothing (`blind`, asked where they would decide) are no witnesses.
     """
     experiment = after.experiment
     held_out = bool(experiment.held_out)
@@ -108,10 +109,14 @@ def gate(
     if not gained >= GATE_GAIN:
         reasons.append("recordings that were not used gain less than chance could give")
     elif held_out and not (
-        gained >= GATE_SHARE * _promised(before, after) or _as_foretold(gained, _changed(before, after))
+        gained >= GATE_SHARE * _promised(before, after)
+        or _as_foretold(gained, _changed(before, after, experiment.held_out))
     ):
         reasons.append("recordings that were not used gain much less than those that it was fitted to")
-    near_zero = not (sigmas >= least or (sigmas >= GATE_FEW and _all_of_much(before, after)))
+    few = by_noise >= least and sigmas >= GATE_FEW
+    near_zero = not (
+        sigmas >= least or (few and (_all_of_much(before, after) or _elsewhere(before, after, blind)))
+    )
     if near_zero:
         size = f"{sigmas:.1f} sigma off zero" if np.isfinite(sigmas) else "not determined"
         reasons.append(f"its coefficients are {size}")
@@ -125,6 +130,25 @@ def gate(
 def _all_of_much(before: Known, after: Known) -> bool:
     """Whether a law leaves nothing of so much that known numbers had been pulled: no other minimum of theirs does."""
     return before.gross and after.excess <= TOLERATED * after.fit_rows
+
+
+def _elsewhere(before: Known, after: Known, blind: Callable[[], Collection[int]]) -> bool:
+    """Whether a law that leaves nothing is of the size that recordings ask for which nothing was fitted to.
+
+    All of these that show it gain half at least of the square of what changes in them, one of another motion among
+    them: where one window alone shows most of a law, windows that were fitted cannot tell its size from each other.
+    What changes in those to which it is `blind` is other numbers' doing.
+    """
+    experiment = after.experiment
+    if after.excess > TOLERATED * after.fit_rows:
+        return False
+    changes = {k: float(np.sum((before.residual[k] - after.residual[k]) ** 2)) for k in experiment.held_out}
+    shown = [k for k, change in changes.items() if change >= SHOWN]
+    if not all(before.chi2[k] - after.chi2[k] >= GATE_FORETOLD * changes[k] for k in shown):
+        return False
+    fitted = {experiment.trials[k].trajectory for k in experiment.fit}
+    other = [k for k in shown if experiment.trials[k].trajectory not in fitted]
+    return bool(other) and not set(other) <= set(blind())
 
 
 def worsened(folds: Sequence[Fold]) -> list[str]:
@@ -190,16 +214,17 @@ def _promised(before: Known, after: Known) -> float:
     return gained * float(after.rows[other].sum() / after.rows[fit].sum())
 
 
-def _changed(before: Known, after: Known) -> float:
-    """Whitened square of what changes in the prediction of held-out recordings."""
-    changes = (before.residual[k] - after.residual[k] for k in after.experiment.held_out)
+def _changed(before: Known, after: Known, trials: Sequence[int]) -> float:
+    """Whitened square of what changes in the prediction of some recordings."""
+    changes = (before.residual[k] - after.residual[k] for k in trials)
     return sum(float(change @ change) for change in changes)
 
 
-def foretold(before: Known, after: Known) -> bool:
-    """Whether held-out recordings gain most of what a law that is right gains."""
-    gained = sum(float(before.chi2[k] - after.chi2[k]) for k in after.experiment.held_out)
-    return _as_foretold(gained, _changed(before, after))
+def foretold(before: Known, after: Known, blind: Collection[int] = ()) -> bool:
+    """Whether held-out recordings, but those to which a law is `blind`, gain most of what one that is right gains."""
+    asked = [k for k in after.experiment.held_out if k not in blind]
+    gained = sum(float(before.chi2[k] - after.chi2[k]) for k in asked)
+    return _as_foretold(gained, _changed(before, after, asked))
 
 
 def _as_foretold(gained: float, changed: float) -> bool:

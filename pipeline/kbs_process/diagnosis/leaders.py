@@ -184,15 +184,14 @@ def gated(
     known = after.known
     places = [known.names.index(name) for name in own.amplitudes]
     shapes = [known.names.index(name) for name in own.names if name not in own.amplitudes]
-    verdict = gate(
-        before.known, known, places, shapes, least=least, blind=partial(blind, after, own, simulate)
-    )
+    nothing = partial(blind, after, own, simulate)
+    verdict = gate(before.known, known, places, shapes, least=least, blind=nothing)
     # What minima of the known parameters leave differs, and is no law's.
     share = explained_share(before.known, known, beyond=TOLERATED)
     index = np.array(places)
     a, C = known.value[index], known.covariance[np.ix_(index, index)]
     if identity(found.suspect).family == UNNAMED:
-        if share is None and known.experiment.held_out and not foretold(before.known, known):
+        if share is None and known.experiment.held_out and not foretold(before.known, known, nothing()):
             verdict = verdict.but("recordings that were held out leave nothing that would show a curve")
         if share is not None and not share >= LAW_VARIANCE:
             verdict = verdict.but(

@@ -20,11 +20,12 @@ from kbs_process.diagnosis.suspects import Candidate, free_actions
 from kbs_process.diagnosis.tails import log_tail
 from kbs_process.diagnosis.thresholds import FALSE_ALARM, ITS_OWN, LEAST_RHO, ORDERS_SHARE
 from kbs_process.diagnosis.view import View
-from kbs_process.plant.effect import Effect, Port
+from kbs_process.plant.effect import Effect
 from kbs_process.plant.effects import find
 from kbs_process.signals.records import Array
 
 _PARTS = (1, 2, 3)  # of a series, which comes once a turn at least, that an order may be; or a tone
+_EXACT = 1e-9  # of a cycle: beats are proposed as fractions of them
 _HARMONICS = 12  # of an order that are tried
 
 
@@ -66,27 +67,26 @@ def _others(view: View, suspect: Catalogued) -> list[float]:
     ]
     own = _orders(suspect)
     tones = any(entry.over == SPECTRUM for entry in suspect.candidate.effect.parameters)
-    series = [
-        (order / part, part)
-        for order in own
-        for part in _parts(view, suspect, order)
-        if tones or order >= part
-    ]
+    series = [(order, part) for order in own for part in _parts(view, tones, order) if tones or order >= part]
     highest = view.standing.known.experiment.highest_Hz if tones else max([*tried, *own], default=0.0)
     harmonics = [
-        k * first for first, part in series for k in range(1, part * _HARMONICS + 1) if k * first <= highest
+        k * order / part
+        for order, part in series
+        for k in range(1, part * _HARMONICS + 1)
+        if k != part and k * order / part <= highest
     ]
     return [value for value in dict.fromkeys([*tried, *harmonics]) if value not in own]
 
 
-def _parts(view: View, suspect: Catalogued, order: float) -> tuple[int, ...]:
-    """Which of a series an order may be: of cycles of a controller, after which all comes again, the one that it is."""
+def _parts(view: View, tones: bool, order: float) -> tuple[int, ...]:
+    """Which of a series an order may be: of a beat of the controller's cycles the one that it is, too."""
     controller = view.standing.known.experiment.rig.controller
-    if suspect.candidate.port is not Port.FIELD or controller is None:
+    if not tones or controller is None:
         return _PARTS
-    return tuple(
-        {*_PARTS, Fraction(order * float(controller.cycle)).limit_denominator(LONGEST_BEAT).numerator} - {0}
-    )
+    cycles = order * float(controller.cycle)
+    beat = Fraction(cycles).limit_denominator(LONGEST_BEAT)
+    own = (beat.numerator,) if abs(cycles - beat) < _EXACT and beat.numerator not in _PARTS else ()
+    return (*_PARTS, *own)
 
 
 def _orders(suspect: Catalogued) -> list[float]:

@@ -80,10 +80,11 @@ MOST: Final = 0.5
 # By which a coefficient's interval has to exclude zero once all numbers are refitted beside it: near LEAST_RHO, as what
 # a longer search gains for the known numbers must not be taken for the law's.
 GATE_SIGMA: Final = 8.0
-# Likewise where a law leaves nothing of so much that numbers had been pulled. Of a base that stiffens one window had
-# nearly all (development), so that parts gave 2.2; of a harness beside a drag two had (development): 5.8. Where less
-# was left, an eccentric disc beside numbers that took up 0.99 of it had 2.9 (development), and was a backlash.
+# Likewise by the scatter of parts, where a law leaves nothing of so much that numbers had been pulled, or all
+# recordings that were not used, one of another motion among them, ask for its size. Of a base that stiffens one window
+# had nearly all (development), so that parts gave 2.2; of a harness beside a drag two had (development): 5.8.
 GATE_FEW: Final = 2.0
+SHOWN: Final = 100.0  # square of what a law changes in a recording, from which on it shows that
 # Likewise of a law that passed, when it is judged again beside those that were found later: what they make needless
 # stands near zero, and one that has just passed would fall by chance. A friction beside an eccentric disc, both right
 # (development), went from 8 to 7.0 when numbers had settled once more.

@@ -22,7 +22,7 @@ from kbs_process.diagnosis.screen import Found
 from kbs_process.diagnosis.settling import released, resettled
 from kbs_process.diagnosis.shapes import bettered
 from kbs_process.diagnosis.supposed import Noted
-from kbs_process.diagnosis.thresholds import MOST, SECOND, SETTLED, TOLERATED
+from kbs_process.diagnosis.thresholds import GATE_SIGMA, MOST, SECOND, SETTLED, TOLERATED
 from kbs_process.diagnosis.tryout import identity
 from kbs_process.diagnosis.view import View
 
@@ -61,7 +61,11 @@ def believed(
     order = [int(k) for k in np.argsort(-chances, kind="stable")]
     for number, best in enumerate(order[: SETTLED if beyond is None else 1]):
         told = passed[best] if passed[best] is beyond else _settled(passed[best], standing, floor, simulate)
-        if reasons := told.gate.reasons or _stands_in(told, standing, floor, simulate, accepted):
+        if reasons := (
+            told.gate.reasons
+            or _as_well_elsewhere(told, passed, standing)
+            or _stands_in(told, standing, floor, simulate, accepted)
+        ):
             noted.fell(replace(told, gate=told.gate.but(*reasons)) if told.gate.passed else told)
             continue
         # Told anew, it may be what another was: their chances are one then.
@@ -83,6 +87,21 @@ def _settled(one: Tried, before: Standing, floor: Floor, simulate: Simulate) -> 
     if settled.known.excess < MOST * before.known.excess:
         settled = released(settled, floor, simulate)
     return _judged_again(reread(replace(one, standing=settled), before, floor, simulate), before, simulate)
+
+
+def _as_well_elsewhere(told: Tried, passed: Sequence[Tried], before: Standing) -> tuple[str, ...]:
+    """Why a law that is a few sigmas off zero by the scatter of parts is not known to be where it is; else nothing.
+
+    Where numbers had taken nearly all of it up, laws at other places do as well.
+    """
+    if before.known.gross or not told.own.names or told.gate.sigmas >= GATE_SIGMA:
+        return ()
+    own = _law(told)
+    others = [_law(one) for one in passed if _as_good(one, told)]
+    elsewhere = [
+        one for one in others if (one.port, one.axis, one.channels) != (own.port, own.axis, own.channels)
+    ]
+    return tuple(f"{one.law} ({one.port}) does as well, and parts of recordings differ" for one in elsewhere)
 
 
 def _stands_in(
