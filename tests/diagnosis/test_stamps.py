@@ -13,6 +13,7 @@ from kbs_process.diagnosis.clocks import timed
 from kbs_process.diagnosis.each_recording import taken_off, taken_off_again
 from kbs_process.diagnosis.finding import find_of
 from kbs_process.diagnosis.joint import Standing
+from kbs_process.diagnosis.jumps import jump
 from kbs_process.diagnosis.scene import Scene
 from kbs_process.diagnosis.screen import Bench, Catalogued, screen
 from kbs_process.diagnosis.stamps import late_by, set_right, slope
@@ -131,3 +132,35 @@ def test_a_clock_that_is_late_by_half_a_period_is_found_at_its_size(late: float)
     np.testing.assert_allclose(
         column[60:-60], late_by(rung[0].values[:, :6], DT, np.full(800, late))[60:-60], atol=0.02
     )
+
+
+@pytest.mark.parametrize("lost", [0.09, 0.46])
+def test_a_clock_that_jumps_by_periods_is_taken_off_at_its_place_and_size(lost: float) -> None:
+    """To first order such a jump is none: it is tried at many sizes."""
+    made = bench.experiment(bench.rig(), ("fit", "fit", "held-out"), 9, seconds=40.0)
+    t = DT * np.arange(800)
+    ringing = np.sin(2.0 * np.pi * (2.0 + 0.04 * t) * t)[:, None] * np.r_[np.full(6, 0.2), 0.0, 0.0]
+    late = np.where(t > 17.3, -lost, 0.0)
+    trials = []
+    for trial in made.trials:
+        whole = trial.measured + ringing
+        whole[:, :6] += late_by(whole[:, :6], DT, late)
+        trials.append(replace(trial, measured=whole * trial.valid[:, None]))
+    here = standing(replace(made, trials=tuple(trials)))
+    rung = {0: replace(here.predicted[0], values=here.predicted[0].values + ringing)}
+    residual = tuple(
+        m(t.measured - rung[0].values)
+        for m, t in zip(here.known.metric, here.known.experiment.trials, strict=True)
+    )
+    known = replace(here.known, shown=rung, residual=residual)
+    here = Standing(known, rung, {})
+    scene = Scene.of(known.experiment, here.hypothesis, rung)
+    suspect = Catalogued(candidate("clock_drops", "wrench"), scene)
+    tried = Bench.of(known, scene)
+    screening = screen(tried, [suspect])
+    told = taken_off(screening.candidates[0], View(here, tried, scene, (suspect,), screening))
+    assert known.gross
+    assert told.found.score.amplitude == pytest.approx([lost, lost], abs=2e-3)
+    when = jump(known.experiment, rung, 0, "wrench")
+    assert when == pytest.approx(17.3, abs=0.3)
+    assert all(told.standing.known.chi2 < 0.2 * known.chi2)

@@ -22,6 +22,7 @@ from kbs_process.diagnosis.joint import Own, Standing
 from kbs_process.diagnosis.known import Known
 from kbs_process.diagnosis.plausible import oversized
 from kbs_process.diagnosis.screen import Catalogued, Found, Suspect
+from kbs_process.diagnosis.stamps import SIZES
 from kbs_process.diagnosis.thresholds import FALSE_ALARM
 from kbs_process.diagnosis.view import View
 from kbs_process.signals.records import Array
@@ -137,7 +138,10 @@ def _each(suspect: Suspect, known: Known, plain: Mapping[int, Array]) -> list[_O
 def _by_the_clock(
     suspect: Catalogued, known: Known, k: int, whitened: Array, precision: Array, first: _Off
 ) -> _Off:
-    """A recording stamped by a clock that is right: to first order, then from where each step leads."""
+    """A recording stamped by a clock that is right: to first order, then from where each step leads.
+
+    Where much is left, from the best of many sizes, as a jump by a period of what moves is none to first order.
+    """
     experiment = known.experiment
     trial = experiment.trials[k]
     late = suspect.late(experiment.reference(trial.trajectory))
@@ -146,14 +150,25 @@ def _by_the_clock(
     zero = np.zeros_like(first.amplitude)
     best = replace(first, measured=trial.measured, left=first.background.z[k], amplitude=zero, gain=0.0)
     step = first.amplitude
-    for _ in range(_PASSES):
-        amplitude = best.amplitude + step
+
+    def at(amplitude: Array) -> tuple[_Off, Background]:
         measured, left = by_a_right_clock(suspect, known, k, late @ amplitude)
         here = Background.of({k: left}, {k: J}, precision)
-        gain = nothing - _height(here, k)
-        if gain > best.gain:
-            best = replace(best, measured=measured, left=left, amplitude=amplitude, gain=gain)
-            step = score(here, Sums.over(here, {k: whitened})).amplitude
+        return replace(
+            best, measured=measured, left=left, amplitude=amplitude, gain=nothing - _height(here, k)
+        ), here
+
+    def from_here(here: Background) -> Array:
+        return score(here, Sums.over(here, {k: whitened})).amplitude
+
+    if known.gross and len(zero) == 1 and (most := float(np.abs(late).max())) > 0.0:
+        far, there = max((at(np.array([size / most])) for size in SIZES), key=lambda one: one[0].gain)
+        if far.gain > max(at(step)[0].gain, 0.0):
+            best, step = far, from_here(there)
+    for _ in range(_PASSES):
+        nearer, here = at(best.amplitude + step)
+        if nearer.gain > best.gain:
+            best, step = nearer, from_here(here)
         else:
             step = 0.5 * step  # too far for a slope
     return best

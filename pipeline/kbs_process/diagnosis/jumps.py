@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from kbs_process.diagnosis.experiment import Experiment
 from kbs_process.diagnosis.floor import channel_windows
 from kbs_process.diagnosis.hypothesis import Prediction
-from kbs_process.diagnosis.stamps import slope
+from kbs_process.diagnosis.stamps import SIZES, late_by, slope
 from kbs_process.signals.records import Array, Mask
 
 PLACES = 400  # that a recording is divided into
@@ -27,18 +27,25 @@ def jump(experiment: Experiment, predicted: Mapping[int, Prediction], trajectory
 
     What is left of a reading y that is late by tau is b + c t - tau dy/dt, with a bias and its drift. The gain of t0 is
     what one tau before it and another after it take of the squares of what is left beyond what one tau for all takes:
-    least squares, channels weighted by their noise, summed over the recordings of the trajectory.
+    least squares, channels weighted by their noise, summed over the recordings of the trajectory. Of a jump by a good
+    part of a period that says little: `SIZES` of it are tried as such, if one does more.
     """
     own = [trial for trial in experiment.trials if trial.trajectory == trajectory]
     own = [trial for trial in own if trial.role != "held-out"] or own
     channels = slice(0, experiment.loads) if stream == "wrench" else slice(experiment.loads, None)
     places = np.linspace(_EDGE, 1.0 - _EDGE, PLACES) * len(own[0].valid)
-    gain = np.zeros(PLACES)
+    gain, far = np.zeros(PLACES), np.zeros((len(SIZES), PLACES))
     for trial in own:
         shown = predicted[trial.drive].values[:, channels]
         there = channel_windows(experiment, trial, trial.valid)[:, channels] > 0.0
         rate = slope(shown, experiment.dt)
-        gain += _gain(trial.measured[:, channels] - shown, rate, there, places)
+        error = trial.measured[:, channels] - shown
+        gain += _gain(error, rate, there, places)
+        for k, size in enumerate(SIZES):
+            change = late_by(shown, experiment.dt, np.full(len(shown), size))
+            far[k] += _relief(error, change, there, places)
+    # At the first place it is nearly all of a recording that is late: no jump.
+    gain = np.maximum(gain, far.max(axis=0) - max(0.0, float(far[:, 0].max())))
     best = int(np.argmax(gain)) if gain.max() > 0.0 else PLACES // 2
     return float(places[best] * experiment.dt)
 
@@ -67,6 +74,19 @@ def _gain(error: Array, rates: Array, there: Mask, places: Array) -> Array:
     # What a change after the place takes beside one tau for all.
     beside = later - overlap**2 / whole
     return np.asarray((of_later - overlap * pull / whole) ** 2 / np.maximum(beside, _LEAST * whole))
+
+
+def _relief(error: Array, change: Array, there: Mask, places: Array) -> Array:
+    """(m,) by how much squares of an error (n, c), beside a bias and its drift, fall by a change from each place on."""
+    total = np.zeros(len(places))
+    for e, by, valid in zip(error.T, change.T, there.T, strict=True):
+        at = np.flatnonzero(valid)
+        noise = float(np.var(np.diff(e[at]))) if len(at) > _FEWEST else 0.0
+        if noise > 0.0:
+            drift = np.linalg.qr(np.stack([np.ones(len(at)), at - at.mean()], axis=1))[0]
+            plain, less = (one - drift @ (drift.T @ one) for one in (e[at], e[at] - by[at]))
+            total += _after(plain**2 - less**2, np.searchsorted(at, places)) / noise
+    return total
 
 
 def _after(series: Array, places: NDArray[np.intp]) -> Array:

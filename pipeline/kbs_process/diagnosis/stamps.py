@@ -13,6 +13,9 @@ from kbs_process.stages.condense import DOUBT
 from kbs_process.stages.resample import Reducer, design
 
 _PASSES = 4  # of the time at which a stamp was due
+# s, that a clock may be late by and no first order tells: nearer to each other than a third of a period of what rings.
+_FAR = (0.01, 0.025, 0.045, 0.07, 0.1, 0.14, 0.19, 0.25, 0.31, 0.37, 0.43, 0.49, 0.55, 0.61)
+SIZES = (*(-one for one in reversed(_FAR)), *_FAR)
 _DIFFERENCE = 1e-3  # s, for slopes: far below a period of the working band
 
 
