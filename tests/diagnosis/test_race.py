@@ -11,6 +11,7 @@ from test_rounds import ROLES, standing, with_cable
 
 from kbs_process.diagnosis import leaders as leading
 from kbs_process.diagnosis import race
+from kbs_process.diagnosis.believed import continued, named_first, named_there
 from kbs_process.diagnosis.finding import Tried
 from kbs_process.diagnosis.floor import declared
 from kbs_process.diagnosis.gate import Gate
@@ -21,7 +22,6 @@ from kbs_process.diagnosis.race import Runner, raced
 from kbs_process.diagnosis.screen import Found
 from kbs_process.diagnosis.thresholds import FIRST, MOSTLY_DONE, TOLERATED, WAYS
 from kbs_process.diagnosis.tryout import extra_of, identity
-from kbs_process.diagnosis.verdict import continued, named_first, unnamed
 from kbs_process.diagnosis.view import View
 
 RIGHT, WRONG, CURVE = ("ground_cable", "el"), ("harness", "el"), ("ground_angle_law", "el")
@@ -78,9 +78,9 @@ def test_a_law_keeps_its_name_beside_a_curve_that_does_a_little_more(
     assert identity(law.found.suspect).port == identity(curve.found.suspect).port
     assert [one.found.suspect.family for one in named_first([curve, law])] == names[::-1]
     # Where the curve alone passed, laws whose place it took are tried, too, but for those that were.
-    assert [one.suspect.family for one in unnamed([curve], [], view)] == [RIGHT, KIN]
-    assert [one.suspect.family for one in unnamed([curve], [identity(law.found.suspect)], view)] == [KIN]
-    assert unnamed([law], [], view) == []
+    assert [one.suspect.family for one in named_there([curve], [], view)] == [RIGHT, KIN]
+    assert [one.suspect.family for one in named_there([curve], [identity(law.found.suspect)], view)] == [KIN]
+    assert named_there([law], [], view) == []
     # One more action of a law that was found goes before another law likewise.
     found = [identity(law.found.suspect)]
     assert continued([curve, law], found) == ([law] if better < 1.0 else [curve, law])

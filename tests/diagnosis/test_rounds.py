@@ -10,8 +10,8 @@ import bench
 import numpy as np
 import pytest
 
+from kbs_process.diagnosis import believed, rounds
 from kbs_process.diagnosis import gate as gate_of
-from kbs_process.diagnosis import rounds, verdict
 from kbs_process.diagnosis.as_suspect import sigma_of, suspect_of
 from kbs_process.diagnosis.experiment import Experiment
 from kbs_process.diagnosis.finding import Tried, as_it_stands, find_of
@@ -184,12 +184,12 @@ def test_a_law_is_judged_where_its_numbers_have_settled(made: Experiment, cable:
     assert begun.gate.passed
     known = after.known
     worse = replace(known, residual=tuple(5.0 * one for one in known.residual))
-    told = verdict._judged_again(
+    told = believed._judged_again(
         replace(begun, standing=replace(after, known=worse)), cable, bench.serial(made)
     )
     assert not told.gate.passed and any("predicted worse" in reason for reason in told.gate.reasons)
     alone = replace(begun, own=Own((), ()))  # of what is each recording's own the verdict stays
-    assert verdict._judged_again(alone, cable, bench.serial(made)) is alone
+    assert believed._judged_again(alone, cable, bench.serial(made)) is alone
 
 
 def test_a_law_of_the_readings_needs_no_plant_and_its_rival_is_told_apart(made: Experiment) -> None:
@@ -301,15 +301,17 @@ def test_the_second_law_that_passed_is_believed_where_the_first_falls(
     seen = SimpleNamespace(scene=scene, bench=tried, screening=found)
     monkeypatch.setattr(rounds.View, "of", lambda _: seen)
     monkeypatch.setattr(rounds, "_place", lambda *_: None)
-    monkeypatch.setattr(verdict, "named_first", list)
+    monkeypatch.setattr(believed, "named_first", list)
     monkeypatch.setattr(rounds, "_passed", lambda *_: iter([[first, second]]))
-    monkeypatch.setattr(verdict, "_settled", lambda one, *_: replace(one, gate=replace(one.gate, reasons=())))
+    monkeypatch.setattr(
+        believed, "_settled", lambda one, *_: replace(one, gate=replace(one.gate, reasons=()))
+    )
     floor, simulate = declared(cable.known.experiment), bench.serial(cable.known.experiment)
     for fallen, kept in ((("harness",), "ground_cable"), (("ground_cable",), "harness")):
         monkeypatch.setattr(
-            verdict,
+            believed,
             "_stands_in",
-            lambda told, *_, no=fallen: ("falls",) if verdict._law(told).law in no else (),
+            lambda told, *_, no=fallen: ("falls",) if believed._law(told).law in no else (),
         )
         done = rounds._round(cable, cable, floor, simulate, [])
         assert done.accepted is not None and done.accepted.find.identity.law == kept
@@ -320,7 +322,7 @@ def test_the_second_law_that_passed_is_believed_where_the_first_falls(
     monkeypatch.setattr(rounds, "_passed", lambda *_: iter([[first], [second]]))
     done = rounds._round(cable, cable, floor, simulate, [])
     assert done.accepted is not None and done.accepted.find.identity.law == "harness"
-    monkeypatch.setattr(verdict, "_stands_in", lambda *_: ("falls",))
+    monkeypatch.setattr(believed, "_stands_in", lambda *_: ("falls",))
     assert rounds._round(cable, cable, floor, simulate, []).accepted is None
 
 
@@ -426,34 +428,34 @@ def test_a_law_that_leaves_less_and_is_too_uneven_settles_before_another_is_beli
     uneven = replace(best, gate=scattered)
     worse = replace(best, gate=best.gate.but("r2 predicted worse"))
     assert best.gate.passed and uneven.gate.uneven and not worse.gate.uneven and not best.gate.uneven
-    assert verdict.beaten([other], [uneven]) is uneven
-    assert verdict.beaten([other], [worse]) is None
-    assert verdict.beaten([best], [replace(other, gate=uneven.gate)]) is None
+    assert believed.beaten([other], [uneven]) is uneven
+    assert believed.beaten([other], [worse]) is None
+    assert believed.beaten([best], [replace(other, gate=uneven.gate)]) is None
     settled: list[str] = []
 
     def settle(one: Tried, *_: object) -> Tried:
-        settled.append(verdict._law(one).law)
+        settled.append(believed._law(one).law)
         return best if stands else replace(one, gate=uneven.gate)
 
-    monkeypatch.setattr(verdict, "_settled", settle)
-    monkeypatch.setattr(verdict, "_stands_in", lambda *_: ())
+    monkeypatch.setattr(believed, "_settled", settle)
+    monkeypatch.setattr(believed, "_stands_in", lambda *_: ())
     view = SimpleNamespace(scene=scene, bench=tried, screening=found)
     floor, simulate = declared(cable.known.experiment), bench.serial(cable.known.experiment)
     noted = Noted()
     noted.fell(uneven)
-    told = verdict.believed([other], view, cable, None, floor, simulate, [], noted)
+    told = believed.believed([other], view, cable, None, floor, simulate, [], noted)
     assert (told is not None) == stands
     assert told is None or told.find.identity.law == "ground_cable"
     assert settled == ["ground_cable"]
     refused = [(one.identity.law, one.reasons[-1]) for one in noted.refused]
     fell = [("ground_cable", "nor with all numbers settled"), ("harness", "ground_cable leaves less")]
     assert refused == ([] if stands else fell)
-    assert verdict.beaten([other], noted.fallen) is None
+    assert believed.beaten([other], noted.fallen) is None
     if stands:
         # What stands in for something else is not made good by what follows it.
         noted.fell(uneven)
-        monkeypatch.setattr(verdict, "_stands_in", lambda *_: ("falls",))
-        assert verdict.believed([other], view, cable, None, floor, simulate, [], noted) is None
+        monkeypatch.setattr(believed, "_stands_in", lambda *_: ("falls",))
+        assert believed.believed([other], view, cable, None, floor, simulate, [], noted) is None
         assert settled == ["ground_cable"] * 2
 
 
@@ -467,10 +469,10 @@ def test_a_few_sigmas_place_no_law_where_others_do_as_well_elsewhere(cable: Stan
     here = replace(one, found=one.found)
     little = replace(cable, known=replace(cable.known, residual=one.standing.known.residual))
     assert not little.known.gross
-    assert verdict._as_well_elsewhere(few, [here, as_good], little)
-    assert not verdict._as_well_elsewhere(few, [here], little)
-    assert not verdict._as_well_elsewhere(one, [here, as_good], little)
+    assert believed._as_well_elsewhere(few, [here, as_good], little)
+    assert not believed._as_well_elsewhere(few, [here], little)
+    assert not believed._as_well_elsewhere(one, [here, as_good], little)
     loud = tuple(5.0 * z for z in cable.known.residual)
-    assert not verdict._as_well_elsewhere(
+    assert not believed._as_well_elsewhere(
         few, [here, as_good], replace(cable, known=replace(cable.known, residual=loud))
     )

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from kbs_process.diagnosis.believed import believed
 from kbs_process.diagnosis.detection import Detection
 from kbs_process.diagnosis.finding import Tried, as_it_stands, find_of, merged, trusted
 from kbs_process.diagnosis.floor import Floor
@@ -39,7 +40,6 @@ from kbs_process.diagnosis.thresholds import (
     TRUST_PART,
 )
 from kbs_process.diagnosis.tryout import identity
-from kbs_process.diagnosis.verdict import believed
 from kbs_process.diagnosis.view import View
 
 

@@ -41,7 +41,7 @@ def believed(
 
     Beside the numbers that it was looked for from first; once all have settled, beside those that leave least.
     """
-    if names := unnamed(passed, noted.identities, view):
+    if names := named_there(passed, noted.identities, view):
         more, less = tried(names, view, view.standing, floor, simulate)
         passed = [*passed, *more]
         noted.fell(*less)
@@ -146,7 +146,7 @@ def named_first(passed: Sequence[Tried]) -> list[Tried]:
     return [one for one in passed if one in named or not told(one)]
 
 
-def unnamed(passed: Sequence[Tried], refused: Sequence[Identity], view: View) -> list[Found]:
+def named_there(passed: Sequence[Tried], refused: Sequence[Identity], view: View) -> list[Found]:
     """Laws of the catalogue to try at the place of a curve that leaves least, if the screen had others before them.
 
     A curve takes the lead from the very law that it follows.
