@@ -234,3 +234,34 @@ def test_a_curved_characteristic_is_held_beyond_its_range() -> None:
     }
     held = changed(effect, **numbers)
     assert set(np.round(held[np.abs(READING - READING.mean()) > 1e-3], 9)) <= {2.1, 0.3}
+
+
+def test_a_drift_that_dies_out_has_one_relaxation_and_a_slower_one() -> None:
+    drift = law("drift_exponential")
+    one = changed(drift, creep=2.0, creep_slow=0.0, creep_time=7.0)
+    np.testing.assert_allclose(one, 2.0 * np.exp(-T / 7.0), rtol=1e-12)
+    slow = changed(drift, creep=0.0, creep_slow=2.0, creep_time=7.0)
+    np.testing.assert_allclose(slow, changed(drift, creep=2.0, creep_slow=0.0, creep_time=28.0), rtol=1e-12)
+
+
+def test_two_relaxations_follow_what_has_many_times() -> None:
+    """Creep with the power of time (Findley) and its recovery, beside an offset and a line; one follows it less."""
+    t = T[: round(75.0 / 0.05)]
+    nature = 1.0 / (1.0 + t / 12.0) ** 0.7
+
+    def left(columns: list[Array]) -> float:
+        A = np.stack([np.ones_like(t), t, *columns], axis=1)
+        return float(np.std(nature - A @ np.linalg.lstsq(A, nature)[0]))
+
+    def terms(tau: float) -> list[Array]:
+        drift, names = law("drift_exponential"), ("creep", "creep_slow")
+        return [
+            changed(drift, creep_time=tau, **{own: float(own == name) for own in names})[: len(t)]
+            for name in names
+        ]
+
+    times = np.geomspace(2.0, 40.0, 30).tolist()
+    one = min(left(terms(tau)[:1]) for tau in times)
+    two = min(left(terms(tau)) for tau in times)
+    assert two < 0.2 * one
+    assert two < 3e-3 * float(np.ptp(nature))
