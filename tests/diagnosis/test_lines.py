@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from kbs_process.diagnosis.experiment import Experiment
-from kbs_process.diagnosis.jumps import _gain, jump
+from kbs_process.diagnosis.jumps import _gain, _telling, jump
 from kbs_process.diagnosis.proposals import _along, proposed
 from kbs_process.diagnosis.scene import Scene
 from kbs_process.signals.records import Array
@@ -158,14 +158,16 @@ def test_a_clock_that_jumps_while_a_joint_turns_at_one_rate_is_a_step_of_its_ang
     shown = 0.01 * np.arange(2000.0)[:, None]
     error = -0.05 * (np.arange(2000) > 1200)[:, None] + 1e-3 * rng.standard_normal((2000, 1))
     places = np.arange(50.0, 1950.0, 10.0)
-    gain = _gain(error, np.gradient(shown, axis=0), np.ones((2000, 1), dtype=np.bool_), places)
+    gain = _gain(
+        error, np.gradient(shown, axis=0), list(_telling(error, np.ones((2000, 1), dtype=np.bool_))), places
+    )
     assert places[np.argmax(gain)] == pytest.approx(1200.0, abs=10.0)
 
 
 @pytest.mark.parametrize("there", [True, False])
 def test_no_jump_is_seen_where_nothing_is_left_or_nothing_is_there(there: bool) -> None:
     shown = np.sin(0.01 * np.arange(500.0))[:, None]
-    gain = _gain(
-        np.zeros((500, 1)), np.gradient(shown, axis=0), np.full((500, 1), there), np.arange(50.0, 450.0)
-    )
+    error = np.zeros((500, 1))
+    telling = list(_telling(error, np.full((500, 1), there)))
+    gain = _gain(error, np.gradient(shown, axis=0), telling, np.arange(50.0, 450.0))
     np.testing.assert_array_equal(gain, 0.0)

@@ -17,12 +17,11 @@ from kbs_process.diagnosis.known import Known
 from kbs_process.diagnosis.screen import Bench, Catalogued, Found, Suspect, evidence
 from kbs_process.diagnosis.shapes import bends, moved
 from kbs_process.diagnosis.signature import stamped
-from kbs_process.diagnosis.stamps import late_by, set_right
+from kbs_process.diagnosis.stamps import SIZES, late_by, set_right
 from kbs_process.estimation.bounded import bounded_minimum
 from kbs_process.signals.records import Array
 
-# s, the greatest lateness of a recording: nearer to each other than a third of a period of what rings.
-_TRIED = (0.01, 0.025, 0.045, 0.07, 0.1, 0.14, 0.19, 0.25)
+_LATEST = 0.25  # s, the greatest lateness of a recording that is tried
 _NEARER = (0.5, 0.25, 0.25, 0.12)  # steps of a shape, up and down, from the best of its grid
 _STEPS = 10  # of a search between two of them
 
@@ -73,7 +72,7 @@ def _sized(bench: Bench, suspect: Catalogued) -> tuple[Catalogued, float, float]
         }
         return height_of(bench, left)
 
-    places = np.array([-one for one in reversed(_TRIED)] + [0.0, *_TRIED])
+    places = np.sort([0.0, *(size for size in SIZES if abs(size) <= _LATEST)])
     heights = [height(float(place)) for place in places]
     best = int(np.argmin(heights))
     low, high = places[max(best - 1, 0)], places[min(best + 1, len(places) - 1)]

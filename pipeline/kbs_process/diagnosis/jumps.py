@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,8 @@ PLACES = 400  # that a recording is divided into
 _EDGE = 0.02  # of a recording, at either end, in which a jump shows too little
 _FEWEST = 8  # samples, of which a channel says something
 _LEAST = 1e-9  # of what a delay does all along, that a jump does beside it
+
+_Telling = tuple[int, NDArray[np.intp], float, Array]
 
 
 def jump(experiment: Experiment, predicted: Mapping[int, Prediction], trajectory: int, stream: str) -> float:
@@ -40,29 +42,26 @@ def jump(experiment: Experiment, predicted: Mapping[int, Prediction], trajectory
         there = channel_windows(experiment, trial, trial.valid)[:, channels] > 0.0
         rate = slope(shown, experiment.dt)
         error = trial.measured[:, channels] - shown
-        gain += _gain(error, rate, there, places)
+        telling = list(_telling(error, there))
+        gain += _gain(error, rate, telling, places)
         for k, size in enumerate(SIZES):
             change = late_by(shown, experiment.dt, np.full(len(shown), size))
-            far[k] += _relief(error, change, there, places)
+            far[k] += _relief(error, change, telling, places)
     # At the first place it is nearly all of a recording that is late: no jump.
     gain = np.maximum(gain, far.max(axis=0) - max(0.0, float(far[:, 0].max())))
     best = int(np.argmax(gain)) if gain.max() > 0.0 else PLACES // 2
     return float(places[best] * experiment.dt)
 
 
-def _gain(error: Array, rates: Array, there: Mask, places: Array) -> Array:
+def _gain(error: Array, rates: Array, telling: Sequence[_Telling], places: Array) -> Array:
     """(m,) what a jump at each of some places, in samples, takes of an error (n, c) of readings that change at `rates`.
 
-    `there` (n, c) is where a channel says something.
+    Of channels that are `telling`.
     """
     sums = np.zeros((5, len(places)))
-    for e, of_channel, valid in zip(error.T, rates.T, there.T, strict=True):
-        at = np.flatnonzero(valid)
-        noise = float(np.var(np.diff(e[at]))) if len(at) > _FEWEST else 0.0
-        if not noise > 0.0:
-            continue
-        drift = np.linalg.qr(np.stack([np.ones(len(at)), at - at.mean()], axis=1))[0]
-        rate, left = of_channel[at], e[at] - drift @ (drift.T @ e[at])
+    for channel, at, noise, drift in telling:
+        e, rate = error[at, channel], rates[at, channel]
+        left = e - drift @ (drift.T @ e)
         after = np.searchsorted(at, places)
         r2, er, u = (_after(one, after) for one in (rate**2, left * rate, drift * rate[:, None]))
         all_u = drift.T @ rate
@@ -76,17 +75,26 @@ def _gain(error: Array, rates: Array, there: Mask, places: Array) -> Array:
     return np.asarray((of_later - overlap * pull / whole) ** 2 / np.maximum(beside, _LEAST * whole))
 
 
-def _relief(error: Array, change: Array, there: Mask, places: Array) -> Array:
+def _relief(error: Array, change: Array, telling: Sequence[_Telling], places: Array) -> Array:
     """(m,) by how much squares of an error (n, c), beside a bias and its drift, fall by a change from each place on."""
     total = np.zeros(len(places))
-    for e, by, valid in zip(error.T, change.T, there.T, strict=True):
+    for channel, at, noise, drift in telling:
+        e = error[at, channel]
+        plain, less = (one - drift @ (drift.T @ one) for one in (e, e - change[at, channel]))
+        total += _after(plain**2 - less**2, np.searchsorted(at, places)) / noise
+    return total
+
+
+def _telling(error: Array, there: Mask) -> Iterator[_Telling]:
+    """Channels of an error (n, c) that say something: which, samples, variance of noise, (m, 2) a bias and its drift.
+
+    `there` (n, c) is where one does.
+    """
+    for channel, (e, valid) in enumerate(zip(error.T, there.T, strict=True)):
         at = np.flatnonzero(valid)
         noise = float(np.var(np.diff(e[at]))) if len(at) > _FEWEST else 0.0
         if noise > 0.0:
-            drift = np.linalg.qr(np.stack([np.ones(len(at)), at - at.mean()], axis=1))[0]
-            plain, less = (one - drift @ (drift.T @ one) for one in (e[at], e[at] - by[at]))
-            total += _after(plain**2 - less**2, np.searchsorted(at, places)) / noise
-    return total
+            yield channel, at, noise, np.linalg.qr(np.stack([np.ones(len(at)), at - at.mean()], axis=1))[0]
 
 
 def _after(series: Array, places: NDArray[np.intp]) -> Array:
