@@ -35,7 +35,7 @@ _BY_PLACE = ("local", "touch", "shift")  # with _angle and _width
 _PLACES = 400  # that a joint's range is divided into
 _WIDEST = 0.1  # of the range, of what has a place
 _SEEN = 20.0  # samples at a place, fewer of which count as that many
-_BY_FREQUENCY = ("floor_frequency", "mains_frequency")
+_BY_FREQUENCY = ("floor_frequency", "mains_frequency", "sway_frequency")
 
 
 def proposed(known: Known, scene: Scene) -> dict[str, tuple[float, ...]]:

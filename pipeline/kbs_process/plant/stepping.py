@@ -10,6 +10,7 @@ The rotors turn against the outputs' parabolas, the field's staircase averaged o
 velocity-dependent torque, whose slope reaches 2e4 1/s at standstill, is integrated exponentially, along the
 secant between the rates before and after; Coulomb friction exactly: the rotor stands where it can hold it.
 The carriers get the change of the rotors' momenta to the last bit, the outputs the mean torque of their gears.
+States that follow an output's angle, as bristles do, are led along its parabola, and set right with the acceleration.
 (E. Hairer, C. Lubich, G. Wanner, Geometric Numerical Integration, 2006, chapters I, VIII and XIII.)
 """
 
@@ -243,18 +244,24 @@ def kicked(structure: Structure, state: InVector) -> list[str]:
     for j in range(n):
         k, o = joint_offset(structure, j), structure.other(j)
 
-        def gear(tag: str, angle: str, rate: str, j: int = j, k: int = k, o: int = o) -> str:
+        def gear(
+            tag: str, angle: str, rate: str, own: str = f"z_{j}", j: int = j, k: int = k, o: int = o
+        ) -> str:
             rotor, other = f"0.0, theta_{j}, w_{j}, 0.0", f"q_{o}, qd_{o}, " * structure.crossed
             given = (
-                f"{rotor}, {angle}, {rate}, {other}p[{k + RATIO}], time + half, z_{j}, p, int({k + DRIVE})"
+                f"{rotor}, {angle}, {rate}, {other}p[{k + RATIO}], time + half, {own}, p, int({k + DRIVE})"
             )
-            results = ", ".join(["_", "_", f"gear{tag}", f"joint{tag}", *["_"] * (z + structure.grounded)])
+            rates = [f"d{i}{tag}" for i in range(z)]
+            results = ", ".join(["_", "_", f"gear{tag}", f"joint{tag}", *rates, *["_"] * structure.grounded])
             return f"    {results} = drive({given})"
 
+        # A state that follows the angle, as bristles do, is a spring: with the angle it would have moved, too.
+        moved = vector_of([f"z_{j}[{i}] + follows_{j}[{i}]" for i in range(z)])
         lines += [
             gear("", f"q_{j}", f"qd_{j}"),
-            gear("_q", f"q_{j} + {NUDGE}", f"qd_{j}"),
             gear("_qd", f"q_{j}", f"qd_{j} + {NUDGE}"),
+            f"    follows_{j} = {vector_of([f'd{i}_qd - d{i}' for i in range(z)])}",
+            gear("_q", f"q_{j} + {NUDGE}", f"qd_{j}", moved),
             "    stiffness = gear + joint - gear_q - joint_q",
             "    damping = gear + joint - gear_qd - joint_qd",
             f"    yields_{j} = max(0.0, ahead * stiffness + half * damping) / {NUDGE}",
@@ -275,6 +282,11 @@ def kicked(structure: Structure, state: InVector) -> list[str]:
         lines.append(f"    drifted = drift(drifted, plate_rates(alpha, {state.vector('omega')}), half)")
         lines += [f"    {state.at('alpha', i)} = drifted[{i}]" for i in range(3)]
     for j in range(n):
+        # The rotors' steps took the output along the parabola of the acceleration before. The new one's ends as far
+        # before the output's true place, by which the next step begins.
+        own = range(j * z, (j + 1) * z)
+        lines += [f"    late = 5.0 * ahead * (qdd_{j} - {state.at('qdd', j)}) / {NUDGE}"] * bool(z)
+        lines += [f"    {state.at('z', i)} += follows_{j}[{m}] * late" for m, i in enumerate(own)]
         lines += [
             f"    {state.at('qdd', j)} = qdd_{j}",
             f"    {state.at('qd', j)} += H * qdd_{j}",
