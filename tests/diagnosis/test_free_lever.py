@@ -116,7 +116,7 @@ def test_a_cord_whose_pull_is_a_weight_to_known_numbers_is_a_lead(monkeypatch: p
     view = View(here, tried, scene, every, screen(tried, every))
     covered = next(one for one in view.screening.candidates if one.suspect.family == ("bungee", "el"))
     assert covered.score.rank == 0 and not covered.significant
-    first, _ = leaders(view)
+    first, _ = leaders(view, bench.serial(made))
     print([(one.suspect.family, one.score.gain) for one in first])
     assert first[0].suspect.family == ("bungee", "el")
     assert first[0].score.gain > 2.0 * max(one.score.gain for one in view.able)

@@ -135,7 +135,7 @@ def test_where_much_is_left_all_are_raced_unless_one_does_nearly_all(
     assert here.known.excess == pytest.approx(excess, rel=1e-6)
     seen = replace(view, standing=here)
     assert here.known.gross
-    ahead, others = leaders(seen)
+    ahead, others = leaders(seen, bench.serial(here.known.experiment))
     assert [one.suspect.family for one in ahead][: len(first)] == first[: len(ahead)]
     assert (len(ahead) < len(view.able)) == (left < 1.0 / MOSTLY_DONE)
     assert {one.suspect.family for one in (*ahead, *others)} == {one.suspect.family for one in view.able}

@@ -18,7 +18,7 @@ from kbs_process.diagnosis.finding import Tried, as_it_stands, find_of
 from kbs_process.diagnosis.floor import declared
 from kbs_process.diagnosis.gate import gate
 from kbs_process.diagnosis.gls import Sums, score
-from kbs_process.diagnosis.hypothesis import Hypothesis, predict
+from kbs_process.diagnosis.hypothesis import Hypothesis, Simulate, predict
 from kbs_process.diagnosis.joint import Own, Standing, with_extra
 from kbs_process.diagnosis.leaders import gated
 from kbs_process.diagnosis.needed import Accepted
@@ -402,7 +402,9 @@ def test_what_each_recording_has_of_its_own_is_not_looked_for_where_a_law_leaves
         asked.extend(chosen)
         return [], []
 
-    def led(view: SimpleNamespace, among: Callable[[object], bool]) -> tuple[list[object], list[object]]:
+    def led(
+        view: SimpleNamespace, _: Simulate, among: Callable[[object], bool]
+    ) -> tuple[list[object], list[object]]:
         return [one for one in (repeating, own) if among(one)], []
 
     monkeypatch.setattr(rounds, "detected", lambda *_: SimpleNamespace(left=left))

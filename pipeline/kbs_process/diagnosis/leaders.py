@@ -27,6 +27,7 @@ from kbs_process.diagnosis.screen import Catalogued, Found, Suspect
 from kbs_process.diagnosis.settling import resettled
 from kbs_process.diagnosis.shapes import bends, bettered, fitted, possible, standing_still, uncovered
 from kbs_process.diagnosis.side_by_side import side_by_side
+from kbs_process.diagnosis.sizes import springs
 from kbs_process.diagnosis.suspects import BY
 from kbs_process.diagnosis.thresholds import (
     BENT,
@@ -49,13 +50,15 @@ from kbs_process.plant.effect import Effect, Port
 from kbs_process.signals.records import Array
 
 
-def leaders(view: View, among: Callable[[Found], bool] = lambda _: True) -> tuple[list[Found], list[Found]]:
+def leaders(
+    view: View, simulate: Simulate, among: Callable[[Found], bool] = lambda _: True
+) -> tuple[list[Found], list[Found]]:
     """The most probable suspects, as many as the linear plant may have in the wrong order, and a few that come next.
 
     Each with its shape bettered along the linear plant, if that could bring it among them, and with all orders that it
-    needs. Of a law that a channel can
-    show in many ways, as products of others are, the best stands for all; laws of one family at one place come after
-    the best of the others.
+    needs; what is a spring in the way of the drives' torque at the size that does most in the plant. Of a law that a
+    channel can show in many ways, as products of others are, the best stands for all; laws of one family at one place
+    come after the best of the others.
     """
     best: dict[tuple[str, ...], Found] = {}
     for found in filter(among, view.able):
@@ -63,12 +66,14 @@ def leaders(view: View, among: Callable[[Found], bool] = lambda _: True) -> tupl
     every = list(best.values())
     if not every:
         return [], []
-    most = max(found.score.gain for found in every)
+    stiff = springs(view, simulate, among)
+    every = [found for found in every if _way(found) not in {*map(_way, stiff)}]
+    most = max(found.score.gain for found in (*every, *stiff))
     able = [*every[:SHAPED], *(one for one in every[SHAPED:] if _mistimed(one, most))]
     least = (1.0 - LEAD) * most / BENT if view.ordered else 0.0
     worth = [found for found in able if found.score.gain >= least or _mistimed(found, most)]
     shaped = [*side_by_side(partial(_shaped, view, most), worth), *_covered(view, among)]
-    able = [*(with_orders(view, one) for one in shaped), *(one for one in able if one not in worth)]
+    able = [*(with_orders(view, one) for one in shaped), *stiff, *(one for one in able if one not in worth)]
     able = sorted(filter(possible, able), key=lambda found: -found.log_evidence)
     if not able:
         return [], []

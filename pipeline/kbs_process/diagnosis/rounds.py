@@ -24,14 +24,15 @@ from kbs_process.diagnosis.outcome import (
     Place,
 )
 from kbs_process.diagnosis.ports import port_test
-from kbs_process.diagnosis.remains import detected, promises_little
+from kbs_process.diagnosis.remains import detected, promises_little, searched
 from kbs_process.diagnosis.scatter import scattered
 from kbs_process.diagnosis.scene import Scene
 from kbs_process.diagnosis.screen import Found, Screening
-from kbs_process.diagnosis.settling import bent, drawn_back, resettled
-from kbs_process.diagnosis.sizes import of_mounting
+from kbs_process.diagnosis.settling import bent, drawn_back, nominal, resettled
+from kbs_process.diagnosis.sizes import in_the_way, of_mounting, springs
 from kbs_process.diagnosis.supposed import Noted, enough, supposed, wanting
 from kbs_process.diagnosis.thresholds import (
+    HIDDEN,
     LEAST_RHO,
     PROMISED,
     ROUNDS,
@@ -248,7 +249,9 @@ def _passed(
     # What each recording has of its own predicts none, and beside a law that was found takes up what its formula lacks.
     own = there.left or not accepted
     first, others = leaders(
-        view, lambda found: (own or not found.suspect.each_trial) and not in_the_shade(found, accepted)
+        view,
+        simulate,
+        lambda found: (own or not found.suspect.each_trial) and not in_the_shade(found, accepted),
     )
     if least > 0.0 and _hopeless(first, least):
         noted.refuse(first[0], "the best beside it would leave far too much")
@@ -260,6 +263,9 @@ def _passed(
         if less_is_left := [one for one in passed if one.standing.known.cost < before.known.cost]:
             passed = less_is_left
             break
+    more, less = _hidden(view, before, floor, simulate, accepted)
+    passed = [*passed, *(one for one in more if one.standing.known.cost < before.known.cost)]
+    noted.fell(*less)
     if passed:
         yield passed
     if own and (chosen := view.unrepeated[:SECOND]):
@@ -268,6 +274,20 @@ def _passed(
         noted.fell(*less)
         if more:
             yield more
+
+
+def _hidden(
+    view: View, before: Standing, floor: Floor, simulate: Simulate, accepted: Sequence[Accepted]
+) -> tuple[list[Tried], list[Tried]]:
+    """Springs in the way of a drive's torque, from numbers near the files': those that were pulled had taken them up.
+
+    A gear that is softer, or joints that seem to rub, leave little of one, and that has the form of something else.
+    """
+    if not before.known.strained or not searched(before.known.experiment):
+        return [], []
+    near = View.of(nominal(before, simulate), in_the_way)
+    chosen = springs(near, simulate, lambda found: not in_the_shade(found, accepted))
+    return tried(chosen[:HIDDEN], near, view.standing, floor, simulate)
 
 
 def _hopeless(first: Sequence[Found], least: float) -> bool:

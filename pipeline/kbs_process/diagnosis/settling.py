@@ -7,7 +7,7 @@ from kbs_process.diagnosis.hypothesis import Simulate
 from kbs_process.diagnosis.joint import Standing, standing_of
 from kbs_process.diagnosis.known import confined, settled
 from kbs_process.diagnosis.remains import detected, searched
-from kbs_process.diagnosis.thresholds import CLOSE, MOST
+from kbs_process.diagnosis.thresholds import CLOSE, MOST, NOMINAL
 
 
 def resettled(standing: Standing, floor: Floor, simulate: Simulate, *, leaps: int) -> Standing:
@@ -32,6 +32,11 @@ def drawn_back(standing: Standing, floor: Floor, simulate: Simulate) -> Standing
     held = confined(known, simulate, CLOSE, laws=standing.laws)
     kept = not bent(standing, floor) and not MOST * held.excess < known.excess
     return standing if kept else standing_of(held, standing.laws)
+
+
+def nominal(standing: Standing, simulate: Simulate) -> Standing:
+    """Known numbers nearly where the files have them: what they have taken up shows there."""
+    return standing_of(confined(standing.known, simulate, NOMINAL, laws=standing.laws), standing.laws)
 
 
 def bent(standing: Standing, floor: Floor) -> bool:

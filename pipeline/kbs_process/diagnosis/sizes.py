@@ -1,13 +1,13 @@
-"""Laws of the mounting at their size: what one does to the plate's own vibration is another thing at every size.
+"""Laws at their size, where what one does is another thing at every size: springs in the way of torque or wrench.
 
-Where the plate slips or stiffens, it rings elsewhere, and longer or shorter than without: along the vibration of a
-plant that has none of it a law promises little, and a search that begins with little creeps. So sizes are tried in the
-plant, and what each leaves is looked at beside all known numbers.
+Where the plate slips or stiffens, it rings elsewhere, and longer or shorter than without; bristles hold a joint, and a
+gear winds up otherwise. Along the motion of a plant that has none of it such a law promises little, and a search that
+begins with little creeps. So sizes are tried in the plant, and what each leaves is looked at beside all known numbers.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -16,12 +16,14 @@ from kbs_process.diagnosis.clocks import height_of
 from kbs_process.diagnosis.hypothesis import Hypothesis, Simulate
 from kbs_process.diagnosis.screen import Bench, Catalogued, Found, Suspect, evidence
 from kbs_process.diagnosis.tryout import inserted
-from kbs_process.plant.effect import Port
+from kbs_process.diagnosis.view import View
+from kbs_process.plant.effect import Effect, Port
 from kbs_process.signals.records import Array
 
-# Of what the moment about an axis varies by, the weight's along the pose included: what the law makes of the present
-# motion, rms over rms.
-_TRIED = (0.01, 0.03, 0.1, 0.3, 1.0)
+# What the law makes of the present motion, rms over rms: of what the moment about an axis varies by, the weight's along
+# the pose included, and of what a gear's torque does, where nothing sticks.
+_OF_MOMENT = (0.01, 0.03, 0.1, 0.3, 1.0)
+_OF_GEAR = (0.03, 0.1, 0.3, 1.0, 3.0)
 
 
 def of_mounting(found: Found) -> bool:
@@ -29,8 +31,26 @@ def of_mounting(found: Found) -> bool:
     return isinstance(found.suspect, Catalogued) and found.suspect.candidate.port is Port.BASE_TORQUE
 
 
+def in_the_way(suspect: Suspect) -> bool:
+    """Whether it is a spring between a rotor and what it turns: bristles where they stick, a gear as it winds up."""
+    if not (isinstance(suspect, Catalogued) and len(suspect.amplitudes) == 1):
+        return False
+    law, port = suspect.candidate.effect, suspect.candidate.port
+    if not isinstance(law, Effect) or port not in (Port.TRANSMISSION, Port.JOINT_TORQUE):
+        return False
+    return bool(law.states) or (port is Port.TRANSMISSION and "joint_angle" in law.arguments)
+
+
+def springs(view: View, simulate: Simulate, among: Callable[[Found], bool]) -> list[Found]:
+    """Springs in the way at their best size, that do more in the plant than the screen saw, the best first."""
+    every = [found for found in view.screening.candidates if in_the_way(found.suspect) and among(found)]
+    tried = [(found, sized(view.bench, found, view.suspects, simulate)) for found in every]
+    better = [best for found, best in tried if best.score.gain > found.score.gain]
+    return sorted(better, key=lambda found: -found.score.gain)
+
+
 def sized(bench: Bench, found: Found, among: Sequence[Suspect], simulate: Simulate) -> Found:
-    """A law of the mounting about one axis, at the shape `among` some and the size that leave least, if less than it.
+    """A law at one place, at the shape `among` some and the size that leave least, if less than it.
 
     Beside known numbers that are refitted to first order.
     """
@@ -72,7 +92,8 @@ def _heights(bench: Bench, models: list[Hypothesis], simulate: Simulate) -> list
 
 
 def _amplitudes(bench: Bench, suspect: Catalogued) -> Iterator[Array]:
-    """(m,) one amplitude after the other at all sizes; either way, where it is none that brakes."""
+    """(m,) one amplitude after the other at all sizes; either way, where it may have both signs."""
+    mounted = suspect.candidate.port is Port.BASE_TORQUE
     columns = [
         column for drive in bench.scene.paths for column in [suspect.inputs(drive)] if column is not None
     ]
@@ -82,13 +103,13 @@ def _amplitudes(bench: Bench, suspect: Catalogued) -> Iterator[Array]:
             for inlet, values in column[index].items():
                 units[inlet.axis] = float(np.hypot(units.get(inlet.axis, 0.0), np.std(values)))
         axis = max(units, key=lambda one: units[one])
-        moment = _moment(bench, f"T{axis}")
-        if not (units[axis] > 0.0 and moment > 0.0):
+        whole = _moment(bench, f"T{axis}") if mounted else _through(bench, suspect.candidate.site)
+        if not (units[axis] > 0.0 and whole > 0.0):
             continue
-        for share in _TRIED:
-            for sign in (1.0,) if entry.dry else (1.0, -1.0):
+        for share in _OF_MOMENT if mounted else _OF_GEAR:
+            for sign in (1.0,) if entry.dry or entry.bounds[0] >= 0.0 else (1.0, -1.0):
                 amplitude = np.zeros(len(suspect.amplitudes))
-                amplitude[index] = sign * share * moment / units[axis]
+                amplitude[index] = sign * share * whole / units[axis]
                 yield amplitude
 
 
@@ -100,3 +121,17 @@ def _moment(bench: Bench, channel: str) -> float:
     place = experiment.channels.index(channel)
     values = [bench.scene.predicted[drive].values[:, place] for drive in bench.scene.paths]
     return float(np.sqrt(np.sum([np.var(one) for one in values])))
+
+
+def _through(bench: Bench, joint: str) -> float:
+    """What varies of the torque through a joint's gear in all references, rms, N m; 0 where none is elastic."""
+    drive = bench.scene.hypothesis.rig.joint(joint).drive
+    if drive is None or "Ka" not in drive.parameters:
+        return 0.0
+    square = 0.0
+    for signals in bench.scene.signals.values():
+        column = dict(zip(signals.columns, signals.values.T, strict=True))
+        square += float(
+            np.var(column[f"rotor_angle.{joint}"] / float(drive.ratio) - column[f"joint_angle.{joint}"])
+        )
+    return float(drive.parameters["Ka"]) * float(np.sqrt(square))
