@@ -86,7 +86,9 @@ def test_a_tone_between_two_bins_is_put_there(made: Experiment) -> None:
     line[:, 0] = 0.5 * np.sin(2.0 * np.pi * tone * np.arange(n) * made.dt + 0.3)
     found = proposals(line, made)
     assert found["floor_frequency"][0] == pytest.approx(tone, abs=0.1 * apart)
-    assert found["sway_frequency"] == found["floor_frequency"]  # what hangs on a link rings at such a line
+    assert tone == pytest.approx(
+        found["sway_frequency"][0], abs=0.1 * apart
+    )  # what hangs on a link may ring there
 
 
 def test_a_line_beside_a_beat_of_the_controller_is_one(made: Experiment) -> None:

@@ -141,3 +141,18 @@ def test_blocks_do_not_show(monkeypatch: pytest.MonkeyPatch) -> None:
     pieces = run(commanded("EL089P00", 8.0), 8.0, DEFAULT_STEP, loop="closed")
     for key, values in whole.items():
         assert values.tobytes() == pieces[key].tobytes()
+
+
+@pytest.mark.parametrize(("loss", "memory"), [(1.0, 1e-6), (5.0, 5e-6)])
+def test_a_gear_far_stiffer_than_a_step_resolves_still_runs(loss: float, memory: float) -> None:
+    """To and fro at 0.5 Hz: set right by a slope that holds one way alone, shares left 1, and all diverged."""
+    t = np.arange(0.0, 4.05, 0.05)
+    size = 0.02 * np.array([1.0, 0.7])
+    swing, rate = np.outer((1.0 - np.cos(np.pi * t)) / np.pi, size), np.outer(np.sin(np.pi * t), size)
+    values = {"windup_loss": loss, "windup_memory": memory}
+    rig = attach(two_axis(), TRANSMISSION_HYSTERESIS, values, joints=["el"])
+    found = streams(
+        rig, (*NOMINAL, TRANSMISSION_HYSTERESIS.name), Schedule(t, swing, rate), rate_Hz=100.0, angle_rate_Hz=20.0,
+        duration_s=4.0, step_s=DEFAULT_STEP, quantise=False,
+    )  # fmt: skip
+    assert np.abs(found["angle"][:, 1]).max() == pytest.approx(0.028 / np.pi, abs=1e-3)

@@ -66,7 +66,7 @@ def leaders(
     every = list(best.values())
     if not every:
         return [], []
-    stiff = springs(view, simulate, among)
+    stiff = [found for found in springs(view, simulate, among) if found not in view.screening.candidates]
     every = [found for found in every if _way(found) not in {*map(_way, stiff)}]
     most = max(found.score.gain for found in (*every, *stiff))
     able = [*every[:SHAPED], *(one for one in every[SHAPED:] if _mistimed(one, most))]

@@ -48,7 +48,8 @@ class Ranges:
         if entry.over == SPECTRUM:
             return tuple(sorted(proposed))
         if not entry.over:
-            grid = tuple(sorted({*entry.grid, *proposed}))
+            low, high = entry.bounds
+            grid = tuple(sorted({*entry.grid, *(value for value in proposed if low <= value <= high)}))
             return grid or (entry.prior.middle if own is None else own,)
         signal, _, kind = entry.over.partition(".")
         span = self.spans.get((site, signal))

@@ -263,9 +263,20 @@ def _passed(
         if less_is_left := [one for one in passed if one.standing.known.cost < before.known.cost]:
             passed = less_is_left
             break
-    more, less = _hidden(view, before, floor, simulate, accepted)
-    passed = [*passed, *(one for one in more if one.standing.known.cost < before.known.cost)]
-    noted.fell(*less)
+    for one in _hidden(view, before, floor, simulate, accepted):
+        law = identity(one.found.suspect)
+        done = [other for other in (*passed, *noted.fallen) if identity(other.found.suspect) == law]
+        if any(other.standing.known.cost <= one.standing.known.cost for other in done):
+            continue
+        # Of the same law from two places the better one counts.
+        passed = [other for other in passed if other not in done]
+        for other in done:
+            if other in noted.fallen:
+                noted.forget(other)
+        if one.gate.passed and one.standing.known.cost < before.known.cost:
+            passed.append(one)
+        else:
+            noted.fell(one)
     if passed:
         yield passed
     if own and (chosen := view.unrepeated[:SECOND]):
@@ -278,16 +289,18 @@ def _passed(
 
 def _hidden(
     view: View, before: Standing, floor: Floor, simulate: Simulate, accepted: Sequence[Accepted]
-) -> tuple[list[Tried], list[Tried]]:
+) -> list[Tried]:
     """Springs in the way of a drive's torque, from numbers near the files': those that were pulled had taken them up.
 
     A gear that is softer, or joints that seem to rub, leave little of one, and that has the form of something else.
     """
     if not before.known.strained or not searched(before.known.experiment):
-        return [], []
+        return []
     near = View.of(nominal(before, simulate), in_the_way)
     chosen = springs(near, simulate, lambda found: not in_the_shade(found, accepted))
-    return tried(chosen[:HIDDEN], near, view.standing, floor, simulate)
+    worth = [found for found in chosen if found.score.gain >= LEAST_RHO**2][:HIDDEN]
+    more, less = tried(worth, near, view.standing, floor, simulate)
+    return [replace(one, screening=view.screening) for one in (*more, *less)]
 
 
 def _hopeless(first: Sequence[Found], least: float) -> bool:

@@ -42,11 +42,10 @@ def in_the_way(suspect: Suspect) -> bool:
 
 
 def springs(view: View, simulate: Simulate, among: Callable[[Found], bool]) -> list[Found]:
-    """Springs in the way at their best size, that do more in the plant than the screen saw, the best first."""
-    every = [found for found in view.screening.candidates if in_the_way(found.suspect) and among(found)]
-    tried = [(found, sized(view.bench, found, view.suspects, simulate)) for found in every]
-    better = [best for found, best in tried if best.score.gain > found.score.gain]
-    return sorted(better, key=lambda found: -found.score.gain)
+    """Springs in the way at the size that does most, in the plant or to first order, the best first."""
+    every = [found for found in view.screening.candidates if in_the_way(found.suspect)]
+    tried = [sized(view.bench, found, view.suspects, simulate) for found in every]
+    return sorted((found for found in tried if among(found)), key=lambda found: -found.score.gain)
 
 
 def sized(bench: Bench, found: Found, among: Sequence[Suspect], simulate: Simulate) -> Found:
@@ -102,6 +101,8 @@ def _amplitudes(bench: Bench, suspect: Catalogued) -> Iterator[Array]:
         for column in columns:
             for inlet, values in column[index].items():
                 units[inlet.axis] = float(np.hypot(units.get(inlet.axis, 0.0), np.std(values)))
+        if not units:
+            continue  # motion that is given, or has been measured, goes through no plant
         axis = max(units, key=lambda one: units[one])
         whole = _moment(bench, f"T{axis}") if mounted else _through(bench, suspect.candidate.site)
         if not (units[axis] > 0.0 and whole > 0.0):

@@ -240,6 +240,7 @@ def handed_over(structure: Structure, state: InVector) -> list[str]:
 def kicked(structure: Structure, state: InVector) -> list[str]:
     """Emit the multibody part's accelerations, and the end of its step."""
     n, z = structure.joints, len(structure.states)
+    units = [one.unit for effect in structure.effects for one in effect.states]
     lines = []
     for j in range(n):
         k, o = joint_offset(structure, j), structure.other(j)
@@ -286,7 +287,13 @@ def kicked(structure: Structure, state: InVector) -> list[str]:
         # before the output's true place, by which the next step begins.
         own = range(j * z, (j + 1) * z)
         lines += [f"    late = 5.0 * ahead * (qdd_{j} - {state.at('qdd', j)}) / {NUDGE}"] * bool(z)
-        lines += [f"    {state.at('z', i)} += follows_{j}[{m}] * late" for m, i in enumerate(own)]
+        for m, (i, unit) in enumerate(zip(own, units, strict=True)):
+            lines.append(f"    right = {state.at('z', i)} + follows_{j}[{m}] * late")
+            if unit == "1":
+                # A share, which slopes of one direction would lead beyond its end.
+                lines.append(f"    most = max(1.0, abs({state.at('z', i)}))")
+                lines.append("    right = max(-most, min(most, right))")
+            lines.append(f"    {state.at('z', i)} = right")
         lines += [
             f"    {state.at('qdd', j)} = qdd_{j}",
             f"    {state.at('qd', j)} += H * qdd_{j}",
