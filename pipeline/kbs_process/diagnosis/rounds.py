@@ -29,6 +29,7 @@ from kbs_process.diagnosis.scatter import scattered
 from kbs_process.diagnosis.scene import Scene
 from kbs_process.diagnosis.screen import Found, Screening
 from kbs_process.diagnosis.settling import bent, drawn_back, nominal, resettled
+from kbs_process.diagnosis.shapes import possible
 from kbs_process.diagnosis.sizes import in_the_way, of_mounting, springs
 from kbs_process.diagnosis.supposed import Noted, enough, supposed, wanting
 from kbs_process.diagnosis.thresholds import (
@@ -298,7 +299,7 @@ def _hidden(
         return []
     near = View.of(nominal(before, simulate), in_the_way)
     chosen = springs(near, simulate, lambda found: not in_the_shade(found, accepted))
-    worth = [found for found in chosen if found.score.gain >= LEAST_RHO**2][:HIDDEN]
+    worth = [found for found in chosen if possible(found) and found.score.gain >= LEAST_RHO**2][:HIDDEN]
     more, less = tried(worth, near, view.standing, floor, simulate)
     return [replace(one, screening=view.screening) for one in (*more, *less)]
 
