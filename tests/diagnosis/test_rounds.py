@@ -12,11 +12,12 @@ import pytest
 
 from kbs_process.diagnosis import believed, rounds
 from kbs_process.diagnosis import gate as gate_of
+from kbs_process.diagnosis import supposed as supposed_laws
 from kbs_process.diagnosis.as_suspect import sigma_of, suspect_of
 from kbs_process.diagnosis.experiment import Experiment
 from kbs_process.diagnosis.finding import Tried, as_it_stands, find_of
 from kbs_process.diagnosis.floor import declared
-from kbs_process.diagnosis.gate import gate
+from kbs_process.diagnosis.gate import Gate, gate
 from kbs_process.diagnosis.gls import Sums, score
 from kbs_process.diagnosis.hypothesis import Hypothesis, Simulate, predict
 from kbs_process.diagnosis.joint import Own, Standing, with_extra
@@ -478,3 +479,29 @@ def test_a_few_sigmas_place_no_law_where_others_do_as_well_elsewhere(cable: Stan
     assert not believed._as_well_elsewhere(
         few, [here, as_good], replace(cable, known=replace(cable.known, residual=loud))
     )
+
+
+@pytest.mark.parametrize(
+    ("cost", "passes", "kept"), [(5.0, True, ["b", "h"]), (8.0, True, ["a", "b"]), (5.0, False, ["a", "b"])]
+)
+def test_of_a_law_tried_from_two_places_the_better_counts(
+    monkeypatch: pytest.MonkeyPatch, cost: float, passes: bool, kept: list[str]
+) -> None:
+    """`h` is the law of `a`, which leaves 7; one that leaves no less than there was is refused, with a reason."""
+
+    def one(name: str, law: str, left: float, passed: bool = True) -> Tried:
+        gate = Gate(passed, (), True, 9.0, (1.0, 1.0), () if passed else ("x",))
+        told = SimpleNamespace(known=SimpleNamespace(cost=left, excess=left, fit_rows=1.0))
+        score = SimpleNamespace(rho_eff=1.0)
+        return Tried(SimpleNamespace(suspect=law, score=score), told, gate, None, Own((name,), ()))  # type: ignore[arg-type]
+
+    for place in (rounds, supposed_laws):
+        monkeypatch.setattr(place, "identity", lambda suspect: suspect)
+    noted = Noted()
+    before = SimpleNamespace(known=SimpleNamespace(cost=10.0))
+    passed = [one("a", "one", 7.0), one("b", "two", 6.0)]
+    hidden = [one("h", "one", cost, passes), one("far", "three", 11.0)]
+    joined = rounds._joined(passed, hidden, before, noted)  # type: ignore[arg-type]
+    assert [two.own.names[0] for two in joined] == kept
+    told = {two.own.names[0]: two.gate.reasons for two in noted.fallen}
+    assert told == {"far": ("no less is left with it than without",)}

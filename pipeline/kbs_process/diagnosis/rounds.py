@@ -264,20 +264,7 @@ def _passed(
         if less_is_left := [one for one in passed if one.standing.known.cost < before.known.cost]:
             passed = less_is_left
             break
-    for one in _hidden(view, before, floor, simulate, accepted):
-        law = identity(one.found.suspect)
-        done = [other for other in (*passed, *noted.fallen) if identity(other.found.suspect) == law]
-        if any(other.standing.known.cost <= one.standing.known.cost for other in done):
-            continue
-        # Of the same law from two places the better one counts.
-        passed = [other for other in passed if other not in done]
-        for other in done:
-            if other in noted.fallen:
-                noted.forget(other)
-        if one.gate.passed and one.standing.known.cost < before.known.cost:
-            passed.append(one)
-        else:
-            noted.fell(one)
+    passed = _joined(passed, _hidden(view, before, floor, simulate, accepted), before, noted)
     if passed:
         yield passed
     if own and (chosen := view.unrepeated[:SECOND]):
@@ -302,6 +289,28 @@ def _hidden(
     worth = [found for found in chosen if possible(found) and found.score.gain >= LEAST_RHO**2][:HIDDEN]
     more, less = tried(worth, near, view.standing, floor, simulate)
     return [replace(one, screening=view.screening) for one in (*more, *less)]
+
+
+def _joined(passed: Sequence[Tried], hidden: Sequence[Tried], before: Standing, noted: Noted) -> list[Tried]:
+    """Laws that passed with those `hidden` that did: of one law, tried from two places, the better counts."""
+    every = list(passed)
+    for one in hidden:
+        law = identity(one.found.suspect)
+        done = [other for other in (*every, *noted.fallen) if identity(other.found.suspect) == law]
+        less = any(other.standing.known.cost <= one.standing.known.cost for other in done)
+        if less or (not one.gate.passed and any(other.gate.passed for other in done)):
+            continue
+        for other in done:
+            if other in noted.fallen:
+                noted.forget(other)
+        every = [other for other in every if other not in done]
+        if one.standing.known.cost >= before.known.cost:
+            noted.fell(replace(one, gate=one.gate.but("no less is left with it than without")))
+        elif one.gate.passed:
+            every.append(one)
+        else:
+            noted.fell(one)
+    return every
 
 
 def _hopeless(first: Sequence[Found], least: float) -> bool:
