@@ -114,6 +114,9 @@ def test_orders_of_a_motor_are_proposed_for_its_gear_and_its_microsteps_too(made
     line[:, made.channels.index("Tz")] = 3.0 * (np.sin(5.0 * angle) + np.sin(cycles * angle))
     found = proposals(line, made)
     assert {5.0, cycles} <= set(found["kinematic_order.az"])
+    # What changes as the output turns, too, has lines between whole ones.
+    of_output = found["joint_order.az"]
+    assert of_output and {order / ratio for order in of_output} <= set(found["kinematic_order.az"])
     assert found["order.az"] == found["ripple_order.az"] == found["kinematic_order.az"]
     assert found["microstep_order.az"] == (1.0,)
     assert "order.el" not in found  # it turns its motor by less than two turns

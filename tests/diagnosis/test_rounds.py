@@ -14,6 +14,7 @@ from kbs_process.diagnosis import believed, rounds
 from kbs_process.diagnosis import gate as gate_of
 from kbs_process.diagnosis import supposed as supposed_laws
 from kbs_process.diagnosis.as_suspect import sigma_of, suspect_of
+from kbs_process.diagnosis.effort import Effort
 from kbs_process.diagnosis.experiment import Experiment
 from kbs_process.diagnosis.finding import Tried, as_it_stands, find_of
 from kbs_process.diagnosis.floor import declared
@@ -353,13 +354,14 @@ def test_what_numbers_gain_where_they_were_drawn_back_is_no_law_s(
     done = rounds._round(cable, back, floor, simulate, [])
     assert (done.seen, done.standing) == (back, alone)
     assert asked == [(back, alone)]
-    told = rounds._diagnosed(cable.known, floor, simulate, detected(cable, floor, experiment.fit))
+    effort = Effort(simulate, cable.known)
+    told = rounds._diagnosed(cable.known, floor, effort, detected(cable, floor, experiment.fit))
     assert told.standing.known.residual is alone.known.residual
     # What they are known to is told by their scatter, too.
     np.testing.assert_array_equal(told.standing.known.covariance, scattered(alone.known))
     assert told.after.ratio < told.before.ratio
     # Numbers that nothing has pulled stay where they are.
-    rounds._diagnosed(cable.known, floor, simulate, detected(cable, floor, experiment.fit), pulled=False)
+    rounds._diagnosed(cable.known, floor, effort, detected(cable, floor, experiment.fit), pulled=False)
     assert asked[-1][0].known is cable.known
 
 
@@ -413,7 +415,9 @@ def test_what_each_recording_has_of_its_own_is_not_looked_for_where_a_law_leaves
     monkeypatch.setattr(rounds, "in_the_shade", lambda *_: ())
     monkeypatch.setattr(rounds, "leaders", led)
     monkeypatch.setattr(rounds, "tried", simulated)
-    view = SimpleNamespace(able=[], unrepeated=[own], standing=cable)
+    view = SimpleNamespace(
+        able=[], unrepeated=[own], standing=cable, screening=SimpleNamespace(candidates=())
+    )
     floor, simulate = declared(cable.known.experiment), bench.serial(cable.known.experiment)
     assert list(rounds._passed(view, cable, floor, simulate, accepted, Noted())) == []  # type: ignore[arg-type]
     assert asked[0] is repeating

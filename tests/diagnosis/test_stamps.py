@@ -9,14 +9,17 @@ import numpy as np
 import pytest
 from test_rounds import candidate, standing
 
+from kbs_process.diagnosis import mistimed, rounds
 from kbs_process.diagnosis.clocks import timed
 from kbs_process.diagnosis.each_recording import taken_off, taken_off_again
 from kbs_process.diagnosis.finding import find_of
+from kbs_process.diagnosis.floor import declared
 from kbs_process.diagnosis.joint import Standing
 from kbs_process.diagnosis.jumps import jump
 from kbs_process.diagnosis.scene import Scene
 from kbs_process.diagnosis.screen import Bench, Catalogued, screen
 from kbs_process.diagnosis.stamps import late_by, set_right, slope
+from kbs_process.diagnosis.supposed import Noted
 from kbs_process.diagnosis.view import View
 from kbs_process.signals.records import Array
 
@@ -164,3 +167,41 @@ def test_a_clock_that_jumps_by_periods_is_taken_off_at_its_place_and_size(lost: 
     when = jump(known.experiment, rung, 0, "wrench")
     assert when == pytest.approx(17.3, abs=0.3)
     assert all(told.standing.known.chi2 < 0.2 * known.chi2)
+    # It is told before any law is simulated, and recordings are stamped anew by it for numbers that it has not pulled.
+    floor, simulate = declared(known.experiment), bench.serial(known.experiment)
+    view = View.of(here, lambda one: isinstance(one, Catalogued) and one.of_clock, linear=False)
+    jumped = min(rounds._jumped(view, floor, simulate, Noted()), key=lambda one: one.standing.known.cost)
+    assert jumped.found.suspect.family == ("clock_drops", "wrench")
+    anew = mistimed._stamped_anew(known)
+    assert anew is not None
+    for trial, right in zip(anew.trials, made.trials, strict=True):
+        apart = (trial.measured - right.measured - ringing)[(t > 18.5) & (t < 39.0), :6]
+        assert np.quantile(np.abs(apart), 0.95) < 0.1 * np.std(ringing[:, 0])
+
+
+def test_what_all_recordings_share_of_a_clock_is_no_jump() -> None:
+    made = bench.experiment(bench.rig(), ("fit", "fit", "held-out"), 9, seconds=40.0)
+    t = DT * np.arange(800)
+    ringing = np.sin(2.0 * np.pi * (2.0 + 0.04 * t) * t)[:, None] * np.r_[np.full(6, 0.2), 0.0, 0.0]
+    trials = []
+    for trial in made.trials:
+        whole = trial.measured + ringing
+        whole[:, :6] += late_by(whole[:, :6], DT, 2e-3 * t)
+        trials.append(replace(trial, measured=whole * trial.valid[:, None]))
+    here = standing(replace(made, trials=tuple(trials)))
+    rung = {0: replace(here.predicted[0], values=here.predicted[0].values + ringing)}
+    residual = tuple(
+        m(trial.measured - rung[0].values)
+        for m, trial in zip(here.known.metric, here.known.experiment.trials, strict=True)
+    )
+    known = replace(here.known, shown=rung, residual=residual)
+    assert known.gross
+    view = View.of(
+        Standing(known, rung, {}), lambda one: isinstance(one, Catalogued) and one.of_clock, linear=False
+    )
+    noted = Noted()
+    assert rounds._jumped(view, declared(known.experiment), bench.serial(known.experiment), noted) == []
+    anew = mistimed._stamped_anew(known)
+    assert anew is not None
+    late = (anew.trials[2].measured - made.trials[2].measured - ringing)[(t > 1.0) & (t < 38.0), :6]
+    assert np.quantile(np.abs(late), 0.95) < 0.1 * np.std(ringing[:, 0])

@@ -12,6 +12,7 @@ import pytest
 from test_rounds import ROLES, passed, screened, standing, with_cable
 
 from kbs_process.diagnosis import rounds
+from kbs_process.diagnosis.effort import Effort
 from kbs_process.diagnosis.experiment import Experiment
 from kbs_process.diagnosis.finding import Tried
 from kbs_process.diagnosis.floor import declared
@@ -115,7 +116,7 @@ def test_each_of_a_pair_has_to_be_found_beside_the_other(
     for name in ("without", "bare"):
         monkeypatch.setattr(rounds, name, lambda here, *_: here)
     empty = rounds._Round(None, cable, cable, first.screening, noted, None)
-    pair = rounds._pair(empty, declared(made), bench.serial(made), [])
+    pair = rounds._pair(empty, declared(made), Effort(bench.serial(made), known), [])
     assert asked[0] == ["ground_cable"]
     if left[0] > 1.0 - MOSTLY_DONE:
         assert len(asked) == 1
@@ -134,7 +135,9 @@ def test_no_law_is_simulated_where_the_best_would_leave_far_too_much(
     tried, scene, found = screened(cable)
     law = passed(cable, tried, scene, found, "ground_cable")
     floor, simulate = declared(cable.known.experiment), bench.serial(cable.known.experiment)
-    view = SimpleNamespace(able=[law.found], unrepeated=[], standing=cable)
+    view = SimpleNamespace(
+        able=[law.found], unrepeated=[], standing=cable, screening=SimpleNamespace(candidates=())
+    )
     monkeypatch.setattr(rounds, "leaders", lambda *_: ([law.found], []))
     monkeypatch.setattr(rounds, "tried", lambda *_: ([law], []))
     noted = Noted()

@@ -49,6 +49,12 @@ def warnings(campaign: Campaign, floor: Floor, outcome: Outcome) -> Iterator[Not
             "known parameters that were not found, would pass too",
             remedy="hold out a recording of another trajectory",
         )
+    if outcome.ended and outcome.verdict == "undecided":
+        yield Notice(
+            severity="warning",
+            what="the search was ended after as much work as it may cost: laws beside those that were tried were not",
+            remedy="give what is known of the rig's parameters closer, or diagnose recordings that show one joint",
+        )
     if floor.source == "declared":
         yield Notice(
             severity="warning",

@@ -23,7 +23,7 @@ from kbs_process.diagnosis.known import Known
 from kbs_process.diagnosis.plausible import oversized
 from kbs_process.diagnosis.screen import Catalogued, Found, Suspect
 from kbs_process.diagnosis.stamps import SIZES
-from kbs_process.diagnosis.thresholds import FALSE_ALARM
+from kbs_process.diagnosis.thresholds import FALSE_ALARM, MOSTLY_DONE
 from kbs_process.diagnosis.view import View
 from kbs_process.signals.records import Array
 
@@ -44,27 +44,32 @@ class _Off:
 
 
 def taken_off(found: Found, view: View) -> Tried:
-    """A suspect of a view taken off each recording, and the gate's verdict: every one has to show it all through."""
+    """A suspect of a view taken off each recording, and the gate's verdict: every one has to show it all through.
+
+    Of what leaves little of much, half of them: others may show it in one part alone, as a jump before the last turn.
+    """
     suspect, known = found.suspect, view.standing.known
     experiment = known.experiment
     references = {experiment.reference(k) for k in range(len(experiment.repeats))}
     plain = {drive: view.bench.signatures([suspect], drive) for drive in references}
     off = _each(suspect, known, plain)
+    standing = _without(view.standing, off)
     folds, strengths = [], []
-    for k, one in enumerate(off):
-        if experiment.trials[k].role == "calibration":
-            continue
-        gained = _even_gain(one, k, known)
-        strengths.append(gained)
-        rows = float(known.rows[k])
+    shown = [k for k in range(len(off)) if experiment.trials[k].role != "calibration"]
+    bounds = {k: float(chi2.isf(FALSE_ALARM / suspect.places, max(off[k].rank, 1))) for k in shown}
+    evenly_gained = {k: _even_gain(off[k], k, known) for k in shown}
+    mostly = standing.known.excess < (1.0 - MOSTLY_DONE) * known.excess
+    half = mostly and 2 * sum(evenly_gained[k] > bounds[k] for k in shown) >= len(shown)
+    for k in shown:
+        one, rows = off[k], float(known.rows[k])
         before, after = (float(z @ z) / rows for z in (known.residual[k], one.left))
-        bound = float(chi2.isf(FALSE_ALARM / suspect.places, max(one.rank, 1)))
-        folds.append(Fold(experiment.trials[k].name, before, after, gained - bound))
+        gained = one.gain if half else evenly_gained[k]
+        strengths.append(gained)
+        folds.append(Fold(experiment.trials[k].name, before, after, gained - bounds[k]))
     worse = tuple(fold.trial for fold in folds if fold.gain <= 0.0)
     reasons = (f"{', '.join(worse)} do not show it, all through",) if worse else ()
     if len(folds) < 2:
         reasons = (*reasons, "one recording alone cannot show that it comes again")
-    standing = _without(view.standing, off)
     verdict = Gate(
         not reasons,
         tuple(folds),

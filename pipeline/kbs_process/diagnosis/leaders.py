@@ -43,7 +43,7 @@ from kbs_process.diagnosis.thresholds import (
     SHAPED,
     TOLERATED,
 )
-from kbs_process.diagnosis.tryout import extra_of, identity, in_plant
+from kbs_process.diagnosis.tryout import extra_of, identity, in_plant, of_every_clock
 from kbs_process.diagnosis.view import View
 from kbs_process.diagnosis.witnesses import blind
 from kbs_process.plant.effect import Effect, Port
@@ -93,8 +93,7 @@ def _shaped(view: View, most: float, found: Found) -> Found:
 
 def _mistimed(found: Found, most: float) -> bool:
     """Whether it is the error of a clock, the same in all recordings, that does some of the `most` that any does."""
-    clock = isinstance(found.suspect, Catalogued) and found.suspect.of_every_clock
-    return clock and found.score.gain >= MISTIMED * most
+    return of_every_clock(found) and found.score.gain >= MISTIMED * most
 
 
 def _covered(view: View, among: Callable[[Found], bool]) -> list[Found]:

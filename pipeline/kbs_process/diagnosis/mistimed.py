@@ -9,18 +9,21 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from kbs_process.diagnosis import phasing
 from kbs_process.diagnosis.clocks import by_a_right_clock, height_of, timed
+from kbs_process.diagnosis.each_recording import taken_off
 from kbs_process.diagnosis.experiment import Experiment
 from kbs_process.diagnosis.floor import Floor
 from kbs_process.diagnosis.hypothesis import Hypothesis, Simulate
 from kbs_process.diagnosis.joint import Standing
 from kbs_process.diagnosis.known import Known, as_it_is, confined, refit
 from kbs_process.diagnosis.screen import Catalogued, Found, Suspect
-from kbs_process.diagnosis.thresholds import CLOSE, MOST
+from kbs_process.diagnosis.thresholds import CLOSE, MOST, TOLERATED
 from kbs_process.diagnosis.view import View
 
-_TIMES = 2  # that recordings are stamped anew, each time by what the numbers of before leave
+_TIMES = 3  # that recordings are stamped anew, each time by what the numbers of before leave
 
 
 def by_another_clock(known: Known, floor: Floor, simulate: Simulate, reach: float) -> Known | None:
@@ -31,10 +34,9 @@ def by_another_clock(known: Known, floor: Floor, simulate: Simulate, reach: floa
     here, right = confined(known, simulate, CLOSE), None
     most = MOST * known.excess
     for _ in range(_TIMES):
-        found = _clock(here)
-        if found is None:
+        experiment = _stamped_anew(here)
+        if experiment is None:
             break
-        experiment = _stamped_anew(here, found)
         nominal = Hypothesis(experiment.rig, experiment.effects)
         start = phasing.begin(experiment, nominal, floor, simulate)
         again = refit(experiment, start, floor, simulate, reach=reach, leaps=1)
@@ -42,34 +44,48 @@ def by_another_clock(known: Known, floor: Floor, simulate: Simulate, reach: floa
             break
         most = again.excess
         right = as_it_is(replace(again, experiment=known.experiment), simulate)
-        if not again.gross:
+        if again.excess < TOLERATED * again.fit_rows:
             break
         here = right
     return right
 
 
-def _clock(known: Known) -> Found | None:
-    """The error of a clock, one of all recordings, that does most of what is to be done; None if none does."""
-    view = View.of(Standing(known, known.shown, {}), _of_all, linear=False)
-    candidates = view.screening.candidates
-    if not candidates:
-        return None
-    tried = [timed(view.bench, one, view.suspects) for one in candidates]
-    best = max(tried, key=lambda one: one.score.gain)
+def _stamped_anew(known: Known) -> Experiment | None:
+    """The recordings stamped by a clock that is right where one error of one does most of what is to be done.
+
+    The error is the same in all recordings, or a jump, which each has of its own; None, if none does as much.
+    """
+    view = View.of(Standing(known, known.shown, {}), _of_a_clock, linear=False)
+    bench = view.bench
     # Beside numbers refitted to first order, which do a part of what is to be done in any case.
-    alone = height_of(view.bench, view.bench.background.z) + known.prior_chi2 - known.fit_rows
-    return best if alone > 0.0 and alone - best.score.gain <= MOST * alone else None
+    alone = height_of(bench, bench.background.z) + known.prior_chi2 - known.fit_rows
+    stamped = [
+        _each_stamped(view, one) if one.suspect.each_trial else _all_stamped(view, one)
+        for one in view.screening.candidates
+    ]
+    gain, experiment = max(stamped, key=lambda one: one[0], default=(0.0, known.experiment))
+    return experiment if alone > 0.0 and alone - gain <= MOST * alone else None
 
 
-def _of_all(suspect: Suspect) -> bool:
-    return isinstance(suspect, Catalogued) and suspect.of_every_clock
+def _of_a_clock(suspect: Suspect) -> bool:
+    return isinstance(suspect, Catalogued) and suspect.of_clock
 
 
-def _stamped_anew(known: Known, found: Found) -> Experiment:
+def _all_stamped(view: View, found: Found) -> tuple[float, Experiment]:
+    """Gain of -2 log likelihood by an error that all recordings share, and what they are without it."""
+    known, found = view.standing.known, timed(view.bench, found, view.suspects)
     suspect, experiment = found.suspect, known.experiment
     assert isinstance(suspect, Catalogued)
     trials = []
     for k, trial in enumerate(experiment.trials):
         late = suspect.late(experiment.reference(trial.trajectory))[:, 0] * float(found.score.amplitude[0])
         trials.append(replace(trial, measured=by_a_right_clock(suspect, known, k, late)[0]))
-    return replace(experiment, trials=tuple(trials))
+    return found.score.gain, replace(experiment, trials=tuple(trials))
+
+
+def _each_stamped(view: View, found: Found) -> tuple[float, Experiment]:
+    """The same of an error of each recording's own, less what so many numbers gain by chance."""
+    bench, without = view.bench, taken_off(found, view).standing.known
+    left = {k: without.residual[k] for k in bench.background.z}
+    chance = len(left) * float(np.log(view.standing.known.fit_rows))
+    return height_of(bench, bench.background.z) - height_of(bench, left) - chance, without.experiment

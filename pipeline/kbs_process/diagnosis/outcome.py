@@ -163,6 +163,7 @@ class Outcome:
     known: Known  # refitted, without any law: what stood before the first find
     standing: Standing  # the corrected model
     otherwise: tuple[Moved, ...] = ()  # known parameters that would have to be off if there were no law
+    ended: bool = False  # whether the search had cost so much that no more laws were looked for
 
     @property
     def verdict(self) -> Verdict:

@@ -42,12 +42,14 @@ def proposed(known: Known, scene: Scene) -> dict[str, tuple[float, ...]]:
     """Values to try beside the grids: parameter name, of one site "name.site" -> values that residuals propose."""
     lines = _frequencies(known)
     found = dict.fromkeys(_BY_FREQUENCY, lines) | {"jitter_frequency": _beats(known, lines)}
+    of_joints = _of_joints(known, scene)
     for joint, orders in _orders(known, scene).items():
-        found |= {f"{name}.{joint}": orders for name in _BY_ORDER}
+        beside = _in_turns_of_the_motor(known, joint, of_joints.get(joint, ()))
+        found |= {f"{name}.{joint}": (*orders, *beside) for name in _BY_ORDER}
         found[f"microstep_order.{joint}"] = _of_cycles(known, joint, orders)
     found |= _between_lines(known, _of_discs(known))
     found |= {f"profile_period.{joint}": periods for joint, periods in periods(known, scene).items()}
-    found |= {f"joint_order.{joint}": lines for joint, lines in _of_joints(known, scene).items()}
+    found |= {f"joint_order.{joint}": lines for joint, lines in of_joints.items()}
     for joint, (angle, width) in _local(known, scene).items():
         for name in _BY_PLACE:
             # What has been passed rings on for a while.
@@ -160,6 +162,15 @@ def _orders(known: Known, scene: Scene) -> dict[str, tuple[float, ...]]:
         joint: _apart([value for _, value in sorted(lines, reverse=True)], 0.5)
         for joint, lines in found.items()
     }
+
+
+def _in_turns_of_the_motor(known: Known, joint: str, lines: tuple[float, ...]) -> tuple[float, ...]:
+    """Orders of a joint as those of its motor: what is periodic in the motor's turns may be so in the output's, too.
+
+    A ripple whose depth changes as the output turns has lines beside its own.
+    """
+    drive = known.experiment.rig.joint(joint).drive
+    return () if drive is None else tuple(line / float(drive.ratio) for line in lines)
 
 
 def _of_cycles(known: Known, joint: str, orders: tuple[float, ...]) -> tuple[float, ...]:

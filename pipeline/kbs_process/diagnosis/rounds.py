@@ -8,7 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kbs_process.diagnosis.believed import believed
+from kbs_process.diagnosis.clocks import timed
 from kbs_process.diagnosis.detection import Detection
+from kbs_process.diagnosis.effort import Effort
 from kbs_process.diagnosis.finding import Tried, as_it_stands, find_of, merged, trusted
 from kbs_process.diagnosis.floor import Floor
 from kbs_process.diagnosis.hypothesis import Simulate
@@ -35,13 +37,14 @@ from kbs_process.diagnosis.supposed import Noted, enough, supposed, wanting
 from kbs_process.diagnosis.thresholds import (
     HIDDEN,
     LEAST_RHO,
+    MOST,
     PROMISED,
     ROUNDS,
     SECOND,
     TRUST,
     TRUST_PART,
 )
-from kbs_process.diagnosis.tryout import identity
+from kbs_process.diagnosis.tryout import identity, of_every_clock, of_one_clock
 from kbs_process.diagnosis.view import View
 
 
@@ -70,16 +73,17 @@ def diagnose(
     left out, if both together are likelier by as much as a law has to bring. Numbers that were found `beside` the error
     of a clock have not been pulled by it.
     """
+    effort = Effort(simulate, known)
     if near is not None:
         left = detected(standing_of(near, {}), floor, near.experiment.fit)
-        instead = _diagnosed(near, floor, simulate, left, at_once=True, pulled=not beside)
+        instead = _diagnosed(near, floor, effort, left, at_once=True, pulled=not beside)
         if instead.finds:
-            alone = _alone(known, near, instead.standing.known, floor, simulate)
+            alone = _alone(known, near, instead.standing.known, floor, effort)
             if instead.standing.known.cost < alone.cost - LEAST_RHO**2:
                 return replace(instead, otherwise=_moved(alone))
             if alone is not known:
                 known, before = alone, detected(standing_of(alone, {}), floor, alone.experiment.fit)
-    return _diagnosed(known, floor, simulate, before)
+    return _diagnosed(known, floor, effort, before)
 
 
 def _alone(known: Known, near: Known, beside: Known, floor: Floor, simulate: Simulate) -> Known:
@@ -101,7 +105,7 @@ def _alone(known: Known, near: Known, beside: Known, floor: Floor, simulate: Sim
 def _diagnosed(
     known: Known,
     floor: Floor,
-    simulate: Simulate,
+    simulate: Effort,
     before: Detection,
     *,
     at_once: bool = False,
@@ -110,7 +114,7 @@ def _diagnosed(
     """Find what one refit of the known parameters leaves out.
 
     What numbers alone explain, far from their priors, one law has to explain `at_once`, but for what may be another's:
-    laws that leave much are not looked beyond.
+    laws that leave much are not looked beyond. A search that has cost too much ends with what it has found.
     """
     begun = Standing(known, known.shown, {})
     standing = begun
@@ -127,7 +131,7 @@ def _diagnosed(
         if not found:
             break
         accepted += found
-        if (at_once and standing.known.gross) or not _goes_on(standing, floor):
+        if (at_once and standing.known.gross) or not _goes_on(standing, floor) or simulate.spent:
             break
     last = rounds[-1]
     kept, standing, fallen = needed(accepted, standing, floor, simulate)
@@ -155,6 +159,7 @@ def _diagnosed(
         left=left,
         known=known,
         standing=told,
+        ended=simulate.spent,
     )
     return replace(outcome, finds=trusted(outcome.finds, TRUST_PART if outcome.much else TRUST))
 
@@ -202,13 +207,15 @@ def _round(
     return _Round(None, standing, seen, view.screening, noted, place)
 
 
-def _pair(last: _Round, floor: Floor, simulate: Simulate, accepted: Sequence[Accepted]) -> tuple[_Round, ...]:
+def _pair(last: _Round, floor: Floor, simulate: Effort, accepted: Sequence[Accepted]) -> tuple[_Round, ...]:
     """Two rounds that find two laws, of which neither passes without the other, where the `last` one found none.
 
     One that did not pass is supposed; if another passes beside it, the supposed one is taken out of the plant, and has
     to be found beside the other like any law.
     """
     for one in supposed(last.noted.fallen, last.standing.known):
+        if simulate.spent:
+            break
         told = find_of([one], 0, np.ones(1), last.standing, None)
         there = one.standing if one.leapt else resettled(one.standing, floor, simulate, leaps=1)
         beside = [*accepted, Accepted(one, told, last.standing)]
@@ -249,6 +256,8 @@ def _passed(
             noted.refuse(found, *reasons)
     # What each recording has of its own predicts none, and beside a law that was found takes up what its formula lacks.
     own = there.left or not accepted
+    if own and (jumped := _jumped(view, floor, simulate, noted)):
+        yield jumped
     first, others = leaders(
         view,
         simulate,
@@ -275,18 +284,40 @@ def _passed(
             yield more
 
 
+def _jumped(view: View, floor: Floor, simulate: Simulate, noted: Noted) -> list[Tried]:
+    """Jumps of a clock that do most of so much that numbers may have been pulled, before any law is simulated.
+
+    To first order a jump by a period of what rings does nothing, so the screen's order says nothing of them. They have
+    to do more than an error of a clock that all recordings share.
+    """
+    known, every = view.standing.known, view.screening.candidates
+    chosen = [one for one in every if of_one_clock(one)]
+    if not (known.gross and chosen):
+        return []
+    more, less = tried(chosen, view, view.standing, floor, simulate)
+    noted.fell(*less)
+    jumps = [one for one in more if one.standing.known.excess < MOST * known.excess]
+    if not jumps:
+        return []
+    shared = [timed(view.bench, one, view.suspects) for one in every if of_every_clock(one)]
+    most = max((one.score.gain for one in shared), default=0.0)
+    return [one for one in jumps if known.cost - one.standing.known.cost > most]
+
+
 def _hidden(
     view: View, before: Standing, floor: Floor, simulate: Simulate, accepted: Sequence[Accepted]
 ) -> list[Tried]:
     """Springs in the way of a drive's torque, from numbers near the files': those that were pulled had taken them up.
 
-    A gear that is softer, or joints that seem to rub, leave little of one, and that has the form of something else.
+    A gear that is softer, or joints that seem to rub, leave little of one, and that has the form of something else. One
+    that does less than half of what they do by being elsewhere is not what has pulled them.
     """
     if not before.known.strained or not searched(before.known.experiment):
         return []
     near = View.of(nominal(before, simulate), in_the_way)
     chosen = springs(near, simulate, lambda found: not in_the_shade(found, accepted))
-    worth = [found for found in chosen if possible(found) and found.score.gain >= LEAST_RHO**2][:HIDDEN]
+    least = max(LEAST_RHO**2, MOST * (near.standing.known.cost - before.known.cost))
+    worth = [found for found in chosen if possible(found) and found.score.gain >= least][:HIDDEN]
     more, less = tried(worth, near, view.standing, floor, simulate)
     return [replace(one, screening=view.screening) for one in (*more, *less)]
 

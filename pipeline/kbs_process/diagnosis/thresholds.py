@@ -151,6 +151,8 @@ WHILE: Final = 0.6
 # Share of an order's signature that other orders have not, from which on it is another one.
 ITS_OWN: Final = 0.5
 ROUNDS: Final = 5  # finds in one campaign at most
+# Slopes of all known numbers, along every motion, that a search may cost; then no more laws are looked for.
+EFFORT: Final = 1000.0
 
 # -- two laws ------------------------------------------------------------------------------------------------------
 RIVALS: Final = 4.65  # rho_delta: P(wrong) = Q(rho_delta / 2) = 1 %

@@ -86,6 +86,16 @@ def in_plant(suspect: Suspect) -> bool:
     )
 
 
+def of_one_clock(found: Found) -> bool:
+    """Whether it is the error of a clock that each recording has of its own."""
+    return isinstance(found.suspect, Catalogued) and found.suspect.of_clock and found.suspect.each_trial
+
+
+def of_every_clock(found: Found) -> bool:
+    """Whether it is the error of a clock, the same in all recordings."""
+    return isinstance(found.suspect, Catalogued) and found.suspect.of_every_clock
+
+
 def extra_of(found: Found, standing: Standing, bench: Bench, scene: Scene) -> Extra:
     """The suspect at the screen's amplitudes, of which its bounds are all that is known.
 

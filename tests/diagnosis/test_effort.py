@@ -1,0 +1,30 @@
+"""What a search may cost is counted alike on every machine, and ends it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import bench
+import pytest
+
+from kbs_process.diagnosis import effort
+from kbs_process.diagnosis.effort import Effort
+from kbs_process.stages.output_error import Scalar
+
+
+def test_a_pass_is_every_motion_with_every_number_moved(monkeypatch: pytest.MonkeyPatch) -> None:
+    made = bench.experiment(bench.rig(), ("fit", "held-out"), 3, seconds=20.0)
+    known = bench.standing(made, (Scalar("joint.el.drive.Ka"), Scalar("joint.az.drive.Ka"))).known
+    simulated = Effort(bench.serial(made), known)
+    shown = simulated([(0, known.hypothesis)] * len(known.free))
+    assert len(shown) == len(known.free)
+    assert simulated.passes == pytest.approx(1.0)
+    # A law more costs more.
+    more = replace(known.hypothesis, effects=(*known.hypothesis.effects, known.hypothesis.effects[0]))
+    simulated([(0, more)])
+    own = len(known.hypothesis.effects)
+    assert simulated.passes == pytest.approx(1.0 + (own + 1) / own / len(known.free))
+    monkeypatch.setattr(effort, "EFFORT", 1.2)
+    assert simulated.spent
+    monkeypatch.setattr(effort, "EFFORT", 2.0)
+    assert not simulated.spent
