@@ -167,6 +167,10 @@ def test_a_clock_that_jumps_by_periods_is_taken_off_at_its_place_and_size(lost: 
     when = jump(known.experiment, rung, 0, "wrench")
     assert when == pytest.approx(17.3, abs=0.3)
     assert all(told.standing.known.chi2 < 0.2 * known.chi2)
+    # What is read about the jump says nothing: there are as many stamps as one may have had.
+    for one in told.standing.known.experiment.trials:
+        lacks = one.measured[:, :6] - rung[0].values[:, :6]
+        assert np.abs(np.diff(lacks[(t > 16.6) & (t < 18.0)], n=2, axis=0)).max() < 1e-9
     # It is told before any law is simulated, and recordings are stamped anew by it for numbers that it has not pulled.
     floor, simulate = declared(known.experiment), bench.serial(known.experiment)
     view = View.of(here, lambda one: isinstance(one, Catalogued) and one.of_clock, linear=False)

@@ -23,6 +23,8 @@ from kbs_process.signals.records import Array
 
 _LATEST = 0.25  # s, the greatest lateness of a recording that is tried
 _NEARER = (0.5, 0.25, 0.25, 0.12)  # steps of a shape, up and down, from the best of its grid
+_JUMP = 0.1  # of the time between two samples, by which a clock changes there that jumps
+_BETWEEN = 1.0  # s, on either side of a jump
 _STEPS = 10  # of a search between two of them
 
 
@@ -37,6 +39,27 @@ def by_a_right_clock(suspect: Catalogued, known: Known, k: int, late: Array) -> 
     instead = measured[:, acted] - late_by(shown, experiment.dt, late)
     measured[:, acted] = np.where(there[:, None], values, instead) * trial.valid[:, None]
     return measured, known.residual[k] + known.metric[k](measured - trial.measured)
+
+
+def unread(suspect: Catalogued, known: Known, k: int, late: Array, measured: Array) -> Array:
+    """A recording (n, c) `measured` by a right clock, where a clock that was `late` (n,) jumps as it is predicted.
+
+    What is read about a jump has a time between two, by whatever made the clock jump. What a prediction lacks before
+    and after, as a bias, it lacks there.
+    """
+    experiment, trial = known.experiment, known.experiment.trials[k]
+    t = experiment.dt * np.arange(len(late))
+    jumps = t[1:][np.abs(np.diff(late)) > _JUMP * experiment.dt]
+    between = (np.abs(t[:, None] - jumps) < _BETWEEN).any(axis=1)
+    there, shown = trial.valid & ~between, known.shown[trial.drive].values
+    told = measured.copy()
+    if not (between.any() and there.any()):
+        return told
+    hidden = between & trial.valid
+    for channel in stamped(suspect.candidate.site, experiment.channels, suspect.scene.hypothesis.rig):
+        lacks = (measured - shown)[there, channel]
+        told[hidden, channel] = shown[hidden, channel] + np.interp(t[hidden], t[there], lacks)
+    return told
 
 
 def timed(bench: Bench, found: Found, among: Sequence[Suspect]) -> Found:

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.linalg import cho_solve
 from scipy.stats import chi2
 
-from kbs_process.diagnosis.clocks import by_a_right_clock
+from kbs_process.diagnosis.clocks import by_a_right_clock, unread
 from kbs_process.diagnosis.evenness import evenly, parts
 from kbs_process.diagnosis.finding import Tried
 from kbs_process.diagnosis.gate import Fold, Gate, whiteness
@@ -53,7 +53,7 @@ def taken_off(found: Found, view: View) -> Tried:
     references = {experiment.reference(k) for k in range(len(experiment.repeats))}
     plain = {drive: view.bench.signatures([suspect], drive) for drive in references}
     off = _each(suspect, known, plain)
-    standing = _without(view.standing, off)
+    standing = _without(view.standing, suspect, off)
     folds, strengths = [], []
     shown = [k for k in range(len(off)) if experiment.trials[k].role != "calibration"]
     bounds = {k: float(chi2.isf(FALSE_ALARM / suspect.places, max(off[k].rank, 1))) for k in shown}
@@ -102,7 +102,7 @@ def taken_off_again(chosen: Tried) -> Tried:
     experiment = known.experiment
     references = {experiment.reference(k) for k in range(len(experiment.repeats))}
     off = _each(suspect, known, {drive: suspect.outputs(drive) for drive in references})
-    standing = _without(chosen.standing, off)
+    standing = _without(chosen.standing, suspect, off)
     if not standing.known.cost < known.cost:
         return chosen
     more = np.concatenate([off[k].amplitude for k in experiment.fit])
@@ -185,17 +185,18 @@ def _height(background: Background, k: int) -> float:
     return float(z @ z - (background.scale * (background.J[k].T @ z)) @ background.shift)
 
 
-def _without(standing: Standing, off: list[_Off]) -> Standing:
-    """What is believed of recordings from which a law was taken off."""
+def _without(standing: Standing, suspect: Suspect, off: list[_Off]) -> Standing:
+    """What is believed of recordings from which a law was taken off; what is read about a jump says nothing."""
     known = standing.known
-    trials = [
-        replace(trial, measured=one.measured) for trial, one in zip(known.experiment.trials, off, strict=True)
-    ]
-    changed = replace(
-        known,
-        experiment=replace(known.experiment, trials=tuple(trials)),
-        residual=tuple(one.left for one in off),
-    )
+    trials, left = [], []
+    for k, (trial, one) in enumerate(zip(known.experiment.trials, off, strict=True)):
+        measured = one.measured
+        if isinstance(suspect, Catalogued) and suspect.of_clock:
+            late = suspect.late(known.experiment.reference(trial.trajectory)) @ one.amplitude
+            measured = unread(suspect, known, k, late, measured)
+        trials.append(replace(trial, measured=measured))
+        left.append(one.left + known.metric[k](measured - one.measured))
+    changed = replace(known, experiment=replace(known.experiment, trials=tuple(trials)), residual=tuple(left))
     return replace(standing, known=changed)
 
 
