@@ -55,7 +55,7 @@ def test_the_residual_says_where_a_law_acts(angle: float) -> None:
     here = with_bump(angle)
     scene = Scene.of(here.known.experiment, here.hypothesis, here.predicted)
     found = proposed(here.known, scene)
-    for name in ("local", "touch", "shift"):
+    for name in ("local", "detent", "touch", "shift"):
         places, (width,) = found[f"{name}_angle.el"], found[f"{name}_width.el"]
         print(name, places, width)
         assert min(abs(place - angle) for place in places) < WIDTH

@@ -13,6 +13,7 @@ from kbs_process.campaign.units import DIMENSIONS
 from kbs_process.errors import ConfigError
 from kbs_process.plant.effect import Effect, LogNormal, Parameter, Port, State
 from kbs_process.plant.effects import CATALOGUE, MEASURED, select
+from kbs_process.plant.effects.detent import torque as detent
 from kbs_process.plant.effects.tooth_stiction import limit as tooth_stiction
 
 UNITS = {unit for units in DIMENSIONS.values() for unit in units}
@@ -139,6 +140,18 @@ def test_friction_that_warms_up_is_dry_and_viscous_and_opposes_the_motion() -> N
     assert torque(-0.3, 0.0) == -torque(0.3, 0.0)
     assert torque(0.3, 40.0) == pytest.approx(torque(0.3, 0.0) / np.e)
     assert torque(0.0, 0.0) == 0.0
+
+
+@pytest.mark.parametrize("size", [0.7, -0.7])
+def test_a_detent_takes_no_work_in_a_pass_and_is_the_slope_of_its_potential(size: float) -> None:
+    angle = np.linspace(-0.3, 0.5, 4001)
+    torque = np.array([detent(q, size, 0.1, 0.03) for q in angle])
+    work = 0.5 * np.cumsum((torque[1:] + torque[:-1]) * np.diff(angle))
+    assert abs(work[-1]) < 1e-9 * abs(size)
+    potential = -size * 0.03 * np.exp(0.5 - 0.5 * ((angle[1:] - 0.1) / 0.03) ** 2)
+    np.testing.assert_allclose(work, potential[0] - potential, atol=1e-4 * abs(size) * 0.03)
+    assert np.abs(torque).max() == pytest.approx(abs(size), rel=1e-5)
+    assert angle[np.argmax(torque)] == pytest.approx(0.1 - np.sign(size) * 0.03, abs=3e-4)
 
 
 def test_a_second_delay_has_its_own_number() -> None:

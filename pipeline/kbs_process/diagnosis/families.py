@@ -55,6 +55,7 @@ FAMILIES: dict[str, str] = {
     "joint_hysteresis": "hysteresis",
     "joint_order": "local torque",
     "local_torque": "local torque",
+    "detent": "local torque",
     "ground_cable": "cable",
     "ground_bump": "local torque",
     "mass_shift": "mass",

@@ -28,6 +28,7 @@ from kbs_process.plant.effects.controller_lag import CONTROLLER_LAG
 from kbs_process.plant.effects.controller_latency import CONTROLLER_LATENCY
 from kbs_process.plant.effects.coulomb import COULOMB
 from kbs_process.plant.effects.dahl import DAHL
+from kbs_process.plant.effects.detent import DETENT
 from kbs_process.plant.effects.dynamic_friction import DYNAMIC_FRICTION
 from kbs_process.plant.effects.flexspline import FLEXSPLINE
 from kbs_process.plant.effects.floor_tilt import FLOOR_TILT
@@ -101,6 +102,7 @@ CATALOGUE: tuple[Effect, ...] = (
     JOINT_HYSTERESIS,
     JOINT_ORDER,
     LOCAL_TORQUE,
+    DETENT,
     # from outside
     GROUND_CABLE,
     GROUND_BUMP,
