@@ -25,6 +25,7 @@ from kbs_process.diagnosis.tryout import extra_of
 from kbs_process.plant.attach import attach
 from kbs_process.plant.effect import Effect
 from kbs_process.plant.effects import select
+from kbs_process.plant.effects.detent import DETENT
 from kbs_process.plant.effects.harness import HARNESS
 from kbs_process.plant.effects.joint_order import JOINT_ORDER
 from kbs_process.plant.effects.local_torque import LOCAL_TORQUE
@@ -118,6 +119,26 @@ def test_a_bump_is_found_from_a_place_where_it_does_nothing() -> None:
     assert begun.score.gain < 0.1 * true
     assert abs(found["local_angle"] - ANGLE) < WIDTH
     assert best.score.gain > 0.95 * true
+
+
+@pytest.mark.parametrize("beside", [-0.5, 0.5])
+def test_a_detent_is_found_from_where_it_seems_to_be_wider(beside: float) -> None:
+    """It is passed in less than what it makes ring takes to decay, and a wide one of the other sign does some of it."""
+    true = {"detent_angle": 1.2745, "detent_width": 7e-4}
+    here = with_law(DETENT, {"detent": -0.6, **true})
+    scene = Scene.of(here.known.experiment, here.hypothesis, here.predicted)
+    tried = Bench.of(here.known, scene)
+    wide = 6.0 * true["detent_width"]
+    shape = (("detent_angle", true["detent_angle"] + beside * wide), ("detent_width", wide))
+    begun = screen(tried, [Catalogued(Candidate(DETENT, "el", shape), scene)]).candidates[0]
+    best = bettered(tried, begun)
+    assert isinstance(best.suspect, Catalogued)
+    found = dict(best.suspect.candidate.shape)
+    print(found, best.score.amplitude, begun.score.gain, best.score.gain, here.known.excess)
+    assert begun.score.gain < 0.5 * here.known.excess
+    assert best.score.gain > 0.9 * here.known.excess
+    assert found["detent_angle"] == pytest.approx(true["detent_angle"], abs=0.1 * true["detent_width"])
+    assert best.score.amplitude[0] == pytest.approx(-0.6, rel=0.1)
 
 
 def test_amplitudes_that_undo_each_other_are_judged_by_what_they_do_together() -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,7 +11,7 @@ from scipy.optimize import minimize
 from kbs_process.diagnosis.gls import Score, Sums, per_trial, score
 from kbs_process.diagnosis.places import half_lengths
 from kbs_process.diagnosis.ranges import SPECTRUM, WHILE_RECORDED, is_place, swept
-from kbs_process.diagnosis.screen import Bench, Catalogued, Found, evidence, screen
+from kbs_process.diagnosis.screen import Bench, Catalogued, Found, evidence
 from kbs_process.diagnosis.suspects import Candidate
 from kbs_process.plant.effect import Effect, LogNormal, Parameter, Uniform
 from kbs_process.rig.model import Rig
@@ -24,9 +24,11 @@ _NEAR = 0.05  # m: steps of a search for a point are no less
 _WHOLE = ("order", "bit")  # in names of numbers that are whole, or ratios of teeth
 _DIFFERENCE = 0.02  # steps
 _PLACES = 24  # of a law that is somewhere, at most, for each width that it may have
+_NARROWER = (0.5, 0.25)  # shares of its width
+_ABOUT = 1.5  # widths, on either side of a place
 _DESCENTS = 12  # of the search along the linear plant
 _ENDS = 0.99  # of the longest time that recordings show
-_STARTS = 3  # of a grid, of one that known numbers take up there
+_STARTS = 3  # of descents, of one that is over less or that known numbers take up on its grid
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,11 +131,18 @@ def bettered(bench: Bench, found: Found) -> Found:
     suspect = found.suspect
     if not isinstance(suspect, Catalogued) or not bends(suspect.candidate, suspect.scene.hypothesis.rig):
         return found
-    start = screen(bench, [suspect, *_everywhere(suspect)]).candidates[0].suspect
-    assert isinstance(start, Catalogued)
-    best, own = _descended(bench, start, _gain)
+    (wide,) = _best(bench, [suspect, *_everywhere(suspect)], 1)
+    # Which of them is the best descents tell.
+    starts = [wide, *_best(bench, [*_narrower(suspect), *_narrower(wide)], _STARTS)]
+    best, own = max((_descended(bench, one, _gain) for one in starts), key=lambda end: _gain(*end))
     gained = own.gain - found.score.gain
     return replace(found, suspect=best, score=own, log_evidence=found.log_evidence + 0.5 * gained)
+
+
+def _best(bench: Bench, suspects: Sequence[Catalogued], most: int) -> list[Catalogued]:
+    """Those of some suspects with as many amplitudes that do most, the best first, at most so many."""
+    scored = zip(suspects, _scores(bench, suspects) if suspects else [], strict=True)
+    return [one for one, _ in sorted(scored, key=lambda end: -_gain(*end))[:most]]
 
 
 def uncovered(bench: Bench, found: Found, grid: Sequence[Catalogued]) -> Found:
@@ -156,21 +165,42 @@ def uncovered(bench: Bench, found: Found, grid: Sequence[Catalogued]) -> Found:
 
 def _everywhere(suspect: Catalogued) -> list[Catalogued]:
     """A law that is somewhere all through what its signal sweeps: between places a width apart it does little."""
-    candidate = suspect.candidate
-    place = next(filter(is_place, candidate.effect.parameters), None)
-    wide = None if place is None else _width(place, candidate)
+    place, wide = _somewhere(suspect.candidate)
     if place is None or wide is None:
         return []
-    ranges = swept(suspect.scene)
-    low, high = ranges.within(place, candidate.site)
+    ranges, site = swept(suspect.scene), suspect.candidate.site
+    low, high = ranges.within(place, site)
     every = []
-    for width in ranges.choices(wide, candidate.site, None):
+    for width in ranges.choices(wide, site, None):
         count = min(int(np.ceil((high - low) / width)), _PLACES)
-        for share in (np.arange(count) + 0.5) / count:
-            moved = {place.name: low + float(share) * (high - low), wide.name: width}
-            shape = tuple((name, moved.get(name, value)) for name, value in candidate.shape)
-            every.append(replace(suspect, candidate=replace(candidate, shape=shape)))
+        places = low + (np.arange(count) + 0.5) / count * (high - low)
+        every += [_put(suspect, {place.name: float(one), wide.name: width}) for one in places]
     return every
+
+
+def _narrower(suspect: Catalogued) -> list[Catalogued]:
+    """A law that is somewhere about where it is, over less: what makes the article ring is seen long after."""
+    place, wide = _somewhere(suspect.candidate)
+    if place is None or wide is None:
+        return []
+    shape, every = dict(suspect.candidate.shape), []
+    for share in _NARROWER:
+        width = share * shape[wide.name]
+        places = shape[place.name] + width * np.arange(-round(_ABOUT / share), round(_ABOUT / share) + 1)
+        every += [_put(suspect, {place.name: float(one), wide.name: width}) for one in places]
+    return every
+
+
+def _somewhere(candidate: Candidate) -> tuple[Parameter | None, Parameter | None]:
+    """The numbers of a law that are its place, and over how much it goes there; none of one that is anywhere."""
+    place = next(filter(is_place, candidate.effect.parameters), None)
+    return place, None if place is None else _width(place, candidate)
+
+
+def _put(suspect: Catalogued, moved: Mapping[str, float]) -> Catalogued:
+    """A suspect with some numbers of its shape elsewhere."""
+    shape = tuple((name, moved.get(name, value)) for name, value in suspect.candidate.shape)
+    return replace(suspect, candidate=replace(suspect.candidate, shape=shape))
 
 
 def _descended(
