@@ -24,7 +24,7 @@ def test_a_pass_is_every_motion_with_every_number_moved(monkeypatch: pytest.Monk
     simulated([(0, more)])
     own = len(known.hypothesis.effects)
     assert simulated.passes == pytest.approx(1.0 + (own + 1) / own / len(known.free))
-    monkeypatch.setattr(effort, "EFFORT", 1.2)
-    assert simulated.spent
     monkeypatch.setattr(effort, "EFFORT", 2.0)
-    assert not simulated.spent
+    assert simulated.goes_on() and not simulated.ended
+    monkeypatch.setattr(effort, "EFFORT", 1.2)
+    assert not simulated.goes_on() and simulated.ended

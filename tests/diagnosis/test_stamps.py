@@ -11,7 +11,7 @@ from test_rounds import candidate, standing
 
 from kbs_process.diagnosis import mistimed, rounds
 from kbs_process.diagnosis.clocks import timed
-from kbs_process.diagnosis.each_recording import taken_off, taken_off_again
+from kbs_process.diagnosis.each_recording import jump_gain, taken_off, taken_off_again
 from kbs_process.diagnosis.finding import find_of
 from kbs_process.diagnosis.floor import declared
 from kbs_process.diagnosis.joint import Standing
@@ -181,6 +181,43 @@ def test_a_clock_that_jumps_by_periods_is_taken_off_at_its_place_and_size(lost: 
     for trial, right in zip(anew.trials, made.trials, strict=True):
         apart = (trial.measured - right.measured - ringing)[(t > 18.5) & (t < 39.0), :6]
         assert np.quantile(np.abs(apart), 0.95) < 0.1 * np.std(ringing[:, 0])
+
+
+def test_what_is_left_out_about_a_jump_is_none_of_its_doing() -> None:
+    """All recordings have a knock at one time: a jump there would hide it, and nobody would look for what it is."""
+    made = bench.experiment(bench.rig(), ("fit", "fit", "held-out"), 9, seconds=40.0)
+    t = DT * np.arange(800)
+    ringing = np.sin(2.0 * np.pi * (2.0 + 0.04 * t) * t)[:, None] * np.r_[np.full(6, 0.2), 0.0, 0.0]
+    knock = 2.0 * np.exp(-(((t - 17.0) / 0.15) ** 2))[:, None] * np.r_[np.full(6, 1.0), 0.0, 0.0]
+    trials = []
+    for trial in made.trials:
+        whole = trial.measured + ringing + knock
+        whole[:, :6] += late_by(whole[:, :6], DT, 4e-4 * (t - 10.0))
+        trials.append(replace(trial, measured=whole * trial.valid[:, None]))
+    here = standing(replace(made, trials=tuple(trials)))
+    rung = {0: replace(here.predicted[0], values=here.predicted[0].values + ringing)}
+    residual = tuple(
+        m(trial.measured - rung[0].values)
+        for m, trial in zip(here.known.metric, here.known.experiment.trials, strict=True)
+    )
+    known = replace(here.known, shown=rung, residual=residual)
+    assert known.gross
+    here = Standing(known, rung, {})
+    view = View.of(here, lambda one: isinstance(one, Catalogued) and one.jumps, linear=False)
+    found = next(one for one in view.screening.candidates if one.suspect.family[1] == "wrench")
+    after = taken_off(found, view).standing.known
+    print(
+        "left of",
+        known.excess,
+        "with a jump",
+        after.excess,
+        "of which its doing",
+        jump_gain(found, known, after),
+    )
+    assert after.excess < 0.5 * known.excess
+    assert jump_gain(found, known, after) < 0.25 * known.excess
+    floor = declared(known.experiment)
+    assert rounds._jumped(view, floor, bench.serial(known.experiment), Noted()) == []
 
 
 def test_what_all_recordings_share_of_a_clock_is_no_jump() -> None:

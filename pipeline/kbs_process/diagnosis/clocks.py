@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 from scipy.linalg import cho_solve
+from scipy.ndimage import uniform_filter1d
 from scipy.optimize import minimize_scalar
 
 from kbs_process.diagnosis.known import Known
@@ -23,8 +24,8 @@ from kbs_process.signals.records import Array
 
 _LATEST = 0.25  # s, the greatest lateness of a recording that is tried
 _NEARER = (0.5, 0.25, 0.25, 0.12)  # steps of a shape, up and down, from the best of its grid
-_JUMP = 0.1  # of the time between two samples, by which a clock changes there that jumps
 _BETWEEN = 1.0  # s, on either side of a jump
+_BESIDE = 11  # samples, over which what a prediction lacks beside that is a mean
 _STEPS = 10  # of a search between two of them
 
 
@@ -41,23 +42,26 @@ def by_a_right_clock(suspect: Catalogued, known: Known, k: int, late: Array) -> 
     return measured, known.residual[k] + known.metric[k](measured - trial.measured)
 
 
-def unread(suspect: Catalogued, known: Known, k: int, late: Array, measured: Array) -> Array:
-    """A recording (n, c) `measured` by a right clock, where a clock that was `late` (n,) jumps as it is predicted.
+def unread(suspect: Catalogued, known: Known, k: int, measured: Array) -> Array:
+    """A recording (n, c) `measured`, where a clock is supposed to jump as it is predicted.
 
     What is read about a jump has a time between two, by whatever made the clock jump. What a prediction lacks before
-    and after, as a bias, it lacks there.
+    and after, as a bias, it lacks there. Of laws of clocks that do not jump, the recording as it is.
     """
     experiment, trial = known.experiment, known.experiment.trials[k]
-    t = experiment.dt * np.arange(len(late))
-    jumps = t[1:][np.abs(np.diff(late)) > _JUMP * experiment.dt]
+    if not suspect.jumps:
+        return measured
+    t = experiment.dt * np.arange(len(measured))
+    late = suspect.late(experiment.reference(trial.trajectory)).sum(axis=1)
+    jumps = t[1:][np.diff(late) != 0.0]
     between = (np.abs(t[:, None] - jumps) < _BETWEEN).any(axis=1)
     there, shown = trial.valid & ~between, known.shown[trial.drive].values
     told = measured.copy()
-    if not (between.any() and there.any()):
+    if not there.any():
         return told
     hidden = between & trial.valid
     for channel in stamped(suspect.candidate.site, experiment.channels, suspect.scene.hypothesis.rig):
-        lacks = (measured - shown)[there, channel]
+        lacks = uniform_filter1d((measured - shown)[there, channel], _BESIDE, mode="nearest")
         told[hidden, channel] = shown[hidden, channel] + np.interp(t[hidden], t[there], lacks)
     return told
 

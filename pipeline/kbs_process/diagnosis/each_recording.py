@@ -46,7 +46,7 @@ class _Off:
 def taken_off(found: Found, view: View) -> Tried:
     """A suspect of a view taken off each recording, and the gate's verdict: every one has to show it all through.
 
-    Of what leaves little of much, half of them: others may show it in one part alone, as a jump before the last turn.
+    Of a clock's jump that does nearly all of much, half of them: others may show it in one part, the last turn's.
     """
     suspect, known = found.suspect, view.standing.known
     experiment = known.experiment
@@ -58,13 +58,14 @@ def taken_off(found: Found, view: View) -> Tried:
     shown = [k for k in range(len(off)) if experiment.trials[k].role != "calibration"]
     bounds = {k: float(chi2.isf(FALSE_ALARM / suspect.places, max(off[k].rank, 1))) for k in shown}
     evenly_gained = {k: _even_gain(off[k], k, known) for k in shown}
-    mostly = standing.known.excess < (1.0 - MOSTLY_DONE) * known.excess
+    mostly = known.gross and jump_gain(found, known, standing.known) > MOSTLY_DONE * known.excess
     half = mostly and 2 * sum(evenly_gained[k] > bounds[k] for k in shown) >= len(shown)
     for k in shown:
         one, rows = off[k], float(known.rows[k])
         before, after = (float(z @ z) / rows for z in (known.residual[k], one.left))
         gained = one.gain if half else evenly_gained[k]
-        strengths.append(gained)
+        if evenly_gained[k] > bounds[k] or not half:
+            strengths.append(evenly_gained[k])
         folds.append(Fold(experiment.trials[k].name, before, after, gained - bounds[k]))
     worse = tuple(fold.trial for fold in folds if fold.gain <= 0.0)
     reasons = (f"{', '.join(worse)} do not show it, all through",) if worse else ()
@@ -90,6 +91,30 @@ def taken_off(found: Found, view: View) -> Tried:
         view.screening,
         Own((), ()),
     )
+
+
+def jump_gain(found: Found, before: Known, after: Known) -> float:
+    """What a jump of a clock does, of -2 log likelihood: more than is done by leaving out what is read about it.
+
+    Less what as many numbers, at as many places, gain by chance. Nothing of any other law.
+    """
+    suspect, experiment = found.suspect, before.experiment
+    if not (isinstance(suspect, Catalogued) and suspect.jumps):
+        return 0.0
+    erased = unread_only(suspect, before)
+    own = len(experiment.fit) * len(suspect.amplitudes) * np.log(before.fit_rows)
+    trajectories = {experiment.trials[k].trajectory for k in experiment.fit}
+    chance = float(own + 2.0 * len(trajectories) * np.log(suspect.places))
+    return sum(float(z @ z) for z in erased.values()) - float(after.chi2[list(experiment.fit)].sum()) - chance
+
+
+def unread_only(suspect: Catalogued, known: Known) -> dict[int, Array]:
+    """(rows,) what is left of recordings that are fitted where what is read about a jump says nothing, and no more."""
+    left = {}
+    for k in known.experiment.fit:
+        measured = known.experiment.trials[k].measured
+        left[k] = known.residual[k] + known.metric[k](unread(suspect, known, k, measured) - measured)
+    return left
 
 
 def taken_off_again(chosen: Tried) -> Tried:
@@ -191,9 +216,8 @@ def _without(standing: Standing, suspect: Suspect, off: list[_Off]) -> Standing:
     trials, left = [], []
     for k, (trial, one) in enumerate(zip(known.experiment.trials, off, strict=True)):
         measured = one.measured
-        if isinstance(suspect, Catalogued) and suspect.of_clock:
-            late = suspect.late(known.experiment.reference(trial.trajectory)) @ one.amplitude
-            measured = unread(suspect, known, k, late, measured)
+        if isinstance(suspect, Catalogued):
+            measured = unread(suspect, known, k, measured)
         trials.append(replace(trial, measured=measured))
         left.append(one.left + known.metric[k](measured - one.measured))
     changed = replace(known, experiment=replace(known.experiment, trials=tuple(trials)), residual=tuple(left))

@@ -2,28 +2,36 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Sequence
 
 from kbs_process.diagnosis.hypothesis import Prediction, Simulate, Task
 from kbs_process.diagnosis.known import Known
+from kbs_process.diagnosis.parameters import COUPLING
 from kbs_process.diagnosis.thresholds import EFFORT
 
 
 class Effort:
-    """Simulates, as `hypothesis.Simulate` says, and counts what it costs: seconds of each plant, times its effects."""
+    """Simulates, as `hypothesis.Simulate` says, and counts what it costs: samples of each plant, times its effects."""
 
     def __init__(self, simulate: Simulate, known: Known) -> None:
         self._simulate = simulate
         experiment = known.experiment
-        self._seconds = [drive.n * experiment.dt for drive in experiment.drives]
+        self._samples = [drive.n for drive in experiment.drives]
         references = {experiment.reference(trial.trajectory) for trial in experiment.trials}
-        every = sum(self._seconds[drive] for drive in references) * len(known.free)
+        # The cross-coupling's slopes are exact.
+        moved = sum(scalar.quantity != COUPLING for scalar in known.free)
+        every = sum(self._samples[drive] for drive in references) * max(1, moved)
         self._pass = every * max(1, len(known.hypothesis.effects))
-        self._cost = 0.0
+        self._cost = 0
+        self._counting = threading.Lock()  # laws of a race are simulated side by side
+        self.ended = False  # whether a search was told to
 
     def __call__(self, tasks: Sequence[Task]) -> list[Prediction]:
         """Return predictions in the order of the tasks."""
-        self._cost += sum(self._seconds[drive] * max(1, len(one.effects)) for drive, one in tasks)
+        cost = sum(self._samples[drive] * max(1, len(one.effects)) for drive, one in tasks)
+        with self._counting:
+            self._cost += cost
         return self._simulate(tasks)
 
     @property
@@ -31,7 +39,7 @@ class Effort:
         """The same in slopes of all known numbers, each motion simulated once with each of them moved."""
         return self._cost / self._pass
 
-    @property
-    def spent(self) -> bool:
-        """Whether no more laws are looked for."""
-        return self.passes > EFFORT
+    def goes_on(self) -> bool:
+        """Whether more laws are looked for; if not, the search is told to end."""
+        self.ended = self.ended or self.passes > EFFORT
+        return not self.ended

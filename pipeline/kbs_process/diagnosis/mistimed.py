@@ -13,7 +13,7 @@ import numpy as np
 
 from kbs_process.diagnosis import phasing
 from kbs_process.diagnosis.clocks import by_a_right_clock, height_of, timed
-from kbs_process.diagnosis.each_recording import taken_off
+from kbs_process.diagnosis.each_recording import taken_off, unread_only
 from kbs_process.diagnosis.experiment import Experiment
 from kbs_process.diagnosis.floor import Floor
 from kbs_process.diagnosis.hypothesis import Hypothesis, Simulate
@@ -85,7 +85,10 @@ def _all_stamped(view: View, found: Found) -> tuple[float, Experiment]:
 
 def _each_stamped(view: View, found: Found) -> tuple[float, Experiment]:
     """The same of an error of each recording's own, less what so many numbers gain by chance."""
-    bench, without = view.bench, taken_off(found, view).standing.known
-    left = {k: without.residual[k] for k in bench.background.z}
-    chance = len(left) * float(np.log(view.standing.known.fit_rows))
-    return height_of(bench, bench.background.z) - height_of(bench, left) - chance, without.experiment
+    bench, known = view.bench, view.standing.known
+    without = taken_off(found, view).standing.known
+    assert isinstance(found.suspect, Catalogued)
+    erased = unread_only(found.suspect, known)
+    left = {k: without.residual[k] for k in erased}
+    chance = len(left) * len(found.suspect.amplitudes) * float(np.log(known.fit_rows))
+    return height_of(bench, erased) - height_of(bench, left) - chance, without.experiment

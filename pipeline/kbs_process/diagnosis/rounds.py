@@ -10,6 +10,7 @@ import numpy as np
 from kbs_process.diagnosis.believed import believed
 from kbs_process.diagnosis.clocks import timed
 from kbs_process.diagnosis.detection import Detection
+from kbs_process.diagnosis.each_recording import jump_gain
 from kbs_process.diagnosis.effort import Effort
 from kbs_process.diagnosis.finding import Tried, as_it_stands, find_of, merged, trusted
 from kbs_process.diagnosis.floor import Floor
@@ -29,7 +30,7 @@ from kbs_process.diagnosis.ports import port_test
 from kbs_process.diagnosis.remains import detected, promises_little, searched
 from kbs_process.diagnosis.scatter import scattered
 from kbs_process.diagnosis.scene import Scene
-from kbs_process.diagnosis.screen import Found, Screening
+from kbs_process.diagnosis.screen import Catalogued, Found, Screening
 from kbs_process.diagnosis.settling import bent, drawn_back, nominal, resettled
 from kbs_process.diagnosis.shapes import possible
 from kbs_process.diagnosis.sizes import in_the_way, of_mounting, springs
@@ -44,7 +45,7 @@ from kbs_process.diagnosis.thresholds import (
     TRUST,
     TRUST_PART,
 )
-from kbs_process.diagnosis.tryout import identity, of_every_clock, of_one_clock
+from kbs_process.diagnosis.tryout import identity, of_every_clock
 from kbs_process.diagnosis.view import View
 
 
@@ -131,7 +132,7 @@ def _diagnosed(
         if not found:
             break
         accepted += found
-        if (at_once and standing.known.gross) or not _goes_on(standing, floor) or simulate.spent:
+        if (at_once and standing.known.gross) or not (_goes_on(standing, floor) and simulate.goes_on()):
             break
     last = rounds[-1]
     kept, standing, fallen = needed(accepted, standing, floor, simulate)
@@ -159,7 +160,7 @@ def _diagnosed(
         left=left,
         known=known,
         standing=told,
-        ended=simulate.spent,
+        ended=simulate.ended,
     )
     return replace(outcome, finds=trusted(outcome.finds, TRUST_PART if outcome.much else TRUST))
 
@@ -214,7 +215,7 @@ def _pair(last: _Round, floor: Floor, simulate: Effort, accepted: Sequence[Accep
     to be found beside the other like any law.
     """
     for one in supposed(last.noted.fallen, last.standing.known):
-        if simulate.spent:
+        if not simulate.goes_on():
             break
         told = find_of([one], 0, np.ones(1), last.standing, None)
         there = one.standing if one.leapt else resettled(one.standing, floor, simulate, leaps=1)
@@ -291,17 +292,18 @@ def _jumped(view: View, floor: Floor, simulate: Simulate, noted: Noted) -> list[
     to do more than an error of a clock that all recordings share.
     """
     known, every = view.standing.known, view.screening.candidates
-    chosen = [one for one in every if of_one_clock(one)]
+    chosen = [one for one in every if isinstance(one.suspect, Catalogued) and one.suspect.jumps]
     if not (known.gross and chosen):
         return []
     more, less = tried(chosen, view, view.standing, floor, simulate)
     noted.fell(*less)
-    jumps = [one for one in more if one.standing.known.excess < MOST * known.excess]
+    gains = [jump_gain(one.found, known, one.standing.known) for one in more]
+    jumps = [(one, gain) for one, gain in zip(more, gains, strict=True) if gain > MOST * known.excess]
     if not jumps:
         return []
     shared = [timed(view.bench, one, view.suspects) for one in every if of_every_clock(one)]
     most = max((one.score.gain for one in shared), default=0.0)
-    return [one for one in jumps if known.cost - one.standing.known.cost > most]
+    return [one for one, gain in jumps if gain > most]
 
 
 def _hidden(

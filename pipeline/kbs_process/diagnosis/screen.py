@@ -82,7 +82,7 @@ class Catalogued:
 
     @property
     def places(self) -> int:
-        return PLACES if "drop_time" in self.candidate.effect.arguments else 1
+        return PLACES if self.jumps else 1
 
     def inputs(self, drive: int) -> Sequence[Mapping[Inlet, Array]] | None:
         if isinstance(self.candidate.effect, Sensing):
@@ -108,6 +108,11 @@ class Catalogued:
             return change
         t, known = self._recorded(drive)
         return sensed(self.candidate, t, prediction, experiment.channels, rig, known)
+
+    @property
+    def jumps(self) -> bool:
+        """Whether it is the jump of a clock, at a time that each trajectory has."""
+        return "drop_time" in self.candidate.effect.arguments
 
     @property
     def of_clock(self) -> bool:

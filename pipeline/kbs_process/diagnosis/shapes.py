@@ -133,7 +133,8 @@ def bettered(bench: Bench, found: Found) -> Found:
         return found
     (wide,) = _best(bench, [suspect, *_everywhere(suspect)], 1)
     # Which of them is the best descents tell.
-    starts = [wide, *_best(bench, [*_narrower(suspect), *_narrower(wide)], _STARTS)]
+    seeds = [wide] if wide is suspect else [suspect, wide]
+    starts = [wide, *_best(bench, [one for seed in seeds for one in _narrower(seed)], _STARTS)]
     best, own = max((_descended(bench, one, _gain) for one in starts), key=lambda end: _gain(*end))
     gained = own.gain - found.score.gain
     return replace(found, suspect=best, score=own, log_evidence=found.log_evidence + 0.5 * gained)

@@ -86,11 +86,6 @@ def in_plant(suspect: Suspect) -> bool:
     )
 
 
-def of_one_clock(found: Found) -> bool:
-    """Whether it is the error of a clock that each recording has of its own."""
-    return isinstance(found.suspect, Catalogued) and found.suspect.of_clock and found.suspect.each_trial
-
-
 def of_every_clock(found: Found) -> bool:
     """Whether it is the error of a clock, the same in all recordings."""
     return isinstance(found.suspect, Catalogued) and found.suspect.of_every_clock
