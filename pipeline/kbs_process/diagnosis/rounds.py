@@ -194,15 +194,13 @@ def _round(
 
     The best has to promise to gain `least`, of -2 log likelihood.
     """
-    over = False
     if seen.known.cost < standing.known.cost:
         # Numbers had ended in a worse place: what they do alone, once they have settled, is no law's.
         standing = resettled(seen, floor, simulate, leaps=1)
-        over = bool(accepted) and not _goes_on(standing, floor)
     view = View.of(seen)
     place = _place(seen, floor, view.scene)
     noted = Noted()
-    for passed in () if over else _passed(view, standing, floor, simulate, accepted, noted, least):
+    for passed in _passed(view, standing, floor, simulate, accepted, noted, least):
         if found := believed(passed, view, standing, place, floor, simulate, accepted, noted):
             return _Round(found, found.tried.standing, seen, view.screening, noted, place)
     return _Round(None, standing, seen, view.screening, noted, place)
