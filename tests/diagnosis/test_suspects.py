@@ -21,6 +21,7 @@ from kbs_process.diagnosis.transfer import follow, respond
 from kbs_process.plant.attach import attach
 from kbs_process.plant.effect import Effect
 from kbs_process.plant.effects import CATALOGUE, select
+from kbs_process.plant.effects.joint_order import JOINT_ORDER
 from kbs_process.plant.predict import Schedule, predict, tap_columns
 from kbs_process.plant.sensing import SENSING
 from kbs_process.rig.model import Rig
@@ -408,3 +409,14 @@ def test_what_rests_has_no_places_and_no_widths(swept: float) -> None:
         choices = moved.choices(entry, "Tx", None)
         assert len(choices) == len(entry.grid)
         assert all(entry.bounds[0] <= value <= entry.bounds[1] for value in choices)
+
+
+@pytest.mark.parametrize(
+    ("swept", "orders"), [(1.2, (6.0, 200.0, 202.0)), (3.3, (2.0, 3.0, 4.0, 6.0, 200.0, 202.0))]
+)
+def test_an_order_that_does_not_come_once_is_none(swept: float, orders: tuple[float, ...]) -> None:
+    """In a part of its period it is a curve, as of a spring."""
+    entry = next(e for e in JOINT_ORDER.parameters if e.name == "joint_order")
+    passed = Ranges({("el", "joint_angle"): (0.3, 0.3 + swept)}, {"joint_order.el": (0.5,)})
+    assert passed.choices(entry, "el", None) == orders
+    assert passed.choices(entry, "az", None) == ()

@@ -13,6 +13,7 @@ from kbs_process.plant.effect import Parameter
 from kbs_process.signals.records import Array
 
 SPECTRUM = "spectrum"  # grid of a parameter that only tones of a residual give
+TURNS = "turns"  # kind of one which is an order, of what a signal sweeps
 WHILE_RECORDED = "time.span"  # that of one which is a time, in lengths of the longest recording
 
 
@@ -56,8 +57,11 @@ class Ranges:
         if span is None:
             return ()
         low, high = span
-        start = 0.0 if kind == "span" else low
         least, most = entry.bounds
+        if kind == TURNS:
+            orders = {*entry.grid, *proposed}
+            return tuple(sorted(k for k in orders if k * (high - low) >= 2.0 * np.pi and least <= k <= most))
+        start = 0.0 if kind == "span" else low
         places = {*(start + share * (high - low) for share in entry.grid), *proposed} if high > low else set()
         return tuple(sorted(place for place in places if least <= place <= most))
 

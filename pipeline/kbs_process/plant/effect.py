@@ -190,7 +190,8 @@ class Parameter:
     An "amplitude" is one that the equation is linear in: without its amplitudes an effect is absent. A "shared" one
     belongs to another effect, without which this one says nothing. Any other is a "shape"; a search tries those of
     its `grid`, which are values, or, where `over` names a signal, shares (0 to 1) of the range that the signal sweeps:
-    with "joint_angle" places in that range, with "joint_angle.span" widths; over a "spectrum" it is a residual's tones.
+    with "joint_angle" places in that range, with "joint_angle.span" widths; over "joint_angle.turns" the grid has
+    orders, of which those count that come once at least in that range; over a "spectrum" it is a residual's tones.
     """
 
     name: str

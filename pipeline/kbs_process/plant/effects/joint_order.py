@@ -12,7 +12,8 @@ def torque(joint_angle: float, joint_sin: float, joint_cos: float, joint_order: 
 
     Equation: $T = a \sin(k \theta_l) + b \cos(k \theta_l)$.
     Units: rad, N m, N m, 1 -> N m.
-    Validity: does not depend on rate. 1, 2: seats of the bearings; 200: teeth of the flexspline, 202: of its ring.
+    Validity: does not depend on rate. 1, 2: seats of the bearings; 200: teeth of the flexspline, 202: of its ring. A
+        part of a period is any curve, and is not looked for.
     Source: T. D. Tuttle, W. P. Seering, A nonlinear model of a harmonic drive gear transmission, IEEE Trans. Robotics
         and Automation 12 (1996) 368.
     """
@@ -49,6 +50,7 @@ JOINT_ORDER = Effect(
             "periods in a turn of the joint",
             (0.0, 1e4),
             grid=(1.0, 2.0, 3.0, 4.0, 6.0, 200.0, 202.0),
+            over="joint_angle.turns",
         ),
     ),
     reference="T. D. Tuttle, W. P. Seering, A nonlinear model of a harmonic drive gear transmission, IEEE Trans. "
