@@ -73,3 +73,19 @@ def test_most_of_the_power_is_in_the_fewest_samples_that_hold_it() -> None:
     assert [mask.tolist() for mask in masks] == [[True, False, False], [True, False, False]]
     assert share == pytest.approx(2.0 / 6.0)
     assert sum(p[m].sum() for p, m in zip(power, masks, strict=True)) >= MOSTLY * 100.0
+
+
+def test_a_law_that_has_come_to_nothing_stays_where_its_numbers_are_fitted(
+    found: tuple[Standing, Own, Changes],
+) -> None:
+    """One more is taken out beside it: what its numbers are of has to be there."""
+    standing, own, _ = found
+    known = standing.known
+    value = np.where([name in own.amplitudes for name in known.names], 0.0, known.value)
+    nothing = replace(known, value=value, hypothesis=known.hypothesis.at(known.free, value), shown={})
+    other = Own(known.names[:1], ())
+    left = bare(replace(standing, known=nothing), other, bench.serial(known.experiment)).known
+    assert left.names == known.names[1:]
+    assert "local_torque" in left.hypothesis.effects
+    gone = bare(replace(standing, known=nothing), own, bench.serial(known.experiment)).known
+    assert "local_torque" not in gone.hypothesis.effects

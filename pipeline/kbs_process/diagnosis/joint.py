@@ -163,10 +163,11 @@ def _stripped(standing: Standing, own: Own) -> tuple[Known, Laws]:
     inside = [one for one in known.free if one.name in own.amplitudes and one.name not in standing.laws]
     still = known.hypothesis.at(inside, np.zeros(len(inside)))
     others = [i for i, name in enumerate(known.names) if name not in own.names]
+    free = tuple(known.free[i] for i in others)
     rest = replace(
         known,
-        hypothesis=_less(still, known.experiment.effects),
-        free=tuple(known.free[i] for i in others),
+        hypothesis=_less(still, known.experiment.effects, free),
+        free=free,
         parameters=_chosen(known.parameters, others),
         scale=known.scale[others],
         value=known.value[others],
@@ -179,11 +180,13 @@ def _stripped(standing: Standing, own: Own) -> tuple[Known, Laws]:
     return rest, {name: columns for name, columns in standing.laws.items() if name not in own.names}
 
 
-def _less(hypothesis: Hypothesis, given: Sequence[str]) -> Hypothesis:
-    """A hypothesis without those effects that are not `given` and do nothing."""
+def _less(hypothesis: Hypothesis, given: Sequence[str], free: Sequence[Scalar]) -> Hypothesis:
+    """A hypothesis without those effects that are not `given` and do nothing, and have no number that is `free`."""
     rig, effects = hypothesis.rig, hypothesis.effects
+    fitted = {scalar.quantity.rpartition(".")[2] for scalar in free}
     for effect in select(effects):
-        if effect.name not in given and idle(rig, effect):
+        own = {entry.name for entry in effect.parameters if entry.role != "shared"}
+        if effect.name not in given and not own & fitted and idle(rig, effect):
             effects = tuple(name for name in effects if name != effect.name)
             rig = detach(rig, effect, select(effects))
     return Hypothesis(rig, effects)
