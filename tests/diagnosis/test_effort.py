@@ -18,13 +18,14 @@ def test_a_pass_is_every_motion_with_every_number_moved(monkeypatch: pytest.Monk
     simulated = Effort(bench.serial(made), known)
     shown = simulated([(0, known.hypothesis)] * len(known.free))
     assert len(shown) == len(known.free)
-    assert simulated.passes == pytest.approx(1.0)
+    # There is one motion, and as many as four count.
+    assert simulated.passes == pytest.approx(1.0 / 4.0)
     # A law more costs more.
     more = replace(known.hypothesis, effects=(*known.hypothesis.effects, known.hypothesis.effects[0]))
     simulated([(0, more)])
     own = len(known.hypothesis.effects)
-    assert simulated.passes == pytest.approx(1.0 + (own + 1) / own / len(known.free))
-    monkeypatch.setattr(effort, "EFFORT", 2.0)
+    assert simulated.passes == pytest.approx((1.0 + (own + 1) / own / len(known.free)) / 4.0)
+    monkeypatch.setattr(effort, "EFFORT", 0.5)
     assert simulated.goes_on() and not simulated.ended
-    monkeypatch.setattr(effort, "EFFORT", 1.2)
+    monkeypatch.setattr(effort, "EFFORT", 0.3)
     assert not simulated.goes_on() and simulated.ended

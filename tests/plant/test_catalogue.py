@@ -66,7 +66,7 @@ class TestSuspects:
                 assert low <= 0.0 < high
                 assert not entry.grid
                 assert 0.0 < entry.prior.spread < high
-            if not entry.over:
+            if not entry.over or entry.over.endswith(".turns"):
                 assert all(low <= point <= high for point in entry.grid)
             elif entry.over != "spectrum":
                 assert entry.grid

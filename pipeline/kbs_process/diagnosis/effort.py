@@ -10,6 +10,8 @@ from kbs_process.diagnosis.known import Known
 from kbs_process.diagnosis.parameters import COUPLING
 from kbs_process.diagnosis.thresholds import EFFORT
 
+_MOTIONS = 4  # of a pass, at least
+
 
 class Effort:
     """Simulates, as `hypothesis.Simulate` says, and counts what it costs: samples of each plant, times its effects."""
@@ -17,12 +19,14 @@ class Effort:
     def __init__(self, simulate: Simulate, known: Known) -> None:
         self._simulate = simulate
         experiment = known.experiment
-        self._samples = [drive.n for drive in experiment.drives]
+        # A measured motion takes the place of a plant, and costs next to nothing.
+        self._samples = [0 if drive.schedule is None else drive.n for drive in experiment.drives]
         references = {experiment.reference(trial.trajectory) for trial in experiment.trials}
         # The cross-coupling's slopes are exact.
         moved = sum(scalar.quantity != COUPLING for scalar in known.free)
-        every = sum(self._samples[drive] for drive in references) * max(1, moved)
-        self._pass = every * max(1, len(known.hypothesis.effects))
+        # Few motions are searched for as long as some.
+        motions = max(1.0, _MOTIONS / len(references)) * sum(self._samples[drive] for drive in references)
+        self._pass = max(1.0, motions * max(1, moved) * max(1, len(known.hypothesis.effects)))
         self._cost = 0
         self._counting = threading.Lock()  # laws of a race are simulated side by side
         self.ended = False  # whether a search was told to
@@ -36,7 +40,7 @@ class Effort:
 
     @property
     def passes(self) -> float:
-        """The same in slopes of all known numbers, each motion simulated once with each of them moved."""
+        """The same in slopes of all known numbers: each motion, of four at least, with each of them moved."""
         return self._cost / self._pass
 
     def goes_on(self) -> bool:

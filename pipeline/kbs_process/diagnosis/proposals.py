@@ -167,10 +167,12 @@ def _orders(known: Known, scene: Scene) -> dict[str, tuple[float, ...]]:
 def _in_turns_of_the_motor(known: Known, joint: str, lines: tuple[float, ...]) -> tuple[float, ...]:
     """Orders of a joint as those of its motor: what is periodic in the motor's turns may be so in the output's, too.
 
-    A ripple whose depth changes as the output turns has lines beside its own.
+    A ripple whose depth changes as the output turns has lines beside its own. Without a gear both are one.
     """
     drive = known.experiment.rig.joint(joint).drive
-    return () if drive is None else tuple(line / float(drive.ratio) for line in lines)
+    if drive is None or not float(drive.ratio) > 1.0:
+        return ()
+    return tuple(line / float(drive.ratio) for line in lines)
 
 
 def _of_cycles(known: Known, joint: str, orders: tuple[float, ...]) -> tuple[float, ...]:
