@@ -309,15 +309,13 @@ def _hidden(
 ) -> list[Tried]:
     """Springs in the way of a drive's torque, from numbers near the files': those that were pulled had taken them up.
 
-    A gear that is softer, or joints that seem to rub, leave little of one, and that has the form of something else. One
-    that does less than half of what they do by being elsewhere is not what has pulled them.
+    A gear that is softer, or joints that seem to rub, leave little of one, and that has the form of something else.
     """
     if not before.known.strained or not searched(before.known.experiment):
         return []
     near = View.of(nominal(before, simulate), in_the_way)
     chosen = springs(near, simulate, lambda found: not in_the_shade(found, accepted))
-    least = max(LEAST_RHO**2, MOST * (near.standing.known.cost - before.known.cost))
-    worth = [found for found in chosen if possible(found) and found.score.gain >= least][:HIDDEN]
+    worth = [found for found in chosen if possible(found) and found.score.gain >= LEAST_RHO**2][:HIDDEN]
     more, less = tried(worth, near, view.standing, floor, simulate)
     return [replace(one, screening=view.screening) for one in (*more, *less)]
 

@@ -62,8 +62,7 @@ MISTIMED: Final = 0.1
 CLOSE: Final = 2.0
 # The same where springs are looked for that known numbers take up nearly whole, and how many are tried from there. A
 # hysteresis of a gear (development) left 0.08 of the floor's power beside numbers within 2 sigma, in the form of a
-# joint's friction; from 1 sigma its size was not found, from 0.3 it left nothing. Such a spring does MOST of what
-# numbers do by being elsewhere.
+# joint's friction; from 1 sigma its size was not found, from 0.3 it left nothing.
 NOMINAL: Final = 0.3
 HIDDEN: Final = 3
 # Candidates that are simulated. A field that lags was the fifth where friction of the joint did nearly as well, and the
