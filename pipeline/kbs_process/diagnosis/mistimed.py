@@ -53,7 +53,7 @@ def by_another_clock(known: Known, floor: Floor, simulate: Simulate, reach: floa
 def _stamped_anew(known: Known) -> Experiment | None:
     """The recordings stamped by a clock that is right where one error of one does most of what is to be done.
 
-    The error is the same in all recordings, or a jump, which each has of its own; None, if none does as much.
+    The error is the same in all recordings, or a jump or a wandering, which each has of its own; None, if none does so.
     """
     view = View.of(Standing(known, known.shown, {}), _of_a_clock, linear=False)
     bench = view.bench
