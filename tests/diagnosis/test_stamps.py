@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from test_rounds import candidate, standing
 
-from kbs_process.diagnosis import mistimed, rounds
+from kbs_process.diagnosis import each_recording, mistimed, rounds
 from kbs_process.diagnosis.clocks import timed
 from kbs_process.diagnosis.each_recording import jump_gain, taken_off, taken_off_again
+from kbs_process.diagnosis.experiment import Experiment
 from kbs_process.diagnosis.finding import find_of
 from kbs_process.diagnosis.floor import declared
 from kbs_process.diagnosis.joint import Standing
@@ -19,7 +20,6 @@ from kbs_process.diagnosis.jumps import jump
 from kbs_process.diagnosis.scene import Scene
 from kbs_process.diagnosis.screen import Bench, Catalogued, screen
 from kbs_process.diagnosis.stamps import late_by, set_right, slope
-from kbs_process.diagnosis.supposed import Noted
 from kbs_process.diagnosis.view import View
 from kbs_process.signals.records import Array
 
@@ -137,13 +137,17 @@ def test_a_clock_that_is_late_by_half_a_period_is_found_at_its_size(late: float)
     )
 
 
-@pytest.mark.parametrize("lost", [0.09, 0.46])
-def test_a_clock_that_jumps_by_periods_is_taken_off_at_its_place_and_size(lost: float) -> None:
-    """To first order such a jump is none: it is tried at many sizes."""
+def ringing_of(t: Array) -> Array:
+    """(n, 8) of the transducer, ever faster; the encoders do not ring."""
+    return np.sin(2.0 * np.pi * (2.0 + 0.04 * t) * t)[:, None] * np.r_[np.full(6, 0.2), 0.0, 0.0]
+
+
+def jumped_at(place: float, lost: float) -> tuple[Experiment, View]:
+    """What rings, without error, and the view of jumps of the wrench's clock, which loses `lost` s at a `place`, s."""
     made = bench.experiment(bench.rig(), ("fit", "fit", "held-out"), 9, seconds=40.0)
     t = DT * np.arange(800)
-    ringing = np.sin(2.0 * np.pi * (2.0 + 0.04 * t) * t)[:, None] * np.r_[np.full(6, 0.2), 0.0, 0.0]
-    late = np.where(t > 17.3, -lost, 0.0)
+    ringing = ringing_of(t)
+    late = np.where(t > place, -lost, 0.0)
     trials = []
     for trial in made.trials:
         whole = trial.measured + ringing
@@ -160,8 +164,18 @@ def test_a_clock_that_jumps_by_periods_is_taken_off_at_its_place_and_size(lost: 
     scene = Scene.of(known.experiment, here.hypothesis, rung)
     suspect = Catalogued(candidate("clock_drops", "wrench"), scene)
     tried = Bench.of(known, scene)
-    screening = screen(tried, [suspect])
-    told = taken_off(screening.candidates[0], View(here, tried, scene, (suspect,), screening))
+    return made, View(here, tried, scene, (suspect,), screen(tried, [suspect]))
+
+
+@pytest.mark.parametrize("lost", [0.09, 0.46])
+def test_a_clock_that_jumps_by_periods_is_taken_off_at_its_place_and_size(lost: float) -> None:
+    """To first order such a jump is none: it is tried at many sizes."""
+    t = DT * np.arange(800)
+    ringing = ringing_of(t)
+    made, view = jumped_at(17.3, lost)
+    here, known = view.standing, view.standing.known
+    rung = known.shown
+    told = taken_off(view.screening.candidates[0], view)
     assert known.gross
     assert told.found.score.amplitude == pytest.approx([lost, lost], abs=2e-3)
     when = jump(known.experiment, rung, 0, "wrench")
@@ -174,7 +188,7 @@ def test_a_clock_that_jumps_by_periods_is_taken_off_at_its_place_and_size(lost: 
     # It is told before any law is simulated, and recordings are stamped anew by it for numbers that it has not pulled.
     floor, simulate = declared(known.experiment), bench.serial(known.experiment)
     view = View.of(here, lambda one: isinstance(one, Catalogued) and one.of_clock, linear=False)
-    jumped = min(rounds._jumped(view, floor, simulate, Noted()), key=lambda one: one.standing.known.cost)
+    jumped = min(rounds._jumped(view, floor, simulate), key=lambda one: one.standing.known.cost)
     assert jumped.found.suspect.family == ("clock_drops", "wrench")
     anew = mistimed._stamped_anew(known)
     assert anew is not None
@@ -183,11 +197,33 @@ def test_a_clock_that_jumps_by_periods_is_taken_off_at_its_place_and_size(lost: 
         assert np.quantile(np.abs(apart), 0.95) < 0.1 * np.std(ringing[:, 0])
 
 
+@pytest.mark.parametrize(
+    ("unevenly", "most", "passes"),
+    [((), True, True), ((2,), True, True), ((1, 2), True, False), ((2,), False, False)],
+)
+def test_half_of_the_recordings_show_a_jump_all_through(
+    monkeypatch: pytest.MonkeyPatch, unevenly: tuple[int, ...], most: bool, passes: bool
+) -> None:
+    """The others may show it in one part, the last turn's, where it does nearly all of much."""
+    _, view = jumped_at(17.3, 0.46)
+    even = each_recording._even_gain
+    monkeypatch.setattr(
+        each_recording, "_even_gain", lambda one, k, known: 0.0 if k in unevenly else even(one, k, known)
+    )
+    if not most:
+        monkeypatch.setattr(each_recording, "jump_gain", lambda *_: 0.5 * view.standing.known.excess)
+    verdict = taken_off(view.screening.candidates[0], view).gate
+    assert verdict.passed == passes
+    assert [reason for reason in verdict.reasons if "all through" in reason] == (
+        [] if passes else [", ".join(f"r{k}" for k in unevenly) + " do not show it, all through"]
+    )
+
+
 def test_what_is_left_out_about_a_jump_is_none_of_its_doing() -> None:
     """All recordings have a knock at one time: a jump there would hide it, and nobody would look for what it is."""
     made = bench.experiment(bench.rig(), ("fit", "fit", "held-out"), 9, seconds=40.0)
     t = DT * np.arange(800)
-    ringing = np.sin(2.0 * np.pi * (2.0 + 0.04 * t) * t)[:, None] * np.r_[np.full(6, 0.2), 0.0, 0.0]
+    ringing = ringing_of(t)
     knock = 2.0 * np.exp(-(((t - 17.0) / 0.15) ** 2))[:, None] * np.r_[np.full(6, 1.0), 0.0, 0.0]
     trials = []
     for trial in made.trials:
@@ -206,24 +242,16 @@ def test_what_is_left_out_about_a_jump_is_none_of_its_doing() -> None:
     view = View.of(here, lambda one: isinstance(one, Catalogued) and one.jumps, linear=False)
     found = next(one for one in view.screening.candidates if one.suspect.family[1] == "wrench")
     after = taken_off(found, view).standing.known
-    print(
-        "left of",
-        known.excess,
-        "with a jump",
-        after.excess,
-        "of which its doing",
-        jump_gain(found, known, after),
-    )
     assert after.excess < 0.5 * known.excess
     assert jump_gain(found, known, after) < 0.25 * known.excess
     floor = declared(known.experiment)
-    assert rounds._jumped(view, floor, bench.serial(known.experiment), Noted()) == []
+    assert rounds._jumped(view, floor, bench.serial(known.experiment)) == []
 
 
 def test_what_all_recordings_share_of_a_clock_is_no_jump() -> None:
     made = bench.experiment(bench.rig(), ("fit", "fit", "held-out"), 9, seconds=40.0)
     t = DT * np.arange(800)
-    ringing = np.sin(2.0 * np.pi * (2.0 + 0.04 * t) * t)[:, None] * np.r_[np.full(6, 0.2), 0.0, 0.0]
+    ringing = ringing_of(t)
     trials = []
     for trial in made.trials:
         whole = trial.measured + ringing
@@ -240,8 +268,7 @@ def test_what_all_recordings_share_of_a_clock_is_no_jump() -> None:
     view = View.of(
         Standing(known, rung, {}), lambda one: isinstance(one, Catalogued) and one.of_clock, linear=False
     )
-    noted = Noted()
-    assert rounds._jumped(view, declared(known.experiment), bench.serial(known.experiment), noted) == []
+    assert rounds._jumped(view, declared(known.experiment), bench.serial(known.experiment)) == []
     anew = mistimed._stamped_anew(known)
     assert anew is not None
     late = (anew.trials[2].measured - made.trials[2].measured - ringing)[(t > 1.0) & (t < 38.0), :6]

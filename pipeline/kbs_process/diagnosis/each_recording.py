@@ -101,11 +101,18 @@ def jump_gain(found: Found, before: Known, after: Known) -> float:
     suspect, experiment = found.suspect, before.experiment
     if not (isinstance(suspect, Catalogued) and suspect.jumps):
         return 0.0
-    erased = unread_only(suspect, before)
-    own = len(experiment.fit) * len(suspect.amplitudes) * np.log(before.fit_rows)
+    erased = sum(float(z @ z) for z in unread_only(suspect, before).values())
+    return erased - float(after.chi2[list(experiment.fit)].sum()) - gained_by_chance(suspect, before)
+
+
+def gained_by_chance(suspect: Suspect, known: Known) -> float:
+    """What the numbers of a law that are each recording's own, and its place in each motion, gain of -2 log likelihood
+    by chance (Schwarz).
+    """
+    experiment = known.experiment
     trajectories = {experiment.trials[k].trajectory for k in experiment.fit}
-    chance = float(own + 2.0 * len(trajectories) * np.log(suspect.places))
-    return sum(float(z @ z) for z in erased.values()) - float(after.chi2[list(experiment.fit)].sum()) - chance
+    own = len(experiment.fit) * len(suspect.amplitudes) * np.log(known.fit_rows)
+    return float(own + 2.0 * len(trajectories) * np.log(suspect.places))
 
 
 def unread_only(suspect: Catalogued, known: Known) -> dict[int, Array]:

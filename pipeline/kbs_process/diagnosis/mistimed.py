@@ -9,11 +9,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
 from kbs_process.diagnosis import phasing
 from kbs_process.diagnosis.clocks import by_a_right_clock, height_of, timed
-from kbs_process.diagnosis.each_recording import taken_off, unread_only
+from kbs_process.diagnosis.each_recording import gained_by_chance, taken_off, unread_only
 from kbs_process.diagnosis.experiment import Experiment
 from kbs_process.diagnosis.floor import Floor
 from kbs_process.diagnosis.hypothesis import Hypothesis, Simulate
@@ -90,5 +88,5 @@ def _each_stamped(view: View, found: Found) -> tuple[float, Experiment]:
     assert isinstance(found.suspect, Catalogued)
     erased = unread_only(found.suspect, known)
     left = {k: without.residual[k] for k in erased}
-    chance = len(left) * len(found.suspect.amplitudes) * float(np.log(known.fit_rows))
-    return height_of(bench, erased) - height_of(bench, left) - chance, without.experiment
+    gained = height_of(bench, erased) - height_of(bench, left)
+    return gained - gained_by_chance(found.suspect, known), without.experiment

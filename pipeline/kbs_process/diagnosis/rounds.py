@@ -255,7 +255,7 @@ def _passed(
             noted.refuse(found, *reasons)
     # What each recording has of its own predicts none, and beside a law that was found takes up what its formula lacks.
     own = there.left or not accepted
-    if own and (jumped := _jumped(view, floor, simulate, noted)):
+    if own and (jumped := _jumped(view, floor, simulate)):
         yield jumped
     first, others = leaders(
         view,
@@ -283,18 +283,17 @@ def _passed(
             yield more
 
 
-def _jumped(view: View, floor: Floor, simulate: Simulate, noted: Noted) -> list[Tried]:
+def _jumped(view: View, floor: Floor, simulate: Simulate) -> list[Tried]:
     """Jumps of a clock that do most of so much that numbers may have been pulled, before any law is simulated.
 
     To first order a jump by a period of what rings does nothing, so the screen's order says nothing of them. They have
-    to do more than an error of a clock that all recordings share.
+    to do more than an error of a clock that all recordings share. Those that do not are judged in their turn.
     """
     known, every = view.standing.known, view.screening.candidates
     chosen = [one for one in every if isinstance(one.suspect, Catalogued) and one.suspect.jumps]
     if not (known.gross and chosen):
         return []
-    more, less = tried(chosen, view, view.standing, floor, simulate)
-    noted.fell(*less)
+    more, _ = tried(chosen, view, view.standing, floor, simulate)
     gains = [jump_gain(one.found, known, one.standing.known) for one in more]
     jumps = [(one, gain) for one, gain in zip(more, gains, strict=True) if gain > MOST * known.excess]
     if not jumps:
