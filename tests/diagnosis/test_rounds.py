@@ -10,7 +10,7 @@ import bench
 import numpy as np
 import pytest
 
-from kbs_process.diagnosis import believed, rounds
+from kbs_process.diagnosis import believed, effort, rounds
 from kbs_process.diagnosis import gate as gate_of
 from kbs_process.diagnosis import supposed as supposed_laws
 from kbs_process.diagnosis.as_suspect import sigma_of, suspect_of
@@ -354,15 +354,47 @@ def test_what_numbers_gain_where_they_were_drawn_back_is_no_law_s(
     done = rounds._round(cable, back, floor, simulate, [])
     assert (done.seen, done.standing) == (back, alone)
     assert asked == [(back, alone)]
-    effort = Effort(simulate, cable.known)
-    told = rounds._diagnosed(cable.known, floor, effort, detected(cable, floor, experiment.fit))
+    search = Effort(simulate, cable.known)
+    told = rounds._diagnosed(cable.known, floor, search, detected(cable, floor, experiment.fit))
     assert told.standing.known.residual is alone.known.residual
     # What they are known to is told by their scatter, too.
     np.testing.assert_array_equal(told.standing.known.covariance, scattered(alone.known))
     assert told.after.ratio < told.before.ratio
     # Numbers that nothing has pulled stay where they are.
-    rounds._diagnosed(cable.known, floor, effort, detected(cable, floor, experiment.fit), pulled=False)
+    rounds._diagnosed(cable.known, floor, search, detected(cable, floor, experiment.fit), pulled=False)
     assert asked[-1][0].known is cable.known
+
+
+@pytest.mark.parametrize("costly", [True, False])
+def test_a_search_that_has_cost_too_much_ends_with_what_it_has_found(
+    cable: Standing, monkeypatch: pytest.MonkeyPatch, costly: bool
+) -> None:
+    tried, scene, found = screened(cable)
+    first = passed(cable, tried, scene, found, "ground_cable")
+    told = find_of([first], 0, np.ones(1), cable, None)
+    asked: list[int] = []
+
+    def look(
+        here: Standing, seen: Standing, _: object, __: object, accepted: list[Accepted]
+    ) -> rounds._Round:
+        asked.append(len(accepted))
+        law = None if accepted else Accepted(first, told, cable)
+        return rounds._Round(law, first.standing if law else here, seen, found, Noted(), None)
+
+    monkeypatch.setattr(rounds, "_round", look)
+    monkeypatch.setattr(rounds, "drawn_back", lambda one, *_: one)
+    monkeypatch.setattr(rounds, "_goes_on", lambda *_: True)
+    monkeypatch.setattr(rounds, "_place", lambda *_: None)
+    monkeypatch.setattr(rounds, "needed", lambda accepted, here, *_: (accepted, here, ()))
+    if costly:
+        monkeypatch.setattr(effort, "EFFORT", -1.0)
+    experiment = cable.known.experiment
+    floor = declared(experiment)
+    search = Effort(bench.serial(experiment), cable.known)
+    done = rounds._diagnosed(cable.known, floor, search, detected(cable, floor, experiment.fit))
+    assert asked == ([0] if costly else [0, 1])
+    assert done.ended == costly
+    assert [one.identity.law for one in done.finds] == ["ground_cable"]
 
 
 def _lower(standing: Standing, share: float) -> Standing:

@@ -116,6 +116,9 @@ def test_each_of_a_pair_has_to_be_found_beside_the_other(
     for name in ("without", "bare"):
         monkeypatch.setattr(rounds, name, lambda here, *_: here)
     empty = rounds._Round(None, cable, cable, first.screening, noted, None)
+    over = Effort(bench.serial(made), known)
+    monkeypatch.setattr(over, "goes_on", lambda: False)
+    assert rounds._pair(empty, declared(made), over, []) == () and not asked
     pair = rounds._pair(empty, declared(made), Effort(bench.serial(made), known), [])
     assert asked[0] == ["ground_cable"]
     if left[0] > 1.0 - MOSTLY_DONE:
