@@ -13,6 +13,7 @@ from kbs_process.diagnosis.metric import metrics
 from kbs_process.diagnosis.ringing import decays
 from kbs_process.plant.effects import select
 from kbs_process.plant.modes import modes
+from kbs_process.rig.model import substitute
 from kbs_process.signals.records import Array
 
 BEGIN = 10
@@ -57,3 +58,10 @@ def test_ringing_is_no_mismatch_but_a_tone_in_the_middle_is(made: Experiment, co
     assert plain > 1e3
     assert float(np.sum(metric(rings) ** 2)) < 0.02 * plain
     assert float(np.sum(metric(late) ** 2)) > 0.2 * float(np.sum(metric.whiten(late) ** 2))
+
+
+def test_what_runs_away_is_no_decay(made: Experiment) -> None:
+    """A base too soft for the weight that it carries topples: what grows has overflown before the end."""
+    soft = substitute(made.rig, {"transducer.stiffness": np.full(3, 1e-3)})
+    n = made.drives[0].n
+    assert decays(made, Hypothesis(soft, made.effects), 0, BEGIN, n).shape == (n, len(made.channels), 0)
