@@ -13,7 +13,7 @@ from test_rounds import standing
 from kbs_process.campaign.commands import read_commands
 from kbs_process.campaign.corrected_diagnosis import write_corrected
 from kbs_process.campaign.diagnosis_files import write_diagnosis
-from kbs_process.campaign.diagnosis_sentences import _law_in_words
+from kbs_process.campaign.diagnosis_sentences import _law_in_words, _shown
 from kbs_process.campaign.load import load_campaign
 from kbs_process.diagnosis.curves import basis
 from kbs_process.diagnosis.detection import Detection
@@ -37,7 +37,7 @@ from kbs_process.diagnosis.outcome import (
 from kbs_process.diagnosis.trajectories import family, limits_of
 from kbs_process.plant.effects.measured_law import COEFFICIENTS, MEASURED
 from kbs_process.report.records.common import load
-from kbs_process.report.records.diagnosis import DiagnosisResults
+from kbs_process.report.records.diagnosis import DiagnosisResults, Trial
 
 OVER_ANGLE = next(one for one in MEASURED if one.effect.name == "ground_angle_law")
 LAW = Identity("external wrench", "el", (), "unnamed", "curve over joint angle")
@@ -232,6 +232,24 @@ def test_laws_of_the_catalogue_that_do_the_same_are_alike_likely() -> None:
     chance, others = _alike_likely(0.6, [same, apart, curve, linear])
     assert chance == pytest.approx(0.31)
     assert [one.probability for one in others] == pytest.approx([0.31, 0.3, 0.08, 0.0])
+
+
+def test_the_channel_that_shows_most_of_what_is_left_is_told() -> None:
+    def trial(**channels: float) -> Trial:
+        return Trial(
+            recording="r",
+            trajectory="0",
+            role="fit",
+            nominal=9.0,
+            known=3.0,
+            corrected=1.2,
+            channels=channels,
+        )
+
+    assert (
+        _shown([trial(Fx=1.0, Fy=2.0), trial(Fx=2.0**0.5, Fy=0.9, el=1.0)]) == " Fy shows 75 % of its power."
+    )
+    assert _shown([trial(Fx=1.5, Fy=1.5)]) == _shown([trial(Fx=0.9)]) == _shown([]) == ""
 
 
 def test_what_cannot_be_told_from_a_law_is_told_with_its_place(outcome: Outcome) -> None:

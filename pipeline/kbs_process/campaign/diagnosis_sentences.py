@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Sequence
 
 import numpy as np
@@ -83,10 +84,10 @@ def sentence(
         return _unnamed(outcome, trials, floor) + _located(outcome) + _matters(outcome, requirements)
     told = [_law_in_words(find) for find in outcome.finds]
     begin = "Nearest to what the model lacks, of the laws known" if outcome.much else "The model lacks"
-    return f"{begin}: {'; '.join(told)}.{_reserve(outcome)}{_matters(outcome, requirements)}"
+    return f"{begin}: {'; '.join(told)}.{_reserve(outcome, trials)}{_matters(outcome, requirements)}"
 
 
-def _reserve(outcome: Outcome) -> str:
+def _reserve(outcome: Outcome, trials: Sequence[records.Trial]) -> str:
     """What is to be said of finds with which something is left: among known laws they are the nearest ones."""
     if not (outcome.after.left or outcome.much):
         return ""
@@ -94,6 +95,21 @@ def _reserve(outcome: Outcome) -> str:
     level = f"{rms(most):.3g} times the floor (rms)"
     return (
         f" With that in the plant {level} is left: more is missing, or a law found stands in for one like it."
+        f"{_shown(trials)}"
+    )
+
+
+def _shown(trials: Sequence[records.Trial]) -> str:
+    """The channel that shows most of the power that is left beyond the floor, if one does."""
+    power: defaultdict[str, float] = defaultdict(float)
+    for trial in trials:
+        for name, ratio in trial.channels.items():
+            power[name] += max(0.0, ratio**2 - 1.0)
+    total = sum(power.values())
+    return "".join(
+        f" {name} shows {100.0 * own / total:.0f} % of its power."
+        for name, own in power.items()
+        if own > 0.5 * total
     )
 
 
@@ -175,7 +191,7 @@ def paragraph(
         )
     if finds:
         parts.append(
-            f"With it in the plant the difference is {corrected:.3g} times the floor.{_reserve(outcome)}"
+            f"With it in the plant the difference is {corrected:.3g} times the floor.{_reserve(outcome, trials)}"
         )
     else:
         parts.append(_unnamed(outcome, trials, floor) + _located(outcome))
