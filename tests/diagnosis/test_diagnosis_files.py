@@ -13,7 +13,7 @@ from test_rounds import standing
 from kbs_process.campaign.commands import read_commands
 from kbs_process.campaign.corrected_diagnosis import write_corrected
 from kbs_process.campaign.diagnosis_files import write_diagnosis
-from kbs_process.campaign.diagnosis_sentences import _law_in_words, _shown
+from kbs_process.campaign.diagnosis_sentences import _law_in_words, _shown, _stopped
 from kbs_process.campaign.load import load_campaign
 from kbs_process.diagnosis.curves import basis
 from kbs_process.diagnosis.detection import Detection
@@ -21,6 +21,7 @@ from kbs_process.diagnosis.finding import _alike_likely, merged, trusted
 from kbs_process.diagnosis.floor import declared
 from kbs_process.diagnosis.gate import Fold, Gate
 from kbs_process.diagnosis.joint import standing_of
+from kbs_process.diagnosis.known import MOVED, NEAR
 from kbs_process.diagnosis.measured import inserted
 from kbs_process.diagnosis.next_test import Proposal, Tried
 from kbs_process.diagnosis.outcome import (
@@ -232,6 +233,22 @@ def test_laws_of_the_catalogue_that_do_the_same_are_alike_likely() -> None:
     chance, others = _alike_likely(0.6, [same, apart, curve, linear])
     assert chance == pytest.approx(0.31)
     assert [one.probability for one in others] == pytest.approx([0.31, 0.3, 0.08, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("sigmas", "told"), [(NEAR, True), (-NEAR, True), (3.0, False), (MOVED + 0.1, False)]
+)
+def test_a_number_that_went_as_far_as_it_was_let_go_is_told(
+    outcome: Outcome, sigmas: float, told: bool
+) -> None:
+    known = outcome.known
+    name = "joint.el.drive.Ka"
+    k = known.names.index(name)
+    value = known.parameters.value.copy()
+    value[k] += sigmas * known.parameters.sigma[k]
+    moved = replace(known, value=value)
+    assert moved.stopped == ((name,) if told else ())
+    assert (f"{name} went as far as chance may have it" in _stopped(moved)) == told
 
 
 def test_the_channel_that_shows_most_of_what_is_left_is_told() -> None:

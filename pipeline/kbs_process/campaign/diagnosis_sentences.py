@@ -11,6 +11,7 @@ from kbs_process.campaign.diagnosis_terms import place_of, rms
 from kbs_process.diagnosis.detection import Detection
 from kbs_process.diagnosis.families import UNNAMED
 from kbs_process.diagnosis.floor import Floor
+from kbs_process.diagnosis.known import NEAR, Known
 from kbs_process.diagnosis.outcome import Find, Outcome
 from kbs_process.diagnosis.thresholds import RIVALS, told_apart
 from kbs_process.report.records import diagnosis as records
@@ -133,12 +134,23 @@ def _unnamed(outcome: Outcome, trials: Sequence[records.Trial], floor: Floor) ->
         where, near = _loudest(outcome.after), _nearest(outcome)
         return _FAINT.format(floor=_FLOOR[floor.source], where=where, share=share, moved=moved, near=near)
     if not outcome.unforeseen:
-        return _WORDS[outcome.verdict].format(floor=_FLOOR[floor.source], near=_nearest(outcome))
+        words = _WORDS[outcome.verdict].format(floor=_FLOOR[floor.source], near=_nearest(outcome))
+        return words + (_stopped(outcome.standing.known) if outcome.verdict == "none" else "")
     worst = max((trial for trial in trials if trial.role == "held-out"), key=lambda trial: trial.corrected)
     channel = max(worst.channels, key=lambda name: worst.channels[name])
     return (
         f"Recordings that were fitted are predicted, {worst.recording}, which was held out, is not: "
         f"{channel} differs by {worst.channels[channel]:.3g} times the floor (rms)."
+    )
+
+
+def _stopped(known: Known) -> str:
+    """Numbers that nothing exceeds the floor with, and that would have gone farther."""
+    if not known.stopped:
+        return ""
+    names = ", ".join(known.stopped)
+    return (
+        f" For that {names} went as far as chance may have it ({NEAR:.2g} sigma): check that at its source."
     )
 
 

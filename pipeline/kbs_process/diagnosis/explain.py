@@ -23,7 +23,7 @@ from kbs_process.diagnosis.detection import Detection, detect
 from kbs_process.diagnosis.experiment import Experiment
 from kbs_process.diagnosis.floor import Floor, estimate, smaller
 from kbs_process.diagnosis.hypothesis import Hypothesis, Prediction, Simulate
-from kbs_process.diagnosis.known import MOVED, Known, confined, leapt, refit
+from kbs_process.diagnosis.known import NEAR, Known, confined, leapt, refit
 from kbs_process.diagnosis.mistimed import by_another_clock
 from kbs_process.diagnosis.parameters import prior
 from kbs_process.diagnosis.remains import searched
@@ -31,7 +31,6 @@ from kbs_process.diagnosis.search import LITTLE, SLIGHT
 from kbs_process.diagnosis.thresholds import EXPLAINED, LEAST_RHO, MOST
 from kbs_process.signals.records import Array
 
-NEAR = 0.99 * MOVED  # sigmas
 LEAPS = 4  # after a descent
 EASED = 4  # passes in a metric that takes what is left for noise
 Task = Callable[[str], AbstractContextManager[object]]  # shows that something of some length is done

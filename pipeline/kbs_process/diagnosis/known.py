@@ -26,6 +26,7 @@ from kbs_process.stages.output_error import Scalar
 
 # Sigmas, from which a parameter is said to be off: of a hundred that are not, one in 160 campaigns has one.
 MOVED = 4.0
+NEAR = 0.99 * MOVED  # sigmas that numbers are let go before any may be off
 # Chance below which all together are said to be off: no single one need be, where many make up for what was left out.
 STRAINED = 1e-3
 CONVERGED = "converged"  # name of the check
@@ -136,6 +137,12 @@ class Known:
         """Whether these numbers are together farther from their priors than chance has them."""
         count = int(self.stated.sum())
         return count > 0 and bool(chi2.sf(self.strain, count) < STRAINED)
+
+    @property
+    def stopped(self) -> tuple[str, ...]:
+        """Numbers that were let go no farther than chance has them, and stopped there: what is off may be hidden so."""
+        far = self.stated & (np.abs(np.nan_to_num(self.moved)) > 0.99 * NEAR) & (np.abs(self.moved) <= MOVED)
+        return tuple(name for name, there in zip(self.names, far, strict=True) if there)
 
     def jacobian(self, trial: int) -> Array:
         """(rows, p) by which a trial's prediction answers to the parameters, whitened as its residual is."""
