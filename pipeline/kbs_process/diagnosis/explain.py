@@ -68,7 +68,7 @@ def explain(experiment: Experiment, simulate: Simulate, task: Task) -> Explained
         held = refit(experiment, start, floor, simulate, reach=NEAR, slopes=slopes, leaps=leaps)
         stood = _moved_on(_stood(held, floor), floor, simulate, LEAPS)
     near: Known | None = None
-    if stood.after.left and (stood.known.gross or _may_be_off(stood.known)):
+    if stood.after.left and (stood.known.gross or stood.known.stopped):
         with task("Refitting the known parameters, free"):
             known = stood.known
             start = eased(known, simulate) if known.gross else known.hypothesis
@@ -87,7 +87,7 @@ def explain(experiment: Experiment, simulate: Simulate, task: Task) -> Explained
             if freed.known.prior_chi2 > stood.known.prior_chi2 + LEAST_RHO**2:
                 near = replace(stood.known, chi2_before=_squares(stood.known, begun))
             stood = freed
-    elif _may_be_off(stood.known):
+    elif stood.known.stopped:
         with task("Refitting the known parameters, free"):
             # What a number cannot reach, a law would do for it.
             free = refit(experiment, stood.known.hypothesis, floor, simulate, leaps=0)
@@ -147,11 +147,6 @@ def _squares(known: Known, predicted: Mapping[int, Prediction]) -> Array:
         for metric, trial in zip(known.metric, trials, strict=True)
     ]
     return np.array([float(z @ z) for z in left])
-
-
-def _may_be_off(known: Known) -> bool:
-    """Whether a number was kept from going farther."""
-    return bool((np.abs(np.nan_to_num(known.moved)) > 0.99 * NEAR).any())
 
 
 @dataclass(frozen=True, slots=True, eq=False)
