@@ -131,6 +131,14 @@ def written(outcome: Outcome, tmp_path_factory: pytest.TempPathFactory) -> Path:
     command = load(target, DiagnosisResults).provenance.command
     assert command == "kbs-process campaign/EL089", "of a diagnosis at the end of processing"
     assert "would look the same" in told_off.verdict_lines[0] and "{" not in told_off.verdict_lines[0]
+    hidden = replace(outcome, finds=(), bent=True)
+    assert hidden.verdict == "undecided" and replace(hidden, moved=off.moved).verdict == "parameters off"
+    told_hidden = write_diagnosis(campaign, declared(experiment), hidden, target, False, None, "")
+    assert "together farther from what the files say" in told_hidden.verdict_lines[0]
+    assert (
+        "most: " in told_hidden.verdict_lines[0]
+        and "Check these at their source" in told_hidden.verdict_lines[0]
+    )
     more = write_diagnosis(
         campaign,
         declared(experiment),

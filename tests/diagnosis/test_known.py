@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from diagnosis import bench
 from kbs_process.diagnosis import floor
 from kbs_process.diagnosis.hypothesis import Hypothesis, predict
-from kbs_process.diagnosis.known import Known, confined, refit
+from kbs_process.diagnosis.known import LEARNT, Known, confined, refit
 from kbs_process.diagnosis.parameters import COUPLING, known_parameters, prior, slopes
 from kbs_process.rig.model import substitute
 from kbs_process.signals.records import Array
@@ -50,6 +52,29 @@ def test_held_out_residual_is_noise_as_well(found: Known) -> None:
 def test_parameters_within_their_uncertainties_are_not_called_off(found: Known) -> None:
     check = next(check for check in found.checks if check.name == "within uncertainties")
     assert check.passed, check.detail
+
+
+def test_numbers_are_strained_where_recordings_have_them_farther_than_chance(found: Known) -> None:
+    """Refits of hardware that is drawn from the prior, seen with the noise: N(0, S - C)."""
+    chosen, rng = found.stated, np.random.default_rng(5)
+    sigma = found.parameters.sigma[chosen]
+    C = found.covariance[np.ix_(chosen, chosen)] / np.outer(sigma, sigma)
+    variance, directions = np.linalg.eigh(np.eye(len(sigma)) - C)
+    spread = directions * np.sqrt(np.maximum(variance, 0.0))
+
+    def moved(by: Array) -> Known:
+        value = found.parameters.value.copy()
+        value[chosen] += sigma * by
+        return replace(found, value=value)
+
+    drawn = [moved(spread @ rng.standard_normal(len(sigma))) for _ in range(200)]
+    assert 0 < drawn[0].strain.count < len(sigma)
+    assert np.mean([one.strain.squares / one.strain.count for one in drawn]) == pytest.approx(1.0, abs=0.05)
+    assert not any(one.strained for one in drawn[:50])
+    untold = directions[:, variance < LEARNT] @ np.full(int(np.sum(variance < LEARNT)), 3.0)
+    assert moved(untold).strain.squares < 1e-9
+    # The same length where recordings tell.
+    assert moved(directions[:, -1] * np.linalg.norm(untold)).strained
 
 
 def test_coupling_needs_no_simulation_and_slopes_are_those_of_the_prediction() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -15,7 +16,7 @@ from kbs_process.diagnosis.hypothesis import Hypothesis
 from kbs_process.diagnosis.known import refit
 from kbs_process.diagnosis.metric import metrics
 from kbs_process.diagnosis.parameters import known_parameters, prior
-from kbs_process.diagnosis.search import GEARS, Predictions, Search, Step
+from kbs_process.diagnosis.search import GEARS, Found, Search, Step
 from kbs_process.diagnosis.thresholds import DETECTED, TOLERATED
 from kbs_process.rig.model import substitute
 from kbs_process.signals.records import Array
@@ -68,9 +69,9 @@ def test_a_descent_gives_up_where_much_is_left_and_a_step_does_little_of_it(
     search = searching(replace(made, trials=(replace(trial, measured=trial.measured + missing),)))
     begun = search.begin(search.hypothesis.values(search.free))
 
-    def step(theta: Array, predicted: Predictions, H: Array, g: Array) -> Step:
+    def step(found: Found, J: Mapping[int, Array]) -> Step:
         left = max(search.left(begun), 1e4)
-        return Step(theta, predicted, promised=1.5 * share * left, gained=share * left)
+        return Step(found.theta, found.predicted, promised=1.5 * share * left, gained=share * left)
 
     monkeypatch.setattr(search, "step", step)
     ended = search.descend(begun, giving_up=True)

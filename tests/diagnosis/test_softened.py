@@ -72,7 +72,7 @@ def test_laws_are_looked_for_from_numbers_that_were_drawn_back(pulled: Known) ->
     floor = declared(pulled.experiment)
     standing = standing_of(pulled, {})
     back = drawn_back(standing, floor, simulate).known
-    assert back.strain < 0.3 * pulled.strain
+    assert back.strain.squares < 0.3 * pulled.strain.squares
     assert back.gross and back.excess < pulled.excess  # the tone is no number's
     assert back.metric is pulled.metric
     calm = Standing(
@@ -93,7 +93,7 @@ def test_numbers_that_leave_nothing_are_drawn_back_if_chance_has_them_elsewhere(
     pulled = standing_of(replace(found, parameters=replace(prior, value=found.value - apart)), {})
     assert bent(pulled, floor)
     back = drawn_back(pulled, floor, simulate).known
-    assert back.strain < 0.5 * pulled.known.strain
+    assert back.strain.squares < 0.5 * pulled.known.strain.squares
     assert detected(standing_of(back, {}), floor, made.fit).left  # what they had taken up
     # Nor is it looked past that single ones are off, until a law is found to be likelier.
     off = replace(prior, value=found.value - 2.0 * apart)

@@ -17,8 +17,7 @@ from mcap_ros2.decoder import DecoderFactory
 
 from engine.ports import OUT
 from proof.concealed import paths
-from proof.concealed.effects import BY_NAME
-from proof.odd import latch, maker, motions
+from proof.odd import aslant, latch, maker, motions
 from proof.odd.__main__ import main
 from proof.odd.cases import BY_NUMBER, CASES, Case
 from proof.truth import Truth
@@ -44,12 +43,12 @@ def messages(folder: Path, file: str) -> dict[str, list[Any]]:
 
 
 def test_every_case_says_which_answers_are_right_and_which_are_wrong() -> None:
-    assert len(CASES) == len(BY_NUMBER) == len({case.name for case in CASES}) == 16
+    assert len(CASES) == len(BY_NUMBER) == len({case.name for case in CASES}) == 17
     for case in CASES:
         assert case.title and case.done.endswith(".") and case.right and case.wrong, case.number
         assert not set(case.right) & set(case.wrong), case.number
         assert len(case.bounds) in (0, case.trajectories)
-        assert all(one.physics in (*BY_NAME, latch.PHYSICS.name) for one in case.effects)
+        assert all(one.physics in maker.PHYSICS for one in case.effects)
         told = maker.truth(case)
         truth = msgspec.convert({key: told[key] for key in told.keys() & set(Truth.__struct_fields__)}, Truth)
         assert len(truth.effects) == len(case.effects) and len(truth.beyond) == len(case.moved)
@@ -110,6 +109,21 @@ def test_the_clip_goes_over_at_either_end_of_its_sector() -> None:
             acting.act(0.0, 1e-3, acting.numbers, memory, motion, np.zeros((2, 21)), out)
         torques.append(out[4])
     assert np.allclose(torques, 2.0 * np.array([-1, 1, 1, 1, -1, -1, -1, 1, 1]))
+
+
+def test_a_spring_aslant_acts_along_its_own_axis_alone_and_holds_back() -> None:
+    acting = aslant.extra(
+        replace(maker.effect(BY_NUMBER["13"].effects[0]), amplitude=3.0, shapes=(2.0, 0.0, 2.0))
+    )
+
+    def torque(*phi: float) -> list[float]:
+        motion, out = np.zeros((3, 7)), np.zeros(OUT)
+        motion[0, :3] = phi
+        acting.act(0.0, 1e-3, acting.numbers, np.zeros((1, acting.states)), motion, np.zeros((2, 21)), out)
+        return list(out)
+
+    assert np.allclose(torque(0.1, 0.0, 0.1)[:3], [-0.3, 0.0, -0.3]) and not any(torque(0.1, 0.0, 0.1)[3:])
+    assert np.allclose(torque(0.1, 0.5, -0.1), 0.0)
 
 
 def test_motions_rest_or_last_as_long_as_the_table_says() -> None:

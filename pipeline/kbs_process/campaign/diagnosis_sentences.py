@@ -6,12 +6,13 @@ from collections import defaultdict
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.stats import chi2
 
 from kbs_process.campaign.diagnosis_terms import place_of, rms
 from kbs_process.diagnosis.detection import Detection
 from kbs_process.diagnosis.families import UNNAMED
 from kbs_process.diagnosis.floor import Floor
-from kbs_process.diagnosis.known import NEAR, Known
+from kbs_process.diagnosis.known import LEARNT, NEAR, Known
 from kbs_process.diagnosis.outcome import Find, Outcome
 from kbs_process.diagnosis.thresholds import RIVALS, told_apart
 from kbs_process.report.records import diagnosis as records
@@ -29,6 +30,11 @@ _WORDS = {
 _FAINT = (
     "Something seems to exceed {floor}, {where}all together by {share:.2g} % of its power: too little to tell what it "
     "is.{moved}{near}"
+)
+_HIDDEN = (
+    "Nothing exceeds {floor}, but known parameters are together farther from what the files say than chance has them "
+    "(squared sigmas {squares:.0f} in {count} directions, p {p:.1g}; most: {names}), though none is by itself: stated "
+    "uncertainties are too small, or physics was left out that does what they do. Check these at their source.{near}"
 )
 MATTERS = 0.1  # of a limit: in a sum of squares a tenth is a half percent
 
@@ -133,6 +139,16 @@ def _unnamed(outcome: Outcome, trials: Sequence[records.Trial], floor: Floor) ->
         moved = " Known parameters are off, too." if outcome.moved else ""
         where, near = _loudest(outcome.after), _nearest(outcome)
         return _FAINT.format(floor=_FLOOR[floor.source], where=where, share=share, moved=moved, near=near)
+    if outcome.hidden and not outcome.after.left and not outcome.unforeseen:
+        strain = outcome.known.strain
+        return _HIDDEN.format(
+            floor=_FLOOR[floor.source],
+            squares=strain.squares,
+            count=strain.count,
+            p=chi2.sf(strain.squares, strain.count),
+            names=", ".join(farthest(outcome.known)),
+            near=_nearest(outcome),
+        )
     if not outcome.unforeseen:
         words = _WORDS[outcome.verdict].format(floor=_FLOOR[floor.source], near=_nearest(outcome))
         return words + (_stopped(outcome.standing.known) if outcome.verdict == "none" else "")
@@ -152,6 +168,15 @@ def _stopped(known: Known) -> str:
     return (
         f" For that {names} went as far as chance may have it ({NEAR:.2g} sigma): check that at its source."
     )
+
+
+def farthest(known: Known, most: int = 3) -> list[str]:
+    """Numbers that are farthest from their priors, in units of what a refit is expected to move each by."""
+    stated = np.flatnonzero(known.stated)
+    learnt = 1.0 - np.minimum(known.sigma[stated] / known.parameters.sigma[stated], 1.0) ** 2
+    far = known.moved[stated] / np.sqrt(np.maximum(learnt, LEARNT))
+    order = np.argsort(-np.abs(far))[:most]
+    return [f"{known.names[stated[i]]} ({known.moved[stated[i]]:+.1f})" for i in order]
 
 
 def _located(outcome: Outcome) -> str:

@@ -15,6 +15,7 @@ from scipy.stats import chi2
 
 from kbs_process.diagnosis.experiment import Experiment
 from kbs_process.diagnosis.floor import Floor
+from kbs_process.diagnosis.ground import information
 from kbs_process.diagnosis.hypothesis import Hypothesis, Prediction, Simulate
 from kbs_process.diagnosis.metric import Metric, metrics
 from kbs_process.diagnosis.parameters import Slopes, known_parameters, prior, within
@@ -29,8 +30,17 @@ MOVED = 4.0
 NEAR = 0.99 * MOVED  # sigmas that numbers are let go before any may be off
 # Chance below which all together are said to be off: no single one need be, where many make up for what was left out.
 STRAINED = 1e-3
+LEARNT = 0.05  # share of a direction's prior variance that recordings take away, from which on it counts
 CONVERGED = "converged"  # name of the check
 CONFINED = 8  # steps of a refit that is looked at, or gone on from
+
+
+@dataclass(frozen=True, slots=True)
+class Strain:
+    """Squared sigmas, each of what chance moves a direction by, and the directions that they are summed over."""
+
+    squares: float
+    count: int
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -128,15 +138,29 @@ class Known:
         return np.array([one in files for one in self.free], dtype=np.bool_) & np.isfinite(self.moved)
 
     @property
-    def strain(self) -> float:
-        """Sum of the squared sigmas by which numbers are off that have a stated prior."""
-        return float(np.sum(self.moved[self.stated] ** 2))
+    def strain(self) -> Strain:
+        """How far numbers with a stated prior are from it together, as far as recordings tell.
+
+        Where these are made by such numbers, and nothing is left out, a refit moves them by N(0, S - C): S is the
+        prior's covariance, C that after it (the law of total variance). In prior sigmas, along the principal directions
+        of that, squares over variances add up to chi square. Validity: a descent that has arrived; along directions
+        that recordings hardly tell (`LEARNT`) what a floor is wrong by counts most.
+        """
+        chosen = self.stated
+        sigma, moved = self.parameters.sigma[chosen], self.moved[chosen]
+        learnt = np.eye(len(sigma)) - self.covariance[np.ix_(chosen, chosen)] / np.outer(sigma, sigma)
+        if not np.isfinite(learnt).all():
+            return Strain(0.0, 0)
+        variance, directions = np.linalg.eigh(learnt)
+        told = variance > LEARNT
+        along = directions.T[told] @ moved
+        return Strain(float(np.sum(along**2 / variance[told])), int(told.sum()))
 
     @property
     def strained(self) -> bool:
         """Whether these numbers are together farther from their priors than chance has them."""
-        count = int(self.stated.sum())
-        return count > 0 and bool(chi2.sf(self.strain, count) < STRAINED)
+        strain = self.strain
+        return strain.count > 0 and bool(chi2.sf(strain.squares, strain.count) < STRAINED)
 
     @property
     def stopped(self) -> tuple[str, ...]:
@@ -268,7 +292,7 @@ def known_of(search: Search, found: Found, before: Array) -> Known:
     rest = [drive for drive in search.everything if drive not in found.predicted]
     predicted = {**found.predicted, **search.predict([found.theta], rest)[0]}
     found = replace(found, predicted=predicted)
-    H, _ = search.normal(found.gradients, predicted)
+    H = information(search.jacobians(found.gradients))
     precision = search.precision + search.ridge
     size = 1.0 / np.sqrt(np.maximum(np.diag(H) + precision, 1e-300))
     scaled = (H + np.diag(precision)) * np.outer(size, size)
@@ -307,7 +331,7 @@ def _checks(known: Known, found: Found) -> tuple[Check, ...]:
         for name, value, low, high in zip(known.names, known.value, limits.lower, limits.upper, strict=True)
         if value <= low or value >= high
     ]
-    within = f"all within {MOVED:g} sigma"
+    within, strain = f"all within {MOVED:g} sigma", known.strain
     return (
         Check(CONVERGED, found.converged, f"{found.rounds} rounds"),
         Check("within bounds", not stuck, ", ".join(stuck) or "none at a bound"),
@@ -315,6 +339,6 @@ def _checks(known: Known, found: Found) -> tuple[Check, ...]:
         Check(
             "together within uncertainties",
             not known.strained,
-            f"squared sigmas {known.strain:.0f} for {int(known.stated.sum())} numbers",
+            f"squared sigmas {strain.squares:.0f} in {strain.count} directions that the recordings tell",
         ),
     )

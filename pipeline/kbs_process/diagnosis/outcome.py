@@ -162,17 +162,25 @@ class Outcome:
     left: Place | None  # after all finds
     known: Known  # refitted, without any law: what stood before the first find
     standing: Standing  # the corrected model
+    bent: bool = (
+        False  # whether known numbers leave nothing, but are farther off together than chance has them
+    )
     otherwise: tuple[Moved, ...] = ()  # known parameters that would have to be off if there were no law
     ended: bool = False  # whether the search had cost so much that no more laws were looked for
 
     @property
     def verdict(self) -> Verdict:
         """The answer in a word: finds beside which much is left are no more than the nearest that is known."""
-        if self.much or (not self.finds and (self.after.left or self.after.faint)):
+        if self.much or (not self.finds and (self.after.left or self.after.faint or self.hidden)):
             return "undecided"
         if self.finds:
             return "physics"
         return "parameters off" if self.moved else "none"
+
+    @property
+    def hidden(self) -> bool:
+        """Whether known numbers, none of which is off by itself, may have taken up physics that was left out."""
+        return self.bent and not self.moved
 
     @property
     def located(self) -> tuple[PortName, ...]:

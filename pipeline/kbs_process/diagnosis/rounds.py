@@ -160,6 +160,7 @@ def _diagnosed(
         left=left,
         known=known,
         standing=told,
+        bent=bent(standing, floor),
         ended=simulate.ended,
     )
     return replace(outcome, finds=trusted(outcome.finds, TRUST_PART if outcome.much else TRUST))

@@ -13,12 +13,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kbs_process.diagnosis.experiment import Experiment
+from kbs_process.diagnosis.ground import Ground, information
 from kbs_process.diagnosis.hypothesis import Hypothesis, Prediction, Simulate
 from kbs_process.diagnosis.leaps import leap, stride
 from kbs_process.diagnosis.metric import Metric
 from kbs_process.diagnosis.parameters import Slopes, known_parameters, slopes
 from kbs_process.diagnosis.side_by_side import side_by_side
-from kbs_process.estimation.bounded import bounded_minimum
 from kbs_process.estimation.fit import Parameters
 from kbs_process.signals.records import Array
 from kbs_process.stages.identification import gearbox
@@ -31,6 +31,8 @@ _SEEN = 5.0  # what a difference should move the whitened residual by
 _SPAN = 1.0  # of a step
 _LEAST_DIFFERENCE, _MOST_DIFFERENCE = 2e-3, 0.4  # prior sigmas
 _DAMPING = (0.0, 1e-2, 1e-1, 1.0, 10.0, 1e3)  # tried side by side
+_CHORDED = 3  # of them, the least, that are corrected where none keeps what slopes promise
+_CHORDS = 3  # corrections of each
 _AGREED = 0.9  # gained over promised, above which slopes are only updated
 _HALF = 0.5  # of the same, below which slopes of drives alone do not do
 _STALLED = 0.1  # of the same, below which a descent goes nowhere
@@ -43,7 +45,6 @@ LITTLE = 25.0  # of the same: what exact slopes gained, below which more rounds 
 SLIGHT = 3e-2  # of all that is left: likewise
 _MUCH = 0.5  # prior sigmas of a body's number, within which its slopes and others' stay what they are
 EARLY = 2  # steps before the first leap: masses and centres of gravity are right then
-_RIDGE = 1e-10  # of unit columns: numbers that nothing shows would leave the equations singular
 _ROUNDS = 10  # steps of a descent at most
 _NEGLIGIBLE = (
     1.0  # of the whitened residual's length: what a number moves by one sigma and is not looked at again
@@ -177,20 +178,6 @@ class Search:
         fit = self.experiment.fit
         return dict(zip(fit, side_by_side(lambda k: self.jacobian(k, gradients), fit), strict=True))
 
-    def normal(self, gradients: Gradients, predicted: Predictions) -> tuple[Array, Array]:
-        """Normal matrix (p, p) and right-hand side (p,) of the data."""
-
-        def part(k: int) -> tuple[Array, Array]:
-            J = self.jacobian(k, gradients)
-            return J.T @ J, J.T @ self.residual(k, predicted)
-
-        p = len(self.free)
-        H, g = np.zeros((p, p)), np.zeros(p)
-        for square, along in side_by_side(part, self.experiment.fit):
-            H += square
-            g += along
-        return H, g
-
     # how it is lowered
 
     def begin(
@@ -245,11 +232,12 @@ class Search:
         little of what is to be done: no number here does it then, and more steps only bend them towards it.
         """
         fresh = found.due if found.due != _OLD else min(GEARS, most)
+        idle = 0
         for number in range(found.rounds + 1, found.rounds + rounds + 1):
             found = self.with_slopes(found)
-            H, g = self.normal(found.gradients, found.predicted)
-            step = self.step(found.theta, found.predicted, H, g)
-            self.settle(H, np.abs(step.theta - found.theta))
+            J = self.jacobians(found.gradients)
+            step = self.step(found, J)
+            self.settle(information(J), np.abs(step.theta - found.theta))
             little = max(LITTLE, SLIGHT * self.left(found))
             arrived = step.gained < max(little, _STALLED * step.promised)
             kept = step.gained > _AGREED * step.promised
@@ -257,8 +245,9 @@ class Search:
                 gradients = self.updated(found.gradients, found.theta, step)
                 found = replace(found, theta=step.theta, predicted=step.predicted, gradients=gradients)
             freshest = min(most, ALL if self._bodies_moved(found.theta) else GEARS)
-            converged = arrived and (fresh >= freshest or step.promised < little)
-            found = replace(found, rounds=number, converged=converged)
+            # Slopes that promise what they do not keep may have been taken over the wrong differences.
+            idle = idle + 1 if arrived and fresh >= freshest else 0
+            found = replace(found, rounds=number, converged=idle > 1 or (arrived and step.promised < little))
             if found.converged:
                 break
             hope = _HOPE * self.left(found)
@@ -266,6 +255,7 @@ class Search:
                 break
             stale = step.gained < max(little, _HALF * step.promised)
             fresh = _OLD if kept else freshest if stale and fresh == GEARS else min(most, GEARS)
+            fresh = min(most, ALL) if idle else fresh
             found = replace(found, due=fresh)
         return found
 
@@ -341,7 +331,7 @@ class Search:
         moved = np.abs(theta - self.bodies_at)[self.slow] / self.spread[self.slow]
         return bool((moved > _MUCH).any())
 
-    def _room(self, theta: Array) -> tuple[Array, Array]:
+    def room(self, theta: Array) -> tuple[Array, Array]:
         """How far each number may go down and up, in the chart of cosines and sines: these have no bounds."""
         limits = self.polar.flat_parameters
         assert limits.lower is not None and limits.upper is not None
@@ -385,31 +375,40 @@ class Search:
             _MOST_DIFFERENCE * self.spread,
         )
 
-    def step(self, theta: Array, predicted: Predictions, H: Array, g: Array) -> Step:
-        """One step in the chart of cosines and sines, as damped as lowers the cost most."""
-        data, excess = self.cost(theta, predicted)
+    def step(self, found: Found, J: Mapping[int, Array]) -> Step:
+        """One step in the chart of cosines and sines, as damped and as often corrected as lowers the cost most.
+
+        Numbers that make up for each other (stiffness and inertia, of a resonance) lie along valleys, narrow and bent:
+        a step along one is off its bottom by more than it gains, and damping makes it as short as the bend is tight.
+        From where a step ends the same equations lead back to the bottom (the chord method).
+        Source: J. M. Ortega, W. C. Rheinboldt, Iterative Solution of Nonlinear Equations in Several Variables (1970).
+        """
+        data, excess = self.cost(found.theta, found.predicted)
         # While much is unexplained, residuals count for less, so that no step is rash.
         weight = 1.0 / max(1.0, data / self.rows)
-        T = self.polar.jacobian(np.eye(len(theta)), theta)[: len(theta)]
-        A = T.T @ (weight * H + np.diag(self.precision + self.ridge)) @ T
-        b = T.T @ (weight * g - self.precision * (theta - self.parameters.value))
-        scale = 1.0 / np.sqrt(np.maximum(np.diag(A), 1e-300))
-        A, b = A * np.outer(scale, scale), scale * b
-        low, high = self._room(theta)
-        candidates, promised = [], 0.0
-        for damping in _DAMPING:
-            du = bounded_minimum(A + (_RIDGE + damping) * np.eye(len(b)), b, low / scale, high / scale)
-            promised = promised or float(2.0 * b @ du - du @ A @ du) / weight
-            candidates.append(self.clipped(self.polar.back(self.polar.flat(theta) + scale * du)))
+        ground = Ground(self, found.theta, J, weight)
+        points = [ground.minimum(found.theta, found.predicted, damping) for damping in _DAMPING]
+        promised = points[0][1]
+        best = Step(found.theta, found.predicted, promised, 0.0)
         if promised < GAIN:
-            return Step(theta, predicted, promised, 0.0)
-        now = weight * data + excess
-        tried = self.predict(candidates, self.drives)
-        costs = [weight * d + e for d, e in self.costs(candidates, tried)]
-        best = int(np.argmin(costs))
-        if not costs[best] < now:
-            return Step(theta, predicted, promised, 0.0)
-        return Step(candidates[best], tried[best], promised, (now - costs[best]) / weight)
+            return best
+        places = [point for point, _ in points]
+        for _ in range(1 + _CHORDS):
+            tried = self.predict(places, self.drives)
+            costs = [weight * d + e for d, e in self.costs(places, tried)]
+            least = int(np.argmin(costs))
+            gained = (weight * data + excess - costs[least]) / weight
+            if gained > best.gained:
+                best = Step(places[least], tried[least], promised, gained)
+            if (
+                best.gained > _AGREED * promised
+                or promised < LITTLE
+                or not np.isfinite(costs[:_CHORDED]).all()
+            ):
+                break
+            onward = zip(places[:_CHORDED], tried, _DAMPING, strict=False)
+            places = [ground.minimum(place, there, damping)[0] for place, there, damping in onward]
+        return best
 
 
 def _widened(slope: Slopes, base: Prediction, missing: int) -> Slopes:

@@ -21,7 +21,7 @@ from proof.concealed.recording import record
 from proof.concealed.sensing import CHANNELS
 from proof.concealed.sensitivity import perturbed
 from proof.concealed.strength import Strength
-from proof.odd import latch, motions, without_encoder
+from proof.odd import aslant, latch, motions, without_encoder
 from proof.odd.cases import Case, Concealed
 
 _SPLIT: Split = "development"
@@ -29,6 +29,8 @@ _LONG_S = 1000.0  # a longer run is read half as often, and its steps are longer
 _LONG_STEP = 2.5e-4  # s
 _MANY = 100_000  # messages of a topic: zstd at its highest level would take minutes
 _CLIPPED = CHANNELS.index("Tz")
+_OWN = latch, aslant  # laws of these campaigns alone
+PHYSICS = effects.BY_NAME | {own.PHYSICS.name: own.PHYSICS for own in _OWN}
 
 
 def make(case: Case, folder: Path) -> dict[str, Any]:
@@ -98,14 +100,14 @@ def _hardware(case: Case, folder: Path, rng: np.random.Generator) -> Hardware:
 
 def effect(one: Concealed) -> Effect:
     """The physics that the table names, with its numbers there."""
-    physics = latch.PHYSICS if one.physics == latch.PHYSICS.name else effects.BY_NAME[one.physics]
-    return Effect(physics, one.place, one.shapes, one.amplitude)
+    return Effect(PHYSICS[one.physics], one.place, one.shapes, one.amplitude)
 
 
 def _extra(case: Case, hardware: Hardware, duration: float) -> Extra:
     hidden = tuple(effect(one) for one in case.effects)
-    if any(one.physics is latch.PHYSICS for one in hidden):
-        return latch.extra(*hidden)  # alone: the engine lets one law act that is not in its table
+    for own in _OWN:
+        if any(one.physics is own.PHYSICS for one in hidden):
+            return own.extra(*hidden)  # alone: the engine lets one law act that is not in its table
     return effects.extra(hidden, hardware, np.zeros((len(CHANNELS), 2)), duration)
 
 
