@@ -130,6 +130,9 @@ def written(outcome: Outcome, tmp_path_factory: pytest.TempPathFactory) -> Path:
     assert nothing in (target / "index.html").read_text().replace("\u00a0", " ")
     command = load(target, DiagnosisResults).provenance.command
     assert command == "kbs-process campaign/EL089", "of a diagnosis at the end of processing"
+    assert told_off.verdict_lines[0].startswith(
+        "Known parameters are off (joint.el.drive.Ka +5.0 sigma): with that"
+    )
     assert "would look the same" in told_off.verdict_lines[0] and "{" not in told_off.verdict_lines[0]
     hidden = replace(outcome, finds=(), bent=True)
     assert hidden.verdict == "undecided" and replace(hidden, moved=off.moved).verdict == "parameters off"

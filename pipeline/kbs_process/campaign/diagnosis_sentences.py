@@ -23,8 +23,8 @@ _FLOOR = {
 }
 _WORDS = {
     "none": "Nothing exceeds {floor}.",
-    "parameters off": "Known parameters are off: moved, they leave nothing that exceeds {floor}. Physics that does "
-    "what they do would look the same; one that is farther off than its file can be wrong stands for such physics.",
+    "parameters off": "Known parameters are off ({moved}): with that nothing exceeds {floor}. Physics that does what "
+    "they do would look the same; one that is farther off than its file can be wrong stands for such physics.",
     "undecided": "There is a mismatch, and no law passed the gate.{near}",
 }
 _FAINT = (
@@ -150,7 +150,11 @@ def _unnamed(outcome: Outcome, trials: Sequence[records.Trial], floor: Floor) ->
             near=_nearest(outcome),
         )
     if not outcome.unforeseen:
-        words = _WORDS[outcome.verdict].format(floor=_FLOOR[floor.source], near=_nearest(outcome))
+        words = _WORDS[outcome.verdict].format(
+            floor=_FLOOR[floor.source],
+            near=_nearest(outcome),
+            moved=_off(outcome),
+        )
         return words + (_stopped(outcome.standing.known) if outcome.verdict == "none" else "")
     worst = max((trial for trial in trials if trial.role == "held-out"), key=lambda trial: trial.corrected)
     channel = max(worst.channels, key=lambda name: worst.channels[name])
@@ -158,6 +162,13 @@ def _unnamed(outcome: Outcome, trials: Sequence[records.Trial], floor: Floor) ->
         f"Recordings that were fitted are predicted, {worst.recording}, which was held out, is not: "
         f"{channel} differs by {worst.channels[channel]:.3g} times the floor (rms)."
     )
+
+
+def _off(outcome: Outcome, most: int = 5) -> str:
+    """Numbers that are off by themselves, farthest first."""
+    far = sorted(outcome.moved, key=lambda one: (-abs(one.sigmas), one.name))
+    more = f" and {len(far) - most} more" if len(far) > most else ""
+    return ", ".join(f"{one.name} {one.sigmas:+.1f} sigma" for one in far[:most]) + more
 
 
 def _stopped(known: Known) -> str:
