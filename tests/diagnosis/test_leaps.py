@@ -56,8 +56,9 @@ def test_edges_of_a_contact_are_found() -> None:
 def test_a_stride_finds_a_contact_that_has_vanished_elsewhere() -> None:
     """Most of its torque gone, other numbers have settled without it."""
     torque = float(bench.rig().quantities()[TORQUE])
-    search, found, own = searching({PHASE: 1.0, TORQUE: -0.9 * torque})
+    search, found, own = searching({PHASE: 2.0, TORQUE: -0.97 * torque})
     stuck = search.descend(found)
+    assert farther_edge(search, stuck.theta, own) > 1.0
     reached = stride(search, stuck, 2, GEARS)
     assert reached is not None
     settled = search.descend(reached)

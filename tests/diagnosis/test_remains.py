@@ -80,7 +80,8 @@ def test_a_law_that_brings_pulled_numbers_back_has_to_be_likelier_than_they_are(
     known = here.known
     prior = known.parameters
     far = replace(prior, value=prior.value - 8.0 * np.where(known.stated, prior.sigma, 0.0))
-    pulled = replace(here, known=replace(known, parameters=far))
+    # As if recordings told all of them.
+    pulled = replace(here, known=replace(known, parameters=far, covariance=1e-2 * known.covariance))
     assert pulled.known.strained and not detected(pulled, floor, made.fit).left
     more = pulled.known.cost - known.cost - gained  # is to be left of recordings that are fitted
     assert more > 0.0
