@@ -7,12 +7,13 @@ from dataclasses import replace
 import numpy as np
 
 from diagnosis import bench
+from kbs_process.diagnosis.costs import GEARS, Found
 from kbs_process.diagnosis.floor import declared
 from kbs_process.diagnosis.hypothesis import Hypothesis
 from kbs_process.diagnosis.leaps import stride
 from kbs_process.diagnosis.metric import metrics
 from kbs_process.diagnosis.parameters import known_parameters, prior
-from kbs_process.diagnosis.search import GEARS, Found, Search
+from kbs_process.diagnosis.search import Search
 from kbs_process.rig.model import substitute
 from kbs_process.signals.records import Array
 

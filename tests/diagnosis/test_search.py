@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from diagnosis import bench
+from kbs_process.diagnosis.costs import GEARS, Found
 from kbs_process.diagnosis.detection import Detection
 from kbs_process.diagnosis.experiment import Experiment
 from kbs_process.diagnosis.floor import declared
@@ -16,7 +17,8 @@ from kbs_process.diagnosis.hypothesis import Hypothesis
 from kbs_process.diagnosis.known import refit
 from kbs_process.diagnosis.metric import metrics
 from kbs_process.diagnosis.parameters import known_parameters, prior
-from kbs_process.diagnosis.search import GEARS, Found, Search, Step
+from kbs_process.diagnosis.search import Search
+from kbs_process.diagnosis.tangents import Step
 from kbs_process.diagnosis.thresholds import DETECTED, TOLERATED
 from kbs_process.rig.model import substitute
 from kbs_process.signals.records import Array

@@ -9,16 +9,17 @@ import numpy as np
 import pytest
 
 from kbs_process.diagnosis import search as module
-from kbs_process.diagnosis.search import Found, Search
+from kbs_process.diagnosis.costs import Found
+from kbs_process.diagnosis.search import Search
 from kbs_process.estimation.fit import Parameters
 from kbs_process.signals.records import Array
 from kbs_process.stages.polar import Polar
 
-STEEP, LONG = 3e4, 1e2
+STEEP, LONG = 1e5, 1e2
 
 
 class Valley(Search):
-    """Residuals 3e4 (y - x^2) and 1e2 (1 - x) of numbers x and y of which next to nothing is known."""
+    """Residuals 1e5 (y - x^2) and 1e2 (1 - x) of numbers x and y of which next to nothing is known."""
 
     def __init__(self) -> None:
         far = np.full(2, np.inf)

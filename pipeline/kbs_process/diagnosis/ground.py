@@ -11,7 +11,8 @@ from kbs_process.estimation.bounded import bounded_minimum
 from kbs_process.signals.records import Array
 
 if TYPE_CHECKING:
-    from kbs_process.diagnosis.search import Predictions, Search
+    from kbs_process.diagnosis.costs import Predictions
+    from kbs_process.diagnosis.tangents import Tangents
 
 _RIDGE = 1e-10  # of unit columns: numbers that nothing shows would leave the equations singular
 
@@ -23,8 +24,8 @@ class Ground:
     to a unit diagonal. They hold for other points, too, as far as slopes are the same there.
     """
 
-    def __init__(self, search: Search, theta: Array, J: Mapping[int, Array], weight: float) -> None:
-        self.search, self.J, self.weight = search, J, weight
+    def __init__(self, search: Tangents, theta: Array, J: Mapping[int, Array], weight: float) -> None:
+        self.search, self.theta, self.J, self.weight = search, theta, J, weight
         self.T = search.polar.jacobian(np.eye(len(theta)), theta)[: len(theta)]
         data = weight * information(J)
         A = self.T.T @ (data + np.diag(search.precision + search.ridge)) @ self.T
@@ -47,7 +48,28 @@ class Ground:
         point = search.clipped(search.polar.back(search.polar.flat(theta) + self.scale * du))
         return point, float(2.0 * b @ du - du @ self.A @ du) / self.weight
 
+    def valleys(self, share: float, length: float) -> list[Array]:
+        """Points (p,), some standard deviations off along each principal direction with an eigenvalue below `share`."""
+        search = self.search
+        here = search.polar.flat(self.theta)
+        low, high = search.room(self.theta)
+        points = list[Array]()
+        if not np.isfinite(self.A).all():
+            return points
+        for value, direction in zip(*_principal(self.A), strict=True):
+            if value < share:
+                du = self.scale * direction * (length / np.sqrt(max(value, _RIDGE)))
+                points.append(search.clipped(search.polar.back(here + np.clip(du, low, high))))
+        return points
+
 
 def information(J: Mapping[int, Array]) -> Array:
     """(p, p) of all trials' slopes together."""
     return np.asarray(sum(j.T @ j for j in J.values()), dtype=np.float64)
+
+
+def _principal(A: Array) -> tuple[Array, Array]:
+    """Eigenvalues (u,) from the least on, and eigenvectors, one in each row, with their largest element positive."""
+    values, vectors = np.linalg.eigh(A)
+    largest = np.argmax(np.abs(vectors), axis=0)
+    return values, (vectors * np.sign(vectors[largest, np.arange(len(values))])).T

@@ -12,9 +12,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from kbs_process.diagnosis.costs import GEARS, Found, Laws, added
 from kbs_process.diagnosis.hypothesis import Hypothesis, Prediction, Simulate
 from kbs_process.diagnosis.known import Known, as_it_is, known_of, resumed, settled
-from kbs_process.diagnosis.search import GEARS, Found, Laws, Search, added
+from kbs_process.diagnosis.search import Search
 from kbs_process.estimation.fit import Parameters
 from kbs_process.plant.attach import detach, idle
 from kbs_process.plant.effects import select

@@ -13,13 +13,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import chi2
 
+from kbs_process.diagnosis.costs import ALL, GROSS, Found, Laws
 from kbs_process.diagnosis.experiment import Experiment
 from kbs_process.diagnosis.floor import Floor
 from kbs_process.diagnosis.ground import information
 from kbs_process.diagnosis.hypothesis import Hypothesis, Prediction, Simulate
 from kbs_process.diagnosis.metric import Metric, metrics
 from kbs_process.diagnosis.parameters import Slopes, known_parameters, prior, within
-from kbs_process.diagnosis.search import ALL, EARLY, GROSS, Found, Laws, Search
+from kbs_process.diagnosis.search import EARLY, Search
 from kbs_process.diagnosis.softened import softened
 from kbs_process.estimation.fit import Check, Parameters
 from kbs_process.signals.records import Array, Mask

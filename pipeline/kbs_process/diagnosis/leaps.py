@@ -22,7 +22,8 @@ from kbs_process.stages.contact import edge_minima
 from kbs_process.stages.screening import Contact, contacts
 
 if TYPE_CHECKING:
-    from kbs_process.diagnosis.search import Found, Predictions, Search
+    from kbs_process.diagnosis.costs import Found, Predictions
+    from kbs_process.diagnosis.search import Search
 
 _SMOOTH = 8  # phases tried all round
 _EDGES = 4  # pairs of edges tried of a contact

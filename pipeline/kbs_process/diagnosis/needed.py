@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from kbs_process.diagnosis.costs import GROSS
 from kbs_process.diagnosis.finding import Tried, explained_share
 from kbs_process.diagnosis.floor import Floor
 from kbs_process.diagnosis.hypothesis import Simulate
@@ -17,7 +18,6 @@ from kbs_process.diagnosis.leaders import gated
 from kbs_process.diagnosis.outcome import Find, Identity, Refused
 from kbs_process.diagnosis.remains import detected, missed, searched, too_little
 from kbs_process.diagnosis.screen import Found
-from kbs_process.diagnosis.search import GROSS
 from kbs_process.diagnosis.settling import bent
 from kbs_process.diagnosis.thresholds import CLEAR, SHADE, STAYS_SIGMA
 from kbs_process.diagnosis.tryout import identity
