@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +12,7 @@ from kbs_process.diagnosis.costs import GEARS, Found
 from kbs_process.diagnosis.detection import Detection
 from kbs_process.diagnosis.experiment import Experiment
 from kbs_process.diagnosis.floor import declared
+from kbs_process.diagnosis.ground import Ground
 from kbs_process.diagnosis.hypothesis import Hypothesis
 from kbs_process.diagnosis.known import refit
 from kbs_process.diagnosis.metric import metrics
@@ -21,7 +21,6 @@ from kbs_process.diagnosis.search import Search
 from kbs_process.diagnosis.tangents import Step
 from kbs_process.diagnosis.thresholds import DETECTED, TOLERATED
 from kbs_process.rig.model import substitute
-from kbs_process.signals.records import Array
 
 
 def searching(made: Experiment) -> Search:
@@ -71,7 +70,7 @@ def test_a_descent_gives_up_where_much_is_left_and_a_step_does_little_of_it(
     search = searching(replace(made, trials=(replace(trial, measured=trial.measured + missing),)))
     begun = search.begin(search.hypothesis.values(search.free))
 
-    def step(found: Found, J: Mapping[int, Array]) -> Step:
+    def step(found: Found, ground: Ground) -> Step:
         left = max(search.left(begun), 1e4)
         return Step(found.theta, found.predicted, promised=1.5 * share * left, gained=share * left)
 

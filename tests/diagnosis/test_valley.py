@@ -10,6 +10,7 @@ import pytest
 
 from kbs_process.diagnosis import search as module
 from kbs_process.diagnosis.costs import Found
+from kbs_process.diagnosis.ground import Ground
 from kbs_process.diagnosis.search import Search
 from kbs_process.estimation.fit import Parameters
 from kbs_process.signals.records import Array
@@ -43,7 +44,7 @@ class Valley(Search):
 
     def moved(self, found: Found) -> Found:
         J = np.array([[2.0 * STEEP * found.theta[0], -STEEP], [LONG, 0.0]])
-        step = self.step(found, {0: J})
+        step = self.step(found, Ground(self, found.theta, {0: J}, 1.0))
         return Found(step.theta, step.predicted, {})
 
 

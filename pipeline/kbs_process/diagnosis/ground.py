@@ -27,26 +27,30 @@ class Ground:
     def __init__(self, search: Tangents, theta: Array, J: Mapping[int, Array], weight: float) -> None:
         self.search, self.theta, self.J, self.weight = search, theta, J, weight
         self.T = search.polar.jacobian(np.eye(len(theta)), theta)[: len(theta)]
-        data = weight * information(J)
-        A = self.T.T @ (data + np.diag(search.precision + search.ridge)) @ self.T
+        self.information = information(J)
+        A = self.T.T @ (weight * self.information + np.diag(search.precision + search.ridge)) @ self.T
         self.scale = 1.0 / np.sqrt(np.maximum(np.diag(A), 1e-300))
         self.A = A * np.outer(self.scale, self.scale)
 
-    def minimum(self, theta: Array, predicted: Predictions, damping: float = 0.0) -> tuple[Array, float]:
-        """The point (p,) where the cost is least from `theta` on, at which `predicted` holds, and what it promises.
+    def pull(self, theta: Array, predicted: Predictions) -> Array:
+        """(u,) minus half the slope of the cost at a point (p,), at which `predicted` holds."""
+        search = self.search
+        data = sum(j.T @ search.residual(k, predicted) for k, j in self.J.items())
+        prior = search.precision * (theta - search.parameters.value)
+        return np.asarray(self.scale * (self.T.T @ (self.weight * data - prior)), dtype=np.float64)
+
+    def minimum(self, theta: Array, pull: Array, damping: float = 0.0) -> tuple[Array, float]:
+        """The point (p,) where the cost is least from `theta` on, which is pulled so, and what it promises.
 
         `damping` is Levenberg's and Marquardt's: 0 for the step of Gauss and Newton.
         """
         search = self.search
-        data = sum(j.T @ search.residual(k, predicted) for k, j in self.J.items())
-        prior = search.precision * (theta - search.parameters.value)
-        b = self.scale * (self.T.T @ (self.weight * data - prior))
         low, high = search.room(theta)
         du = bounded_minimum(
-            self.A + (_RIDGE + damping) * np.eye(len(b)), b, low / self.scale, high / self.scale
+            self.A + (_RIDGE + damping) * np.eye(len(pull)), pull, low / self.scale, high / self.scale
         )
         point = search.clipped(search.polar.back(search.polar.flat(theta) + self.scale * du))
-        return point, float(2.0 * b @ du - du @ self.A @ du) / self.weight
+        return point, float(2.0 * pull @ du - du @ self.A @ du) / self.weight
 
     def valleys(self, share: float, length: float) -> list[Array]:
         """Points (p,), some standard deviations off along each principal direction with an eigenvalue below `share`."""

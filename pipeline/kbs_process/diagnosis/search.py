@@ -6,16 +6,14 @@ updated by what the step gave. Phases, and where tooth contact begins and ends, 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
 from kbs_process.diagnosis.costs import ALL, GEARS, OLD, Found
-from kbs_process.diagnosis.ground import Ground, information
+from kbs_process.diagnosis.ground import Ground
 from kbs_process.diagnosis.leaps import leap, stride
 from kbs_process.diagnosis.tangents import Step, Tangents
-from kbs_process.signals.records import Array
 
 # Tried side by side: valleys are as narrow as 1e-8 of what is across them, in squares, and each has its own.
 _DAMPING = (0.0, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0, 1e3)
@@ -68,9 +66,9 @@ class Search(Tangents):
         idle = 0
         for number in range(found.rounds + 1, found.rounds + rounds + 1):
             found = self.with_slopes(found)
-            J = self.jacobians(found.gradients)
-            step = self.step(found, J)
-            self.settle(information(J), np.abs(step.theta - found.theta))
+            ground = self.ground(found)
+            step = self.step(found, ground)
+            self.settle(ground.information, np.abs(step.theta - found.theta))
             little = max(LITTLE, SLIGHT * self.left(found))
             arrived = step.gained < max(little, _STALLED * step.promised)
             kept = step.gained > _AGREED * step.promised
@@ -106,7 +104,12 @@ class Search(Tangents):
         predicted = self.predict([theta], self.everything)[0]
         return Found(theta, predicted, self.slopes(theta, found.gradients), rounds=found.rounds)
 
-    def step(self, found: Found, J: Mapping[int, Array]) -> Step:
+    def ground(self, found: Found) -> Ground:
+        """The cost around a place; while much is unexplained residuals count for less, so that no step is rash."""
+        weight = 1.0 / max(1.0, self.cost(found.theta, found.predicted)[0] / self.rows)
+        return Ground(self, found.theta, self.jacobians(found.gradients), weight)
+
+    def step(self, found: Found, ground: Ground) -> Step:
         """One step in the chart of cosines and sines, as damped and as often corrected as lowers the cost most.
 
         Numbers that make up for each other (stiffness and inertia, of a resonance) lie along valleys, narrow and bent:
@@ -115,28 +118,35 @@ class Search(Tangents):
         Source: J. M. Ortega, W. C. Rheinboldt, Iterative Solution of Nonlinear Equations in Several Variables (1970).
         """
         data, excess = self.cost(found.theta, found.predicted)
-        # While much is unexplained, residuals count for less, so that no step is rash.
-        weight = 1.0 / max(1.0, data / self.rows)
-        ground = Ground(self, found.theta, J, weight)
-        points = [ground.minimum(found.theta, found.predicted, damping) for damping in _DAMPING]
-        promised = points[0][1]
+        pull = ground.pull(found.theta, found.predicted)
+        points = {damping: ground.minimum(found.theta, pull, damping) for damping in _DAMPING}
+        promised = points[0.0][1]
         best = Step(found.theta, found.predicted, promised, 0.0)
         if promised < GAIN:
             return best
-        places = [point for point, _ in points]
+        places = {damping: point for damping, (point, _) in points.items()}
         for _ in range(1 + _CHORDS):
-            tried = self.predict(places, self.drives)
-            costs = [weight * d + e for d, e in self.costs(places, tried)]
-            least = int(np.argmin(costs))
-            gained = (weight * data + excess - costs[least]) / weight
+            tried = dict(zip(places, self.predict([*places.values()], self.drives), strict=True))
+            found_costs = self.costs([*places.values()], [*tried.values()])
+            costs = {
+                damping: ground.weight * d + e for damping, (d, e) in zip(places, found_costs, strict=True)
+            }
+            least = min(costs, key=costs.__getitem__)
+            gained = data + (excess - costs[least]) / ground.weight
             if gained > best.gained:
                 best = Step(places[least], tried[least], promised, gained)
-            if (
-                best.gained > _AGREED * promised
-                or promised < LITTLE
-                or not np.isfinite(costs[:_CHORDED]).all()
-            ):
+            if best.gained > _AGREED * promised or promised < LITTLE:
                 break
-            onward = zip(places[:_CHORDED], tried, _DAMPING, strict=False)
-            places = [ground.minimum(place, there, damping)[0] for place, there, damping in onward]
+            # What promises less than another has gained is not worth a correction.
+            worth = [
+                damping
+                for damping in _DAMPING[:_CHORDED]
+                if np.isfinite(costs.get(damping, np.inf)) and points[damping][1] > best.gained
+            ]
+            if not worth:
+                break
+            pulls = {damping: ground.pull(places[damping], tried[damping]) for damping in worth}
+            places = {
+                damping: ground.minimum(places[damping], pull, damping)[0] for damping, pull in pulls.items()
+            }
         return best
