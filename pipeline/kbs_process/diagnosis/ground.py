@@ -53,7 +53,10 @@ class Ground:
         return point, float(2.0 * pull @ du - du @ self.A @ du) / self.weight
 
     def valleys(self, share: float, length: float) -> list[Array]:
-        """Points (p,), some standard deviations off along each principal direction with an eigenvalue below `share`."""
+        """Points (p,), some standard deviations off along each principal direction with an eigenvalue below `share`.
+
+        Of one that nothing shows, no standard deviation is known.
+        """
         search = self.search
         here = search.polar.flat(self.theta)
         low, high = search.room(self.theta)
@@ -61,8 +64,8 @@ class Ground:
         if not np.isfinite(self.A).all():
             return points
         for value, direction in zip(*_principal(self.A), strict=True):
-            if value < share:
-                du = self.scale * direction * (length / np.sqrt(max(value, _RIDGE)))
+            if _RIDGE < value < share:
+                du = self.scale * direction * (length / np.sqrt(value))
                 points.append(search.clipped(search.polar.back(here + np.clip(du, low, high))))
         return points
 
