@@ -73,7 +73,11 @@ def results_of(
             for one in outcome.located
         ),
         suspects=tuple(_suspects(outcome))[:_SHOWN],
-        checks=tuple(Check(name=c.name, ok=c.passed, detail=c.detail) for c in known.checks),
+        # Without a law, the search may have gone on to a better place.
+        checks=tuple(
+            Check(name=c.name, ok=c.passed, detail=c.detail)
+            for c in (known if outcome.finds else outcome.standing.known).checks
+        ),
         files=tuple(files),
         next_test=None if proposal is None else next_test(proposal, COMMANDS),
         warnings=tuple(warnings(campaign, floor, outcome)),

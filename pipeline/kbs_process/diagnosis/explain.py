@@ -91,9 +91,11 @@ def explain(experiment: Experiment, simulate: Simulate, task: Task) -> Explained
         with task("Refitting the known parameters, free"):
             # What a number cannot reach, a law would do for it.
             free = refit(experiment, stood.known.hypothesis, floor, simulate, leaps=0)
-        freed = _stood(free, floor)
+        freed = _moved_on(_stood(free, floor), floor, simulate, LEAPS)
         # Without any being off, searches end as far from each other.
-        if free.cost < stood.known.cost - LEAST_RHO**2 and not _unseen(freed, floor) > _unseen(stood, floor):
+        if freed.known.cost < stood.known.cost - LEAST_RHO**2 and not _unseen(freed, floor) > _unseen(
+            stood, floor
+        ):
             stood = freed
     if near is None and stood.after.left and stood.known.gross and searched(experiment):
         with task("Phases again, beside numbers that are about right"):
@@ -171,11 +173,15 @@ def _unseen(stood: _Stood, floor: Floor) -> float:
 
 
 def _moved_on(stood: _Stood, floor: Floor, simulate: Simulate, leaps: int) -> _Stood:
-    """Leap from minimum to minimum, while something is left and leaps take some of it."""
+    """Leap from minimum to minimum: once, and on while something is left or numbers are strained, and leaps gain.
+
+    A wrong edge of tooth contact may leave nothing to see, and others make up for it.
+    """
     idle = 0
     for number in range(leaps):
         # What is missing makes wrong phases as good as right ones.
-        if not stood.after.left or stood.known.gross or idle > 1:
+        wanting = number == 0 or stood.after.left or stood.known.strained
+        if not wanting or stood.known.gross or idle > 1:
             break
         known = stood.known
         moved = leapt(known, simulate, smooth=number == 0)
