@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kbs_process.estimation.bounded import bounded_minimum
-from kbs_process.signals.records import Array
+from kbs_process.signals.records import Array, Mask
 
 if TYPE_CHECKING:
     from kbs_process.diagnosis.costs import Predictions
@@ -52,20 +52,21 @@ class Ground:
         point = search.clipped(search.polar.back(search.polar.flat(theta) + self.scale * du))
         return point, float(2.0 * pull @ du - du @ self.A @ du) / self.weight
 
-    def valleys(self, share: float, length: float) -> list[Array]:
-        """Points (p,), some standard deviations off along each principal direction with an eigenvalue below `share`.
+    def valleys(self, among: Mask, share: float, length: float) -> list[Array]:
+        """Points (p,), some standard deviations off along principal directions with an eigenvalue below `share`.
 
-        Of one that nothing shows, no standard deviation is known.
+        Of the numbers `among` (p,), while the others stay. Of one that nothing shows, no standard deviation is known.
         """
         search = self.search
         here = search.polar.flat(self.theta)
         low, high = search.room(self.theta)
         points = list[Array]()
-        if not np.isfinite(self.A).all():
+        if not (among.any() and np.isfinite(self.A).all()):
             return points
-        for value, direction in zip(*_principal(self.A), strict=True):
+        for value, direction in zip(*_principal(self.A[np.ix_(among, among)]), strict=True):
             if _RIDGE < value < share:
-                du = self.scale * direction * (length / np.sqrt(value))
+                du = np.zeros(len(here))
+                du[among] = self.scale[among] * direction * (length / np.sqrt(value))
                 points.append(search.clipped(search.polar.back(here + np.clip(du, low, high))))
         return points
 

@@ -35,15 +35,13 @@ def along_valleys(search: Tangents, theta: Array, gradients: Gradients) -> Gradi
     data = sum(float(z @ z) for z in (search.residual(k, bases) for k in trials))
     weight = 1.0 / max(1.0, data / sum(search.metric[k].rows for k in trials))
     ground = Ground(search, theta, search.jacobians(gradients), weight)
-    points = ground.valleys(_ALIKE, _LENGTH)
+    points = ground.valleys(search.stated, _ALIKE, _LENGTH)
     gone = list(zip(points, search.predict(points, search.references), strict=True))
     gone = [(p, there) for p, there in gone if all(np.isfinite(one.values).all() for one in there.values())]
     if not gone:
         return gradients
     steps = np.array([point - theta for point, _ in gone])
-    own = np.zeros_like(steps)
-    own[:, search.inside] = (steps / search.spread)[:, search.inside]
-    back = np.linalg.pinv(own, rcond=_APART) / search.spread[:, None]
+    back = np.linalg.pinv(steps / search.spread, rcond=_APART) / search.spread[:, None]
     new = {}
     for drive, slope in gradients.items():
         seen = np.array([there[drive].values for _, there in gone]) - slope.base.values

@@ -57,8 +57,8 @@ class Tangents(Costs):
         gears = set(gearbox(experiment.rig, experiment.effects))
         files = set(known_parameters(experiment.rig, experiment.effects))
         # A law's number has a prior that is wider by far than it is large.
-        stated = np.array([one in files for one in free], dtype=np.bool_) & np.isfinite(parameters.sigma)
-        self.spread = np.where(stated, parameters.sigma, self.scale)
+        self.stated = np.array([one in files for one in free], dtype=np.bool_) & np.isfinite(parameters.sigma)
+        self.spread = np.where(self.stated, parameters.sigma, self.scale)
         self.differences = _DIFFERENCE * self.spread
         others = files - gears
         self.slow = [i for i, scalar in enumerate(free) if scalar in others]
