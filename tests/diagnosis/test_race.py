@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from test_rounds import ROLES, standing, with_cable
 
+from kbs_process.diagnosis import believed as believing
 from kbs_process.diagnosis import leaders as leading
 from kbs_process.diagnosis import race
-from kbs_process.diagnosis.believed import continued, named_first, named_there
+from kbs_process.diagnosis.believed import contested, continued, inherited, named_first, named_there
 from kbs_process.diagnosis.finding import Tried
 from kbs_process.diagnosis.floor import declared
 from kbs_process.diagnosis.gate import Gate
@@ -85,6 +86,56 @@ def test_a_law_keeps_its_name_beside_a_curve_that_does_a_little_more(
     found = [identity(law.found.suspect)]
     assert continued([curve, law], found) == ([law] if better < 1.0 else [curve, law])
     assert continued([curve, law], []) == [curve, law]
+
+
+def told(view: View, found: Found, share: float, strained: bool = False) -> Tried:
+    """A law that passed, whose residuals have `share` of the standing's power, one number nine sigmas off or none."""
+    known = view.standing.known
+    less = replace(known, residual=tuple(np.sqrt(share) * z for z in known.residual))
+    if strained:
+        value = known.value.copy()
+        index = known.names.index("joint.el.drive.Ka")
+        value[index] += 9.0 * known.parameters.sigma[index]
+        less = replace(less, value=value)
+    passed = Gate(True, (), True, 0.0, (1.0, 1.0), ())
+    return Tried(found, replace(view.standing, known=less), passed, view.screening, Own(("k",), ("k",)))
+
+
+def test_a_law_that_took_a_curves_name_has_the_curves_chance_against_laws_of_other_places(
+    view: View, by_family: dict[tuple[str, str], Found]
+) -> None:
+    law, curve = told(view, by_family[RIGHT], 0.990), told(view, by_family[CURVE], 0.980)
+    other = told(view, by_family[WRONG], 0.985)
+    assert inherited([law, other], [law, other], 1000).argmax() == 1
+    assert inherited([law, other], [curve, law, other], 1000).argmax() == 0
+    assert inherited([law], [law], 1000) == pytest.approx([1.0])
+
+
+@pytest.mark.parametrize(("second", "eased"), [(WRONG, 2), (KIN, 0)])
+def test_numbers_are_let_go_again_beside_laws_of_several_places_that_leave_as_little(
+    view: View,
+    by_family: dict[tuple[str, str], Found],
+    monkeypatch: pytest.MonkeyPatch,
+    second: tuple[str, str],
+    eased: int,
+) -> None:
+    seen: list[Standing] = []
+
+    def released(standing: Standing, floor: object, simulate: Simulate) -> Standing:
+        seen.append(standing)
+        return view.standing
+
+    monkeypatch.setattr(believing, "released", released)
+    made = view.standing.known.experiment
+    passed = [
+        told(view, by_family[RIGHT], 0.98, strained=True),
+        told(view, by_family[second], 0.98, strained=True),
+    ]
+    after = contested(passed, declared(made), bench.serial(made))
+    assert len(seen) == eased and [one.found for one in after] == [one.found for one in passed]
+    assert all((one.standing is view.standing) == bool(eased) for one in after)
+    far = told(view, by_family[WRONG], 2.0)
+    assert contested([passed[0], far], declared(made), bench.serial(made)) == [passed[0], far]
 
 
 def test_a_plant_that_diverged_comes_last(view: View, by_family: dict[tuple[str, str], Found]) -> None:

@@ -44,7 +44,8 @@ def search(columns: Array, broken: bool = False) -> Any:
         return [{0: Shown((columns @ point)[:, None] * (np.nan if broken else 1.0))} for point in points]
 
     return SimpleNamespace(
-        stated=np.ones(3, dtype=np.bool_), parameters=parameters, polar=polar, precision=parameters.sigma**-2.0, ridge=np.zeros(3), spread=np.ones(3),
+        stated=np.ones(3, dtype=np.bool_), parameters=parameters, polar=polar,
+        precision=parameters.sigma**-2.0, ridge=np.zeros(3), spread=np.ones(3),
         inside=[0, 1, 2], references=[0], predict=predict,
         experiment=SimpleNamespace(fit=(0,), trials=[SimpleNamespace(drive=0)]),
         metric=(SimpleNamespace(rows=200),),

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.special import softmax
 
 from kbs_process.diagnosis.families import UNNAMED
 from kbs_process.diagnosis.finding import Tried, find_of
@@ -17,14 +18,15 @@ from kbs_process.diagnosis.moments import only_while
 from kbs_process.diagnosis.needed import Accepted
 from kbs_process.diagnosis.outcome import Identity, Place
 from kbs_process.diagnosis.remains import too_little
-from kbs_process.diagnosis.rivals import probabilities
+from kbs_process.diagnosis.rivals import evidences
 from kbs_process.diagnosis.screen import Found
 from kbs_process.diagnosis.settling import released, resettled
 from kbs_process.diagnosis.shapes import bettered
 from kbs_process.diagnosis.supposed import Noted
-from kbs_process.diagnosis.thresholds import GATE_SIGMA, MOST, SECOND, SETTLED, TOLERATED
+from kbs_process.diagnosis.thresholds import CONTESTED, GATE_SIGMA, MOST, SECOND, SETTLED, TOLERATED
 from kbs_process.diagnosis.tryout import identity
 from kbs_process.diagnosis.view import View
+from kbs_process.signals.records import Array
 
 
 def believed(
@@ -45,7 +47,8 @@ def believed(
         more, less = tried(names, view, view.standing, floor, simulate)
         passed = [*passed, *more]
         noted.fell(*less)
-    passed = continued(named_first(passed), [one.find.identity for one in accepted])
+    every = contested(passed, floor, simulate)
+    passed = continued(named_first(every), [one.find.identity for one in accepted])
     if (beyond := beaten(passed, noted.fallen)) is not None:
         # What is missing elsewhere, or numbers that have yet to settle, speaks against it; the others are farther off.
         noted.forget(beyond)
@@ -56,8 +59,7 @@ def believed(
             noted.fell(*(replace(one, gate=one.gate.but(follows)) for one in passed))
             return None
         passed = [beyond, *passed]
-    fitted = [_each_time(one) for one in passed]
-    chances = probabilities([one.standing.known for one in passed], view.bench.background.rows, fitted)
+    chances = inherited(passed, every, view.bench.background.rows)
     order = [int(k) for k in np.argsort(-chances, kind="stable")]
     for number, best in enumerate(order[: SETTLED if beyond is None else 1]):
         told = passed[best] if passed[best] is beyond else _settled(passed[best], standing, floor, simulate)
@@ -79,6 +81,40 @@ def believed(
     return None
 
 
+def contested(passed: Sequence[Tried], floor: Floor, simulate: Simulate) -> list[Tried]:
+    """Laws that passed; where those of several places leave as little, the best of each place with numbers at ease.
+
+    What their numbers are strained by then decides between them: it was done before any law was in the plant.
+    """
+    best = min(passed, key=lambda one: one.standing.known.cost)
+    first: dict[tuple[str, ...], Tried] = {}
+    for one in sorted(passed, key=lambda one: one.standing.known.cost):
+        if one.own.names and _as_good(one, best):
+            first.setdefault(_where(one), one)
+    if len(first) < 2:
+        return list(passed)
+    rivals = list(first.values())[:CONTESTED]
+    eased = [replace(one, standing=released(one.standing, floor, simulate)) for one in rivals]
+    return [eased[rivals.index(one)] if one in rivals else one for one in passed]
+
+
+def inherited(passed: Sequence[Tried], every: Sequence[Tried], rows: int) -> Array:
+    """(passed,) chance of each; that of a curve which gave way to a law of its place is the likeliest law's there.
+
+    What a formula has differently from nature says nothing of where nature acts.
+    """
+    gone = [one for one in every if one not in passed]
+    all_laws = [*passed, *gone]
+    logs = evidences([one.standing.known for one in all_laws], rows, [_each_time(one) for one in all_laws])
+    mine, theirs = logs[: len(passed)].copy(), logs[len(passed) :]
+    for one, log in zip(gone, theirs, strict=True):
+        heirs = [k for k, other in enumerate(passed) if _where(other) == _where(one)]
+        if heirs and _law(one).family == UNNAMED:
+            heir = max(heirs, key=lambda k: logs[k])
+            mine[heir] = np.logaddexp(mine[heir], log)
+    return np.asarray(softmax(mine), dtype=np.float64)
+
+
 def _settled(one: Tried, before: Standing, floor: Floor, simulate: Simulate) -> Tried:
     """A law that passed, with all numbers settled beside it, told anew and judged again."""
     settled = one.standing
@@ -96,11 +132,7 @@ def _as_well_elsewhere(told: Tried, passed: Sequence[Tried], before: Standing) -
     """
     if before.known.gross or not told.own.names or told.gate.sigmas >= GATE_SIGMA:
         return ()
-    own = _law(told)
-    others = [_law(one) for one in passed if _as_good(one, told)]
-    elsewhere = [
-        one for one in others if (one.port, one.axis, one.channels) != (own.port, own.axis, own.channels)
-    ]
+    elsewhere = [_law(one) for one in passed if _as_good(one, told) and _where(one) != _where(told)]
     return tuple(f"{one.law} ({one.port}) does as well, and parts of recordings differ" for one in elsewhere)
 
 
@@ -191,6 +223,12 @@ def _as_good(one: Tried, other: Tried) -> bool:
     """Whether a law leaves no more than another, as far as the plant is exact."""
     known = other.standing.known
     return one.standing.known.cost <= known.cost + TOLERATED * known.fit_rows
+
+
+def _where(one: Tried) -> tuple[str, ...]:
+    """The place at which a law acts."""
+    own = _law(one)
+    return own.port, own.axis, *own.channels
 
 
 def _law(one: Tried) -> Identity:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
-from scipy.special import logsumexp
+from scipy.special import softmax
 from scipy.stats import norm
 
 from kbs_process.diagnosis.known import Known
@@ -41,15 +41,18 @@ def rivalry(accepted: Known, rival: Known) -> Rivalry:
     return Rivalry(rho, float(norm.sf(0.5 * rho)))
 
 
-def probabilities(models: Sequence[Known], rows: int, fitted: Sequence[int] = ()) -> Array:
-    """(models,) that each is right, one of them being so: Schwarz's criterion of the refitted non-linear models.
+def evidences(models: Sequence[Known], rows: int, fitted: Sequence[int] = ()) -> Array:
+    """(models,) log evidence of each, less a constant: Schwarz's criterion of the refitted non-linear models.
 
     `fitted` numbers were taken off the recordings before, beside those that are free in a model.
     """
     count = np.array([len(model.free) for model in models]) + (np.array(fitted) if fitted else 0)
-    logs = -0.5 * np.array([model.cost for model in models]) - 0.5 * count * np.log(rows)
-    found: Array = np.exp(logs - logsumexp(logs))
-    return found
+    return np.asarray(-0.5 * np.array([model.cost for model in models]) - 0.5 * count * np.log(rows))
+
+
+def probabilities(models: Sequence[Known], rows: int, fitted: Sequence[int] = ()) -> Array:
+    """(models,) that each is right, one of them being so."""
+    return softmax(evidences(models, rows, fitted))
 
 
 def _precision(known: Known) -> Array:

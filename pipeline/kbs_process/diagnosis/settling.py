@@ -51,8 +51,9 @@ def bent(standing: Standing, floor: Floor) -> bool:
 def released(standing: Standing, floor: Floor, simulate: Simulate) -> Standing:
     """Known numbers that were pulled before the law was in the plant, drawn back to their priors and let go again."""
     known = standing.known
-    if not known.strained or not detected(standing, floor, known.experiment.fit).left:
+    if not known.strained:
         return standing
-    held = confined(known, simulate, CLOSE, laws=standing.laws)
-    again = resettled(standing_of(held, standing.laws), floor, simulate, leaps=1)
+    held = standing_of(confined(known, simulate, CLOSE, laws=standing.laws), standing.laws)
+    left = detected(held, floor, known.experiment.fit).left
+    again = resettled(held, floor, simulate, leaps=1 if left else 0)
     return again if again.known.cost < known.cost else standing

@@ -128,6 +128,9 @@ SETTLED_TIMES: Final = 3.0
 # Laws that passed, likeliest first, beside each of which all numbers settle until one passes then, too. It was set on
 # no case.
 SETTLED: Final = 2
+# Places whose best laws leave as little, at which numbers that are strained are drawn back and let go again before one
+# of them is believed. It was set on no case.
+CONTESTED: Final = 3
 # Leaders of a race, one after the other, beside which better phases are looked for: what two did not find, a third has
 # not found either. It was set on no case.
 WAYS: Final = 2
