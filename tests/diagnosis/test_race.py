@@ -138,6 +138,21 @@ def test_numbers_are_let_go_again_beside_laws_of_several_places_that_leave_as_li
     assert contested([passed[0], far], declared(made), bench.serial(made)) == [passed[0], far]
 
 
+def test_a_law_with_a_name_is_not_told_anew_as_a_curve(
+    view: View, by_family: dict[tuple[str, str], Found], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = view.standing.known.experiment
+    floor, simulate = declared(made), bench.serial(made)
+    law = told(view, by_family[RIGHT], 0.98)
+    monkeypatch.setattr(leading, "bare", lambda standing, own, simulate: standing)
+    monkeypatch.setattr(
+        View,
+        "of",
+        lambda *_, **__: replace(view, screening=replace(view.screening, candidates=(by_family[CURVE],))),
+    )
+    assert leading._told_anew(law, view.standing, floor, simulate) is law
+
+
 def test_a_plant_that_diverged_comes_last(view: View, by_family: dict[tuple[str, str], Found]) -> None:
     known = replace(view.standing.known, residual=tuple(np.nan * z for z in view.standing.known.residual))
     assert Runner(by_family[RIGHT], replace(view.standing, known=known)).cost == np.inf

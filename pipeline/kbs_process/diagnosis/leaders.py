@@ -260,9 +260,12 @@ def _told_anew(chosen: Tried, before: Standing, floor: Floor, simulate: Simulate
         lambda one: _reads(one) == site and not in_plant(one) and not one.each_trial,
         linear=False,
     )
-    if not view.able or _alike(view.able[0].suspect, suspect):
+    # A curve follows what the law does, and says no more of it than its name does.
+    named = identity(suspect).family != UNNAMED
+    able = [one for one in view.able if not (named and identity(one.suspect).family == UNNAMED)]
+    if not able or _alike(able[0].suspect, suspect):
         return chosen
-    found = bettered(view.bench, view.able[0])
+    found = bettered(view.bench, able[0])
     new = with_extra(view.standing, extra_of(found, view.standing, view.bench, view.scene), simulate)
     new = resettled(new, floor, simulate, leaps=0)
     own = own_of(found, before, new)
