@@ -34,8 +34,8 @@ def plant() -> Array:
     return np.column_stack([one, -one + 1e-3 * other, third])
 
 
-def search(columns: Array, broken: bool = False) -> Any:
-    """What `along_valleys` asks of a search: one trial, no noise, next to nothing known before."""
+def search(columns: Array, broken: bool = False, left: float = 0.0) -> Any:
+    """What `along_valleys` asks of a search: one trial, `left` times the noise's power in it, little known before."""
     wide = np.full(3, np.inf)
     parameters = Parameters(("a", "b", "c"), np.zeros(3), np.full(3, 1e3), -wide, wide)
     polar = Polar.of((), parameters)
@@ -49,7 +49,7 @@ def search(columns: Array, broken: bool = False) -> Any:
         inside=[0, 1, 2], references=[0], predict=predict,
         experiment=SimpleNamespace(fit=(0,), trials=[SimpleNamespace(drive=0)]),
         metric=(SimpleNamespace(rows=200),),
-        residual=lambda k, shown: -shown[0].values[:, 0],
+        residual=lambda k, shown: np.sqrt(left) - shown[0].values[:, 0],
         jacobians=lambda gradients: {0: gradients[0].columns[:, :, 0].T},
         room=lambda theta: (-wide, wide), clipped=lambda theta: theta,
     )  # fmt: skip
@@ -81,3 +81,10 @@ def test_a_plant_that_cannot_run_there_leaves_slopes_as_they_are() -> None:
     columns = plant()
     before = taken(columns)
     assert along_valleys(search(columns, broken=True), np.zeros(3), before) is before
+
+
+def test_where_much_is_left_slopes_stay_as_they_are() -> None:
+    columns = plant()
+    before = taken(columns)
+    assert along_valleys(search(columns, left=3.0), np.zeros(3), before) is before
+    assert along_valleys(search(columns, left=1.0), np.zeros(3), before) is not before

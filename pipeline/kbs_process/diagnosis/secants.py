@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from kbs_process.diagnosis.costs import GROSS
 from kbs_process.diagnosis.ground import Ground
 from kbs_process.signals.records import Array
 
@@ -33,7 +34,11 @@ def along_valleys(search: Tangents, theta: Array, gradients: Gradients) -> Gradi
     bases = {drive: slope.base for drive, slope in gradients.items()}
     trials = [k for k in search.experiment.fit if search.experiment.trials[k].drive in bases]
     data = sum(float(z @ z) for z in (search.residual(k, bases) for k in trials))
-    weight = 1.0 / max(1.0, data / sum(search.metric[k].rows for k in trials))
+    rows = sum(search.metric[k].rows for k in trials)
+    # Where much is left, standard deviations are as wide, and the plant is not linear over them.
+    if not data <= (1.0 + GROSS) * rows:
+        return gradients
+    weight = 1.0 / max(1.0, data / rows)
     ground = Ground(search, theta, search.jacobians(gradients), weight)
     points = ground.valleys(search.stated, _ALIKE, _LENGTH)
     gone = list(zip(points, search.predict(points, search.references), strict=True))
