@@ -129,7 +129,7 @@ SETTLED_TIMES: Final = 3.0
 # no case.
 SETTLED: Final = 2
 # Places whose best laws leave as little, at which numbers that are strained are drawn back and let go again before one
-# of them is believed. It was set on no case.
+# of them is believed. How many was set on no case; that they are, on a disc off its centre (development, 300).
 CONTESTED: Final = 3
 # Leaders of a race, one after the other, beside which better phases are looked for: what two did not find, a third has
 # not found either. It was set on no case.
