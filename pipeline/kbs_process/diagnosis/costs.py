@@ -10,7 +10,7 @@ import numpy as np
 from kbs_process.diagnosis.experiment import Experiment
 from kbs_process.diagnosis.hypothesis import Hypothesis, Prediction, Simulate
 from kbs_process.diagnosis.metric import Metric
-from kbs_process.diagnosis.parameters import Slopes
+from kbs_process.diagnosis.parameters import Slopes, known_parameters
 from kbs_process.diagnosis.side_by_side import side_by_side
 from kbs_process.estimation.fit import Parameters
 from kbs_process.signals.records import Array
@@ -19,6 +19,7 @@ from kbs_process.stages.output_error import Scalar
 from kbs_process.stages.polar import Polar
 from kbs_process.stages.screening import phases
 
+_DIFFERENCE = 0.05  # prior sigmas (phases: rad), first difference
 GROSS = 1.0  # of the noise: wrong phases alone have left 0.8
 # Which slopes are taken where the search stands: none, those of suspects alone, of drives too, all.
 OLD, OWN, GEARS, ALL = range(4)
@@ -77,6 +78,17 @@ class Costs:
         self.drives = sorted({trials[k].drive for k in experiment.fit})
         self.references = sorted({experiment.reference(trials[k].trajectory) for k in experiment.fit})
         self.alike = {trial.drive: experiment.reference(trial.trajectory) for trial in trials}
+        # What slopes are taken by.
+        files = set(known_parameters(experiment.rig, experiment.effects))
+        # A law's number has a prior that is wider by far than it is large.
+        self.stated = np.array([one in files for one in free], dtype=np.bool_) & np.isfinite(parameters.sigma)
+        self.spread = np.where(self.stated, parameters.sigma, self.scale)
+        self.differences = _DIFFERENCE * self.spread
+        self.slow = [i for i, scalar in enumerate(free) if scalar in files - gears]
+        self.geared = [i for i, scalar in enumerate(free) if scalar in gears]
+        self.calibrations = {trial.drive for trial in trials if trial.role == "calibration"}
+        self.idle: dict[int, list[int]] = {}
+        self.bodies_at: Array | None = None  # where slopes of bodies were taken last
 
     @property
     def rows(self) -> int:

@@ -9,18 +9,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kbs_process.diagnosis.costs import ALL, GEARS, OLD, OWN, Costs, Found, Gradients, Laws, Predictions
-from kbs_process.diagnosis.experiment import Experiment
-from kbs_process.diagnosis.hypothesis import Hypothesis, Prediction, Simulate
-from kbs_process.diagnosis.metric import Metric
-from kbs_process.diagnosis.parameters import Slopes, known_parameters, slopes
+from kbs_process.diagnosis.costs import ALL, GEARS, OLD, OWN, Costs, Found, Gradients, Predictions
+from kbs_process.diagnosis.hypothesis import Prediction
+from kbs_process.diagnosis.parameters import Slopes, slopes
 from kbs_process.diagnosis.secants import along_valleys
-from kbs_process.estimation.fit import Parameters
 from kbs_process.signals.records import Array
-from kbs_process.stages.identification import gearbox
-from kbs_process.stages.output_error import Scalar
 
-_DIFFERENCE = 0.05  # prior sigmas (phases: rad), first difference
 _SEEN = 5.0  # what a difference should move the whitened residual by
 _SPAN = 1.0  # of a step
 _LEAST_DIFFERENCE, _MOST_DIFFERENCE = 2e-3, 0.4  # prior sigmas
@@ -41,31 +35,6 @@ class Step:
 
 class Tangents(Costs):
     """Costs, and how predictions answer to the free numbers where a search stands."""
-
-    def __init__(
-        self,
-        experiment: Experiment,
-        metric: tuple[Metric, ...],
-        simulate: Simulate,
-        hypothesis: Hypothesis,
-        free: tuple[Scalar, ...],
-        parameters: Parameters,
-        laws: Laws | None = None,
-        scale: Array | None = None,
-    ) -> None:
-        super().__init__(experiment, metric, simulate, hypothesis, free, parameters, laws, scale)
-        gears = set(gearbox(experiment.rig, experiment.effects))
-        files = set(known_parameters(experiment.rig, experiment.effects))
-        # A law's number has a prior that is wider by far than it is large.
-        self.stated = np.array([one in files for one in free], dtype=np.bool_) & np.isfinite(parameters.sigma)
-        self.spread = np.where(self.stated, parameters.sigma, self.scale)
-        self.differences = _DIFFERENCE * self.spread
-        others = files - gears
-        self.slow = [i for i, scalar in enumerate(free) if scalar in others]
-        self.geared = [i for i, scalar in enumerate(free) if scalar in gears]
-        self.calibrations = {trial.drive for trial in experiment.trials if trial.role == "calibration"}
-        self.idle: dict[int, list[int]] = {}
-        self.bodies_at: Array | None = None  # where slopes of bodies were taken last
 
     def begin(
         self, theta: Array, gradients: Gradients | None = None, predicted: Predictions | None = None
