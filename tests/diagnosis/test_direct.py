@@ -23,7 +23,7 @@ from kbs_process.plant.effect import Port
 from kbs_process.plant.effects import CATALOGUE
 from kbs_process.plant.effects.measured_law import MEASURED, Measured
 from kbs_process.plant.moved import added_loads, grounded, pressed
-from kbs_process.plant.rigid import axis_of, kinematics, loads
+from kbs_process.plant.rigid import kinematics, loads
 from kbs_process.rig.model import Effort, Rig
 from kbs_process.signals.frames import rotate
 from kbs_process.signals.records import Array, Signal
@@ -131,7 +131,7 @@ def test_the_loads_answer_to_a_weight_as_to_a_force_and_to_the_ground_by_its_pow
         force = rotate(R_TL, weight)
         wrench = np.hstack([force, np.cross(arm, force)])
         assert np.allclose(rotate(answers[link.name], wrench), added, atol=1e-9)
-        axis = axis_of(link, links[link.parent])
+        axis = links[link.name].axis
         for row, other in enumerate(here.joints):
             rate = still.copy()
             rate[:, row] = 1.0

@@ -8,7 +8,7 @@ import numpy as np
 from plant_rigs import joint, two_axis
 from scipy.spatial.transform import Rotation
 
-from kbs_process.plant.rigid import axis_of, kinematics
+from kbs_process.plant.rigid import kinematics
 from kbs_process.plant.structure import turn
 from kbs_process.rig.model import Quantity
 from kbs_process.signals.frames import about_axis, from_rotation_vector
@@ -43,4 +43,4 @@ def test_a_misalignment_turns_the_link_and_its_axis_before_the_joint_turns() -> 
     links = kinematics(rig, angle, still, still)
     relative = links["T"].R[0].T @ links["az"].R[0]
     np.testing.assert_allclose(relative, expected, atol=1e-14)
-    np.testing.assert_allclose(links["T"].R[0].T @ axis_of(turned, links["T"])[0], axis, atol=1e-14)
+    np.testing.assert_allclose(links["T"].R[0].T @ links[turned.name].axis[0], axis, atol=1e-14)

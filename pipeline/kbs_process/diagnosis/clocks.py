@@ -122,5 +122,5 @@ def height_of(bench: Bench, left: Mapping[int, Array]) -> float:
     squares, bounded = float(sum(z @ z for z in left.values())), background.bounded
     if bounded is None:
         return squares - float(pull @ cho_solve(background.factor, pull))
-    x = bounded_minimum(bounded.H, pull, bounded.low, bounded.high)
+    x = bounded_minimum(bounded.H, pull, bounded.low, bounded.high, bounded.at)
     return squares - float(2.0 * pull @ x - x @ bounded.H @ x)

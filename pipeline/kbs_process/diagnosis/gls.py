@@ -42,12 +42,13 @@ class Bounded:
     h: Array  # (p,)
     low: Array  # (p,)
     high: Array  # (p,)
-    alone: float  # what they gain without any candidate
+    at: Array  # (p,) where they are best without any candidate
+    alone: float  # what they gain there
 
     @classmethod
     def of(cls, H: Array, h: Array, low: Array, high: Array) -> Bounded:
         x = bounded_minimum(H, h, low, high)
-        return cls(H, h, low, high, float(2.0 * h @ x - x @ H @ x))
+        return cls(H, h, low, high, x, float(2.0 * h @ x - x @ H @ x))
 
     def bars(self, step: Array) -> bool:
         """Whether a step (p,) leads beyond bounds."""
@@ -59,7 +60,13 @@ class Bounded:
         A = np.block([[self.H, across.T], [across, whole + _RIDGE * np.eye(m)]])
         b = np.concatenate([self.h, pull])
         free = np.full(m, np.inf)
-        x = bounded_minimum(A, b, np.concatenate([self.low, -free]), np.concatenate([self.high, free]))
+        x = bounded_minimum(
+            A,
+            b,
+            np.concatenate([self.low, -free]),
+            np.concatenate([self.high, free]),
+            np.concatenate([self.at, np.zeros(m)]),
+        )
         return x[-m:], max(0.0, float(2.0 * b @ x - x @ A @ x) - self.alone)
 
 

@@ -105,13 +105,18 @@ def _covered(view: View, among: Callable[[Found], bool]) -> list[Found]:
     most = max(found.score.gain for found in view.able)
     if not any(_pulls(found) and found.score.gain >= MOST * most for found in view.able):
         return []
-    hidden = [
-        uncovered(view.bench, found, [one for one in view.suspects if _same(one, found.suspect)])
+    taken_up = [
+        found
         for found in view.screening.candidates
         if _anywhere(found) and found.score.rank == 0 and among(found)
     ]
+    hidden = side_by_side(partial(_uncovered, view), taken_up)
     least = most / PROMISED if view.standing.known.gross else most
     return [one for one in hidden if one.score.gain > least]
+
+
+def _uncovered(view: View, found: Found) -> Found:
+    return uncovered(view.bench, found, [one for one in view.suspects if _same(one, found.suspect)])
 
 
 def _pulls(found: Found) -> bool:

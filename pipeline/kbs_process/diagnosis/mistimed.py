@@ -8,6 +8,7 @@ near their priors is tried first, and numbers are looked for from the files' on,
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 from kbs_process.diagnosis import phasing
 from kbs_process.diagnosis.clocks import by_a_right_clock, height_of, timed
@@ -18,6 +19,7 @@ from kbs_process.diagnosis.hypothesis import Hypothesis, Simulate
 from kbs_process.diagnosis.joint import Standing
 from kbs_process.diagnosis.known import Known, as_it_is, confined, refit
 from kbs_process.diagnosis.screen import Catalogued, Found, Suspect
+from kbs_process.diagnosis.side_by_side import side_by_side
 from kbs_process.diagnosis.thresholds import CLOSE, MOST, TOLERATED
 from kbs_process.diagnosis.view import View
 
@@ -57,10 +59,7 @@ def _stamped_anew(known: Known) -> Experiment | None:
     bench = view.bench
     # Beside numbers refitted to first order, which do a part of what is to be done in any case.
     alone = height_of(bench, bench.background.z) + known.prior_chi2 - known.fit_rows
-    stamped = [
-        _each_stamped(view, one) if one.suspect.each_trial else _all_stamped(view, one)
-        for one in view.screening.candidates
-    ]
+    stamped = side_by_side(partial(_stamped, view), view.screening.candidates)
     gain, experiment = max(stamped, key=lambda one: one[0], default=(0.0, known.experiment))
     return experiment if alone > 0.0 and alone - gain <= MOST * alone else None
 
@@ -69,8 +68,13 @@ def _of_a_clock(suspect: Suspect) -> bool:
     return isinstance(suspect, Catalogued) and suspect.of_clock
 
 
+def _stamped(view: View, found: Found) -> tuple[float, Experiment]:
+    """Gain of -2 log likelihood by the error of a clock, and what recordings are without it."""
+    return _each_stamped(view, found) if found.suspect.each_trial else _all_stamped(view, found)
+
+
 def _all_stamped(view: View, found: Found) -> tuple[float, Experiment]:
-    """Gain of -2 log likelihood by an error that all recordings share, and what they are without it."""
+    """`_stamped`, of an error that all recordings share."""
     known, found = view.standing.known, timed(view.bench, found, view.suspects)
     suspect, experiment = found.suspect, known.experiment
     assert isinstance(suspect, Catalogued)
@@ -82,7 +86,7 @@ def _all_stamped(view: View, found: Found) -> tuple[float, Experiment]:
 
 
 def _each_stamped(view: View, found: Found) -> tuple[float, Experiment]:
-    """The same of an error of each recording's own, less what so many numbers gain by chance."""
+    """`_stamped`, of an error of each recording's own, less what so many numbers gain by chance."""
     bench, known = view.bench, view.standing.known
     without = taken_off(found, view).standing.known
     assert isinstance(found.suspect, Catalogued)

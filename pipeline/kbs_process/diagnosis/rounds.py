@@ -33,6 +33,7 @@ from kbs_process.diagnosis.scene import Scene
 from kbs_process.diagnosis.screen import Catalogued, Found, Screening
 from kbs_process.diagnosis.settling import bent, drawn_back, nominal, resettled
 from kbs_process.diagnosis.shapes import possible
+from kbs_process.diagnosis.side_by_side import side_by_side
 from kbs_process.diagnosis.sizes import in_the_way, of_mounting, springs
 from kbs_process.diagnosis.supposed import Noted, enough, supposed, wanting
 from kbs_process.diagnosis.thresholds import (
@@ -299,7 +300,8 @@ def _jumped(view: View, floor: Floor, simulate: Simulate) -> list[Tried]:
     jumps = [(one, gain) for one, gain in zip(more, gains, strict=True) if gain > MOST * known.excess]
     if not jumps:
         return []
-    shared = [timed(view.bench, one, view.suspects) for one in every if of_every_clock(one)]
+    clocks = [one for one in every if of_every_clock(one)]
+    shared = side_by_side(lambda one: timed(view.bench, one, view.suspects), clocks)
     most = max((one.score.gain for one in shared), default=0.0)
     return [one for one, gain in jumps if gain > most]
 

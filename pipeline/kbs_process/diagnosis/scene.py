@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
+from kbs_process.diagnosis.courses import Course, courses
 from kbs_process.diagnosis.experiment import Experiment
 from kbs_process.diagnosis.hypothesis import Hypothesis, Prediction, Tapped, acting, tapped
 from kbs_process.diagnosis.inlets import Inlet
+from kbs_process.diagnosis.side_by_side import side_by_side
 from kbs_process.diagnosis.transfer import Path, follow
 from kbs_process.plant.effects import select
 from kbs_process.signals.records import Array
@@ -25,6 +28,7 @@ class Scene:
     hypothesis: Hypothesis
     predicted: Mapping[int, Prediction]  # by drive, of all drives
     signals: Mapping[int, Tapped]  # by drive, of references
+    courses: Mapping[int, Mapping[str, Course]]  # of links, likewise
     paths: Mapping[int, Path]  # likewise
 
     @classmethod
@@ -37,13 +41,13 @@ class Scene:
         linear: bool = True,
     ) -> Scene:
         """Tap the plant of a hypothesis; linearise it, if asked to, for what goes through. `predicted` by drive."""
-        signals, paths = {}, {}
-        for trajectory in range(len(experiment.repeats)):
-            drive = experiment.reference(trajectory)
-            signals[drive] = tapped(hypothesis, experiment, drive)
-            if linear and experiment.drives[drive].schedule is not None:
-                paths[drive] = _path(experiment, hypothesis, signals[drive], drive)
-        return cls(experiment, hypothesis, predicted, signals, paths)
+        drives = [experiment.reference(trajectory) for trajectory in range(len(experiment.repeats))]
+        every = side_by_side(partial(tapped, hypothesis, experiment), drives)
+        signals = dict(zip(drives, every, strict=True))
+        driven = [drive for drive in drives if linear and experiment.drives[drive].schedule is not None]
+        paths = side_by_side(lambda drive: _path(experiment, hypothesis, signals[drive], drive), driven)
+        ways = {drive: courses(hypothesis.rig, one) for drive, one in signals.items()}
+        return cls(experiment, hypothesis, predicted, signals, ways, dict(zip(driven, paths, strict=True)))
 
     def stepped(self, drive: int, column: Mapping[Inlet, Array]) -> dict[Inlet, Array]:
         """Inputs at the taps' rate as means over the linear plant's steps; over samples, where there is no plant."""

@@ -87,11 +87,12 @@ class Catalogued:
     def inputs(self, drive: int) -> Sequence[Mapping[Inlet, Array]] | None:
         if isinstance(self.candidate.effect, Sensing):
             return None
-        hypothesis = self.scene.hypothesis
+        scene, hypothesis = self.scene, self.scene.hypothesis
+        tapped, ways = scene.signals[drive], scene.courses[drive]
         return [
-            self.scene.stepped(drive, column)
+            scene.stepped(drive, column)
             for action in self.candidate.actions
-            for column in inputs(action, self.scene.signals[drive], hypothesis.rig, hypothesis.effects)
+            for column in inputs(action, tapped, hypothesis.rig, hypothesis.effects, ways.get(action.site))
         ]
 
     def outputs(self, drive: int) -> Array:

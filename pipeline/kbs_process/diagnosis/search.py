@@ -15,9 +15,9 @@ from kbs_process.diagnosis.ground import Ground
 from kbs_process.diagnosis.leaps import leap, stride
 from kbs_process.diagnosis.tangents import Step, Tangents
 
-# Tried side by side: valleys are as narrow as 1e-8 of what is across them, in squares, and each has its own.
-_DAMPING = (0.0, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0, 1e3)
-_CHORDED = 5  # of them, the least, that are corrected where none keeps what slopes promise
+# Tried side by side, as many as a processor's vector has lanes: valleys are as narrow as 1e-8 of what is across them,
+# in squares, and each has its own.
+_DAMPING = (0.0, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 10.0)
 _CHORDS = 3  # corrections of each
 _AGREED = 0.9  # gained over promised, above which slopes are only updated
 _HALF = 0.5  # of the same, below which slopes of drives alone do not do
@@ -140,7 +140,7 @@ class Search(Tangents):
             # What promises less than another has gained is not worth a correction.
             worth = [
                 damping
-                for damping in _DAMPING[:_CHORDED]
+                for damping in _DAMPING
                 if np.isfinite(costs.get(damping, np.inf)) and points[damping][1] > best.gained
             ]
             if not worth:

@@ -27,6 +27,7 @@ _PLACES = 24  # of a law that is somewhere, at most, for each width that it may 
 _NARROWER = (0.5, 0.25)  # shares of its width
 _ABOUT = 1.5  # widths, on either side of a place
 _DESCENTS = 12  # of the search along the linear plant
+_SLIGHT = 1e-3  # of what a suspect does: a step that adds less is the last, and the plant betters the rest
 _ENDS = 0.99  # of the longest time that recordings show
 _STARTS = 3  # of descents, of one that is over less or that known numbers take up on its grid
 
@@ -225,7 +226,7 @@ def _descended(
         jac=True,
         method="L-BFGS-B",
         bounds=[one.room for one in free],
-        options={"maxiter": _DESCENTS, "maxfun": 2 * _DESCENTS},
+        options={"maxiter": _DESCENTS, "maxfun": 2 * _DESCENTS, "ftol": _SLIGHT},
     )
     return max(seen, key=lambda end: worth(*end))
 

@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from kbs_process.diagnosis.courses import Course, courses
 from kbs_process.diagnosis.hypothesis import Tapped
 from kbs_process.diagnosis.inlets import BASE_PORT, MOUNTING_PORT, WRENCH_PORT, Inlet
 from kbs_process.diagnosis.places import point_of
@@ -21,11 +22,9 @@ from kbs_process.plant.along import along, signals_of
 from kbs_process.plant.effect import Effect, Port
 from kbs_process.plant.effects import select
 from kbs_process.plant.linear import drive_slopes
-from kbs_process.plant.rigid import kinematics
 from kbs_process.plant.sensing import Sensing, SensingPort
 from kbs_process.plant.taps import plate_column
-from kbs_process.rig.model import TRANSDUCER, Rig
-from kbs_process.signals.frames import rotate
+from kbs_process.rig.model import Rig
 from kbs_process.signals.records import WRENCH_CHANNELS, Array
 from kbs_process.stages.resample import resample
 
@@ -33,18 +32,19 @@ _POSITION = ("x", "y", "z")  # signals of an effect at a point; its velocity is 
 _BENEATH = {Port.BASE_ACCELERATION: BASE_PORT, Port.BASE_TORQUE: MOUNTING_PORT}
 
 
-def port_inputs(candidate: Candidate, tapped: Tapped, rig: Rig) -> Array:
+def port_inputs(candidate: Candidate, tapped: Tapped, rig: Rig, course: Course | None = None) -> Array:
     """What a suspect of the plant puts in at its port, for a unit of each amplitude, (m, amplitudes, components).
 
     Components: one at a drive (N m, of its field rad), three at a point of a link (N), the floor (m/s^2) or the
-    mounting (N m), along the undeflected T's axes. Each row is the mean from one tap to the next.
+    mounting (N m), along the undeflected T's axes. Each row is the mean from one tap to the next. `course` is that of
+    the link, where it is known.
     """
     effect = candidate.effect
     assert isinstance(effect, Effect)
     columns = {name: k for k, name in enumerate(tapped.columns)}
     signals: dict[str, Array] = {"time": np.arange(len(tapped.values)) / tapped.rate}
     if effect.port is Port.EXTERNAL_FORCE:
-        signals |= dict(zip(_POSITION, _way(rig, candidate, tapped).T, strict=True))
+        signals |= dict(zip(_POSITION, _way(candidate, tapped, rig, course).T, strict=True))
     elif effect.port is Port.BASE_TORQUE:
         signals |= {f"base_{axis}": tapped.values[:, columns[plate_column(axis)]] for axis in _POSITION}
     elif effect.port.of_drive:
@@ -59,21 +59,14 @@ def port_inputs(candidate: Candidate, tapped: Tapped, rig: Rig) -> Array:
     return whole[:, [every.index(entry.name) for entry in candidate.amplitudes]]
 
 
-def _way(rig: Rig, candidate: Candidate, tapped: Tapped) -> Array:
+def _way(candidate: Candidate, tapped: Tapped, rig: Rig, course: Course | None) -> Array:
     """Position (m, 3) of a candidate's point from T's origin, in the undeflected T's axes."""
-    columns = {name: k for k, name in enumerate(tapped.columns)}
-    q = tapped.values[:, [columns[f"joint_angle.{name}"] for name in rig.joint_names]]
-    still = np.zeros_like(q)
-    links = kinematics(rig, q, still, still)
-    T, moved = links[TRANSDUCER], links[candidate.site]
     point = point_of(rig, candidate.site) if candidate.point is None else np.array(candidate.point)
-    from_T = moved.r + rotate(moved.R, point) - T.r
-    way: Array = np.einsum("nji,nj->ni", T.R, from_T)
-    return way
+    return (course or courses(rig, tapped)[candidate.site]).of(point)
 
 
 def inputs(
-    candidate: Candidate, tapped: Tapped, rig: Rig, effects: Sequence[str]
+    candidate: Candidate, tapped: Tapped, rig: Rig, effects: Sequence[str], course: Course | None = None
 ) -> list[dict[Inlet, Array]]:
     """Inputs of the linearised plant for a unit of each amplitude: series (m,), means from one tap to the next.
 
@@ -81,7 +74,7 @@ def inputs(
     follows it, as `effects`, those of the model, have it at rest.
     """
     site = candidate.site
-    values = port_inputs(candidate, tapped, rig)
+    values = port_inputs(candidate, tapped, rig, course)
     if candidate.port is Port.FIELD:
         drive = rig.joint(site).drive
         assert drive is not None
@@ -95,7 +88,7 @@ def inputs(
             for a in range(values.shape[1])
         ]
     if candidate.port is Port.EXTERNAL_FORCE:
-        way = _way(rig, candidate, tapped)
+        way = _way(candidate, tapped, rig, course)
         middle = 0.5 * (way + np.vstack([way[1:], way[-1:]]))
         wrenches = [np.hstack([values[:, a], np.cross(middle, values[:, a])]) for a in range(values.shape[1])]
         return [

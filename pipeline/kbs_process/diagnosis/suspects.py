@@ -15,11 +15,10 @@ from kbs_process.plant.along import signals_of
 from kbs_process.plant.effect import ACTIONS, VELOCITIES, Effect, Parameter, Port, instance
 from kbs_process.plant.effects import CATALOGUE
 from kbs_process.plant.effects.joint_order import JOINT_ORDER
-from kbs_process.plant.rigid import kinematics, links_beyond
+from kbs_process.plant.rigid import links_beyond, poses
 from kbs_process.plant.sensing import SENSING, Sensing, SensingPort
 from kbs_process.plant.taps import plate_column
 from kbs_process.rig.model import LAB, TRANSDUCER, Joint, Rig
-from kbs_process.signals.frames import rotate
 from kbs_process.signals.records import WRENCH_CHANNELS
 
 FLOOR = "floor"
@@ -145,8 +144,7 @@ def _direct(joint: Joint) -> bool:
 
 def weighed(rig: Rig, joint: Joint) -> bool:
     """Whether weight has a moment about a joint's axis: one that turns and is not along gravity."""
-    pose = np.zeros((1, len(rig.joints)))
-    axis = rotate(kinematics(rig, pose, pose, pose)[joint.parent].R, np.asarray(joint.axis, dtype=float))
+    axis = poses(rig, np.zeros((1, len(rig.joints))))[joint.name].axis
     return joint.type == "revolute" and bool(abs(axis[0, 2]) < _ALONG_GRAVITY)
 
 

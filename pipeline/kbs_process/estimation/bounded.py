@@ -8,12 +8,15 @@ from scipy.linalg import cho_factor, cho_solve
 from kbs_process.signals.records import Array
 
 
-def bounded_minimum(A: Array, b: Array, low: Array, high: Array) -> Array:
+def bounded_minimum(A: Array, b: Array, low: Array, high: Array, start: Array | None = None) -> Array:
     """Return x (p,) that minimises x' A x / 2 - b' x between bounds around zero; A (p, p) is positive definite.
 
+    `start` (p,), between bounds too, is where it is looked for from, else zero: what the same bounds hold is found at
+    once.
     Source: the active set of P. B. Stark and R. L. Parker, Bounded-variable least squares, Comput. Stat. 10:129 (1995).
     """
-    x, free = np.zeros(len(b)), np.ones(len(b), dtype=np.bool_)
+    x = np.zeros(len(b)) if start is None else start.copy()
+    free = np.ones(len(b), dtype=np.bool_) if start is None else (low < x) & (x < high)
     for _ in range(4 * len(b)):
         target = x.copy()
         pull = b[free] - A[np.ix_(free, ~free)] @ x[~free]

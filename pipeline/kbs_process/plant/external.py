@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from kbs_process.plant.effect import POINT_SIGNALS, VELOCITIES, Effect, Port
-from kbs_process.plant.rigid import LinkMotion, axis_of, kinematics, links_beyond
+from kbs_process.plant.rigid import LinkMotion, kinematics, links_beyond
 from kbs_process.plant.structure import external_of
 from kbs_process.rig.model import TRANSDUCER, Rig
 from kbs_process.signals.frames import cross, from_xyz, rotate
@@ -65,7 +65,7 @@ def external_efforts(rig: Rig, effects: Sequence[Effect], q: Array, rates: Array
             if external.on in links_beyond(rig, joint.name):
                 turn, slide = joint.screw
                 along = turn * cross(place - links[joint.name].r, f) + slide * f
-                efforts[:, index] -= np.sum(axis_of(joint, links[joint.parent]) * along, axis=1)
+                efforts[:, index] -= np.sum(links[joint.name].axis * along, axis=1)
     return efforts
 
 

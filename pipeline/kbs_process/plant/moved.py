@@ -13,7 +13,7 @@ import numpy as np
 from kbs_process.plant.along import along, signals_of
 from kbs_process.plant.effect import Effect, Port
 from kbs_process.plant.external import external_efforts, external_wrench
-from kbs_process.plant.rigid import axis_of, kinematics, links_beyond
+from kbs_process.plant.rigid import links_beyond, poses
 from kbs_process.plant.structure import other_joint
 from kbs_process.rig.model import TRANSDUCER, Joint, Rig
 from kbs_process.signals.averages import instants
@@ -68,14 +68,13 @@ def grounded(rig: Rig, q: Array) -> dict[str, Array]:
 
     Equation: `pressed` by the wrench $(0, e_j)$, or $(e_j, (p_j - o) \times e_j)$ of a joint that slides along $e_j$.
     """
-    still = np.zeros_like(q)
-    links = kinematics(rig, q, still, still)
+    links = poses(rig, q)
     T, answers = links[TRANSDUCER], pressed(rig, q)
     R_TL = np.swapaxes(T.R, 1, 2)
     found = {}
     for joint in rig.joints:
         turn, slide = joint.screw
-        axis = axis_of(joint, links[joint.parent])
+        axis = links[joint.name].axis
         moment = turn * axis + slide * cross(links[joint.name].r - T.r, axis)
         wrench = np.hstack([slide * rotate(R_TL, axis), rotate(R_TL, moment)])
         found[joint.name] = rotate(answers[joint.name], wrench)
@@ -91,8 +90,7 @@ def pressed(rig: Rig, q: Array) -> dict[str, Array]:
     Units: rad, N, N m -> N, N m, units of the efforts.
     Validity: a plate that does not give way.
     """
-    still = np.zeros_like(q)
-    links = kinematics(rig, q, still, still)
+    links = poses(rig, q)
     T = links[TRANSDUCER]
     R_TL = np.swapaxes(T.R, 1, 2)
     found = {}
@@ -103,7 +101,7 @@ def pressed(rig: Rig, q: Array) -> dict[str, Array]:
         for row, joint in enumerate(rig.joints, 6):
             if joint.effort is not None and name in links_beyond(rig, joint.name):
                 turn, slide = joint.screw
-                axis = axis_of(joint, links[joint.parent])
+                axis = links[joint.name].axis
                 force = turn * cross(axis, T.r - links[joint.name].r) + slide * axis
                 works = np.hstack([rotate(R_TL, force), turn * rotate(R_TL, axis)])
                 answer[:, row] = -works / float(joint.effort.gain)

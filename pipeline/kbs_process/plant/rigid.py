@@ -6,11 +6,11 @@ acceleration here has gravity taken off (what an accelerometer would read), so w
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kbs_process.rig.model import LAB, TRANSDUCER, Joint, Rig
+from kbs_process.rig.model import LAB, TRANSDUCER, Rig
 from kbs_process.signals.frames import (
     about_axis,
     cross,
@@ -27,11 +27,19 @@ _SAG_ROUNDS = 3  # each round takes the error down by weight * height / stiffnes
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class LinkMotion:
-    """Pose and motion of a link in the laboratory's axes, (n, ...)."""
+class Pose:
+    """Where a link is, in the laboratory's axes, (n, ...)."""
 
     R: Array  # (n, 3, 3) R_L,link
     r: Array  # (n, 3) origin, m
+    arm: Array  # (n, 3) from its parent's origin, m
+    axis: Array  # (n, 3) of its joint; zero without one
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LinkMotion(Pose):
+    """The same with its motion."""
+
     v: Array  # (n, 3) of the origin, m/s
     omega: Array  # (n, 3) rad/s
     alpha: Array  # (n, 3) rad/s^2
@@ -83,7 +91,7 @@ def joint_efforts(rig: Rig, q: Array, qd: Array, qdd: Array) -> Array:
     for index, joint in enumerate(rig.joints):
         link, carrier = links[joint.name], links[joint.parent]
         force, moment = _reaction(rig, links, links_beyond(rig, joint.name), link.r)
-        e = axis_of(joint, carrier)
+        e = link.axis
         turn, slide = joint.screw
         efforts[:, index] = -np.sum(e * (turn * moment + slide * force), axis=1)
         if joint.viscous is not None:
@@ -145,42 +153,63 @@ def links_beyond(rig: Rig, link: str = TRANSDUCER) -> frozenset[str]:
     return frozenset(beyond)
 
 
-def kinematics(rig: Rig, q: Array, qd: Array, qdd: Array) -> dict[str, LinkMotion]:
-    """Motion of every link, the transducer not deflected."""
+def poses(rig: Rig, q: Array) -> dict[str, Pose]:
+    """Where every link is, the transducer not deflected."""
     n = len(q)
-    upward = np.broadcast_to([0.0, 0.0, float(rig.gravity)], (n, 3))
     still = np.zeros((n, 3))
-    links = {LAB: LinkMotion(np.broadcast_to(np.eye(3), (n, 3, 3)), still, still, still, still, upward)}
+    links = {LAB: Pose(np.broadcast_to(np.eye(3), (n, 3, 3)), still, still, still)}
 
     def place_transducer(carrier: str) -> None:
-        base = links[carrier]
-        R = base.R @ from_tilt(rig.transducer.tilt.value)
-        links[TRANSDUCER] = LinkMotion(R, base.r, base.v, base.omega, base.alpha, base.accel)
+        R = links[carrier].R @ from_tilt(rig.transducer.tilt.value)
+        links[TRANSDUCER] = Pose(R, links[carrier].r, still, still)
 
     if rig.transducer.on == LAB:
         place_transducer(LAB)
     for index, joint in enumerate(rig.joints):
         parent, (turn, slide) = links[joint.parent], joint.screw
         R_J = from_rotation_vector(joint.misalignment.value)
-        e = axis_of(joint, parent)
-        rate, acceleration = e * qd[:, index, None], e * qdd[:, index, None]
-        d = rotate(parent.R, joint.origin.value) + slide * e * q[:, index, None]
-        links[joint.name] = LinkMotion(
+        axis = rotate(parent.R, R_J @ np.asarray(joint.axis))
+        arm = rotate(parent.R, joint.origin.value) + slide * axis * q[:, index, None]
+        links[joint.name] = Pose(
             R=parent.R @ R_J @ about_axis(np.asarray(joint.axis, dtype=float), turn * q[:, index]),
-            r=parent.r + d,
-            v=parent.v + cross(parent.omega, d) + slide * rate,
-            omega=parent.omega + turn * rate,
-            alpha=parent.alpha + turn * (acceleration + cross(parent.omega, rate)),
-            accel=_accel_at(parent, d) + slide * (acceleration + 2.0 * cross(parent.omega, rate)),
+            r=parent.r + arm,
+            arm=arm,
+            axis=axis,
         )
         if rig.transducer.on == joint.name:
             place_transducer(joint.name)
     return links
 
 
-def axis_of(joint: Joint, carrier: LinkMotion) -> Array:
-    """The joint's axis (n, 3) in the laboratory's axes."""
-    return rotate(carrier.R, from_rotation_vector(joint.misalignment.value) @ np.asarray(joint.axis))
+def kinematics(rig: Rig, q: Array, qd: Array, qdd: Array) -> dict[str, LinkMotion]:
+    """Motion of every link, the transducer not deflected."""
+    n = len(q)
+    upward = np.broadcast_to([0.0, 0.0, float(rig.gravity)], (n, 3))
+    still = np.zeros((n, 3))
+    placed = poses(rig, q)
+    links = {LAB: LinkMotion(placed[LAB].R, still, still, still, still, still, still, upward)}
+
+    def place_transducer(carrier: str) -> None:
+        links[TRANSDUCER] = replace(links[carrier], R=placed[TRANSDUCER].R, arm=still, axis=still)
+
+    if rig.transducer.on == LAB:
+        place_transducer(LAB)
+    for index, joint in enumerate(rig.joints):
+        parent, pose, (turn, slide) = links[joint.parent], placed[joint.name], joint.screw
+        rate, acceleration = pose.axis * qd[:, index, None], pose.axis * qdd[:, index, None]
+        links[joint.name] = LinkMotion(
+            R=pose.R,
+            r=pose.r,
+            arm=pose.arm,
+            axis=pose.axis,
+            v=parent.v + cross(parent.omega, pose.arm) + slide * rate,
+            omega=parent.omega + turn * rate,
+            alpha=parent.alpha + turn * (acceleration + cross(parent.omega, rate)),
+            accel=_accel_at(parent, pose.arm) + slide * (acceleration + 2.0 * cross(parent.omega, rate)),
+        )
+        if rig.transducer.on == joint.name:
+            place_transducer(joint.name)
+    return links
 
 
 def _accel_at(link: LinkMotion, d: Array) -> Array:
@@ -247,7 +276,7 @@ def _rotors(rig: Rig, links: dict[str, LinkMotion], beyond: frozenset[str]) -> A
             continue
         carrier, link = links[joint.parent], links[joint.name]
         Jr, ratio = float(joint.drive.rotor_inertia), float(joint.drive.ratio)
-        e = axis_of(joint, carrier)
+        e = link.axis
         rate = _along(link.omega - carrier.omega, e)
         acceleration = _along(link.alpha - carrier.alpha, e)
         spin = _along(carrier.omega, e) + ratio * rate
