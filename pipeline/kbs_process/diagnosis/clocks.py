@@ -71,10 +71,11 @@ def timed(bench: Bench, found: Found, among: Sequence[Suspect]) -> Found:
     family = found.suspect.family
     grid = [one for one in among if isinstance(one, Catalogued) and one.family == family]
     nothing = height_of(bench, bench.background.z)
-    suspect, size, height = min((_sized(bench, one) for one in grid), key=lambda one: one[2])
+    suspect, late, height = min((_latest(bench, one) for one in grid), key=lambda one: one[2])
     for steps in _NEARER if bends(suspect.candidate, suspect.scene.hypothesis.rig) else ():
-        near = [_sized(bench, moved(suspect, [one])) for one in (-steps, steps)]
-        suspect, size, height = min([(suspect, size, height), *near], key=lambda one: one[2])
+        near = [_latest(bench, moved(suspect, [one]), late) for one in (-steps, steps)]
+        suspect, late, height = min([(suspect, late, height), *near], key=lambda one: one[2])
+    size = late / _greatest(_units(bench, suspect))
     gain = nothing - height
     if not gain > found.score.gain:
         return found
@@ -85,12 +86,13 @@ def timed(bench: Bench, found: Found, among: Sequence[Suspect]) -> Found:
     )
 
 
-def _sized(bench: Bench, suspect: Catalogued) -> tuple[Catalogued, float, float]:
-    """Size of a law's amplitude that leaves least, and the height that is."""
-    experiment = bench.known.experiment
-    references = {k: experiment.reference(experiment.trials[k].trajectory) for k in bench.background.z}
-    units = {drive: suspect.late(drive)[:, 0] for drive in set(references.values())}
-    most = max(float(np.max(np.abs(unit))) for unit in units.values())
+def _latest(bench: Bench, suspect: Catalogued, about: float | None = None) -> tuple[Catalogued, float, float]:
+    """By how many s stamps are late at most where that leaves least, and the height that is.
+
+    Near `about` as many; without that, all are tried.
+    """
+    references, units = _references(bench), _units(bench, suspect)
+    most = _greatest(units)
 
     def height(late: float) -> float:
         left = {
@@ -100,6 +102,9 @@ def _sized(bench: Bench, suspect: Catalogued) -> tuple[Catalogued, float, float]
         return height_of(bench, left)
 
     places = np.sort([0.0, *(size for size in SIZES if abs(size) <= _LATEST)])
+    if about is not None:
+        nearest = int(np.argmin(np.abs(places - about)))
+        places = places[max(nearest - 1, 0) : nearest + 2]
     heights = [height(float(place)) for place in places]
     best = int(np.argmin(heights))
     low, high = places[max(best - 1, 0)], places[min(best + 1, len(places) - 1)]
@@ -107,7 +112,22 @@ def _sized(bench: Bench, suspect: Catalogued) -> tuple[Catalogued, float, float]
     late, least = min(
         (float(found.x), float(found.fun)), (float(places[best]), heights[best]), key=lambda one: one[1]
     )
-    return suspect, late / most, least
+    return suspect, late, least
+
+
+def _references(bench: Bench) -> dict[int, int]:
+    """Reference drive of each trial that is looked at."""
+    experiment = bench.known.experiment
+    return {k: experiment.reference(experiment.trials[k].trajectory) for k in bench.background.z}
+
+
+def _units(bench: Bench, suspect: Catalogued) -> dict[int, Array]:
+    """(n,) s by which stamps are late for a unit of a law's lone amplitude, by reference drive."""
+    return {drive: suspect.late(drive)[:, 0] for drive in set(_references(bench).values())}
+
+
+def _greatest(units: Mapping[int, Array]) -> float:
+    return max(float(np.max(np.abs(unit))) for unit in units.values())
 
 
 def height_of(bench: Bench, left: Mapping[int, Array]) -> float:
