@@ -6,14 +6,18 @@ updated by what the step gave. Phases, and where tooth contact begins and ends, 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
-from kbs_process.diagnosis.costs import ALL, GEARS, OLD, Found
+from kbs_process.diagnosis.costs import ALL, GEARS, OLD, Found, Predictions
 from kbs_process.diagnosis.ground import Ground
 from kbs_process.diagnosis.leaps import leap, stride
+from kbs_process.diagnosis.side_by_side import side_by_side
 from kbs_process.diagnosis.tangents import Step, Tangents
+from kbs_process.signals.records import Array
 
 # Tried side by side, as many as a processor's vector has lanes: valleys are as narrow as 1e-8 of what is across them,
 # in squares, and each has its own.
@@ -46,8 +50,6 @@ class Search(Tangents):
             if moved is not None:
                 left.append(found)
                 found = moved
-            elif number > 0:
-                break
         ended = self.descend(found, giving_up=True)
         before = min(left, key=self.height, default=ended)
         if not self.height(ended) > self.height(before):
@@ -119,15 +121,18 @@ class Search(Tangents):
         """
         data, excess = self.cost(found.theta, found.predicted)
         pull = ground.pull(found.theta, found.predicted)
-        points = {damping: ground.minimum(found.theta, pull, damping) for damping in _DAMPING}
+        ends = side_by_side(partial(ground.minimum, found.theta, pull), _DAMPING)
+        points = dict(zip(_DAMPING, ends, strict=True))
         promised = points[0.0][1]
         best = Step(found.theta, found.predicted, promised, 0.0)
         if promised < GAIN:
             return best
         places = {damping: point for damping, (point, _) in points.items()}
+        costs = dict.fromkeys(_DAMPING, np.inf)
         for _ in range(1 + _CHORDS):
             tried = dict(zip(places, self.predict([*places.values()], self.drives), strict=True))
             found_costs = self.costs([*places.values()], [*tried.values()])
+            before = costs
             costs = {
                 damping: ground.weight * d + e for damping, (d, e) in zip(places, found_costs, strict=True)
             }
@@ -137,16 +142,21 @@ class Search(Tangents):
                 best = Step(places[least], tried[least], promised, gained)
             if best.gained > _AGREED * promised or promised < LITTLE:
                 break
-            # What promises less than another has gained is not worth a correction.
+            # What promises less than another has gained is not worth a correction, nor what the last one made worse.
             worth = [
                 damping
-                for damping in _DAMPING
-                if np.isfinite(costs.get(damping, np.inf)) and points[damping][1] > best.gained
+                for damping, cost in costs.items()
+                if cost < before[damping] and points[damping][1] > best.gained
             ]
             if not worth:
                 break
-            pulls = {damping: ground.pull(places[damping], tried[damping]) for damping in worth}
-            places = {
-                damping: ground.minimum(places[damping], pull, damping)[0] for damping, pull in pulls.items()
-            }
+            corrected = side_by_side(partial(_corrected, ground, places, tried), worth)
+            places = dict(zip(worth, corrected, strict=True))
         return best
+
+
+def _corrected(
+    ground: Ground, places: Mapping[float, Array], tried: Mapping[float, Predictions], damping: float
+) -> Array:
+    """Where the same equations lead from the place that a damping has led to."""
+    return ground.minimum(places[damping], ground.pull(places[damping], tried[damping]), damping)[0]
