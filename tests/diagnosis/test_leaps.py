@@ -5,8 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from diagnosis import bench
+from kbs_process.diagnosis import leaps
 from kbs_process.diagnosis.costs import GEARS, Found
 from kbs_process.diagnosis.floor import declared
 from kbs_process.diagnosis.hypothesis import Hypothesis
@@ -65,6 +67,15 @@ def test_a_stride_finds_a_contact_that_has_vanished_elsewhere() -> None:
     settled = search.descend(reached)
     assert farther_edge(search, settled.theta, own) < 0.05
     assert sum(search.cost(settled.theta, settled.predicted)) < sum(search.cost(stuck.theta, stuck.predicted))
+
+
+def test_a_stride_does_not_descend_from_a_place_that_is_worse_by_far(monkeypatch: pytest.MonkeyPatch) -> None:
+    torque = float(bench.rig().quantities()[TORQUE])
+    search, found, _ = searching({PHASE: 2.0, TORQUE: -0.97 * torque})
+    stuck = search.descend(found)
+    monkeypatch.setattr(leaps, "_FAR", 0.0)
+    monkeypatch.setattr(search, "descend", lambda *_, **__: pytest.fail("it descended"))
+    assert stride(search, stuck, 2, GEARS) is None
 
 
 def test_no_stride_leaves_the_right_place() -> None:

@@ -177,20 +177,20 @@ def _moved_on(stood: _Stood, floor: Floor, simulate: Simulate, leaps: int) -> _S
 
     A wrong edge of tooth contact may leave nothing to see, and others make up for it.
     """
-    idle = 0
     for number in range(leaps):
         # What is missing makes wrong phases as good as right ones.
         wanting = number == 0 or stood.after.left or stood.known.strained
-        if not wanting or stood.known.gross or idle > 1:
+        if not wanting or stood.known.gross:
             break
         known = stood.known
         moved = leapt(known, simulate, smooth=number == 0)
         if moved is known:
             break
         gained = known.cost - moved.cost
-        idle = 0 if gained > max(LITTLE, SLIGHT * known.excess) else idle + 1
         if gained > 0.0:
             stood = _stood(moved, floor)
+        if not gained > max(LITTLE, SLIGHT * known.excess):
+            break
     return stood
 
 

@@ -36,6 +36,7 @@ _BETTER = 10.0  # of -2 log likelihood, for which something is moved
 _RIDGE = 1e-10  # of each number's own information
 _FOLLOWED = (1.0, 0.3, 0.0)  # shares of how the others follow
 _RISE = 1.5  # times the cost, that a leap may bring before the others have settled
+_FAR = 1.08  # likewise, of a stride: places that two steps reached the bottom from rose by 5 % at most
 
 
 def leap(search: Search, found: Found, *, smooth: bool) -> Array | None:
@@ -74,10 +75,12 @@ def stride(search: Search, found: Found, steps: int, most: int) -> Found | None:
             J = search.jacobians(found.gradients)
             view = Moving(search, found, J, trials, (contact.torque, contact.width, contact.phase))
             here, *others = view.followed([found.theta, *view.ranked(found.theta, contact, _STRIDES)])
-            reached = [found]
+            reached, standing = [found], sum(search.cost(found.theta, found.predicted))
             for one in others:
                 theta = view.with_rest(found.theta, one, here)
-                point, predicted, _ = _followed(search, found, theta, view.own)
+                point, predicted, cost = _followed(search, found, theta, view.own)
+                if not cost < _FAR * standing:
+                    continue
                 gradients = search.slopes(point, found.gradients)
                 gone = replace(
                     found, theta=point, predicted=predicted, gradients=gradients, rounds=begun.rounds

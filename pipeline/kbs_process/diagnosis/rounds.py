@@ -188,7 +188,7 @@ def _round(
     standing: Standing,
     seen: Standing,
     floor: Floor,
-    simulate: Simulate,
+    simulate: Effort,
     accepted: Sequence[Accepted],
     least: float = 0.0,
 ) -> _Round:
@@ -237,7 +237,7 @@ def _passed(
     view: View,
     before: Standing,
     floor: Floor,
-    simulate: Simulate,
+    simulate: Effort,
     accepted: Sequence[Accepted],
     noted: Noted,
     least: float = 0.0,
@@ -267,14 +267,17 @@ def _passed(
     if least > 0.0 and _hopeless(first, least):
         noted.refuse(first[0], "the best beside it would leave far too much")
         return
-    for chosen in (first, *([found] for found in others)):
+    for number, chosen in enumerate((first, *([found] for found in others))):
+        if number > 0 and not simulate.goes_on():
+            break
         more, less = tried(chosen, view, view.standing, floor, simulate)
         passed = [*passed, *more]
         noted.fell(*less)
         if less_is_left := [one for one in passed if one.standing.known.cost < before.known.cost]:
             passed = less_is_left
             break
-    passed = _joined(passed, _hidden(view, before, floor, simulate, accepted), before, noted)
+    if simulate.goes_on() and not any(_settled(one, floor) for one in passed):
+        passed = _joined(passed, _hidden(view, before, floor, simulate, accepted), before, noted)
     if passed:
         yield passed
     if own and (chosen := view.unrepeated[:SECOND]):
@@ -283,6 +286,12 @@ def _passed(
         noted.fell(*less)
         if more:
             yield more
+
+
+def _settled(one: Tried, floor: Floor) -> bool:
+    """Whether a law leaves nothing, and numbers beside it are where the files have them, as far as chance goes."""
+    known = one.standing.known
+    return not known.strained and not detected(one.standing, floor, known.experiment.fit).left
 
 
 def _jumped(view: View, floor: Floor, simulate: Simulate) -> list[Tried]:

@@ -156,7 +156,7 @@ ITS_OWN: Final = 0.5
 ROUNDS: Final = 5  # finds in one campaign at most
 # Slopes of all known numbers, along every motion, that a search may cost; then no more laws are looked for. One law
 # that was named took 15 (by other hands), two of one friction 68, two of one hysteresis 90 (development).
-EFFORT: Final = 150.0
+EFFORT: Final = 100.0
 
 # -- two laws ------------------------------------------------------------------------------------------------------
 RIVALS: Final = 4.65  # rho_delta: P(wrong) = Q(rho_delta / 2) = 1 %
