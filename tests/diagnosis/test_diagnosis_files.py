@@ -165,6 +165,24 @@ def written(outcome: Outcome, tmp_path_factory: pytest.TempPathFactory) -> Path:
     )
     assert "1.5 times the floor (rms) is left: more is missing, or" in much.verdict_lines[0]
     assert "<strong>Undecided</strong>" in (target / "index.html").read_text()
+    there = outcome.standing.known
+    stated = np.where(there.stated, there.parameters.sigma, 0.0)
+    pulled = replace(there, value=there.value + 8.0 * stated, covariance=0.01 * there.covariance)
+    near, far = (
+        replace(find, alternatives=(Alternative(DRAG, 0.1, share * find.rho_eff, 0.0, False, True),))
+        for find in outcome.finds
+        for share in (0.1, 0.5)
+    )
+    open_yet = replace(outcome, standing=replace(outcome.standing, known=pulled), finds=(near,))
+    assert open_yet.verdict == "undecided"
+    assert replace(open_yet, standing=outcome.standing).verdict == "physics"
+    assert replace(open_yet, finds=(far,)).verdict == "physics"
+    assert replace(open_yet, finds=outcome.finds).verdict == "physics", "the rival is at the same place"
+    disputed = write_diagnosis(campaign, declared(experiment), open_yet, target, False, None)
+    assert disputed.verdict_lines[0].startswith(
+        "Nearest to what the model lacks, of the laws known: curve over"
+    )
+    assert "joint viscous (joint torque, el) does nearly the same" in disputed.verdict_lines[0]
     faint = replace(outcome, finds=(), after=Detection((), -80.0, 1.02))
     (little, *_) = write_diagnosis(campaign, declared(experiment), faint, target, False, None).verdict_lines
     assert (

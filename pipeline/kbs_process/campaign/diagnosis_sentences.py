@@ -90,8 +90,10 @@ def sentence(
     if not outcome.finds:
         return _unnamed(outcome, trials, floor) + _located(outcome) + _matters(outcome, requirements)
     told = [_law_in_words(find) for find in outcome.finds]
-    begin = "Nearest to what the model lacks, of the laws known" if outcome.much else "The model lacks"
-    return f"{begin}: {'; '.join(told)}.{_reserve(outcome, trials)}{_matters(outcome, requirements)}"
+    open_yet = outcome.verdict == "undecided"
+    begin = "Nearest to what the model lacks, of the laws known" if open_yet else "The model lacks"
+    reserves = _reserve(outcome, trials) + _disputed(outcome)
+    return f"{begin}: {'; '.join(told)}.{reserves}{_matters(outcome, requirements)}"
 
 
 def _reserve(outcome: Outcome, trials: Sequence[records.Trial]) -> str:
@@ -103,6 +105,19 @@ def _reserve(outcome: Outcome, trials: Sequence[records.Trial]) -> str:
     return (
         f" With that in the plant {level} is left: more is missing, or a law found stands in for one like it."
         f"{_shown(trials)}"
+    )
+
+
+def _disputed(outcome: Outcome) -> str:
+    """What is to be said of laws elsewhere that may be the ones."""
+    if not outcome.disputed:
+        return ""
+    others = dict.fromkeys(f"{_words(one.law)} ({_where(place_of(one))})" for one in outcome.disputed)
+    strain = outcome.standing.known.strain
+    return (
+        f" {', '.join(others)} does nearly the same, and beside either known parameters are together farther from what "
+        f"the files say than chance has them (squared sigmas {strain.squares:.0f} in {strain.count} directions): which "
+        "of them it is, these recordings do not tell."
     )
 
 
@@ -231,7 +246,7 @@ def paragraph(
             for one in find.rivals
             if one.distance < (near if one.simulated else RIVALS)
         ]
-        left_out = "Nearest to what was left out is" if outcome.much else "Left out was"
+        left_out = "Nearest to what was left out is" if outcome.verdict == "undecided" else "Left out was"
         begin = left_out if find.named else "No law of the catalogue passes; measured was a"
         parts.append(
             f"{begin} {_words(find.name)} ({_where(find.place)}): {numbers}; probability {find.probability:.2f}"
@@ -240,6 +255,7 @@ def paragraph(
     if finds:
         parts.append(
             f"With it in the plant the difference is {corrected:.3g} times the floor.{_reserve(outcome, trials)}"
+            f"{_disputed(outcome)}"
         )
     else:
         parts.append(_unnamed(outcome, trials, floor) + _located(outcome))

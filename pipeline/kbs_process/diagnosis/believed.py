@@ -90,7 +90,7 @@ def contested(passed: Sequence[Tried], floor: Floor, simulate: Simulate) -> list
     first: dict[tuple[str, ...], Tried] = {}
     for one in sorted(passed, key=lambda one: one.standing.known.cost):
         if one.own.names and _as_good(one, best):
-            first.setdefault(_where(one), one)
+            first.setdefault(_law(one).place, one)
     if len(first) < 2:
         return list(passed)
     rivals = list(first.values())[:CONTESTED]
@@ -108,7 +108,7 @@ def inherited(passed: Sequence[Tried], every: Sequence[Tried], rows: int) -> Arr
     logs = evidences([one.standing.known for one in all_laws], rows, [_each_time(one) for one in all_laws])
     mine, theirs = logs[: len(passed)].copy(), logs[len(passed) :]
     for one, log in zip(gone, theirs, strict=True):
-        heirs = [k for k, other in enumerate(passed) if _where(other) == _where(one)]
+        heirs = [k for k, other in enumerate(passed) if _law(other).place == _law(one).place]
         if heirs and _law(one).family == UNNAMED:
             heir = max(heirs, key=lambda k: logs[k])
             mine[heir] = np.logaddexp(mine[heir], log)
@@ -132,7 +132,7 @@ def _as_well_elsewhere(told: Tried, passed: Sequence[Tried], before: Standing) -
     """
     if before.known.gross or not told.own.names or told.gate.sigmas >= GATE_SIGMA:
         return ()
-    elsewhere = [_law(one) for one in passed if _as_good(one, told) and _where(one) != _where(told)]
+    elsewhere = [_law(one) for one in passed if _as_good(one, told) and _law(one).place != _law(told).place]
     return tuple(f"{one.law} ({one.port}) does as well, and parts of recordings differ" for one in elsewhere)
 
 
@@ -223,12 +223,6 @@ def _as_good(one: Tried, other: Tried) -> bool:
     """Whether a law leaves no more than another, as far as the plant is exact."""
     known = other.standing.known
     return one.standing.known.cost <= known.cost + TOLERATED * known.fit_rows
-
-
-def _where(one: Tried) -> tuple[str, ...]:
-    """The place at which a law acts."""
-    own = _law(one)
-    return own.port, own.axis, *own.channels
 
 
 def _law(one: Tried) -> Identity:

@@ -11,6 +11,7 @@ from kbs_process.diagnosis.joint import Standing
 from kbs_process.diagnosis.known import Known
 from kbs_process.diagnosis.localise import PortName
 from kbs_process.diagnosis.ports import Cells, PortTest
+from kbs_process.diagnosis.thresholds import DISPUTED
 from kbs_process.plant.effects.measured_law import Measured
 from kbs_process.plant.sensing import Sensing
 from kbs_process.signals.records import Array
@@ -28,6 +29,11 @@ class Identity:
     # Of physics, "unnamed" for a measured law; by it alone laws do not differ: orders of one motor may be of two.
     family: str = field(compare=False)
     law: str  # name in the catalogue, or what the measured law is a function of
+
+    @property
+    def place(self) -> tuple[str, ...]:
+        """Where it acts."""
+        return self.port, self.axis, *self.channels
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,7 +177,11 @@ class Outcome:
     @property
     def verdict(self) -> Verdict:
         """The answer in a word: finds beside which much is left are no more than the nearest that is known."""
-        if self.much or (not self.finds and (self.after.left or self.after.faint or self.hidden)):
+        if (
+            self.much
+            or self.disputed
+            or (not self.finds and (self.after.left or self.after.faint or self.hidden))
+        ):
             return "undecided"
         if self.finds:
             return "physics"
@@ -193,6 +203,23 @@ class Outcome:
     def much(self) -> bool:
         """Whether much is left, in recordings that were fitted or in those that were held out."""
         return self.after.much or (self.held_out is not None and self.held_out[1].much)
+
+    @property
+    def disputed(self) -> tuple[Identity, ...]:
+        """Laws at other places that the finds may stand for: they do nearly the same, beside numbers that were pulled.
+
+        Where a search leaves these then decides which of the laws does more.
+        """
+        if not self.standing.known.strained:
+            return ()
+        return tuple(
+            other.identity
+            for find in self.finds
+            for other in find.alternatives
+            if other.refitted
+            and other.rho_delta < DISPUTED * find.rho_eff
+            and other.identity.place != find.identity.place
+        )
 
     @property
     def unforeseen(self) -> bool:

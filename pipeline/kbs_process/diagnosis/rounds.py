@@ -164,7 +164,9 @@ def _diagnosed(
         bent=bent(standing, floor),
         ended=simulate.ended,
     )
-    return replace(outcome, finds=trusted(outcome.finds, TRUST_PART if outcome.much else TRUST))
+    return replace(
+        outcome, finds=trusted(outcome.finds, TRUST_PART if outcome.verdict == "undecided" else TRUST)
+    )
 
 
 def _goes_on(standing: Standing, floor: Floor) -> bool:
