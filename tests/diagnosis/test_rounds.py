@@ -314,7 +314,8 @@ def test_the_second_law_that_passed_is_believed_where_the_first_falls(
     monkeypatch.setattr(
         believed, "_settled", lambda one, *_: replace(one, gate=replace(one.gate, reasons=()))
     )
-    floor, simulate = declared(cable.known.experiment), bench.serial(cable.known.experiment)
+    floor = declared(cable.known.experiment)
+    simulate = Effort(bench.serial(cable.known.experiment), cable.known)
     for fallen, kept in ((("harness",), "ground_cable"), (("ground_cable",), "harness")):
         monkeypatch.setattr(
             believed,
@@ -356,11 +357,10 @@ def test_what_numbers_gain_where_they_were_drawn_back_is_no_law_s(
     monkeypatch.setattr(rounds, "_place", lambda *_: None)
     monkeypatch.setattr(rounds, "_passed", none_passed)
     experiment = cable.known.experiment
-    floor, simulate = declared(experiment), bench.serial(experiment)
-    done = rounds._round(cable, back, floor, simulate, [])
+    floor, search = declared(experiment), Effort(bench.serial(experiment), cable.known)
+    done = rounds._round(cable, back, floor, search, [])
     assert (done.seen, done.standing) == (back, alone)
     assert asked == [(back, alone)]
-    search = Effort(simulate, cable.known)
     told = rounds._diagnosed(cable.known, floor, search, detected(cable, floor, experiment.fit))
     assert told.standing.known.residual is alone.known.residual
     # What they are known to is told by their scatter, too.
@@ -456,7 +456,8 @@ def test_what_each_recording_has_of_its_own_is_not_looked_for_where_a_law_leaves
     view = SimpleNamespace(
         able=[], unrepeated=[own], standing=cable, screening=SimpleNamespace(candidates=())
     )
-    floor, simulate = declared(cable.known.experiment), bench.serial(cable.known.experiment)
+    floor = declared(cable.known.experiment)
+    simulate = Effort(bench.serial(cable.known.experiment), cable.known)
     assert list(rounds._passed(view, cable, floor, simulate, accepted, Noted())) == []  # type: ignore[arg-type]
     assert asked[0] is repeating
     assert (own in asked) == looked

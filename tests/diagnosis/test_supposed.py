@@ -137,7 +137,8 @@ def test_no_law_is_simulated_where_the_best_would_leave_far_too_much(
 ) -> None:
     tried, scene, found = screened(cable)
     law = passed(cable, tried, scene, found, "ground_cable")
-    floor, simulate = declared(cable.known.experiment), bench.serial(cable.known.experiment)
+    floor = declared(cable.known.experiment)
+    simulate = Effort(bench.serial(cable.known.experiment), cable.known)
     view = SimpleNamespace(
         able=[law.found], unrepeated=[], standing=cable, screening=SimpleNamespace(candidates=())
     )
