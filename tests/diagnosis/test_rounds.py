@@ -191,11 +191,11 @@ def test_a_law_is_judged_where_its_numbers_have_settled(made: Experiment, cable:
     )
     assert not told.gate.passed and any("predicted worse" in reason for reason in told.gate.reasons)
     floor = declared(known.experiment)
-    assert rounds._settled(begun, floor)
-    assert not rounds._settled(replace(begun, standing=cable), floor)
+    assert rounds._explains_all(begun, floor)
+    assert not rounds._explains_all(replace(begun, standing=cable), floor)
     sigma = np.where(known.stated, known.parameters.sigma, 0.0)
     pulled = replace(known, value=known.value + 8.0 * sigma)
-    assert not rounds._settled(replace(begun, standing=replace(after, known=pulled)), floor)
+    assert not rounds._explains_all(replace(begun, standing=replace(after, known=pulled)), floor)
     alone = replace(begun, own=Own((), ()))  # of what is each recording's own the verdict stays
     assert believed._judged_again(alone, cable, bench.serial(made)) is alone
 

@@ -278,7 +278,7 @@ def _passed(
         if less_is_left := [one for one in passed if one.standing.known.cost < before.known.cost]:
             passed = less_is_left
             break
-    if simulate.goes_on() and not any(_settled(one, floor) for one in passed):
+    if simulate.goes_on() and not any(_explains_all(one, floor) for one in passed):
         passed = _joined(passed, _hidden(view, before, floor, simulate, accepted), before, noted)
     if passed:
         yield passed
@@ -290,7 +290,7 @@ def _passed(
             yield more
 
 
-def _settled(one: Tried, floor: Floor) -> bool:
+def _explains_all(one: Tried, floor: Floor) -> bool:
     """Whether a law leaves nothing, and numbers beside it are where the files have them, as far as chance goes."""
     known = one.standing.known
     return not known.strained and not detected(one.standing, floor, known.experiment.fit).left
