@@ -13,6 +13,7 @@ from kbs_process.diagnosis import believed as believing
 from kbs_process.diagnosis import leaders as leading
 from kbs_process.diagnosis import race
 from kbs_process.diagnosis.believed import contested, continued, inherited, named_first, named_there
+from kbs_process.diagnosis.effort import Effort
 from kbs_process.diagnosis.finding import Tried
 from kbs_process.diagnosis.floor import declared
 from kbs_process.diagnosis.gate import Gate
@@ -50,7 +51,7 @@ def test_the_right_law_comes_first_and_who_follows_gets_no_less_far(
     view: View, by_family: dict[tuple[str, str], Found]
 ) -> None:
     made = view.standing.known.experiment
-    simulate = bench.serial(made)
+    simulate = Effort(bench.serial(made), view.standing.known)
     chosen = [by_family[WRONG], by_family[RIGHT]]
     runners = raced(chosen, view, declared(made), simulate)
     assert [one.found.suspect.family for one in runners] == [RIGHT, WRONG]
@@ -173,7 +174,7 @@ def test_pulled_numbers_are_drawn_back_beside_a_promising_law_that_does_little(
     index = standing.known.names.index("joint.el.drive.Ka")
     value[index] += sigmas * standing.known.parameters.sigma[index]
     pulled = replace(standing, known=replace(standing.known, value=value))
-    simulate = bench.serial(pulled.known.experiment)
+    simulate = Effort(bench.serial(pulled.known.experiment), pulled.known)
     extra = extra_of(by_family[RIGHT], standing, view.bench, view.scene)
     done = pulled.known.cost - with_extra(pulled, extra, simulate, FIRST).known.cost
     chosen = replace(by_family[RIGHT], score=replace(by_family[RIGHT].score, gain=done / share))
@@ -213,7 +214,7 @@ def test_a_law_that_leaves_nothing_is_judged_once_others_have_settled_beside_it(
 ) -> None:
     """Refused `once` where its first steps ended, or wherever others settle."""
     made = view.standing.known.experiment
-    simulate = bench.serial(made)
+    simulate = Effort(bench.serial(made), view.standing.known)
     costs = list[float]()
 
     def strict(found: Found, before: Standing, after: Standing, own: Own, simulate: Simulate) -> Gate:
@@ -233,11 +234,13 @@ def test_a_law_that_leaves_nothing_is_judged_once_others_have_settled_beside_it(
         assert refused[0].gate.reasons[-1] == "too early"
 
 
-@pytest.mark.parametrize(("nothing_left", "ways"), [(False, WAYS), (True, 0)])
+@pytest.mark.parametrize(
+    ("nothing_left", "goes_on", "ways"), [(False, True, WAYS), (True, True, 0), (False, False, 0)]
+)
 def test_the_next_law_looks_for_phases_too_while_something_is_left(
-    view: View, monkeypatch: pytest.MonkeyPatch, nothing_left: bool, ways: int
+    view: View, monkeypatch: pytest.MonkeyPatch, nothing_left: bool, goes_on: bool, ways: int
 ) -> None:
-    """A wrong law that leads would show all others a wrong way."""
+    """A wrong law that leads would show all others a wrong way; a search that has cost too much looks no more."""
     made = view.standing.known.experiment
     looked: list[float] = []
 
@@ -248,7 +251,9 @@ def test_the_next_law_looks_for_phases_too_while_something_is_left(
     monkeypatch.setattr(race, "moved_on", unmoved)
     monkeypatch.setattr(race, "at_floor", lambda *_: nothing_left)
     monkeypatch.setattr(race, "_near", lambda *_: True)
-    runners = race.raced(view.able[:3], view, declared(made), bench.serial(made))
+    simulate = Effort(bench.serial(made), view.standing.known)
+    monkeypatch.setattr(simulate, "goes_on", lambda: goes_on)
+    runners = race.raced(view.able[:3], view, declared(made), simulate)
     assert len(runners) == 3
     assert len(looked) == ways == sum(one.leapt for one in runners)
     assert len(set(looked)) == ways  # each once

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import softmax
 
+from kbs_process.diagnosis.effort import Effort
 from kbs_process.diagnosis.families import UNNAMED
 from kbs_process.diagnosis.finding import Tried, find_of
 from kbs_process.diagnosis.floor import Floor
@@ -35,7 +36,7 @@ def believed(
     standing: Standing,
     place: Place | None,
     floor: Floor,
-    simulate: Simulate,
+    simulate: Effort,
     accepted: Sequence[Accepted],
     noted: Noted,
 ) -> Accepted | None:

@@ -13,6 +13,7 @@ from kbs_process.diagnosis.clocks import timed
 from kbs_process.diagnosis.curves import CurveSuspect
 from kbs_process.diagnosis.dissipation import drives, pushes
 from kbs_process.diagnosis.each_recording import taken_off, taken_off_again
+from kbs_process.diagnosis.effort import Effort
 from kbs_process.diagnosis.families import UNNAMED
 from kbs_process.diagnosis.finding import Tried, explained_share
 from kbs_process.diagnosis.floor import Floor
@@ -162,7 +163,7 @@ def _way(found: Found) -> tuple[str, ...]:
 
 
 def tried(
-    chosen: Sequence[Found], view: View, before: Standing, floor: Floor, simulate: Simulate
+    chosen: Sequence[Found], view: View, before: Standing, floor: Floor, simulate: Effort
 ) -> tuple[list[Tried], list[Tried]]:
     """Leaders of a view refitted and gated against what was believed `before`: those that passed, and those that did
     not.

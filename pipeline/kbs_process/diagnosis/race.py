@@ -15,8 +15,8 @@ from functools import partial
 
 import numpy as np
 
+from kbs_process.diagnosis.effort import Effort
 from kbs_process.diagnosis.floor import Floor
-from kbs_process.diagnosis.hypothesis import Simulate
 from kbs_process.diagnosis.joint import Entered, Own, Standing, bare, entered, moved_on, with_extra
 from kbs_process.diagnosis.remains import detected
 from kbs_process.diagnosis.screen import Found
@@ -42,8 +42,11 @@ class Runner:
         return float(np.nan_to_num(self.standing.known.cost, nan=np.inf))
 
 
-def raced(chosen: Sequence[Found], view: View, floor: Floor, simulate: Simulate) -> list[Runner]:
-    """Suspects refitted, best first. Those that the first steps leave far behind go no farther."""
+def raced(chosen: Sequence[Found], view: View, floor: Floor, simulate: Effort) -> list[Runner]:
+    """Suspects refitted, best first. Those that the first steps leave far behind go no farther.
+
+    A search that has cost too much is told so before each look for better phases.
+    """
 
     def begun(found: Found) -> Entered:
         extra = extra_of(found, view.standing, view.bench, view.scene)
@@ -80,7 +83,7 @@ def raced(chosen: Sequence[Found], view: View, floor: Floor, simulate: Simulate)
     behind = [one for one in runners if one not in near]
     for _ in range(WAYS):
         next_one = next((one for one in near if not one.leapt), None)
-        if next_one is None or at_floor(near[0], floor):
+        if next_one is None or at_floor(near[0], floor) or not simulate.goes_on():
             break
         first = replace(next_one, standing=moved_on(next_one.standing, simulate), leapt=True)
         way = bare(first.standing, own_of(first.found, view.standing, first.standing), simulate)

@@ -296,7 +296,7 @@ def _explains_all(one: Tried, floor: Floor) -> bool:
     return not known.strained and not detected(one.standing, floor, known.experiment.fit).left
 
 
-def _jumped(view: View, floor: Floor, simulate: Simulate) -> list[Tried]:
+def _jumped(view: View, floor: Floor, simulate: Effort) -> list[Tried]:
     """Jumps of a clock that do most of so much that numbers may have been pulled, before any law is simulated.
 
     To first order a jump by a period of what rings does nothing, so the screen's order says nothing of them. They have
@@ -318,7 +318,7 @@ def _jumped(view: View, floor: Floor, simulate: Simulate) -> list[Tried]:
 
 
 def _hidden(
-    view: View, before: Standing, floor: Floor, simulate: Simulate, accepted: Sequence[Accepted]
+    view: View, before: Standing, floor: Floor, simulate: Effort, accepted: Sequence[Accepted]
 ) -> list[Tried]:
     """Springs in the way of a drive's torque, from numbers near the files': those that were pulled had taken them up.
 
