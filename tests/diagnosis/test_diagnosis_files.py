@@ -183,6 +183,12 @@ def written(outcome: Outcome, tmp_path_factory: pytest.TempPathFactory) -> Path:
         "Nearest to what the model lacks, of the laws known: curve over"
     )
     assert "joint viscous (joint torque, el) does nearly the same" in disputed.verdict_lines[0]
+    named = replace(open_yet, finds=(far,), ended=True)
+    strained = write_diagnosis(campaign, declared(experiment), named, target, False, None)
+    assert strained.verdict_lines[0].startswith("The model lacks: curve over")
+    assert "Beside that known parameters are together farther from what" in strained.verdict_lines[0]
+    assert "Beside that" not in disputed.verdict_lines[0]
+    assert "as much work as it may cost" in (target / "results.json").read_text()
     faint = replace(outcome, finds=(), after=Detection((), -80.0, 1.02))
     (little, *_) = write_diagnosis(campaign, declared(experiment), faint, target, False, None).verdict_lines
     assert (

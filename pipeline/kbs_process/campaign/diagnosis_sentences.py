@@ -92,7 +92,7 @@ def sentence(
     told = [_law_in_words(find) for find in outcome.finds]
     open_yet = outcome.verdict == "undecided"
     begin = "Nearest to what the model lacks, of the laws known" if open_yet else "The model lacks"
-    reserves = _reserve(outcome, trials) + _disputed(outcome)
+    reserves = _reserve(outcome, trials) + _disputed(outcome) + _pulled(outcome)
     return f"{begin}: {'; '.join(told)}.{reserves}{_matters(outcome, requirements)}"
 
 
@@ -118,6 +118,19 @@ def _disputed(outcome: Outcome) -> str:
         f" {', '.join(others)} does nearly the same, and beside either known parameters are together farther from what "
         f"the files say than chance has them (squared sigmas {strain.squares:.0f} in {strain.count} directions): which "
         "of them it is, these recordings do not tell."
+    )
+
+
+def _pulled(outcome: Outcome) -> str:
+    """What is to be said of known numbers that went farther beside finds than chance has them."""
+    known = outcome.standing.known
+    if outcome.disputed or not known.strained:
+        return ""
+    strain = known.strain
+    return (
+        " Beside that known parameters are together farther from what the files say than chance has them (squared "
+        f"sigmas {strain.squares:.0f} in {strain.count} directions; most: {', '.join(farthest(known))}): they are "
+        "off, or have taken up more that was left out. Check these at their source."
     )
 
 
@@ -255,7 +268,7 @@ def paragraph(
     if finds:
         parts.append(
             f"With it in the plant the difference is {corrected:.3g} times the floor.{_reserve(outcome, trials)}"
-            f"{_disputed(outcome)}"
+            f"{_disputed(outcome)}{_pulled(outcome)}"
         )
     else:
         parts.append(_unnamed(outcome, trials, floor) + _located(outcome))

@@ -49,7 +49,7 @@ def warnings(campaign: Campaign, floor: Floor, outcome: Outcome) -> Iterator[Not
             "known parameters that were not found, would pass too",
             remedy="hold out a recording of another trajectory",
         )
-    if outcome.ended and outcome.verdict == "undecided":
+    if outcome.ended and (outcome.verdict == "undecided" or outcome.standing.known.strained):
         yield Notice(
             severity="warning",
             what="the search was ended after as much work as it may cost: laws beside those that were tried were not",
