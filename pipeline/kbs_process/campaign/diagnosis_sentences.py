@@ -33,7 +33,7 @@ _FAINT = (
 )
 _HIDDEN = (
     "Nothing exceeds {floor}, but known parameters are together farther from what the files say than chance has them "
-    "(squared sigmas {squares:.0f} in {count} directions, p {p:.1g}; most: {names}), though none is by itself: stated "
+    "({strain}, p {p:.1g}; most: {names}), though none is by itself: stated "
     "uncertainties are too small, or physics was left out that does what they do. Check these at their source.{near}"
 )
 MATTERS = 0.1  # of a limit: in a sum of squares a tenth is a half percent
@@ -113,10 +113,9 @@ def _disputed(outcome: Outcome) -> str:
     if not outcome.disputed:
         return ""
     others = dict.fromkeys(f"{_words(one.law)} ({_where(place_of(one))})" for one in outcome.disputed)
-    strain = outcome.standing.known.strain
     return (
         f" {', '.join(others)} does nearly the same, and beside either known parameters are together farther from what "
-        f"the files say than chance has them (squared sigmas {strain.squares:.0f} in {strain.count} directions): which "
+        f"the files say than chance has them ({_strain(outcome.standing.known)}): which "
         "of them it is, these recordings do not tell."
     )
 
@@ -126,12 +125,16 @@ def _pulled(outcome: Outcome) -> str:
     known = outcome.standing.known
     if outcome.disputed or not known.strained:
         return ""
-    strain = known.strain
     return (
-        " Beside that known parameters are together farther from what the files say than chance has them (squared "
-        f"sigmas {strain.squares:.0f} in {strain.count} directions; most: {', '.join(farthest(known))}): they are "
-        "off, or have taken up more that was left out. Check these at their source."
+        " Beside that known parameters are together farther from what the files say than chance has them "
+        f"({_strain(known)}; most: {', '.join(farthest(known))}): they are off, or have taken up more that was left "
+        "out. Check these at their source."
     )
+
+
+def _strain(known: Known) -> str:
+    strain = known.strain
+    return f"squared sigmas {strain.squares:.0f} in {strain.count} directions"
 
 
 def _shown(trials: Sequence[records.Trial]) -> str:
@@ -171,8 +174,7 @@ def _unnamed(outcome: Outcome, trials: Sequence[records.Trial], floor: Floor) ->
         strain = outcome.known.strain
         return _HIDDEN.format(
             floor=_FLOOR[floor.source],
-            squares=strain.squares,
-            count=strain.count,
+            strain=_strain(outcome.known),
             p=chi2.sf(strain.squares, strain.count),
             names=", ".join(farthest(outcome.known)),
             near=_nearest(outcome),

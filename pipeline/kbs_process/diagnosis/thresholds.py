@@ -161,18 +161,16 @@ EFFORT: Final = 100.0
 
 # -- two laws ------------------------------------------------------------------------------------------------------
 RIVALS: Final = 4.65  # rho_delta: P(wrong) = Q(rho_delta / 2) = 1 %
-
-# -- measured law --------------------------------------------------------------------------------------------------
-# Share of the residual's excess on trials not used that a curve has to explain, TOLERATED aside. On a development case
-# (friction by the other axis' rate) the right one explained 0.46, a wrong one 0.28.
-LAW_VARIANCE: Final = 0.4
-
-
 # Share of a law's distance from none, nearer than which a law at another place may be the one, where known numbers are
 # together farther off beside it than chance has them: what these made up for decides between such. Set on development:
 # from 0.07 to 0.16 the wrong one had won in 73005 and, by two states of four, in 81001, the right one in 81002; at 0.4
 # the right one, in 81003.
 DISPUTED: Final = 0.2
+
+# -- measured law --------------------------------------------------------------------------------------------------
+# Share of the residual's excess on trials not used that a curve has to explain, TOLERATED aside. On a development case
+# (friction by the other axis' rate) the right one explained 0.46, a wrong one 0.28.
+LAW_VARIANCE: Final = 0.4
 
 
 def told_apart(rho_eff: float) -> float:
