@@ -10,6 +10,7 @@ import pytest
 from test_rounds import ROLES, standing
 
 from kbs_process.diagnosis import race, rounds
+from kbs_process.diagnosis.effort import Effort
 from kbs_process.diagnosis.experiment import Experiment
 from kbs_process.diagnosis.floor import declared
 from kbs_process.diagnosis.hypothesis import Hypothesis, Prediction, predict
@@ -118,7 +119,8 @@ def test_sizes_are_tried_where_much_is_left(
         return found
 
     monkeypatch.setattr(race, "sized", noted)
-    race.raced(list(view.screening.candidates), view, declared(slipping), bench.serial(slipping))
+    simulate = Effort(bench.serial(slipping), known)
+    race.raced(list(view.screening.candidates), view, declared(slipping), simulate)
     assert asked == [("base_hysteresis", TRANSDUCER)] * much
 
 
@@ -176,8 +178,8 @@ def test_a_spring_that_numbers_had_taken_up_is_looked_for_where_the_files_have_t
     sticking: Experiment, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Refitted without it, numbers had taken up half; beside those that are near the files' all is its own."""
-    simulate, floor = bench.serial(sticking), declared(sticking)
-    begun = standing(sticking)
+    begun, floor = standing(sticking), declared(sticking)
+    simulate = Effort(bench.serial(sticking), begun.known)
     refitted = refit(sticking, begun.hypothesis, floor, simulate, reach=4.0, leaps=0)
     pulled = standing_of(refitted, {})
     assert pulled.known.excess < 0.6 * begun.known.excess

@@ -12,6 +12,7 @@ from test_rounds import candidate, standing
 from kbs_process.diagnosis import each_recording, mistimed, rounds
 from kbs_process.diagnosis.clocks import timed
 from kbs_process.diagnosis.each_recording import jump_gain, taken_off, taken_off_again
+from kbs_process.diagnosis.effort import Effort
 from kbs_process.diagnosis.experiment import Experiment
 from kbs_process.diagnosis.finding import find_of
 from kbs_process.diagnosis.floor import declared
@@ -186,7 +187,7 @@ def test_a_clock_that_jumps_by_periods_is_taken_off_at_its_place_and_size(lost: 
         lacks = one.measured[:, :6] - rung[0].values[:, :6]
         assert np.abs(np.diff(lacks[(t > 16.6) & (t < 18.0)], n=2, axis=0)).max() < 1e-9
     # It is told before any law is simulated, and recordings are stamped anew by it for numbers that it has not pulled.
-    floor, simulate = declared(known.experiment), bench.serial(known.experiment)
+    floor, simulate = declared(known.experiment), Effort(bench.serial(known.experiment), known)
     view = View.of(here, lambda one: isinstance(one, Catalogued) and one.of_clock, linear=False)
     jumped = min(rounds._jumped(view, floor, simulate), key=lambda one: one.standing.known.cost)
     assert jumped.found.suspect.family == ("clock_drops", "wrench")
@@ -244,8 +245,8 @@ def test_what_is_left_out_about_a_jump_is_none_of_its_doing() -> None:
     after = taken_off(found, view).standing.known
     assert after.excess < 0.5 * known.excess
     assert jump_gain(found, known, after) < 0.25 * known.excess
-    floor = declared(known.experiment)
-    assert rounds._jumped(view, floor, bench.serial(known.experiment)) == []
+    floor, simulate = declared(known.experiment), Effort(bench.serial(known.experiment), known)
+    assert rounds._jumped(view, floor, simulate) == []
 
 
 def test_what_all_recordings_share_of_a_clock_is_no_jump() -> None:
@@ -268,7 +269,8 @@ def test_what_all_recordings_share_of_a_clock_is_no_jump() -> None:
     view = View.of(
         Standing(known, rung, {}), lambda one: isinstance(one, Catalogued) and one.of_clock, linear=False
     )
-    assert rounds._jumped(view, declared(known.experiment), bench.serial(known.experiment)) == []
+    simulate = Effort(bench.serial(known.experiment), known)
+    assert rounds._jumped(view, declared(known.experiment), simulate) == []
     anew = mistimed._stamped_anew(known)
     assert anew is not None
     late = (anew.trials[2].measured - made.trials[2].measured - ringing)[(t > 1.0) & (t < 38.0), :6]
