@@ -106,7 +106,9 @@ def gate(
     gained = sum(fold.gain for fold in asked)
     if worse := worsened(asked):
         reasons.append(f"{', '.join(worse)} predicted worse")
-    if not gained >= GATE_GAIN:
+    if not asked:
+        reasons.append("no recording that was not used could show it")
+    elif not gained >= GATE_GAIN:
         reasons.append("recordings that were not used gain less than chance could give")
     elif held_out and not (
         gained >= GATE_SHARE * _promised(before, after)
