@@ -209,6 +209,24 @@ def test_jittered_sampling_is_interpolated() -> None:
     assert np.abs(run.wrench.values - wrench(t))[run.wrench.valid].max() < 1e-4
 
 
+def test_what_a_fast_sensor_misses_for_less_than_the_band_shows_is_bridged() -> None:
+    """Stamps that jitter by a fifth of 0.1 ms are equal now and then, and one of two is dropped."""
+    rng = np.random.default_rng(9)
+    times = np.sort(np.arange(600_000) + 0.2 * rng.standard_normal(600_000)) / 10_000.0
+    times[20_000::1000] = times[19_999:-1:1000]
+    kept = np.delete(times, slice(300_000, 300_200))
+    run = run_of({"wrench": stream(wrench, 10_000.0, 60.0, times=kept)})
+    assert run.wrench is not None
+    assert loss(run, "repeat") == pytest.approx(580, abs=2)
+    assert loss(run, "short gap") == pytest.approx(loss(run, "repeat"), rel=0.2)  # jitter makes some
+    assert loss(run, "gap") == pytest.approx(200, abs=2)
+    t, valid = run.wrench.t, run.wrench.valid
+    missing = np.abs(t + kept[0] - 30.01) < 0.03
+    assert missing.any() and not valid[missing].any()
+    assert np.mean(valid) > 0.95
+    assert np.abs(run.wrench.values - wrench(t + kept[0]))[valid].max() < 1e-3
+
+
 def test_duplicate_stamps_and_repeated_values_survive() -> None:
     block = stream(lambda t: np.column_stack((np.sin(t), np.round(np.cos(t), 1))), 100.0, 50.0)
     block.stamp[[1000, 2000, 3000]] = block.stamp[[999, 1999, 2999]]

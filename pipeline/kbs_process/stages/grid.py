@@ -13,6 +13,9 @@ from kbs_process.signals.records import Array, Mask, Stamps
 GAP = 1.5  # nominal periods: a longer step is a gap, if the stamps around it do not say that it is jitter
 LEFT, RIGHT = 3, 3  # neighbours that the six-point interpolation needs on either side
 AROUND = 4  # stamps on either side that a long step is held against
+BRIDGED = (
+    1e-3  # by which a straight line across a gap may be wrong about what is in the band, and is no invention
+)
 PIECE = 65536  # grid points made at a time, which bounds what a long gap costs in memory
 
 
@@ -69,16 +72,26 @@ def counted(u: Array) -> Array:
     return count
 
 
+def longest_bridged(frequency: float) -> float:
+    """Return the longest gap, s, across which a straight line errs by no more than `BRIDGED` at `frequency`, Hz.
+
+    Half way along it a cosine of that frequency is missed by (2 pi f T)^2/8 of its amplitude. What is faster is
+    missed by more, and filtered out afterwards.
+    """
+    return float(np.sqrt(8.0 * BRIDGED) / (2.0 * np.pi * frequency))
+
+
 class Regridder:
     """Interpolate a stream onto its grid, block by block.
 
     Samples that lie on the grid pass unchanged. Between samples: Lagrange's polynomial through the six
     nearest, where their spacing is regular to half a period, else a straight line. Worst gain error of the
     former, half way between samples, 5/1024 (2 pi f T)^6: 8e-5 at 8 Hz sampled at 100 Hz, 3e-7 at 240 Hz;
-    of the latter (2 pi f T)^2/8. Points in gaps are flagged as invented.
+    of the latter (2 pi f T)^2/8. Points in gaps longer than `bridged`, s, are flagged as invented.
     """
 
-    def __init__(self, grid: Grid) -> None:
+    def __init__(self, grid: Grid, bridged: float = 0.0) -> None:
+        self._bridged = bridged * grid.rate  # periods
         self._on_grid = max(1e-6, 1.0 / grid.period_ns)  # periods; stamps are rounded to 1 ns
         self._u: Array = np.empty(0)
         self._x: Array = np.empty((0, 0))
@@ -112,7 +125,7 @@ class Regridder:
                 self._next = stop
                 yield x[first : first + n], None
                 return
-        gap = counted(u) > 1.0
+        gap = (counted(u) > 1.0) & (np.diff(u) > self._bridged)
         while self._next < stop:
             n = min(stop - self._next, PIECE)
             rows, invented = np.empty((n, x.shape[1])), np.zeros(n, dtype=np.bool_)

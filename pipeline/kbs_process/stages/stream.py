@@ -10,7 +10,7 @@ import numpy as np
 from kbs_process.signals.records import PUT_IN_ORDER, Array, Block, Loss, Mask, Stamps
 from kbs_process.stages.clocks import ClockData, LatencyFloor
 from kbs_process.stages.envelope import MinMax
-from kbs_process.stages.grid import AROUND, Grid, Regridder, counted, nominal_grid
+from kbs_process.stages.grid import AROUND, Grid, Regridder, counted, longest_bridged, nominal_grid
 from kbs_process.stages.ordering import Orderer, Reblock, finite_rows, judge
 from kbs_process.stages.resample import Kept, Reducer, design
 from kbs_process.stages.spectrum import Welch
@@ -36,6 +36,8 @@ class Timeline:
     grid: Grid | None = None
     by_recorder: bool = False
     gaps: list[Gap] = field(default_factory=list)
+    bridged: float = 0.0  # s, the longest gap that is drawn over, as nothing in the band is so fast
+    missing_bridged: int = 0  # samples in such gaps
     gaps_unlisted: int = 0
     missing_unlisted: int = 0
     non_finite: int = 0  # samples that are NaN or infinite in some channel: all of each is left out
@@ -95,8 +97,10 @@ class Timeline:
         judged = max(len(count) - held_back, self._judged)
         for index in self._judged + np.flatnonzero(count[self._judged : judged] > 1.0):
             missing = int(count[index]) - 1
-            if len(self.gaps) < GAPS_LISTED:
-                start, end = (self.own_one(int(one)) for one in stamp[index : index + 2])
+            start, end = (self.own_one(int(one)) for one in stamp[index : index + 2])
+            if end - start <= self.bridged:
+                self.missing_bridged += missing
+            elif len(self.gaps) < GAPS_LISTED:
                 self.gaps.append(Gap(start, end, missing))
             else:
                 self.gaps_unlisted += 1
@@ -154,6 +158,9 @@ class Timeline:
         if self.gaps_unlisted:
             detail = f"{self.gaps_unlisted} more gaps"
             found.append(Loss("gap", self.where, self.missing_unlisted, detail=detail))
+        if self.missing_bridged:
+            detail = f"up to {1e3 * self.bridged:.2g} ms each, which is nothing in the band: bridged"
+            found.append(Loss("short gap", self.where, self.missing_bridged, detail=detail))
         if self.non_finite:
             detail = f"{self.non_finite_channels}: interpolated"
             found.append(Loss("non-finite", self.where, self.non_finite, detail=detail))
@@ -223,7 +230,7 @@ class Uniform:
         """`turning` channels are angles, which go on through full turns; `spectrum`: (resolution, limit), Hz; below a
         rate of `keep_below`, Hz, samples are kept as such.
         """
-        self.line = Timeline(where, channels)
+        self.line = Timeline(where, channels, bridged=longest_bridged(working_rate / 2.0))
         self.welch: Welch | None = None
         self.envelope = MinMax(len(channels), stretches) if stretches else None
         self._working_rate = working_rate
@@ -260,7 +267,7 @@ class Uniform:
         if grid is None:
             return
         if self._regrid is None:
-            self._regrid = Regridder(grid)
+            self._regrid = Regridder(grid, self.line.bridged)
             self._reduce = Reducer(design(grid.rate, self._working_rate))
             if self._spectrum:
                 self.welch = Welch(grid.rate, *self._spectrum, self.line.channels)
