@@ -189,6 +189,15 @@ def written(outcome: Outcome, tmp_path_factory: pytest.TempPathFactory) -> Path:
     assert "Beside that known parameters are together farther from what" in strained.verdict_lines[0]
     assert "Beside that" not in disputed.verdict_lines[0]
     assert "as much work as it may cost" in (target / "results.json").read_text()
+    write_diagnosis(campaign, declared(experiment), replace(outcome, ended=True), target, False, None)
+    assert "as much work as it may cost" in (target / "results.json").read_text()
+    assert (
+        campaign.topics.command is not None and "commanded one" not in (target / "results.json").read_text()
+    )
+    without = replace(campaign, topics=replace(campaign.topics, angle=campaign.topics.command))
+    write_diagnosis(without, declared(experiment), outcome, target, False, None)
+    assert "the motion is the commanded one" in (target / "results.json").read_text()
+    assert "as much work" not in (target / "results.json").read_text()
     faint = replace(outcome, finds=(), after=Detection((), -80.0, 1.02))
     (little, *_) = write_diagnosis(campaign, declared(experiment), faint, target, False, None).verdict_lines
     assert (
@@ -262,7 +271,7 @@ def test_the_next_test_can_be_simulated(written: Path) -> None:
 def test_laws_of_the_catalogue_that_do_the_same_are_alike_likely() -> None:
     """By odds of formulas that nature need not have; curves, and laws that are told apart, keep theirs."""
     same = Alternative(DRAG, 0.02, 2.0, 0.16, True, True)
-    apart = Alternative(CABLE, 0.3, 9.0, 1e-6, True, True)
+    apart = Alternative(CABLE, 0.3, 9.0, 1e-6, False, True)
     curve = Alternative(LAW, 0.08, 1.0, 0.3, True, True)
     linear = Alternative(CABLE, 0.0, 1.0, 0.3, True, False)  # was not simulated
     chance, others = _alike_likely(0.6, [same, apart, curve, linear])

@@ -49,11 +49,19 @@ def warnings(campaign: Campaign, floor: Floor, outcome: Outcome) -> Iterator[Not
             "known parameters that were not found, would pass too",
             remedy="hold out a recording of another trajectory",
         )
-    if outcome.ended and (outcome.verdict == "undecided" or outcome.standing.known.strained):
+    if outcome.ended and outcome.verdict != "none":
         yield Notice(
             severity="warning",
             what="the search was ended after as much work as it may cost: laws beside those that were tried were not",
             remedy="give what is known of the rig's parameters closer, or diagnose recordings that show one joint",
+        )
+    angle, command = campaign.topics.angle, campaign.topics.command
+    if angle and command and angle.topic == command.topic and outcome.verdict != "none":
+        yield Notice(
+            severity="warning",
+            what="the motion is the commanded one: what motors, gears and friction made of it shows in the loads, and "
+            "no prediction has it",
+            remedy="record the encoders, and name their topic under [topics]",
         )
     if floor.source == "declared":
         yield Notice(

@@ -115,7 +115,7 @@ def _alike_likely(chance: float, others: Sequence[Alternative]) -> tuple[float, 
     Schwarz's criterion would tell them apart by how many numbers they have: so it does for formulas that are nature's.
     """
     alike = [
-        one for one in others if one.refitted and one.rho_delta < RIVALS and one.identity.family != UNNAMED
+        one for one in others if one.refitted and one.indistinguishable and one.identity.family != UNNAMED
     ]
     even = (chance + sum(one.probability for one in alike)) / (1 + len(alike))
     return even, [replace(one, probability=even) if one in alike else one for one in others]
