@@ -13,9 +13,7 @@ from kbs_process.signals.records import Array, Mask, Stamps
 GAP = 1.5  # nominal periods: a longer step is a gap, if the stamps around it do not say that it is jitter
 LEFT, RIGHT = 3, 3  # neighbours that the six-point interpolation needs on either side
 AROUND = 4  # stamps on either side that a long step is held against
-BRIDGED = (
-    1e-3  # by which a straight line across a gap may be wrong about what is in the band, and is no invention
-)
+BRIDGED = 1e-3  # error, in the band, up to which a straight line across a gap is no invention
 PIECE = 65536  # grid points made at a time, which bounds what a long gap costs in memory
 
 
