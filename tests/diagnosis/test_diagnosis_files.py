@@ -142,6 +142,13 @@ def written(outcome: Outcome, tmp_path_factory: pytest.TempPathFactory) -> Path:
         "most: " in told_hidden.verdict_lines[0]
         and "Check these at their source" in told_hidden.verdict_lines[0]
     )
+    cut_short = replace(off, ended=True)
+    assert cut_short.verdict == "undecided" and replace(cut_short, moved=()).verdict == "none"
+    told_cut = write_diagnosis(campaign, declared(experiment), cut_short, target, False, None, "")
+    assert told_cut.verdict_lines[0].startswith(
+        "Known parameters that are off (joint.el.drive.Ka +5.0 sigma) would explain all: with that"
+    )
+    assert "is open, as the search ended before all were tried. Nearest is" in told_cut.verdict_lines[0]
     more = write_diagnosis(
         campaign,
         declared(experiment),

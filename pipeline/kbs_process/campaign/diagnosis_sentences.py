@@ -36,6 +36,10 @@ _HIDDEN = (
     "({strain}, p {p:.1g}; most: {names}), though none is by itself: stated "
     "uncertainties are too small, or physics was left out that does what they do. Check these at their source.{near}"
 )
+_UNTRIED = (
+    "Known parameters that are off ({moved}) would explain all: with that nothing exceeds {floor}. Whether a law does "
+    "that was left out is open, as the search ended before all were tried.{near}"
+)
 MATTERS = 0.1  # of a limit: in a sum of squares a tenth is a half percent
 
 
@@ -179,6 +183,8 @@ def _unnamed(outcome: Outcome, trials: Sequence[records.Trial], floor: Floor) ->
             names=", ".join(farthest(outcome.known)),
             near=_nearest(outcome),
         )
+    if outcome.untried and not outcome.after.left and not outcome.unforeseen:
+        return _UNTRIED.format(floor=_FLOOR[floor.source], moved=_off(outcome), near=_nearest(outcome))
     if not outcome.unforeseen:
         words = _WORDS[outcome.verdict].format(
             floor=_FLOOR[floor.source],

@@ -180,7 +180,7 @@ class Outcome:
         if (
             self.much
             or self.disputed
-            or (not self.finds and (self.after.left or self.after.faint or self.hidden))
+            or (not self.finds and (self.after.left or self.after.faint or self.hidden or self.untried))
         ):
             return "undecided"
         if self.finds:
@@ -191,6 +191,14 @@ class Outcome:
     def hidden(self) -> bool:
         """Whether known numbers, none of which is off by itself, may have taken up physics that was left out."""
         return self.bent and not self.moved
+
+    @property
+    def untried(self) -> bool:
+        """Whether numbers that are off leave nothing, and not all laws were tried that could be there instead.
+
+        That no law does as well as these numbers is what their being off rests on.
+        """
+        return self.ended and bool(self.moved)
 
     @property
     def located(self) -> tuple[PortName, ...]:
