@@ -9,7 +9,8 @@ import numpy as np
 from scipy.special import ndtri_exp
 from scipy.stats import beta, binom
 
-LEAST_LOG10_P = -43429.0  # 1e5 e-folds: where answers cut off their p-values, at a z of 447
+# Where answers cut off the p-value of a mismatch: 1e5 e-folds, once or doubled, a z of 447. That of a find may be less.
+CUT_LOG10_P = (-43430.0, -43429.0)
 
 
 def clopper_pearson(k: int, n: int, level: float = 0.95) -> tuple[float, float]:

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 from proof.answer import Answer, Part
-from proof.match import Judged, covered, error_over_bound, match, superfluous
-from proof.rates import LEAST_LOG10_P, clopper_pearson, decibels_from_clairvoyant, median_interval
+from proof.match import Judged, covered, error_over_bound, match, same_place, superfluous
+from proof.rates import CUT_LOG10_P, clopper_pearson, decibels_from_clairvoyant, median_interval
 from proof.truth import Truth
 from proof.words import NULLS, Split
 
@@ -120,6 +120,19 @@ def _called_beyond(trial: Trial) -> Iterable[bool]:
         yield trial.answer.verdict == "parameters off" and not trial.answer.finds
 
 
+def _said(verdict: str, *kinds: str) -> Tally:
+    """Answers of a verdict, and whether the trial was of such a kind."""
+    return lambda trial: (trial.truth.kind in kinds,) if trial.answer.verdict == verdict else ()
+
+
+def _finds(verdict: str) -> Tally:
+    """Finds of answers of a verdict, and whether something concealed is at their place."""
+    return lambda trial: (
+        any(same_place(find, one.effect) for one in trial.judged)
+        for find in (trial.answer.finds if trial.answer.verdict == verdict else ())
+    )
+
+
 SHARES: Mapping[str, Tally] = {
     "answered": lambda trial: (not trial.answer.failure,),
     "mismatch detected": lambda trial: (trial.answer.detected,) if trial.truth.kind == "concealed" else (),
@@ -142,6 +155,10 @@ SHARES: Mapping[str, Tally] = {
     "superfluous find": lambda trial: (
         (superfluous(trial.answer, trial.judged) > 0,) if trial.truth.kind == "concealed" else ()
     ),
+    'said "none", and is': _said("none", "nothing", "within"),
+    'said "parameters off", and are': _said("parameters off", "beyond"),
+    'find of "physics" at its place': _finds("physics"),
+    'find of "undecided" at its place': _finds("undecided"),
     "indistinguishable, and told": _equivalents_told,
     "told apart, but called indistinguishable": _falsely_undecided,
     "interval covers": _covers,
@@ -149,9 +166,9 @@ SHARES: Mapping[str, Tally] = {
 
 
 def _decibels(trial: Trial) -> Iterable[float]:
-    """Of answers whose p-value is a number: one at the least that answers give says no more than that it is less."""
-    given = trial.answer.log10_p
-    if trial.truth.kind == "concealed" and given is not None and given > LEAST_LOG10_P:
+    """Of answers whose p-value was not cut off, which says no more than that it is less."""
+    given, (low, high) = trial.answer.log10_p, CUT_LOG10_P
+    if trial.truth.kind == "concealed" and given is not None and not low < given < high:
         yield decibels_from_clairvoyant(trial.truth.rho_eff, given)
 
 

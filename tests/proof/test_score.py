@@ -206,6 +206,10 @@ def test_nulls_count_finds_and_parameters_off() -> None:
     assert value(rows, "false find") == 0.25 and value(rows, "false find", "within") == 1.0
     assert value(rows, "false alarm") == 0.5  # that parameters are off, beyond sigma, is no false alarm
     assert value(rows, "called parameters off") == 0.5
+    assert value(rows, 'said "none", and is') == 0.5, "of the first and the last, whose numbers are off"
+    assert value(rows, 'said "parameters off", and are') == 1.0
+    assert value(rows, 'find of "physics" at its place') == 0.0, "it is a null's"
+    assert find(rows, "kbs-process", 'find of "undecided" at its place', "all") is None
     assert reached(AIMS[0], find(rows, "kbs-process", "false find", "all")) == "missed"
 
 
@@ -214,13 +218,17 @@ def test_detection_strength_and_residual_are_grouped() -> None:
     log10_p = math.log10(norm.sf(20.0))
     given = [
         answer("A", log10_p=log10_p),
-        answer("B", claim(), log10_p=-1e6, held_out=HeldOut(before=9.0, after=1.05)),
+        answer("B", claim(), log10_p=-43429.15, held_out=HeldOut(before=9.0, after=1.05)),
     ]
     rows = score(truths, given)
     assert value(rows, "mismatch detected", "40") == 0.0 and value(rows, "mismatch detected", "1000") == 1.0
     assert value(rows, "decibels from the clairvoyant", "40") == pytest.approx(6.02, abs=0.01)
     # A p-value that was cut off says that the effect was seen, and not how well.
     assert find(rows, "kbs-process", "decibels from the clairvoyant", "1000") is None
+    beyond = [given[0], answer("B", claim(), log10_p=math.log10(math.e) * -(1000.0**2) / 2.0)]
+    rows = score(truths, beyond)
+    assert value(rows, "decibels from the clairvoyant", "1000") == pytest.approx(0.0, abs=0.01)
+    rows = score(truths, given)
     assert value(rows, "held-out residual over floor, after", ">=300") == 1.05
 
 
