@@ -38,7 +38,7 @@ _HIDDEN = (
 )
 _UNTRIED = (
     "Known parameters that are off ({moved}) would explain all: with that nothing exceeds {floor}. Whether a law does "
-    "that was left out is open, as the search ended before all were tried.{near}"
+    "that was left out is open, as the search ended before all were tried."
 )
 MATTERS = 0.1  # of a limit: in a sum of squares a tenth is a half percent
 
@@ -184,7 +184,7 @@ def _unnamed(outcome: Outcome, trials: Sequence[records.Trial], floor: Floor) ->
             near=_nearest(outcome),
         )
     if outcome.untried and not outcome.after.left and not outcome.unforeseen:
-        return _UNTRIED.format(floor=_FLOOR[floor.source], moved=_off(outcome), near=_nearest(outcome))
+        return _UNTRIED.format(floor=_FLOOR[floor.source], moved=_off(outcome))
     if not outcome.unforeseen:
         words = _WORDS[outcome.verdict].format(
             floor=_FLOOR[floor.source],
