@@ -69,7 +69,7 @@ def test_a_mismatch_is_diagnosed_and_linked(
     monkeypatch.setattr(diagnosing, "diagnose", answered)
     assert run(finished) == 0
     told = capsys.readouterr().out
-    assert "differ by 3 times the repeatability floor (rms)." in told
+    assert "differ by 3 times the repeatability floor (rms), all together." in told
     assert "With known numbers refitted within their uncertainties: Left out: a harness." in told
     assert "Floor: what the data sheets say." in told
     assert f"Diagnosis: {finished / 'diagnosis' / 'index.html'}" in told

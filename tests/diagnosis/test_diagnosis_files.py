@@ -7,6 +7,7 @@ from pathlib import Path
 
 import bench
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 from test_rounds import standing
 
@@ -245,6 +246,21 @@ def test_results_read_back_and_the_page_tells_them(written: Path) -> None:
     assert "cannot tell curve over joint angle" in page.replace("\u00a0", " ")
     for kind in ("residual", "residual_spectrum"):
         assert {path.stem for path in (written / "tables" / kind).iterdir()} == {"r0", "r1"}
+
+
+def test_residuals_are_without_what_no_recording_knows_and_keep_an_angle_s_slope(
+    written: Path, outcome: Outcome
+) -> None:
+    known = outcome.known
+    experiment = known.experiment
+    trial = experiment.trials[0]
+    left = (trial.measured - known.shown[trial.drive].values)[trial.valid]
+    t = np.arange(len(left))
+    table = pq.read_table(written / "tables" / "residual" / f"{trial.name}.parquet")
+    for c, name in enumerate(experiment.channels):
+        told = table[f"{name}.before"].to_numpy()
+        fit = np.polyfit(t, left[:, c], 1 if c < experiment.loads else 0)
+        assert told == pytest.approx(left[:, c] - np.polyval(fit, t), abs=1e-9 * np.ptp(left[:, c])), name
 
 
 def test_the_corrected_model_has_the_curve_in_its_plant(written: Path) -> None:

@@ -43,7 +43,7 @@ def diagnose_results(
         build.build(folder, pdf)
     return (
         *told,
-        f"With the parameter files' numbers, prediction and recordings differ by {ratio}.",
+        f"With the parameter files' numbers, prediction and recordings differ by {ratio}, all together.",
         f"With known numbers refitted within their uncertainties: {outcome.verdict_lines[0]}",
         f"Diagnosis: {results / FOLDER / outcome.report.name}",
     )

@@ -22,6 +22,7 @@ from kbs_process.diagnosis.hypothesis import Prediction
 from kbs_process.diagnosis.joint import Standing
 from kbs_process.diagnosis.known import Known
 from kbs_process.diagnosis.next_test import Proposal
+from kbs_process.diagnosis.nuisance import unknown_terms
 from kbs_process.diagnosis.outcome import Outcome
 from kbs_process.report import build
 from kbs_process.report.records.common import encode
@@ -84,17 +85,21 @@ def _spectra(folder: Path, before: Known, after: Known, k: int) -> None:
 def _histories(
     folder: Path, experiment: Experiment, predicted: Mapping[int, Prediction], standing: Standing, k: int
 ) -> None:
-    """Measured less predicted in the channels' units, constant and slope taken off, before and after."""
+    """Measured less predicted in the channels' units, before and after, without what no recording knows.
+
+    As where they are judged (`diagnosis/nuisance.py`), that is a constant and a slope of each load channel with a bias,
+    and a constant of each angle, whose slope would be a mismatch.
+    """
     trial = experiment.trials[k]
     t: Array = experiment.dt * np.flatnonzero(trial.valid).astype(np.float64)
     columns: dict[str, Array] = {"t": t}
     units = {"t": "s"}
-    A = np.stack([np.ones(len(t)), t], axis=1)
+    A, own = np.stack([np.ones(len(t)), t], axis=1), unknown_terms(experiment)
     for side, model in (("before", predicted[trial.drive].values), ("after", standing.shown(k))):
         left = (trial.measured - model)[trial.valid]
-        left = left - A @ np.linalg.lstsq(A, left, rcond=None)[0]
         for c in seen_channels(standing.known, k):
-            columns[f"{experiment.channels[c]}.{side}"] = left[:, c]
+            x, terms = left[:, c], A[:, : own[c]]
+            columns[f"{experiment.channels[c]}.{side}"] = x - terms @ np.linalg.lstsq(terms, x, rcond=None)[0]
             units[f"{experiment.channels[c]}.{side}"] = experiment.units[c]
     path = folder / "tables" / "residual" / f"{trial.name}.parquet"
     write_table(path, columns, units, frame="T", recording=trial.name)

@@ -11,6 +11,13 @@ from kbs_process.diagnosis.stamps import slope
 from kbs_process.signals.records import Array
 
 
+def unknown_terms(experiment: Experiment) -> tuple[int, ...]:
+    """Of each channel, how many of a constant and a slope: both of a load with a bias, the first of an angle."""
+    rig = experiment.rig
+    tared = rig.loads.bias_sigma[rig.loads.index(rig.channels)] > 0.0
+    return (*(2 if one else 0 for one in tared), *[1] * (len(experiment.channels) - experiment.loads))
+
+
 def nuisances(
     experiment: Experiment, trial: Trial, prediction: Prediction, hypothesis: Hypothesis
 ) -> tuple[Array, Array]:
@@ -23,11 +30,8 @@ def nuisances(
     wrench = experiment.loads
     t = np.linspace(-1.0, 1.0, n)
     columns, precision = [np.zeros((n, c))], [1.0]  # none, where there are no others
-    rig = experiment.rig
-    tared = rig.loads.bias_sigma[rig.loads.index(rig.channels)] > 0.0
-    for channel in range(c):
-        shapes = (np.ones(n),) if channel >= wrench else (np.ones(n), t) if tared[channel] else ()
-        for shape in shapes:
+    for channel, terms in enumerate(unknown_terms(experiment)):
+        for shape in (np.ones(n), t)[:terms]:
             column = np.zeros((n, c))
             column[:, channel] = shape
             columns.append(column)
