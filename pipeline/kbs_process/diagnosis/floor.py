@@ -140,10 +140,8 @@ def estimate(experiment: Experiment, residuals: Mapping[int, Array]) -> Floor:
         dof.append(float(freedom[first:end].sum()))
         centres.append(float(np.exp(np.mean(np.log(f[first:end])))))
         edges.append(float(f[end - 1]))
-    runs, plural = (
-        sum(len(members) for members in repeated),
-        "trajectory" if len(groups) == 1 else "trajectories",
-    )
+    runs = sum(len(members) for members in repeated)
+    plural = "trajectory" if len(groups) == 1 else "trajectories"
     return Floor(
         experiment, np.array(edges), np.array(centres), np.array(C), np.array(dof), level, "repeats",
         f"from what {runs} recordings of {len(groups)} repeated {plural} differ by",
