@@ -18,7 +18,20 @@ from engine.campaigns import CAMPAIGNS
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "pipeline" / "kbs_process"
 # What computes. The command line and the importers name campaigns in their examples.
-COMPUTING = ("stages", "plant", "estimation", "ingest", "rig", "signals", "campaign", "report")
+COMPUTING = (
+    "stages",
+    "plant",
+    "estimation",
+    "identification",
+    "recordings",
+    "rig",
+    "signals",
+    "campaign",
+    "reduction",
+    "results",
+    "report",
+    "studies",
+)
 
 # Opens every file through the audit hook, and prints those below the checkout.
 WATCHED = """
@@ -27,10 +40,10 @@ from pathlib import Path
 root, campaign, target = map(Path, sys.argv[1:])
 opened = set()
 sys.addaudithook(lambda event, args: opened.add(args[0]) if event in ("open", "os.listdir", "os.scandir") else None)
-from kbs_process.campaign import run
+from kbs_process.studies.correlate import run
 from kbs_process.campaign.load import load_campaign
-from kbs_process.campaign.progress import SilentProgress
-run.build.build = lambda folder, pdf: folder / "index.html"
+from kbs_process.progress import SilentProgress
+run.build = lambda folder, document, pdf: folder / "index.html"
 run.process(load_campaign(campaign), target, progress=SilentProgress(), pdf=False)
 for path in sorted({str(path) for path in opened if isinstance(path, (str, bytes, Path))}):
     print(path)
@@ -57,7 +70,7 @@ def strings(source: Path) -> set[str]:
 def test_code_names_neither_campaigns_nor_truth(folder: str):
     campaigns = {path.name for path in (ROOT / "campaigns").iterdir() if path.is_dir()}
     secrets = campaigns | {"truth", "tests/"}
-    modules = [path for path in (PACKAGE / folder).rglob("*.py") if "importers" not in path.parts]
+    modules = [path for path in (PACKAGE / folder).rglob("*.py") if "convert" not in path.parts]
     assert modules
     for module in modules:
         found = {text for text in strings(module) if any(secret in text for secret in secrets)}

@@ -7,9 +7,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from kbs_process.plant.generate import module_text
-from kbs_process.plant.multibody import carrier, joint_offset, unrolled
-from kbs_process.plant.stepping import accelerated, state_layout
+from kbs_process.plant.compiled.generate import module_text
+from kbs_process.plant.compiled.multibody import carrier, joint_offset, unrolled
+from kbs_process.plant.compiled.stepping import accelerated, state_layout
 from kbs_process.plant.structure import DRIVE, MICROSTEP, RATIO, ROTOR, Structure
 
 LOOP = '''

@@ -16,9 +16,9 @@ from pytest_benchmark.fixture import BenchmarkFixture
 from scipy.signal import butter, sosfiltfilt
 
 from kbs_process.signals.records import WRENCH_CHANNELS, WRENCH_UNITS, Block, Signal
+from kbs_process.stages.align.condense import CondenseSettings, condense
+from kbs_process.stages.align.resample import resample
 from kbs_process.stages.bandpass import Band, apply
-from kbs_process.stages.condense import CondenseSettings, condense
-from kbs_process.stages.resample import resample
 
 RATE, WORKING, SECONDS = 1000.0, 20.0, 3600
 BAND = Band("lt1Hz", 0.01, 1.0)

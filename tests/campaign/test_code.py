@@ -11,7 +11,7 @@ from types import SimpleNamespace
 import pytest
 
 import kbs_process
-from kbs_process.campaign import code
+from kbs_process.results import code
 
 PACKAGE = Path(kbs_process.__file__).parent
 COMMIT = "0123456789abcdef0123456789abcdef01234567"

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from kbs_process.campaign.commands import read_commands
 from kbs_process.errors import RecordingError
+from kbs_process.reduction.commands import read_commands
 
 
 def table(folder: Path, text: str) -> Path:

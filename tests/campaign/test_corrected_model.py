@@ -12,19 +12,19 @@ import pytest
 
 from campaign.campaign_folder import make_folder
 from kbs_process.campaign.config import SensingLaw
-from kbs_process.campaign.corrected_diagnosis import write_corrected
 from kbs_process.campaign.corrected_model import write_model
 from kbs_process.campaign.load import load_campaign
 from kbs_process.campaign.mission import load_day
-from kbs_process.campaign.reading_laws import readings
-from kbs_process.diagnosis.hypothesis import Hypothesis
-from kbs_process.diagnosis.outcome import Estimate, Identity
+from kbs_process.diagnosis.experiments.hypothesis import Hypothesis
+from kbs_process.diagnosis.selection.outcome import Estimate, Identity
 from kbs_process.errors import ConfigError
+from kbs_process.identification.output_error import Scalar
 from kbs_process.plant.attach import attach
 from kbs_process.plant.effects import select
 from kbs_process.rig.model import Quantity, substitute
 from kbs_process.signals.records import WRENCH_CHANNELS
-from kbs_process.stages.output_error import Scalar
+from kbs_process.studies.diagnose.corrected import write_corrected
+from kbs_process.studies.predict.reading_laws import readings
 
 CAMPAIGN = Path(__file__).parents[2] / "campaigns" / "EL089"
 

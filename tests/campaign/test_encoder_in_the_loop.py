@@ -8,7 +8,7 @@ import numpy as np
 
 from campaign.campaign_folder import EXAMPLE
 from kbs_process.campaign.load import load_campaign
-from kbs_process.campaign.predicting import schedule_of
+from kbs_process.reduction.predicting import schedule_of
 from kbs_process.signals.records import Events
 
 JOINTS = ("az", "el")

@@ -9,11 +9,11 @@ import pytest
 
 from campaign.campaign_folder import EXAMPLE
 from kbs_process.campaign.load import load_campaign
-from kbs_process.campaign.predicting import LEAD, approached, predict_run
 from kbs_process.plant.predict import predict
 from kbs_process.plant.schedule import Schedule
+from kbs_process.reduction.predicting import LEAD, approached, predict_run
 from kbs_process.signals.records import WRENCH_CHANNELS, WRENCH_UNITS, Events, Run, Signal
-from kbs_process.stages.condense import CondenseSettings
+from kbs_process.stages.align.condense import CondenseSettings
 
 RATE = np.radians(0.3)
 EMPTY = Run("late", None, None, None, None, None, None, None, None, None, 0)

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from campaign.campaign_folder import CampaignFolder
-from kbs_process.campaign import provenance
 from kbs_process.campaign.load import load_campaign
 from kbs_process.campaign.schema import load_schema, schema_folder
+from kbs_process.results import provenance
 
 
 def test_example_becomes_a_rig_in_si(folder: CampaignFolder) -> None:
@@ -197,14 +197,13 @@ def test_a_right_checksum_passes(folder: CampaignFolder) -> None:
 
 def test_provenance_names_every_input_and_stays_the_same(folder: CampaignFolder) -> None:
     campaign = load_campaign(folder.path)
-    inputs = provenance.inputs(campaign)
-    assert {entry["file"] for entry in inputs} == {
+    by_file = provenance.checksums(campaign.folder, campaign.files)
+    assert set(by_file) == {
         "campaign.toml",
         "parameters/rig.toml",
         "parameters/drives.toml",
         *(f"recordings/{entry.name}.mcap" for entry in campaign.recordings),
     }
-    by_file = {entry["file"]: entry["sha256"] for entry in inputs}
     text = (folder.path / "campaign.toml").read_bytes()
     assert by_file["campaign.toml"] == hashlib.sha256(text).hexdigest()
     one, two = (json.dumps([provenance.software(), provenance.parameters(campaign.rig)]) for _ in range(2))

@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 
 from kbs_process.campaign.config import RecordingEntry
-from kbs_process.campaign.notices import lost
-from kbs_process.campaign.validate import in_words
-from kbs_process.report import results
 from kbs_process.signals.records import PUT_IN_ORDER, TRUNCATED, Loss
+from kbs_process.studies.correlate import results
+from kbs_process.studies.correlate.notices import lost
+from kbs_process.studies.validate.run import in_words
 
 
 @pytest.mark.parametrize(

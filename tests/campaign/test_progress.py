@@ -6,7 +6,7 @@ import io
 
 import pytest
 
-from kbs_process.campaign.progress import PlainProgress, Progress, SilentProgress, TerminalProgress
+from kbs_process.progress import PlainProgress, Progress, SilentProgress, TerminalProgress
 
 
 def work(progress: Progress) -> None:

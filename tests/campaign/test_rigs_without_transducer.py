@@ -10,14 +10,14 @@ import pytest
 from campaign_folder import CampaignFolder, make_folder
 
 from kbs_process.campaign.corrected_model import write_model
-from kbs_process.campaign.importers import PRESETS
 from kbs_process.campaign.load import load_campaign
-from kbs_process.campaign.relief import in_motion, without_effects
 from kbs_process.errors import ConfigError
 from kbs_process.plant.attach import attach
 from kbs_process.plant.effects import select
+from kbs_process.reduction.relief import in_motion, without_effects
 from kbs_process.signals.records import Signal
 from kbs_process.stages.motion import Motion
+from kbs_process.studies.convert import PRESETS
 
 RECORDING = """
 [[recording]]

@@ -15,9 +15,9 @@ from pathlib import Path
 
 import pytest
 
-from kbs_process.campaign import store
-from kbs_process.campaign.store import revising, writing
 from kbs_process.errors import OutputError
+from kbs_process.results import store
+from kbs_process.results.store import revising, writing
 
 MARKER = store.RESULTS
 
@@ -45,7 +45,7 @@ def child(code: str, target: Path, *, prelude: str = "") -> subprocess.Popen[str
     """Start a process that imports the store, runs `prelude`, and then `code` with `target`."""
     program = (
         "import os, sys, time, resource, signal\nfrom pathlib import Path\n"
-        "from kbs_process.campaign.store import writing\nfrom kbs_process.errors import OutputError\n"
+        "from kbs_process.results.store import writing\nfrom kbs_process.errors import OutputError\n"
         f"{prelude}\ntarget = Path(sys.argv[1])\n{code}\n"
     )
     return subprocess.Popen(
@@ -123,7 +123,7 @@ def test_a_kill_between_the_two_renames_is_undone_by_the_next_run(tmp_path: Path
     target = tmp_path / "A"
     write(target, "old")
     prelude = (
-        "from kbs_process.campaign import store\n"
+        "from kbs_process.results import store\n"
         "store._exchange = lambda one, other: False\n"
         "rename = Path.rename\n"
         "def dying(self, other):\n"

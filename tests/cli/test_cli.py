@@ -20,10 +20,10 @@ import pytest
 from campaign.campaign_folder import EXAMPLE, CampaignFolder, make_folder
 from end_to_end import short_campaign
 from kbs_process import cli
-from kbs_process.campaign.importers import preset_names
 from kbs_process.errors import RecordingError
-from kbs_process.ingest.encoding import OutStream
-from kbs_process.ingest.writer import write_mcap
+from kbs_process.recordings.mcap.messages.encoding import OutStream
+from kbs_process.recordings.mcap.writer import write_mcap
+from kbs_process.studies.convert import preset_names
 
 VERBS = ("process", "validate", "inspect", "simulate", "predict", "import", "report", "prove")
 RATE = 100.0
@@ -90,8 +90,8 @@ def processed(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
             report=target / "index.html",
         )
 
-    importlib.import_module("kbs_process.campaign.diagnose")  # which the real one is read by
-    fake = ModuleType("kbs_process.campaign.run")
+    importlib.import_module("kbs_process.studies.diagnose.run")  # which the real one is read by
+    fake = ModuleType("kbs_process.studies.correlate.run")
     fake.process = process  # type: ignore[attr-defined]
     monkeypatch.setitem(sys.modules, fake.__name__, fake)
     return state

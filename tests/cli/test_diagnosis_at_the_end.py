@@ -12,13 +12,13 @@ import pytest
 from campaign.campaign_folder import make_folder
 from end_to_end.short_campaign import record
 from kbs_process import cli
-from kbs_process.campaign import diagnosing
 from kbs_process.campaign.config import Campaign
 from kbs_process.campaign.load import load_campaign
-from kbs_process.campaign.progress import SilentProgress
-from kbs_process.campaign.run import Outcome
 from kbs_process.errors import OutputError, RecordingError
-from kbs_process.report.records.common import encode
+from kbs_process.progress import SilentProgress
+from kbs_process.results.records import encode
+from kbs_process.studies.correlate.run import Outcome
+from kbs_process.studies.diagnose import diagnosing
 from report import sample
 from report.test_report_diagnosis import results
 
@@ -36,7 +36,7 @@ def finished(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         assert target == folder
         return Outcome(("done",), None, target / "index.html")
 
-    fake = ModuleType("kbs_process.campaign.run")
+    fake = ModuleType("kbs_process.studies.correlate.run")
     fake.process = process  # type: ignore[attr-defined]
     monkeypatch.setitem(sys.modules, fake.__name__, fake)
     monkeypatch.setattr(diagnosing, "experiment_of", lambda *_: "experiment")

@@ -10,10 +10,10 @@ import pytest
 
 from end_to_end.short_campaign import short_campaign
 from kbs_process import cli
-from kbs_process.campaign import provenance
-from kbs_process.campaign.earlier_diagnosis import earlier_diagnosis
 from kbs_process.campaign.load import load_campaign
-from kbs_process.report.records.common import encode
+from kbs_process.results import provenance
+from kbs_process.results.records import encode
+from kbs_process.studies.correlate.earlier_diagnosis import earlier_diagnosis
 from report.test_report_diagnosis import results
 
 LINK = 'href="diagnosis/index.html"'
@@ -28,7 +28,8 @@ def run(*arguments: str | Path) -> int:
 
 def diagnose(campaign: Path, results_folder: Path) -> None:
     """Leave what a diagnosis of the campaign as it is leaves."""
-    made = provenance.made("diagnose", load_campaign(campaign))
+    loaded = load_campaign(campaign)
+    made = provenance.made("diagnose", loaded.folder, loaded.files)
     corrected = results_folder / "diagnosis" / "corrected"
     corrected.mkdir(parents=True)
     (corrected / "campaign.toml").write_text("hours of work")

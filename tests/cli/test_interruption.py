@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from kbs_process import interruption
-from kbs_process.campaign.progress import SilentProgress
-from kbs_process.campaign.store import RESULTS, writing
+from kbs_process.progress import SilentProgress
+from kbs_process.results.store import RESULTS, writing
 
 
 def interrupt_that_is_swallowed() -> None:

@@ -8,17 +8,17 @@ from pathlib import Path
 import numpy as np
 
 from kbs_process.campaign.load import load_campaign
-from kbs_process.diagnosis.experiment import Drive, Experiment, Trial
-from kbs_process.diagnosis.floor import declared
-from kbs_process.diagnosis.hypothesis import Hypothesis, predict
-from kbs_process.diagnosis.joint import Standing
-from kbs_process.diagnosis.known import Known
-from kbs_process.diagnosis.metric import metrics
-from kbs_process.diagnosis.parameters import prior, slopes
+from kbs_process.diagnosis.experiments.experiment import Drive, Experiment, Trial
+from kbs_process.diagnosis.experiments.floor import declared
+from kbs_process.diagnosis.experiments.hypothesis import Hypothesis, predict
+from kbs_process.diagnosis.experiments.metric import metrics
+from kbs_process.diagnosis.nominal.joint import Standing
+from kbs_process.diagnosis.nominal.known import Known
+from kbs_process.diagnosis.nominal.parameters import prior, slopes
+from kbs_process.identification.output_error import Scalar
 from kbs_process.plant.predict import Schedule
 from kbs_process.rig.model import Rig
 from kbs_process.signals.records import Array
-from kbs_process.stages.output_error import Scalar
 
 CAMPAIGN = Path(__file__).parents[2] / "campaigns" / "EL089"
 DT = 0.05

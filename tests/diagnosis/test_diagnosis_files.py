@@ -11,21 +11,18 @@ import pyarrow.parquet as pq
 import pytest
 from test_rounds import standing
 
-from kbs_process.campaign.commands import read_commands
-from kbs_process.campaign.corrected_diagnosis import write_corrected
-from kbs_process.campaign.diagnosis_files import write_diagnosis
-from kbs_process.campaign.diagnosis_sentences import _law_in_words, _shown, _stopped
 from kbs_process.campaign.load import load_campaign
-from kbs_process.diagnosis.curves import basis
-from kbs_process.diagnosis.detection import Detection
-from kbs_process.diagnosis.finding import _alike_likely, merged, trusted
-from kbs_process.diagnosis.floor import declared
-from kbs_process.diagnosis.gate import Fold, Gate
-from kbs_process.diagnosis.joint import standing_of
-from kbs_process.diagnosis.known import MOVED, NEAR
-from kbs_process.diagnosis.measured import inserted
-from kbs_process.diagnosis.next_test import Proposal, Tried
-from kbs_process.diagnosis.outcome import (
+from kbs_process.diagnosis.acceptance.finding import _alike_likely, merged, trusted
+from kbs_process.diagnosis.acceptance.gate import Fold, Gate
+from kbs_process.diagnosis.experiments.detection import Detection
+from kbs_process.diagnosis.experiments.floor import declared
+from kbs_process.diagnosis.experiments.trajectories import family, limits_of
+from kbs_process.diagnosis.nominal.joint import standing_of
+from kbs_process.diagnosis.nominal.known import MOVED, NEAR
+from kbs_process.diagnosis.proposing.curves import basis
+from kbs_process.diagnosis.proposing.measured import inserted
+from kbs_process.diagnosis.selection.next_test import Proposal, Tried
+from kbs_process.diagnosis.selection.outcome import (
     Absorbed,
     Alternative,
     Curve,
@@ -36,10 +33,13 @@ from kbs_process.diagnosis.outcome import (
     Outcome,
     Refused,
 )
-from kbs_process.diagnosis.trajectories import family, limits_of
 from kbs_process.plant.effects.measured_law import COEFFICIENTS, MEASURED
-from kbs_process.report.records.common import load
-from kbs_process.report.records.diagnosis import DiagnosisResults, Trial
+from kbs_process.reduction.commands import read_commands
+from kbs_process.results.records import load
+from kbs_process.studies.diagnose.corrected import write_corrected
+from kbs_process.studies.diagnose.files import write_diagnosis
+from kbs_process.studies.diagnose.results import DiagnosisResults, Trial
+from kbs_process.studies.diagnose.sentences import _law_in_words, _shown, _stopped
 
 OVER_ANGLE = next(one for one in MEASURED if one.effect.name == "ground_angle_law")
 LAW = Identity("external wrench", "el", (), "unnamed", "curve over joint angle")

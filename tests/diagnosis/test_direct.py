@@ -8,22 +8,22 @@ import bench
 import numpy as np
 import pytest
 
-from kbs_process.campaign.relief import without_forces
-from kbs_process.diagnosis import direct
-from kbs_process.diagnosis.curves import CurveSuspect, curves, series
-from kbs_process.diagnosis.hypothesis import Hypothesis, Tapped
-from kbs_process.diagnosis.inlets import WRENCH_PORT, Inlet
-from kbs_process.diagnosis.measured import inserted
-from kbs_process.diagnosis.parameters import known_parameters
-from kbs_process.diagnosis.scene import Scene
-from kbs_process.diagnosis.signature import inputs
-from kbs_process.diagnosis.suspects import Candidate, felt_from_the_ground
+from kbs_process.diagnosis.experiments.hypothesis import Hypothesis, Tapped
+from kbs_process.diagnosis.nominal.parameters import known_parameters
+from kbs_process.diagnosis.proposing.curves import CurveSuspect, curves, series
+from kbs_process.diagnosis.proposing.measured import inserted
+from kbs_process.diagnosis.screening import direct
+from kbs_process.diagnosis.screening.inlets import WRENCH_PORT, Inlet
+from kbs_process.diagnosis.screening.scene import Scene
+from kbs_process.diagnosis.screening.signature import inputs
+from kbs_process.diagnosis.screening.suspects import Candidate, felt_from_the_ground
 from kbs_process.plant.attach import attach
 from kbs_process.plant.effect import Port
 from kbs_process.plant.effects import CATALOGUE
 from kbs_process.plant.effects.measured_law import MEASURED, Measured
 from kbs_process.plant.moved import added_loads, grounded, pressed
 from kbs_process.plant.rigid import kinematics, loads
+from kbs_process.reduction.relief import without_forces
 from kbs_process.rig.model import Effort, Rig
 from kbs_process.signals.frames import rotate
 from kbs_process.signals.records import Array, Signal

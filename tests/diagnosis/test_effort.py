@@ -7,9 +7,9 @@ from dataclasses import replace
 import bench
 import pytest
 
-from kbs_process.diagnosis import effort
-from kbs_process.diagnosis.effort import Effort
-from kbs_process.stages.output_error import Scalar
+from kbs_process.diagnosis.selection import effort
+from kbs_process.diagnosis.selection.effort import Effort
+from kbs_process.identification.output_error import Scalar
 
 
 def test_a_pass_is_every_motion_with_every_number_moved(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,10 +8,10 @@ from typing import cast
 import numpy as np
 import pytest
 
-from kbs_process.diagnosis.evenness import evenly, parts
-from kbs_process.diagnosis.experiment import Experiment
-from kbs_process.diagnosis.metric import Metric
-from kbs_process.diagnosis.whiten import Projector, whitener
+from kbs_process.diagnosis.acceptance.evenness import evenly, parts
+from kbs_process.diagnosis.experiments.experiment import Experiment
+from kbs_process.diagnosis.experiments.metric import Metric
+from kbs_process.diagnosis.experiments.whiten import Projector, whitener
 from kbs_process.signals.records import Array
 
 DT, N, CHANNELS = 0.02, 12000, 3  # 240 s: 15 windows

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from diagnosis import bench
-from kbs_process.diagnosis.experiment import Experiment, Recorded, assemble
+from kbs_process.diagnosis.experiments.experiment import Experiment, Recorded, assemble
 from kbs_process.plant.predict import Schedule
 from kbs_process.signals.records import Events, Run, Signal
 

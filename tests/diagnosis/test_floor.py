@@ -9,11 +9,11 @@ import pytest
 from scipy.signal import lfilter
 
 from diagnosis import bench
-from kbs_process.diagnosis import floor
-from kbs_process.diagnosis.experiment import Drive, Experiment, Trial
-from kbs_process.diagnosis.whiten import Projector
+from kbs_process.diagnosis.experiments import floor
+from kbs_process.diagnosis.experiments.experiment import Drive, Experiment, Trial
+from kbs_process.diagnosis.experiments.whiten import Projector
 from kbs_process.signals.records import Array
-from kbs_process.stages.resample import resample
+from kbs_process.stages.align.resample import resample
 
 N = 3000
 CHANNELS = 8

@@ -9,27 +9,27 @@ import bench
 import numpy as np
 import pytest
 
-from kbs_process.diagnosis.experiment import Experiment
-from kbs_process.diagnosis.families import port_word
-from kbs_process.diagnosis.hypothesis import Hypothesis, predict
-from kbs_process.diagnosis.joint import Standing, with_extra
-from kbs_process.diagnosis.leaders import leaders
-from kbs_process.diagnosis.parameters import known_parameters, prior
-from kbs_process.diagnosis.places import points_of
-from kbs_process.diagnosis.ranges import Ranges
-from kbs_process.diagnosis.scene import Scene
-from kbs_process.diagnosis.screen import Bench, Catalogued, screen
-from kbs_process.diagnosis.shapes import bettered
-from kbs_process.diagnosis.suspects import Candidate, candidates
-from kbs_process.diagnosis.tryout import extra_of, identity
-from kbs_process.diagnosis.view import View
+from kbs_process.diagnosis.experiments.experiment import Experiment
+from kbs_process.diagnosis.experiments.hypothesis import Hypothesis, predict
+from kbs_process.diagnosis.nominal.joint import Standing, with_extra
+from kbs_process.diagnosis.nominal.parameters import known_parameters, prior
+from kbs_process.diagnosis.proposing.families import port_word
+from kbs_process.diagnosis.screening.places import points_of
+from kbs_process.diagnosis.screening.ranges import Ranges
+from kbs_process.diagnosis.screening.scene import Scene
+from kbs_process.diagnosis.screening.screen import Bench, Catalogued, screen
+from kbs_process.diagnosis.screening.shapes import bettered
+from kbs_process.diagnosis.screening.suspects import Candidate, candidates
+from kbs_process.diagnosis.screening.view import View
+from kbs_process.diagnosis.selection.leaders import leaders
+from kbs_process.diagnosis.selection.tryout import extra_of, identity
+from kbs_process.identification.output_error import Scalar
 from kbs_process.plant.attach import attach
 from kbs_process.plant.effect import Effect
 from kbs_process.plant.effects import select
 from kbs_process.plant.effects.air_drag import AIR_DRAG
 from kbs_process.plant.effects.bungee import BUNGEE
 from kbs_process.plant.predict import Schedule
-from kbs_process.stages.output_error import Scalar
 
 DRAG, POWER, POINT = 0.8, 1.75, np.array([0.3, -0.1, 0.12])  # N at 0.01 m/s, 1, m
 FREE = (Scalar("body.antenna.cog", (0,)), Scalar("joint.el.drive.Ka"))

@@ -7,8 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from kbs_process.diagnosis import gate
-from kbs_process.diagnosis.gate import Fold, foretold, worsened
+from kbs_process.diagnosis.acceptance import gate
+from kbs_process.diagnosis.acceptance.gate import Fold, foretold, worsened
 
 
 def folds(*gains: float) -> list[Fold]:

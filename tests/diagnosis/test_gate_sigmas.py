@@ -8,9 +8,9 @@ import bench
 import numpy as np
 import pytest
 
-from kbs_process.diagnosis.evenness import evenly, parts
-from kbs_process.diagnosis.gate import _beside, _evenly, _sigmas
-from kbs_process.stages.output_error import Scalar
+from kbs_process.diagnosis.acceptance.evenness import evenly, parts
+from kbs_process.diagnosis.acceptance.gate import _beside, _evenly, _sigmas
+from kbs_process.identification.output_error import Scalar
 
 
 def test_numbers_that_are_held_leave_the_inverse_of_what_is_left_of_the_information() -> None:

@@ -6,8 +6,8 @@ import bench
 import numpy as np
 import pytest
 
-from kbs_process.diagnosis.metric import counted
-from kbs_process.diagnosis.whiten import independent, whitener
+from kbs_process.diagnosis.experiments.metric import counted
+from kbs_process.diagnosis.experiments.whiten import independent, whitener
 
 
 def test_numbers_that_windows_correlate_count_once() -> None:

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from diagnosis import bench
-from kbs_process.diagnosis import floor
-from kbs_process.diagnosis.hypothesis import Hypothesis, predict
-from kbs_process.diagnosis.known import LEARNT, Known, confined, refit
-from kbs_process.diagnosis.parameters import COUPLING, known_parameters, prior, slopes
+from kbs_process.diagnosis.experiments import floor
+from kbs_process.diagnosis.experiments.hypothesis import Hypothesis, predict
+from kbs_process.diagnosis.nominal.known import LEARNT, Known, confined, refit
+from kbs_process.diagnosis.nominal.parameters import COUPLING, known_parameters, prior, slopes
 from kbs_process.rig.model import substitute
 from kbs_process.signals.records import Array
 

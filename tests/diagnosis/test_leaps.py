@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from diagnosis import bench
-from kbs_process.diagnosis import leaps
-from kbs_process.diagnosis.costs import GEARS, Found
-from kbs_process.diagnosis.floor import declared
-from kbs_process.diagnosis.hypothesis import Hypothesis
-from kbs_process.diagnosis.leaps import stride
-from kbs_process.diagnosis.metric import metrics
-from kbs_process.diagnosis.parameters import known_parameters, prior
-from kbs_process.diagnosis.search import Search
+from kbs_process.diagnosis.experiments.floor import declared
+from kbs_process.diagnosis.experiments.hypothesis import Hypothesis
+from kbs_process.diagnosis.experiments.metric import metrics
+from kbs_process.diagnosis.nominal import leaps
+from kbs_process.diagnosis.nominal.costs import GEARS, Found
+from kbs_process.diagnosis.nominal.leaps import stride
+from kbs_process.diagnosis.nominal.parameters import known_parameters, prior
+from kbs_process.diagnosis.nominal.search import Search
 from kbs_process.rig.model import substitute
 from kbs_process.signals.records import Array
 

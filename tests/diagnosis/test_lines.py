@@ -8,12 +8,12 @@ import bench
 import numpy as np
 import pytest
 
-from kbs_process.diagnosis.experiment import Experiment
-from kbs_process.diagnosis.jumps import _gain, _telling, jump
-from kbs_process.diagnosis.proposals import _along, proposed
-from kbs_process.diagnosis.scene import Scene
+from kbs_process.diagnosis.experiments.experiment import Experiment
+from kbs_process.diagnosis.experiments.jumps import _gain, _telling, jump
+from kbs_process.diagnosis.proposing.proposals import _along, proposed
+from kbs_process.diagnosis.screening.scene import Scene
+from kbs_process.identification.output_error import Scalar
 from kbs_process.signals.records import Array
-from kbs_process.stages.output_error import Scalar
 
 
 @pytest.mark.parametrize(

@@ -11,17 +11,19 @@ import bench
 import numpy as np
 import pytest
 
-from kbs_process.diagnosis import leaders, proposals
-from kbs_process.diagnosis.hypothesis import Hypothesis, predict
-from kbs_process.diagnosis.joint import Standing, with_extra
-from kbs_process.diagnosis.plausible import implausible, undone
-from kbs_process.diagnosis.proposals import proposed
-from kbs_process.diagnosis.ranges import Ranges
-from kbs_process.diagnosis.scene import Scene
-from kbs_process.diagnosis.screen import Bench, Catalogued, screen
-from kbs_process.diagnosis.shapes import bettered
-from kbs_process.diagnosis.suspects import Candidate
-from kbs_process.diagnosis.tryout import extra_of
+from kbs_process.diagnosis.acceptance.plausible import implausible, undone
+from kbs_process.diagnosis.experiments.hypothesis import Hypothesis, predict
+from kbs_process.diagnosis.nominal.joint import Standing, with_extra
+from kbs_process.diagnosis.proposing import proposals
+from kbs_process.diagnosis.proposing.proposals import proposed
+from kbs_process.diagnosis.screening.ranges import Ranges
+from kbs_process.diagnosis.screening.scene import Scene
+from kbs_process.diagnosis.screening.screen import Bench, Catalogued, screen
+from kbs_process.diagnosis.screening.shapes import bettered
+from kbs_process.diagnosis.screening.suspects import Candidate
+from kbs_process.diagnosis.selection import leaders
+from kbs_process.diagnosis.selection.tryout import extra_of
+from kbs_process.identification.output_error import Scalar
 from kbs_process.plant.attach import attach
 from kbs_process.plant.effect import Effect
 from kbs_process.plant.effects import select
@@ -29,7 +31,6 @@ from kbs_process.plant.effects.detent import DETENT
 from kbs_process.plant.effects.harness import HARNESS
 from kbs_process.plant.effects.joint_order import JOINT_ORDER
 from kbs_process.plant.effects.local_torque import LOCAL_TORQUE
-from kbs_process.stages.output_error import Scalar
 
 FREE = (Scalar("body.antenna.cog", (0,)), Scalar("joint.el.drive.Ka"))
 TORQUE, ANGLE, WIDTH = 0.6, 1.27941, 1e-3  # N m, rad, rad: a fortieth of the swing

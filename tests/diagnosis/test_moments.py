@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from test_local_law import ANGLE, TORQUE, WIDTH, with_bump
 
-from kbs_process.diagnosis.joint import Own, Standing, bare, with_extra
-from kbs_process.diagnosis.moments import most_of, only_while
-from kbs_process.diagnosis.scene import Scene
-from kbs_process.diagnosis.screen import Bench, Catalogued, screen
-from kbs_process.diagnosis.suspects import Candidate
-from kbs_process.diagnosis.thresholds import MOSTLY
-from kbs_process.diagnosis.tryout import extra_of
+from kbs_process.diagnosis.acceptance.moments import most_of, only_while
+from kbs_process.diagnosis.experiments.thresholds import MOSTLY
+from kbs_process.diagnosis.nominal.joint import Own, Standing, bare, with_extra
+from kbs_process.diagnosis.screening.scene import Scene
+from kbs_process.diagnosis.screening.screen import Bench, Catalogued, screen
+from kbs_process.diagnosis.screening.suspects import Candidate
+from kbs_process.diagnosis.selection.tryout import extra_of
 from kbs_process.plant.effects.local_torque import LOCAL_TORQUE
 from kbs_process.signals.records import Array
 

@@ -9,18 +9,18 @@ import numpy as np
 import pytest
 from test_rounds import ROLES, screened, standing, with_cable
 
-from kbs_process.diagnosis import needed as needing
-from kbs_process.diagnosis.experiment import Experiment
-from kbs_process.diagnosis.finding import Tried
-from kbs_process.diagnosis.floor import declared
-from kbs_process.diagnosis.gate import Gate
-from kbs_process.diagnosis.joint import Own, Standing, with_extra, without
-from kbs_process.diagnosis.known import Known
-from kbs_process.diagnosis.needed import Accepted, in_the_shade, needed
-from kbs_process.diagnosis.outcome import Find
-from kbs_process.diagnosis.race import own_of
-from kbs_process.diagnosis.thresholds import CLEAR, GATE_SIGMA, STAYS_SIGMA
-from kbs_process.diagnosis.tryout import extra_of, identity
+from kbs_process.diagnosis.acceptance import needed as needing
+from kbs_process.diagnosis.acceptance.finding import Tried
+from kbs_process.diagnosis.acceptance.gate import Gate
+from kbs_process.diagnosis.acceptance.needed import Accepted, in_the_shade, needed
+from kbs_process.diagnosis.experiments.experiment import Experiment
+from kbs_process.diagnosis.experiments.floor import declared
+from kbs_process.diagnosis.experiments.thresholds import CLEAR, GATE_SIGMA, STAYS_SIGMA
+from kbs_process.diagnosis.nominal.joint import Own, Standing, with_extra, without
+from kbs_process.diagnosis.nominal.known import Known
+from kbs_process.diagnosis.selection.outcome import Find
+from kbs_process.diagnosis.selection.race import own_of
+from kbs_process.diagnosis.selection.tryout import extra_of, identity
 from kbs_process.plant.effects import CATALOGUE
 
 LAG, CABLE, HARNESS = ("channel_lag", "Tx"), ("ground_cable", "el"), ("harness", "el")

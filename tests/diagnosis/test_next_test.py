@@ -10,15 +10,15 @@ import bench
 import numpy as np
 import pytest
 
-from kbs_process.campaign.commands import read_commands
-from kbs_process.campaign.next_test import commands_of, next_test
-from kbs_process.diagnosis.floor import declared
-from kbs_process.diagnosis.gate import Gate
-from kbs_process.diagnosis.joint import Standing
-from kbs_process.diagnosis.next_test import Proposal, propose
-from kbs_process.diagnosis.outcome import Alternative, Estimate, Find, Identity
-from kbs_process.diagnosis.trajectories import family, limits_of
-from kbs_process.stages.output_error import Scalar
+from kbs_process.diagnosis.acceptance.gate import Gate
+from kbs_process.diagnosis.experiments.floor import declared
+from kbs_process.diagnosis.experiments.trajectories import family, limits_of
+from kbs_process.diagnosis.nominal.joint import Standing
+from kbs_process.diagnosis.selection.next_test import Proposal, propose
+from kbs_process.diagnosis.selection.outcome import Alternative, Estimate, Find, Identity
+from kbs_process.identification.output_error import Scalar
+from kbs_process.reduction.commands import read_commands
+from kbs_process.studies.diagnose.next_test import commands_of, next_test
 
 FREE = (Scalar("joint.el.drive.Ka"), Scalar("joint.el.drive.b_m"))
 VISCOUS = Identity("joint torque", "el", (), "viscous", "joint_viscous")

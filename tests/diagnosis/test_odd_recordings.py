@@ -10,32 +10,38 @@ import numpy as np
 import pytest
 from test_experiment import N, made, recording
 
-from kbs_process.campaign import stretch
 from kbs_process.campaign.config import Campaign, RecordingEntry
-from kbs_process.campaign.diagnosable import LEAST_S, check_copies, check_length, check_noise, check_signs
-from kbs_process.campaign.diagnosis_warnings import passed_over
-from kbs_process.campaign.held import Alive
 from kbs_process.campaign.load import load_campaign
-from kbs_process.campaign.progress import SilentProgress
-from kbs_process.campaign.reading import read_run
-from kbs_process.campaign.stretch import LONGEST_S, busiest, read_stretch
-from kbs_process.diagnosis import floor
-from kbs_process.diagnosis.experiment import Experiment, Recorded
-from kbs_process.diagnosis.gate import gate
-from kbs_process.diagnosis.gls import Background, Sums, score
-from kbs_process.diagnosis.localise import cells_and_ports
-from kbs_process.diagnosis.plausible import implausible
-from kbs_process.diagnosis.scene import Scene
+from kbs_process.diagnosis.acceptance.gate import gate
+from kbs_process.diagnosis.acceptance.plausible import implausible
+from kbs_process.diagnosis.experiments import floor
+from kbs_process.diagnosis.experiments.experiment import Experiment, Recorded
+from kbs_process.diagnosis.screening.gls import Background, Sums, score
+from kbs_process.diagnosis.screening.localise import cells_and_ports
+from kbs_process.diagnosis.screening.scene import Scene
 from kbs_process.errors import ConfigError, RecordingError
-from kbs_process.ingest.encoding import OutStream
-from kbs_process.ingest.writer import write_mcap
+from kbs_process.identification.output_error import Scalar
 from kbs_process.plant.effects import CATALOGUE
 from kbs_process.plant.rigid import loads
 from kbs_process.plant.sensing import SENSING
+from kbs_process.progress import SilentProgress
+from kbs_process.recordings.mcap.messages.encoding import OutStream
+from kbs_process.recordings.mcap.writer import write_mcap
+from kbs_process.reduction.held import Alive
+from kbs_process.reduction.reading import read_run
 from kbs_process.rig.model import Rig
 from kbs_process.signals.records import Array, Block, Events, Loss, Mask, Run
 from kbs_process.stages.motion import Motion
-from kbs_process.stages.output_error import Scalar
+from kbs_process.studies.diagnose import stretch
+from kbs_process.studies.diagnose.diagnosable import (
+    LEAST_S,
+    check_copies,
+    check_length,
+    check_noise,
+    check_signs,
+)
+from kbs_process.studies.diagnose.stretch import LONGEST_S, busiest, read_stretch
+from kbs_process.studies.diagnose.warnings import passed_over
 
 RIG = bench.rig()
 ENTRY = RecordingEntry("a", Path("recordings/a.mcap"), "SWING", "fit", 1, None, None, None)

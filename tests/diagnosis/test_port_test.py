@@ -5,7 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kbs_process.diagnosis.ports import Cells, PortModel, benjamini_yekutieli, fisher, port_test, sine_window
+from kbs_process.diagnosis.screening.ports import (
+    Cells,
+    PortModel,
+    benjamini_yekutieli,
+    fisher,
+    port_test,
+    sine_window,
+)
 
 C, D, CELLS, NU = 6, 1, 20, 24
 

@@ -9,22 +9,28 @@ import numpy as np
 import pytest
 from test_rounds import ROLES, standing, with_cable
 
-from kbs_process.diagnosis import believed as believing
-from kbs_process.diagnosis import leaders as leading
-from kbs_process.diagnosis import race
-from kbs_process.diagnosis.believed import contested, continued, inherited, named_first, named_there
-from kbs_process.diagnosis.effort import Effort
-from kbs_process.diagnosis.finding import Tried
-from kbs_process.diagnosis.floor import declared
-from kbs_process.diagnosis.gate import Gate
-from kbs_process.diagnosis.hypothesis import Simulate
-from kbs_process.diagnosis.joint import Own, Standing, with_extra
-from kbs_process.diagnosis.leaders import gated, leaders, tried, various
-from kbs_process.diagnosis.race import Runner, raced
-from kbs_process.diagnosis.screen import Found
-from kbs_process.diagnosis.thresholds import FIRST, MOSTLY_DONE, TOLERATED, WAYS
-from kbs_process.diagnosis.tryout import extra_of, identity
-from kbs_process.diagnosis.view import View
+from kbs_process.diagnosis.acceptance.finding import Tried
+from kbs_process.diagnosis.acceptance.gate import Gate
+from kbs_process.diagnosis.experiments.floor import declared
+from kbs_process.diagnosis.experiments.hypothesis import Simulate
+from kbs_process.diagnosis.experiments.thresholds import FIRST, MOSTLY_DONE, TOLERATED, WAYS
+from kbs_process.diagnosis.nominal.joint import Own, Standing, with_extra
+from kbs_process.diagnosis.screening.screen import Found
+from kbs_process.diagnosis.screening.view import View
+from kbs_process.diagnosis.selection import believed as believing
+from kbs_process.diagnosis.selection import leaders as leading
+from kbs_process.diagnosis.selection import race
+from kbs_process.diagnosis.selection.believed import (
+    contested,
+    continued,
+    inherited,
+    named_first,
+    named_there,
+)
+from kbs_process.diagnosis.selection.effort import Effort
+from kbs_process.diagnosis.selection.leaders import gated, leaders, tried, various
+from kbs_process.diagnosis.selection.race import Runner, raced
+from kbs_process.diagnosis.selection.tryout import extra_of, identity
 
 RIGHT, WRONG, CURVE = ("ground_cable", "el"), ("harness", "el"), ("ground_angle_law", "el")
 KIN = ("tether", "el")  # of the right one's family and place

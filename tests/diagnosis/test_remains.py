@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from test_rounds import ROLES, screened, standing, with_cable
 
-from kbs_process.diagnosis import rounds
-from kbs_process.diagnosis.experiment import Experiment
-from kbs_process.diagnosis.floor import declared
-from kbs_process.diagnosis.joint import Standing, with_extra
-from kbs_process.diagnosis.remains import detected, missed, promises_little, taken, too_little
-from kbs_process.diagnosis.thresholds import LEAST_RHO, TAKEN, TOLERATED
-from kbs_process.diagnosis.tryout import extra_of
-from kbs_process.diagnosis.view import View
+from kbs_process.diagnosis.acceptance.remains import detected, missed, promises_little, taken, too_little
+from kbs_process.diagnosis.experiments.experiment import Experiment
+from kbs_process.diagnosis.experiments.floor import declared
+from kbs_process.diagnosis.experiments.thresholds import LEAST_RHO, TAKEN, TOLERATED
+from kbs_process.diagnosis.nominal.joint import Standing, with_extra
+from kbs_process.diagnosis.screening.view import View
+from kbs_process.diagnosis.selection import rounds
+from kbs_process.diagnosis.selection.tryout import extra_of
 
 
 @pytest.fixture(scope="module")

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from diagnosis import bench
-from kbs_process.diagnosis.experiment import Experiment
-from kbs_process.diagnosis.floor import declared
-from kbs_process.diagnosis.hypothesis import Hypothesis, predict
-from kbs_process.diagnosis.metric import metrics
-from kbs_process.diagnosis.ringing import decays
+from kbs_process.diagnosis.experiments.experiment import Experiment
+from kbs_process.diagnosis.experiments.floor import declared
+from kbs_process.diagnosis.experiments.hypothesis import Hypothesis, predict
+from kbs_process.diagnosis.experiments.metric import metrics
+from kbs_process.diagnosis.experiments.ringing import decays
 from kbs_process.plant.effects import select
-from kbs_process.plant.modes import modes
+from kbs_process.plant.linear.modes import modes
 from kbs_process.rig.model import substitute
 from kbs_process.signals.records import Array
 

@@ -10,36 +10,36 @@ import bench
 import numpy as np
 import pytest
 
-from kbs_process.diagnosis import believed, effort, rounds
-from kbs_process.diagnosis import gate as gate_of
-from kbs_process.diagnosis import supposed as supposed_laws
-from kbs_process.diagnosis.as_suspect import sigma_of, suspect_of
-from kbs_process.diagnosis.effort import Effort
-from kbs_process.diagnosis.experiment import Experiment
-from kbs_process.diagnosis.finding import Tried, as_it_stands, find_of
-from kbs_process.diagnosis.floor import declared
-from kbs_process.diagnosis.gate import Gate, gate
-from kbs_process.diagnosis.gls import Sums, score
-from kbs_process.diagnosis.hypothesis import Hypothesis, Simulate, predict
-from kbs_process.diagnosis.joint import Own, Standing, with_extra
-from kbs_process.diagnosis.leaders import gated
-from kbs_process.diagnosis.needed import Accepted
-from kbs_process.diagnosis.outcome import Identity
-from kbs_process.diagnosis.race import own_of
-from kbs_process.diagnosis.remains import detected
-from kbs_process.diagnosis.rivals import probabilities, rivalry
-from kbs_process.diagnosis.scatter import scattered
-from kbs_process.diagnosis.scene import Scene
-from kbs_process.diagnosis.screen import Bench, Catalogued, Found, Screening, screen
-from kbs_process.diagnosis.supposed import Noted
-from kbs_process.diagnosis.suspects import Candidate
-from kbs_process.diagnosis.thresholds import told_apart
-from kbs_process.diagnosis.tryout import extra_of, identity
+from kbs_process.diagnosis.acceptance import gate as gate_of
+from kbs_process.diagnosis.acceptance import supposed as supposed_laws
+from kbs_process.diagnosis.acceptance.finding import Tried, as_it_stands, find_of
+from kbs_process.diagnosis.acceptance.gate import Gate, gate
+from kbs_process.diagnosis.acceptance.needed import Accepted
+from kbs_process.diagnosis.acceptance.remains import detected
+from kbs_process.diagnosis.acceptance.rivals import probabilities, rivalry
+from kbs_process.diagnosis.acceptance.supposed import Noted
+from kbs_process.diagnosis.experiments.experiment import Experiment
+from kbs_process.diagnosis.experiments.floor import declared
+from kbs_process.diagnosis.experiments.hypothesis import Hypothesis, Simulate, predict
+from kbs_process.diagnosis.experiments.thresholds import told_apart
+from kbs_process.diagnosis.nominal.joint import Own, Standing, with_extra
+from kbs_process.diagnosis.nominal.scatter import scattered
+from kbs_process.diagnosis.proposing.as_suspect import sigma_of, suspect_of
+from kbs_process.diagnosis.screening.gls import Sums, score
+from kbs_process.diagnosis.screening.scene import Scene
+from kbs_process.diagnosis.screening.screen import Bench, Catalogued, Found, Screening, screen
+from kbs_process.diagnosis.screening.suspects import Candidate
+from kbs_process.diagnosis.selection import believed, effort, rounds
+from kbs_process.diagnosis.selection.effort import Effort
+from kbs_process.diagnosis.selection.leaders import gated
+from kbs_process.diagnosis.selection.outcome import Identity
+from kbs_process.diagnosis.selection.race import own_of
+from kbs_process.diagnosis.selection.tryout import extra_of, identity
+from kbs_process.identification.output_error import Scalar
 from kbs_process.plant.attach import attach
 from kbs_process.plant.effects import CATALOGUE, select
 from kbs_process.plant.sensing import SENSING
 from kbs_process.signals.records import Array
-from kbs_process.stages.output_error import Scalar
 
 FREE = (
     Scalar("body.antenna.cog", (0,)),

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from test_rounds import FREE
 
-from kbs_process.diagnosis.known import Known
-from kbs_process.diagnosis.scatter import ENDED, scattered
+from kbs_process.diagnosis.nominal.known import Known
+from kbs_process.diagnosis.nominal.scatter import ENDED, scattered
+from kbs_process.identification.output_error import Scalar
 from kbs_process.signals.records import Array
-from kbs_process.stages.output_error import Scalar
 
 DAMPING = FREE.index(Scalar("joint.el.drive.b_m"))
 

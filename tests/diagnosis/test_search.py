@@ -8,18 +8,18 @@ import numpy as np
 import pytest
 
 from diagnosis import bench
-from kbs_process.diagnosis.costs import GEARS, Found
-from kbs_process.diagnosis.detection import Detection
-from kbs_process.diagnosis.experiment import Experiment
-from kbs_process.diagnosis.floor import declared
-from kbs_process.diagnosis.ground import Ground
-from kbs_process.diagnosis.hypothesis import Hypothesis
-from kbs_process.diagnosis.known import refit
-from kbs_process.diagnosis.metric import metrics
-from kbs_process.diagnosis.parameters import known_parameters, prior
-from kbs_process.diagnosis.search import Search
-from kbs_process.diagnosis.tangents import Step
-from kbs_process.diagnosis.thresholds import DETECTED, TOLERATED
+from kbs_process.diagnosis.experiments.detection import Detection
+from kbs_process.diagnosis.experiments.experiment import Experiment
+from kbs_process.diagnosis.experiments.floor import declared
+from kbs_process.diagnosis.experiments.hypothesis import Hypothesis
+from kbs_process.diagnosis.experiments.metric import metrics
+from kbs_process.diagnosis.experiments.thresholds import DETECTED, TOLERATED
+from kbs_process.diagnosis.nominal.costs import GEARS, Found
+from kbs_process.diagnosis.nominal.ground import Ground
+from kbs_process.diagnosis.nominal.known import refit
+from kbs_process.diagnosis.nominal.parameters import known_parameters, prior
+from kbs_process.diagnosis.nominal.search import Search
+from kbs_process.diagnosis.nominal.tangents import Step
 from kbs_process.rig.model import substitute
 
 

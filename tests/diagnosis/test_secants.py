@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from kbs_process.diagnosis.secants import along_valleys
+from kbs_process.diagnosis.nominal.secants import along_valleys
 from kbs_process.estimation.fit import Parameters
+from kbs_process.identification.polar import Polar
 from kbs_process.signals.records import Array
-from kbs_process.stages.polar import Polar
 
 FAR = np.array([1.0, 1.0, 0.0]) / np.sqrt(2.0)  # along it the first two numbers make up for each other
 

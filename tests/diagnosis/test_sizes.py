@@ -9,18 +9,18 @@ import numpy as np
 import pytest
 from test_rounds import ROLES, standing
 
-from kbs_process.diagnosis import race, rounds
-from kbs_process.diagnosis.effort import Effort
-from kbs_process.diagnosis.experiment import Experiment
-from kbs_process.diagnosis.floor import declared
-from kbs_process.diagnosis.hypothesis import Hypothesis, Prediction, predict
-from kbs_process.diagnosis.joint import standing_of
-from kbs_process.diagnosis.known import Known, refit
-from kbs_process.diagnosis.leaders import leaders
-from kbs_process.diagnosis.screen import Catalogued, Found
-from kbs_process.diagnosis.sizes import in_the_way, of_mounting, sized
-from kbs_process.diagnosis.thresholds import HIDDEN
-from kbs_process.diagnosis.view import View
+from kbs_process.diagnosis.experiments.experiment import Experiment
+from kbs_process.diagnosis.experiments.floor import declared
+from kbs_process.diagnosis.experiments.hypothesis import Hypothesis, Prediction, predict
+from kbs_process.diagnosis.experiments.thresholds import HIDDEN
+from kbs_process.diagnosis.nominal.joint import standing_of
+from kbs_process.diagnosis.nominal.known import Known, refit
+from kbs_process.diagnosis.proposing.sizes import in_the_way, of_mounting, sized
+from kbs_process.diagnosis.screening.screen import Catalogued, Found
+from kbs_process.diagnosis.screening.view import View
+from kbs_process.diagnosis.selection import race, rounds
+from kbs_process.diagnosis.selection.effort import Effort
+from kbs_process.diagnosis.selection.leaders import leaders
 from kbs_process.plant.attach import attach
 from kbs_process.plant.effects import find
 from kbs_process.rig.model import TRANSDUCER

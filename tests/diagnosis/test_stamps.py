@@ -9,19 +9,20 @@ import numpy as np
 import pytest
 from test_rounds import candidate, standing
 
-from kbs_process.diagnosis import each_recording, mistimed, rounds
-from kbs_process.diagnosis.clocks import timed
-from kbs_process.diagnosis.each_recording import jump_gain, taken_off, taken_off_again
-from kbs_process.diagnosis.effort import Effort
-from kbs_process.diagnosis.experiment import Experiment
-from kbs_process.diagnosis.finding import find_of
-from kbs_process.diagnosis.floor import declared
-from kbs_process.diagnosis.joint import Standing
-from kbs_process.diagnosis.jumps import jump
-from kbs_process.diagnosis.scene import Scene
-from kbs_process.diagnosis.screen import Bench, Catalogued, screen
-from kbs_process.diagnosis.stamps import late_by, set_right, slope
-from kbs_process.diagnosis.view import View
+from kbs_process.diagnosis.acceptance.finding import find_of
+from kbs_process.diagnosis.experiments.experiment import Experiment
+from kbs_process.diagnosis.experiments.floor import declared
+from kbs_process.diagnosis.experiments.jumps import jump
+from kbs_process.diagnosis.experiments.stamps import late_by, set_right, slope
+from kbs_process.diagnosis.nominal import mistimed
+from kbs_process.diagnosis.nominal.joint import Standing
+from kbs_process.diagnosis.proposing.clocks import timed
+from kbs_process.diagnosis.screening.scene import Scene
+from kbs_process.diagnosis.screening.screen import Bench, Catalogued, screen
+from kbs_process.diagnosis.screening.view import View
+from kbs_process.diagnosis.selection import each_recording, rounds
+from kbs_process.diagnosis.selection.each_recording import jump_gain, taken_off, taken_off_again
+from kbs_process.diagnosis.selection.effort import Effort
 from kbs_process.signals.records import Array
 
 DT = 0.05

@@ -11,16 +11,16 @@ import numpy as np
 import pytest
 from test_rounds import ROLES, passed, screened, standing, with_cable
 
-from kbs_process.diagnosis import rounds
-from kbs_process.diagnosis.effort import Effort
-from kbs_process.diagnosis.experiment import Experiment
-from kbs_process.diagnosis.finding import Tried
-from kbs_process.diagnosis.floor import declared
-from kbs_process.diagnosis.joint import Own, Standing
-from kbs_process.diagnosis.known import Known
-from kbs_process.diagnosis.needed import Accepted
-from kbs_process.diagnosis.supposed import Noted, enough, supposed, wanting
-from kbs_process.diagnosis.thresholds import MOSTLY_DONE, PROMISED, TAKEN, WAYS
+from kbs_process.diagnosis.acceptance.finding import Tried
+from kbs_process.diagnosis.acceptance.needed import Accepted
+from kbs_process.diagnosis.acceptance.supposed import Noted, enough, supposed, wanting
+from kbs_process.diagnosis.experiments.experiment import Experiment
+from kbs_process.diagnosis.experiments.floor import declared
+from kbs_process.diagnosis.experiments.thresholds import MOSTLY_DONE, PROMISED, TAKEN, WAYS
+from kbs_process.diagnosis.nominal.joint import Own, Standing
+from kbs_process.diagnosis.nominal.known import Known
+from kbs_process.diagnosis.selection import rounds
+from kbs_process.diagnosis.selection.effort import Effort
 
 
 def leaving(known: Known, share: float) -> Known:

@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 from kbs_process.campaign.load import load_campaign
-from kbs_process.diagnosis.families import FAMILIES, PORTS, family, port_word
-from kbs_process.diagnosis.hypothesis import Tapped
-from kbs_process.diagnosis.inlets import Inlet
-from kbs_process.diagnosis.places import half_lengths, point_of
-from kbs_process.diagnosis.ranges import Ranges, ranges_of
-from kbs_process.diagnosis.signature import inputs, port_inputs, reduced, sensed
-from kbs_process.diagnosis.suspects import Candidate, candidates
-from kbs_process.diagnosis.transfer import follow, respond
+from kbs_process.diagnosis.experiments.hypothesis import Tapped
+from kbs_process.diagnosis.proposing.families import FAMILIES, PORTS, family, port_word
+from kbs_process.diagnosis.screening.inlets import Inlet
+from kbs_process.diagnosis.screening.places import half_lengths, point_of
+from kbs_process.diagnosis.screening.ranges import Ranges, ranges_of
+from kbs_process.diagnosis.screening.signature import inputs, port_inputs, reduced, sensed
+from kbs_process.diagnosis.screening.suspects import Candidate, candidates
+from kbs_process.diagnosis.screening.transfer import follow, respond
 from kbs_process.plant.attach import attach
 from kbs_process.plant.effect import Effect
 from kbs_process.plant.effects import CATALOGUE, select
@@ -26,7 +26,7 @@ from kbs_process.plant.predict import Schedule, predict, tap_columns
 from kbs_process.plant.sensing import SENSING
 from kbs_process.rig.model import Rig
 from kbs_process.signals.records import Array
-from kbs_process.stages.resample import resample
+from kbs_process.stages.align.resample import resample
 
 CHANNELS = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz", "az", "el")
 NOMINAL = tuple(effect.name for effect in CATALOGUE[:6])

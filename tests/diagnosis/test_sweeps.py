@@ -8,11 +8,11 @@ import bench
 import numpy as np
 import pytest
 
-from kbs_process.diagnosis.proposals import proposed
-from kbs_process.diagnosis.scene import Scene
-from kbs_process.diagnosis.sweeps import sweeping
+from kbs_process.diagnosis.proposing.proposals import proposed
+from kbs_process.diagnosis.proposing.sweeps import sweeping
+from kbs_process.diagnosis.screening.scene import Scene
+from kbs_process.identification.output_error import Scalar
 from kbs_process.signals.records import Array
-from kbs_process.stages.output_error import Scalar
 
 FREE = (Scalar("joint.el.drive.Ka"),)
 DT, HIGHEST = 0.1, 4.0

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from test_rounds import candidate, standing
 
-from kbs_process.diagnosis.finding import Tried
-from kbs_process.diagnosis.floor import declared
-from kbs_process.diagnosis.joint import with_extra
-from kbs_process.diagnosis.leaders import gated, reread
-from kbs_process.diagnosis.race import own_of
-from kbs_process.diagnosis.scene import Scene
-from kbs_process.diagnosis.screen import Bench, Catalogued, screen
-from kbs_process.diagnosis.tryout import extra_of
+from kbs_process.diagnosis.acceptance.finding import Tried
+from kbs_process.diagnosis.experiments.floor import declared
+from kbs_process.diagnosis.nominal.joint import with_extra
+from kbs_process.diagnosis.screening.scene import Scene
+from kbs_process.diagnosis.screening.screen import Bench, Catalogued, screen
+from kbs_process.diagnosis.selection.leaders import gated, reread
+from kbs_process.diagnosis.selection.race import own_of
+from kbs_process.diagnosis.selection.tryout import extra_of
 
 
 def test_a_step_told_at_the_wrong_load_is_found_where_it_is() -> None:

@@ -9,17 +9,17 @@ import bench
 import numpy as np
 import pytest
 
-from kbs_process.diagnosis.hypothesis import Hypothesis, predict
-from kbs_process.diagnosis.inlets import Inlet
-from kbs_process.diagnosis.places import points_of
-from kbs_process.diagnosis.scene import Scene, rebinned
-from kbs_process.diagnosis.signature import inputs
-from kbs_process.diagnosis.suspects import Candidate
-from kbs_process.diagnosis.transfer import amplified, respond
+from kbs_process.diagnosis.experiments.hypothesis import Hypothesis, predict
+from kbs_process.diagnosis.screening.inlets import Inlet
+from kbs_process.diagnosis.screening.places import points_of
+from kbs_process.diagnosis.screening.scene import Scene, rebinned
+from kbs_process.diagnosis.screening.signature import inputs
+from kbs_process.diagnosis.screening.suspects import Candidate
+from kbs_process.diagnosis.screening.transfer import amplified, respond
 from kbs_process.plant.attach import attach
 from kbs_process.plant.effect import SIGNALS, Effect, Port
 from kbs_process.plant.effects import CATALOGUE, select
-from kbs_process.plant.linear import drive_damping
+from kbs_process.plant.linear.linearise import drive_damping
 from kbs_process.rig.model import Amplifier, Drive, Quantity, Rig, substitute
 from kbs_process.signals.records import WRENCH_CHANNELS, Array
 

@@ -10,11 +10,11 @@ import pytest
 
 from kbs_process.campaign.config import Requirement
 from kbs_process.campaign.load import load_campaign
-from kbs_process.campaign.unexplained import unexplained
-from kbs_process.diagnosis.experiment import Experiment
-from kbs_process.diagnosis.joint import Standing
+from kbs_process.diagnosis.experiments.experiment import Experiment
+from kbs_process.diagnosis.nominal.joint import Standing
+from kbs_process.identification.output_error import Scalar
 from kbs_process.signals.records import Array
-from kbs_process.stages.output_error import Scalar
+from kbs_process.studies.diagnose.unexplained import unexplained
 
 SECONDS = 120.0
 FREE = (Scalar("joint.el.drive.b_m", ()),)

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from kbs_process.diagnosis import search as module
-from kbs_process.diagnosis.costs import Found
-from kbs_process.diagnosis.ground import Ground
-from kbs_process.diagnosis.search import Search
+from kbs_process.diagnosis.nominal import search as module
+from kbs_process.diagnosis.nominal.costs import Found
+from kbs_process.diagnosis.nominal.ground import Ground
+from kbs_process.diagnosis.nominal.search import Search
 from kbs_process.estimation.fit import Parameters
+from kbs_process.identification.polar import Polar
 from kbs_process.signals.records import Array
-from kbs_process.stages.polar import Polar
 
 STEEP, LONG = 1e5, 1e2
 

@@ -84,9 +84,9 @@ def process_apart(
 
 def main() -> None:
     """Process one campaign without its page."""
-    from kbs_process.campaign import run
     from kbs_process.campaign.load import load_campaign
-    from kbs_process.campaign.progress import SilentProgress
+    from kbs_process.progress import SilentProgress
+    from kbs_process.studies.correlate import run
 
     target, name = Path(sys.argv[1]), sys.argv[2]
     with patch.object(run.build, "build", lambda folder, _: folder / "index.html"):

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from campaign.campaign_folder import CampaignFolder, make_folder
-from kbs_process.ingest.encoding import OutStream
-from kbs_process.ingest.writer import write_mcap
+from kbs_process.recordings.mcap.messages.encoding import OutStream
+from kbs_process.recordings.mcap.writer import write_mcap
 
 JOINTS = ("az", "el")
 

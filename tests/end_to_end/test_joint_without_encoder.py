@@ -13,23 +13,25 @@ import pytest
 
 from campaign.campaign_folder import CampaignFolder
 from end_to_end.short_campaign import record
-from kbs_process.campaign.diagnose import experiment_of
-from kbs_process.campaign.identify import identify
 from kbs_process.campaign.load import load_campaign
-from kbs_process.campaign.predicting import schedule_of
-from kbs_process.campaign.progress import SilentProgress
-from kbs_process.campaign.reading import read_run
-from kbs_process.campaign.run import build, process
-from kbs_process.campaign.settings import motion_settings
-from kbs_process.diagnosis import floor, phasing
-from kbs_process.diagnosis.hypothesis import Hypothesis, predict
+from kbs_process.diagnosis.experiments import floor
+from kbs_process.diagnosis.experiments.hypothesis import Hypothesis, predict
+from kbs_process.diagnosis.nominal import phasing
 from kbs_process.errors import ConfigError, RecordingError
+from kbs_process.identification.estimate import Settings
+from kbs_process.identification.screening import _pose
 from kbs_process.plant.effects import select
-from kbs_process.plant.modes import modes
+from kbs_process.plant.linear.modes import modes
+from kbs_process.progress import SilentProgress
+from kbs_process.reduction.predicting import schedule_of
+from kbs_process.reduction.reading import read_run
+from kbs_process.reduction.settings import motion_settings
 from kbs_process.signals.records import Events, Signal
-from kbs_process.stages.identification import Settings
 from kbs_process.stages.motion import estimate
-from kbs_process.stages.screening import _pose
+from kbs_process.studies.correlate import run
+from kbs_process.studies.correlate.run import process
+from kbs_process.studies.diagnose.run import experiment_of
+from kbs_process.studies.identify.run import identify
 
 TOPIC = 'encoder = "/encoder"'
 READ = 'encoder = { topic = "/encoder", joints = ["el"] }'
@@ -47,7 +49,7 @@ def folder(folder: CampaignFolder) -> CampaignFolder:
 def test_it_is_where_its_command_is_and_the_budget_says_how_well(
     folder: CampaignFolder, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(build, "build", lambda target, _: target / "index.html")
+    monkeypatch.setattr(run, "build", lambda target, document, pdf: target / "index.html")
     campaign = load_campaign(folder.path, checksums=False)
     assert campaign.topics.angle is not None
     assert (campaign.topics.angle.channels, campaign.topics.angle.fields) == (("el",), ("position[el]",))

@@ -11,10 +11,11 @@ import pytest
 
 from end_to_end.short_campaign import JOINTS, short_campaign
 from kbs_process.campaign.load import load_campaign
-from kbs_process.campaign.progress import SilentProgress
-from kbs_process.campaign.run import build, process
-from kbs_process.ingest.encoding import OutStream
-from kbs_process.ingest.writer import write_mcap
+from kbs_process.progress import SilentProgress
+from kbs_process.recordings.mcap.messages.encoding import OutStream
+from kbs_process.recordings.mcap.writer import write_mcap
+from kbs_process.studies.correlate import run
+from kbs_process.studies.correlate.run import process
 
 STOPPED = 12.0  # s, of twenty
 
@@ -36,7 +37,7 @@ def test_a_disturbance_is_not_judged_where_the_angles_are_missing(
             OutStream("/command", "joints", stamp[::10], stamp[::10], command, JOINTS),
         ],
     )
-    monkeypatch.setattr(build, "build", lambda target, _: target / "index.html")
+    monkeypatch.setattr(run, "build", lambda target, document, pdf: target / "index.html")
     out = tmp_path / "out"
     process(load_campaign(folder.path, checksums=False), out, progress=SilentProgress(), pdf=False)
 

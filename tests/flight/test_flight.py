@@ -8,12 +8,12 @@ import pyarrow.parquet as pq
 import pytest
 from click.testing import CliRunner
 
-from kbs_process.campaign.flight import Job, fly, in_orbit
 from kbs_process.campaign.load import load_campaign
-from kbs_process.campaign.parallel import ordered_map
 from kbs_process.cli import cli
 from kbs_process.errors import ConfigError
+from kbs_process.results.parallel import ordered_map
 from kbs_process.rig.model import substitute
+from kbs_process.studies.flight.run import Job, fly, in_orbit
 
 ROOT = Path(__file__).parents[2]
 SLEW = "t,az,el\n" + "\n".join(
@@ -63,10 +63,10 @@ def test_the_number_of_processes_changes_nothing():
 
 def test_a_slow_slew_in_orbit_costs_what_the_inertia_does():
     """T_y = -I d2(elevation)/dt2 at T, to which friction adds nothing: it is internal."""
-    from kbs_process.campaign.analysis import bands_of
     from kbs_process.campaign.config import Requirement
-    from kbs_process.campaign.flight import Judged
     from kbs_process.plant.predict import Schedule
+    from kbs_process.reduction.analysis import bands_of
+    from kbs_process.studies.flight.run import Judged
 
     campaign = load_campaign(ROOT / "campaigns" / "EL089", checksums=False, flight=True)
     balanced = {"body.antenna.cog": np.zeros(3), "body.antenna.inertia": np.array([0.7, 0.9, 0.8, 0, 0, 0])}

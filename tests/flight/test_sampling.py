@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from scipy.stats import kstest, norm
 
-from kbs_process.campaign.flight import in_orbit
 from kbs_process.campaign.load import load_campaign
 from kbs_process.plant.effects import select
 from kbs_process.plant.sampling import draw, uncertain, values
 from kbs_process.rig.model import substitute
-from kbs_process.stages.propagation import by_chance, importance, probability, upper_bound
+from kbs_process.studies.flight.propagation import by_chance, importance, probability, upper_bound
+from kbs_process.studies.flight.run import in_orbit
 
 EL089 = Path(__file__).parents[2] / "campaigns" / "EL089"
 

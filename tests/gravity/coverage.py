@@ -22,8 +22,10 @@ from scipy.stats import beta
 
 from gravity.drawn import CALIBRATION, Drawn, DrawnCampaign, truth_of
 from kbs_process.signals.records import WRENCH_CHANNELS, Array, Signal
-from kbs_process.stages import bandpass, budget, gravity, gravity_error, motion
+from kbs_process.stages import bandpass, budget, motion
 from kbs_process.stages.bandpass import Band
+from kbs_process.stages.gravity import error as gravity_error
+from kbs_process.stages.gravity import model as gravity
 
 KINDS = (
     ("EL089", "EL089P00"),

@@ -26,7 +26,7 @@ from kbs_process.campaign.load import load_campaign
 from kbs_process.rig.model import Rig
 from kbs_process.signals.records import Block, Run
 from kbs_process.stages import decouple
-from kbs_process.stages.condense import CondenseSettings, condense
+from kbs_process.stages.align.condense import CondenseSettings, condense
 
 CALIBRATION = "AZPS_ATA"
 FINE_S = 5e-3  # a tenth of the amplifier's fastest period

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from synthetic import FINE, record
 
-from kbs_process.stages import gravity, motion
-from kbs_process.stages.gravity_angles import rounding_scores
-from kbs_process.stages.gravity_equation import Equation
+from kbs_process.stages import motion
+from kbs_process.stages.gravity import model as gravity
+from kbs_process.stages.gravity.angles import rounding_scores
+from kbs_process.stages.gravity.equation import Equation
 from rigid.rigs import pointing_rig
 
 

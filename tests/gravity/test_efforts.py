@@ -10,8 +10,9 @@ import pytest
 from kbs_process.plant.rigid import loads
 from kbs_process.rig.model import Effort, Rig, no_transducer, substitute
 from kbs_process.signals.records import Run, Signal
-from kbs_process.stages import gravity, motion
-from kbs_process.stages.gravity import GravitySettings, Sample
+from kbs_process.stages import motion
+from kbs_process.stages.gravity import model as gravity
+from kbs_process.stages.gravity.model import GravitySettings, Sample
 from kbs_process.stages.motion import MotionSettings
 from rigid.rigs import body, joint, quantity, smooth_motion
 

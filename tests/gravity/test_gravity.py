@@ -10,8 +10,9 @@ from kbs_process.errors import FitError
 from kbs_process.plant.rigid import static_wrench
 from kbs_process.rig.model import substitute
 from kbs_process.signals.smoothing import smooth
-from kbs_process.stages import gravity, motion
-from kbs_process.stages.gravity_quality import feasibility
+from kbs_process.stages import motion
+from kbs_process.stages.gravity import model as gravity
+from kbs_process.stages.gravity.quality import feasibility
 from rigid.rigs import pointing_rig, smooth_motion, wheel_rig
 
 

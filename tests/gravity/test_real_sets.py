@@ -22,7 +22,8 @@ from real_sets import (
 )
 
 from kbs_process.signals.grid import crop
-from kbs_process.stages import gravity, motion
+from kbs_process.stages import motion
+from kbs_process.stages.gravity import model as gravity
 
 pytestmark = pytest.mark.skipif(not DATA.is_dir(), reason="real recordings (../shared/data) are not here")
 

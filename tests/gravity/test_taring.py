@@ -7,9 +7,11 @@ import pytest
 from synthetic import FINE, RATE, perturbed, record, staircase
 
 from kbs_process.signals.smoothing import smooth
-from kbs_process.stages import gravity, gravity_error, motion
-from kbs_process.stages.gravity_quality import misfits
-from kbs_process.stages.gravity_taring import locate
+from kbs_process.stages import motion
+from kbs_process.stages.gravity import error as gravity_error
+from kbs_process.stages.gravity import model as gravity
+from kbs_process.stages.gravity.quality import misfits
+from kbs_process.stages.gravity.taring import locate
 from rigid.rigs import pointing_rig
 
 BIAS = np.array([3.0, -4.0, 6.0, 0.4, -0.6, 0.5])

@@ -32,14 +32,14 @@ from engine.hardware import Hardware
 from engine.sensors import FRICTION_SPREAD, Recording, Stream, record
 from engine.trajectories import Axis, Commands, commands
 from kbs_process.campaign.load import load_campaign
-from kbs_process.campaign.measured import measured
 from kbs_process.estimation.whittle import periodogram
+from kbs_process.identification.estimate import Identification, Settings, identify, intervals
+from kbs_process.identification.output_error import Experiment, residual, sensor_spectra, unexplained
+from kbs_process.identification.screening import Evaluate, Task
+from kbs_process.identification.unknowns import frictions, gearbox
 from kbs_process.signals.records import Array, Block
-from kbs_process.stages.condense import CondenseSettings, condense
-from kbs_process.stages.identification import Identification, Settings, identify, intervals
-from kbs_process.stages.output_error import Experiment, residual, sensor_spectra, unexplained
-from kbs_process.stages.screening import Evaluate, Task
-from kbs_process.stages.unknowns import frictions, gearbox
+from kbs_process.stages.align.condense import CondenseSettings, condense
+from kbs_process.studies.identify.measured import measured
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from kbs_process.estimation.fit import Parameters, difference_jacobian
-from kbs_process.stages.contact import edge_minima, left_to_contact
-from kbs_process.stages.screening import Contact
+from kbs_process.identification.contact import edge_minima, left_to_contact
+from kbs_process.identification.screening import Contact
 
 FINE = 512  # places around a turn
 PSI = -np.pi + (np.arange(FINE) + 0.5) * 2.0 * np.pi / FINE

@@ -15,7 +15,7 @@ PROGRAM = """
 import os
 import time
 
-from kbs_process.campaign.parallel import Crew
+from kbs_process.results.parallel import Crew
 
 
 def tell(held: float, piece: int) -> None:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kbs_process.campaign.parallel import Crew
 from kbs_process.estimation.descent import descend
 from kbs_process.estimation.fit import Parameters, difference_jacobian, fit_map
+from kbs_process.results.parallel import Crew
 
 T = np.linspace(0.0, 1.0, 100)
 PARAMETERS = Parameters(

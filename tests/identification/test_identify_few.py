@@ -11,12 +11,12 @@ from engine.hardware import Hardware
 from engine.sensors import Recording
 from engine.trajectories import Axis, commands
 from identification.coverage import RUN_TO_RUN, errors, experiment, make, serial, silent, true_values
+from kbs_process.identification.contact import left_to_contact
+from kbs_process.identification.estimate import Identification, Settings, identify
+from kbs_process.identification.output_error import Scalar
+from kbs_process.identification.screening import contacts
 from kbs_process.rig.model import substitute
 from kbs_process.signals.records import Array
-from kbs_process.stages.contact import left_to_contact
-from kbs_process.stages.identification import Identification, Settings, identify
-from kbs_process.stages.output_error import Scalar
-from kbs_process.stages.screening import contacts
 
 FREE = ("tcog", "phi_cog", "d1", "phi_dyn", "Ts0", "delta", "phi_stat", "Ka")
 SEED = 1  # its contact has a minimum elsewhere that costs 120 more

@@ -8,19 +8,19 @@ from pathlib import Path
 
 import numpy as np
 
-from kbs_process.campaign.identify import Outcomes, Prediction
-from kbs_process.campaign.identify_files import PARAMETERS, write_identification
 from kbs_process.campaign.load import load_campaign
-from kbs_process.campaign.measured import measured
-from kbs_process.campaign.reading import read_run
 from kbs_process.estimation.fit import Check, Fit
 from kbs_process.estimation.linearise import Unpredicted
 from kbs_process.estimation.profile import Profile
-from kbs_process.report.records.common import load
-from kbs_process.report.records.identify import IdentifyResults
-from kbs_process.stages.identification import Identification, Settings
-from kbs_process.stages.output_error import Experiment, sensor_spectra
-from kbs_process.stages.unknowns import frictions, gearbox, prior, with_factors
+from kbs_process.identification.estimate import Identification, Settings
+from kbs_process.identification.output_error import Experiment, sensor_spectra
+from kbs_process.identification.unknowns import frictions, gearbox, prior, with_factors
+from kbs_process.reduction.reading import read_run
+from kbs_process.results.records import load
+from kbs_process.studies.identify.files import PARAMETERS, write_identification
+from kbs_process.studies.identify.measured import measured
+from kbs_process.studies.identify.results import IdentifyResults
+from kbs_process.studies.identify.run import Outcomes, Prediction
 
 DUMMY1 = Path(__file__).parents[2] / "campaigns" / "DUMMY1"
 

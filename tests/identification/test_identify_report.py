@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from kbs_process.campaign.tables import write_table
-from kbs_process.report.build import build
-from kbs_process.report.records.common import Check, Conclusion, Provenance, encode
-from kbs_process.report.records.identify import (
+from kbs_process.results.records import Check, Conclusion, Provenance, encode
+from kbs_process.results.tables import write_table
+from kbs_process.studies.documents import render as build
+from kbs_process.studies.identify.results import (
     Correlations,
     Followed,
     Identified,

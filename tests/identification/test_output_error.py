@@ -11,11 +11,11 @@ import pytest
 
 from kbs_process.campaign.config import Campaign
 from kbs_process.campaign.load import load_campaign
-from kbs_process.campaign.measured import measured
-from kbs_process.campaign.reading import read_run
-from kbs_process.stages.output_error import Experiment, residual, sensor_spectra
-from kbs_process.stages.screening import match_resonances, phases
-from kbs_process.stages.unknowns import frictions, gearbox, others, prior
+from kbs_process.identification.output_error import Experiment, residual, sensor_spectra
+from kbs_process.identification.screening import match_resonances, phases
+from kbs_process.identification.unknowns import frictions, gearbox, others, prior
+from kbs_process.reduction.reading import read_run
+from kbs_process.studies.identify.measured import measured
 
 TESTS = Path(__file__).parents[1]
 STEP = 5e-4  # s

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from kbs_process.estimation.fit import Parameters, difference_jacobian, fit_map
-from kbs_process.stages.polar import Polar
-from kbs_process.stages.screening import Phase
+from kbs_process.identification.polar import Polar
+from kbs_process.identification.screening import Phase
 
 T = np.linspace(0.0, 4.0 * np.pi, 300)
 PARAMETERS = Parameters(

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from kbs_process.estimation.fit import triangle
-from kbs_process.stages import objective
-from kbs_process.stages.objective import Objective
-from kbs_process.stages.output_error import Experiment, Spectra
-from kbs_process.stages.screening import Task
+from kbs_process.identification import objective
+from kbs_process.identification.objective import Objective
+from kbs_process.identification.output_error import Experiment, Spectra
+from kbs_process.identification.screening import Task
 
 SUM = 0.3  # by which the residual moves for a unit of the sum, and
 DIFFERENCE = 60.0  # of the difference

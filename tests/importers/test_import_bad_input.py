@@ -22,10 +22,10 @@ from importer_files import (
     write_tdms,
 )
 
-from kbs_process.campaign import importers
-from kbs_process.campaign.importers import isolated
 from kbs_process.campaign.load import load_campaign
 from kbs_process.errors import ConfigError, KbsError, OutputError, RecordingError
+from kbs_process.studies import convert as importers
+from kbs_process.studies.convert import isolated
 
 
 def _import(folder: Path, file: str, mapping: str = MAPPING, notices: list[str] | None = None) -> Path:

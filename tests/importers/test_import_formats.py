@@ -25,10 +25,10 @@ from importer_files import (
     write_tsv,
 )
 
-from kbs_process.campaign import importers
-from kbs_process.campaign.importers import text
-from kbs_process.campaign.importers.clock import numbers
-from kbs_process.campaign.importers.mapping import Text
+from kbs_process.studies import convert as importers
+from kbs_process.studies.convert import text
+from kbs_process.studies.convert.clock import numbers
+from kbs_process.studies.convert.mapping import Text
 
 NO_TIME = MAPPING.replace('[time]\ncolumn = "t"\nunit = "s"\n', "")
 

@@ -10,11 +10,11 @@ import pytest
 from importer_files import read_streams
 from scipy.io import loadmat
 
-from kbs_process.campaign import importers
-from kbs_process.campaign.importers.mapping import find_mapping, load_mapping
 from kbs_process.campaign.load import load_campaign
-from kbs_process.ingest import Stream
+from kbs_process.recordings import Stream
 from kbs_process.signals.records import Array, Stamps
+from kbs_process.studies import convert as importers
+from kbs_process.studies.convert.mapping import find_mapping, load_mapping
 
 DATA = Path(__file__).parents[3] / "shared" / "data"
 

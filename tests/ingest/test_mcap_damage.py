@@ -17,7 +17,7 @@ from mcap.writer import CompressionType, IndexType
 from mcap_files import FORCE, MAGIC, read, rewrite, top_records
 
 from kbs_process.errors import RecordingError
-from kbs_process.ingest import OutStream, Stream, inspect_recording, open_recording, write_mcap
+from kbs_process.recordings import OutStream, Stream, inspect_recording, open_recording, write_mcap
 from kbs_process.signals.records import Block, Loss
 
 WRENCH = Stream("w", "/wrench", FORCE)

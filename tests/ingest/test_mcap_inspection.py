@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from mcap_files import build
 
-from kbs_process.ingest import OutStream, inspect_recording, write_mcap
-from kbs_process.ingest.encoding import Encoding
+from kbs_process.recordings import OutStream, inspect_recording, write_mcap
+from kbs_process.recordings.mcap.messages.encoding import Encoding
 
 
 @pytest.mark.parametrize("encoding", ["ros2", "json", "protobuf"])

@@ -7,7 +7,7 @@ from collections.abc import Generator
 
 import pytest
 
-from kbs_process.ingest.ahead import ahead
+from kbs_process.recordings.mcap.ahead import ahead
 
 
 def counted(limit: int, made: list[int], error: Exception | None = None) -> Generator[int]:

@@ -12,8 +12,9 @@ from mcap.reader import make_reader
 from mcap.records import Message
 
 from kbs_process.errors import RecordingError
-from kbs_process.ingest import OutStream, Stream, open_recording, write_mcap, write_pieces, writer
-from kbs_process.ingest.encoding import Encoding
+from kbs_process.recordings import OutStream, Stream, open_recording, write_mcap, write_pieces
+from kbs_process.recordings.mcap import writer
+from kbs_process.recordings.mcap.messages.encoding import Encoding
 
 START = 1_700_000_000_000_000_000
 

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from campaign.campaign_folder import EXAMPLE
-from kbs_process.campaign.analysis import Pair
-from kbs_process.campaign.judging import coverage_below, judged
 from kbs_process.campaign.load import load_campaign
-from kbs_process.report import results
+from kbs_process.reduction.analysis import Pair
+from kbs_process.reduction.judging import coverage_below, judged
 from kbs_process.signals.records import WRENCH_CHANNELS, WRENCH_UNITS, Signal
 from kbs_process.stages.bandpass import Band
+from kbs_process.studies.correlate import results
 
 CAMPAIGN = load_campaign(EXAMPLE, checksums=False)
 BAND = Band("lt1Hz", 0.01, 1.0)

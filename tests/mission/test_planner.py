@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kbs_process.campaign.reference_sections import boundaries
 from kbs_process.errors import MissionError
 from kbs_process.mission.geometry import azimuth_elevation, line_of_sight
 from kbs_process.mission.model import Mission
 from kbs_process.mission.planner import Plan, plan
+from kbs_process.studies.reference_day.day import boundaries
 from mission.reference import DAY, MISSION, later
 
 PLAN = plan(MISSION, DAY.lead)

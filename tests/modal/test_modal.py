@@ -7,21 +7,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kbs_process.campaign.transducer import rigid_base
 from kbs_process.plant.attach import attach
-from kbs_process.plant.compile import compiled_plant
+from kbs_process.plant.compiled.compile import compiled_plant
+from kbs_process.plant.compiled.equilibrium import at_rest
+from kbs_process.plant.compiled.generate import state_layout
 from kbs_process.plant.effects import CATALOGUE, select
-from kbs_process.plant.equilibrium import at_rest
-from kbs_process.plant.generate import state_layout
-from kbs_process.plant.linear import linearise
-from kbs_process.plant.modal import ModalModel, ModalTable, derive, respond, select_modes, tracked
+from kbs_process.plant.linear.linearise import linearise
+from kbs_process.plant.linear.modal import ModalModel, ModalTable, derive, respond, select_modes, tracked
 from kbs_process.plant.schedule import Schedule
 from kbs_process.plant.structure import parameters, structure_of
 from kbs_process.rig.model import substitute
 from kbs_process.signals.records import WRENCH_CHANNELS, WRENCH_UNITS, Array, Signal
 from kbs_process.stages.bandpass import Band
-from kbs_process.stages.onset import smooth_rig
 from kbs_process.stages.resonance import amplification, filter_errors, transmit
+from kbs_process.studies.correlate.transducer import rigid_base
+from kbs_process.studies.stability.onset import smooth_rig
 from plant.plant_rigs import NOMINAL, streams, two_axis
 
 POSE = np.array([0.3, np.radians(70.0)])

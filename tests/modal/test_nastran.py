@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from kbs_process.campaign.nastran import read_f06
 from kbs_process.errors import RecordingError
 from kbs_process.plant.effects import select
-from kbs_process.plant.modal import ModalModel, derive
+from kbs_process.plant.linear.modal import ModalModel, derive
 from kbs_process.signals.records import Array
+from kbs_process.studies.modal.nastran import read_f06
 from plant.plant_rigs import NOMINAL, two_axis
 
 F06 = Path(__file__).parent / "data" / "pose70.f06"

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from kbs_process.plant.simulation import Simulation
+from kbs_process.plant.compiled.simulation import Simulation
 from kbs_process.rig.model import Rig
 from kbs_process.signals.records import Array
 

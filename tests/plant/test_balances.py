@@ -11,11 +11,11 @@ from plant_rigs import NOMINAL, body, joint, one_axis, rig, three_axis, two_axis
 from scipy.linalg import eigh
 
 from kbs_process.plant.attach import attach
+from kbs_process.plant.compiled.simulation import Simulation
 from kbs_process.plant.effects import find, select
-from kbs_process.plant.modes import modes as modes_on_transducer
+from kbs_process.plant.linear.modes import modes as modes_on_transducer
 from kbs_process.plant.predict import predict
 from kbs_process.plant.schedule import Schedule
-from kbs_process.plant.simulation import Simulation
 from kbs_process.rig.model import Rig, substitute
 from kbs_process.signals.records import Array
 

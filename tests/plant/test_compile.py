@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from plant_rigs import DRIVE, body, joint, quantity, rig
 
-from kbs_process.plant import compile as compiling
+from kbs_process.plant.compiled import compile as compiling
+from kbs_process.plant.compiled.generate import module_text
+from kbs_process.plant.compiled.simulation import Simulation
 from kbs_process.plant.effect import Effect, LogNormal, Parameter, Port, State
 from kbs_process.plant.effects import CATALOGUE, select
-from kbs_process.plant.generate import module_text
 from kbs_process.plant.schedule import Schedule
-from kbs_process.plant.simulation import Simulation
 from kbs_process.plant.structure import Structure
 
 TWO = Structure((-1, 0), True, tuple(effect for effect in CATALOGUE if effect.port.of_drive))
@@ -84,7 +84,7 @@ def test_edited_equation_gets_another_file(monkeypatch: pytest.MonkeyPatch) -> N
 
 RACE = """
 import numpy as np
-from kbs_process.plant.compile import compiled_plant
+from kbs_process.plant.compiled.compile import compiled_plant
 from kbs_process.plant.effects import select
 from kbs_process.plant.structure import Structure
 plant = compiled_plant(Structure((-1,), False, select(["synchronous_motor", "flexspline"])))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numba import njit
 
-from kbs_process.plant import elementary
+from kbs_process.plant.compiled import elementary
 from kbs_process.signals.records import Array
 
 

@@ -11,12 +11,12 @@ from plant_rigs import NOMINAL, three_axis, two_axis
 
 from kbs_process.errors import ConfigError
 from kbs_process.plant.attach import attach
+from kbs_process.plant.compiled.simulation import Simulation
 from kbs_process.plant.effect import Effect, Normal, Parameter, Port
 from kbs_process.plant.effects import select
 from kbs_process.plant.effects.bungee import BUNGEE
-from kbs_process.plant.linear import linearise
+from kbs_process.plant.linear.linearise import linearise
 from kbs_process.plant.schedule import Schedule
-from kbs_process.plant.simulation import Simulation
 from kbs_process.rig.model import Rig, substitute
 from kbs_process.signals.records import Array
 

@@ -6,10 +6,10 @@ import energetics as lab
 import numpy as np
 from plant_rigs import NOMINAL, streams, three_axis
 
+from kbs_process.plant.compiled.simulation import Simulation
 from kbs_process.plant.effects import select
 from kbs_process.plant.predict import tap_columns
 from kbs_process.plant.schedule import Schedule
-from kbs_process.plant.simulation import Simulation
 
 RATE = 500.0
 START, SPEED = np.array([0.3, 0.5, -0.4]), np.radians([2.0, -3.0, 4.0])

@@ -11,11 +11,11 @@ from typing import cast
 import numpy as np
 import pytest
 
-from kbs_process.campaign.analysis import Analysis
 from kbs_process.campaign.load import load_campaign
-from kbs_process.campaign.pointing import recorded_pointing
+from kbs_process.reduction.analysis import Analysis
+from kbs_process.reduction.pointing import recorded_pointing
 from kbs_process.signals.records import WRENCH_CHANNELS, Array, Block, Run
-from kbs_process.stages.condense import CondenseSettings, condense
+from kbs_process.stages.align.condense import CondenseSettings, condense
 
 ROOT = Path(__file__).parents[2]
 DURATION, OFFSET, MISREAD = 120.0, 2e-4, 5e-4

@@ -13,20 +13,20 @@ import pytest
 from kbs_process.campaign.config import Campaign
 from kbs_process.campaign.load import load_campaign
 from kbs_process.campaign.mission import load_day
-from kbs_process.campaign.progress import SilentProgress
-from kbs_process.campaign.reference_day import commands, fly, simulate_day
-from kbs_process.campaign.reference_discussion import discussion
-from kbs_process.campaign.reference_sections import Extreme, Section
 from kbs_process.errors import ConfigError
 from kbs_process.mission.planner import Phase, Plan, plan
-from kbs_process.report.build import build
-from kbs_process.report.records.common import load
-from kbs_process.report.records.reference_day import ReferenceDayResults
+from kbs_process.progress import SilentProgress
+from kbs_process.results.records import load
 from kbs_process.rig.model import substitute
 from kbs_process.signals.records import Array
 from kbs_process.stages import pointing
 from kbs_process.stages.bandpass import Band
 from kbs_process.stages.pointing import PointingStatistics
+from kbs_process.studies.documents import render as build
+from kbs_process.studies.reference_day.day import Extreme, Section
+from kbs_process.studies.reference_day.discussion import discussion
+from kbs_process.studies.reference_day.results import ReferenceDayResults
+from kbs_process.studies.reference_day.run import commands, fly, simulate_day
 from mission.reference import FOLDER
 
 

@@ -8,8 +8,8 @@ from collections.abc import Iterable
 import msgspec
 
 from kbs_process.errors import OutputError
-from kbs_process.report.records.common import decode
-from kbs_process.report.records.diagnosis import DiagnosisResults, Find, Fitted, Place, Rival
+from kbs_process.results.records import decode
+from kbs_process.studies.diagnose.results import DiagnosisResults, Find, Fitted, Place, Rival
 from proof.answer import Answer, Candidate, Claim, Estimate, HeldOut, Moved, Suspect
 from proof.words import OURS
 

@@ -96,6 +96,6 @@ def _covered(hidden: Sequence[Path]) -> list[str]:
 
 def _compiled_code() -> Path:
     """Where plants are kept once compiled: half a minute of each trial without it."""
-    from kbs_process.plant.compile import cache_folder
+    from kbs_process.plant.compiled.compile import cache_folder
 
     return cache_folder()

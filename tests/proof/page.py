@@ -8,8 +8,7 @@ from pathlib import Path
 from matplotlib.figure import Figure as Sheet
 
 import kbs_process
-from kbs_process.report import page
-from kbs_process.report.figures import draw
+from kbs_process.report import draw, page
 from kbs_process.report.panel import (
     Block,
     Caption,
@@ -23,8 +22,8 @@ from kbs_process.report.panel import (
     Text,
     Tone,
 )
-from kbs_process.report.records.common import Conclusion
 from kbs_process.report.text import MISSING, count, number, percent
+from kbs_process.results.records import Conclusion
 from proof.aims import AIMS, Aim, Reached, beaten, find, reached
 from proof.answer import Answer, Suspect
 from proof.score import ALL, MEDIANS, SHARES, STRONG, Bench, Row

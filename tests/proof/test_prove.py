@@ -15,8 +15,8 @@ from typing import Any
 
 import pytest
 
-from kbs_process.campaign import prove as verb
 from kbs_process.errors import ConfigError
+from kbs_process.studies import prove as verb
 from proof import answer, prove, trials
 from proof.answer import Answer, Claim
 from proof.methods import Job, failed

@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as pq
 
-from kbs_process.campaign import importers
-from kbs_process.campaign.importers import PRESETS
 from kbs_process.campaign.load import load_campaign
-from kbs_process.campaign.progress import SilentProgress
-from kbs_process.campaign.run import process
-from kbs_process.report.records.common import load
-from kbs_process.report.results import Results
+from kbs_process.progress import SilentProgress
+from kbs_process.results.records import load
+from kbs_process.studies import convert as importers
+from kbs_process.studies.convert import PRESETS
+from kbs_process.studies.correlate.results import Results
+from kbs_process.studies.correlate.run import process
 
 EDGE_S = 1.0  # of the scoring filter, at either end
 

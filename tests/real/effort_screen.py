@@ -12,14 +12,14 @@ from itertools import product
 
 import numpy as np
 
-from kbs_process.campaign.analysis import bands_of
-from kbs_process.campaign.reading import read_run
-from kbs_process.campaign.settings import motion_settings
 from kbs_process.plant.along import signals_of
 from kbs_process.plant.effect import Port
 from kbs_process.plant.effects import CATALOGUE
 from kbs_process.plant.moved import reading, unit_torques
 from kbs_process.plant.rigid import loads
+from kbs_process.reduction.analysis import bands_of
+from kbs_process.reduction.reading import read_run
+from kbs_process.reduction.settings import motion_settings
 from kbs_process.rig.model import substitute
 from kbs_process.signals.averages import instants
 from kbs_process.signals.records import Signal

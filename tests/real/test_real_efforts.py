@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from gravity.real_sets import DATA
-from kbs_process.campaign import run
+from kbs_process.studies.correlate import run
 from real.campaigns import processed, sampling_error
 from real.effort_screen import Screen, suspects
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import shutil
 
 from engine.campaigns import CAMPAIGNS_FOLDER
-from kbs_process.campaign import run
 from kbs_process.campaign.load import load_campaign
-from kbs_process.campaign.progress import SilentProgress
+from kbs_process.progress import SilentProgress
+from kbs_process.studies.correlate import run
 from real.campaigns import Processed
 
 

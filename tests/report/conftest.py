@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from kbs_process.report.build import build
+from kbs_process.studies.documents import render as build
 from report import sample
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from kbs_process.report import results as r
+from kbs_process.studies.correlate import results as r
 
 CHANNELS = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
 UNITS = dict(zip(CHANNELS, ("N", "N", "N", "N m", "N m", "N m"), strict=True))

@@ -9,10 +9,10 @@ from typing import get_args
 import msgspec
 import numpy as np
 
-from kbs_process.campaign.tables import write_table
-from kbs_process.report.build import build
-from kbs_process.report.records import diagnosis as d
-from kbs_process.report.records.common import Check, Conclusion, encode
+from kbs_process.results.records import Check, Conclusion, encode
+from kbs_process.results.tables import write_table
+from kbs_process.studies.diagnose import results as d
+from kbs_process.studies.documents import render as build
 from report import sample
 
 

@@ -9,7 +9,7 @@ import pytest
 from kbs_process.plant.effect import Effect
 from kbs_process.plant.effects import CATALOGUE, MEASURED
 from kbs_process.plant.sensing import SENSING, Sensing
-from kbs_process.report.figures.formula import equation, formula
+from kbs_process.report.formula import equation, formula
 from kbs_process.report.panel import Formula
 
 EVERY = (*CATALOGUE, *SENSING, *MEASURED)

@@ -16,8 +16,8 @@ import pytest
 
 from kbs_process.errors import OutputError
 from kbs_process.report import pdf as paper
-from kbs_process.report import results as r
-from kbs_process.report.build import build
+from kbs_process.studies.correlate import results as r
+from kbs_process.studies.documents import render as build
 from report import sample
 
 HOSTILE = '<script>alert("x")</script>&$\\frac{1}$"onerror="alert(1)'
@@ -199,7 +199,7 @@ def test_hostile_data_cannot_leave_its_script_element(tmp_path: Path) -> None:
 
 def test_the_same_results_give_the_same_bytes_in_another_process(one_channel: Path, tmp_path: Path) -> None:
     folder = sample.one_channel(tmp_path)
-    code = "import sys, pathlib; from kbs_process.report.build import build; build(pathlib.Path(sys.argv[1]))"
+    code = "import sys, pathlib; from kbs_process.studies.documents import render; render(pathlib.Path(sys.argv[1]))"
     subprocess.run(
         [sys.executable, "-c", code, folder], check=True, env={**os.environ, "PYTHONHASHSEED": "2"}
     )

@@ -11,10 +11,10 @@ import msgspec
 import pytest
 
 from kbs_process.errors import OutputError
-from kbs_process.report import results as r
-from kbs_process.report.build import build
-from kbs_process.report.documents import DOCUMENTS
-from kbs_process.report.records.common import decode, load, schema_of
+from kbs_process.results.records import decode, load, schema_of
+from kbs_process.studies.correlate import results as r
+from kbs_process.studies.documents import DOCUMENTS
+from kbs_process.studies.documents import render as build
 from report import sample
 
 SCHEMAS = Path(__file__).parents[2] / "schemas"

@@ -9,8 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from kbs_process.report import series, text
-from kbs_process.report.panels import views
+from kbs_process.report import series, text, views
 
 
 @settings(max_examples=60, deadline=None)

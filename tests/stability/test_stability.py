@@ -13,9 +13,10 @@ from kbs_process.plant.attach import attach
 from kbs_process.plant.effect import instance
 from kbs_process.plant.effects import CATALOGUE, select
 from kbs_process.plant.effects.measured_law import MEASURED
-from kbs_process.plant.linear import Linear, linearise
+from kbs_process.plant.linear.linearise import Linear, linearise
 from kbs_process.rig.model import Controller, Quantity
-from kbs_process.stages import onset, stability
+from kbs_process.studies.stability import loop as stability
+from kbs_process.studies.stability import onset
 from plant.plant_rigs import NOMINAL, two_axis
 
 POSE = np.radians([0.0, 30.0])

@@ -8,10 +8,10 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from kbs_process.campaign import stability
 from kbs_process.campaign.load import load_campaign
-from kbs_process.campaign.progress import SilentProgress
 from kbs_process.errors import ConfigError
+from kbs_process.progress import SilentProgress
+from kbs_process.studies.stability import run as stability
 
 ROOT = Path(__file__).parents[2]
 

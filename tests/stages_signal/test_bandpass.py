@@ -8,9 +8,9 @@ from scipy.linalg import solveh_banded
 from scipy.signal import butter, sosfiltfilt
 
 from kbs_process.signals.records import Signal
+from kbs_process.stages.align.resample import resample
 from kbs_process.stages.bandpass import UNFILTERED, Band, apply, edge_seconds, gain, statement
 from kbs_process.stages.lowfrequency import high_pass
-from kbs_process.stages.resample import resample
 
 DT = 0.05
 BELOW_1 = Band("lt1Hz", 0.01, 1.0)

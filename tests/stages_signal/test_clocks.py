@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from kbs_process.signals.records import Block, Clock
-from kbs_process.stages.clocks import ClockData, LatencyFloor, align
+from kbs_process.stages.align.clocks import ClockData, LatencyFloor, align
 from stages_signal.recordings import stream
 
 

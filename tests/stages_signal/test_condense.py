@@ -9,7 +9,7 @@ import pytest
 
 from kbs_process.errors import RecordingError
 from kbs_process.signals.records import WRENCH_CHANNELS, Block, Run
-from kbs_process.stages.condense import CondenseSettings, condense
+from kbs_process.stages.align.condense import CondenseSettings, condense
 from stages_signal.recordings import EPOCH, chunks, rows, stream
 
 CHANNELS = {"wrench": WRENCH_CHANNELS, "angle": ("az", "el"), "command": ("az", "el"), "temperature": ("T",)}

@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from kbs_process.signals.records import Block
-from kbs_process.stages.grid import Grid, Regridder, nominal_grid
-from kbs_process.stages.ordering import BLOCK, Orderer, Reblock, concatenate, judge
-from kbs_process.stages.stream import Timeline
+from kbs_process.stages.align.grid import Grid, Regridder, nominal_grid
+from kbs_process.stages.align.ordering import BLOCK, Orderer, Reblock, concatenate, judge
+from kbs_process.stages.align.stream import Timeline
 
 
 def block(stamp: np.ndarray) -> Block:

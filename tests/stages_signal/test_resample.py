@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kbs_process.stages.resample import Reducer, design, resample
+from kbs_process.stages.align.resample import Reducer, design, resample
 
 WORKING = 20.0
 RATES = [10.0, 13.7, 20.0, 31.0, 100.0, 240.0, 1000.0, 1000.03, 10000.0]

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.signal import csd
 
-from kbs_process.stages.envelope import MinMax
-from kbs_process.stages.spectrum import Welch
+from kbs_process.stages.align.envelope import MinMax
+from kbs_process.stages.align.spectrum import Welch
 
 
 @pytest.mark.parametrize("piece", [8192, 1000, 40_000])

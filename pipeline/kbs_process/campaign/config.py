@@ -140,6 +140,11 @@ class Campaign:
     modal: Path | None = None  # modes of the article on its transducer; None: derived from the plant
     sensing: tuple[SensingLaw, ...] = ()  # acting on predictions of one recording alone
 
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """Every file that results depend on: the description, then the recordings."""
+        return tuple(dict.fromkeys((*self.inputs, *(entry.path for entry in self.recordings))))
+
     def acting(self, entry: RecordingEntry) -> tuple[str, ...]:
         """Return the effects of the nominal model that acted in a recording."""
         return tuple(name for name in self.effects if name not in entry.without)

@@ -12,7 +12,7 @@ from kbs_process.campaign.problems import Problems
 from kbs_process.campaign.schema import violations
 from kbs_process.campaign.units import factor
 from kbs_process.errors import did_you_mean
-from kbs_process.plant.modal import ModalModel, ModalTable, tracked
+from kbs_process.plant.linear.modal import ModalModel, ModalTable, tracked
 from kbs_process.signals.records import Array
 
 SIX = ("shape", "participation", "gravity")

@@ -54,8 +54,8 @@ def identify(
     folder = find_campaign(campaign)
     target = results_folder(folder, output, suffix="-identify")
     loaded = load_campaign(folder)
-    from kbs_process.campaign.identify import identify as run
-    from kbs_process.stages.identification import Settings
+    from kbs_process.identification.estimate import Settings
+    from kbs_process.studies.identify.run import identify as run
 
     settings = Settings(starts=starts, run_to_run=run_to_run)
     outcome = run(loaded, target, settings=settings, progress=progress(quiet), pdf=pdf)
@@ -82,7 +82,7 @@ def diagnose(campaign: str, output: Path | None, pdf: bool | None, quiet: bool) 
     folder = find_campaign(campaign)
     target = results_folder(folder, output, suffix="-diagnosis")
     loaded = load_campaign(folder)
-    from kbs_process.campaign.diagnose import diagnose as run
+    from kbs_process.studies.diagnose.run import diagnose as run
 
     outcome = run(loaded, target, progress=progress(quiet), pdf=pdf)
     for line in outcome.verdict_lines:
@@ -124,7 +124,7 @@ def prove(
     Makes campaigns, conceals in each nothing or up to three effects, seals what is concealed, has each diagnosed by a
     process that cannot read the seals, then breaks them and scores: found, placed, named, measured, beside rivals.
     """
-    from kbs_process.campaign.prove import run_bench
+    from kbs_process.studies.prove import run_bench
 
     given = {"trials": trials, "work": work, "output": output, "jobs": jobs, "dask": dask}
     options = [f"--{name}={value}" for name, value in given.items() if value is not None]

@@ -60,7 +60,7 @@ def stability(
     folder = find_campaign(campaign)
     target = results_folder(folder, output, suffix="-stability")
     loaded = load_campaign(folder, checksums=False)
-    from kbs_process.campaign.stability import analyse_stability
+    from kbs_process.studies.stability.run import analyse_stability
 
     outcome = analyse_stability(
         loaded,
@@ -127,7 +127,7 @@ def modal(
     from kbs_process.campaign.locate import find_campaign
 
     loaded = load_campaign(find_campaign(campaign), checksums=False)
-    from kbs_process.campaign.modal import derive_modes, import_modes
+    from kbs_process.studies.modal.run import derive_modes, import_modes
 
     if interface is not None and f06:
         table = import_modes(loaded, joint, f06, file, interface=interface, ground=ground, damping=damping)

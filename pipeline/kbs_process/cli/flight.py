@@ -60,7 +60,7 @@ def flight(
     folder = find_campaign(campaign)
     target = results_folder(folder, output, suffix="-flight")
     loaded = load_campaign(folder, checksums=False, flight=True, recordings=command is None)
-    from kbs_process.campaign.flight import predict_flight
+    from kbs_process.studies.flight.run import predict_flight
 
     outcome = predict_flight(
         loaded, trajectory, command, target, samples=samples, seed=seed, progress=progress(quiet), pdf=pdf
@@ -91,7 +91,7 @@ def reference_day(campaign: str, output: Path | None, pdf: bool | None, check: b
     folder = find_campaign(campaign)
     target = results_folder(folder, output, suffix="-reference-day")
     loaded = load_campaign(folder, recordings=False)
-    from kbs_process.campaign.reference_day import simulate_day
+    from kbs_process.studies.reference_day.run import simulate_day
 
     outcome = simulate_day(loaded, target, progress=progress(quiet), pdf=pdf)
     for line in outcome.verdict_lines:

@@ -58,7 +58,7 @@ def simulate(
         raise click.UsageError("Give --trajectory or --command, not both.")
     from kbs_process.campaign.load import load_campaign
     from kbs_process.campaign.locate import find_campaign, results_folder
-    from kbs_process.campaign.simulate import simulate_commands, simulate_trajectory
+    from kbs_process.studies.predict.run import simulate_commands, simulate_trajectory
 
     folder = find_campaign(campaign)
     target = results_folder(folder, output, suffix="-simulated")
@@ -98,7 +98,7 @@ def predict(words: tuple[str, ...], model: Path | None, output: Path | None, qui
         raise click.UsageError("Give CAMPAIGN and RECORDING, or --model FOLDER and RECORDING.")
     from kbs_process.campaign.load import load_campaign
     from kbs_process.campaign.locate import find_campaign, results_folder
-    from kbs_process.campaign.simulate import predict_recording, predict_with
+    from kbs_process.studies.predict.run import predict_recording, predict_with
 
     folder = find_campaign(words[0] if model is None else str(model))
     # The recordings that a model came from may be elsewhere by now.

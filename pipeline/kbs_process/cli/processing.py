@@ -24,7 +24,7 @@ from kbs_process.errors import ConfigError, FitError, RecordingError, Simulation
 
 if TYPE_CHECKING:
     from kbs_process.campaign.config import Campaign
-    from kbs_process.campaign.progress import Progress
+    from kbs_process.progress import Progress
 
 
 @click.command(epilog=examples("campaign/EL089", "process campaign/EL089 --check --output /data/EL089"))
@@ -48,9 +48,9 @@ def process(
     Where the two differ by more than repeats of one trajectory do, a diagnosis follows. One of the same inputs that
     is in the results already stays until a new one replaces it.
     """
-    from kbs_process.campaign.earlier_diagnosis import earlier_diagnosis
     from kbs_process.campaign.load import load_campaign
     from kbs_process.campaign.locate import find_campaign, results_folder
+    from kbs_process.studies.correlate.earlier_diagnosis import earlier_diagnosis
 
     folder = find_campaign(campaign)
     target = results_folder(folder, output)
@@ -59,7 +59,7 @@ def process(
     if before is not None and before.outdated:
         complain(before.warning)  # now, as long as it is there
     # Bad input is told before all that computes is imported.
-    from kbs_process.campaign.run import process as run
+    from kbs_process.studies.correlate.run import process as run
 
     outcome = run(loaded, target, progress=progress(quiet), pdf=pdf)
     try:
@@ -81,10 +81,11 @@ def _diagnose(
     campaign: Campaign, results: Path, *, progress: Progress, pdf: bool | None, wanted: bool
 ) -> None:
     """Diagnose what was processed; recordings that allow no diagnosis are an error only if one is wanted."""
-    from kbs_process.campaign.diagnosing import diagnose_results
+    from kbs_process.studies.diagnose.diagnosing import diagnose_results
+    from kbs_process.studies.documents import render
 
     try:
-        for line in diagnose_results(campaign, results, progress=progress, pdf=pdf):
+        for line in diagnose_results(campaign, results, render=render, progress=progress, pdf=pdf):
             click.echo(line)
     except (ConfigError, RecordingError, FitError, SimulationError) as error:
         if wanted:
@@ -106,8 +107,8 @@ def validate(campaign: str, check: bool, quiet: bool) -> None:
     """
     from kbs_process.campaign.load import load_campaign
     from kbs_process.campaign.locate import find_campaign
-    from kbs_process.campaign.validate import describe
-    from kbs_process.campaign.validate import validate as run
+    from kbs_process.studies.validate.run import describe
+    from kbs_process.studies.validate.run import validate as run
 
     loaded = load_campaign(find_campaign(campaign))
     found = run(loaded, progress(quiet))
@@ -123,11 +124,11 @@ def validate(campaign: str, check: bool, quiet: bool) -> None:
 @pdf_option
 def report(results: Path, pdf: bool | None) -> None:
     """Render the report again from stored RESULTS, computing nothing."""
-    from kbs_process.campaign.store import revising
-    from kbs_process.report.build import build
+    from kbs_process.results.store import revising
+    from kbs_process.studies.documents import render
 
     with revising(results, without=("index.html", "report.pdf")) as folder:
-        page = build(folder, pdf)
+        page = render(folder, pdf)
         stale = (results / "report.pdf").is_file() and not (folder / "report.pdf").is_file()
     if stale:
         click.echo(f"{results / 'report.pdf'} showed the report of before, and is gone: --pdf makes it again")

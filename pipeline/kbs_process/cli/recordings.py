@@ -8,8 +8,16 @@ from pathlib import Path
 
 import click
 
-from kbs_process.campaign.importers import preset_names
-from kbs_process.cli.shared import BAD_INPUT, EXISTING_FILE, FOLDER, NOT_MET, examples, progress, quiet_option
+from kbs_process.cli.shared import (
+    BAD_INPUT,
+    EXISTING_FILE,
+    FOLDER,
+    NOT_MET,
+    examples,
+    progress,
+    quiet_option,
+)
+from kbs_process.studies.convert import preset_names
 
 
 @click.command(epilog=examples("inspect recording.mcap", "inspect --check campaigns/EL089/recordings/*.mcap"))
@@ -20,8 +28,8 @@ def inspect(files: tuple[Path, ...], check: bool) -> None:
 
     Exits with 2 if one of them cannot be read at all.
     """
-    from kbs_process.campaign.listing import describe_inspection
-    from kbs_process.ingest.inspection import inspect_recording
+    from kbs_process.recordings.inspection import inspect_recording
+    from kbs_process.studies.validate.listing import describe_inspection
 
     states = set()
     for path in files:
@@ -59,7 +67,7 @@ def import_(
 
     MAPPING is a TOML file that says which columns are which channels, or the name of a preset.
     """
-    from kbs_process.campaign import importers
+    from kbs_process.studies import convert as importers
 
     if file is not None:
         click.echo(importers.describe(file), nl=False)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 if TYPE_CHECKING:
-    from kbs_process.campaign.progress import Progress
+    from kbs_process.progress import Progress
 
 _Verb = TypeVar("_Verb", bound=Callable[..., Any])
 
@@ -43,7 +43,7 @@ def examples(*lines: str) -> str:
 
 def progress(quiet: bool) -> Progress:
     """Return what tells a terminal how far a verb has come, or nothing."""
-    from kbs_process.campaign.progress import SilentProgress, progress_for_terminal
+    from kbs_process.progress import SilentProgress, progress_for_terminal
 
     return SilentProgress() if quiet else progress_for_terminal()
 

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from kbs_process.plant.compile import compiled_module
+from kbs_process.plant.compiled.compile import compiled_module
 from kbs_process.plant.effect import Effect, Parameter, Port, State
 from kbs_process.signals.records import Array
 
@@ -128,7 +128,7 @@ def along_text(effect: Effect) -> str:
     lines = [
         f'"""Generated: {effect.name} along signals."""',
         "from numba import njit",
-        "from kbs_process.plant.elementary import linked",
+        "from kbs_process.plant.compiled.elementary import linked",
         f"from {effect.equation.__module__} import {effect.equation.__qualname__} as _equation",
         "",
         "# Neither entries from Python nor the plant's own sine: half the time to compile.",

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from kbs_process.plant.multibody import carrier, joint_offset, placing
-from kbs_process.plant.stepping import state_layout
+from kbs_process.plant.compiled.multibody import carrier, joint_offset, placing
+from kbs_process.plant.compiled.stepping import state_layout
 from kbs_process.plant.structure import MICROSTEP, Structure
 from kbs_process.rig.model import TRANSDUCER, Rig
 

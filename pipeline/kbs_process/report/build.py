@@ -3,28 +3,21 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
-from kbs_process.errors import OutputError, did_you_mean
+from kbs_process.errors import OutputError
 from kbs_process.report import pdf as paper
-from kbs_process.report.records.common import FILE, kind_of
+from kbs_process.report.document import Document
 
 
-def build(results: Path, pdf: bool | None = None) -> Path:
+def build(results: Path, document: Document[Any], pdf: bool | None = None) -> Path:
     """Write index.html, and report.pdf where possible, into a results folder; return the page's path.
 
     `pdf`: True demands the PDF, False leaves it out, None makes it where weasyprint is installed.
     """
-    kind = kind_of(results)
     from kbs_process.report import page  # draws: matplotlib costs most of a second to import
-    from kbs_process.report.documents import DOCUMENTS
 
-    if kind not in DOCUMENTS:
-        raise OutputError(
-            f"there is no report of kind '{kind}'",
-            where=str(results / FILE),
-            remedy=did_you_mean(kind, DOCUMENTS),
-        )
-    head, sections = DOCUMENTS[kind].read(results)
+    head, sections = document.read(results)
     target = results / "index.html"
     try:
         _replace(target, page.render(head, sections, "screen").encode())

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Generic, TypeVar
 
 from kbs_process.report.panel import Head, Panel
-from kbs_process.report.records.common import Record, load
 from kbs_process.report.tables import Tables
+from kbs_process.results.records import Record, load
 
 R = TypeVar("R", bound=Record)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from kbs_process.report.records.common import Conclusion
+from kbs_process.results.records import Conclusion
 
 Tone = Literal["", "pass", "fail", "undecided", "muted"]
 

@@ -116,3 +116,9 @@ def _raised(exponent: int) -> str:
 
 def _sign(text: str) -> str:
     return text.replace("-", "−")
+
+
+def frame_label(frame: str) -> str:
+    """Return a frame in words."""
+    names = {"S": "spacecraft (S)", "T": "transducer (T)", "joint": "the joints"}
+    return names.get(frame, frame)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.signal import get_window
 
-from kbs_process.plant.modal import ModalModel, ModalTable, respond
+from kbs_process.plant.linear.modal import ModalModel, ModalTable, respond
 from kbs_process.signals.records import Array, Signal
 from kbs_process.stages import bandpass
 from kbs_process.stages.bandpass import Band

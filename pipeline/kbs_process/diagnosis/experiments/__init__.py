@@ -1,0 +1,1 @@
+"""Repeats on one grid, what predicts them, and what repeats differ by."""

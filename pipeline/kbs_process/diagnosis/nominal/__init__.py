@@ -1,0 +1,1 @@
+"""The nominal fit: known parameters near their priors."""

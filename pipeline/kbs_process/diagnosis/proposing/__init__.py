@@ -1,0 +1,1 @@
+"""Candidate effects: where their shapes and sizes come from."""

@@ -1,0 +1,1 @@
+"""Every candidate effect along the linearised plant."""

@@ -1,0 +1,231 @@
+"""Suspects of a rig: what its model leaves out, at every site and with every shape that a search tries."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations_with_replacement, product
+
+import numpy as np
+
+from kbs_process.diagnosis.screening.inlets import plate_turns
+from kbs_process.diagnosis.screening.places import Place, points_of
+from kbs_process.diagnosis.screening.ranges import Ranges
+from kbs_process.plant.along import signals_of
+from kbs_process.plant.effect import ACTIONS, VELOCITIES, Effect, Parameter, Port, instance
+from kbs_process.plant.effects import CATALOGUE
+from kbs_process.plant.effects.joint_order import JOINT_ORDER
+from kbs_process.plant.rigid import links_beyond, poses
+from kbs_process.plant.sensing import SENSING, Sensing, SensingPort
+from kbs_process.plant.taps import plate_column
+from kbs_process.rig.model import LAB, TRANSDUCER, Joint, Rig
+from kbs_process.signals.records import WRENCH_CHANNELS
+
+FLOOR = "floor"
+_ALONG_GRAVITY = 0.95  # cosine
+BY = "<-"  # in the site of a coupling: channel that reads, channel that acts, or the two of which the product does
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """One suspect at one site with one choice of its shape.
+
+    `site` is a joint (drives, encoders), a link (forces of the laboratory), the floor, T (its mounting), a channel,
+    "Tx", two or three of them ("Tx<-Fz", "Tx<-Fy<-Fz"), or a stream ("wrench", "encoder").
+    """
+
+    effect: Effect | Sensing
+    site: str
+    shape: tuple[tuple[str, float], ...]  # every parameter that is neither an amplitude nor shared
+    point: Place | None = None  # of a force: where it acts on the link; None is the CoG
+    again: tuple[Candidate, ...] = ()  # further actions of the same law there, as of other orders
+    longest: float = np.inf  # s, of the recordings
+
+    @property
+    def name(self) -> str:
+        """The law's, whichever of its actions this is."""
+        return (
+            self.effect.name.removesuffix(self.effect.tag)
+            if isinstance(self.effect, Effect)
+            else self.effect.name
+        )
+
+    @property
+    def port(self) -> Port | SensingPort:
+        return self.effect.port
+
+    @property
+    def amplitudes(self) -> tuple[Parameter, ...]:
+        """Parameters that it is linear in, action by action."""
+        own = tuple(entry for entry in self.effect.parameters if entry.role == "amplitude")
+        return own + tuple(entry for other in self.again for entry in other.amplitudes)
+
+    @property
+    def actions(self) -> tuple[Candidate, ...]:
+        """Each of its actions alone."""
+        return (replace(self, again=()), *self.again)
+
+
+def candidates(
+    rig: Rig,
+    nominal: Sequence[str],
+    ranges: Ranges,
+    columns: Sequence[str],
+    channels: Sequence[str],
+    *,
+    accepted: Sequence[str] = (),
+    field_recorded: bool = True,
+) -> tuple[Candidate, ...]:
+    """Every suspect of a rig: what the nominal model leaves out of the plant, then what sensors may do.
+
+    `columns` are those of the signals along which suspects are run, `channels` those of the prediction. An effect among
+    the `accepted` that acts at a site already is a suspect there once more, as its next action.
+    """
+    left_out = [
+        effect
+        for effect in CATALOGUE
+        if effect.name not in nominal and not (effect.recorded and (field_recorded or rig.controller is None))
+    ]
+    longest = ranges.longest
+    plant = [
+        Candidate(effect, site, shape, point, longest=longest)
+        for law in left_out
+        if any(entry.role == "amplitude" for entry in law.parameters)
+        for site in _sites(law, rig, columns)
+        for effect in [next_action(law, rig, site, accepted)]
+        for point in points_of(effect, rig, site)
+        for shape in _grid(effect, site, ranges, own_values(rig, site))
+    ]
+    sensing = [
+        Candidate(law, site, shape, longest=longest)
+        for law in SENSING
+        for site in _sensed_sites(law, rig, channels, ranges)
+        for shape in _grid(law, site, ranges, {})
+    ]
+    return (*plant, *sensing)
+
+
+def _sites(effect: Effect, rig: Rig, columns: Sequence[str]) -> list[str]:
+    if effect.port is Port.BASE_ACCELERATION:
+        return [FLOOR] if rig.transducer.channels else []
+    if effect.port is Port.BASE_TORQUE:
+        return [TRANSDUCER] if plate_turns(rig) and plate_column("x") in columns else []
+    if effect.port is Port.EXTERNAL_FORCE:
+        # A screen has velocities as T sees them.
+        blind = rig.transducer.on != LAB and bool(VELOCITIES & set(effect.arguments))
+        return [] if blind else [name for name in rig.joint_names if name in links_beyond(rig)]
+    shared = [entry.name for entry in effect.parameters if entry.role == "shared"]
+    needed = [name for name in signals_of(effect) if name != "time"]
+
+    reached = felt_from_the_ground(rig)
+
+    def fits(joint: Joint) -> bool:
+        if effect.port is Port.GROUND_TORQUE and joint.name not in reached:
+            return False
+        if effect.of_weight and not weighed(rig, joint):
+            return False
+        if effect is JOINT_ORDER and _direct(joint):
+            return False  # the motor's orders are the joint's
+        own = {} if joint.drive is None else joint.drive.parameters
+        turned = joint.drive is not None or "ratio" not in effect.arguments
+        return (
+            turned
+            and all(name in own for name in shared)
+            and all(f"{name}.{joint.name}" in columns for name in needed)
+        )
+
+    return [joint.name for joint in rig.joints if fits(joint)]
+
+
+def _direct(joint: Joint) -> bool:
+    """Whether a motor turns with its joint."""
+    return joint.effort is not None if joint.drive is None else float(joint.drive.ratio) == 1.0
+
+
+def weighed(rig: Rig, joint: Joint) -> bool:
+    """Whether weight has a moment about a joint's axis: one that turns and is not along gravity."""
+    axis = poses(rig, np.zeros((1, len(rig.joints))))[joint.name].axis
+    return joint.type == "revolute" and bool(abs(axis[0, 2]) < _ALONG_GRAVITY)
+
+
+def felt_from_the_ground(rig: Rig) -> frozenset[str]:
+    """Joints of which a torque against the ground shows otherwise than one between their links: in a transducer."""
+    return links_beyond(rig) if rig.transducer.channels else frozenset()
+
+
+def next_action(effect: Effect, rig: Rig, site: str, accepted: Sequence[str]) -> Effect:
+    """The effect itself, or its first instance that does not act at the site; the last, where all do."""
+    return next(free_actions(effect, rig, site, accepted), instance(effect, ACTIONS))
+
+
+def free_actions(effect: Effect, rig: Rig, site: str, accepted: Sequence[str]) -> Iterator[Effect]:
+    """Of the effect itself and its instances those that do not act at the site."""
+    own = own_values(rig, site)
+    for number in range(1, ACTIONS + 1):
+        action = effect if number == 1 else instance(effect, number)
+        amplitudes = [entry.name for entry in action.parameters if entry.role == "amplitude"]
+        # A drive's effect has numbers at every joint; one of the laboratory acts at a single place.
+        here = not action.port.of_drive or any(own.get(name, 0.0) for name in amplitudes)
+        if action.name not in accepted or not here:
+            yield action
+
+
+def own_values(rig: Rig, site: str) -> dict[str, float]:
+    """Numbers that the rig has for the effects at a site."""
+    values: dict[str, float] = {}
+    for load in rig.external:
+        if load.on == site:
+            values |= {name: float(quantity) for name, quantity in load.parameters.items()}
+    for joint in rig.joints:
+        if joint.name == site and joint.drive is not None:
+            values |= {name: float(quantity) for name, quantity in joint.drive.parameters.items()}
+    return values
+
+
+def _grid(
+    effect: Effect | Sensing, site: str, ranges: Ranges, own: Mapping[str, float]
+) -> Iterator[tuple[tuple[str, float], ...]]:
+    """Every choice of an effect's shape; a parameter without a grid is what the rig has, or its prior's middle."""
+    shapes = [entry for entry in effect.parameters if entry.role == "shape"]
+    # Whichever action of a law it is, its shape's grid has one name.
+    tag = effect.tag if isinstance(effect, Effect) else ""
+    grids = [replace(entry, name=entry.name.removesuffix(tag)) for entry in shapes]
+    choices = [
+        ranges.choices(grid, site, own.get(entry.name)) for entry, grid in zip(shapes, grids, strict=True)
+    ]
+    for point in product(*choices):
+        yield tuple((entry.name, value) for entry, value in zip(shapes, point, strict=True))
+
+
+def couplings(channels: Sequence[str]) -> list[str]:
+    """Sites of what one channel does to another."""
+    return [f"{reads}{BY}{acts}" for reads in channels for acts in channels if reads != acts]
+
+
+def products(channels: Sequence[str]) -> list[str]:
+    """Sites of what the product of two channels does to one; its own square is its non-linearity's."""
+    pairs = list(combinations_with_replacement(channels, 2))
+    return [BY.join((reads, *pair)) for reads in channels for pair in pairs if pair != (reads, reads)]
+
+
+def _sensed_sites(
+    law: Sensing,
+    rig: Rig,
+    channels: Sequence[str],
+    ranges: Ranges,
+) -> list[str]:
+    encoders = [name for name in rig.joint_names if name in channels]
+    loads = [name for name in channels if name not in encoders]
+    if "temperature" in law.arguments and not ranges.temperature:
+        return []
+    match law.port:
+        case SensingPort.CHANNEL:
+            return loads
+        case SensingPort.COUPLING:
+            return couplings([name for name in loads if name in WRENCH_CHANNELS])
+        case SensingPort.PRODUCT:
+            return products([name for name in loads if name in WRENCH_CHANNELS])
+        case SensingPort.ENCODER:
+            return encoders
+        case SensingPort.STREAM:
+            return [*(["wrench"] if loads else []), *(["encoder"] if encoders else [])]

@@ -1,0 +1,1 @@
+"""From candidate effects to what a diagnosis reports."""

@@ -1,0 +1,1 @@
+"""Identification of a rig's numbers from its recordings: search, objective, uncertainty."""

@@ -1,0 +1,1 @@
+"""The plant as compiled code: generated, stepped, simulated."""

@@ -1,0 +1,1 @@
+"""The plant linearised: modes, modal models, forced response."""

@@ -1,0 +1,1 @@
+"""MCAP files: read a chunk at a time, verified, never trusted; and written."""

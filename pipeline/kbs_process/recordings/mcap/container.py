@@ -1,0 +1,303 @@
+"""One pass over an MCAP file: every chunk verified, everything unreadable counted, located and passed over.
+
+The file is read front to back, never by its index: so a damaged index misleads nobody, chunks cannot
+overlap, and the work is proportional to the file's size. Where a record's frame is broken, reading
+resumes at the next chunk (or message outside a chunk) that is consistent in itself.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Generator, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+
+from kbs_process.recordings.mcap import framing as mcap
+from kbs_process.recordings.mcap.checksum import crc32
+from kbs_process.recordings.mcap.compression import LARGEST, Decompressor
+from kbs_process.recordings.mcap.framing import MalformedError
+from kbs_process.recordings.mcap.kernels import Bytes, Words, walk
+from kbs_process.signals.records import TRUNCATED, Loss
+
+WINDOW = 1 << 20  # bytes read at a time: they stay in the processor's cache until used
+CANDIDATE = re.compile(rb"(?=([\x05\x06]).{5}\x00\x00\x00)", re.DOTALL)  # a chunk or message below 2^40 bytes
+MOST_ENTRIES = 1 << 17  # schemas and channels that one chunk may hold: all numbers there are
+OPCODE, CHANNEL, LOG, AT, SIZE = range(5)  # rows of the table that `walk` returns
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Segment:
+    """Messages in one buffer, which is theirs alone, and what the file has described up to there."""
+
+    buffer: Bytes
+    table: Words  # (5, n): OPCODE, CHANNEL, LOG, AT, SIZE
+    dictionary: mcap.Dictionary
+
+
+class Container:
+    """The segments of one file, and what was lost on the way."""
+
+    def __init__(self, path: Path, dictionary: mcap.Dictionary, origin: int | None) -> None:
+        self.path = path
+        self.size = path.stat().st_size
+        self.dictionary = dictionary
+        self._known = dictionary.copy()  # as the segments have it: they may be in use while reading goes on
+        self.losses: list[Loss] = []
+        self.origin = origin  # log time of the recording's first message, ns: zero of the losses' times
+        self._last: int | None = None
+        self._decompress = Decompressor()
+        self._buffer = np.zeros(WINDOW, dtype=np.uint8)
+        self._at = 0  # in the file, of the buffer's first byte
+        self._left = 0  # bytes carried over from the window before
+        self._crc: int | None = crc32(mcap.MAGIC)  # of all before the buffer; None where some was skipped
+        self._loose = False  # the file has messages outside chunks
+
+    def lose(
+        self, kind: str, detail: str, *, count: int = 1, start: int | None = None, end: int | None = None
+    ) -> None:
+        """Note a loss; `start` and `end` are log times in ns."""
+        self.losses.append(Loss(kind, self.path.name, count, self.seconds(start), self.seconds(end), detail))
+
+    def seconds(self, log: int | None) -> float | None:
+        """Return a log time in s since the recording's first message."""
+        return None if log is None or self.origin is None else (log - self.origin) / 1e9
+
+    def segments(self) -> Generator[Segment]:
+        """Yield the messages of the file, in its order."""
+        with self.path.open("rb", buffering=0) as file:
+            self._seek(file, len(mcap.MAGIC))
+            while (stop := self._fill(file)) > 0:
+                end, table = self._walk(self._buffer, stop, chunk=False)
+                ends = np.flatnonzero((table[OPCODE] == mcap.DATA_END_OP) & (table[SIZE] == 4))
+                yield from self._window(table[:, : ends[0]] if len(ends) else table)
+                if len(ends):
+                    self._check_data_section(int(table[AT, ends[0]]))
+                    return
+                if end == 0:
+                    self._oversized(file, stop)
+                else:
+                    self._carry(end, stop)
+        self._truncated(self._at, b"")
+
+    @staticmethod
+    def _walk(buffer: Bytes, stop: int, *, chunk: bool) -> tuple[int, Words]:
+        """Return where the records in buffer[:stop] end, and their table."""
+        table = walk(buffer, np.uint64(stop), chunk)
+        return int(table[AT, -1]), table[:, :-1]
+
+    # The window over the file
+
+    def _seek(self, file: BinaryIO, at: int) -> None:
+        file.seek(at)
+        self._at, self._left = at, 0
+
+    def _fill(self, file: BinaryIO) -> int:
+        """Read on behind the bytes carried over; return how many the buffer holds."""
+        room = memoryview(self._buffer)[self._left :]  # type: ignore[arg-type]
+        return self._left + file.readinto(room)  # type: ignore[attr-defined, no-any-return]
+
+    def _carry(self, end: int, stop: int) -> None:
+        self._add_crc(self._buffer[:end])
+        self._left = stop - end
+        view = memoryview(self._buffer)  # type: ignore[arg-type]
+        view[: self._left] = view[end:stop]  # unlike numpy's arrays, moved without a copy where they overlap
+        self._at += end
+
+    def _oversized(self, file: BinaryIO, stop: int) -> None:
+        """Deal with a first record that does not fit the window: too long, cut off, or none at all."""
+        head = self._buffer[: min(stop, mcap.CHUNK_HEAD_MAX + mcap.RECORD_HEAD.size)].tobytes()
+        if stop < mcap.RECORD_HEAD.size:
+            self._truncated(self._at, head)
+            self._seek(file, self.size)
+            return
+        opcode, length = mcap.RECORD_HEAD.unpack_from(head)
+        end = self._at + mcap.RECORD_HEAD.size + length
+        if opcode == 0 or end > self.size or (opcode == mcap.MESSAGE_OP and length < 22):
+            self._resume(file, head)
+        elif stop == len(self._buffer) and length <= LARGEST:
+            self._buffer = np.zeros(mcap.RECORD_HEAD.size + length, dtype=np.uint8)
+            self._seek(file, self._at)
+        elif stop < len(self._buffer):
+            self._truncated(self._at, head)  # the file has become shorter meanwhile
+            self._seek(file, self.size)
+        else:
+            self._pass_over(file, opcode, length)
+
+    def _pass_over(self, file: BinaryIO, opcode: int, length: int) -> None:
+        """Check an attachment that is too large for memory; anything else of that size is lost."""
+        if opcode != mcap.ATTACHMENT_OP:
+            self.lose("undecodable", f"a record of {length} bytes at byte {self._at}")
+        file.seek(self._at)
+        self._add_crc(file.read(mcap.RECORD_HEAD.size))
+        crc, left = 0, length - 4
+        while left and (piece := file.read(min(left, WINDOW))):
+            crc, left = crc32(piece, crc), left - len(piece)
+            self._add_crc(piece)
+        tail = file.read(4)
+        self._add_crc(tail)
+        if opcode == mcap.ATTACHMENT_OP:
+            self._check_attachment(crc, int.from_bytes(tail, "little"))
+        self._seek(file, self._at + mcap.RECORD_HEAD.size + length)
+
+    def _add_crc(self, piece: Bytes | bytes) -> None:
+        if self._crc is not None:
+            self._crc = crc32(piece, self._crc)
+
+    def _check_data_section(self, at: int) -> None:
+        """Check the CRC over all records before the one whose content begins at `at`, where there is one."""
+        expected = int.from_bytes(self._buffer[at : at + 4].tobytes(), "little")
+        self._add_crc(self._buffer[: at - mcap.RECORD_HEAD.size])
+        if expected and self._crc not in (None, expected):
+            self.lose("crc", "the data section's CRC is wrong: something in the file has changed")
+
+    # Records
+
+    def _window(self, table: Words) -> Iterator[Segment]:
+        first = 0
+        for i in np.flatnonzero(table[OPCODE] != mcap.MESSAGE_OP).tolist():
+            opcode, content = int(table[OPCODE, i]), self._content(self._buffer, table[:, i])
+            if opcode == mcap.CHUNK_OP:
+                yield from self._loose_messages(table[:, first:i])
+                first = i
+                yield from self._chunk(content)
+            else:
+                self._record(opcode, content, self._at + int(table[AT, i]))
+        yield from self._loose_messages(table[:, first:])
+
+    def _loose_messages(self, table: Words) -> Iterator[Segment]:
+        messages = table[OPCODE] == mcap.MESSAGE_OP
+        if messages.any():
+            self._loose = True
+            yield self._segment(self._buffer.copy(), table[:, messages])
+
+    def _segment(self, buffer: Bytes, table: Words) -> Segment:
+        if self.origin is None:
+            self.origin = int(table[LOG, 0])
+        self._last = int(table[LOG, -1])
+        if self.dictionary.size > self._known.size:
+            self._known = self.dictionary.copy()
+        return Segment(buffer, table, self._known)
+
+    @staticmethod
+    def _content(buffer: Bytes, column: Words) -> memoryview:
+        at = int(column[AT])
+        return memoryview(buffer)[at : at + int(column[SIZE])]  # type: ignore[arg-type]
+
+    def _record(self, opcode: int, content: memoryview, place: int) -> None:
+        """Check a record that is no message and no chunk, and learn schemas and channels from it."""
+        try:
+            if opcode in (mcap.SCHEMA_OP, mcap.CHANNEL_OP):
+                self.dictionary.add(opcode, bytes(content))
+            elif opcode == mcap.MESSAGE_INDEX_OP:
+                mcap.parse_message_index(bytes(content))
+            elif opcode == mcap.ATTACHMENT_OP:
+                crc = int.from_bytes(content[-4:], "little")
+                self._check_attachment(crc32(content[:-4]), crc)
+            elif opcode == mcap.HEADER_OP and place != len(mcap.MAGIC) + mcap.RECORD_HEAD.size:
+                raise MalformedError("a second header")
+            elif opcode not in (mcap.HEADER_OP, mcap.METADATA_OP) and opcode < mcap.PRIVATE_OP:
+                raise MalformedError(f"opcode {opcode} does not belong there")
+        except MalformedError as error:
+            self.lose("undecodable", f"record at byte {place}: {error}")
+
+    def _check_attachment(self, crc: int, expected: int) -> None:
+        if expected not in (0, crc):
+            self.lose("crc", "an attachment's CRC is wrong")
+
+    def _chunk(self, content: memoryview) -> Iterator[Segment]:
+        """Verify, decompress and walk a chunk; a bad one is lost as a whole."""
+        try:
+            head = mcap.parse_chunk_head(bytes(content[: mcap.CHUNK_HEAD_MAX]), len(content))
+        except MalformedError as error:
+            self.lose("undecodable", f"chunk: {error}", start=self._last)
+            return
+        span = {"start": head.start, "end": head.end}
+        try:
+            buffer = self._decompress(head.compression, content[head.at :], head.size)
+        except MalformedError as error:
+            self.lose("undecodable", f"chunk: {error}", **span)
+            return
+        if head.crc and crc32(memoryview(buffer)[: head.size]) != head.crc:  # type: ignore[arg-type]
+            self.lose("crc", "chunk with a wrong CRC", **span)
+            return
+        end, table = self._walk(buffer, head.size, chunk=True)
+        if end != head.size:
+            self.lose("undecodable", f"chunk: its last {head.size - end} bytes are no records", **span)
+        others = np.flatnonzero(table[OPCODE] != mcap.MESSAGE_OP)
+        if len(others) > MOST_ENTRIES:
+            self.lose("undecodable", f"chunk: {len(others)} schemas and channels", **span)
+            return
+        for i in others:
+            try:
+                self.dictionary.add(int(table[OPCODE, i]), bytes(self._content(buffer, table[:, i])))
+            except MalformedError as error:
+                self.lose("undecodable", f"record in a chunk: {error}", **span)
+        if len(others) < table.shape[1]:
+            yield self._segment(buffer, np.delete(table, others, axis=1) if len(others) else table)
+
+    # Damage
+
+    def _resume(self, file: BinaryIO, head: bytes) -> None:
+        """Go on at the next consistent chunk or loose message, or end the pass as truncated."""
+        broken = self._at
+        self._crc = None
+        for place in self._candidates(file, broken + 1):
+            if self._consistent(file, place):
+                self.lose(
+                    "undecodable",
+                    f"{place - broken} bytes from byte {broken} are no records",
+                    start=self._last,
+                )
+                self._seek(file, place)
+                return
+        self._truncated(broken, head)
+        self._seek(file, self.size)
+
+    def _candidates(self, file: BinaryIO, at: int) -> Iterator[int]:
+        while at < self.size:
+            file.seek(at)
+            piece = file.read(WINDOW)
+            for match in CANDIDATE.finditer(piece):
+                if match[1] == b"\x06" or self._loose:
+                    yield at + match.start()
+            if at + len(piece) >= self.size:
+                return
+            at += len(piece) - mcap.RECORD_HEAD.size + 1
+
+    def _consistent(self, file: BinaryIO, at: int) -> bool:
+        """Whether a chunk at `at` agrees with itself, or a message there with what follows it."""
+        file.seek(at)
+        head = file.read(mcap.RECORD_HEAD.size + mcap.CHUNK_HEAD_MAX)
+        opcode, length = mcap.RECORD_HEAD.unpack_from(head)
+        end = at + mcap.RECORD_HEAD.size + length
+        if end > self.size:
+            return False
+        if opcode == mcap.CHUNK_OP:
+            try:
+                chunk = mcap.parse_chunk_head(head[mcap.RECORD_HEAD.size :], length)
+            except MalformedError:
+                return False
+            return chunk.compression in ("", "zstd", "lz4")
+        channel = int.from_bytes(head[mcap.RECORD_HEAD.size :][:2], "little")
+        if length < 22 or channel not in self.dictionary.channels:
+            return False
+        file.seek(end)
+        follower = file.read(mcap.RECORD_HEAD.size)
+        if len(follower) < mcap.RECORD_HEAD.size:
+            return not follower
+        opcode, length = mcap.RECORD_HEAD.unpack(follower)
+        return bool(opcode <= mcap.DATA_END_OP and length <= self.size - end - mcap.RECORD_HEAD.size)
+
+    def _truncated(self, at: int, head: bytes) -> None:
+        """Note that the file ends without its end mark, `self.size - at` bytes of it unread."""
+        if any(loss.kind == TRUNCATED for loss in self.losses):
+            return
+        end = None
+        if len(head) >= mcap.RECORD_HEAD.size + mcap.CHUNK_HEAD.size and head[0] == mcap.CHUNK_OP:
+            end = mcap.CHUNK_HEAD.unpack_from(head, mcap.RECORD_HEAD.size)[1]
+        self.lose(
+            TRUNCATED, f"{self.size - at} bytes unread; the file was not closed", start=self._last, end=end
+        )

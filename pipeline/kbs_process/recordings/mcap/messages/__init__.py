@@ -1,0 +1,1 @@
+"""Messages of MCAP files, in each encoding: decoded and encoded."""

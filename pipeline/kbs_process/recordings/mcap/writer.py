@@ -1,0 +1,196 @@
+"""Writing MCAP: deterministic, in the order of log times, and read again before it counts as written."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+from hashlib import blake2b
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+from mcap.writer import CompressionType, Writer
+
+from kbs_process.errors import OutputError
+from kbs_process.recordings.mcap.messages.encoding import OutStream, payloads
+from kbs_process.recordings.mcap.messages.schemas import (
+    TYPES,
+    json_schema,
+    protobuf_name,
+    protobuf_schema,
+    ros2_schema,
+)
+from kbs_process.recordings.mcap.source import open_recording
+from kbs_process.recordings.mcap.streams import Stream
+from kbs_process.signals.records import Block
+
+CHUNK = 1 << 20  # bytes, uncompressed
+BATCH = 1 << 16  # messages gathered before some are written
+HOLD = 1 << 20  # messages that wait for older ones of another topic
+
+
+def write_mcap(path: Path, streams: Sequence[OutStream]) -> None:
+    """Write whole streams to `path`, as `write_pieces` does, in the order of their log times throughout."""
+    if len({stream.topic for stream in streams}) != len(streams):
+        raise ValueError("two streams of one topic")
+    write_pieces(path, streams, hold=sum(len(stream.log) for stream in streams))
+
+
+def write_pieces(path: Path, pieces: Iterable[OutStream], *, hold: int = HOLD) -> None:
+    """Write pieces of streams to `path` in one step: it holds all of them, verified, or what it held before.
+
+    A topic is known from its first piece, which may be empty: it should come before the second of any other.
+    The messages are put in the order of their log times as far as `hold` of them reach: little more than these
+    are ever in memory. The same pieces give the same bytes. Raises `OutputError` where the file cannot be
+    written, or does not give back what was written to it.
+    """
+    draft = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        with draft.open("wb") as file:
+            topics = _write(file, pieces, hold)
+            file.flush()
+            os.fsync(file.fileno())
+        _verify(draft, topics)
+        draft.replace(path)
+    except OSError as error:
+        raise OutputError(f"cannot be written: {error.strerror}", where=str(path)) from error
+    finally:
+        draft.unlink(missing_ok=True)
+
+
+class _Digest:
+    """What went through, whatever the pieces: how many messages, and a hash of each of their columns."""
+
+    def __init__(self) -> None:
+        self.count = 0
+        self._hashes = [blake2b(digest_size=16) for _ in range(3)]
+
+    def add(self, data: Block | OutStream) -> None:
+        self.count += len(data.stamp)
+        # All NaN are one: some encodings have but one. Adding zero makes one of both zeros, which are equal.
+        values = np.where(np.isnan(data.values), np.nan, data.values) + 0.0
+        for column, known in zip((data.stamp, data.log, values), self._hashes, strict=True):
+            known.update(np.ascontiguousarray(column).tobytes())
+
+    def result(self) -> tuple[int, list[bytes]]:
+        return self.count, [known.digest() for known in self._hashes]
+
+
+def _head(stream: OutStream) -> OutStream:
+    """Return the stream without its messages."""
+    return replace(
+        stream, stamp=stream.stamp[:0].copy(), log=stream.log[:0].copy(), values=stream.values[:0].copy()
+    )
+
+
+class _Topic:
+    """A topic being written: its messages that still wait, and what has been written of it."""
+
+    def __init__(self, first: OutStream, number: int) -> None:
+        self.head = _head(first)
+        self.number = number
+        self.written = _Digest()
+        self.latest = -1 << 63
+        self._pieces: list[OutStream] = []
+
+    def add(self, piece: OutStream) -> None:
+        like = replace(self.head, stamp=piece.stamp, log=piece.log, values=piece.values)
+        if like.fields != self.head.fields or piece.encoding != self.head.encoding:
+            raise ValueError(f"{piece.topic}: pieces of different kinds")
+        if len(piece.log):
+            self._pieces.append(like)
+            self.latest = max(self.latest, int(piece.log.max()))
+
+    def logs(self) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
+        """Return the log times of the messages that wait."""
+        return np.concatenate([self.head.log[:0], *(piece.log for piece in self._pieces)])
+
+    def take(self, limit: int) -> OutStream:
+        """Return, in order, the messages that wait and are older than `limit`."""
+        log = self.logs()
+        order = np.argsort(log, kind="stable")
+        stamp = np.concatenate([self.head.stamp[:0], *(piece.stamp for piece in self._pieces)])
+        values = np.concatenate([self.head.values[:0], *(piece.values for piece in self._pieces)])
+        split = int(np.searchsorted(log[order], limit))
+        go, stay = (
+            replace(self.head, stamp=stamp[rows], log=log[rows], values=values[rows])
+            for rows in (order[:split], order[split:])
+        )
+        self._pieces = [stay] if len(stay.log) else []
+        return go
+
+
+def _write(file: BinaryIO, pieces: Iterable[OutStream], hold: int) -> list[_Topic]:
+    """Write the pieces; return their topics."""
+    writer = Writer(file, chunk_size=CHUNK, compression=CompressionType.ZSTD, enable_data_crcs=True)
+    topics: dict[str, _Topic] = {}
+    waiting, due = 0, BATCH
+    for piece in pieces:
+        if not topics:
+            writer.start(profile="ros2" if piece.encoding == "ros2" else "", library="kbs-process")
+        if piece.topic not in topics:
+            topics[piece.topic] = _Topic(piece, _register(writer, piece))
+        elif waiting >= due:  # only now: before a topic comes again, others may still be unknown
+            limit = min(topic.latest for topic in topics.values())
+            if waiting > hold:
+                logs = np.sort(np.concatenate([topic.logs() for topic in topics.values()]))
+                limit = max(limit, int(logs[len(logs) - hold // 2]))
+            waiting -= _flush(writer, list(topics.values()), limit)
+            due = waiting + BATCH
+        topics[piece.topic].add(piece)
+        waiting += len(piece.log)
+    if not topics:
+        writer.start(library="kbs-process")
+    _flush(writer, list(topics.values()), (1 << 63) - 1)
+    writer.finish()  # type: ignore[no-untyped-call]
+    return list(topics.values())
+
+
+def _flush(writer: Writer, topics: Sequence[_Topic], limit: int) -> int:
+    """Write the messages older than `limit`, of equal age in the order of the topics; return how many."""
+    ready = [topic.take(limit) for topic in topics]
+    order = np.argsort(np.concatenate([stream.log for stream in ready]), kind="stable") if ready else ()
+    which = np.repeat(np.arange(len(ready)), [len(stream.log) for stream in ready])[order].tolist()
+    rows = [_messages(stream, topic.written.count) for stream, topic in zip(ready, topics, strict=True)]
+    for number in which:
+        log, stamp, sequence, payload = next(rows[number])
+        writer.add_message(topics[number].number, log, payload, publish_time=stamp, sequence=sequence)
+    for topic, stream in zip(topics, ready, strict=True):
+        topic.written.add(stream)
+    return len(which)
+
+
+def _messages(stream: OutStream, first: int) -> Iterator[tuple[int, int, int, bytes]]:
+    """Yield (log, stamp, sequence, payload); `first` is the sequence number of the first."""
+    rows = zip(stream.log.tolist(), stream.stamp.tolist(), payloads(stream), strict=True)
+    for sequence, (log, stamp, payload) in enumerate(rows, start=first):
+        yield log, stamp, sequence, payload
+
+
+def _register(writer: Writer, stream: OutStream) -> int:
+    kind = stream.kind
+    if stream.encoding == "ros2":
+        schema = writer.register_schema(TYPES[kind], "ros2msg", ros2_schema(kind))
+    elif stream.encoding == "json":
+        schema = writer.register_schema(TYPES[kind], "jsonschema", json_schema(kind))
+    else:
+        schema = writer.register_schema(protobuf_name(kind), "protobuf", protobuf_schema())
+    return writer.register_channel(
+        stream.topic, "cdr" if stream.encoding == "ros2" else stream.encoding, schema
+    )
+
+
+def _verify(path: Path, topics: Sequence[_Topic]) -> None:
+    """Read the file and compare every number with what was to be written."""
+    source = open_recording(path)
+    found = {topic.head.topic: _Digest() for topic in topics}
+    for name, block in source.read([Stream(s.topic, s.topic, s.fields) for s in (t.head for t in topics)]):
+        found[name].add(block)
+    for topic in topics:
+        name = topic.head.topic
+        if found[name].result() != topic.written.result():
+            raise OutputError(f"{name} does not read back as it was written", where=str(path))
+    lost = [loss for loss in source.losses if loss.kind not in ("non-finite", "missing field")]
+    if lost:
+        raise OutputError(f"reads back with losses: {lost}", where=str(path), remedy="check the disk")

@@ -1,0 +1,1 @@
+"""A campaign's recordings through the stages: read, prepared, predicted, analysed, judged."""

@@ -1,0 +1,157 @@
+"""Readings that a transducer's channel holds although it has noise: saturated, cut off or dead.
+
+They are left out as if they were missing. A joint's effort may be what was commanded, or zero behind a brake, and is
+not looked at.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from kbs_process.campaign.config import Campaign, RecordingEntry
+from kbs_process.errors import RecordingError
+from kbs_process.reduction.reading import read_run
+from kbs_process.rig.model import Rig
+from kbs_process.signals.records import Array, Block, Loss, Mask, Run
+from kbs_process.stages.align.ordering import concatenate, select
+
+HELD_S = (
+    0.5  # longer than any channel with noise shows one and the same reading, whatever its amplifier passes
+)
+DEAD = 0.5  # share of a recording beyond which a channel that is held is no channel
+
+
+def noisy(rig: Rig) -> dict[str, bool]:
+    """By recorded channel, whether its noise is greater than half its resolution: no reading stays the same then."""
+    index = rig.loads.index(rig.transducer.channels)
+    noise, step = rig.transducer.noise.value[index], rig.transducer.resolution.value[index]
+    return dict(zip(rig.transducer.channels, (noise > 0.0) & (noise >= 0.5 * step), strict=True))
+
+
+class Alive:
+    """Passes the blocks of a recording on, without rows in which a channel is held; tells what it has left out.
+
+    With `keep` it leaves nothing out and tells all the same: a peak that was cut off was no smaller.
+    """
+
+    def __init__(self, rig: Rig, entry: RecordingEntry, *, keep: bool = False) -> None:
+        able = noisy(rig)
+        self._entry = entry
+        self._stream = _Stream(
+            {place: name for place, name in enumerate(rig.transducer.channels) if able[name]}, keep
+        )
+
+    def __call__(self, blocks: Iterator[tuple[str, Block]]) -> Iterator[tuple[str, Block]]:
+        """Yield the blocks; raises RecordingError at the end where a channel was held for most of the time.
+
+        Nothing is raised of what is kept: simulated recordings may have no noise.
+        """
+        for key, block in blocks:
+            watched = key == "wrench" and self._stream.channels and len(block)
+            yield key, self._stream.push(block) if watched else block
+        if (last := self._stream.flush()) is not None:
+            yield "wrench", last
+        if not self._stream.keep:
+            self._stream.check(self._entry)
+
+    @property
+    def losses(self) -> tuple[Loss, ...]:
+        return tuple(self._stream.losses())
+
+
+def read_alive(campaign: Campaign, entry: RecordingEntry, *, keep: bool = False) -> Run:
+    """Read a recording without what its channels were held in, or with it (`keep`); its losses tell of that.
+
+    Raises RecordingError where a channel was held most of the time, and that is not kept.
+    """
+    alive = Alive(campaign.rig, entry, keep=keep)
+    run = read_run(campaign, entry, alive)
+    return replace(run, losses=(*run.losses, *alive.losses))
+
+
+@dataclass(slots=True)
+class _Stream:
+    """Rows wait until those of `HELD_S` behind them are there, and stay for as long to be looked at with later ones."""
+
+    channels: Mapping[int, str]  # by column
+    keep: bool = False
+    rows: int = 0
+    first: int = 0  # ns
+    counts: dict[int, int] = field(default_factory=dict)
+    spans: dict[int, tuple[int, int]] = field(default_factory=dict)  # ns
+    reading: dict[int, float] = field(default_factory=dict)
+    _block: Block | None = None
+    _done: int = 0  # rows of it that were passed on
+
+    def push(self, block: Block) -> Block:
+        if self._block is None and len(block):
+            self.first = int(block.stamp[0])
+        self._block = block if self._block is None else concatenate([self._block, block])
+        return self._release(_least(self._block))
+
+    def flush(self) -> Block | None:
+        return None if self._block is None else self._release(0)
+
+    def _release(self, kept: int) -> Block:
+        block = self._block
+        assert block is not None
+        end = max(len(block) - kept, self._done)
+        part = slice(self._done, end)
+        gone = np.zeros(end - self._done, dtype=np.bool_)
+        least = _least(block)
+        for column, held in ((c, _held(block.values[:, c], least)[part]) for c in self.channels):
+            if held.any():
+                self._note(column, select(block, part), held)
+                gone |= held
+        self.rows += len(gone)
+        start = max(0, end - kept)
+        ready = select(block, part)
+        self._block, self._done = select(block, slice(start, None)), end - start
+        return select(ready, ~gone) if gone.any() and not self.keep else ready
+
+    def _note(self, column: int, block: Block, held: Mask) -> None:
+        stamps = block.stamp[held]
+        self.counts[column] = self.counts.get(column, 0) + len(stamps)
+        begin = self.spans.get(column, (int(stamps[0]), 0))[0]
+        self.spans[column] = begin, int(stamps[-1])
+        self.reading[column] = float(block.values[held, column][-1])
+
+    def check(self, entry: RecordingEntry) -> None:
+        for column, count in self.counts.items():
+            if count > DEAD * self.rows:
+                raise RecordingError(
+                    f"{self.channels[column]} reads {self.reading[column]:.6g} without any noise for "
+                    f"{100.0 * count / self.rows:.0f} % of the time: it is dead, saturated or not connected",
+                    where=str(entry.path),
+                    remedy="take it out of the channels in the parameter files, or the recording out of campaign.toml",
+                )
+
+    def losses(self) -> Iterator[Loss]:
+        detail = "one reading without noise: saturated or cut off"
+        for column, count in self.counts.items():
+            begin, end = ((stamp - self.first) * 1e-9 for stamp in self.spans[column])
+            yield Loss("held", self.channels[column], count, begin, end, detail)
+
+
+def _least(block: Block) -> int:
+    """Rows in `HELD_S`."""
+    if len(block) < 2:
+        return 2
+    period = float(np.median(np.diff(block.stamp))) * 1e-9
+    if period == 0.0:  # stamps of packets, or none
+        spans = (float(times[-1] - times[0]) for times in (block.stamp, block.log))
+        period = next((span for span in spans if span > 0.0), 0.0) * 1e-9 / (len(block) - 1)
+    return max(2, int(np.ceil(HELD_S / period))) if period > 0.0 else len(block)
+
+
+def _held(x: Array, least: int) -> Mask:
+    """(n,) where a reading is one of `least` or more in a row that are the same."""
+    same = np.concatenate([[False], x[1:] == x[:-1], [False]])
+    edges = np.flatnonzero(same[1:] != same[:-1]).reshape(-1, 2)
+    found = np.zeros(len(x), dtype=np.bool_)
+    for start, end in edges[edges[:, 1] - edges[:, 0] + 1 >= least]:
+        found[start : end + 1] = True
+    return found

@@ -1,0 +1,151 @@
+"""Requirements judged: the channel and the recording that are closest to failing decide."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from kbs_process.campaign.config import Campaign, Requirement
+from kbs_process.errors import ConfigError
+from kbs_process.reduction.analysis import Analysis, bands_of
+from kbs_process.reduction.measurable import judged_channels
+from kbs_process.results import judged as results
+from kbs_process.signals.records import Signal
+from kbs_process.stages.bandpass import Band, crossing_rate
+from kbs_process.stages.verdict import (
+    COVERAGE,
+    Extreme,
+    Judgement,
+    extremes,
+    interval,
+    judge,
+    peak_coverage,
+)
+
+SEVERITY: dict[Judgement, int] = {"pass": 0, "undecided": 1, "fail": 2}
+
+
+@dataclass(frozen=True, slots=True)
+class _Candidate:
+    """One channel of one recording against the limit, by its own uncertainty."""
+
+    extreme: Extreme
+    sigma: float
+    limit: float
+    below: float  # sigmas that the true statistic may lie below
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        return interval(self.extreme.value, self.sigma, self.below)
+
+    @property
+    def verdict(self) -> Judgement:
+        return judge(self.extreme.value, self.sigma, self.limit, self.below)
+
+    def severity(self) -> tuple[int, float]:
+        """Order of candidates: the worst verdict, then the highest end of the interval."""
+        return SEVERITY[self.verdict], self.interval[1]
+
+
+def judged(
+    campaign: Campaign,
+    requirement: Requirement,
+    runs: Sequence[Analysis],
+    budgets: Sequence[results.Budget],
+) -> results.Requirement:
+    """Judge a requirement by the channel and recording that are closest to failing it."""
+    band = band_of(requirement, bands_of(campaign.bands))
+    key = (requirement.frame, band.name)
+    channels = judged_channels(requirement, campaign.rig)
+    pairs = [(analysis.entry.name, analysis.pairs[key]) for analysis in runs]
+    below = coverage_below(requirement.statistic, [pair.measured for _, pair in pairs], band)
+    sigmas = {
+        (entry.recording, entry.channel): entry.total for entry in budgets if (entry.frame, entry.band) == key
+    }
+    measured = [
+        _Candidate(extreme, sigmas[extreme.recording, extreme.channel], requirement.limit, below)
+        for extreme in extremes(
+            [(name, pair.measured) for name, pair in pairs], channels, requirement.statistic
+        )
+    ]
+    if not measured:
+        raise ConfigError(
+            f"no sample of {band.name} is known: near a recording's ends and gaps, to some periods of its lower "
+            "edge, none is",
+            where=requirement.name,
+            remedy="record longer, or raise the band's lower edge",
+        )
+    predicted = extremes(
+        [(name, pair.predicted) for name, pair in pairs if pair.predicted is not None],
+        channels,
+        requirement.statistic,
+    )
+    worst = max(measured, key=_Candidate.severity)
+    return results.Requirement(
+        name=requirement.name,
+        quantity=requirement.quantity,
+        frame=requirement.frame,
+        statistic=requirement.statistic,
+        band=band.name,
+        band_Hz=requirement.band,
+        limit=requirement.limit,
+        unit=requirement.unit,
+        value=worst.extreme.value,
+        sigma=worst.sigma,
+        low=worst.interval[0],
+        high=worst.interval[1],
+        margin=requirement.limit - worst.extreme.value,
+        verdict=worst.verdict,
+        recording=worst.extreme.recording,
+        channel=worst.extreme.channel,
+        time_s=worst.extreme.time_s,
+        predicted_value=max((extreme.value for extreme in predicted), default=None),
+        channels=tuple(
+            _channel(channel, measured, predicted)
+            for channel in channels
+            if any(one.extreme.channel == channel for one in measured)
+        ),
+        source=requirement.source,
+    )
+
+
+def _channel(
+    channel: str, measured: Sequence[_Candidate], predicted: Sequence[Extreme]
+) -> results.ChannelResult:
+    """The recording in which a channel is closest to failing, beside the largest prediction of any."""
+    worst = max((one for one in measured if one.extreme.channel == channel), key=_Candidate.severity)
+    return results.ChannelResult(
+        channel=channel,
+        value=worst.extreme.value,
+        sigma=worst.sigma,
+        low=worst.interval[0],
+        high=worst.interval[1],
+        predicted=max((one.value for one in predicted if one.channel == channel), default=None),
+        recording=worst.extreme.recording,
+        time_s=worst.extreme.time_s,
+    )
+
+
+def coverage_below(statistic: str, measured: Sequence[Signal], band: Band) -> float:
+    """Return how many sigmas the true statistic may lie below that of all these signals."""
+    if statistic != "peak":
+        return COVERAGE
+    seconds = sum(float(np.count_nonzero(signal.valid)) * signal.dt for signal in measured)
+    return peak_coverage(crossing_rate(band, measured[0].dt) * seconds)
+
+
+def band_of(requirement: Requirement, bands: Iterable[Band]) -> Band:
+    """Return the band in which a requirement is judged: the one with its upper edge.
+
+    Raises ConfigError where the campaign cuts no such band.
+    """
+    for band in bands:
+        if band.low_pass_Hz is not None and np.isclose(band.low_pass_Hz, requirement.band[1]):
+            return band
+    raise ConfigError(
+        f"the requirement ends at {requirement.band[1]:g} Hz, and no band does",
+        where=requirement.name,
+        remedy=f"add {requirement.band[1]:g} to low_pass_Hz in [bands] of campaign.toml",
+    )

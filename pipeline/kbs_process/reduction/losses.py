@@ -1,0 +1,46 @@
+"""What a recording lacks, as a notice to its reader."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
+
+from kbs_process.campaign.config import RecordingEntry
+from kbs_process.results.records import Notice
+from kbs_process.signals.records import TRUNCATED, Loss
+
+
+def lost(entry: RecordingEntry, losses: Sequence[Loss]) -> Iterable[Notice]:
+    """Yield one notice of what a recording lacks, if that is anything."""
+    kinds: dict[str, list[Loss]] = defaultdict(list)
+    for loss in losses:
+        kinds[loss.kind].append(loss)
+    if kinds:
+        yield Notice(
+            severity="warning" if any(loss.real for loss in losses) else "info",
+            what="; ".join(f"{kind}: {_extent(own, entry.path.name)}" for kind, own in kinds.items()),
+            where=entry.name,
+            remedy=f"kbs-process inspect recordings/{entry.path.name} lists each with its time",
+        )
+
+
+def _extent(losses: Sequence[Loss], file: str) -> str:
+    """How many, and from when to when: "3, between 12.0 s and 14.2 s".
+
+    What the reader of the file found and a stage behind it found again counts once.
+    """
+    by_reader = sum(max(loss.count, 1) for loss in losses if loss.where.startswith(file))
+    behind_it = sum(max(loss.count, 1) for loss in losses if not loss.where.startswith(file))
+    count = str(max(by_reader, behind_it))
+    starts = [loss.start_s for loss in losses if loss.start_s is not None]
+    ends = [loss.end_s for loss in losses if loss.end_s is not None]
+    if not starts:
+        return count
+    first, last = min(starts), max([*ends, *starts])
+    if {loss.kind for loss in losses} == {
+        TRUNCATED
+    }:  # how long it would have been, a file that breaks off does not say
+        return f"{count}, from {first:.1f} s on"
+    return (
+        f"{count}, between {first:.1f} s and {last:.1f} s" if last > first else f"{count}, at {first:.1f} s"
+    )

@@ -1,0 +1,93 @@
+"""The first half of processing, which `validate` goes through as well: recordings read, gravity fitted to them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from kbs_process.campaign.config import Campaign, RecordingEntry
+from kbs_process.errors import RecordingError
+from kbs_process.progress import Progress
+from kbs_process.reduction.held import read_alive
+from kbs_process.reduction.relief import forces_in, relieved, without_effects
+from kbs_process.reduction.settings import gravity_settings, motion_settings
+from kbs_process.signals.records import Run, Signal
+from kbs_process.stages import decouple, motion
+from kbs_process.stages.decouple import Decoupling
+from kbs_process.stages.gravity import model as gravity
+from kbs_process.stages.gravity.model import GravityModel, Sample
+from kbs_process.stages.gravity.taring import Taring
+from kbs_process.stages.motion import Motion
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Prepared:
+    """A recording on one clock, decoupled, with its joints' motion."""
+
+    entry: RecordingEntry
+    raw: Signal
+    run: Run
+    motion: Motion
+
+
+def prepare(
+    campaign: Campaign, entry: RecordingEntry, decoupling: Decoupling, progress: Progress
+) -> Prepared:
+    """Read a recording as processing needs it."""
+    with progress.task(f"Reading {entry.name}"):
+        run = read_alive(campaign, entry, keep=True)
+        if run.loads is None:
+            raise RecordingError(
+                "there is neither wrench nor effort in this recording", where=str(entry.path)
+            )
+        return Prepared(
+            entry,
+            run.loads,
+            decouple.apply(run, decoupling),
+            motion.estimate(run, campaign.rig, motion_settings(campaign)),
+        )
+
+
+def fit_gravity(campaign: Campaign, prepared: Sequence[Prepared], progress: Progress) -> GravityModel:
+    """Fit over calibration and fit recordings; held-out ones are not looked at.
+
+    Nor are those in which the rig pulled at the article, where there are others: what is not known of the pull would be
+    taken for weight.
+    A rig that is driven by its motion has its inertia fitted too; its commands, if any, drive nothing.
+    """
+    with progress.task("Fitting gravity and centres of gravity"):
+        fitted = [one for one in prepared if one.entry.role != "held-out"]
+        free = [one for one in fitted if not forces_in(campaign, one.entry)]
+        samples = [
+            Sample(
+                one.entry.name,
+                one.motion,
+                without_effects(campaign, one.entry, one.motion, loads, campaign.rig),
+                calibration=one.entry.role == "calibration",
+            )
+            for one in free or fitted
+            if (loads := relieved(campaign, one.entry, one.run, one.motion).loads) is not None
+        ]
+        return gravity.fit(
+            samples,
+            campaign.rig,
+            include_inertia=campaign.drive == "motion",
+            settings=gravity_settings(campaign),
+        )
+
+
+def tare(
+    campaign: Campaign, entry: RecordingEntry, run: Run, motion: Motion, model: GravityModel
+) -> tuple[Sample, Taring]:
+    """Return what gravity is taken off of a recording whose cords are relieved, and its zeros.
+
+    Raises RecordingError where too little of it is whole for that.
+    """
+    assert run.loads is not None  # `prepare` demands them
+    sample = Sample(entry.name, motion, without_effects(campaign, entry, motion, run.loads, model.rig))
+    return sample, gravity.tare(sample, model)
+
+
+def check_taring(campaign: Campaign, one: Prepared, model: GravityModel) -> None:
+    """Raise RecordingError where processing could not take gravity off a recording, in the fit or not."""
+    tare(campaign, one.entry, relieved(campaign, one.entry, one.run, one.motion), one.motion, model)

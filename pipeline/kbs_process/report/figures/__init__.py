@@ -1,1 +1,0 @@
-"""The report's figures: the only modules that import matplotlib."""

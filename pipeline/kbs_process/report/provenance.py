@@ -1,0 +1,43 @@
+"""What made these results, and from what."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from kbs_process.report.panel import Block, Fold, Grid, Panel, Text
+from kbs_process.report.text import count, measure, unit
+from kbs_process.results.records import Constant, Provenance
+
+
+def panel(made: Provenance, recorded: Mapping[str, str] | None = None) -> Panel:
+    """Return the section for any kind of results; `recorded` gives checksums of recordings by file."""
+    software = (
+        ("kbs-process", made.version),
+        *((("commit", made.commit),) if made.commit else ()),
+        *((("source, SHA-256", made.source),) if made.source else ()),
+        ("Python", made.python),
+        ("platform", made.platform),
+        *made.libraries.items(),
+    )
+    inputs = dict(recorded or {}) | {entry.file: entry.sha256 for entry in made.inputs}
+    blocks: list[Block] = [
+        Text(f"Made by: {made.command}"),
+        Grid("Software", ("Component", "Version"), software, "ll"),
+        Grid("Inputs", ("File", "SHA-256"), tuple(inputs.items()), "lk"),
+    ]
+    return Panel("provenance", "Provenance", "What made these results, and from what?", tuple(blocks))
+
+
+def constants(entries: Sequence[Constant]) -> Fold:
+    """Return a table of constants that a reader opens on demand."""
+    rows = tuple(
+        (entry.name, *_value(entry.value, entry.sigma), unit(entry.unit), entry.source) for entry in entries
+    )
+    grid = Grid("Constants used", ("Name", "Value", "Unit", "Source"), rows, "lrll")
+    return Fold(f"Constants ({count(len(rows), 'parameter')})", (grid,))
+
+
+def _value(value: float | str, sigma: float | str | None) -> tuple[str]:
+    if isinstance(value, str) or isinstance(sigma, str):
+        return (f"{value} ± {sigma}" if sigma not in (None, "") else f"{value}",)
+    return (measure(value, sigma),)

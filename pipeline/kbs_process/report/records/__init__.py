@@ -1,1 +1,0 @@
-"""The contents of results.json, typed: what all kinds share, and one module a kind."""

@@ -1,0 +1,70 @@
+"""Requirements as judged, and the uncertainty budgets that they are judged by: records of results.json."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from kbs_process.results.records import Record
+
+Verdict = Literal["pass", "fail", "undecided"]
+Frame = Literal["T", "S", "joint"]  # the transducer's, the spacecraft's, or the joints' own, of their efforts
+Statistic = Literal["peak", "rms"]
+
+
+class ChannelResult(Record, frozen=True, kw_only=True):
+    """A requirement's statistic on one channel, over all recordings that count."""
+
+    channel: str
+    value: float | None  # measured, in the requirement's unit
+    sigma: float | None
+    predicted: float | None
+    recording: str | None  # where the measured value occurs
+    time_s: float | None
+    low: float | None = None  # the true one lies between low and high, at 95 %
+    high: float | None = None
+
+
+class Requirement(Record, frozen=True, kw_only=True):
+    """A requirement and what was found: the worst recording and channel decide."""
+
+    name: str
+    quantity: Literal["torque", "force"]
+    frame: Frame
+    statistic: Statistic
+    band: str  # name of a Band
+    band_Hz: tuple[float | None, float | None]  # None: open on that side
+    limit: float
+    unit: str
+    value: float | None  # measured
+    sigma: float | None
+    margin: float | None  # limit less value, in `unit`
+    verdict: Verdict
+    recording: str | None = None
+    channel: str | None = None
+    time_s: float | None = None
+    predicted_value: float | None = None  # the same statistic of the prediction
+    predicted_sigma: float | None = None
+    channels: tuple[ChannelResult, ...] = ()
+    source: str = ""
+    low: float | None = None  # the true value lies between low and high, at 95 %
+    high: float | None = None
+
+
+class BudgetItem(Record, frozen=True, kw_only=True):
+    """One stage's part in a channel's uncertainty."""
+
+    stage: str
+    source: str
+    sigma: float
+
+
+class Budget(Record, frozen=True, kw_only=True):
+    """The uncertainty budget of one channel of a recording in one band; `total` is the root sum of squares."""
+
+    channel: str
+    unit: str
+    frame: Frame
+    band: str
+    contributions: tuple[BudgetItem, ...]
+    total: float
+    recording: str | None = None  # None: of all recordings alike

@@ -1,0 +1,15 @@
+"""What a study tells the command line when it is done."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What the command line tells."""
+
+    verdict_lines: tuple[str, ...]
+    requirement_met: bool | None  # None: there is no requirement, or it is undecided
+    report: Path

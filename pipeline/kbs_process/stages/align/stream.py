@@ -1,0 +1,302 @@
+"""One stream of a recording on its way to the working rate: ordered, timed, regridded, reduced."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from kbs_process.signals.records import PUT_IN_ORDER, Array, Block, Loss, Mask, Stamps
+from kbs_process.stages.align.clocks import ClockData, LatencyFloor
+from kbs_process.stages.align.envelope import MinMax
+from kbs_process.stages.align.grid import AROUND, Grid, Regridder, counted, longest_bridged, nominal_grid
+from kbs_process.stages.align.ordering import Orderer, Reblock, finite_rows, judge
+from kbs_process.stages.align.resample import Kept, Reducer, design
+from kbs_process.stages.align.spectrum import Welch
+
+GAPS_LISTED = 20  # one by one; the others in one line
+
+
+@dataclass(frozen=True, slots=True)
+class Gap:
+    """Samples that are missing between two."""
+
+    start: float  # s on the stream's own clock, last sample before
+    end: float  # first sample after
+    missing: int
+
+
+@dataclass(slots=True)
+class Timeline:
+    """Order, clock, gaps and losses of one stream, common to fast and slow ones."""
+
+    where: str
+    channels: tuple[str, ...] = ()
+    grid: Grid | None = None
+    by_recorder: bool = False
+    gaps: list[Gap] = field(default_factory=list)
+    bridged: float = 0.0  # s, the longest gap that is drawn over, as nothing in the band is so fast
+    missing_bridged: int = 0  # samples in such gaps
+    gaps_unlisted: int = 0
+    missing_unlisted: int = 0
+    non_finite: int = 0  # samples that are NaN or infinite in some channel: all of each is left out
+    samples: int = 0
+    _non_finite_in: dict[str, int] = field(default_factory=dict)  # by channel
+    _reblock: Reblock = field(default_factory=Reblock)
+    _orderer: Orderer | None = None
+    _floor: LatencyFloor | None = None
+    _first: int = 0
+    _last: int = 0
+    _near: Stamps = field(
+        default_factory=lambda: np.empty(0, dtype=np.int64)
+    )  # of steps that are not judged yet
+    _judged: int = 0  # steps between these that are
+
+    def push(self, chunk: Block) -> list[Block]:
+        """Take a chunk in file order; return ordered blocks that nothing can precede any more."""
+        return [ready for block in self._reblock.push(chunk) for ready in self._order(block)]
+
+    def flush(self) -> list[Block]:
+        """Return what was held back."""
+        ready = [ready for block in self._reblock.flush() for ready in self._order(block)]
+        last = self._orderer.flush() if self._orderer else None
+        if last is not None:
+            ready.append(self._timed(last))
+        if self.grid is not None:
+            self._find_gaps(self._near[:0], self.grid, held_back=0)
+        return ready
+
+    def _order(self, block: Block) -> list[Block]:
+        if self._orderer is None:
+            sense = judge(block)
+            self.by_recorder = not sense.stamp and sense.log
+            self._orderer = Orderer(sense)
+        if self.by_recorder:
+            block = Block(block.log, block.log, block.values)
+        released = self._orderer.push(block)
+        return [] if released is None else [self._timed(released)]
+
+    def _timed(self, block: Block) -> Block:
+        if self._floor is None:
+            self._floor = LatencyFloor(int(block.stamp[0]), int(block.log[0]))
+            self._first = self._last = int(block.stamp[0])
+        if self.grid is None and len(block) > 1:
+            self.grid = nominal_grid(block.stamp)
+        self._floor.push(block.stamp, block.log)
+        if self.grid is not None:
+            self._find_gaps(block.stamp, self.grid, held_back=AROUND)
+        self._last = int(block.stamp[-1])
+        self.samples += len(block)
+        return block
+
+    def _find_gaps(self, stamp: Stamps, grid: Grid, held_back: int) -> None:
+        """Judge steps by the stamps around them; the last `held_back` wait for those that follow."""
+        stamp = np.concatenate((self._near, stamp))
+        count = counted(grid.periods(stamp))
+        judged = max(len(count) - held_back, self._judged)
+        for index in self._judged + np.flatnonzero(count[self._judged : judged] > 1.0):
+            missing = int(count[index]) - 1
+            start, end = (self.own_one(int(one)) for one in stamp[index : index + 2])
+            if end - start <= self.bridged:
+                self.missing_bridged += missing
+            elif len(self.gaps) < GAPS_LISTED:
+                self.gaps.append(Gap(start, end, missing))
+            else:
+                self.gaps_unlisted += 1
+                self.missing_unlisted += missing
+        kept = max(judged - AROUND, 0)
+        self._near, self._judged = stamp[kept:].copy(), judged - kept
+
+    def finite(self, block: Block) -> tuple[Stamps, Array]:
+        """Return stamps and values of the samples that are numbers in every channel; count the others, by channel."""
+        good = finite_rows(block.values)
+        if good is None:
+            return block.stamp, block.values
+        self.non_finite += len(good) - int(np.count_nonzero(good))
+        bad_in = (~np.isfinite(block.values)).sum(axis=0).tolist()
+        for channel, bad in zip(self.channels, bad_in, strict=True):
+            if bad:
+                self._non_finite_in[channel] = self._non_finite_in.get(channel, 0) + bad
+        return block.stamp[good], block.values[good]
+
+    @property
+    def non_finite_channels(self) -> str:
+        """In which channels how many samples are NaN or infinite: "Fz in 2000, Tx in 3"."""
+        return ", ".join(
+            f"{name} in {self._non_finite_in[name]}" for name in self.channels if name in self._non_finite_in
+        )
+
+    def own_one(self, stamp: int) -> float:
+        """Time of one stamp, s from the stream's first."""
+        return (stamp - self._first) * 1e-9
+
+    def own(self, stamp: Stamps) -> Array:
+        """Times of stamps, s from the stream's first."""
+        return (stamp - self._first).astype(np.float64) * 1e-9
+
+    @property
+    def first_stamp(self) -> int:
+        return self._first
+
+    @property
+    def span(self) -> float:
+        """From the first sample to the last, s."""
+        return self.own_one(self._last)
+
+    def clock(self) -> ClockData:
+        """What the stream tells about its clock."""
+        assert self._floor is not None
+        return ClockData(self._first, self._floor.first_log, self.span, self._floor.line(), self.by_recorder)
+
+    def losses(self, offset: float, rate: float) -> list[Loss]:
+        """Everything that was wrong, on the run's time axis t = offset + rate own."""
+        found = [
+            Loss("gap", self.where, gap.missing, offset + rate * gap.start, offset + rate * gap.end)
+            for gap in self.gaps
+        ]
+        if self.gaps_unlisted:
+            detail = f"{self.gaps_unlisted} more gaps"
+            found.append(Loss("gap", self.where, self.missing_unlisted, detail=detail))
+        if self.missing_bridged:
+            detail = f"up to {1e3 * self.bridged:.2g} ms each, which is nothing in the band: bridged"
+            found.append(Loss("short gap", self.where, self.missing_bridged, detail=detail))
+        if self.non_finite:
+            detail = f"{self.non_finite_channels}: interpolated"
+            found.append(Loss("non-finite", self.where, self.non_finite, detail=detail))
+        if self.by_recorder:
+            detail = "the sensor's stamps do not advance: the recorder's clock is used"
+            found.append(Loss("clock", self.where, self.samples, detail=detail))
+        if self._orderer is not None:
+            found += self._disorder(self._orderer)
+        return found
+
+    def _disorder(self, orderer: Orderer) -> list[Loss]:
+        found = []
+        if orderer.repeats:
+            found.append(Loss("repeat", self.where, orderer.repeats, detail="same stamp: the first is kept"))
+        if orderer.late:
+            detail = "too late to be put in order: dropped"
+            found.append(Loss("out of order", self.where, orderer.late, detail=detail))
+        placed = orderer.displaced - orderer.late
+        if placed > 0:
+            detail = "arrived after younger ones: nothing is lost by that"
+            found.append(Loss(PUT_IN_ORDER, self.where, placed, detail=detail))
+        if orderer.stray:
+            detail = "stamps more than 10 s off the recorder's clock: dropped"
+            found.append(Loss("clock", self.where, orderer.stray, detail=detail))
+        return found
+
+
+class Collected:
+    """A slow stream, kept sample by sample."""
+
+    def __init__(self, where: str, channels: tuple[str, ...]) -> None:
+        self.line = Timeline(where, channels)
+        self._own: list[Array] = []
+        self._values: list[Array] = []
+
+    def push(self, chunk: Block) -> None:
+        self._take(self.line.push(chunk))
+
+    def finish(self) -> tuple[Array, Array]:
+        """Return times (n,), s from the stream's first sample, and values (n, c)."""
+        self._take(self.line.flush())
+        if not self._own:
+            return np.empty(0), np.empty((0, len(self.line.channels)))
+        return np.concatenate(self._own), np.concatenate(self._values)
+
+    def _take(self, blocks: list[Block]) -> None:
+        for block in blocks:
+            stamp, values = self.line.finite(block)
+            self._own.append(self.line.own(stamp))
+            self._values.append(values)
+
+
+class Uniform:
+    """A fast stream, reduced to a little more than twice the working rate as it passes."""
+
+    def __init__(
+        self,
+        where: str,
+        channels: tuple[str, ...],
+        working_rate: float,
+        *,
+        turning: Sequence[bool] = (),
+        spectrum: tuple[float, float] | None = None,
+        stretches: int = 0,
+        keep_below: float = 0.0,
+    ) -> None:
+        """`turning` channels are angles, which go on through full turns; `spectrum`: (resolution, limit), Hz; below a
+        rate of `keep_below`, Hz, samples are kept as such.
+        """
+        self.line = Timeline(where, channels, bridged=longest_bridged(working_rate / 2.0))
+        self.welch: Welch | None = None
+        self.envelope = MinMax(len(channels), stretches) if stretches else None
+        self._working_rate = working_rate
+        self._spectrum = spectrum
+        self._keep_below = keep_below
+        self._turning = np.array(turning, dtype=np.float64)
+        self._turns = np.zeros(len(channels)) if any(turning) else None
+        self._before: Array | None = None
+        self._regrid: Regridder | None = None
+        self._reduce: Reducer | None = None
+        self._own: list[Array] = []
+        self._values: list[Array] = []
+
+    def push(self, chunk: Block) -> None:
+        for block in self.line.push(chunk):
+            self._take(block)
+
+    def finish(self) -> Kept | None:
+        """Return the reduced stream, or None where it is too short for the filters."""
+        for block in self.line.flush():
+            self._take(block)
+        if self._regrid is None or self._reduce is None:
+            return None
+        for rows, invented in self._regrid.flush():
+            self._pass_on(rows, invented)
+        return self._reduce.finish()
+
+    def samples(self) -> tuple[Array, Array] | None:
+        """Return times (n,) and values (n, c) of a stream slow enough to be kept."""
+        return (np.concatenate(self._own), np.concatenate(self._values)) if self._own else None
+
+    def _take(self, block: Block) -> None:
+        grid = self.line.grid
+        if grid is None:
+            return
+        if self._regrid is None:
+            self._regrid = Regridder(grid, self.line.bridged)
+            self._reduce = Reducer(design(grid.rate, self._working_rate))
+            if self._spectrum:
+                self.welch = Welch(grid.rate, *self._spectrum, self.line.channels)
+        stamp, values = self.line.finite(block)
+        if self._turns is not None and len(values):
+            values = self._unwrapped(values, self._turns)
+        if grid.rate <= self._keep_below:
+            self._own.append(self.line.own(stamp))
+            self._values.append(values)
+        for rows, invented in self._regrid.push(grid.periods(stamp), values):
+            self._pass_on(rows, invented)
+
+    def _pass_on(self, rows: Array, invented: Mask | None) -> None:
+        assert self._reduce is not None
+        self._reduce.push(rows, invented)
+        if self.welch is not None:
+            self.welch.push(rows, invented)
+        if self.envelope is not None:
+            self.envelope.push(rows)
+
+    def _unwrapped(self, values: Array, turned: Array) -> Array:
+        """Continue angles through full turns: no joint turns by half a turn between samples."""
+        first = values[:1] if self._before is None else self._before
+        whole = np.concatenate((first, values))
+        self._before = values[-1:].copy()
+        jumps = -np.rint(np.diff(whole, axis=0) / (2.0 * np.pi)) * self._turning
+        if not jumps.any() and not turned.any():
+            return values
+        turns = turned + np.cumsum(jumps, axis=0)
+        self._turns = turns[-1]
+        unwrapped: Array = values + 2.0 * np.pi * turns
+        return unwrapped

@@ -1,0 +1,77 @@
+"""Time as files write it, to nanoseconds since 1970-01-01."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime, timedelta
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kbs_process.errors import RecordingError
+from kbs_process.signals.records import Array, Mask, Stamps
+from kbs_process.studies.convert.mapping import Time
+from kbs_process.studies.convert.tables import Cells
+
+_NS = {"s": 1_000_000_000, "ms": 1_000_000, "us": 1000, "ns": 1, "min": 60_000_000_000}
+_GREATEST = 2.0**63 - 1024.0  # ns, the greatest double that an int64 holds
+
+
+def numbers(cells: Cells) -> Array:
+    """Return cells as doubles, bit for bit where they are; NaN where a text is no number."""
+    if cells.dtype.kind in "iufb":
+        return cells.astype(np.float64)
+    return np.array([_number(cell) for cell in cells.tolist()], dtype=np.float64)
+
+
+def _number(cell: Any) -> float:
+    try:
+        return float(cell)
+    except (TypeError, ValueError):
+        return float("nan")
+
+
+def nanoseconds(cells: Cells, time: Time, where: str) -> tuple[Stamps, Mask]:
+    """Return the stamps (n,) in ns of cells that hold times or count samples, and which of them are times.
+
+    Integers stay exact. A double of t seconds is known to t * 1.1e-16; the nearest nanosecond is exact
+    below 4e6 s.
+    """
+    if cells.dtype.kind == "M":
+        return _from_dates(cells)
+    if time.unit == "datetime":
+        return _from_texts(cells, where)
+    start = epoch_ns(time.start)
+    if time.rate_Hz is not None:
+        return _rounded(numbers(cells) / time.rate_Hz * 1e9, start)
+    scale = _NS[time.unit]
+    if cells.dtype.kind in "iu" and np.abs(cells.astype(np.float64)).max(initial=0.0) * scale < _GREATEST:
+        return cells.astype(np.int64) * scale + start, np.ones(len(cells), dtype=np.bool_)
+    return _rounded(numbers(cells) * scale, start)
+
+
+def epoch_ns(start: datetime | None) -> int:
+    """Return a date and time as ns since 1970-01-01T00:00:00Z, exactly."""
+    if start is None:
+        return 0
+    return (start - datetime(1970, 1, 1, tzinfo=UTC)) // timedelta(microseconds=1) * 1000
+
+
+def _rounded(ns: Array, start: int) -> tuple[Stamps, Mask]:
+    known = np.abs(ns) < _GREATEST / 2  # False for NaN too
+    return np.rint(np.where(known, ns, 0.0)).astype(np.int64) + start, known
+
+
+def _from_dates(cells: NDArray[Any]) -> tuple[Stamps, Mask]:
+    return cells.astype("datetime64[ns]").astype(np.int64), ~np.isnat(cells)
+
+
+def _from_texts(cells: Cells, where: str) -> tuple[Stamps, Mask]:
+    import pandas as pd
+
+    if cells.dtype.kind in "iuf":
+        raise RecordingError(
+            "holds numbers, not dates", where=where, remedy='give their unit, such as unit = "s", in [time]'
+        )
+    dates = pd.to_datetime(pd.Series(cells, dtype="str"), utc=True, format="ISO8601", errors="coerce")
+    return _from_dates(dates.dt.tz_localize(None).to_numpy(dtype="datetime64[ns]"))

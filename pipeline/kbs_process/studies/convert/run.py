@@ -1,0 +1,153 @@
+"""From source files and a mapping to a campaign folder."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from collections.abc import Mapping as MappingOf
+from pathlib import Path
+
+import numpy as np
+
+from kbs_process.campaign.config import Campaign, Topic
+from kbs_process.campaign.documents import shown
+from kbs_process.campaign.load import load_campaign
+from kbs_process.campaign.locate import CAMPAIGN_FILE
+from kbs_process.errors import OutputError, RecordingError, did_you_mean
+from kbs_process.progress import Progress, SilentProgress
+from kbs_process.recordings import OutStream, write_pieces
+from kbs_process.recordings.mcap.messages.encoding import JOINT_PARTS
+from kbs_process.results.provenance import sha256
+from kbs_process.results.store import writing
+from kbs_process.signals.records import Array, Block
+from kbs_process.studies.convert.description import Origin, prepare, recording_file, write_campaign
+from kbs_process.studies.convert.formats import open_table
+from kbs_process.studies.convert.mapping import (
+    WRENCH_FIELDS,
+    Mapping,
+    Part,
+    StreamMap,
+    find_mapping,
+    load_mapping,
+)
+from kbs_process.studies.convert.streams import Findings, read_part
+
+LATEST_NS = (1 << 31) * 1_000_000_000  # the seconds of a ROS 2 time stamp are a signed 32-bit number
+
+
+def convert(
+    mapping: Path | str,
+    source: Path,
+    target: Path,
+    *,
+    progress: Progress | None,
+    notice: Callable[[str], None] | None,
+) -> Path:
+    """Do what `importers.import_recordings` promises."""
+    progress = progress or SilentProgress()
+    plan = load_mapping(find_mapping(mapping))
+    files = _source_files(plan, source)
+    _refuse_occupied(target)
+    with writing(target, marker=CAMPAIGN_FILE) as folder:
+        _refuse_occupied(target)  # another import may have ended while this one waited for the lock
+        campaign = prepare(plan, folder)
+        checksums: dict[str, str] = {}
+        findings: dict[str, tuple[str, ...]] = {}
+        for part in plan.parts:
+            with progress.task(f"{part.source} -> {recording_file(part.stem)}"):
+                found = _convert_part(plan, part, files[part.source], campaign, folder)
+                checksums[part.stem] = sha256(folder / recording_file(part.stem))
+            lines = tuple(f"{part.stem}: {line}" for line in found)
+            findings[part.source] = findings.get(part.source, ()) + lines
+            if notice:
+                for line in lines:
+                    notice(f"{part.source}, {line}")
+        origins = tuple(Origin(name, sha256(path), findings[name]) for name, path in files.items())
+        write_campaign(plan, folder, checksums, origins)
+        load_campaign(folder)
+    return target
+
+
+def _source_files(mapping: Mapping, source: Path) -> dict[str, Path]:
+    """Return the source files by the names that the mapping gives them."""
+    names = list(dict.fromkeys(part.source for part in mapping.parts))
+    if source.is_file():
+        if len(names) > 1:
+            raise RecordingError(
+                f"is one file, where the mapping names {len(names)}: {', '.join(names)}",
+                where=shown(source),
+                remedy="give the folder that holds them",
+            )
+        return {names[0]: source}
+    if not source.is_dir():
+        raise RecordingError(
+            "there is no such file or folder",
+            where=shown(source),
+            remedy=f"give the folder that holds {', '.join(names)}",
+        )
+    found = [path.name for path in source.iterdir() if not path.name.startswith(".")]
+    for name in names:
+        if not (source / name).is_file():
+            origin = f" (published: {mapping.source.origin})" if mapping.source.origin else ""
+            raise RecordingError(
+                f"there is no '{name}', which the mapping names",
+                where=shown(source),
+                remedy=did_you_mean(name, found) + origin,
+            )
+    return {name: source / name for name in names}
+
+
+def _refuse_occupied(target: Path) -> None:
+    if target.exists() and not (target.is_dir() and not any(target.iterdir())):
+        raise OutputError(
+            "is there already, and is not empty: nothing was changed",
+            where=shown(target),
+            remedy="name another folder, or move this one away",
+        )
+
+
+def _convert_part(
+    mapping: Mapping, part: Part, path: Path, campaign: Campaign, folder: Path
+) -> tuple[str, ...]:
+    """Write one recording; return what was found wrong with its source."""
+    table = open_table(path, mapping.format, mapping.text)
+    findings = Findings()
+    topics = {"encoder" if topic.key == "angle" else topic.key: topic for topic in campaign.topics.present()}
+    pieces = (
+        _out_stream(stream, block, topics[stream.key], path)
+        for stream, block in read_part(table, mapping, part, findings)
+    )
+    write_pieces(folder / recording_file(part.stem), pieces)
+    return findings.lines()
+
+
+def _out_stream(stream: StreamMap, block: Block, topic: Topic, path: Path) -> OutStream:
+    """Return the stream as messages; what the file does not have is NaN in them.
+
+    The file has one clock: recorder's and sensor's are the same.
+    """
+    if len(block) and (int(block.stamp.min()) < 0 or int(block.stamp.max()) >= LATEST_NS):
+        raise RecordingError(
+            f"times of '{stream.key}' reach from {block.stamp.min() / 1e9:g} s to {block.stamp.max() / 1e9:g} s "
+            "after 1970, where recordings hold 0 to 2147483648 s",
+            where=shown(path),
+            remedy="check column and unit in [time]; where times begin below zero, give the date of time "
+            "zero, such as start = 2026-01-31T12:00:00Z",
+        )
+    columns = {channel.field: block.values[:, i] for i, channel in enumerate(stream.channels)}
+    match stream.key:
+        case "wrench":
+            values = _columns(columns, list(WRENCH_FIELDS.values()), len(block))
+            return OutStream(topic.topic, "wrench", block.stamp, block.log, values, frame="T")
+        case "temperature":
+            return OutStream(topic.topic, "temperature", block.stamp, block.log, block.values)
+        case _:
+            names = tuple(dict.fromkeys(field.partition("[")[2].rstrip("]") for field in columns))
+            # A message has its parts in this order; those before the last that is known may hold nothing.
+            last = max(JOINT_PARTS.index(field.partition("[")[0]) for field in columns)
+            fields = [f"{part}[{name}]" for part in JOINT_PARTS[: last + 1] for name in names]
+            values = _columns(columns, fields, len(block))
+            return OutStream(topic.topic, "joints", block.stamp, block.log, values, names)
+
+
+def _columns(columns: MappingOf[str, Array], fields: list[str], count: int) -> Array:
+    return np.column_stack([columns.get(field, np.full(count, np.nan)) for field in fields])

@@ -1,0 +1,217 @@
+"""From the columns of a source file to the streams of a recording, a piece at a time."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from itertools import chain
+
+import numpy as np
+
+from kbs_process.errors import RecordingError
+from kbs_process.signals.records import Array, Block, Mask, Stamps
+from kbs_process.studies.convert.clock import nanoseconds, numbers
+from kbs_process.studies.convert.mapping import Channel, Mapping, Part, StreamMap, Time, Turn
+from kbs_process.studies.convert.tables import Cells, Table, find_column
+
+_NO_STAMPS = np.empty(0, dtype=np.int64)
+_TIMELESS = "rows have no time, left out"
+Piece = dict[str, Block]  # by stream key; the streams of one pass over the file
+
+
+@dataclass(slots=True)
+class Findings:
+    """What is wrong with a part of a source file, counted while it is read."""
+
+    counts: Counter[str] = field(default_factory=Counter)
+    last: dict[str, int] = field(default_factory=dict)  # stream -> its last stamp
+
+    def check(self, key: str, block: Block) -> None:
+        """Count cells without a number and stamps that do not grow."""
+        self.counts[f"cells of '{key}' hold no number, kept as NaN"] += int(np.isnan(block.values).sum())
+        self.counts[f"values of '{key}' are infinite, kept"] += int(np.isinf(block.values).sum())
+        if len(block):
+            steps = np.diff(block.stamp, prepend=self.last.get(key, int(block.stamp[0]) - 1))
+            self.counts[f"time stamps of '{key}' repeat the one before, kept"] += int((steps == 0).sum())
+            self.counts[f"time stamps of '{key}' lie before their predecessor, put in order"] += int(
+                (steps < 0).sum()
+            )
+            self.last[key] = int(block.stamp[-1])
+
+    def lines(self) -> tuple[str, ...]:
+        """Return what was found, most frequent first."""
+        return tuple(f"{count} {what}" for what, count in self.counts.most_common() if count)
+
+
+def read_part(
+    table: Table, mapping: Mapping, part: Part, findings: Findings
+) -> Iterator[tuple[StreamMap, Block]]:
+    """Yield the streams of one recording a piece at a time, those of several passes side by side in time.
+
+    The first piece of each stream is empty: so all are known before the first sample. Raises RecordingError,
+    at the end, for a stream without a sample.
+    """
+    streams = {stream.key: stream for stream in mapping.streams}
+    for stream in mapping.streams:
+        yield stream, Block(_NO_STAMPS, _NO_STAMPS, np.empty((0, len(stream.channels))))
+    passes = [_pieces(table, mapping, shared, findings) for shared in _passes(mapping.streams)]
+    start, end = -(1 << 63), (1 << 63) - 1
+    if part.start_s > 0.0 or np.isfinite(part.end_s):
+        heads = [next(pieces, {}) for pieces in passes]
+        passes = [chain([head], pieces) for head, pieces in zip(heads, passes, strict=True)]
+        stamps = [int(block.stamp[0]) for head in heads for block in head.values() if len(block)]
+        first = min(stamps, default=0)
+        start = first + round(part.start_s * 1e9)
+        end = first + round(part.end_s * 1e9) if np.isfinite(part.end_s) else end
+
+    empty = set(streams)
+    for piece in _side_by_side(passes):
+        for key, block in piece.items():
+            inside = _select(block, (block.stamp >= start) & (block.stamp < end))
+            findings.check(key, inside)
+            if len(inside):
+                empty.discard(key)
+                yield streams[key], inside
+    for key in streams:
+        if key in empty:
+            raise RecordingError(
+                f"no sample of '{key}' for recording '{part.stem}'",
+                where=str(table.path),
+                remedy=_why_empty(findings),
+            )
+
+
+def _why_empty(findings: Findings) -> str:
+    if findings.counts[_TIMELESS]:
+        return (
+            "no row has a time that is a number: check [time] and, of a text file, delimiter, decimal, units_row and "
+            "skip_rows in [text]; `kbs-process import --describe` shows what the columns hold"
+        )
+    return "check start_s and end_s (s from the file's first sample), and that the file is whole"
+
+
+def _side_by_side(passes: Sequence[Iterator[Piece]]) -> Iterator[Piece]:
+    """Yield the pieces of all passes, the next from the one that is furthest behind in time."""
+    reached = dict.fromkeys(range(len(passes)), -(1 << 63))
+    while reached:
+        behind = min(reached, key=reached.__getitem__)
+        piece = next(passes[behind], None)
+        if piece is None:
+            del reached[behind]
+            continue
+        yield piece
+        reached[behind] = max([reached[behind], *(int(b.stamp[-1]) for b in piece.values() if len(b))])
+
+
+def _passes(streams: Sequence[StreamMap]) -> list[list[StreamMap]]:
+    """Group streams that share their time: the file is read once for each group."""
+    passes: list[list[StreamMap]] = []
+    for stream in streams:
+        shared = next((group for group in passes if stream.time and group[0].time == stream.time), None)
+        if shared is None:
+            passes.append([stream])
+        else:
+            shared.append(stream)
+    return passes
+
+
+def _pieces(
+    table: Table, mapping: Mapping, streams: Sequence[StreamMap], findings: Findings
+) -> Iterator[Piece]:
+    time = streams[0].time
+    channels = [channel for stream in streams for channel in stream.channels]
+    columns = [find_column(table, channel.column) for channel in channels]
+    if time is None:
+        clocks = [column.clock for column in columns]
+        if not all(clocks):
+            raise RecordingError(
+                f"'{columns[clocks.index('')].name}' comes without a time of its own",
+                where=str(table.path),
+                remedy="say in the mapping's [time] which column holds it, or give rate_Hz",
+            )
+    else:
+        clocks = [find_column(table, time.column).name] if time.column is not None else []
+    wanted = list(dict.fromkeys([column.name for column in columns] + clocks))
+    carry: dict[str, float] = {}
+    rows = 0
+    for cells in table.chunks(wanted):
+        named = dict(zip(wanted, cells, strict=True))
+        _check_lengths(table, named)
+        stamp, known = _stamps(table, time, clocks, named, rows)
+        rows += len(stamp)
+        findings.counts[_TIMELESS] += int((~known).sum())
+        values = {
+            channel.field: _si(named[column.name], channel, carry)
+            for channel, column in zip(channels, columns, strict=True)
+        }
+        if mapping.turn and any(stream.key == "wrench" for stream in streams):
+            _turn(values, mapping.turn)
+        yield {stream.key: _select(Block(stamp, stamp, _matrix(stream, values)), known) for stream in streams}
+
+
+def _stamps(
+    table: Table, time: Time | None, clocks: Sequence[str], named: dict[str, Cells], rows: int
+) -> tuple[Stamps, Mask]:
+    if time is not None and not clocks:
+        count = len(next(iter(named.values())))
+        return nanoseconds(np.arange(rows, rows + count), time, str(table.path))
+    stamp, known = nanoseconds(named[clocks[0]], time or Time(), f"{table.path}: {clocks[0]}")
+    for clock in clocks[1:]:
+        if not np.array_equal(named[clock], named[clocks[0]]):
+            raise RecordingError(
+                f"'{clocks[0]}' and '{clock}' differ: the channels of one stream must be sampled together",
+                where=str(table.path),
+                remedy="give a common [time], or import channels of one clock",
+            )
+    return stamp, known
+
+
+def _check_lengths(table: Table, named: dict[str, Cells]) -> None:
+    first, *rest = named
+    for name in rest:
+        if len(named[name]) != len(named[first]):
+            raise RecordingError(
+                f"'{first}' and '{name}' are not equally long",
+                where=str(table.path),
+                remedy="channels of one stream, and its time, must be; give other streams a [time] of their own",
+            )
+
+
+def _si(cells: Cells, channel: Channel, carry: dict[str, float]) -> Array:
+    """Return a channel in SI units; `carry` holds the last angle of those that are unwrapped."""
+    values = numbers(cells)
+    if channel.gain != 1.0 or channel.offset != 0.0:  # not a sum with zero, which would change -0.0
+        values = values * channel.gain + channel.offset
+    if channel.turn:
+        finite = np.isfinite(values)
+        if finite.any():
+            known = values[finite]
+            before = carry.get(channel.field, float(known[0]))
+            values[finite] = np.unwrap(np.concatenate(([before], known)), period=channel.turn)[1:]
+            carry[channel.field] = float(values[finite][-1])
+    return values
+
+
+def _turn(values: dict[str, Array], turn: Turn) -> None:
+    """Turn forces and moments by factor * q about the axis k: v cos + (k x v) sin + k (k . v) (1 - cos)."""
+    angle = (turn.factor * values[f"position[{turn.joint}]"])[:, None]
+    k = np.asarray(turn.axis)
+    for kind in ("force", "torque"):
+        fields = [f"wrench.{kind}.{axis}" for axis in "xyz"]
+        if fields[0] not in values:
+            continue
+        v = np.column_stack([values[field] for field in fields])
+        along = (v @ k)[:, None] * k
+        turned = (v - along) * np.cos(angle) + np.cross(k, v) * np.sin(angle) + along
+        values.update(zip(fields, turned.T, strict=True))
+
+
+def _matrix(stream: StreamMap, values: dict[str, Array]) -> Array:
+    return np.column_stack([values[channel.field] for channel in stream.channels])
+
+
+def _select(block: Block, mask: Mask) -> Block:
+    if mask.all():
+        return block
+    return Block(block.stamp[mask], block.log[mask], block.values[mask])

@@ -1,0 +1,1 @@
+"""From recordings to the correlation report: the study that gives the program its name."""

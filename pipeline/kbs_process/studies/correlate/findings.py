@@ -1,0 +1,181 @@
+"""What the analyses of all recordings amount to: repeatability, merit, uncertainty budget, requirements."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from kbs_process.campaign.config import Campaign
+from kbs_process.plant.effects import select
+from kbs_process.plant.linear.modes import modes
+from kbs_process.reduction.analysis import Analysis, bands_of, passband
+from kbs_process.reduction.judging import judged
+from kbs_process.stages import repeatability, repeats
+from kbs_process.stages.bandpass import Band, BandStatement, statement
+from kbs_process.stages.compare import compare
+from kbs_process.stages.decouple import Decoupling
+from kbs_process.stages.gravity.model import GravityModel
+from kbs_process.studies.correlate import results
+from kbs_process.studies.correlate.uncertainty import budgets
+
+Frame = Literal["S", "T", "joint"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Findings:
+    """What the report's tables hold."""
+
+    repeatability: tuple[results.Repeatability, ...]
+    merit: tuple[results.Merit, ...]
+    budget: tuple[results.Budget, ...]
+    requirements: tuple[results.Requirement, ...]
+    bands: tuple[results.Band, ...]
+    resonances: tuple[results.Resonance, ...]
+
+
+def find(
+    campaign: Campaign, analyses: Sequence[Analysis], model: GravityModel, decoupling: Decoupling
+) -> Findings:
+    """Gather the findings; calibration recordings serve the fit and are judged by its residual alone."""
+    runs = [analysis for analysis in analyses if analysis.entry.role != "calibration"]
+    bands = bands_of(campaign.bands)
+    statements = _statements(bands, runs)
+    repeated = tuple(_repeatability(runs, bands))
+    resonances = _resonances(campaign, runs, model)
+    found = tuple(budgets(campaign, runs, model, decoupling, statements, repeated, resonances))
+    return Findings(
+        repeatability=repeated,
+        merit=tuple(_merits(campaign, runs, bands, found)),
+        budget=found,
+        requirements=tuple(
+            judged(campaign, requirement, runs, found) for requirement in campaign.requirements
+        ),
+        bands=tuple(_band(statements[band.name]) for band in bands if band.name in statements),
+        resonances=resonances,
+    )
+
+
+def _statements(bands: Sequence[Band], runs: Sequence[Analysis]) -> dict[str, BandStatement]:
+    """Statements for the shortest recording, where edges weigh most."""
+    if not runs:
+        return {}
+    shortest = min((analysis.residual for analysis in runs), key=len)
+    return {band.name: statement(band, shortest.dt, len(shortest)) for band in bands}
+
+
+def _band(stated: BandStatement) -> results.Band:
+    label = "unfiltered" if stated.high_Hz is None else f"{stated.low_Hz or 0:g} to {stated.high_Hz:g} Hz"
+    return results.Band(
+        name=stated.name,
+        label=label,
+        high_pass_Hz=stated.low_Hz,
+        low_pass_Hz=stated.high_Hz,
+        method=stated.method,
+        edge_s=stated.edge_s,
+        edge_error=stated.edge_error,
+        edge_error_drift=stated.edge_error_drift,
+    )
+
+
+def _repeatability(runs: Sequence[Analysis], bands: Sequence[Band]) -> Iterable[results.Repeatability]:
+    by_trajectory: dict[str, list[Analysis]] = defaultdict(list)
+    for analysis in runs:
+        by_trajectory[analysis.entry.trajectory].append(analysis)
+    for trajectory, group in by_trajectory.items():
+        lags = _lags(group)
+        if len(lags) < 2:
+            continue
+        for frame, band in group[0].pairs:
+            signals = [group[index].pairs[frame, band].measured for index in lags]
+            common = repeatability.on_common_axis(signals, list(lags.values()))
+            if repeatability.in_common(common) < 2:
+                continue  # a band whose edges take all of so short a recording
+            found = repeatability.fit(common)
+            for index, channel in enumerate(found.channels):
+                yield results.Repeatability(
+                    trajectory=trajectory,
+                    band=band,
+                    frame=_frame(frame),
+                    channel=channel,
+                    unit=found.units[index],
+                    signal_rms=float(found.signal[index]),
+                    noise_rms=float(found.noise[index]),
+                    ratio=float(found.ratio[index]),
+                    n=found.repeats,
+                )
+
+
+def _lags(group: Sequence[Analysis]) -> dict[int, float]:
+    """How much later each recording of a group moves than its first; those that do not repeat it are left out."""
+    reference = repeats.motion_of(group[0].run)
+    lags = {0: 0.0}
+    for index, analysis in enumerate(group[1:], start=1):
+        motion = repeats.motion_of(analysis.run)
+        late = None if reference is None or motion is None else repeats.lag(reference, motion)
+        if late is not None:
+            lags[index] = late
+    return lags
+
+
+def _merits(
+    campaign: Campaign, runs: Sequence[Analysis], bands: Sequence[Band], budget: Sequence[results.Budget]
+) -> Iterable[results.Merit]:
+    by_name = {band.name: band for band in bands}
+    sigma = {(entry.recording, entry.frame, entry.band, entry.channel): entry.total for entry in budget}
+    for analysis in runs:
+        for (frame, name), pair in analysis.pairs.items():
+            if pair.predicted is None:
+                continue
+            limits = passband(by_name[name], campaign.bands.working_rate)
+            for merit in compare(pair.measured, pair.predicted, limits):
+                yield results.Merit(
+                    recording=analysis.entry.name,
+                    role=analysis.entry.role,
+                    band=name,
+                    frame=_frame(frame),
+                    channel=merit.channel,
+                    unit=merit.unit,
+                    measured_rms=merit.measured_rms,
+                    predicted_rms=merit.predicted_rms,
+                    residual_rms=merit.residual_rms,
+                    measured_peak=merit.measured_peak,
+                    predicted_peak=merit.predicted_peak,
+                    correlation=merit.correlation,
+                    fraction_of_variance=merit.fraction_of_variance,
+                    spectral_ratio=merit.spectral_ratio,
+                    pessimism=merit.pessimism,
+                    sigma=sigma.get((analysis.entry.name, _frame(frame), name, merit.channel)),
+                )
+
+
+def _resonances(
+    campaign: Campaign, runs: Sequence[Analysis], model: GravityModel
+) -> tuple[results.Resonance, ...]:
+    """Modes on the transducer at the first and the last pose of the first run: they move with the joints."""
+    if not runs:
+        return ()
+    q, nyquist = runs[0].motion.q, 0.5 * float(runs[0].run.load_rates.max())
+    found = []
+    for where, pose in (("first pose", q[0]), ("last pose", q[-1])):
+        angles = ", ".join(
+            f"{name} {np.degrees(angle):.1f} deg"
+            for name, angle in zip(campaign.rig.joint_names, pose, strict=True)
+        )
+        for mode in modes(model.rig, select(campaign.effects), pose):
+            if mode.frequency > nyquist:
+                continue
+            source = f"turning about {mode.axis}, {where} ({angles})"
+            found.append(
+                results.Resonance(
+                    axis=mode.axis, frequency_Hz=mode.frequency, sigma_Hz=mode.sigma, source=source
+                )
+            )
+    return tuple(found)
+
+
+def _frame(name: str) -> Frame:
+    return "S" if name == "S" else "joint" if name == "joint" else "T"

@@ -1,0 +1,80 @@
+"""The correlation report: its sections in the order in which a reader meets them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from kbs_process.report import provenance
+from kbs_process.report.document import Document
+from kbs_process.report.panel import Head, Panel
+from kbs_process.report.tables import Tables
+from kbs_process.studies.correlate.results import Results
+from kbs_process.studies.correlate.sections import (
+    budget,
+    compliance,
+    conventions,
+    coupling,
+    diagnosed,
+    disturbance,
+    gravity,
+    merit,
+    methods,
+    pointing,
+    recordings,
+    repeatability,
+    spectra,
+    static,
+    transducer,
+)
+
+_DRIVE = {"command": "command-driven prediction", "motion": "motion-driven prediction"}
+
+
+def head(results: Results) -> Head:
+    """Name, article and verdict of the campaign."""
+    campaign = results.campaign
+    configuration = f"configuration {campaign.configuration}" if campaign.configuration else ""
+    about = " · ".join(filter(None, (campaign.article, configuration, _DRIVE[campaign.drive])))
+    return Head(
+        "Disturbance correlation report",
+        campaign.name,
+        campaign.title,
+        about,
+        results.verdict,
+        results.provenance.version,
+    )
+
+
+def _on_transducer(make: Callable[[Results, Tables], Panel]) -> Callable[[Results, Tables], Panel | None]:
+    """A section that says nothing about a rig whose loads are the efforts of its joints alone."""
+    return lambda results, tables: make(results, tables) if results.campaign.frame == "T" else None
+
+
+def _provenance(results: Results, tables: Tables) -> Panel:
+    """The command, the software, and the checksum of every input."""
+    return provenance.panel(results.provenance, {entry.file: entry.sha256 for entry in results.recordings})
+
+
+DOCUMENT = Document(
+    title="Results of a processed campaign",
+    record=Results,
+    head=head,
+    panels=(
+        compliance.panel,
+        disturbance.panel,
+        merit.panel,
+        spectra.panel,
+        diagnosed.panel,
+        _on_transducer(transducer.panel),
+        _on_transducer(static.panel),
+        gravity.panel,
+        _on_transducer(coupling.panel),
+        repeatability.panel,
+        budget.panel,
+        _on_transducer(pointing.panel),
+        recordings.panel,
+        _on_transducer(conventions.panel),
+        methods.panel,
+        _provenance,
+    ),
+)

@@ -1,0 +1,89 @@
+"""How well did the article point, as its encoders and an external instrument saw it?"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kbs_process.report import distributions as figures
+from kbs_process.report.panel import Block, Caption, Figure, Grid, Panel, Picture, Text
+from kbs_process.report.tables import Tables
+from kbs_process.report.text import measure, number
+from kbs_process.results.pointing import RecordedPointing
+from kbs_process.studies.correlate.results import Results
+from kbs_process.studies.correlate.sections.static import PLATES
+
+_DENSITY = Caption(
+    shown="Density of each axis' error (encoder less command) about its bias, with the normal density of the same "
+    "standard deviation; between the dashed lines lie 95 %.",
+    good="One hump about zero.",
+    bad="Two humps or flat shoulders: a limit cycle over one encoder code. Long tails: rare events, which a standard "
+    "deviation does not tell. Spikes: the antenna stood still.",
+    do="Compare the width with one code of the encoder; for tails look at starts, stops and reversals.",
+)
+_NOTE = (
+    "± is one standard deviation, from the length of the recording and the correlation of its error. Variation: half "
+    "the range of the slow part within the recording. Errors are at the working rate; what the encoder rounds is in "
+    "them, and what it misreads is not: only an external instrument sees that."
+)
+
+
+def panel(results: Results, tables: Tables) -> Panel:
+    """Densities of the first recordings, and the statistics of all."""
+    question = "How well did the article point, as its encoders and an external instrument saw it?"
+    rows = results.pointing
+    if not rows:
+        text = Text("No recording has both commands and angles: nothing can be said of pointing.")
+        return Panel("pointing", "Pointing", question, (text,))
+    blocks: list[Block] = []
+    pictures = _densities(rows, tables)
+    if pictures:
+        blocks.append(Figure("Distribution of the pointing error", pictures, _DENSITY))
+    blocks.append(_table(rows))
+    return Panel("pointing", "Pointing", question, tuple(blocks))
+
+
+def _densities(rows: tuple[RecordedPointing, ...], tables: Tables) -> tuple[Picture, ...]:
+    pictures = []
+    for recording in list(dict.fromkeys(row.recording for row in rows))[:PLATES]:
+        table = tables.read("aligned", recording)
+        if table is None:
+            continue
+        found = []
+        for row in rows:
+            axis = row.estimate.axis
+            # An axis that was not asked to move may read one code throughout: there is nothing to draw.
+            if (row.recording, row.instrument) == (recording, "encoder") and row.estimate.random > 0.0:
+                error = table.columns[f"angle.{axis}"] - table.columns[f"command.{axis}"]
+                found.append((axis, error[table.valid & np.isfinite(error)], row.estimate))
+        if found:
+            pictures.append(figures.distributions(found, recording))
+    return tuple(pictures)
+
+
+def _table(rows: tuple[RecordedPointing, ...]) -> Grid:
+    head = (
+        "Recording", "Instrument", "Axis", "Bias / mdeg", "Random, 2 σ / mdeg", "95 % / mdeg", "Variation / mdeg",
+        "Greatest / mdeg",
+    )  # fmt: skip
+    body = tuple(
+        (
+            row.recording,
+            row.instrument,
+            row.estimate.axis,
+            _mdeg(row.estimate.bias, row.estimate.bias_sigma),
+            _mdeg(row.estimate.random, row.estimate.random_sigma),
+            _mdeg(row.estimate.percentile, row.estimate.percentile_sigma),
+            number(_in_mdeg(row.estimate.orbit)),
+            number(_in_mdeg(row.estimate.greatest)),
+        )
+        for row in rows
+    )
+    return Grid("Pointing error against the command", head, body, "kkkrrrrr", _NOTE)
+
+
+def _mdeg(value: float, sigma: float) -> str:
+    return measure(_in_mdeg(value), _in_mdeg(sigma))
+
+
+def _in_mdeg(value: float) -> float:
+    return 1e3 * float(np.degrees(value))

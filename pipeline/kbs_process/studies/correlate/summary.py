@@ -1,0 +1,246 @@
+"""results.json: what was found, what a reader must be told, and where every number comes from."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from kbs_process.campaign.config import Campaign
+from kbs_process.plant.rigid import loads
+from kbs_process.reduction.analysis import Analysis, select
+from kbs_process.reduction.pointing import recorded_pointing
+from kbs_process.results import provenance
+from kbs_process.signals.records import Signal
+from kbs_process.stages.conventions import SignCheck, check_encoder_sense, check_gravity_sign, check_weight
+from kbs_process.stages.decouple import Decoupling
+from kbs_process.stages.gravity.equation import RESPONSE
+from kbs_process.stages.gravity.model import GravityModel, taring_error
+from kbs_process.stages.gravity.quality import feasibility
+from kbs_process.stages.repeats import commanded
+from kbs_process.stages.to_cog import ASSUMPTION
+from kbs_process.studies.correlate import results
+from kbs_process.studies.correlate.findings import Findings
+from kbs_process.studies.correlate.methods import methods
+from kbs_process.studies.correlate.notices import notices
+
+RESPONSE_UNITS = dict(zip(RESPONSE, ("s", "s^2"), strict=True))
+
+
+def summarise(
+    campaign: Campaign,
+    analyses: Sequence[Analysis],
+    model: GravityModel,
+    decoupling: Decoupling,
+    findings: Findings,
+) -> results.Results:
+    """Return the contents of results.json."""
+    conventions = tuple(_conventions(campaign, analyses))
+    return results.Results(
+        campaign=results.CampaignSummary(
+            name=campaign.name,
+            title=campaign.title,
+            article=campaign.article,
+            configuration=campaign.configuration,
+            drive=campaign.drive,
+            frame="joint" if campaign.rig.frame == "joint" else "T",
+        ),
+        verdict=_conclusion(findings.requirements),
+        provenance=provenance.made("", campaign.folder, campaign.files),
+        requirements=findings.requirements,
+        warnings=tuple(notices(campaign, analyses, model, findings, conventions)),
+        recordings=tuple(_recording(analysis) for analysis in analyses),
+        conventions=conventions,
+        gravity=_gravity(campaign, analyses, model),
+        cross_coupling=_cross_coupling(analyses, decoupling) if decoupling.channels else None,
+        bands=findings.bands,
+        repeatability=findings.repeatability,
+        merit=findings.merit,
+        resonances=findings.resonances,
+        budget=findings.budget,
+        pointing=tuple(recorded_pointing(analyses)),
+        methods=methods(campaign, analyses, findings),
+        parameters=tuple(provenance.constants(campaign.rig)),
+        notes=(ASSUMPTION,) if campaign.rig.spacecraft is not None else (),
+    )
+
+
+def _conclusion(requirements: Sequence[results.Requirement]) -> results.Conclusion:
+    if not requirements:
+        return results.Conclusion(status="none", sentence="The campaign states no requirement.")
+    worst = max(requirements, key=lambda one: ("pass", "undecided", "fail").index(one.verdict))
+    words = {"pass": "met", "fail": "not met", "undecided": "neither met nor broken within the uncertainty"}
+    value, low, high = (figure or 0.0 for figure in (worst.value, worst.low, worst.high))
+    least = f"{low:.4f}" if low > 0.0 else "0"
+    sentence = (
+        f"{worst.name}: {words[worst.verdict]}. {worst.statistic.capitalize()} {value:.4f} {worst.unit} "
+        f"({least} to {high:.4f} at 95 %) on {worst.channel} in {worst.recording}, "
+        f"{worst.band_Hz[0] or 0:g} to {worst.band_Hz[1] or 0:g} Hz; limit {worst.limit:g} {worst.unit}."
+    )
+    return results.Conclusion(status=worst.verdict, sentence=sentence)
+
+
+def _recording(analysis: Analysis) -> results.Recording:
+    entry, run = analysis.entry, analysis.run
+    return results.Recording(
+        name=entry.name,
+        file=entry.path.name,
+        trajectory=entry.trajectory,
+        role=entry.role,
+        repeat=entry.repeat,
+        sha256=provenance.sha256(entry.path),
+        duration_s=len(analysis.residual) * analysis.residual.dt,
+        rates=run.rates,
+        losses=tuple(
+            results.LossEntry(
+                kind=loss.kind,
+                where=loss.where,
+                count=loss.count,
+                start_s=loss.start_s,
+                end_s=loss.end_s,
+                detail=loss.detail,
+            )
+            for loss in run.losses
+        ),
+        clocks=tuple(
+            results.Clock(
+                stream=stream,
+                offset_s=clock.offset_s,
+                skew=clock.skew,
+                sigma_s=clock.sigma_offset_s if np.isfinite(clock.sigma_offset_s) else None,
+            )
+            for stream, clock in run.clocks.items()
+        ),
+    )
+
+
+def _conventions(campaign: Campaign, analyses: Sequence[Analysis]) -> Iterable[results.Convention]:
+    checks: list[SignCheck] = [*check_weight(campaign.rig)]
+    for analysis in analyses[:2]:  # the calibration and the first run: signs do not change within a campaign
+        measured, rest = analysis.run.loads, np.zeros_like(analysis.motion.q)
+        assert measured is not None
+        every = campaign.rig.loads
+        index = every.index(measured.channels)
+        static = loads(campaign.rig, analysis.motion.q, rest, rest)[:, index]
+        nominal = measured.derive(static, "nominal static loads")
+        found = [*check_gravity_sign(measured, nominal, every.noise[index])]
+        command, angle = commanded(analysis.run), analysis.run.angle
+        if command is not None and angle is not None:
+            found += check_encoder_sense(angle, command)
+        checks += [
+            SignCheck(f"{check.check}, {analysis.entry.name}", check.expected, check.found, check.ok)
+            for check in found
+        ]
+    for check in checks:
+        yield results.Convention(check=check.check, expected=check.expected, found=check.found, ok=check.ok)
+
+
+def _gravity(campaign: Campaign, analyses: Sequence[Analysis], model: GravityModel) -> results.Gravity:
+    fit = model.fit
+    prior = model.equation.start()
+    quantities = campaign.rig.quantities()
+    parameters = []
+    for index, name in enumerate(model.equation.names):
+        quantity = quantities.get(name.split("[")[0])
+        parameters.append(
+            results.FittedParameter(
+                name=name,
+                unit=RESPONSE_UNITS.get(name, "") if quantity is None else quantity.unit,
+                prior=float(prior[index]),
+                prior_sigma=float(fit.prior_sigma[index]),
+                value=float(fit.value[index]),
+                sigma=float(fit.sigma[index]),
+            )
+        )
+    return results.Gravity(
+        parameters=tuple(parameters),
+        channels=tuple(_gravity_channel(analyses, index) for index in range(len(model.channels))),
+        checks=tuple(results.Check(name=c.name, ok=c.passed, detail=c.detail) for c in fit.checks),
+        samples=fit.dof + len(fit.value),
+        reduced_chi_square=fit.residual_rms**2,
+        feasible=_feasible(campaign, model),
+        recordings=tuple(_static_recording(analysis, model) for analysis in analyses),
+        low_pass_Hz=model.settings.low_pass_Hz,
+    )
+
+
+def _static_recording(analysis: Analysis, model: GravityModel) -> results.StaticRecording:
+    taring = analysis.static.taring
+    channels = tuple(
+        results.StaticChannel(
+            channel=misfit.channel,
+            unit=misfit.unit,
+            constant=float(constant),
+            sigma=float(sigma),
+            left=misfit.left,
+            explained=misfit.explained,
+            ok=misfit.ok,
+        )
+        for misfit, constant, sigma in zip(
+            analysis.misfits, taring.bias, taring_error(model, taring), strict=True
+        )
+    )
+    return results.StaticRecording(recording=analysis.entry.name, fitted=taring.fitted, channels=channels)
+
+
+def _gravity_channel(analyses: Sequence[Analysis], index: int) -> results.GravityChannel:
+    """Over all recordings: the largest static wrench, the rms of what is left, the rms of the model's errors."""
+
+    def over(signals: Iterable[Signal]) -> float:
+        parts = [signal.values[signal.valid, index] for signal in signals]
+        return float(np.sqrt(np.mean(np.concatenate(parts) ** 2)))
+
+    statics = [analysis.static for analysis in analyses]
+    first = statics[0].wrench
+    return results.GravityChannel(
+        channel=first.channels[index],
+        unit=first.units[index],
+        static_peak=max(float(np.max(np.abs(static.wrench.values[:, index]))) for static in statics),
+        residual_rms=over(analysis.residual for analysis in analyses),
+        encoder_sigma=over(static.wrench.derive(static.sigma_encoder, "sigma") for static in statics),
+        model_sigma=over(static.wrench.derive(static.sigma_parameters, "sigma") for static in statics),
+    )
+
+
+def _feasible(campaign: Campaign, model: GravityModel) -> str:
+    """Is gravity compensation by computation feasible? Its error on each torque channel against the tightest limit."""
+    limits = [requirement.limit for requirement in campaign.requirements if requirement.quantity == "torque"]
+    if not campaign.rig.transducer.channels:
+        return ""
+    if not limits:
+        return "There is no limit on a torque to measure the compensation's error against."
+    found = feasibility(model, {channel: min(limits) for channel in ("Tx", "Ty", "Tz")})
+    if not found:
+        return "No torque channel is recorded."
+    worst = max(found, key=lambda one: one.ratio)
+    answer = "feasible" if worst.ratio < 1.0 else "feasible only within a band that leaves slow errors out"
+    return (
+        f"Computed compensation is {answer}: its error before filtering is at most {worst.error:.3g} N m rms "
+        f"({worst.channel}), {100 * worst.ratio:.0f} % of the limit of {worst.limit:g} N m."
+    )
+
+
+def _cross_coupling(analyses: Sequence[Analysis], decoupling: Decoupling) -> results.CrossCoupling:
+    channels = decoupling.channels
+    X = np.linalg.inv(decoupling.matrix) - np.eye(len(channels))
+    wrenches = [select(analysis.raw, channels) for analysis in analyses]
+    raw = np.concatenate([wrench.values[wrench.valid] for wrench in wrenches])
+    decoupled = (raw - decoupling.bias) @ decoupling.matrix.T
+    removed = raw - decoupling.bias - decoupled
+    share = np.abs(X) * np.std(decoupled, axis=0)
+    row, column = np.unravel_index(int(np.argmax(share / np.std(decoupled, axis=0)[:, None])), share.shape)
+    units = wrenches[0].units
+    largest = (
+        f"Relative to what varies on the channel itself, {channels[column]} leaks most into {channels[row]}: "
+        f"{share[row, column]:.3g} {units[row]} rms."
+    )
+    return results.CrossCoupling(
+        channels=channels,
+        matrix=tuple(tuple(float(x) for x in line) for line in X),
+        sigma=tuple(tuple(float(x) for x in line) for line in decoupling.sigma),
+        largest=largest if np.any(X) else "The parameter files state no cross-coupling: none was undone.",
+        contributions=tuple(
+            results.Contribution(channel=channel, unit=units[index], value=float(np.std(removed[:, index])))
+            for index, channel in enumerate(channels)
+        ),
+    )

@@ -1,0 +1,161 @@
+"""The uncertainty budget of every recording: each channel, in every band, at the transducer and at the spacecraft."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+
+import numpy as np
+
+from kbs_process.campaign.config import Campaign
+from kbs_process.reduction.analysis import Analysis, bands_of, passband, select
+from kbs_process.reduction.relief import errors, forces_in
+from kbs_process.rig.model import Amplifier
+from kbs_process.signals.records import WRENCH_CHANNELS, Array, Clock, Signal
+from kbs_process.stages import bandpass, budget
+from kbs_process.stages.align.clocks import offset_sigma
+from kbs_process.stages.bandpass import Band, BandStatement
+from kbs_process.stages.decouple import Decoupling
+from kbs_process.stages.gravity import error as gravity_error
+from kbs_process.stages.gravity.model import GravityModel
+from kbs_process.stages.to_cog import sigma_at_spacecraft, sigma_of_pose
+from kbs_process.studies.correlate import results
+from kbs_process.studies.correlate.results import Frame
+
+
+def budgets(
+    campaign: Campaign,
+    runs: Sequence[Analysis],
+    model: GravityModel,
+    decoupling: Decoupling,
+    statements: Mapping[str, BandStatement],
+    repeated: Sequence[results.Repeatability],
+    resonances: Sequence[results.Resonance],
+) -> Iterable[results.Budget]:
+    """Yield every recording's own budget; where nothing of a recording is known in a band, there is none."""
+    lowest = min((mode.frequency_Hz for mode in resonances), default=None)
+    spacecraft, own = campaign.rig.spacecraft, campaign.rig.frame
+    for band in bands_of(campaign.bands)[1:]:
+        for analysis in runs:
+            measured = analysis.pairs[own, band.name].measured
+            if not measured.valid.any():
+                continue
+            of_band = [entry for entry in repeated if (entry.frame, entry.band) == (own, band.name)]
+            noise = _repeat_noise(of_band, measured.channels, analysis.entry.trajectory)
+            entries = _entries(
+                campaign, analysis, model, decoupling, band, statements[band.name], noise, lowest
+            )
+            frame: Frame = "joint" if own == "joint" else "T"
+            yield from _rows(entries, frame, band.name, analysis.entry.name, measured)
+            if spacecraft is not None and set(WRENCH_CHANNELS) <= set(measured.channels):
+                whole = select(measured, WRENCH_CHANNELS)
+                six = [measured.channels.index(channel) for channel in WRENCH_CHANNELS]
+                moved = [
+                    budget.Entry(entry.stage, entry.source, sigma_at_spacecraft(entry.sigma[six], spacecraft))
+                    for entry in entries
+                ]
+                pose = sigma_of_pose(whole, spacecraft)
+                moved.append(budget.Entry("to the spacecraft", "position and attitude of S in T", pose))
+                yield from _rows(moved, "S", band.name, analysis.entry.name, whole)
+
+
+def _entries(
+    campaign: Campaign,
+    analysis: Analysis,
+    model: GravityModel,
+    decoupling: Decoupling,
+    band: Band,
+    stated: BandStatement,
+    repeat_noise: Array | None,
+    resonance: float | None,
+) -> list[budget.Entry]:
+    """The budget of one recording in one band, in the frame of the recorded loads."""
+
+    def cut(signal: Signal) -> Signal:
+        return bandpass.apply(signal, band)
+
+    rig = campaign.rig
+    measured = analysis.pairs[rig.frame, band.name].measured
+    limits = passband(band, campaign.bands.working_rate)
+    sensor = budget.sensor_noise(
+        rig.loads.noise[rig.loads.index(measured.channels)],
+        analysis.run.load_rates,
+        bandpass.noise_bandwidth(band, measured.dt),
+    )
+    late = late_sigma(analysis.run.clocks, rig.transducer.amplifier)
+    entries = [
+        sensor,
+        *([_cross_coupling(analysis, model, decoupling, band)] if rig.transducer.channels else []),
+        *gravity_error.entries(analysis.motion, analysis.static, model, cut),
+        budget.clock(analysis.static.wrench, late, cut, gravity_error.moving(analysis.motion)),
+        *budget.filter_edges(
+            measured, stated.edge_error, stated.edge_error_drift, budget.drifting_part(measured, band)
+        ),
+        *([budget.resonance(measured, resonance, limits)] if rig.transducer.channels else []),
+    ]
+    forces = forces_in(campaign, analysis.entry)
+    if unknown := list(errors(measured, rig, forces, analysis.motion.q)):
+        in_motion = gravity_error.moving(analysis.motion)
+        entries.append(budget.from_shapes("rig", "what is not known of its cords", unknown, cut, in_motion))
+    if repeat_noise is not None:
+        entries.append(budget.repeatability(repeat_noise, sensor.sigma))
+    return entries
+
+
+def _cross_coupling(
+    analysis: Analysis, model: GravityModel, decoupling: Decoupling, band: Band
+) -> budget.Entry:
+    """What the matrix's uncertainty makes of a recording's wrench, counted once.
+
+    Where the gravity fit estimates what the calibration left, its covariance holds the leak of the static wrench; here
+    remains that of the disturbance, by the fit's own sigmas. Where it does not, the calibration's sigmas concern all.
+    """
+    measured = analysis.pairs["T", band.name].measured
+    if not model.settings.cross_coupling:
+        assert analysis.run.wrench is not None  # of a rig with a transducer
+        wrench = bandpass.apply(analysis.run.wrench, band)
+        leak = budget.cross_coupling(wrench, decoupling.sigma)
+        efforts = len(measured.channels) - len(wrench.channels)
+        return budget.Entry(leak.stage, leak.source, np.append(leak.sigma, np.zeros(efforts)))
+    index = model.equation.index
+    fitted = model.equation.whole_coupling(model.fit.sigma[: model.equation.size])[np.ix_(index, index)]
+    return budget.cross_coupling(measured, fitted)
+
+
+def late_sigma(clocks: Mapping[str, Clock], amplifier: Amplifier | None) -> float:
+    """How well it is known when angles and wrench belong together, s: their clocks, and the amplifier's delay."""
+    clock = clocks.get("angle") or clocks["rate"]
+    late = float(np.hypot(offset_sigma(clock), np.nan_to_num(clock.latency_s)))
+    if amplifier is None:
+        return late
+    return float(np.hypot(late, amplifier.delay * float(amplifier.corner.sigma) / float(amplifier.corner)))
+
+
+def _repeat_noise(
+    of_band: Sequence[results.Repeatability], channels: Sequence[str], trajectory: str
+) -> Array | None:
+    """The noise of a trajectory's repeats, (c,); the largest of all where it was not repeated; else None."""
+    own = [entry for entry in of_band if entry.trajectory == trajectory]
+    worst = np.zeros(len(channels))
+    for entry in own or of_band:
+        column = channels.index(entry.channel)
+        worst[column] = max(worst[column], entry.noise_rms or 0.0)
+    return worst if of_band else None
+
+
+def _rows(
+    entries: Sequence[budget.Entry], frame: Frame, band: str, recording: str, measured: Signal
+) -> Iterable[results.Budget]:
+    sums = budget.total(entries)
+    for index, (channel, unit) in enumerate(zip(measured.channels, measured.units, strict=True)):
+        yield results.Budget(
+            channel=channel,
+            unit=unit,
+            frame=frame,
+            band=band,
+            recording=recording,
+            contributions=tuple(
+                results.BudgetItem(stage=entry.stage, source=entry.source, sigma=float(entry.sigma[index]))
+                for entry in entries
+            ),
+            total=float(sums[index]),
+        )

@@ -1,0 +1,1 @@
+"""Why recordings and prediction differ."""

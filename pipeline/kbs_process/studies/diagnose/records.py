@@ -1,0 +1,239 @@
+"""What a diagnosis says, as the contents of its results.json."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from kbs_process.campaign.config import Campaign
+from kbs_process.diagnosis.experiments.experiment import Experiment
+from kbs_process.diagnosis.experiments.floor import Floor
+from kbs_process.diagnosis.nominal.joint import Standing
+from kbs_process.diagnosis.nominal.known import Known
+from kbs_process.diagnosis.selection.next_test import Proposal
+from kbs_process.diagnosis.selection.outcome import Curve, Find, Outcome
+from kbs_process.plant.effects.measured_law import Measured, unit_of
+from kbs_process.plant.structure import other_joint
+from kbs_process.results import provenance
+from kbs_process.results.records import Check, Conclusion
+from kbs_process.rig.model import Joint, Rig
+from kbs_process.studies.diagnose import results as records
+from kbs_process.studies.diagnose.next_test import next_test
+from kbs_process.studies.diagnose.sentences import paragraph, sentence
+from kbs_process.studies.diagnose.terms import COMMANDS, place_of, rms
+from kbs_process.studies.diagnose.unexplained import unexplained
+from kbs_process.studies.diagnose.warnings import warnings
+
+_SHOWN = 25  # suspects in the table
+_NOTES = (
+    "The floor is what repeats of one trajectory differ by. Constants and slopes of the transducer's channels and "
+    "errors of the clocks, each recording's own, are taken out of every comparison.",
+    "Known parameters are refitted within their priors before anything is looked for, and again beside each suspect.",
+    "A find has passed the gate: inside the non-linear plant, with all known parameters refitted, it improves the "
+    "prediction of recordings that it was not fitted to, all together, and makes none of them markedly worse.",
+    "Channels are whitened in their order: each is judged given those before it.",
+)
+_PORTS = {"ground torque": "external wrench"}  # of the port test, in the words of finds
+
+
+def results_of(
+    campaign: Campaign,
+    floor: Floor,
+    outcome: Outcome,
+    files: Sequence[str],
+    proposal: Proposal | None,
+    verb: str = "diagnose",
+) -> records.DiagnosisResults:
+    """What a diagnosis says; `verb` is that of the command that was given, none of processing."""
+    known = outcome.known
+    finds = tuple(_find(find, known.experiment) for find in outcome.finds)
+    trials = tuple(_trials(known, outcome.standing.known))
+    requirements = tuple(unexplained(campaign, Standing(known, known.shown, {}), outcome.standing))
+    return records.DiagnosisResults(
+        name=campaign.name,
+        title=campaign.title,
+        article=campaign.article,
+        verdict=Conclusion(
+            status="undecided" if outcome.verdict == "undecided" else "none",
+            sentence=sentence(outcome, trials, requirements, floor),
+        ),
+        provenance=provenance.made(verb, campaign.folder, campaign.files),
+        answer=outcome.verdict,
+        paragraph=paragraph(outcome, finds, trials, requirements, floor),
+        floor=floor.statement,
+        log10_p=outcome.log_p / float(np.log(10.0)),
+        moved=tuple(_moved(outcome.standing.known)),
+        finds=finds,
+        trials=trials,
+        requirements=requirements,
+        ports=tuple(_ports(outcome)),
+        located=tuple(
+            records.Place(port=_PORTS.get(one.port, one.port), site=one.axis, channels=one.channels)
+            for one in outcome.located
+        ),
+        suspects=tuple(_suspects(outcome))[:_SHOWN],
+        # Without a law, the search may have gone on to a better place.
+        checks=tuple(
+            Check(name=c.name, ok=c.passed, detail=c.detail)
+            for c in (known if outcome.finds else outcome.standing.known).checks
+        ),
+        files=tuple(files),
+        next_test=None if proposal is None else next_test(proposal, COMMANDS),
+        warnings=tuple(warnings(campaign, floor, outcome)),
+        notes=_NOTES,
+    )
+
+
+def _find(find: Find, experiment: Experiment) -> records.Find:
+    roles = {trial.name: trial.role for trial in experiment.trials}
+    joint = _joint(find, experiment.rig)
+    return records.Find(
+        name=find.identity.law,
+        family=find.identity.family,
+        named=find.named,
+        place=place_of(find.identity),
+        equation=find.equation,
+        reference=find.reference,
+        parameters=tuple(
+            records.Fitted(
+                name=one.name,
+                unit=_unit(one.unit or _unit_of_nodes(find.curve), joint),
+                value=one.value,
+                sigma=one.sigma,
+                low=one.low,
+                high=one.high,
+            )
+            for one in find.estimates
+        ),
+        probability=find.probability,
+        distance=find.rho_eff,
+        absorbed=find.kappa,
+        rivals=tuple(
+            records.Rival(
+                name=other.identity.law,
+                family=other.identity.family,
+                place=place_of(other.identity),
+                distance=other.rho_delta,
+                probability=other.probability,
+                simulated=other.refitted,
+            )
+            for other in find.alternatives
+        ),
+        gate=tuple(
+            records.Gated(
+                recording=fold.trial,
+                role=roles[fold.trial],
+                before=rms(fold.before),
+                after=rms(fold.after),
+                gain=fold.gain,
+            )
+            for fold in find.gate.folds
+        ),
+        same_ports=find.ports_alike,
+        curve=None if find.curve is None else _curve(find.curve, experiment.rig, joint),
+        held_out_variance=find.held_out_variance,
+    )
+
+
+def _unit_of_nodes(curve: Curve | None) -> str:
+    """Unit of a measured torque's coefficients, whose names no law declares."""
+    return "N m" if curve is not None and isinstance(curve.law, Measured) else ""
+
+
+def _joint(find: Find, rig: Rig) -> Joint | None:
+    """The joint whose numbers a find has: units are those of one that turns, or slides."""
+    return next((joint for joint in rig.joints if joint.name == find.identity.axis), None)
+
+
+def _unit(turning: str, joint: Joint | None) -> str:
+    return turning if joint is None else joint.unit_of(turning)
+
+
+def _curve(curve: Curve, rig: Rig, joint: Joint | None) -> records.Curve:
+    over, regressor, own = joint, "joint_angle", "rad"
+    if isinstance(curve.law, Measured):
+        regressor, own = curve.law.regressor, "N m"
+        if joint is not None and curve.law.effect.crossed:
+            over = rig.joint(other_joint(rig, joint.name))
+    return records.Curve(
+        regressor=regressor.replace("_", " "),
+        x_unit=_unit(unit_of(regressor), over),
+        y_unit=_unit(own, joint),
+        x=tuple(curve.x.tolist()),
+        y=tuple(curve.value.tolist()),
+        sigma=tuple(curve.sigma.tolist()),
+    )
+
+
+def _trials(known: Known, corrected: Known) -> Iterator[records.Trial]:
+    rows = known.rows
+    for k, trial in enumerate(known.experiment.trials):
+        z = corrected.metric[k].layout(corrected.residual[k])
+        seen = seen_channels(corrected, k)
+        each = np.sqrt(np.mean(z**2, axis=(0, 1)))
+        yield records.Trial(
+            recording=trial.name,
+            trajectory=str(trial.trajectory),
+            role=trial.role,
+            nominal=rms(float(known.chi2_before[k] / rows[k])),
+            known=rms(float(known.chi2[k] / rows[k])),
+            corrected=rms(float(corrected.chi2[k] / rows[k])),
+            channels={known.experiment.channels[c]: float(each[c]) for c in seen},
+        )
+
+
+def _moved(known: Known) -> Iterator[records.Moved]:
+    units = {name: quantity.unit for name, quantity in known.hypothesis.rig.quantities().items()}
+    entries = zip(
+        known.free, known.value, known.sigma, known.parameters.value, known.parameters.sigma, strict=True
+    )
+    for scalar, value, sigma, prior, spread in entries:
+        if scalar.quantity not in units:
+            continue
+        bounded = bool(np.isfinite(spread) and spread > 0.0)
+        yield records.Moved(
+            name=scalar.name,
+            unit=units[scalar.quantity],
+            prior=float(prior),
+            prior_sigma=float(spread) if bounded else None,
+            value=float(value),
+            sigma=float(sigma),
+            sigmas=float((value - prior) / spread) if bounded else None,
+        )
+
+
+def _ports(outcome: Outcome) -> Iterator[records.PortTest]:
+    if outcome.place is None:
+        return
+    for port in outcome.place.test.ports:
+        yield records.PortTest(
+            port=port.name,
+            log10_p=port.log_p / float(np.log(10.0)),
+            sufficient=port.sufficient,
+            share=port.explained,
+            same_as=port.alike,
+        )
+
+
+def _suspects(outcome: Outcome) -> Iterator[records.Suspect]:
+    entries = (
+        *((one.identity, one.rho_eff, one.kappa, "accepted") for one in outcome.finds),
+        *((one.identity, one.rho_eff, None, f"refused: {'; '.join(one.reasons)}") for one in outcome.refused),
+        *((one.identity, one.rho, one.kappa, f"absorbed by {', '.join(one.by)}") for one in outcome.absorbed),
+    )
+    for identity, distance, absorbed, said in entries:
+        yield records.Suspect(
+            name=identity.law,
+            family=identity.family,
+            place=place_of(identity),
+            distance=distance,
+            absorbed=absorbed,
+            outcome=said,
+        )
+
+
+def seen_channels(known: Known, k: int) -> list[int]:
+    """Channels of a trial that show something."""
+    window = known.metric[k].whiten.window
+    return [c for c in range(window.shape[1]) if window[:, c].any()]

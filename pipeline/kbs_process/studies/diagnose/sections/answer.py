@@ -1,0 +1,110 @@
+"""Is there a mismatch, and what was left out?"""
+
+from __future__ import annotations
+
+from kbs_process.report.panel import Block, Caption, Cell, Figure, Grid, Notices, Panel, Text
+from kbs_process.report.tables import Tables
+from kbs_process.report.text import MISSING, chance, number, percent
+from kbs_process.studies.diagnose import figures
+from kbs_process.studies.diagnose.results import Answer, DiagnosisResults, Find, Place, Trial, Unexplained
+
+_TRIALS = Caption(
+    shown="Whitened residual over the floor, rms, of every recording: with the parameter files' numbers (phases, of "
+    "which these say nothing, as found), with known parameters refitted under their priors, and with what was found. "
+    "Held-out recordings were used by neither.",
+    good="Corrected bars end at the floor (dashed), those of held-out recordings as well.",
+    bad="A held-out bar far above those of the fit: what was found does not carry over. All above: something is left.",
+    do="See what remains, and record the trajectory where it is strongest.",
+)
+AT_FLOOR = 1.1
+
+
+def where(place: Place) -> str:
+    """A place in words."""
+    return f"{place.port}, {place.site}" if place.site else place.port
+
+
+def panel(results: DiagnosisResults, tables: Tables) -> Panel:
+    """The paragraph, notices, finds and residuals over the floor."""
+    blocks: list[Block] = [Text(results.paragraph)]
+    if results.warnings:
+        blocks.append(
+            Notices(
+                tuple((entry.severity, entry.what, entry.where, entry.remedy) for entry in results.warnings)
+            )
+        )
+    if results.finds:
+        blocks.append(_finds(results.finds, results.answer))
+    blocks.append(Figure("Residual over the floor", (figures.trials(results.trials),), _TRIALS))
+    blocks.append(_trials(results.trials))
+    if results.requirements:
+        blocks.append(_requirements(results.requirements))
+    blocks.append(
+        Text(f"Floor: {results.floor}. Chance of what the known parameters leave: {chance(results.log10_p)}.")
+    )
+    if results.files:
+        blocks.append(
+            Text(
+                f"{results.model}, for kbs-process predict --model and for any campaign's parameter files:",
+                results.files,
+            )
+        )
+    return Panel("answer", "Answer", "Is there a mismatch, and what was left out?", tuple(blocks))
+
+
+def _finds(finds: tuple[Find, ...], answer: Answer) -> Grid:
+    rows = tuple(
+        (
+            find.name,
+            find.family,
+            where(find.place),
+            ", ".join(find.place.channels[:3]) or MISSING,
+            number(find.probability, 3),
+            number(find.distance, 3),
+            MISSING if find.held_out_variance is None else percent(find.held_out_variance, 2),
+        )
+        for find in finds
+    )
+    head = (
+        "Find",
+        "Physics",
+        "Enters at",
+        "Seen in",
+        "Probability",
+        "Distance / sigma",
+        "Of the held-out excess",
+    )
+    title = "Nearest to what was left out" if answer == "undecided" else "Physics that was left out"
+    return Grid(title, head, rows, "klllrrr")
+
+
+def _trials(trials: tuple[Trial, ...]) -> Grid:
+    rows = tuple(
+        (
+            entry.recording,
+            entry.role,
+            number(entry.nominal),
+            number(entry.known),
+            Cell(number(entry.corrected), "pass" if entry.corrected < AT_FLOOR else "undecided"),
+        )
+        for entry in trials
+    )
+    head = ("Recording", "Role", "Nominal", "Known refitted", "Corrected")
+    return Grid("Residual over the floor, rms", head, rows, "klrrr")
+
+
+def _requirements(requirements: tuple[Unexplained, ...]) -> Grid:
+    rows = tuple(
+        (
+            entry.name,
+            f"{entry.statistic}, {number(entry.band_Hz[0])} to {number(entry.band_Hz[1])} Hz",
+            f"{number(entry.limit)} {entry.unit}",
+            f"{number(entry.known, 2)} {entry.unit}",
+            f"{number(entry.corrected, 2)} {entry.unit}",
+            percent(entry.share, 2),
+            f"{entry.channel}, {entry.recording}",
+        )
+        for entry in requirements
+    )
+    head = ("Requirement", "As", "Limit", "Known refitted", "Corrected", "Of the limit", "Where")
+    return Grid("What is left, noise included, as requirements count it", head, rows, "klrrrrl")

@@ -1,0 +1,96 @@
+"""What law is it, how well is it known, and what else could it be?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from kbs_process.diagnosis.experiments.thresholds import RIVALS, SHADE, told_apart
+from kbs_process.report.formula import equation
+from kbs_process.report.panel import Block, Caption, Cell, Figure, Grid, Panel, Text
+from kbs_process.report.tables import Tables
+from kbs_process.report.text import number, percent, unit
+from kbs_process.studies.diagnose import figures
+from kbs_process.studies.diagnose.results import DiagnosisResults, Find, Rival
+from kbs_process.studies.diagnose.sections.answer import where
+
+_LAW = Caption(
+    shown="What enters at the port, estimated from the residual without presuming a law, against what orders it, and "
+    "the law that was put into the plant.",
+    good="The law within the band everywhere.",
+    bad="A stretch of the band that the law leaves: it holds elsewhere only.",
+    do="Take the measured curve there, or widen the motion.",
+)
+
+
+def panel(results: DiagnosisResults, tables: Tables) -> Panel:
+    """A find after the other: law, parameters, gate, rivals."""
+    blocks = tuple(block for find in results.finds for block in _find(find))
+    nothing = Text("No law passed the gate: nothing is claimed to have been left out.")
+    return Panel("finds", "Finds", "What law is it, and what else could it be?", blocks or (nothing,))
+
+
+def _find(find: Find) -> Iterator[Block]:
+    known = "" if find.named else " No effect of the catalogue passed the gate: the law is as measured."
+    alike = (
+        f" These channels cannot tell that port from {', '.join(find.same_ports)}." if find.same_ports else ""
+    )
+    digits = 2 if find.absorbed < 0.99 else 4  # what a weight leaves of a cord is not nothing
+    yield Text(
+        f"{find.name}, {where(find.place)}.{known} Known parameters could have taken up "
+        f"{percent(find.absorbed, digits)} of its signature.{alike}"
+    )
+    if find.equation:
+        yield equation(find.equation)
+    if find.reference:
+        yield Text(f"Source: {find.reference}.", tone="muted")
+    rows = tuple(
+        (
+            entry.name,
+            unit(entry.unit),
+            number(entry.value, 4),
+            number(entry.sigma, 2),
+            f"{number(entry.low, 4)} to {number(entry.high, 4)}",
+        )
+        for entry in find.parameters
+    )
+    if rows:
+        yield Grid(f"{find.name}: parameters", ("Parameter", "Unit", "Value", "Sigma", "95 %"), rows, "klrrr")
+    if find.curve is not None:
+        yield Figure(f"{find.name}: the law", (figures.law(find, find.curve),), _LAW)
+    gate = tuple(
+        (
+            entry.recording,
+            entry.role,
+            number(entry.before),
+            Cell(number(entry.after), "pass" if entry.after <= entry.before else "fail"),
+            number(entry.gain),
+        )
+        for entry in find.gate
+    )
+    note = "Held-out recordings decide: each of them has to be predicted better."
+    head = ("Recording", "Role", "Before", "After", "Gain (-2 log likelihood)")
+    yield Grid(f"{find.name}: residual over the floor, without and with it", head, gate, "klrrr", note)
+    if find.rivals:
+        yield Grid(
+            f"{find.name}: other laws",
+            ("Law", "Physics", "Enters at", "Simulated", "Distance / sigma", "Probability"),
+            tuple(
+                (
+                    rival.name,
+                    rival.family,
+                    where(rival.place),
+                    "yes" if rival.simulated else "no",
+                    Cell(number(rival.distance), "undecided" if _alike(find, rival) else ""),
+                    number(rival.probability, 2),
+                )
+                for rival in find.rivals
+            ),
+            "kllcrr",
+            "Laws that are marked cannot be told from it by these recordings: they are nearer than "
+            f"{RIVALS} sigma, or than {SHADE} of what it does (those simulated): nature's formula is neither's.",
+        )
+
+
+def _alike(find: Find, rival: Rival) -> bool:
+    """Whether a law cannot be told from a find."""
+    return rival.distance < (told_apart(find.distance) if rival.simulated else RIVALS)

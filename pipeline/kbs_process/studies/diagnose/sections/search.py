@@ -1,0 +1,103 @@
+"""Where does it enter, and what was tried?"""
+
+from __future__ import annotations
+
+from kbs_process.report.panel import Block, Caption, Cell, Figure, Fold, Grid, Panel, Picture
+from kbs_process.report.tables import Tables
+from kbs_process.report.text import MISSING, chance, count, measure, number, percent, unit
+from kbs_process.studies.diagnose import figures
+from kbs_process.studies.diagnose.results import DiagnosisResults, Moved, PortTest, Suspect
+from kbs_process.studies.diagnose.sections.answer import where
+
+_FAR = 3.0  # sigma
+_MAPS = Caption(
+    shown="Mean residual of each trajectory's repeats, over the floor, in windows of time by frequencies: known "
+    "parameters refitted (before), with the finds (after). Dots: cells that chance does not explain.",
+    good="White after, everywhere.",
+    bad="A line along time: a resonance or a tone. One that follows the rate: a motor order. A column: a place or "
+    "an event.",
+    do="Compare a column's time with the commands, a line's frequency with the motors' rates.",
+)
+
+
+def panel(results: DiagnosisResults, tables: Tables) -> Panel:
+    """Known parameters, ports, suspects, checks."""
+    blocks: list[Block] = []
+    far = tuple(entry for entry in results.moved if entry.sigmas is not None and abs(entry.sigmas) > _FAR)
+    if far:
+        blocks.append(_moved(f"Known parameters that moved by more than {_FAR:g} sigma", far))
+    if maps := _maps(results, tables):
+        blocks.append(Figure("Where the residual lives", maps, _MAPS))
+    if results.ports and results.answer != "none":  # where nothing is left, every port explains that
+        blocks.append(_ports(results.ports))
+    if results.suspects:
+        blocks.append(_suspects(results.suspects))
+    checks = tuple(
+        (check.name, Cell("yes" if check.ok else "no", "pass" if check.ok else "undecided"), check.detail)
+        for check in results.checks
+    )
+    if checks:
+        blocks.append(Grid("Checks of the refit", ("Check", "Passed", "Detail"), checks, "kcl"))
+    if results.moved:
+        title = f"All known parameters ({count(len(results.moved), 'number')})"
+        blocks.append(Fold(title, (_moved("Known parameters", results.moved),)))
+    return Panel("search", "Search", "Where does it enter, and what was tried?", tuple(blocks))
+
+
+def _maps(results: DiagnosisResults, tables: Tables) -> tuple[Picture, ...]:
+    """One of each trajectory, named by its recordings."""
+    members: dict[str, list[str]] = {}
+    for trial in results.trials:
+        if trial.role != "held-out":
+            members.setdefault(trial.trajectory, []).append(trial.recording)
+    found = ((tables.read("residual_map", number), names) for number, names in members.items())
+    return tuple(figures.where(table, ", ".join(names)) for table, names in found if table is not None)
+
+
+def _ports(entries: tuple[PortTest, ...]) -> Grid:
+    rows = tuple(
+        (
+            entry.port,
+            percent(entry.share, 3),
+            chance(entry.log10_p),
+            Cell("yes" if entry.sufficient else "no", "pass" if entry.sufficient else ""),
+            ", ".join(entry.same_as) or MISSING,
+        )
+        for entry in entries
+    )
+    note = "An input that is free to be anything at one port: if it cannot explain the residual, no law there can."
+    head = ("Port", "Takes up of the excess", "p", "Suffices", "Looks the same as")
+    return Grid("Where it enters", head, rows, "krrcl", note)
+
+
+def _suspects(entries: tuple[Suspect, ...]) -> Grid:
+    rows = tuple(
+        (
+            entry.name,
+            entry.family,
+            where(entry.place),
+            number(entry.distance),
+            MISSING if entry.absorbed is None else percent(entry.absorbed, 2),
+            entry.outcome,
+        )
+        for entry in entries
+    )
+    head = ("Suspect", "Physics", "Enters at", "Distance / sigma", "Absorbed", "Outcome")
+    note = "Distance: the whitened size of its signature, without what known parameters can take up."
+    return Grid("Suspects, strongest first", head, rows, "kllrrl", note)
+
+
+def _moved(title: str, entries: tuple[Moved, ...]) -> Grid:
+    rows = tuple(
+        (
+            entry.name,
+            unit(entry.unit),
+            "unknown phase" if entry.prior_sigma is None else measure(entry.prior, entry.prior_sigma),
+            measure(entry.value, entry.sigma),
+            MISSING
+            if entry.sigmas is None
+            else Cell(number(entry.sigmas, 2), "undecided" if abs(entry.sigmas) > _FAR else ""),
+        )
+        for entry in entries
+    )
+    return Grid(title, ("Number", "Unit", "Prior", "Refitted", "Moved / sigma"), rows, "klrrr")

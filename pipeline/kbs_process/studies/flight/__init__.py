@@ -1,0 +1,1 @@
+"""The flight model in orbit: many units, one trajectory."""

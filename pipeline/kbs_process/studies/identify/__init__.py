@@ -1,0 +1,1 @@
+"""Motor-gear parameters from recordings."""

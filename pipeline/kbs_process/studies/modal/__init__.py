@@ -1,0 +1,1 @@
+"""Modes of the article on its transducer, as files."""

@@ -1,0 +1,1 @@
+"""Predictions of the plant: on commands alone, or along a recording."""

@@ -1,0 +1,103 @@
+"""What a simulated reference day has to say: the contents of its results.json, typed. Angles in rad."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from kbs_process.results.pointing import PointingEstimate
+from kbs_process.results.records import Conclusion, Constant, Notice, Provenance, Record, Status
+
+
+class PublishedSection(Record, frozen=True, kw_only=True):
+    """A published table's figures, in the units that it is printed in."""
+
+    azimuth_mdeg: float
+    elevation_mdeg: float
+    torque_Nm: float
+    torque: str
+    comment: str
+    end_s: float
+
+
+class Torque(Record, frozen=True, kw_only=True):
+    """Greatest disturbance torque at the spacecraft's centre of mass, over all axes."""
+
+    band: str  # names its table
+    label: str
+    value: float  # N m
+    axis: str
+    time_s: float
+
+
+class Section(Record, frozen=True, kw_only=True):
+    """A section of the day."""
+
+    name: str
+    start_s: float
+    end_s: float
+    ends_with: str  # event
+    modes: tuple[str, ...]  # what the antenna does, in order: "tracking DRS59"
+    greatest_rate: float  # rad/s, commanded on either axis
+    azimuth: PointingEstimate
+    elevation: PointingEstimate
+    torques: tuple[Torque, ...]  # narrowest band first
+    published: PublishedSection | None = None
+
+
+class Judged(Record, frozen=True, kw_only=True):
+    """A requirement and the worst section and axis."""
+
+    name: str
+    statistic: str
+    limit: float
+    unit: str
+    value: float
+    sigma: float
+    verdict: Status
+    where: str
+    source: str
+
+
+class Phase(Record, frozen=True, kw_only=True):
+    """A stretch of the trajectory in one mode."""
+
+    mode: str
+    relay: str
+    start_s: float
+    end_s: float
+
+
+class Geometry(Record, frozen=True, kw_only=True):
+    """The orbit, and what the trajectory asks of the mechanism."""
+
+    epoch: str
+    nodal_period_s: float
+    semi_major_axis_m: float
+    node_rate: float  # rad/s
+    greatest_rate: float  # rad/s
+    greatest_acceleration: float  # rad/s^2
+    rate_limit: float
+    acceleration_limit: float
+    azimuth: tuple[float, float]  # least and greatest
+    elevation: tuple[float, float]
+
+
+class ReferenceDayResults(Record, frozen=True, kw_only=True):
+    """results.json of a simulated reference day."""
+
+    name: str
+    title: str
+    article: str
+    verdict: Conclusion
+    provenance: Provenance
+    kind: Literal["reference-day"] = "reference-day"
+    schema: Literal[1] = 1
+    geometry: Geometry
+    phases: tuple[Phase, ...]
+    sections: tuple[Section, ...]
+    requirements: tuple[Judged, ...]
+    boresight: tuple[PointingEstimate, ...]  # over the whole day
+    discussion: tuple[str, ...] = ()
+    warnings: tuple[Notice, ...] = ()
+    parameters: tuple[Constant, ...] = ()
+    notes: tuple[str, ...] = ()

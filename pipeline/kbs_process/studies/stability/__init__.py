@@ -1,0 +1,1 @@
+"""Stability of the pointing loop over the range."""

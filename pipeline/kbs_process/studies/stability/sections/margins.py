@@ -1,0 +1,88 @@
+"""Margins over the swept joint, and what they depend on."""
+
+from __future__ import annotations
+
+import math
+
+from kbs_process.report.panel import Block, Caption, Figure, Grid, Panel, Text
+from kbs_process.report.tables import Tables
+from kbs_process.report.text import number
+from kbs_process.studies.stability import figures
+from kbs_process.studies.stability.results import StabilityResults
+
+_ROWS = 9
+_CAPTION = Caption(
+    shown="Gain margin, phase margin and peak of the sensitivity |1 / (1 + L)| of each joint's loop over the swept "
+    "joint's angle, the other loops closed. Dashed: the customary 6 dB and 30°, and a sensitivity of 2.",
+    good="All curves on the safe side of the dashed lines, and nearly level: the pose does not matter to the loop.",
+    bad="A dip: at these poses a resonance of the article comes close to the loop.",
+    do="Where a margin is short, lower Kp or the latency, or see the map of poles for the mode that comes near.",
+)
+
+
+def panel(results: StabilityResults, tables: Tables) -> Panel:
+    """Figure and table of margins, and the parameters that the critical gain hangs on."""
+    question = "How far is the loop from instability, and does that change with the pose?"
+    gains = ", ".join(
+        f"{joint}: Kp {number(kp)}, Ki {number(ki)} 1/s"
+        for joint, kp, ki in zip(results.joints, results.Kp, results.Ki, strict=True)
+    )
+    words = (
+        f"Gains {gains}; cycle {number(results.cycle_s)} s, latency {results.latency} cycle(s). The plant is "
+        "linearised about rest without friction, with base, joints, rotors and the drives' own slopes, and discretised "
+        "exactly for a field that moves linearly within a cycle."
+    )
+    alt = "Gain margin, phase margin and sensitivity peak over the angle of the swept joint"
+    blocks: list[Block] = [
+        Text(words),
+        Figure("Margins over the range", (figures.margins(results, alt),), _CAPTION),
+        _table(results),
+        _sensitivities(results),
+    ]
+    return Panel("margins", "Margins", question, tuple(blocks))
+
+
+def _table(results: StabilityResults) -> Grid:
+    angles = [entry.angle_rad for entry in results.critical]
+    shown = {angles[round(i * (len(angles) - 1) / max(1, _ROWS - 1))] for i in range(_ROWS)}
+    critical = {entry.angle_rad: entry for entry in results.critical}
+    rows = tuple(
+        (
+            f"{number(math.degrees(entry.angle_rad))}°",
+            entry.joint,
+            _decibel(entry.gain),
+            number(entry.gain_frequency_Hz),
+            number(None if entry.phase_rad is None else math.degrees(entry.phase_rad)),
+            number(entry.phase_frequency_Hz),
+            number(entry.sensitivity_peak),
+            number(critical[entry.angle_rad].factor, 4),
+            number(critical[entry.angle_rad].at_rest, 4),
+        )
+        for entry in results.margins
+        if entry.angle_rad in shown
+    )
+    head = (
+        f"Angle of {results.joint}", "Loop", "Gain margin / dB", "at / Hz", "Phase margin / °", "at / Hz",
+        "Sensitivity peak", "Critical factor", "with friction's slope at rest",
+    )  # fmt: skip
+    note = (
+        "Critical factor: on Kp and Ki of all joints together, by the eigenvalues of the closed loop; the gain margin "
+        "is python-control's, of one joint's loop with the others closed. Friction's slope at rest holds for motions "
+        "below the rate at which it saturates."
+    )
+    return Grid("Margins", head, rows, "kkrrrrrrr", note)
+
+
+def _sensitivities(results: StabilityResults) -> Grid:
+    rows = tuple((entry.name, number(entry.sigma_of_factor, 2)) for entry in results.sensitivities[:8])
+    total = (
+        f"all together: {number(results.worst_sigma, 2)}, at {number(math.degrees(results.worst_angle_rad))}°"
+    )
+    note = f"First order, every uncertain number of the rig moved by one standard deviation; {total}."
+    return Grid(
+        "What the critical factor hangs on", ("Parameter", "Its sigma moves the factor by"), rows, "lr", note
+    )
+
+
+def _decibel(value: float | None) -> str:
+    return number(None if value is None else 20.0 * math.log10(value))

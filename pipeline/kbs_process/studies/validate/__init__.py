@@ -1,0 +1,1 @@
+"""Is a campaign complete and sound, and would processing take it?"""

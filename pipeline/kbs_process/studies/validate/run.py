@@ -1,0 +1,143 @@
+"""Can a campaign be processed? It is read and fitted as processing does it, and what that finds is listed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+
+from kbs_process.campaign.config import Campaign, RecordingEntry
+from kbs_process.errors import KbsError, RecordingError
+from kbs_process.progress import Progress
+from kbs_process.reduction.measurable import check_requirements
+from kbs_process.reduction.preparing import Prepared, check_taring, fit_gravity, prepare
+from kbs_process.signals.records import TRUNCATED, Loss
+from kbs_process.stages import decouple
+from kbs_process.stages.gravity.model import GravityModel
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One recording: what it holds, what it lost, or why it cannot be used."""
+
+    name: str
+    role: str
+    rates: dict[str, float] = field(default_factory=dict)  # Hz, by stream
+    losses: tuple[Loss, ...] = ()
+    error: str = ""
+
+    @property
+    def lossy(self) -> bool:
+        return any(loss.real for loss in self.losses)
+
+
+@dataclass(frozen=True, slots=True)
+class Validation:
+    """What was found, recording by recording, and why processing would refuse them all together."""
+
+    findings: tuple[Finding, ...]
+    refusal: str = ""
+
+    @property
+    def refused(self) -> bool:
+        return bool(self.refusal) or any(finding.error for finding in self.findings)
+
+
+def validate(campaign: Campaign, progress: Progress) -> Validation:
+    """Read every recording of the campaign to its end, and fit gravity to them if all can be read."""
+    decoupling = decouple.fit(campaign.rig)
+    findings: list[Finding] = []
+    prepared: list[Prepared] = []
+    for entry in campaign.recordings:
+        try:
+            one = prepare(campaign, entry, decoupling, progress)
+        except RecordingError as error:
+            findings.append(Finding(entry.name, entry.role, error=str(error)))
+        else:
+            prepared.append(one)
+            findings.append(Finding(entry.name, entry.role, dict(one.run.rates), one.run.losses))
+    try:
+        check_requirements(campaign)
+        if len(prepared) == len(findings):
+            model = fit_gravity(campaign, prepared, progress)
+            findings = [
+                replace(finding, error=_untared(campaign, one, model))
+                for finding, one in zip(findings, prepared, strict=True)
+            ]
+    except KbsError as error:
+        return Validation(tuple(findings), str(error))
+    return Validation(tuple(findings))
+
+
+def _untared(campaign: Campaign, one: Prepared, model: GravityModel) -> str:
+    """Why gravity cannot be taken off a recording, or nothing."""
+    try:
+        check_taring(campaign, one, model)
+    except RecordingError as error:
+        return str(error)
+    return ""
+
+
+def describe(campaign: Campaign, validation: Validation) -> Iterator[str]:
+    """Yield the lines of the listing: a table, then losses and errors, then a summary."""
+    findings = validation.findings
+    rig = campaign.rig
+    yield f"{campaign.name}: {campaign.title}"
+    yield (
+        f"  {len(rig.quantities())} quantities, joints {', '.join(rig.joint_names)}, "
+        f"channels {', '.join(rig.channels)}, driven by {campaign.drive}"
+    )
+    width = max(len(finding.name) for finding in findings)
+    for finding in findings:
+        state = "unreadable" if finding.error else "lossy" if finding.lossy else "clean"
+        rates = ", ".join(f"{key} {rate:.5g} Hz" for key, rate in sorted(finding.rates.items()))
+        yield f"  {finding.name:<{width}}  {finding.role:<11}  {state:<10}  {rates}".rstrip()
+    for finding in findings:
+        yield from (f"  {finding.name}: {in_words(loss)}" for loss in finding.losses)
+        if finding.error:
+            yield f"  {finding.error}"
+    bad = sum(bool(finding.error) for finding in findings)
+    lossy = sum(finding.lossy for finding in findings)
+    recordings = "recording" if len(findings) == 1 else "recordings"
+    yield f"{len(findings)} {recordings}: {bad} unreadable, {lossy} with losses"
+    if validation.refusal:
+        yield f"cannot be processed: {validation.refusal}"
+    if hint := repeatability_hint(campaign):
+        yield f"hint: {hint}"
+
+
+def repeatability_hint(campaign: Campaign) -> str:
+    """Say what a campaign without repeats goes without, and what is taken instead; nothing of one that has some."""
+    judged = [entry for entry in campaign.recordings if entry.role != "calibration"]
+    if not judged or _repeats(judged):
+        return ""
+    # What `diagnosis.floor` and the budget do; a calibration is part of the former alone.
+    floor = (
+        ""
+        if _repeats(campaign.recordings)
+        else ", and diagnose takes what the parameter files say of the sensors' noise and rounding for its floor"
+    )
+    return (
+        "no trajectory is repeated: what differs from run to run is not known, the uncertainty budget has no "
+        f"repeatability{floor}\n  -> record a trajectory two or three times, and list each run with its `repeat`"
+    )
+
+
+def _repeats(entries: Sequence[RecordingEntry]) -> bool:
+    """Whether two recordings are runs of one trajectory."""
+    return len({entry.trajectory for entry in entries}) < len(entries)
+
+
+def in_words(loss: Loss) -> str:
+    """Return one line for a loss: what, how many, when, where."""
+    start, end = loss.start_s, loss.end_s
+    when = (
+        ""
+        if start is None
+        else f", from {start:.4f} s on"
+        if loss.kind == TRUNCATED
+        else f" at {start:.4f} s"
+        if end in (None, start)
+        else f", {start:.4f} to {end:.4f} s"
+    )
+    detail = f" ({loss.detail})" if loss.detail else ""
+    return f"{loss.count} x {loss.kind}{when}, {loss.where}{detail}"
