@@ -25,13 +25,9 @@ LARGEST_ARCHIVE = 22e6  # bytes: the archive is part of every clone
 def test_checksums(name: str) -> None:
     folder = CAMPAIGNS_FOLDER / name
     recordings = tomllib.loads((folder / "campaign.toml").read_text())["recording"]
-    assert [entry["file"] for entry in recordings] == [
-        f"recordings/{run.file}" for run in CAMPAIGNS[name].runs
-    ]
+    assert [entry["file"] for entry in recordings] == [f"recordings/{run.file}" for run in CAMPAIGNS[name].runs]
     for entry in recordings:
-        assert hashlib.sha256((folder / entry["file"]).read_bytes()).hexdigest() == entry["sha256"], entry[
-            "file"
-        ]
+        assert hashlib.sha256((folder / entry["file"]).read_bytes()).hexdigest() == entry["sha256"], entry["file"]
 
 
 @pytest.mark.parametrize("name", CAMPAIGNS)

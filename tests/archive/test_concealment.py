@@ -53,12 +53,8 @@ for path in sorted({str(path) for path in opened if isinstance(path, (str, bytes
 def strings(source: Path) -> set[str]:
     """String constants of a module, its docstrings aside."""
     tree = ast.parse(source.read_text())
-    documented = [
-        node for node in ast.walk(tree) if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef))
-    ]
-    docstrings = {
-        id(node.body[0].value) for node in documented if node.body and isinstance(node.body[0], ast.Expr)
-    }
+    documented = [node for node in ast.walk(tree) if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef))]
+    docstrings = {id(node.body[0].value) for node in documented if node.body and isinstance(node.body[0], ast.Expr)}
     return {
         node.value
         for node in ast.walk(tree)
@@ -107,13 +103,9 @@ def test_campaign_folders_hold_what_a_bench_gives_and_no_more(name: str):
     """Description, parameters, recordings: no other file, no hint of an engine, seed or truth, no number drawn."""
     folder = ROOT / "campaigns" / name
     recordings = {f"recordings/{run.file}" for run in CAMPAIGNS[name].runs}
-    others = {
-        path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()
-    } - recordings
+    others = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()} - recordings
     assert "campaign.toml" in others
-    assert all(re.fullmatch(r"campaign\.toml|parameters/\w+\.(toml|csv|json)", other) for other in others), (
-        others
-    )
+    assert all(re.fullmatch(r"campaign\.toml|parameters/\w+\.(toml|csv|json)", other) for other in others), others
     drawn = numbers_of_truth()
     assert len(drawn) > 300
     for other in others:

@@ -80,11 +80,7 @@ def _rates(structure: Structure) -> list[str]:
             f"    dx[{theta}] = w",
             f"    dx[{spin}] = drag_{j} / p[{k + ROTOR}]",
         ]
-    lines += [
-        f"    guess = yields = {zero}",
-        *accelerated(structure),
-        "    turning = plate_rates(alpha, omega)",
-    ]
+    lines += [f"    guess = yields = {zero}", *accelerated(structure), "    turning = plate_rates(alpha, omega)"]
     for i in range(3):
         lines += [
             f"    dx[{layout['alpha'].start + i}] = turning[{i}]",

@@ -73,10 +73,7 @@ def chunks(path: Path) -> Iterator[tuple[bytes, int]]:
                 continue
             size, name = struct.unpack_from("<16xQ4xI", content)
             data = memoryview(content)[32 + name + 8 :]
-            yield (
-                (decompress(data) if content[32 : 32 + name] == b"zstd" else lz4.frame.decompress(data)),
-                size,
-            )
+            yield ((decompress(data) if content[32 : 32 + name] == b"zstd" else lz4.frame.decompress(data)), size)
 
 
 def floor(path: Path) -> None:
@@ -132,11 +129,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     ],
 )
 def test_reading_costs_little_more_than_decompressing(
-    benchmark: BenchmarkFixture,
-    files: dict[str, Path],
-    name: str,
-    lowest: Callable[[Path], None],
-    limit: float,
+    benchmark: BenchmarkFixture, files: dict[str, Path], name: str, lowest: Callable[[Path], None], limit: float
 ) -> None:
     path = files[name]
     rounds = 2 if name == "json" else 7

@@ -50,13 +50,7 @@ def test_speed(benchmark: BenchmarkFixture, tmp_path: Path) -> None:
 
     def plant(loop: str = "open", step: float = DEFAULT_STEP) -> Array:
         blocks = predict(
-            loops[loop],
-            effects,
-            schedule,
-            rate_Hz=100.0,
-            angle_rate_Hz=100.0,
-            duration_s=SECONDS,
-            step_s=step,
+            loops[loop], effects, schedule, rate_Hz=100.0, angle_rate_Hz=100.0, duration_s=SECONDS, step_s=step
         )
         return np.concatenate([block.values for key, block in blocks if key == "wrench"])
 
@@ -86,9 +80,7 @@ def test_speed(benchmark: BenchmarkFixture, tmp_path: Path) -> None:
     reference = times["plant, 2 ms, open loop"]
     print()
     for name, taken in times.items():
-        print(
-            f"{name:32s} {SECONDS / taken:7.1f} simulated s/s   the plant is {taken / reference:6.2f} times as fast"
-        )
+        print(f"{name:32s} {SECONDS / taken:7.1f} simulated s/s   the plant is {taken / reference:6.2f} times as fast")
     ratio = times["RK4 0.1 ms, C by hand"] / times["RK4 0.1 ms, generated plant"]
     print(f"RK4, generated plant against C: {ratio:.2f}")
     gain = LANES * reference / times[f"{LANES} plants side by side"]

@@ -155,11 +155,7 @@ def test_no_campaign_file(folder: CampaignFolder) -> None:
 
 @pytest.mark.parametrize(
     ("text", "place"),
-    [
-        ("name = \n", "campaign.toml:1"),
-        ("a = 1\na = 2\n", "campaign.toml:2"),
-        ("x = [1,\n", "campaign.toml:2"),
-    ],
+    [("name = \n", "campaign.toml:1"), ("a = 1\na = 2\n", "campaign.toml:2"), ("x = [1,\n", "campaign.toml:2")],
 )
 def test_malformed_toml_names_the_line(folder: CampaignFolder, text: str, place: str) -> None:
     (folder.path / CAMPAIGN).write_text(text)
@@ -190,9 +186,7 @@ def test_requirement_at_the_spacecraft_needs_a_spacecraft(folder: CampaignFolder
     assert "spacecraft's centre of mass" in str(folder.refusal())
 
 
-def test_a_recording_that_is_listed_already_is_not_proposed_for_one_that_is_missing(
-    folder: CampaignFolder,
-) -> None:
+def test_a_recording_that_is_listed_already_is_not_proposed_for_one_that_is_missing(folder: CampaignFolder) -> None:
     (folder.path / "recordings" / "EL089P00_2.mcap").rename(folder.path / "recordings" / "EL089P00_22.mcap")
     assert "did you mean 'EL089P00_22.mcap'?" in str(folder.refusal())
     (folder.path / "recordings" / "EL089P00_22.mcap").unlink()

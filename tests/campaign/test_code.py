@@ -24,9 +24,7 @@ def copy_of(package: Path, target: Path) -> Path:
 
 def git(folder: Path, *words: str) -> str:
     who = ["-c", "user.name=a", "-c", "user.email=a@example.org"]
-    done = subprocess.run(
-        ["git", "-C", str(folder), *who, *words], capture_output=True, text=True, check=True
-    )
+    done = subprocess.run(["git", "-C", str(folder), *who, *words], capture_output=True, text=True, check=True)
     return done.stdout.strip()
 
 
@@ -57,9 +55,7 @@ def test_a_checkout_is_named_by_its_commit_and_by_its_files_only_if_they_differ(
     assert len(code.source(package)) == 64
 
 
-def test_an_installer_that_fetched_a_commit_says_which(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_installer_that_fetched_a_commit_says_which(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     package = tmp_path / "site" / "kbs_process"
     package.mkdir(parents=True)
     (package / "__init__.py").write_text("")

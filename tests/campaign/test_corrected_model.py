@@ -49,9 +49,7 @@ def test_it_loads_with_the_effect_that_was_found(tmp_path: Path) -> None:
 
 def gain(site: str, value: float) -> SensingLaw:
     return SensingLaw(
-        "channel_gain",
-        site,
-        {"gain": Quantity("sensing", np.asarray(value), "1", np.asarray(1e-3), "a test")},
+        "channel_gain", site, {"gain": Quantity("sensing", np.asarray(value), "1", np.asarray(1e-3), "a test")}
     )
 
 
@@ -86,14 +84,10 @@ def test_readings_are_what_the_laws_make_of_a_prediction() -> None:
     expected[:, 4] *= 1.02
     np.testing.assert_allclose(read, expected)
     angle = wrench[:, :2]
-    np.testing.assert_array_equal(
-        readings([gain("Ty", 0.02)], "angle", rig.joint_names, t, angle, rig, None), angle
-    )
+    np.testing.assert_array_equal(readings([gain("Ty", 0.02)], "angle", rig.joint_names, t, angle, rig, None), angle)
 
 
-def test_a_diagnosis_that_went_round_a_phase_and_found_a_gain_leaves_a_model_that_loads(
-    tmp_path: Path,
-) -> None:
+def test_a_diagnosis_that_went_round_a_phase_and_found_a_gain_leaves_a_model_that_loads(tmp_path: Path) -> None:
     campaign = load_campaign(CAMPAIGN, checksums=False)
     phase, name = "joint.el.drive.phi_stat", "law.channel_gain.Ty.gain"
     rig = substitute(campaign.rig, {phase: 7.0})

@@ -30,9 +30,7 @@ def slew(duration: float = 40.0) -> Schedule:
 
 def late(schedule: Schedule, start: float) -> Schedule:
     kept = schedule.t >= start - 1e-9
-    return Schedule(
-        schedule.t[kept] - start, *(x[kept] for x in (schedule.position, schedule.rate, schedule.field))
-    )
+    return Schedule(schedule.t[kept] - start, *(x[kept] for x in (schedule.position, schedule.rate, schedule.field)))
 
 
 def test_what_preceded_is_smooth_and_ends_where_the_recording_begins() -> None:
@@ -62,9 +60,7 @@ def test_nothing_is_predicted_for_a_time_without_commands() -> None:
     slewed = slew(30.0)
     events = Events(slewed.t + 12.0, slewed.position, names)
     t = np.arange(800) * 0.05
-    wrench = Signal(
-        0.0, 0.05, np.zeros((800, 6)), WRENCH_CHANNELS, WRENCH_UNITS, "T", np.ones(len(t), dtype=bool)
-    )
+    wrench = Signal(0.0, 0.05, np.zeros((800, 6)), WRENCH_CHANNELS, WRENCH_UNITS, "T", np.ones(len(t), dtype=bool))
     run = replace(EMPTY, wrench=wrench, command=events, rates={"wrench": 100.0, "angle": 20.0})
     predicted = predict_run(campaign.rig, campaign.effects, run, CondenseSettings(working_rate_Hz=20.0))
     for signal in (predicted.wrench, predicted.angle):

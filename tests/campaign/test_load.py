@@ -71,17 +71,11 @@ def test_rates_and_lists_of_units_are_converted(folder: CampaignFolder) -> None:
         'bias = { value = [1, 2, 3, 4, 5, 6], unit = ["kN", "N", "mN", "N m", "N mm", "kN m"]',
     )
     folder.replace(
-        "parameters/drives.toml",
-        'w_dyn = { value = 0.05, unit = "rad/s"',
-        'w_dyn = { value = 3, unit = "rpm"',
+        "parameters/drives.toml", 'w_dyn = { value = 0.05, unit = "rad/s"', 'w_dyn = { value = 3, unit = "rpm"'
     )
     quantities = load_campaign(folder.path).rig.quantities()
-    np.testing.assert_allclose(
-        quantities["transducer.bias"].value, [1000, 2, 3e-3, 4, 5e-3, 6000], rtol=1e-15
-    )
-    np.testing.assert_allclose(
-        quantities["transducer.bias"].sigma, [5000, 5, 5e-3, 0.5, 0.5e-3, 500], rtol=1e-15
-    )
+    np.testing.assert_allclose(quantities["transducer.bias"].value, [1000, 2, 3e-3, 4, 5e-3, 6000], rtol=1e-15)
+    np.testing.assert_allclose(quantities["transducer.bias"].sigma, [5000, 5, 5e-3, 0.5, 0.5e-3, 500], rtol=1e-15)
     assert float(quantities["joint.az.drive.w_dyn"]) == pytest.approx(0.1 * pi, rel=1e-15)
 
 
@@ -93,11 +87,7 @@ def test_fields_of_a_topic_can_be_named(folder: CampaignFolder) -> None:
     )
     angle = load_campaign(folder.path).topics.angle
     assert angle is not None
-    assert (angle.key, angle.topic, angle.fields) == (
-        "angle",
-        "/bench/angles",
-        ("azimuth.value", "elevation.value"),
-    )
+    assert (angle.key, angle.topic, angle.fields) == ("angle", "/bench/angles", ("azimuth.value", "elevation.value"))
 
 
 def test_matrix_from_a_csv_file(folder: CampaignFolder) -> None:

@@ -19,9 +19,7 @@ def root(folder: CampaignFolder) -> Path:
 
 @pytest.mark.parametrize("place", [".", "campaigns", "campaigns/EL089", "campaigns/EL089/parameters"])
 @pytest.mark.parametrize("name", ["campaign/EL089", "campaigns/EL089"])
-def test_a_name_is_found_here_and_above(
-    root: Path, monkeypatch: pytest.MonkeyPatch, place: str, name: str
-) -> None:
+def test_a_name_is_found_here_and_above(root: Path, monkeypatch: pytest.MonkeyPatch, place: str, name: str) -> None:
     monkeypatch.chdir(root / place)
     assert find_campaign(name) == root / "campaigns" / "EL089"
 

@@ -51,9 +51,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
 
 def test_every_package_is_listed_once() -> None:
     listed = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]["packages"]
-    folders = (
-        path.parent.relative_to(ROOT / "pipeline") for path in (ROOT / "pipeline").rglob("__init__.py")
-    )
+    folders = (path.parent.relative_to(ROOT / "pipeline") for path in (ROOT / "pipeline").rglob("__init__.py"))
     packages = {".".join(folder.parts) for folder in folders} | {"kbs_process.schemas"}
     assert sorted(listed) == sorted(packages), "pyproject.toml: [tool.setuptools] packages"
 

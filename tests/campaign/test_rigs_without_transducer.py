@@ -72,12 +72,7 @@ def test_a_current_needs_the_gain_of_its_joints_type(axis: CampaignFolder) -> No
     ("file", "old", "new", "what"),
     [
         ("campaign.toml", 'effort = "/motor"', "", "topics.effort: is missing"),
-        (
-            "campaign.toml",
-            'effort = "/motor"',
-            'effort = "/motor"\nwrench = "/wrench"',
-            "transducer: is missing",
-        ),
+        ("campaign.toml", 'effort = "/motor"', 'effort = "/motor"\nwrench = "/wrench"', "transducer: is missing"),
         ("parameters/rig.toml", '"prismatic"', '"helical"', "'helical' is not allowed"),
         ("parameters/rig.toml", 'unit = "N s/m"', 'unit = "N m s/rad"', "where linear damping"),
         ("parameters/rig.toml", 'parent = "lab"', 'parent = "T"', "'T' is no other link"),
@@ -95,9 +90,7 @@ def test_what_only_a_measured_motion_can_drive_is_refused_under_commands(tmp_pat
     assert "joint.az.viscous: goes with a rig that its measured motion drives" in str(folder.refusal())
 
 
-def test_a_corrected_model_of_a_slide_has_newtons_and_metres_and_loads(
-    axis: CampaignFolder, tmp_path: Path
-) -> None:
+def test_a_corrected_model_of_a_slide_has_newtons_and_metres_and_loads(axis: CampaignFolder, tmp_path: Path) -> None:
     campaign = load_campaign(axis.path)
     (dahl,) = select(["dahl"])
     rig = attach(campaign.rig, dahl, {"dahl": 3.0, "dahl_displacement": 1e-3})

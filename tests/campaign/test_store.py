@@ -49,10 +49,7 @@ def child(code: str, target: Path, *, prelude: str = "") -> subprocess.Popen[str
         f"{prelude}\ntarget = Path(sys.argv[1])\n{code}\n"
     )
     return subprocess.Popen(
-        [sys.executable, "-c", program, str(target)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
+        [sys.executable, "-c", program, str(target)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
 
 

@@ -63,14 +63,7 @@ def record(path: Path, *, nan: bool = False) -> None:
         [
             OutStream("/transducer/wrench", "wrench", stamp, stamp, wrench),
             OutStream("/encoder", "joints", stamp, stamp, np.hstack([0.0 * el, el]), ("az", "el")),
-            OutStream(
-                "/command",
-                "joints",
-                cycle,
-                cycle,
-                np.stack([zero, command, zero, rate], axis=1),
-                ("az", "el"),
-            ),
+            OutStream("/command", "joints", cycle, cycle, np.stack([zero, command, zero, rate], axis=1), ("az", "el")),
         ],
     )
 
@@ -140,18 +133,7 @@ def test_help_imports_nothing_that_computes(verb: list[str]) -> None:
         "print(sorted({name.split('.')[0] for name in sys.modules}), file=sys.stderr)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    heavy = {
-        "numpy",
-        "scipy",
-        "pandas",
-        "pyarrow",
-        "numba",
-        "matplotlib",
-        "rich",
-        "jsonschema",
-        "jinja2",
-        "msgspec",
-    }
+    heavy = {"numpy", "scipy", "pandas", "pyarrow", "numba", "matplotlib", "rich", "jsonschema", "jinja2", "msgspec"}
     assert not [name for name in heavy if f"'{name}'" in done.stderr]
 
 
@@ -220,9 +202,7 @@ def test_an_interrupt_is_status_130(
         (("campaign/EL089", "--chek"), "No such option"),
     ],
 )
-def test_wrong_words_are_status_2(
-    arguments: tuple[str, ...], words: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_wrong_words_are_status_2(arguments: tuple[str, ...], words: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(*arguments) == 2
     message = capsys.readouterr().err
     assert words in message
@@ -238,9 +218,7 @@ def processable(tmp_path: Path) -> CampaignFolder:
     return folder
 
 
-def test_validate_finds_sound_recordings_clean(
-    processable: CampaignFolder, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_validate_finds_sound_recordings_clean(processable: CampaignFolder, capsys: pytest.CaptureFixture[str]) -> None:
     assert run("validate", str(processable.path), "--check") == 0
     out = capsys.readouterr().out
     assert "EL089P00_1  fit          clean" in out
@@ -262,9 +240,7 @@ def test_validate_tells_losses_and_fails_only_when_asked(
 def test_validate_tells_what_was_put_in_order_and_counts_no_loss(
     processable: CampaignFolder, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    short_campaign.record(
-        processable.path / "recordings" / "EL089P00_2.mcap", noise=0.01, seed=5, swapped=True
-    )
+    short_campaign.record(processable.path / "recordings" / "EL089P00_2.mcap", noise=0.01, seed=5, swapped=True)
     assert run("validate", str(processable.path), "--check") == 0
     out = capsys.readouterr().out
     assert "EL089P00_2  held-out     clean" in out
@@ -295,10 +271,7 @@ def test_validate_tells_a_recording_of_which_nothing_is_whole_long_enough(
     ],
 )
 def test_validate_hints_at_a_campaign_without_repeats(
-    processable: CampaignFolder,
-    capsys: pytest.CaptureFixture[str],
-    trajectories: dict[str, str],
-    hinted: str,
+    processable: CampaignFolder, capsys: pytest.CaptureFixture[str], trajectories: dict[str, str], hinted: str
 ) -> None:
     text = (processable.path / "campaign.toml").read_text()
     for number, (name, trajectory) in enumerate(trajectories.items(), start=11):
@@ -313,9 +286,7 @@ def test_validate_hints_at_a_campaign_without_repeats(
     assert hinted in out
 
 
-def test_validate_refuses_what_it_cannot_read(
-    folder: CampaignFolder, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_validate_refuses_what_it_cannot_read(folder: CampaignFolder, capsys: pytest.CaptureFixture[str]) -> None:
     (folder.path / "recordings" / "EL089P00_2.mcap").write_bytes(b"")
     folder.replace("campaign.toml", 'wrench = "/transducer/wrench"', 'wrench = "/transducer/wrnch"')
     assert run("validate", str(folder.path), "-q") == 2
@@ -342,9 +313,7 @@ def test_validate_tells_what_processing_refuses_in_the_same_words(
     assert not target.exists()
 
 
-def test_inspect_shows_what_is_in_a_recording(
-    folder: CampaignFolder, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_inspect_shows_what_is_in_a_recording(folder: CampaignFolder, capsys: pytest.CaptureFixture[str]) -> None:
     path = folder.path / "recordings" / "EL089P00_1.mcap"
     assert run("inspect", str(path)) == 0
     out = capsys.readouterr().out
@@ -402,10 +371,7 @@ def test_an_interrupted_simulation_leaves_the_old_one(folder: CampaignFolder, tm
     (tmp_path / "long.csv").write_text("t,az,el\n0,0,1.3\n1,0,1.3\n20000,0,1.31\n")
     command = [sys.executable, "-m", "kbs_process", "simulate", str(folder.path), "-o", str(target)]
     process = subprocess.Popen(
-        [*command, "--command", str(tmp_path / "long.csv")],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
+        [*command, "--command", str(tmp_path / "long.csv")], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
     assert process.stderr is not None
     assert process.stderr.readline() == "Simulating long.csv\n"
@@ -471,9 +437,7 @@ def test_there_is_nothing_to_simulate_without_commands(
     assert "use 'predict'" in capsys.readouterr().err
 
 
-def test_results_never_go_into_the_campaign(
-    folder: CampaignFolder, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_results_never_go_into_the_campaign(folder: CampaignFolder, capsys: pytest.CaptureFixture[str]) -> None:
     before = sorted(folder.path.rglob("*"))
     assert run("predict", str(folder.path), "EL089P00_1", "-o", str(folder.path / "out")) == 2
     assert "campaign's folder" in capsys.readouterr().err

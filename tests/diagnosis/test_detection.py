@@ -66,9 +66,7 @@ def resting(monkeypatch: pytest.MonkeyPatch) -> None:
 
     def windows(experiment: Experiment, trial: Trial, valid: Mask) -> Array:
         part = valid & (np.arange(N) < SHOWN)
-        return np.stack(
-            [window_of(part if k >= experiment.loads else valid) for k in range(CHANNELS)], axis=1
-        )
+        return np.stack([window_of(part if k >= experiment.loads else valid) for k in range(CHANNELS)], axis=1)
 
     monkeypatch.setattr(floor, "channel_windows", windows)
 

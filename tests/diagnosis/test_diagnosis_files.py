@@ -93,9 +93,7 @@ def outcome() -> Outcome:
         alternatives=(Alternative(CABLE, 0.1, 2.0, 0.16, True, True),),
         ports_alike=(),
         held_out_variance=0.95,
-        curve=Curve(
-            OVER_ANGLE, x, basis(OVER_ANGLE, x, *ends), np.linspace(0.6, 0.4, 101), np.full(101, 0.01)
-        ),
+        curve=Curve(OVER_ANGLE, x, basis(OVER_ANGLE, x, *ends), np.linspace(0.6, 0.4, 101), np.full(101, 0.01)),
     )
     return Outcome(
         before=NOTHING,
@@ -117,9 +115,7 @@ def outcome() -> Outcome:
 def written(outcome: Outcome, tmp_path_factory: pytest.TempPathFactory) -> Path:
     (find,), experiment = outcome.finds, outcome.known.experiment
     trajectory = family(limits_of(experiment.drives, experiment.dt), ("az", "el"), 60.0, "el")[0]
-    proposal = Proposal(
-        LAW, (CABLE,), trajectory, 3.0, 0.067, 3, float("nan"), (Tried(trajectory.words, 3.2),)
-    )
+    proposal = Proposal(LAW, (CABLE,), trajectory, 3.0, 0.067, 3, float("nan"), (Tried(trajectory.words, 3.2),))
     target = tmp_path_factory.mktemp("diagnosis") / "out"
     campaign = load_campaign(bench.CAMPAIGN, checksums=False)
     discs = merged([disc(find, 1.0, ""), disc(find, 2.0, "_2")])
@@ -131,18 +127,13 @@ def written(outcome: Outcome, tmp_path_factory: pytest.TempPathFactory) -> Path:
     assert nothing in (target / "index.html").read_text().replace("\u00a0", " ")
     command = load(target, DiagnosisResults).provenance.command
     assert command == "kbs-process campaign/EL089", "of a diagnosis at the end of processing"
-    assert told_off.verdict_lines[0].startswith(
-        "Known parameters are off (joint.el.drive.Ka +5.0 sigma): with that"
-    )
+    assert told_off.verdict_lines[0].startswith("Known parameters are off (joint.el.drive.Ka +5.0 sigma): with that")
     assert "would look the same" in told_off.verdict_lines[0] and "{" not in told_off.verdict_lines[0]
     hidden = replace(outcome, finds=(), bent=True)
     assert hidden.verdict == "undecided" and replace(hidden, moved=off.moved).verdict == "parameters off"
     told_hidden = write_diagnosis(campaign, declared(experiment), hidden, target, False, None, "")
     assert "together farther from what the files say" in told_hidden.verdict_lines[0]
-    assert (
-        "most: " in told_hidden.verdict_lines[0]
-        and "Check these at their source" in told_hidden.verdict_lines[0]
-    )
+    assert "most: " in told_hidden.verdict_lines[0] and "Check these at their source" in told_hidden.verdict_lines[0]
     cut_short = replace(off, ended=True)
     assert cut_short.verdict == "undecided" and replace(cut_short, moved=()).verdict == "none"
     told_cut = write_diagnosis(campaign, declared(experiment), cut_short, target, False, None, "")
@@ -151,22 +142,12 @@ def written(outcome: Outcome, tmp_path_factory: pytest.TempPathFactory) -> Path:
     )
     assert "is open, as the search ended before all were tried." in told_cut.verdict_lines[0]
     more = write_diagnosis(
-        campaign,
-        declared(experiment),
-        replace(outcome, after=Detection((), -80.0, 1.44)),
-        target,
-        False,
-        proposal,
+        campaign, declared(experiment), replace(outcome, after=Detection((), -80.0, 1.44)), target, False, proposal
     )
     assert "The model lacks: curve" in more.verdict_lines[0]
     assert "1.2 times the floor (rms) is left: more is missing, or" in more.verdict_lines[0]
     much = write_diagnosis(
-        campaign,
-        declared(experiment),
-        replace(outcome, after=Detection((), -80.0, 2.25)),
-        target,
-        False,
-        proposal,
+        campaign, declared(experiment), replace(outcome, after=Detection((), -80.0, 2.25)), target, False, proposal
     )
     assert much.verdict_lines[0].startswith(
         "Nearest to what the model lacks, of the laws known: curve over joint angle"
@@ -187,9 +168,7 @@ def written(outcome: Outcome, tmp_path_factory: pytest.TempPathFactory) -> Path:
     assert replace(open_yet, finds=(far,)).verdict == "physics"
     assert replace(open_yet, finds=outcome.finds).verdict == "physics", "the rival is at the same place"
     disputed = write_diagnosis(campaign, declared(experiment), open_yet, target, False, None)
-    assert disputed.verdict_lines[0].startswith(
-        "Nearest to what the model lacks, of the laws known: curve over"
-    )
+    assert disputed.verdict_lines[0].startswith("Nearest to what the model lacks, of the laws known: curve over")
     assert "joint viscous (joint torque, el) does nearly the same" in disputed.verdict_lines[0]
     named = replace(open_yet, finds=(far,), ended=True)
     strained = write_diagnosis(campaign, declared(experiment), named, target, False, None)
@@ -199,9 +178,7 @@ def written(outcome: Outcome, tmp_path_factory: pytest.TempPathFactory) -> Path:
     assert "as much work as it may cost" in (target / "results.json").read_text()
     write_diagnosis(campaign, declared(experiment), replace(outcome, ended=True), target, False, None)
     assert "as much work as it may cost" in (target / "results.json").read_text()
-    assert (
-        campaign.topics.command is not None and "commanded one" not in (target / "results.json").read_text()
-    )
+    assert campaign.topics.command is not None and "commanded one" not in (target / "results.json").read_text()
     without = replace(campaign, topics=replace(campaign.topics, angle=campaign.topics.command))
     write_diagnosis(without, declared(experiment), outcome, target, False, None)
     assert "the motion is the commanded one" in (target / "results.json").read_text()
@@ -214,10 +191,7 @@ def written(outcome: Outcome, tmp_path_factory: pytest.TempPathFactory) -> Path:
     )
     assert "leaves 1.1 times the floor (rms) of what was fitted, but: r1 predicted no better." in little
     told = write_diagnosis(campaign, declared(experiment), outcome, target, False, proposal)
-    assert (
-        told.verdict_lines[0]
-        == "The model lacks: curve over joint angle or ground cable (external wrench, el)."
-    )
+    assert told.verdict_lines[0] == "The model lacks: curve over joint angle or ground cable (external wrench, el)."
     assert told.verdict_lines[1] == f"Corrected model: {target / 'corrected'}"
     assert told.verdict_lines[-1] == f"Next test: {target / 'next-test.csv'}"
     return target
@@ -302,12 +276,8 @@ def test_laws_of_the_catalogue_that_do_the_same_are_alike_likely() -> None:
     assert [one.probability for one in others] == pytest.approx([0.31, 0.3, 0.08, 0.0])
 
 
-@pytest.mark.parametrize(
-    ("sigmas", "told"), [(NEAR, True), (-NEAR, True), (3.0, False), (MOVED + 0.1, False)]
-)
-def test_a_number_that_went_as_far_as_it_was_let_go_is_told(
-    outcome: Outcome, sigmas: float, told: bool
-) -> None:
+@pytest.mark.parametrize(("sigmas", "told"), [(NEAR, True), (-NEAR, True), (3.0, False), (MOVED + 0.1, False)])
+def test_a_number_that_went_as_far_as_it_was_let_go_is_told(outcome: Outcome, sigmas: float, told: bool) -> None:
     known = outcome.known
     name = "joint.el.drive.Ka"
     k = known.names.index(name)
@@ -321,18 +291,10 @@ def test_a_number_that_went_as_far_as_it_was_let_go_is_told(
 def test_the_channel_that_shows_most_of_what_is_left_is_told() -> None:
     def trial(**channels: float) -> Trial:
         return Trial(
-            recording="r",
-            trajectory="0",
-            role="fit",
-            nominal=9.0,
-            known=3.0,
-            corrected=1.2,
-            channels=channels,
+            recording="r", trajectory="0", role="fit", nominal=9.0, known=3.0, corrected=1.2, channels=channels
         )
 
-    assert (
-        _shown([trial(Fx=1.0, Fy=2.0), trial(Fx=2.0**0.5, Fy=0.9, el=1.0)]) == " Fy shows 75 % of its power."
-    )
+    assert _shown([trial(Fx=1.0, Fy=2.0), trial(Fx=2.0**0.5, Fy=0.9, el=1.0)]) == " Fy shows 75 % of its power."
     assert _shown([trial(Fx=1.5, Fy=1.5)]) == _shown([trial(Fx=0.9)]) == _shown([]) == ""
 
 
@@ -354,9 +316,7 @@ def test_a_find_is_as_sure_as_such_finds_were(outcome: Outcome, share: float) ->
     (find,) = outcome.finds
     (told,) = trusted([find], share)
     assert told.probability == share * find.probability
-    assert [one.probability for one in told.alternatives] == [
-        share * one.probability for one in find.alternatives
-    ]
+    assert [one.probability for one in told.alternatives] == [share * one.probability for one in find.alternatives]
 
 
 @pytest.mark.parametrize(

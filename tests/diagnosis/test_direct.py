@@ -104,18 +104,14 @@ def chain(carrier: str, slider: int) -> Rig:
         one = joint(name, parent, tuple(axis / np.linalg.norm(axis)), 0.3 * rng.standard_normal(3))
         effort = Effort("V", *(quantity("effort", value) for value in (1.7 + k, 0.1, 0.0, 0.0)))
         joints.append(replace(one, type="prismatic" if k == slider else "revolute", effort=effort))
-    bodies = tuple(
-        body(f"of {name}", name, 2.0, 0.2 * rng.standard_normal(3), (0.1, 0.1, 0.1)) for name in "abc"
-    )
+    bodies = tuple(body(f"of {name}", name, 2.0, 0.2 * rng.standard_normal(3), (0.1, 0.1, 0.1)) for name in "abc")
     whole = plain_rig(bodies, tuple(joints), tilt=(0.02, -0.03), stiffness=None)
     return replace(whole, transducer=replace(whole.transducer, on=carrier))
 
 
 @pytest.mark.parametrize("carrier", ["lab", "a", "b"])
 @pytest.mark.parametrize("slider", [-1, 0, 1, 2])
-def test_the_loads_answer_to_a_weight_as_to_a_force_and_to_the_ground_by_its_power(
-    carrier: str, slider: int
-) -> None:
+def test_the_loads_answer_to_a_weight_as_to_a_force_and_to_the_ground_by_its_power(carrier: str, slider: int) -> None:
     here = chain(carrier, slider)
     q = np.random.default_rng(5).standard_normal((7, 3))
     still = np.zeros_like(q)

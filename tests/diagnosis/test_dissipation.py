@@ -58,9 +58,7 @@ def test_viscous_friction_does_the_work_of_its_rate(scene: Scene) -> None:
     assert told == pytest.approx(2.0 * np.sum(rate**2) / tapped.rate, rel=0.02)
 
 
-def test_what_brakes_one_way_more_than_it_pushes_the_other_and_what_is_no_friction_may_stay(
-    scene: Scene,
-) -> None:
+def test_what_brakes_one_way_more_than_it_pushes_the_other_and_what_is_no_friction_may_stay(scene: Scene) -> None:
     for amplitudes in ((0.6, -0.1), (-0.1, 0.6)):
         assert said(scene, "asymmetric_coulomb", *amplitudes) == ()
         assert said(scene, "asymmetric_coulomb", *(-a for a in amplitudes)) != ()

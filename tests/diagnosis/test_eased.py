@@ -34,9 +34,7 @@ def test_numbers_that_are_far_off_go_to_where_they_are() -> None:
     gone = eased(near, simulate)
     found = gone.rig.quantities()
     for name, element in OFF.items():
-        apart = (found[name].value[element] - quantities[name].value[element]) / quantities[name].sigma[
-            element
-        ]
+        apart = (found[name].value[element] - quantities[name].value[element]) / quantities[name].sigma[element]
         assert apart == pytest.approx(SIGMAS, abs=2.0), name
     # Bounds are none of those that kept them near.
     freed = refit(made, gone, floor, simulate, leaps=0)
@@ -53,9 +51,7 @@ def test_nothing_moves_where_nothing_is_wrong() -> None:
     assert moved.max() < 0.5
 
 
-def test_phases_are_looked_for_again_beside_numbers_that_were_refitted(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_phases_are_looked_for_again_beside_numbers_that_were_refitted(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where the numbers that they were looked for beside first leave much, and only if that halves it."""
     made = bench.experiment(bench.rig(), ("fit", "fit"), 5)
     simulate, floor = bench.serial(made), declared(made)

@@ -47,9 +47,7 @@ def sigmas(law: Array, recorded: Array) -> tuple[float, float]:
     of = metric()
     S, z = of(law), of(recorded)
     a = float(S @ z / (S @ S))
-    return abs(a) * float(np.linalg.norm(S)), evenly(
-        EXPERIMENT, {0: parts(EXPERIMENT, 0, of, a * S, z - a * S)}
-    )
+    return abs(a) * float(np.linalg.norm(S)), evenly(EXPERIMENT, {0: parts(EXPERIMENT, 0, of, a * S, z - a * S)})
 
 
 def law_and_noise(seed: int = 3) -> tuple[Array, Array]:

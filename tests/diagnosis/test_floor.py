@@ -37,19 +37,7 @@ def made(seed: int, repeats: int, common: Array) -> Experiment:
     valid = np.ones(N, dtype=np.bool_)
     valid[1200:1230] = False
     trials = tuple(
-        Trial(
-            f"r{k}",
-            "fit",
-            0,
-            0,
-            (common + coloured(rng, N)) * valid[:, None],
-            valid,
-            100.0,
-            100.0,
-            0.0,
-            0.0,
-            None,
-        )
+        Trial(f"r{k}", "fit", 0, 0, (common + coloured(rng, N)) * valid[:, None], valid, 100.0, 100.0, 0.0, 0.0, None)
         for k in range(repeats)
     )
     return Experiment(rig, bench.effects(), bench.DT, channels, ("",) * CHANNELS, (drive,), trials, 8.0)

@@ -77,9 +77,7 @@ def test_a_cord_that_nobody_stated_is_found_wherever_its_anchor_is() -> None:
     scene = Scene.of(here.known.experiment, here.hypothesis, here.predicted)
     tried = Bench.of(here.known, scene)
     none = Ranges({})
-    every = [
-        one for one in candidates(made.rig, made.effects, none, (), made.channels) if one.name == BUNGEE.name
-    ]
+    every = [one for one in candidates(made.rig, made.effects, none, (), made.channels) if one.name == BUNGEE.name]
     best = bettered(tried, screen(tried, [Catalogued(one, scene) for one in every]).candidates[0])
     own = identity(best.suspect)
     assert (own.port, own.axis, own.family) == ("external wrench", "el", "bungee")

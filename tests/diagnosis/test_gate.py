@@ -26,9 +26,7 @@ def folds(*gains: float) -> list[Fold]:
         ((200.0, float("nan")), ["r0", "r1"]),  # a plant that diverged
     ],
 )
-def test_worse_is_what_chance_and_the_formula_do_not_explain(
-    gains: tuple[float, ...], worse: list[str]
-) -> None:
+def test_worse_is_what_chance_and_the_formula_do_not_explain(gains: tuple[float, ...], worse: list[str]) -> None:
     assert worsened(folds(*gains)) == worse
 
 
@@ -41,9 +39,7 @@ def test_worse_is_what_chance_and_the_formula_do_not_explain(
         (1.0, 100.0, False),  # less than a suspect has to show
     ],
 )
-def test_a_law_that_is_right_gains_the_square_of_what_it_changes(
-    size: float, noise: float, enough: bool
-) -> None:
+def test_a_law_that_is_right_gains_the_square_of_what_it_changes(size: float, noise: float, enough: bool) -> None:
     rng = np.random.default_rng(5)
     law = np.full(2000, 0.4) / noise
     left = rng.standard_normal(2000)

@@ -87,9 +87,7 @@ def test_known_numbers_that_stand_at_bounds_do_not_do_what_an_effect_does() -> N
     S = {k: J[k][:, 3:4] + 0.3 * rng.standard_normal((ROWS, 1)) for k in J}
     z = {k: 4.0 * S[k][:, 0] + 2.0 * J[k][:, 3] + rng.standard_normal(ROWS) for k in J}
     far, near = np.full(KNOWN, 100.0), np.where(np.arange(KNOWN) == 3, 0.0, 100.0)
-    free, wide, bound = (
-        Background.of(z, J, precision, room=room) for room in (None, (-far, far), (-far, near))
-    )
+    free, wide, bound = (Background.of(z, J, precision, room=room) for room in (None, (-far, far), (-far, near)))
     without, unbarred, held = (score(one, Sums.over(one, S)) for one in (free, wide, bound))
     assert unbarred.gain == without.gain
     assert held.gain > 3.0 * without.gain
@@ -125,9 +123,7 @@ def test_dependent_amplitudes_count_once() -> None:
     z = {k: 2.0 * column[k][:, 0] + rng.standard_normal(ROWS) for k in J}
     background = Background.of(z, J, precision)
     one = score(background, Sums.over(background, column))
-    twice = score(
-        background, Sums.over(background, {k: np.hstack([c, 2.0 * c, 0.0 * c]) for k, c in column.items()})
-    )
+    twice = score(background, Sums.over(background, {k: np.hstack([c, 2.0 * c, 0.0 * c]) for k, c in column.items()}))
     assert (one.rank, twice.rank) == (1, 1)
     assert twice.gain == pytest.approx(one.gain)
     assert twice.amplitude @ [1.0, 2.0, 0.0] == pytest.approx(one.amplitude[0])
@@ -139,9 +135,7 @@ def test_an_amplitude_of_its_own_in_each_trial() -> None:
     column = {k: rng.standard_normal((ROWS, 1)) for k in J}
     z = {k: (k - 1.0) * column[k][:, 0] + 0.1 * rng.standard_normal(ROWS) for k in J}
     background = Background.of(z, J, precision)
-    assert score(background, per_trial(background, column)).amplitude == pytest.approx(
-        [-1.0, 0.0, 1.0], abs=0.05
-    )
+    assert score(background, per_trial(background, column)).amplitude == pytest.approx([-1.0, 0.0, 1.0], abs=0.05)
 
 
 def test_repeats_whitened_alike_are_multiplied_once_and_counted_all() -> None:

@@ -16,9 +16,7 @@ from kbs_process.identification.output_error import Scalar
 from kbs_process.signals.records import Array
 
 
-@pytest.mark.parametrize(
-    "orders", [np.arange(0.25, 60.0, 0.25), np.arange(7.3, 90.0, 0.61), np.arange(1.0, 3.0)]
-)
+@pytest.mark.parametrize("orders", [np.arange(0.25, 60.0, 0.25), np.arange(7.3, 90.0, 0.61), np.arange(1.0, 3.0)])
 def test_power_along_orders_is_that_of_the_sum(orders: np.ndarray) -> None:
     rng = np.random.default_rng(4)
     angle = np.cumsum(rng.normal(0.01, 0.02, 4000)) - 11.0
@@ -86,9 +84,7 @@ def test_a_tone_between_two_bins_is_put_there(made: Experiment) -> None:
     line[:, 0] = 0.5 * np.sin(2.0 * np.pi * tone * np.arange(n) * made.dt + 0.3)
     found = proposals(line, made)
     assert found["floor_frequency"][0] == pytest.approx(tone, abs=0.1 * apart)
-    assert tone == pytest.approx(
-        found["sway_frequency"][0], abs=0.1 * apart
-    )  # what hangs on a link may ring there
+    assert tone == pytest.approx(found["sway_frequency"][0], abs=0.1 * apart)  # what hangs on a link may ring there
 
 
 def test_a_line_beside_a_beat_of_the_controller_is_one(made: Experiment) -> None:
@@ -164,9 +160,7 @@ def test_a_clock_that_jumps_while_a_joint_turns_at_one_rate_is_a_step_of_its_ang
     shown = 0.01 * np.arange(2000.0)[:, None]
     error = -0.05 * (np.arange(2000) > 1200)[:, None] + 1e-3 * rng.standard_normal((2000, 1))
     places = np.arange(50.0, 1950.0, 10.0)
-    gain = _gain(
-        error, np.gradient(shown, axis=0), list(_telling(error, np.ones((2000, 1), dtype=np.bool_))), places
-    )
+    gain = _gain(error, np.gradient(shown, axis=0), list(_telling(error, np.ones((2000, 1), dtype=np.bool_))), places)
     assert places[np.argmax(gain)] == pytest.approx(1200.0, abs=10.0)
 
 

@@ -25,13 +25,7 @@ from kbs_process.diagnosis.screening.screen import Bench, Found
 from kbs_process.diagnosis.selection import leaders
 from kbs_process.diagnosis.selection.leaders import gated
 from kbs_process.plant.effect import Port
-from kbs_process.plant.effects.measured_law import (
-    COEFFICIENTS,
-    MEASURED,
-    Measured,
-    torque,
-    torque_over_rate,
-)
+from kbs_process.plant.effects.measured_law import COEFFICIENTS, MEASURED, Measured, torque, torque_over_rate
 
 # Of a bump in the middle of the range, N m.
 BUMP = np.array([0.0, 0.0, 0.02, 0.1, 0.3, 0.3, 0.1, 0.02, 0.0, 0.0])
@@ -141,9 +135,7 @@ def test_written_it_loads_and_acts_where_it_was_found(scene: Scene, tmp_path: Pa
         hypothesis, _ = inserted(hypothesis, law, "el", (0.1, 0.9), BUMP, 0.1 * BUMP)
     known = campaign.rig.quantities()
     changed = {
-        name: entry
-        for name, entry in hypothesis.rig.quantities().items()
-        if name not in known or entry.value.ndim > 1
+        name: entry for name, entry in hypothesis.rig.quantities().items() if name not in known or entry.value.ndim > 1
     }
     write_model(campaign, hypothesis.rig, hypothesis.effects, changed, tmp_path, "by a test")
     loaded = load_campaign(tmp_path, checksums=False)
@@ -168,9 +160,7 @@ def test_a_curve_is_refitted_inside_the_plant() -> None:
     added = predict(truth, made, 0).values - predict(nominal, made, 0).values
     made = replace(
         made,
-        trials=tuple(
-            replace(trial, measured=trial.measured + added * trial.valid[:, None]) for trial in made.trials
-        ),
+        trials=tuple(replace(trial, measured=trial.measured + added * trial.valid[:, None]) for trial in made.trials),
     )
     before = standing(made)
     along = Bench.of(before.known, Scene.of(made, before.hypothesis, before.predicted))
@@ -196,9 +186,7 @@ def test_a_curve_is_none_that_recordings_held_out_have_nothing_to_show_of(
 ) -> None:
     made = bench.experiment(bench.rig(), ("fit", "held-out"), 1)
     if excess:
-        louder = made.trials[1].measured + 3.0 * bench.noise(
-            np.random.default_rng(2), *made.trials[1].measured.shape
-        )
+        louder = made.trials[1].measured + 3.0 * bench.noise(np.random.default_rng(2), *made.trials[1].measured.shape)
         made = replace(made, trials=(made.trials[0], replace(made.trials[1], measured=louder)))
     there = standing(made)
     of = Scene.of(made, there.hypothesis, there.predicted, linear=False)

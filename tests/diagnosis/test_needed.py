@@ -75,9 +75,7 @@ def test_without_a_needless_law_nothing_is_lost_and_without_the_right_one_much_i
 
 
 @pytest.mark.parametrize("family", [LAG, HARNESS])
-def test_the_needless_law_goes_and_the_other_is_judged_without_it(
-    made: Experiment, family: tuple[str, str]
-) -> None:
+def test_the_needless_law_goes_and_the_other_is_judged_without_it(made: Experiment, family: tuple[str, str]) -> None:
     begun = standing(made)
     first, needless = joined(made, begun, family)
     both, cable = joined(made, first, CABLE)
@@ -205,7 +203,5 @@ def test_a_law_that_does_what_no_other_does_stays_whatever_recordings_that_it_do
     assert not needing._vital(both.known, both.known)
     told, reasons = needing._again([cable], cable.tried.own, rest, both, declared(made), simulate, alone=True)
     assert "r2 predicted worse" in reasons
-    told, reasons = needing._again(
-        [cable], cable.tried.own, rest, both, declared(made), simulate, alone=False
-    )
+    told, reasons = needing._again([cable], cable.tried.own, rest, both, declared(made), simulate, alone=False)
     assert "r2 predicted worse" not in reasons and told[0].find.identity == cable.find.identity

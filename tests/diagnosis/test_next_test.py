@@ -107,17 +107,13 @@ def test_what_an_encoder_alone_shows_is_measured_with_it(standing: Standing) -> 
     law = Identity("encoder", "el", (), "eccentricity", "encoder_eccentricity")
     numbers = {"eccentric_sin": 1e-4, "eccentric_cos": 5e-5}
     fitted = tuple(Estimate(name, "rad", value, 0.5 * value) for name, value in numbers.items())
-    disc = replace(
-        found(0.3), identity=law, estimates=(*fitted, Estimate("eccentric_order", "1", 300.0, 0.0))
-    )
+    disc = replace(found(0.3), identity=law, estimates=(*fitted, Estimate("eccentric_order", "1", 300.0, 0.0)))
     proposal = propose(standing, [disc], declared(standing.known.experiment), simulating)
     assert proposal is not None
     assert proposal.sigma < 0.5
 
 
-def test_its_commands_are_read_as_they_were_planned(
-    standing: Standing, proposal: Proposal, tmp_path: Path
-) -> None:
+def test_its_commands_are_read_as_they_were_planned(standing: Standing, proposal: Proposal, tmp_path: Path) -> None:
     file = tmp_path / "next.csv"
     file.write_text(commands_of(proposal, standing.known.experiment.rig))
     read, planned = read_commands(file, ("az", "el")), proposal.trajectory.schedule

@@ -33,13 +33,7 @@ from kbs_process.rig.model import Rig
 from kbs_process.signals.records import Array, Block, Events, Loss, Mask, Run
 from kbs_process.stages.motion import Motion
 from kbs_process.studies.diagnose import stretch
-from kbs_process.studies.diagnose.diagnosable import (
-    LEAST_S,
-    check_copies,
-    check_length,
-    check_noise,
-    check_signs,
-)
+from kbs_process.studies.diagnose.diagnosable import LEAST_S, check_copies, check_length, check_noise, check_signs
 from kbs_process.studies.diagnose.stretch import LONGEST_S, busiest, read_stretch
 from kbs_process.studies.diagnose.warnings import passed_over
 
@@ -154,14 +148,10 @@ def test_what_is_read_with_the_other_sign_is_told() -> None:
     assert run.wrench is not None and run.angle is not None
     check_signs(run, moved, campaign(), ENTRY)
     reaction = run.with_wrench(run.wrench.derive(-run.wrench.values, "reaction"))
-    with pytest.raises(
-        RecordingError, match=r"slope of measured T. against computed gravity is -1\.000, expected \+1"
-    ):
+    with pytest.raises(RecordingError, match=r"slope of measured T. against computed gravity is -1\.000, expected \+1"):
         check_signs(reaction, moved, campaign(), ENTRY)
     dead = replace(run, angle=run.angle.derive(np.ones((N, 2)), "dead"))
-    with pytest.raises(
-        RecordingError, match=r"slope of encoder el against its command is \+0\.0000, expected \+1"
-    ):
+    with pytest.raises(RecordingError, match=r"slope of encoder el against its command is \+0\.0000, expected \+1"):
         check_signs(dead, moved, campaign(), ENTRY)
 
 
@@ -179,9 +169,7 @@ def slower(one: Recorded) -> Recorded:
 def gappy(one: Recorded, gone: Mask) -> Recorded:
     assert one.run.wrench is not None
     wrench = one.run.wrench
-    return replace(
-        one, run=one.run.with_wrench(wrench.derive(wrench.values, "gap", valid=wrench.valid & ~gone))
-    )
+    return replace(one, run=one.run.with_wrench(wrench.derive(wrench.values, "gap", valid=wrench.valid & ~gone)))
 
 
 def test_recordings_at_other_rates_are_no_repeats_for_their_noise_is_another() -> None:
@@ -228,9 +216,7 @@ def alike() -> Experiment:
 def test_repeats_that_are_the_same_have_what_the_plant_is_exact_to_for_a_floor() -> None:
     experiment = alike()
     predicted = bench.standing(experiment, (Scalar("joint.el.drive.Ka"),)).predicted[0].values
-    found = floor.estimate(
-        experiment, {k: trial.measured - predicted for k, trial in enumerate(experiment.trials)}
-    )
+    found = floor.estimate(experiment, {k: trial.measured - predicted for k, trial in enumerate(experiment.trials)})
     whiten = found.whitener(experiment.trials[0], predicted)
     # A tenth of the stated noise is one sigma of this floor.
     noise = np.concatenate([[0.02] * 3, [0.002] * 3, [0.0] * 2]) * np.sqrt(20.0 / 100.0)
@@ -339,9 +325,7 @@ def test_a_copy_is_no_repeat() -> None:
 
 
 def test_a_law_whose_coefficients_have_no_covariance_does_not_pass() -> None:
-    known = bench.standing(
-        bench.experiment(RIG, ("fit", "held-out"), 4), (Scalar("joint.el.drive.Ka"),)
-    ).known
+    known = bench.standing(bench.experiment(RIG, ("fit", "held-out"), 4), (Scalar("joint.el.drive.Ka"),)).known
     for covariance in (np.zeros((1, 1)), np.full((1, 1), np.nan)):
         verdict = gate(known, replace(known, covariance=covariance), [0])
         assert not verdict.passed

@@ -119,9 +119,7 @@ def test_noise_has_no_orders(view: View) -> None:
         z = {k: size * rng.standard_normal(len(one)) for k, one in view.bench.background.z.items()}
         noisy = replace(view.bench, background=replace(view.bench.background, z=z))
         best = screen(noisy, view.suspects).candidates[0]
-        assert (
-            with_orders(replace(view, bench=noisy), replace(found, score=best.score)).suspect is found.suspect
-        )
+        assert with_orders(replace(view, bench=noisy), replace(found, score=best.score)).suspect is found.suspect
 
 
 def test_the_rest_of_a_shape_is_the_suspect_s_own(view: View) -> None:
@@ -131,9 +129,7 @@ def test_the_rest_of_a_shape_is_the_suspect_s_own(view: View) -> None:
         Catalogued(Candidate(law, "el", (("ripple_order", order), ("ripple_rate", 0.05))), view.scene)
         for order in (1.0, 2.0)
     ]
-    own = replace(
-        grid[0], candidate=replace(grid[0].candidate, shape=(("ripple_order", 1.0), ("ripple_rate", 0.2)))
-    )
+    own = replace(grid[0], candidate=replace(grid[0].candidate, shape=(("ripple_order", 1.0), ("ripple_rate", 0.2))))
     other = replace(grid[0], candidate=replace(grid[0].candidate, site="az", shape=(("ripple_order", 7.0),)))
     orders = _others(replace(view, suspects=(*grid, other)), own)
     assert orders == [2.0]

@@ -5,14 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kbs_process.diagnosis.screening.ports import (
-    Cells,
-    PortModel,
-    benjamini_yekutieli,
-    fisher,
-    port_test,
-    sine_window,
-)
+from kbs_process.diagnosis.screening.ports import Cells, PortModel, benjamini_yekutieli, fisher, port_test, sine_window
 
 C, D, CELLS, NU = 6, 1, 20, 24
 
@@ -74,8 +67,7 @@ def test_known_parameters_take_their_share_before_a_port_is_judged() -> None:
     best = port_test(cells, ports, 0.0).ports[0]
     assert best.name == "a" and best.sufficient
     without = Cells(
-        **{name: getattr(cells, name) for name in cells.__slots__}
-        | {"J": cells.J[:, :, :0], "precision": np.zeros(0)}
+        **{name: getattr(cells, name) for name in cells.__slots__} | {"J": cells.J[:, :, :0], "precision": np.zeros(0)}
     )
     assert not any(v.sufficient for v in port_test(without, ports, 0.0).ports)
 
@@ -122,9 +114,7 @@ def test_no_input_at_all_is_told() -> None:
 
 def test_of_nothing_no_port_takes_a_share() -> None:
     cells, ports = experiment(np.random.default_rng(6), 0.0)
-    quiet = Cells(
-        0.5 * cells.z, cells.J, cells.seen, cells.precision, cells.nu, cells.t, cells.f, cells.trajectory
-    )
+    quiet = Cells(0.5 * cells.z, cells.J, cells.seen, cells.precision, cells.nu, cells.t, cells.f, cells.trajectory)
     assert all(verdict.explained == 0.0 for verdict in port_test(quiet, ports, 0.0).ports)
 
 

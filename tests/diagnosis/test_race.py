@@ -20,13 +20,7 @@ from kbs_process.diagnosis.screening.view import View
 from kbs_process.diagnosis.selection import believed as believing
 from kbs_process.diagnosis.selection import leaders as leading
 from kbs_process.diagnosis.selection import race
-from kbs_process.diagnosis.selection.believed import (
-    contested,
-    continued,
-    inherited,
-    named_first,
-    named_there,
-)
+from kbs_process.diagnosis.selection.believed import contested, continued, inherited, named_first, named_there
 from kbs_process.diagnosis.selection.effort import Effort
 from kbs_process.diagnosis.selection.leaders import gated, leaders, tried, various
 from kbs_process.diagnosis.selection.race import Runner, raced
@@ -134,10 +128,7 @@ def test_numbers_are_let_go_again_beside_laws_of_several_places_that_leave_as_li
 
     monkeypatch.setattr(believing, "released", released)
     made = view.standing.known.experiment
-    passed = [
-        told(view, by_family[RIGHT], 0.98, strained=True),
-        told(view, by_family[second], 0.98, strained=True),
-    ]
+    passed = [told(view, by_family[RIGHT], 0.98, strained=True), told(view, by_family[second], 0.98, strained=True)]
     after = contested(passed, declared(made), bench.serial(made))
     assert len(seen) == eased and [one.found for one in after] == [one.found for one in passed]
     assert all((one.standing is view.standing) == bool(eased) for one in after)
@@ -153,9 +144,7 @@ def test_a_law_with_a_name_is_not_told_anew_as_a_curve(
     law = told(view, by_family[RIGHT], 0.98)
     monkeypatch.setattr(leading, "bare", lambda standing, own, simulate: standing)
     monkeypatch.setattr(
-        View,
-        "of",
-        lambda *_, **__: replace(view, screening=replace(view.screening, candidates=(by_family[CURVE],))),
+        View, "of", lambda *_, **__: replace(view, screening=replace(view.screening, candidates=(by_family[CURVE],)))
     )
     assert leading._told_anew(law, view.standing, floor, simulate) is law
 
@@ -201,9 +190,7 @@ def test_where_much_is_left_all_are_raced_unless_one_does_nearly_all(
     # As many numbers of noise as make what is left gross, and the best do a share of it.
     excess = left * best.score.gain
     level = excess / known.fit_rows + 1.0
-    residual = tuple(
-        np.sqrt(level * n / (z @ z)) * z for n, z in zip(known.rows, known.residual, strict=True)
-    )
+    residual = tuple(np.sqrt(level * n / (z @ z)) * z for n, z in zip(known.rows, known.residual, strict=True))
     here = replace(view.standing, known=replace(known, residual=residual))
     assert here.known.excess == pytest.approx(excess, rel=1e-6)
     seen = replace(view, standing=here)
@@ -240,9 +227,7 @@ def test_a_law_that_leaves_nothing_is_judged_once_others_have_settled_beside_it(
         assert refused[0].gate.reasons[-1] == "too early"
 
 
-@pytest.mark.parametrize(
-    ("nothing_left", "goes_on", "ways"), [(False, True, WAYS), (True, True, 0), (False, False, 0)]
-)
+@pytest.mark.parametrize(("nothing_left", "goes_on", "ways"), [(False, True, WAYS), (True, True, 0), (False, False, 0)])
 def test_the_next_law_looks_for_phases_too_while_something_is_left(
     view: View, monkeypatch: pytest.MonkeyPatch, nothing_left: bool, goes_on: bool, ways: int
 ) -> None:

@@ -114,9 +114,7 @@ def test_a_law_that_leaves_most_follows_something_else(cabled: Experiment, made:
     assert missed(before.known, after.known) == ()  # an eighth of what was not fitted is enough
 
 
-def test_a_law_has_to_take_as_much_of_recordings_that_were_not_used(
-    cabled: Experiment, made: Experiment
-) -> None:
+def test_a_law_has_to_take_as_much_of_recordings_that_were_not_used(cabled: Experiment, made: Experiment) -> None:
     before, after = standing(cabled), standing(with_cable(made, (2,)))
     assert too_little(before, after, declared(cabled)) == ()  # another law may be what the held-out one shows
     (reason,) = missed(before.known, after.known)

@@ -127,9 +127,7 @@ def test_a_law_that_held_out_recordings_do_not_show_is_refused(made: Experiment)
     here = standing(with_cable(made, (0, 1)))
     tried, scene, found = screened(here)
     after = with_extra(here, extra_of(found.candidates[0], here, tried, scene), bench.serial(made))
-    verdict = gate(
-        here.known, after.known, range(len(FREE), len(FREE) + len(found.candidates[0].suspect.amplitudes))
-    )
+    verdict = gate(here.known, after.known, range(len(FREE), len(FREE) + len(found.candidates[0].suspect.amplitudes)))
     assert not verdict.passed and "r2 predicted worse" in verdict.reasons
 
 
@@ -158,9 +156,7 @@ def test_without_held_out_recordings_each_is_left_out_in_turn(made: Experiment, 
     here = standing(fit_only)
     tried, scene, found = screened(here)
     after = with_extra(here, extra_of(found.candidates[0], here, tried, scene), bench.serial(made))
-    verdict = gate(
-        here.known, after.known, range(len(FREE), len(FREE) + len(found.candidates[0].suspect.amplitudes))
-    )
+    verdict = gate(here.known, after.known, range(len(FREE), len(FREE) + len(found.candidates[0].suspect.amplitudes)))
     assert not verdict.held_out and [fold.trial for fold in verdict.folds] == ["r0", "r1"]
     assert verdict.passed, verdict.reasons
 
@@ -186,9 +182,7 @@ def test_a_law_is_judged_where_its_numbers_have_settled(made: Experiment, cable:
     assert begun.gate.passed
     known = after.known
     worse = replace(known, residual=tuple(5.0 * one for one in known.residual))
-    told = believed._judged_again(
-        replace(begun, standing=replace(after, known=worse)), cable, bench.serial(made)
-    )
+    told = believed._judged_again(replace(begun, standing=replace(after, known=worse)), cable, bench.serial(made))
     assert not told.gate.passed and any("predicted worse" in reason for reason in told.gate.reasons)
     floor = declared(known.experiment)
     assert rounds._explains_all(begun, floor)
@@ -210,9 +204,7 @@ def test_a_law_of_the_readings_needs_no_plant_and_its_rival_is_told_apart(made: 
     here = standing(replace(made, trials=trials))
     scene = Scene.of(here.known.experiment, here.hypothesis, here.predicted)
     tried = Bench.of(here.known, scene)
-    suspects = [
-        Catalogued(one, scene) for one in (law, candidate("channel_lag", "Ty"), candidate("harness", "el"))
-    ]
+    suspects = [Catalogued(one, scene) for one in (law, candidate("channel_lag", "Ty"), candidate("harness", "el"))]
     found = screen(tried, suspects)
     assert found.candidates[0].suspect.family == ("channel_lag", "Ty")
     assert identity(found.candidates[0].suspect).channels == ("Ty",)
@@ -282,9 +274,7 @@ def test_an_error_of_an_encoder_that_no_law_has_is_measured_with_a_band(made: Ex
     taken = suspect_of(find, scene)
     assert taken is not None
     suspect, amplitude = taken
-    np.testing.assert_allclose(
-        suspect.outputs(0)[:, el] @ amplitude, tried.signatures([suspect], 0)[:, el] @ amplitude
-    )
+    np.testing.assert_allclose(suspect.outputs(0)[:, el] @ amplitude, tried.signatures([suspect], 0)[:, el] @ amplitude)
     sigma = sigma_of(find, suspect, amplitude)
     assert sigma.shape == amplitude.shape and (sigma > 0.0).all()
 
@@ -311,22 +301,16 @@ def test_the_second_law_that_passed_is_believed_where_the_first_falls(
     monkeypatch.setattr(rounds, "_place", lambda *_: None)
     monkeypatch.setattr(believed, "named_first", list)
     monkeypatch.setattr(rounds, "_passed", lambda *_: iter([[first, second]]))
-    monkeypatch.setattr(
-        believed, "_settled", lambda one, *_: replace(one, gate=replace(one.gate, reasons=()))
-    )
+    monkeypatch.setattr(believed, "_settled", lambda one, *_: replace(one, gate=replace(one.gate, reasons=())))
     floor = declared(cable.known.experiment)
     simulate = Effort(bench.serial(cable.known.experiment), cable.known)
     for fallen, kept in ((("harness",), "ground_cable"), (("ground_cable",), "harness")):
         monkeypatch.setattr(
-            believed,
-            "_stands_in",
-            lambda told, *_, no=fallen: ("falls",) if believed._law(told).law in no else (),
+            believed, "_stands_in", lambda told, *_, no=fallen: ("falls",) if believed._law(told).law in no else ()
         )
         done = rounds._round(cable, cable, floor, simulate, [])
         assert done.accepted is not None and done.accepted.find.identity.law == kept
-        assert [one.identity.law for one in done.noted.refused] == (
-            [] if kept == "ground_cable" else list(fallen)
-        )
+        assert [one.identity.law for one in done.noted.refused] == ([] if kept == "ground_cable" else list(fallen))
     # Those that are each recording's own are looked at where none of the others stands.
     monkeypatch.setattr(rounds, "_passed", lambda *_: iter([[first], [second]]))
     done = rounds._round(cable, cable, floor, simulate, [])
@@ -350,9 +334,7 @@ def test_what_numbers_gain_where_they_were_drawn_back_is_no_law_s(
     monkeypatch.setattr(rounds, "drawn_back", lambda *_: back)
     monkeypatch.setattr(rounds, "resettled", lambda one, *_, leaps: alone if one is back else one)
     monkeypatch.setattr(
-        rounds.View,
-        "of",
-        lambda one: SimpleNamespace(standing=one, scene=scene, bench=tried, screening=found),
+        rounds.View, "of", lambda one: SimpleNamespace(standing=one, scene=scene, bench=tried, screening=found)
     )
     monkeypatch.setattr(rounds, "_place", lambda *_: None)
     monkeypatch.setattr(rounds, "_passed", none_passed)
@@ -380,9 +362,7 @@ def test_a_search_that_has_cost_too_much_ends_with_what_it_has_found(
     told = find_of([first], 0, np.ones(1), cable, None)
     asked: list[int] = []
 
-    def look(
-        here: Standing, seen: Standing, _: object, __: object, accepted: list[Accepted]
-    ) -> rounds._Round:
+    def look(here: Standing, seen: Standing, _: object, __: object, accepted: list[Accepted]) -> rounds._Round:
         asked.append(len(accepted))
         law = None if accepted else Accepted(first, told, cable)
         return rounds._Round(law, first.standing if law else here, seen, found, Noted(), None)
@@ -422,8 +402,7 @@ def _lower(standing: Standing, share: float) -> Standing:
 
 
 @pytest.mark.parametrize(
-    ("left", "some", "looked"),
-    [(True, True, True), (True, False, True), (False, False, True), (False, True, False)],
+    ("left", "some", "looked"), [(True, True, True), (True, False, True), (False, False, True), (False, True, False)]
 )
 def test_what_each_recording_has_of_its_own_is_not_looked_for_where_a_law_leaves_nothing(
     cable: Standing, monkeypatch: pytest.MonkeyPatch, left: bool, some: bool, looked: bool
@@ -434,8 +413,7 @@ def test_what_each_recording_has_of_its_own_is_not_looked_for_where_a_law_leaves
     told = find_of([first], 0, np.ones(1), cable, None)
     accepted = [Accepted(first, told, cable)] if some else []
     own, repeating = (
-        SimpleNamespace(suspect=SimpleNamespace(each_trial=each, family=("drift", str(each))))
-        for each in (True, False)
+        SimpleNamespace(suspect=SimpleNamespace(each_trial=each, family=("drift", str(each)))) for each in (True, False)
     )
     asked: list[object] = []
 
@@ -443,9 +421,7 @@ def test_what_each_recording_has_of_its_own_is_not_looked_for_where_a_law_leaves
         asked.extend(chosen)
         return [], []
 
-    def led(
-        view: SimpleNamespace, _: Simulate, among: Callable[[object], bool]
-    ) -> tuple[list[object], list[object]]:
+    def led(view: SimpleNamespace, _: Simulate, among: Callable[[object], bool]) -> tuple[list[object], list[object]]:
         return [one for one in (repeating, own) if among(one)], []
 
     monkeypatch.setattr(rounds, "detected", lambda *_: SimpleNamespace(left=left))
@@ -453,9 +429,7 @@ def test_what_each_recording_has_of_its_own_is_not_looked_for_where_a_law_leaves
     monkeypatch.setattr(rounds, "in_the_shade", lambda *_: ())
     monkeypatch.setattr(rounds, "leaders", led)
     monkeypatch.setattr(rounds, "tried", simulated)
-    view = SimpleNamespace(
-        able=[], unrepeated=[own], standing=cable, screening=SimpleNamespace(candidates=())
-    )
+    view = SimpleNamespace(able=[], unrepeated=[own], standing=cable, screening=SimpleNamespace(candidates=()))
     floor = declared(cable.known.experiment)
     simulate = Effort(bench.serial(cable.known.experiment), cable.known)
     assert list(rounds._passed(view, cable, floor, simulate, accepted, Noted())) == []  # type: ignore[arg-type]

@@ -40,8 +40,7 @@ def slipping() -> Experiment:
     with_it = predict(Hypothesis(rig, (*made.effects, law.name)), replace(made, rig=rig), 0).values
     without = predict(Hypothesis(made.rig, made.effects), made, 0).values
     trials = tuple(
-        replace(trial, measured=trial.measured + (with_it - without) * trial.valid[:, None])
-        for trial in made.trials
+        replace(trial, measured=trial.measured + (with_it - without) * trial.valid[:, None]) for trial in made.trials
     )
     return replace(made, trials=trials)
 
@@ -62,9 +61,7 @@ def test_a_slip_of_the_mounting_is_found_at_its_size(slipping: Experiment) -> No
     assert isinstance(cable.suspect, Catalogued)
     better = sized(view.bench, found, view.suspects, bench.serial(slipping))
     assert better.suspect.family == found.suspect.family
-    assert (
-        abs(amplitude_about(view, found.score.amplitude)["base_loop_y"]) < LOOP / 10.0
-    )  # what rings on promises
+    assert abs(amplitude_about(view, found.score.amplitude)["base_loop_y"]) < LOOP / 10.0  # what rings on promises
     told = amplitude_about(view, better.score.amplitude)
     assert told["base_loop_x"] == told["base_loop_z"] == 0.0
     assert LOOP / 3.0 < told["base_loop_y"] < 3.0 * LOOP
@@ -103,9 +100,7 @@ def test_where_no_moment_is_read_no_size_is_tried(slipping: Experiment) -> None:
 
 
 @pytest.mark.parametrize("much", [False, True])
-def test_sizes_are_tried_where_much_is_left(
-    slipping: Experiment, monkeypatch: pytest.MonkeyPatch, much: bool
-) -> None:
+def test_sizes_are_tried_where_much_is_left(slipping: Experiment, monkeypatch: pytest.MonkeyPatch, much: bool) -> None:
     view = of(slipping)
     known = view.standing.known
     if not much:
@@ -137,8 +132,7 @@ def sticking() -> Experiment:
     with_it = predict(Hypothesis(rig, (*made.effects, law.name)), replace(made, rig=rig), 0).values
     without = predict(Hypothesis(made.rig, made.effects), made, 0).values
     trials = tuple(
-        replace(trial, measured=trial.measured + (with_it - without) * trial.valid[:, None])
-        for trial in made.trials
+        replace(trial, measured=trial.measured + (with_it - without) * trial.valid[:, None]) for trial in made.trials
     )
     return replace(made, trials=trials)
 
@@ -146,9 +140,7 @@ def sticking() -> Experiment:
 def test_a_gear_s_stiff_hysteresis_leads_at_its_size(sticking: Experiment) -> None:
     laws = ("transmission_hysteresis", "stribeck", "harness", "kinematic_error")
     view = View.of(standing(sticking), lambda one: one.family[0] in laws)
-    found = next(
-        one for one in view.screening.candidates if one.suspect.family == ("transmission_hysteresis", "el")
-    )
+    found = next(one for one in view.screening.candidates if one.suspect.family == ("transmission_hysteresis", "el"))
     assert in_the_way(found.suspect)
     better = sized(view.bench, found, view.suspects, bench.serial(sticking))
     excess = sum(float(z @ z) for z in view.bench.background.z.values()) - view.standing.known.fit_rows
@@ -164,14 +156,7 @@ def test_only_springs_in_a_drive_are_sized_there(sticking: Experiment) -> None:
     view = View.of(standing(sticking), lambda one: not one.each_trial)
     named = {one.suspect.family[0] for one in view.screening.candidates if in_the_way(one.suspect)}
     assert {"transmission_hysteresis", "dahl", "lugre", "joint_hysteresis", "backlash"} <= named
-    assert not named & {
-        "kinematic_error",
-        "harness",
-        "stribeck",
-        "load_friction",
-        "base_hysteresis",
-        "cogging",
-    }
+    assert not named & {"kinematic_error", "harness", "stribeck", "load_friction", "base_hysteresis", "cogging"}
 
 
 def test_a_spring_that_numbers_had_taken_up_is_looked_for_where_the_files_have_them(
@@ -191,7 +176,5 @@ def test_a_spring_that_numbers_had_taken_up_is_looked_for_where_the_files_have_t
     every = rounds._hidden(seen, pulled, floor, simulate, [])
     assert len(every) <= HIDDEN
     law = next(one for one in every if one.found.suspect.family == ("transmission_hysteresis", "el"))
-    print(
-        "left", pulled.known.excess, "with it", law.standing.known.excess, "of", law.standing.known.fit_rows
-    )
+    print("left", pulled.known.excess, "with it", law.standing.known.excess, "of", law.standing.known.fit_rows)
     assert law.standing.known.excess < 0.02 * pulled.known.excess

@@ -75,9 +75,7 @@ def test_laws_are_looked_for_from_numbers_that_were_drawn_back(pulled: Known) ->
     assert back.strain.squares < 0.3 * pulled.strain.squares
     assert back.gross and back.excess < pulled.excess  # the tone is no number's
     assert back.metric is pulled.metric
-    calm = Standing(
-        replace(pulled, residual=tuple(0.01 * z for z in pulled.residual)), standing.predicted, {}
-    )
+    calm = Standing(replace(pulled, residual=tuple(0.01 * z for z in pulled.residual)), standing.predicted, {})
     assert drawn_back(calm, floor, simulate) is calm
 
 

@@ -46,9 +46,7 @@ def test_what_is_late_reads_what_was_at_the_resonance_too() -> None:
 
 def test_slopes_are_right_up_to_the_end_of_the_band() -> None:
     fast = 2.0 * np.pi * 6.3 * np.cos(2.0 * np.pi * 6.3 * T)
-    np.testing.assert_allclose(
-        slope(vibration(T), DT)[INSIDE, 1], fast[INSIDE], atol=5e-3 * np.abs(fast).max()
-    )
+    np.testing.assert_allclose(slope(vibration(T), DT)[INSIDE, 1], fast[INSIDE], atol=5e-3 * np.abs(fast).max())
 
 
 @pytest.mark.parametrize("late", [LATE, np.where(T > 31.0, -0.08, 0.0), np.full(len(T), 0.06)])
@@ -80,9 +78,7 @@ def test_a_clock_is_taken_off_exactly() -> None:
     here = standing(replace(made, trials=tuple(trials)))
     known = here.known
     rung = {0: replace(here.predicted[0], values=here.predicted[0].values + ringing)}
-    residual = tuple(
-        m(t.measured - rung[0].values) for m, t in zip(known.metric, known.experiment.trials, strict=True)
-    )
+    residual = tuple(m(t.measured - rung[0].values) for m, t in zip(known.metric, known.experiment.trials, strict=True))
     known = replace(known, shown=rung, residual=residual)
     here = Standing(known, rung, {})
     scene = Scene.of(known.experiment, here.hypothesis, rung)
@@ -119,9 +115,7 @@ def test_a_clock_that_is_late_by_half_a_period_is_found_at_its_size(late: float)
     here = standing(replace(made, trials=tuple(trials)))
     known = here.known
     rung = {0: replace(here.predicted[0], values=here.predicted[0].values + ringing)}
-    residual = tuple(
-        m(t.measured - rung[0].values) for m, t in zip(known.metric, known.experiment.trials, strict=True)
-    )
+    residual = tuple(m(t.measured - rung[0].values) for m, t in zip(known.metric, known.experiment.trials, strict=True))
     known = replace(known, shown=rung, residual=residual)
     scene = Scene.of(known.experiment, here.hypothesis, rung)
     suspect = Catalogued(candidate("clock_offset", "wrench"), scene)
@@ -158,8 +152,7 @@ def jumped_at(place: float, lost: float) -> tuple[Experiment, View]:
     here = standing(replace(made, trials=tuple(trials)))
     rung = {0: replace(here.predicted[0], values=here.predicted[0].values + ringing)}
     residual = tuple(
-        m(t.measured - rung[0].values)
-        for m, t in zip(here.known.metric, here.known.experiment.trials, strict=True)
+        m(t.measured - rung[0].values) for m, t in zip(here.known.metric, here.known.experiment.trials, strict=True)
     )
     known = replace(here.known, shown=rung, residual=residual)
     here = Standing(known, rung, {})
@@ -200,8 +193,7 @@ def test_a_clock_that_jumps_by_periods_is_taken_off_at_its_place_and_size(lost: 
 
 
 @pytest.mark.parametrize(
-    ("unevenly", "most", "passes"),
-    [((), True, True), ((2,), True, True), ((1, 2), True, False), ((2,), False, False)],
+    ("unevenly", "most", "passes"), [((), True, True), ((2,), True, True), ((1, 2), True, False), ((2,), False, False)]
 )
 def test_half_of_the_recordings_show_a_jump_all_through(
     monkeypatch: pytest.MonkeyPatch, unevenly: tuple[int, ...], most: bool, passes: bool
@@ -267,9 +259,7 @@ def test_what_all_recordings_share_of_a_clock_is_no_jump() -> None:
     )
     known = replace(here.known, shown=rung, residual=residual)
     assert known.gross
-    view = View.of(
-        Standing(known, rung, {}), lambda one: isinstance(one, Catalogued) and one.of_clock, linear=False
-    )
+    view = View.of(Standing(known, rung, {}), lambda one: isinstance(one, Catalogued) and one.of_clock, linear=False)
     simulate = Effort(bench.serial(known.experiment), known)
     assert rounds._jumped(view, declared(known.experiment), simulate) == []
     anew = mistimed._stamped_anew(known)

@@ -79,11 +79,7 @@ def test_two_leave_enough_where_they_leave_little(cable: Standing) -> None:
     ("left", "alone"), [((0.15, 0.1), False), ((0.15, 0.3), False), ((0.5, 0.1), False), ((0.15, 0.1), True)]
 )
 def test_each_of_a_pair_has_to_be_found_beside_the_other(
-    cable: Standing,
-    laws: dict[str, Tried],
-    monkeypatch: pytest.MonkeyPatch,
-    left: tuple[float, float],
-    alone: bool,
+    cable: Standing, laws: dict[str, Tried], monkeypatch: pytest.MonkeyPatch, left: tuple[float, float], alone: bool
 ) -> None:
     """`left` by both, in either order; `alone`: the supposed law is not found again beside the other."""
     known, made = cable.known, cable.known.experiment
@@ -95,12 +91,7 @@ def test_each_of_a_pair_has_to_be_found_beside_the_other(
     asked: list[list[str]] = []
 
     def look(
-        here: Standing,
-        seen: Standing,
-        _: object,
-        __: object,
-        accepted: Sequence[Accepted],
-        least: float = 0.0,
+        here: Standing, seen: Standing, _: object, __: object, accepted: Sequence[Accepted], least: float = 0.0
     ) -> rounds._Round:
         asked.append([one.find.identity.law for one in accepted])
         wanted = wanting(known, here.known) if len(asked) == 1 else 0.0
@@ -139,15 +130,11 @@ def test_no_law_is_simulated_where_the_best_would_leave_far_too_much(
     law = passed(cable, tried, scene, found, "ground_cable")
     floor = declared(cable.known.experiment)
     simulate = Effort(bench.serial(cable.known.experiment), cable.known)
-    view = SimpleNamespace(
-        able=[law.found], unrepeated=[], standing=cable, screening=SimpleNamespace(candidates=())
-    )
+    view = SimpleNamespace(able=[law.found], unrepeated=[], standing=cable, screening=SimpleNamespace(candidates=()))
     monkeypatch.setattr(rounds, "leaders", lambda *_: ([law.found], []))
     monkeypatch.setattr(rounds, "tried", lambda *_: ([law], []))
     noted = Noted()
     least = (0.9 if hopeful else 1.1) * PROMISED * law.found.score.gain
     simulated = list(rounds._passed(view, cable, floor, simulate, [], noted, least))
     assert simulated == ([[law]] if hopeful else [])
-    assert ["would leave far too much" in "".join(one.reasons) for one in noted.refused] == [True] * (
-        not hopeful
-    )
+    assert ["would leave far too much" in "".join(one.reasons) for one in noted.refused] == [True] * (not hopeful)

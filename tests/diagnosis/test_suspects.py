@@ -60,9 +60,7 @@ def ranges(**given: bool) -> Ranges:
     return ranges_of([tapped()], [prediction()], CHANNELS, DT, proposed=TONES, **given)
 
 
-def suspects(
-    of: Rig | None = None, *, accepted: tuple[str, ...] = (), **given: bool
-) -> tuple[Candidate, ...]:
+def suspects(of: Rig | None = None, *, accepted: tuple[str, ...] = (), **given: bool) -> tuple[Candidate, ...]:
     found = ranges(temperature=given.pop("temperature", False))
     return candidates(of or rig(), NOMINAL, found, tapped().columns, CHANNELS, accepted=accepted, **given)
 
@@ -145,13 +143,9 @@ def test_an_accepted_law_may_act_once_more_where_it_acts_already() -> None:
     assert dict(found["el"].shape).keys() == {"order_2"}
     twice = inputs(found["el"], tapped(), acting, NOMINAL)[0][Inlet("motor_torque", "el")]
     once = next(
-        s
-        for s in suspects()
-        if s.name == "motor_order" and s.site == "el" and s.shape[0][1] == found["el"].shape[0][1]
+        s for s in suspects() if s.name == "motor_order" and s.site == "el" and s.shape[0][1] == found["el"].shape[0][1]
     )
-    np.testing.assert_array_equal(
-        twice, inputs(once, tapped(), rig(), NOMINAL)[0][Inlet("motor_torque", "el")]
-    )
+    np.testing.assert_array_equal(twice, inputs(once, tapped(), rig(), NOMINAL)[0][Inlet("motor_torque", "el")])
     assert [entry.name for entry in found["el"].amplitudes] == ["order_sin_2", "order_cos_2"]
     pulled = {s.effect.name for s in suspects(accepted=("tether",)) if s.name == "tether"}
     assert pulled == {"tether_2"}  # a force has one place, wherever the next is looked for
@@ -197,9 +191,7 @@ def test_an_area_in_the_air_is_looked_for_around_the_link() -> None:
     places = np.array([drag.point for drag in drags]) - antenna.cog.value
     expected = np.vstack([np.zeros(3), *(np.outer([-a, a], np.eye(3)[k]) for k, a in enumerate(reach))])
     np.testing.assert_allclose(places, expected, atol=1e-12)
-    assert {s.point for s in suspects() if s.name == "tether" and s.site == "el"} == {
-        tuple(antenna.cog.value)
-    }
+    assert {s.point for s in suspects() if s.name == "tether" and s.site == "el"} == {tuple(antenna.cog.value)}
     # Azimuth alone: sideways, in proportion to the square of the distance from its axis.
     turned = Tapped(RATE, tapped().columns, np.zeros((2000, len(tapped().columns))))
     turned.values[:, turned.columns.index("joint_angle.az")] = 0.03 * np.arange(2000) / RATE
@@ -237,9 +229,7 @@ def test_a_wrong_field_is_followed_by_the_motor() -> None:
     stiffness = float(drive.parameters["Tmax"]) * float(drive.parameters["Kangle"])
     (column,) = inputs(late, tapped(), rig(), NOMINAL)
     np.testing.assert_allclose(
-        column[Inlet("motor_torque", "el")],
-        stiffness * port_inputs(late, tapped(), rig())[:, 0, 0],
-        rtol=1e-6,
+        column[Inlet("motor_torque", "el")], stiffness * port_inputs(late, tapped(), rig())[:, 0, 0], rtol=1e-6
     )
 
 
@@ -363,14 +353,10 @@ def test_a_little_of_it_in_the_plant_shows_as_its_signature(
     full, names, base, along = without()
     found = ranges_of([along], [base], CHANNELS, DT)
     suspect = next(
-        s
-        for s in candidates(full, NOMINAL, found, along.columns, CHANNELS)
-        if (s.name, s.site) == (name, "el")
+        s for s in candidates(full, NOMINAL, found, along.columns, CHANNELS) if (s.name, s.site) == (name, "el")
     )
     assert isinstance(suspect.effect, Effect)
-    changed, _ = shown(
-        attach(full, suspect.effect, dict(suspect.shape) | {amplitude: value}, joints=["el"]), names
-    )
+    changed, _ = shown(attach(full, suspect.effect, dict(suspect.shape) | {amplitude: value}, joints=["el"]), names)
     index = [entry.name for entry in suspect.amplitudes].index(amplitude)
     column = {inlet: value * series for inlet, series in inputs(suspect, along, full, names)[index].items()}
     taps = dict(zip(along.columns, along.values.T, strict=True))
@@ -411,9 +397,7 @@ def test_what_rests_has_no_places_and_no_widths(swept: float) -> None:
         assert all(entry.bounds[0] <= value <= entry.bounds[1] for value in choices)
 
 
-@pytest.mark.parametrize(
-    ("swept", "orders"), [(1.2, (6.0, 200.0, 202.0)), (3.3, (2.0, 3.0, 4.0, 6.0, 200.0, 202.0))]
-)
+@pytest.mark.parametrize(("swept", "orders"), [(1.2, (6.0, 200.0, 202.0)), (3.3, (2.0, 3.0, 4.0, 6.0, 200.0, 202.0))])
 def test_an_order_that_does_not_come_once_is_none(swept: float, orders: tuple[float, ...]) -> None:
     """In a part of its period it is a curve, as of a spring."""
     entry = next(e for e in JOINT_ORDER.parameters if e.name == "joint_order")

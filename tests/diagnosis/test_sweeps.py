@@ -44,9 +44,7 @@ def test_a_tone_that_runs_is_found(sweep: float) -> None:
 
 
 @pytest.mark.parametrize(("size", "seen"), [(7e-4, True), (0.0, False)])
-def test_one_that_is_a_fraction_of_the_noise_is_proposed_from_whitened_residuals(
-    size: float, seen: bool
-) -> None:
+def test_one_that_is_a_fraction_of_the_noise_is_proposed_from_whitened_residuals(size: float, seen: bool) -> None:
     """Its distance from the noise is some twenty sigmas, and what whitened series show is in units of these."""
     made = bench.experiment(bench.rig(), ("fit", "fit"), 1, seconds=60.0)
     t = bench.DT * np.arange(len(made.trials[0].valid))

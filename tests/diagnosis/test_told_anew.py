@@ -41,9 +41,7 @@ def test_a_step_told_at_the_wrong_load_is_found_where_it_is() -> None:
     floor, simulate = declared(made), bench.serial(made)
     after = with_extra(here, extra_of(wrong.candidates[0], here, tried, tried.scene), simulate)
     own = own_of(wrong.candidates[0], here, after)
-    chosen = Tried(
-        wrong.candidates[0], after, gated(wrong.candidates[0], here, after, own, simulate), wrong, own
-    )
+    chosen = Tried(wrong.candidates[0], after, gated(wrong.candidates[0], here, after, own, simulate), wrong, own)
     told = reread(chosen, here, floor, simulate)
     assert isinstance(told.found.suspect, Catalogued)
     shape = dict(told.found.suspect.candidate.shape)

@@ -79,15 +79,11 @@ def whitened(x: Array) -> Array:
 def along_trajectory(scene: Scene, columns: list[dict[Inlet, Array]]) -> Array:
     path = scene.paths[0]
     n = scene.experiment.drives[0].n
-    found = respond(
-        path, [scene.stepped(0, c) for c in columns], WRENCH_CHANNELS, round(path.rate * bench.DT), n
-    )
+    found = respond(path, [scene.stepped(0, c) for c in columns], WRENCH_CHANNELS, round(path.rate * bench.DT), n)
     return np.asarray(found)
 
 
-@pytest.mark.parametrize(
-    ("name", "site", "shape", "amplitude", "size", "bound"), CASES, ids=[c[0] for c in CASES]
-)
+@pytest.mark.parametrize(("name", "site", "shape", "amplitude", "size", "bound"), CASES, ids=[c[0] for c in CASES])
 def test_signature_is_that_of_the_real_plant(
     scene: Scene, capsys: pytest.CaptureFixture[str], name: str, site: str, shape: dict[str, float],
     amplitude: str, size: float, bound: float,
@@ -146,9 +142,7 @@ def test_amplifier_is_butterworth() -> None:
     for order in (1, 2, 3):
         corner = Quantity("c", np.asarray(20.0), "Hz", np.asarray(0.0), "test")
         response = amplified(Amplifier(order, corner), np.array([0.0, 10.0, 20.0]))
-        assert np.abs(response) == pytest.approx(
-            (1.0 + (np.array([0.0, 10.0, 20.0]) / 20.0) ** (2 * order)) ** -0.5
-        )
+        assert np.abs(response) == pytest.approx((1.0 + (np.array([0.0, 10.0, 20.0]) / 20.0) ** (2 * order)) ** -0.5)
         assert np.angle(response[1]) < 0.0
 
 

@@ -49,17 +49,13 @@ def test_a_recording_is_blind_where_a_law_cannot_be_seen(
         value[places] *= share
         weak = replace(known, value=value, hypothesis=known.hypothesis.at(known.free, value))
         shown = {k: bench.serial(made)([(k, weak.hypothesis)])[0] for k in {one.drive for one in made.trials}}
-        left = tuple(
-            known.metric[k](one.measured - shown[one.drive].values) for k, one in enumerate(made.trials)
-        )
+        left = tuple(known.metric[k](one.measured - shown[one.drive].values) for k, one in enumerate(made.trials))
         weak = replace(weak, shown=shown, residual=left)
         told = blind(Standing(weak, shown, {}), own, simulate)
         assert (2 not in told) == seen, LEAST_RHO
 
 
-def test_recordings_in_which_it_does_nothing_do_not_refuse_a_law(
-    found: tuple[Standing, Standing, Own],
-) -> None:
+def test_recordings_in_which_it_does_nothing_do_not_refuse_a_law(found: tuple[Standing, Standing, Own]) -> None:
     before, after, own = found
     places = [after.known.names.index(name) for name in own.amplitudes]
     worse = louder(after.known, 2, 30.0)

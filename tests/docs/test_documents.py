@@ -113,9 +113,7 @@ def test_every_answer_of_a_diagnosis_is_explained() -> None:
 
 def test_every_dependency_is_justified_and_nothing_else() -> None:
     text = (ROOT / "docs" / "dependencies.md").read_text(encoding="utf-8")
-    rows = [
-        [cell.strip() for cell in row.strip("|").split("|")] for row in re.findall(r"^\|.*\|$", text, re.M)
-    ]
+    rows = [[cell.strip() for cell in row.strip("|").split("|")] for row in re.findall(r"^\|.*\|$", text, re.M)]
     justified = [name for row in rows for name in row[-2].split(", ") if not set(name) <= set("- ")]
     runtime, test = dependencies()
     assert sorted(set(justified) - {"package"}) == sorted(runtime | test)

@@ -56,20 +56,10 @@ def processed(name: str, root: Path) -> Processed:
     return Processed(name, target)
 
 
-def process_apart(
-    name: str, target: Path, environment: Mapping[str, str] | None = None, folder: Path = TESTS
-) -> None:
+def process_apart(name: str, target: Path, environment: Mapping[str, str] | None = None, folder: Path = TESTS) -> None:
     """Process an archived campaign in another process, started in `folder`; warnings are errors."""
     arguments = (
-        [
-            "kbs_process",
-            str(CAMPAIGNS_FOLDER / name),
-            "--output",
-            str(target),
-            "--no-pdf",
-            "--no-diagnose",
-            "--quiet",
-        ]
+        ["kbs_process", str(CAMPAIGNS_FOLDER / name), "--output", str(target), "--no-pdf", "--no-diagnose", "--quiet"]
         if name in WITH_PAGE
         else ["end_to_end.archive_run", str(target), name]
     )

@@ -44,9 +44,7 @@ def alter(path: Path, topic: str, change: Callable[[float, bytes], bytes]) -> No
             if channel.id not in channels:
                 assert schema is not None
                 number = writer.register_schema(schema.name, schema.encoding, schema.data)
-                channels[channel.id] = writer.register_channel(
-                    channel.topic, channel.message_encoding, number
-                )
+                channels[channel.id] = writer.register_channel(channel.topic, channel.message_encoding, number)
             first = message.log_time if first is None else first
             t = (message.log_time - first) * 1e-9
             data = change(t, message.data) if channel.topic == topic else message.data

@@ -52,9 +52,7 @@ def extract(campaign: Processed) -> dict[str, Any]:
         merit[row][f"{one['channel']} {one['unit']}"] = [_short(one[key]) for key in MERITS]
     return {
         "verdict": results["verdict"]["status"],
-        "requirements": {
-            one["name"]: {key: _short(one[key]) for key in JUDGED} for one in results["requirements"]
-        },
+        "requirements": {one["name"]: {key: _short(one[key]) for key in JUDGED} for one in results["requirements"]},
         "parameters": {
             one["name"]: [_short(one["value"]), _short(one["sigma"]), one["unit"]]
             for one in results["gravity"]["parameters"]
@@ -116,17 +114,13 @@ def main() -> None:
     """Make the files, or compare with them."""
     parser = argparse.ArgumentParser(prog="python -m end_to_end.expected", description=__doc__)
     parser.add_argument("campaign", nargs="*", default=list(CAMPAIGNS))
-    parser.add_argument(
-        "--compare", action="store_true", help="print the greatest differences, write nothing"
-    )
+    parser.add_argument("--compare", action="store_true", help="print the greatest differences, write nothing")
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as root:
         for name in arguments.campaign:
             campaign = processed(name, Path(root))
             if arguments.compare:
-                worst = sorted(
-                    differences(extract(campaign), expected(name)), key=lambda one: one[1], reverse=True
-                )
+                worst = sorted(differences(extract(campaign), expected(name)), key=lambda one: one[1], reverse=True)
                 for what, distance in worst[:5]:
                     print(f"{name}: {what}: {distance:.2g} of its limit")
             else:

@@ -112,12 +112,7 @@ def test_a_channel_that_is_no_number(folder: CampaignFolder, refused: Callable[[
 def test_a_joint_that_no_encoder_reads(folder: CampaignFolder, refused: Callable[[], str]) -> None:
     record(folder.path / "recordings" / "EL089P00_2.mcap", read=("el",))
     message = refused()
-    for word in (
-        "EL089P00_2.mcap, /encoder",
-        "'az' of position",
-        "known: el",
-        "`joints` of [topics.encoder]",
-    ):
+    for word in ("EL089P00_2.mcap, /encoder", "'az' of position", "known: el", "`joints` of [topics.encoder]"):
         assert word in message, message
 
 

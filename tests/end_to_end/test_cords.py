@@ -12,8 +12,7 @@ def torques(campaign: Processed, recording: str) -> dict[str, float]:
     return {
         one["channel"]: one["measured_rms"]
         for one in campaign.results["merit"]
-        if (one["recording"], one["band"], one["frame"]) == (recording, "lt1Hz", "T")
-        and one["channel"].startswith("T")
+        if (one["recording"], one["band"], one["frame"]) == (recording, "lt1Hz", "T") and one["channel"].startswith("T")
     }
 
 

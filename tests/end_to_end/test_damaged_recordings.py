@@ -44,9 +44,7 @@ class Damaged:
         return str(what)
 
     def losses(self, recording: str) -> list[dict[str, Any]]:
-        (found,) = [
-            entry["losses"] for entry in self.campaign.results["recordings"] if entry["name"] == recording
-        ]
+        (found,) = [entry["losses"] for entry in self.campaign.results["recordings"] if entry["name"] == recording]
         return list(found)
 
 

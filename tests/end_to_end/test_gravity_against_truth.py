@@ -105,9 +105,7 @@ def test_error_in_the_band_is_what_the_budget_states(
     }
     for index, channel in enumerate(WRENCH_CHANNELS):
         error = _rms(table[f"{channel}.measured"][valid] - cut.values[valid, index])
-        print(
-            f"{name} {channel}: error {error:.2e}, budget {stated[channel]:.2e}, {error / stated[channel]:.2f}"
-        )
+        print(f"{name} {channel}: error {error:.2e}, budget {stated[channel]:.2e}, {error / stated[channel]:.2f}")
         assert 0.7 < error / stated[channel] < 1.4
 
 

@@ -77,8 +77,7 @@ def content(folder: Path) -> dict[str, str]:
 def state(folder: Path) -> dict[Path, tuple[int, int]]:
     """Size and time of change of every file and folder: a file that came and went changes its folder's."""
     return {
-        path: (path.stat().st_size, path.stat().st_mtime_ns)
-        for path in (folder, folder.parent, *folder.rglob("*"))
+        path: (path.stat().st_size, path.stat().st_mtime_ns) for path in (folder, folder.parent, *folder.rglob("*"))
     }
 
 

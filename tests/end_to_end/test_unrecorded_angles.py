@@ -20,9 +20,7 @@ from kbs_process.studies.correlate.run import process
 STOPPED = 12.0  # s, of twenty
 
 
-def test_a_disturbance_is_not_judged_where_the_angles_are_missing(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-):
+def test_a_disturbance_is_not_judged_where_the_angles_are_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     folder = short_campaign(tmp_path / "EL089")
     stamp = np.arange(2000) * 10_000_000
     angle = np.stack([np.zeros(2000), 1.3 + 0.1 * np.sin(0.5 * stamp * 1e-9)], axis=1)

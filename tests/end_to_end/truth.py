@@ -49,9 +49,7 @@ class Truth:
     def parameter(self, name: str) -> float:
         """True value of a fitted parameter: `body.antenna.cog[0]`, `transducer.cross_coupling[0,3]`."""
         stem, _, index = name.rstrip("]").partition("[")
-        value = (
-            self.coupling if stem.endswith("cross_coupling") else np.array(self.document["hardware"][stem])
-        )
+        value = self.coupling if stem.endswith("cross_coupling") else np.array(self.document["hardware"][stem])
         return float(value[tuple(int(i) for i in index.split(","))] if index else value)
 
     def runs(self) -> Iterator[TrueRun]:
@@ -107,9 +105,7 @@ class TrueRun:
         fine = t[0] + dt / OVERSAMPLED * np.arange((len(t) - 1) * OVERSAMPLED + 1)
         wrench, angle = at(dense.t, amplify(self.hardware, dense), fine), at(dense.t, dense.q, fine)[:, EL]
         az = self.commands.position[0, 0]
-        grid = [
-            self.static(np.array([az, el])) for el in np.linspace(angle.min() - 0.01, angle.max() + 0.01, 60)
-        ]
+        grid = [self.static(np.array([az, el])) for el in np.linspace(angle.min() - 0.01, angle.max() + 0.01, 60)]
         static = CubicSpline([q[1] for q, _ in grid], [w for _, w in grid])
         kernel = firwin(40 * OVERSAMPLED + 1, 0.8 / OVERSAMPLED)
         half = len(kernel) // 2

@@ -17,9 +17,7 @@ def main() -> None:
     asked = parser.parse_args().campaign
     names = list(CAMPAIGNS) if "all" in asked else asked
     with ProcessPoolExecutor(2, initializer=os.nice, initargs=(10,)) as pool:
-        jobs = {
-            name: [pool.submit(archive, name, k) for k in range(len(CAMPAIGNS[name].runs))] for name in names
-        }
+        jobs = {name: [pool.submit(archive, name, k) for k in range(len(CAMPAIGNS[name].runs))] for name in names}
         for name, runs in jobs.items():
             finish(CAMPAIGNS[name], [run.result() for run in runs])
             print(f"{name}: {len(runs)} recordings", flush=True)

@@ -88,11 +88,7 @@ _ALL = (
         "AESTPP00",
         seed=103,
         day=3,
-        runs=(
-            _CALIBRATION,
-            Run("AESTPP00_1.mcap", "AESTPP00"),
-            Run("AESTPP00_2.mcap", "AESTPP00"),
-        ),
+        runs=(_CALIBRATION, Run("AESTPP00_1.mcap", "AESTPP00"), Run("AESTPP00_2.mcap", "AESTPP00")),
     ),
     Campaign(
         "ELSTPP00",
@@ -130,18 +126,8 @@ _ALL = (
         day=7,
         runs=(
             _CALIBRATION,
-            Run(
-                "ALSTPP00_1.mcap",
-                "ALSTPP00",
-                bungee=ABOVE_ANTENNA,
-                form=Format(encoding="json", message_index=False),
-            ),
-            Run(
-                "ALSTPP00_2.mcap",
-                "ALSTPP00",
-                bungee=ABOVE_ANTENNA,
-                form=Format(encoding="json", message_index=False),
-            ),
+            Run("ALSTPP00_1.mcap", "ALSTPP00", bungee=ABOVE_ANTENNA, form=Format(encoding="json", message_index=False)),
+            Run("ALSTPP00_2.mcap", "ALSTPP00", bungee=ABOVE_ANTENNA, form=Format(encoding="json", message_index=False)),
         ),
     ),
     Campaign(

@@ -65,11 +65,7 @@ class Hardware:
 
     @classmethod
     def from_campaign(
-        cls,
-        folder: Path | str,
-        overrides: Mapping[str, Any] | None = None,
-        *,
-        seed: int | None = None,
+        cls, folder: Path | str, overrides: Mapping[str, Any] | None = None, *, seed: int | None = None
     ) -> Hardware:
         """Return the campaign's nominal hardware, or one drawn around it.
 

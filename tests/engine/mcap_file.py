@@ -29,14 +29,7 @@ from mcap.records import (
 )
 
 from engine.hardware import AXES
-from engine.ros2 import (
-    DEFINITIONS,
-    JOINT_STATE,
-    JSON_SCHEMAS,
-    WRENCH_STAMPED,
-    joint_payloads,
-    wrench_payloads,
-)
+from engine.ros2 import DEFINITIONS, JOINT_STATE, JSON_SCHEMAS, WRENCH_STAMPED, joint_payloads, wrench_payloads
 from engine.sensors import Recording
 
 MAGIC = b"\x89MCAP0\r\n"
@@ -154,9 +147,7 @@ def _append_chunk(out: bytearray, declared: bytes, group: list[_Arrival], form: 
         data += _packed([message])
     compressed = _compressed(bytes(data), form.compression)
     start = len(out)
-    out += _packed(
-        [Chunk(form.compression, compressed, group[-1].log, group[0].log, zlib.crc32(data), len(data))]
-    )
+    out += _packed([Chunk(form.compression, compressed, group[-1].log, group[0].log, zlib.crc32(data), len(data))])
     length = len(out) - start
     offsets: dict[int, int] = {}
     index_start = len(out)

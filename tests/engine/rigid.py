@@ -63,23 +63,12 @@ def build(hardware: Hardware, timestep: float) -> RigidModel:
         "xyz", np.eye(3), hardware["transducer.stiffness"], hardware["transducer.damping"], strict=True
     ):
         ET.SubElement(
-            base,
-            "joint",
-            name=f"plate_{name}",
-            axis=_text(axis),
-            stiffness=repr(float(k)),
-            damping=repr(float(c)),
+            base, "joint", name=f"plate_{name}", axis=_text(axis), stiffness=repr(float(k)), damping=repr(float(c))
         )
     ET.SubElement(base, "site", name="T")
 
-    mount_az = {
-        "pos": _text(hardware["joint.az.origin"]),
-        "quat": _quaternion(hardware["joint.az.misalignment"]),
-    }
-    mount_el = {
-        "pos": _text(hardware["joint.el.origin"]),
-        "quat": _quaternion(hardware["joint.el.misalignment"]),
-    }
+    mount_az = {"pos": _text(hardware["joint.az.origin"]), "quat": _quaternion(hardware["joint.az.misalignment"])}
+    mount_el = {"pos": _text(hardware["joint.el.origin"]), "quat": _quaternion(hardware["joint.el.misalignment"])}
     axis_az, axis_el = np.array([0.0, 0.0, 1.0]), np.array([0.0, -1.0, 0.0])
 
     cross_az = _rotor(base, "az", mount_az, axis_az, hardware)

@@ -124,13 +124,7 @@ def vary(hardware: Hardware, rng: np.random.Generator) -> Hardware:
 
 
 def read_transducer(
-    hardware: Hardware,
-    t: Array,
-    wrench: Array,
-    drift: Array,
-    rng: np.random.Generator,
-    *,
-    extra: Extra = NONE,
+    hardware: Hardware, t: Array, wrench: Array, drift: Array, rng: np.random.Generator, *, extra: Extra = NONE
 ) -> Array:
     """Return raw = (I + X) w + bias + drift + noise, rounded to the resolution; shape (n, 6).
 

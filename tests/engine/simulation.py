@@ -47,12 +47,7 @@ class Dense:
 
 
 def simulate(
-    hardware: Hardware,
-    commands: Commands,
-    *,
-    rate_hz: float = 100.0,
-    time_step: float = TIME_STEP,
-    extra: Extra = NONE,
+    hardware: Hardware, commands: Commands, *, rate_hz: float = 100.0, time_step: float = TIME_STEP, extra: Extra = NONE
 ) -> Result:
     """Drive `hardware` along `commands`; sample wrench and encoders at `rate_hz` without noise.
 
@@ -65,9 +60,7 @@ def simulate(
     return sample(hardware, dense, t, t, extra=extra)
 
 
-def sample(
-    hardware: Hardware, dense: Dense, wrench_t: Array, angle_t: Array, *, extra: Extra = NONE
-) -> Result:
+def sample(hardware: Hardware, dense: Dense, wrench_t: Array, angle_t: Array, *, extra: Extra = NONE) -> Result:
     """Read the sensors at instants of their own: the wrench behind its amplifier, the angles at once."""
     q = at(dense.t, dense.q, angle_t)
     angles = q[:, [AZ, EL]]
@@ -226,9 +219,7 @@ def _view(rigid: RigidModel) -> tuple[Array, ...]:
 def amplify(hardware: Hardware, dense: Dense) -> Array:
     """Low-pass the wrench as the transducer's amplifier does (Butterworth), settled at the start."""
     rate = 1.0 / (dense.t[1] - dense.t[0])
-    sos = butter(
-        hardware.amplifier_order, hardware.scalar("transducer.amplifier.corner"), fs=rate, output="sos"
-    )
+    sos = butter(hardware.amplifier_order, hardware.scalar("transducer.amplifier.corner"), fs=rate, output="sos")
     start = sosfilt_zi(sos)[:, :, None] * dense.wrench[0]
     amplified, _ = sosfilt(sos, dense.wrench, axis=0, zi=start)
     return np.asarray(amplified)

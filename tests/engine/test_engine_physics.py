@@ -25,9 +25,7 @@ UNDAMPED = FRICTIONLESS | {
 }
 
 
-def step_of(
-    az: float, el: float, *, base: tuple[float, float] = (10.0, 75.0), seconds: float = 4.0
-) -> Commands:
+def step_of(az: float, el: float, *, base: tuple[float, float] = (10.0, 75.0), seconds: float = 4.0) -> Commands:
     """Rest at `base` (deg), then a jump by (az, el) deg within the first cycle."""
     t = 0.1 * np.arange(round(seconds / 0.1) + 1)
     position = np.tile(np.radians(base), (len(t), 1))
@@ -53,11 +51,7 @@ def test_at_rest_the_wrench_is_the_weight_and_r_cross_weight(tilt: tuple[float, 
     hardware = NOMINAL.with_values({"transducer.tilt": tilt})
     result = simulate(hardware, step_of(0.0, 0.0, base=(40.0, 72.0), seconds=0.2))
     sag_x, sag_y, sag_z = result.plate[0]
-    R = (
-        rotation(np.array([sag_x, 0, 0]))
-        @ rotation(np.array([0, sag_y, 0]))
-        @ rotation(np.array([0, 0, sag_z]))
-    )
+    R = rotation(np.array([sag_x, 0, 0])) @ rotation(np.array([0, sag_y, 0])) @ rotation(np.array([0, 0, sag_z]))
     tx, ty = tilt
     gravity = R.T @ (G * np.array([np.sin(ty), -np.sin(tx) * np.cos(ty), -np.cos(tx) * np.cos(ty)]))
     bodies = centres(hardware, *result.angles[0])
@@ -65,9 +59,7 @@ def test_at_rest_the_wrench_is_the_weight_and_r_cross_weight(tilt: tuple[float, 
     torque = sum(np.cross(r, m * gravity) for m, r in bodies)
     np.testing.assert_allclose(result.wrench[0], [*force, *torque], atol=1e-7)
     # The springs carry it; their axes differ from the plate's by the sag.
-    np.testing.assert_allclose(
-        hardware["transducer.stiffness"] * result.plate[0], result.wrench[0, 3:], atol=0.03
-    )
+    np.testing.assert_allclose(hardware["transducer.stiffness"] * result.plate[0], result.wrench[0, 3:], atol=0.03)
 
 
 def test_force_moves_the_centre_of_mass() -> None:
@@ -87,9 +79,7 @@ def test_undamped_vibration_neither_decays_nor_grows() -> None:
     hardware = NOMINAL.with_values(UNDAMPED)
     dense = integrate(hardware, step_of(0.02, 0.02, seconds=12.0))
     torque = dense.wrench[:, 3:] - dense.wrench[:, 3:].mean(axis=0)
-    early, late = (
-        np.sqrt(np.mean(torque[part] ** 2)) for part in (slice(10000, 60000), slice(70000, 120000))
-    )
+    early, late = (np.sqrt(np.mean(torque[part] ** 2)) for part in (slice(10000, 60000), slice(70000, 120000)))
     assert early > 0.1
     assert late == pytest.approx(early, rel=0.02)
 

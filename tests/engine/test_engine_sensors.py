@@ -54,10 +54,7 @@ def test_encoder_reads_codes(recording: Recording) -> None:
 
 
 def test_clocks_and_latency(recording: Recording) -> None:
-    for stream, clock in (
-        (recording.wrench, recording.wrench_clock),
-        (recording.encoder, recording.encoder_clock),
-    ):
+    for stream, clock in ((recording.wrench, recording.wrench_clock), (recording.encoder, recording.encoder_clock)):
         assert np.all(np.diff(stream.stamp) == 10_000_000)
         assert np.all(np.diff(stream.log) >= 0)
         reading = (stream.stamp - EPOCH) * 1e-9

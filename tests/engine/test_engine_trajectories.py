@@ -21,9 +21,7 @@ def test_limits_and_consistency(name: str) -> None:
     # Rates are the positions' own: between two cycles, the mean of two rates where acceleration is steady.
     steady = np.abs(np.diff(acceleration, axis=0, prepend=0.0)) < 1e-4
     mean_rate = (rate[1:] + rate[:-1]) / 2
-    np.testing.assert_allclose(
-        np.where(steady, np.diff(position, axis=0) / 0.1 - mean_rate, 0.0), 0.0, atol=2e-3
-    )
+    np.testing.assert_allclose(np.where(steady, np.diff(position, axis=0) / 0.1 - mean_rate, 0.0), 0.0, atol=2e-3)
     np.testing.assert_array_equal(rate[0], 0.0)
     if "STPP" in name:
         np.testing.assert_allclose(rate[-1], 0.0, atol=1e-6)

@@ -52,9 +52,7 @@ class Axis:
         stretch = (abs(change) / acceleration, float(np.copysign(acceleration, change)))
         return replace(self, stretches=(*self.stretches, stretch))
 
-    def move(
-        self, distance: float, rate: float = RATE_LIMIT, acceleration: float = ACCELERATION_LIMIT
-    ) -> Axis:
+    def move(self, distance: float, rate: float = RATE_LIMIT, acceleration: float = ACCELERATION_LIMIT) -> Axis:
         """Move by `distance` (deg) from rest to rest: accelerate, coast at `rate` if reached, brake."""
         peak = min(rate, float(np.sqrt(abs(distance) * acceleration)))
         ramp = peak / acceleration
@@ -180,9 +178,7 @@ def acq600() -> Commands:
     return commands(az, el.accelerate(0.02).rest(60.0), 240.0)
 
 
-_BUNGEE_ACCELERATION = (
-    0.25  # deg/s^2: the paper, too, left the flight's limit to reach 2 deg/s within +-12 deg
-)
+_BUNGEE_ACCELERATION = 0.25  # deg/s^2: the paper, too, left the flight's limit to reach 2 deg/s within +-12 deg
 
 
 def _al012() -> tuple[Axis, Axis]:

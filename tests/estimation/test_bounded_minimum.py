@@ -20,9 +20,7 @@ def test_it_is_the_bounded_minimum(seed: int) -> None:
     x = bounded_minimum(J.T @ J, J.T @ z, low, high)
     best = lsq_linear(J, z, (low, high + 1e-12), method="bvls", tol=1e-14).x
     for start in (x, np.clip(3.0 * rng.standard_normal(20), low, high)):
-        np.testing.assert_allclose(
-            bounded_minimum(J.T @ J, J.T @ z, low, high, start), x, rtol=1e-6, atol=1e-9
-        )
+        np.testing.assert_allclose(bounded_minimum(J.T @ J, J.T @ z, low, high, start), x, rtol=1e-6, atol=1e-9)
     assert np.all((x >= low) & (x <= high))
     assert np.sum((J @ x - z) ** 2) <= np.sum((J @ best - z) ** 2) * (1.0 + 1e-9)
 

@@ -17,8 +17,7 @@ from kbs_process.studies.flight.run import Job, fly, in_orbit
 
 ROOT = Path(__file__).parents[2]
 SLEW = "t,az,el\n" + "\n".join(
-    f"{t:.1f},0.0,{1.2 + 0.1 * (1 - np.cos(np.pi * min(t, 30.0) / 30.0)):.9f}"
-    for t in np.arange(0.0, 130.0, 0.1)
+    f"{t:.1f},0.0,{1.2 + 0.1 * (1 - np.cos(np.pi * min(t, 30.0) / 30.0)):.9f}" for t in np.arange(0.0, 130.0, 0.1)
 )
 
 
@@ -74,9 +73,7 @@ def test_a_slow_slew_in_orbit_costs_what_the_inertia_does():
     t = np.arange(0.0, 140.0, 0.1)
     omega = 2 * np.pi / 40.0
     elevation = 1.2 + 0.1 * np.cos(omega * t)
-    schedule = Schedule(
-        t, np.stack([0 * t, elevation], axis=1), np.stack([0 * t, -0.1 * omega * np.sin(omega * t)], 1)
-    )
+    schedule = Schedule(t, np.stack([0 * t, elevation], axis=1), np.stack([0 * t, -0.1 * omega * np.sin(omega * t)], 1))
     requirement = Requirement("torque", "torque", "T", "rms", 1.0, "N m", (0.01, 1.0), "test")
     band = next(band for band in bands_of(campaign.bands) if band.name == "lt1Hz")
     job = Job(rig, campaign.effects, schedule, 140.0, 20.0, (Judged(requirement, band, ("Tx", "Ty", "Tz")),))

@@ -29,12 +29,7 @@ def numbers(campaign):
 
 def test_every_uncertain_number_of_the_article_and_none_of_the_bench_is_drawn(campaign, numbers):
     names = {number.name for number in numbers}
-    assert {
-        "joint.el.drive.Ka",
-        "joint.az.drive.phi_cog",
-        "body.antenna.mass",
-        "body.antenna.cog[2]",
-    } <= names
+    assert {"joint.el.drive.Ka", "joint.az.drive.phi_cog", "body.antenna.mass", "body.antenna.cog[2]"} <= names
     assert not any(name.startswith(("transducer", "gravity")) for name in names)
     assert "joint.el.drive.ratio" not in names  # exact
 
@@ -51,9 +46,7 @@ def test_drawn_numbers_have_their_stated_mean_and_sigma(numbers):
 
 def test_a_phase_of_which_nothing_is_known_is_uniform_and_a_stiffness_is_positive(numbers):
     drawn = dict(zip((n.name for n in numbers), draw(numbers, 2000, seed=2).T, strict=True))
-    assert (
-        kstest(drawn["joint.el.drive.phi_stat"], "uniform", (-np.pi, 2 * np.pi)).pvalue > 0.9
-    )  # evenly spread
+    assert kstest(drawn["joint.el.drive.phi_stat"], "uniform", (-np.pi, 2 * np.pi)).pvalue > 0.9  # evenly spread
     assert np.log(drawn["joint.el.drive.Ka"] / 1.2e4).std() == pytest.approx(0.125, rel=0.03)
     assert drawn["joint.el.drive.Ts0"].min() > 0.0
 

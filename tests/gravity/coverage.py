@@ -116,8 +116,7 @@ def lines(scores: Iterable[Scores]) -> Iterator[str]:
     yield "held-out static wrench, 0.01 to 1 Hz, rms of all campaigns, mN and mN m:"
     for index, channel in enumerate(WRENCH_CHANNELS):
         wrong, stated = (
-            1e3 * np.sqrt(np.mean([getattr(one, key)[index] ** 2 for one in scores]))
-            for key in ("wrong", "stated")
+            1e3 * np.sqrt(np.mean([getattr(one, key)[index] ** 2 for one in scores])) for key in ("wrong", "stated")
         )
         yield f"    {channel}: error {wrong:.4f}, stated {stated:.4f}, ratio {wrong / stated:.2f}"
 
@@ -142,9 +141,7 @@ def main() -> None:
     for seed in range(arguments.first, arguments.first + arguments.count):
         scores.append(score(*make(seed, still=arguments.still)))
         informed = scores[-1].z[scores[-1].gain > INFORMED]
-        print(
-            f"{seed} {KINDS[seed % len(KINDS)][0]}: z rms {np.sqrt(np.mean(informed**2)):.2f} of {len(informed)}"
-        )
+        print(f"{seed} {KINDS[seed % len(KINDS)][0]}: z rms {np.sqrt(np.mean(informed**2)):.2f} of {len(informed)}")
     print(*lines(scores), sep="\n")
 
 

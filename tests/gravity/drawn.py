@@ -82,9 +82,7 @@ class DrawnCampaign:
         kept = []
 
         def simulate(hardware: Hardware, commands: Commands, *, time_step: float) -> Dense:
-            dense = (
-                at_rest(hardware, commands) if still else integrate(hardware, commands, time_step=time_step)
-            )
+            dense = at_rest(hardware, commands) if still else integrate(hardware, commands, time_step=time_step)
             kept.append(dense)
             return dense
 
@@ -113,9 +111,7 @@ class DrawnCampaign:
         clock = recording.wrench_clock
         start = (recording.wrench.stamp[0] * 1e-9 - clock.offset) / (1 + clock.skew)
         t, static = _static_history(recording.hardware, kept[0])
-        return Drawn(
-            decouple.apply(run, decouple.fit(self.rig)), recording.hardware, recording.drift, start, t, static
-        )
+        return Drawn(decouple.apply(run, decouple.fit(self.rig)), recording.hardware, recording.drift, start, t, static)
 
 
 def _block(stream: Stream) -> Block:
@@ -136,11 +132,7 @@ def at_rest(hardware: Hardware, commands: Commands) -> Dense:
         q[k, [ROTOR_AZ, ROTOR_EL]] = ratio * position
     t = np.arange(0.0, commands.t[-1], FINE_S)
     return Dense(
-        t,
-        CubicSpline(commands.t, wrench)(t),
-        CubicSpline(commands.t, q)(t),
-        commands.t,
-        ratio * commands.position,
+        t, CubicSpline(commands.t, wrench)(t), CubicSpline(commands.t, q)(t), commands.t, ratio * commands.position
     )
 
 

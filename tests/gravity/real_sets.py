@@ -19,11 +19,7 @@ def _run(name, dt, wrench, channels, angle=None, rate=None, joint_name=""):
     units = tuple(WRENCH_UNITS[WRENCH_CHANNELS.index(c)] for c in channels)
 
     def motion(values, unit):
-        return (
-            None
-            if values is None
-            else Signal(0.0, dt, values[:, None], (joint_name,), (unit,), "joint", valid)
-        )
+        return None if values is None else Signal(0.0, dt, values[:, None], (joint_name,), (unit,), "joint", valid)
 
     return Run(
         name=name,
@@ -57,9 +53,7 @@ def smartwheel(which):
     The file gives forces and moments in axes that do not turn, x of the forces with the other sign.
     """
     columns = np.genfromtxt(
-        DATA / "smartwheel" / f"pushrimkinetics_offsets_{which}.csv",
-        delimiter=",",
-        usecols=(3, *range(18, 24)),
+        DATA / "smartwheel" / f"pushrimkinetics_offsets_{which}.csv", delimiter=",", usecols=(3, *range(18, 24))
     )
     angle = np.unwrap(np.radians(columns[:, 0]))
     hub = columns[:, 1:] * np.array([-1.0, 1, 1, 1, 1, 1])

@@ -53,13 +53,7 @@ def record(rig, name, q_fine, rng, *, noise=None, bias=None, deviation=0.0):
     return Run(
         name=name,
         wrench=Signal(
-            0.0,
-            dt,
-            wrench[:, index],
-            rig.transducer.channels,
-            tuple(WRENCH_UNITS[i] for i in index),
-            "T",
-            valid,
+            0.0, dt, wrench[:, index], rig.transducer.channels, tuple(WRENCH_UNITS[i] for i in index), "T", valid
         ),
         angle=Signal(0.0, dt, angle, names, ("rad",) * len(names), "joint", valid),
         rate=None,

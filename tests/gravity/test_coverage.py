@@ -33,8 +33,7 @@ def test_fitted_parameters_lie_within_their_sigmas_as_often_as_they_should(score
 
 def test_torques_of_a_held_out_recording_are_as_wrong_in_the_band_as_stated(scores):
     wrong, stated = (
-        np.sqrt(np.mean([getattr(one, key)[3:5] ** 2 for one in scores], axis=0))
-        for key in ("wrong", "stated")
+        np.sqrt(np.mean([getattr(one, key)[3:5] ** 2 for one in scores], axis=0)) for key in ("wrong", "stated")
     )
     assert np.all(wrong < 2.0 * stated)
     assert np.all(wrong > 0.3 * stated)

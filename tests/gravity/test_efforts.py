@@ -64,10 +64,7 @@ def sample(rig, offset):
 def test_mass_and_friction_are_found_and_a_zero_only_where_one_may_be(offset, bias_sigma):
     rig = axis(bias_sigma)
     model = gravity.fit(
-        [sample(rig, offset)],
-        rig,
-        include_inertia=True,
-        settings=GravitySettings(low_pass_Hz=5.0, response=True),
+        [sample(rig, offset)], rig, include_inertia=True, settings=GravitySettings(low_pass_Hz=5.0, response=True)
     )
     for name, value in TRUE.items():
         found = float(model.rig.quantities()[name])
@@ -78,17 +75,13 @@ def test_mass_and_friction_are_found_and_a_zero_only_where_one_may_be(offset, bi
     assert len(zeros) == (3 if bias_sigma else 0)  # constant, drift and its curvature
     assert model.taring["run"].bias[0] == pytest.approx(offset, abs=0.2)
     assert (model.channels, model.units) == (("axis.effort",), ("N",))
-    assert not any(
-        name.startswith("response") for name in model.fit.names
-    )  # a transducer's, and there is none
+    assert not any(name.startswith("response") for name in model.fit.names)  # a transducer's, and there is none
 
 
 def test_the_model_is_what_the_effort_reads():
     rig = axis(0.0)
     data = sample(rig, 0.0)
-    model = gravity.fit(
-        [data], rig, include_inertia=True, settings=GravitySettings(low_pass_Hz=5.0, response=True)
-    )
+    model = gravity.fit([data], rig, include_inertia=True, settings=GravitySettings(low_pass_Hz=5.0, response=True))
     predicted = gravity.apply(data.motion, model)
     assert predicted.wrench.frame == "joint"
     inner = slice(100, -100)

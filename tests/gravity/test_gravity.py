@@ -111,8 +111,7 @@ def test_inertia_of_an_instrumented_wheel_is_found():
         {"body.pushrim.inertia": np.array([0, 0, 0.02, 0, 0, 0])},
     )
     truth = substitute(
-        nominal,
-        {"body.pushrim.mass": 0.7, "body.pushrim.inertia": np.array([0.02, 0.02, 0.055, 0.001, 0, 0])},
+        nominal, {"body.pushrim.mass": 0.7, "body.pushrim.inertia": np.array([0.02, 0.02, 0.055, 0.001, 0, 0])}
     )
     _, q, _, _ = smooth_motion(1, seconds=60, rate=FINE)
     run = record(truth, "turning", 3 * q, np.random.default_rng(0))
@@ -135,9 +134,7 @@ def test_what_the_calibration_left_of_the_cross_coupling_is_found():
     X[0, 4] = 0.03
     spread = np.zeros((6, 6))
     spread[0, 4] = 0.05
-    loose = substitute(
-        nominal, {"transducer.cross_coupling": np.zeros((6, 6))}, {"transducer.cross_coupling": spread}
-    )
+    loose = substitute(nominal, {"transducer.cross_coupling": np.zeros((6, 6))}, {"transducer.cross_coupling": spread})
     run = record(nominal, "calibration", calibration_angles(), np.random.default_rng(0))
     mixed = run.with_wrench(run.wrench.derive(run.wrench.values @ (np.eye(6) + X).T, "mixed"))
     model = gravity.fit([sample(mixed, loose, True)], loose, include_inertia=False)

@@ -68,9 +68,7 @@ def test_the_encoder_is_kept_where_the_joint_leaves_its_command():
 
 def test_a_joint_at_rest_keeps_the_rounding_error_of_a_code():
     rig = pointing_rig()
-    motion = estimate(
-        record(rig, "rest", slow_ramp(), np.random.default_rng(0)), rig, MotionSettings(source="encoder")
-    )
+    motion = estimate(record(rig, "rest", slow_ramp(), np.random.default_rng(0)), rig, MotionSettings(source="encoder"))
     step = float(rig.joints[0].encoder.step)
     assert motion.sigma_q[200, 0] == pytest.approx(step / np.sqrt(12), rel=0.2)
 
@@ -97,9 +95,7 @@ def test_a_measured_rate_is_integrated():
     rate = smooth(q, 1 / FINE, 2.0, derivative=1)[:: int(FINE / RATE)]
     angle = run.angle
     rated = replace(
-        run,
-        angle=None,
-        rate=Signal(0.0, angle.dt, rate, angle.channels, ("rad/s",) * 2, "joint", angle.valid),
+        run, angle=None, rate=Signal(0.0, angle.dt, rate, angle.channels, ("rad/s",) * 2, "joint", angle.valid)
     )
     motion = estimate(rated, rig)
     truth = q[:: int(FINE / RATE)] - q[0]

@@ -10,16 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from real_sets import (
-    DATA,
-    hand_free,
-    hub_axes,
-    low_pass,
-    smartwheel,
-    smartwheel_rig,
-    treadmill,
-    treadmill_rig,
-)
+from real_sets import DATA, hand_free, hub_axes, low_pass, smartwheel, smartwheel_rig, treadmill, treadmill_rig
 
 from kbs_process.signals.grid import crop
 from kbs_process.stages import motion
@@ -32,9 +23,7 @@ EDGE_S = 1.0  # of the scoring filter, at either end
 
 
 def _part(run, start, stop):
-    return replace(
-        run, wrench=crop(run.wrench, start, stop - start), angle=crop(run.angle, start, stop - start)
-    )
+    return replace(run, wrench=crop(run.wrench, start, stop - start), angle=crop(run.angle, start, stop - start))
 
 
 def _motion(run, rig):
@@ -110,8 +99,7 @@ def test_treadmill_trial_predicts_the_other(train, test, known, published):
     model = _fit(treadmill(train), rig, 5.0, response=True)
     edge = int(EDGE_S / run.wrench.dt)
     before, left = (
-        low_pass(values, run.wrench.dt, 6.0)[edge:-edge].std()
-        for values in (run.wrench.values, _left(run, rig, model))
+        low_pass(values, run.wrench.dt, 6.0)[edge:-edge].std() for values in (run.wrench.values, _left(run, rig, model))
     )
     change = 100 * (left / before - 1)
     resonance = 1 / (2 * np.pi * np.sqrt(-model.fit["response.inertia"]))

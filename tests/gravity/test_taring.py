@@ -30,9 +30,7 @@ def calibration(seconds=120.0):
 
 
 def sample(run):
-    return gravity.Sample(
-        run.name, motion.estimate(run, pointing_rig()), run.wrench, run.name == "calibration"
-    )
+    return gravity.Sample(run.name, motion.estimate(run, pointing_rig()), run.wrench, run.name == "calibration")
 
 
 @pytest.fixture(scope="module")

@@ -193,15 +193,10 @@ def binomial(hits: int, n: int) -> tuple[float, float]:
     return low, high
 
 
-def bootstrap(
-    groups: Sequence[Sequence[float | bool]], of: Callable[[Sequence[float]], float]
-) -> tuple[float, float]:
+def bootstrap(groups: Sequence[Sequence[float | bool]], of: Callable[[Sequence[float]], float]) -> tuple[float, float]:
     """95 % interval of a statistic over groups, by drawing groups again (B. Efron, Annals of Statistics 7:1, 1979)."""
     rng = np.random.default_rng(0)
-    drawn = [
-        of(np.concatenate([groups[k] for k in rng.integers(0, len(groups), len(groups))]))
-        for _ in range(2000)
-    ]
+    drawn = [of(np.concatenate([groups[k] for k in rng.integers(0, len(groups), len(groups))])) for _ in range(2000)]
     low, high = np.percentile(drawn, [2.5, 97.5])
     return float(low), float(high)
 
@@ -263,8 +258,7 @@ def main() -> None:
             furthest = max(done.estimates, key=lambda one: abs(one.error / one.bound))
             print(f"seed {done.seed}: {sum(one.covered for one in done.estimates)} of", end=" ")
             print(
-                f"{len(done.estimates)} held; rms {rms(one.error / one.bound for one in done.estimates):.2f};",
-                end=" ",
+                f"{len(done.estimates)} held; rms {rms(one.error / one.bound for one in done.estimates):.2f};", end=" "
             )
             print(f"furthest {furthest.name} {furthest.error / furthest.bound:+.1f} sigma;", end=" ")
             print(f"truth {done.truth_above:+.0f}; checks {done.checks}", flush=True)

@@ -44,13 +44,10 @@ def test_errors_are_within_the_bound(results: dict[str, Any], hardware: dict[str
     assert np.mean(np.abs(z) <= 1.96) >= 0.84  # 27 of 32: five or more outside have a chance of 2 %
 
 
-def test_profile_intervals_hold_most_of_the_critical_numbers(
-    results: dict[str, Any], hardware: dict[str, Any]
-) -> None:
+def test_profile_intervals_hold_most_of_the_critical_numbers(results: dict[str, Any], hardware: dict[str, Any]) -> None:
     critical = [one for one in results["parameters"] if one["interval"] is not None]
     assert len(critical) == 18
     held = [
-        one["interval"]["low"] <= one["value"] - error(hardware, one) <= one["interval"]["high"]
-        for one in critical
+        one["interval"]["low"] <= one["value"] - error(hardware, one) <= one["interval"]["high"] for one in critical
     ]
     assert sum(held) >= 14

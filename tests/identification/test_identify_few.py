@@ -52,9 +52,7 @@ def test_search_converges_to_noise(found: Identification) -> None:
     assert found.fit.residual_rms == pytest.approx(1.0, abs=0.03)
 
 
-def test_errors_are_of_the_size_of_their_sigmas(
-    drawn: tuple[Hardware, Recording], found: Identification
-) -> None:
+def test_errors_are_of_the_size_of_their_sigmas(drawn: tuple[Hardware, Recording], found: Identification) -> None:
     wrong = errors(found, true_values(drawn[0], found))
     sigma = found.fit.sigma[: len(FREE)]
     assert np.max(np.abs(wrong) / sigma) < 4.0

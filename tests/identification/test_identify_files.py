@@ -29,9 +29,7 @@ def test_folder(tmp_path: Path) -> None:
     campaign = load_campaign(DUMMY1, checksums=False)
     full = replace(campaign, bands=replace(campaign.bands, working_rate=100.0))
     recording = measured(read_run(full, replace(campaign.recordings[0], end=12.0)), campaign.rig)
-    setting = Experiment(
-        campaign.rig, campaign.effects, gearbox(campaign.rig, campaign.effects), (recording,), 0.05
-    )
+    setting = Experiment(campaign.rig, campaign.effects, gearbox(campaign.rig, campaign.effects), (recording,), 0.05)
     parameters = with_factors(prior(setting), setting, 0.02)
     names = parameters.names
     assert len(names) == len(setting.free) + len(frictions(setting))
@@ -39,9 +37,7 @@ def test_folder(tmp_path: Path) -> None:
     at, phase = names.index("joint.el.drive.Ka"), names.index("joint.el.drive.phi_cog")
     value[at], value[phase] = 10321.0, 4.0
     sigma = np.where(np.isfinite(parameters.sigma), 0.1 * parameters.sigma, 0.01)
-    fit = Fit(
-        names, value, sigma, np.diag(sigma**2), parameters.sigma, (Check("converged", True, "3"),), 1.0, 9, 3
-    )
+    fit = Fit(names, value, sigma, np.diag(sigma**2), parameters.sigma, (Check("converged", True, "3"),), 1.0, 9, 3)
     noise = sensor_spectra(setting, recording)
     found = Identification(
         setting, fit, np.zeros((9, len(names))), (noise,), (), Unpredicted(np.zeros((9, 2))), (), parameters
@@ -50,9 +46,7 @@ def test_folder(tmp_path: Path) -> None:
     profile = Profile("joint.el.drive.Ka", x, np.array([4.0, 0.0, 4.0]), float(x[0]), float(x[2]))
     shape = (len(recording.valid), len(setting.channels))
     after = np.random.default_rng(1).standard_normal(shape) * 1e-3
-    outcomes = Outcomes(
-        found, Settings(), (profile,), (Prediction(recording, "held-out", noise, 10.0 * after, after),)
-    )
+    outcomes = Outcomes(found, Settings(), (profile,), (Prediction(recording, "held-out", noise, 10.0 * after, after),))
     target = tmp_path / "results"
     told = write_identification(campaign, outcomes, target, False)
     assert told.report.is_file()

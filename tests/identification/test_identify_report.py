@@ -9,14 +9,7 @@ import numpy as np
 from kbs_process.results.records import Check, Conclusion, Provenance, encode
 from kbs_process.results.tables import write_table
 from kbs_process.studies.documents import render as build
-from kbs_process.studies.identify.results import (
-    Correlations,
-    Followed,
-    Identified,
-    IdentifyResults,
-    Interval,
-    Misfit,
-)
+from kbs_process.studies.identify.results import Correlations, Followed, Identified, IdentifyResults, Interval, Misfit
 
 
 def number(name: str, group: str, value: float, sigma: float) -> Identified:
@@ -61,8 +54,7 @@ def sample() -> IdentifyResults:
         checks=(Check(name="told apart", ok=False, detail="tcog with Ts0"),),
         misfits=(Misfit(recording="A", role="held-out", channel="Ty", before=12.3, after=1.01),),
         correlations=Correlations(
-            names=tuple(p.name for p in parameters[:3]),
-            matrix=((1.0, -0.97, 0.1), (-0.97, 1.0, 0.0), (0.1, 0.0, 1.0)),
+            names=tuple(p.name for p in parameters[:3]), matrix=((1.0, -0.97, 0.1), (-0.97, 1.0, 0.0), (0.1, 0.0, 1.0))
         ),
         files=("identified/parameters/drives.toml",),
     )
@@ -71,26 +63,13 @@ def sample() -> IdentifyResults:
 def test_page(tmp_path: Path) -> None:
     rng = np.random.default_rng(1)
     f = np.linspace(0.01, 50.0, 500)
-    spectrum = {
-        "f": f,
-        "Ty.before": 1e-4 / f,
-        "Ty.after": 1e-7 * rng.chisquare(2, 500),
-        "Ty.noise": np.full(500, 1e-7),
-    }
-    write_table(
-        tmp_path / "tables/residual_spectrum/A.parquet", spectrum, {"Ty.after": "(N m)^2/Hz"}, recording="A"
-    )
+    spectrum = {"f": f, "Ty.before": 1e-4 / f, "Ty.after": 1e-7 * rng.chisquare(2, 500), "Ty.noise": np.full(500, 1e-7)}
+    write_table(tmp_path / "tables/residual_spectrum/A.parquet", spectrum, {"Ty.after": "(N m)^2/Hz"}, recording="A")
     history = {"t": f, "Ty.before": np.sin(f), "Ty.after": 0.01 * rng.standard_normal(500)}
     write_table(tmp_path / "tables/residual/A.parquet", history, {"Ty.after": "N m"}, recording="A")
     (tmp_path / "results.json").write_bytes(encode(sample()))
     page = build(tmp_path, False).read_text()
-    for text in (
-        "az.drive.tcog",
-        "12.3",
-        "identified/parameters/drives.toml",
-        "tcog with Ts0",
-        "Profile likelihood",
-    ):
+    for text in ("az.drive.tcog", "12.3", "identified/parameters/drives.toml", "tcog with Ts0", "Profile likelihood"):
         assert text in page
     for figure in (
         "A: spectra of what is unexplained",

@@ -26,9 +26,7 @@ def test_linear_model_has_its_exact_posterior() -> None:
     rng = np.random.default_rng(2)
     A, y = rng.standard_normal((N, P)), rng.standard_normal(N)
     at = np.array([0.3, -0.2, 0.1])
-    model = linearised(
-        lambda many: [y - A @ one for one in many], -A, at, draws(at, np.eye(P), PARAMETERS, 8, rng)
-    )
+    model = linearised(lambda many: [y - A @ one for one in many], -A, at, draws(at, np.eye(P), PARAMETERS, 8, rng))
     mean, C = model.posterior(PARAMETERS)
     exact = np.linalg.inv(A.T @ A + np.eye(P) / 25.0)
     np.testing.assert_allclose(C, exact, rtol=1e-9)
@@ -67,9 +65,7 @@ class Jumping:
 def wide_slopes(plant: Jumping, theta: np.ndarray, sigma: np.ndarray) -> np.ndarray:
     """Central differences over five sigmas to either side."""
     ends = plant.residuals([theta + side * one for one in 5.0 * np.diag(sigma) for side in (1.0, -1.0)])
-    return np.column_stack(
-        [(a - b) / (10.0 * s) for a, b, s in zip(ends[::2], ends[1::2], sigma, strict=True)]
-    )
+    return np.column_stack([(a - b) / (10.0 * s) for a, b, s in zip(ends[::2], ends[1::2], sigma, strict=True)])
 
 
 def test_errors_are_of_the_stated_size_where_events_flip_within_the_posterior() -> None:

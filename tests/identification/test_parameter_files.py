@@ -17,18 +17,10 @@ DUMMY1 = Path(__file__).parents[2] / "campaigns" / "DUMMY1"
 def test_round_trip(tmp_path: Path) -> None:
     campaign = load_campaign(DUMMY1, checksums=False)
     known = campaign.rig.quantities()
-    names = (
-        "joint.el.drive.Ka",
-        "transducer.stiffness",
-        "body.antenna.inertia",
-        "transducer.amplifier.corner",
-    )
+    names = ("joint.el.drive.Ka", "transducer.stiffness", "body.antenna.inertia", "transducer.amplifier.corner")
     changed = {
         name: replace(
-            known[name],
-            value=known[name].value * 1.01,
-            sigma=known[name].sigma / 3.0,
-            source='identified from "A"',
+            known[name], value=known[name].value * 1.01, sigma=known[name].sigma / 3.0, source='identified from "A"'
         )
         for name in names
     }

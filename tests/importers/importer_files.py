@@ -131,9 +131,7 @@ def write_hdf5(path: Path, columns: dict[str, np.ndarray]) -> None:
 
     with h5py.File(path, "w") as file:
         file["t"] = columns["t"]
-        file.create_dataset(
-            "run/forces", data=np.column_stack([columns[name] for name in ("Fx", "Fy", "Fz")])
-        )
+        file.create_dataset("run/forces", data=np.column_stack([columns[name] for name in ("Fx", "Fy", "Fz")]))
         file["run/forces"].attrs["units"] = "N"
         file["run/angle"] = columns["angle"][None, :]  # as MATLAB writes a row
 
@@ -152,9 +150,7 @@ def write_mdf(path: Path, columns: dict[str, np.ndarray]) -> None:
     from asammdf import MDF, Signal
 
     with MDF(version="4.10") as file:
-        file.append(
-            [Signal(x, columns["t"], name=name, unit="N") for name, x in columns.items() if name != "t"]
-        )
+        file.append([Signal(x, columns["t"], name=name, unit="N") for name, x in columns.items() if name != "t"])
         file.start_time = pd.Timestamp("1970-01-01T00:00:00Z").to_pydatetime()
         file.save(path, overwrite=True)
 

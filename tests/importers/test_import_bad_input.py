@@ -50,11 +50,7 @@ def _import(folder: Path, file: str, mapping: str = MAPPING, notices: list[str] 
         ("description/campaign.toml", "campaign.toml", "does not exist"),
         ("repeat = 1", "repeat = 1\nstart_s = 5.0\nend_s = 4.0", "is not after start_s"),
         ('"SOURCE"', '"../SOURCE"', "no file of the source folder"),
-        (
-            "[[recording]]",
-            '[turn]\njoint = "wheel"\naxis = [0, 0, 2]\nfactor = 1.0\n[[recording]]',
-            "unit vector",
-        ),
+        ("[[recording]]", '[turn]\njoint = "wheel"\naxis = [0, 0, 2]\nfactor = 1.0\n[[recording]]', "unit vector"),
         ('unit = "s"', 'unit = "s"\nstart = 2026-01-31T12:00:00', "offset from UTC"),
     ],
 )
@@ -164,9 +160,7 @@ def test_damaged_binary_files(tmp_path: Path, suffix: str, write: Writer) -> Non
         ('print(\'[["x", "", ""\', end=\'\')', "no column of numbers"),
     ],
 )
-def test_a_reader_that_dies_or_hangs(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, body: str, said: str
-) -> None:
+def test_a_reader_that_dies_or_hangs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, body: str, said: str) -> None:
     (tmp_path / "bad_reader.py").write_text(body)
     (tmp_path / "run.tdms").write_bytes(b"TDSm")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
@@ -219,10 +213,7 @@ def test_the_description_is_taken_whole_and_from_its_folder_only(tmp_path: Path)
     assert load_campaign(folder).rig.transducer.cross_coupling.value[2, 2] == 0.01
 
     rig.rename(tmp_path / "rig.toml")
-    for name, said in {
-        "parameters/rig.toml": "does not exist",
-        "../rig.toml": "outside the campaign",
-    }.items():
+    for name, said in {"parameters/rig.toml": "does not exist", "../rig.toml": "outside the campaign"}.items():
         campaign.write_text(CAMPAIGN.replace("parameters/rig.toml", name))
         with pytest.raises(ConfigError, match=said):
             importers.import_recordings(plan, tmp_path, tmp_path / "other")

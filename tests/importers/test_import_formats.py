@@ -77,9 +77,7 @@ NO_TIME = MAPPING.replace('[time]\ncolumn = "t"\nunit = "s"\n', "")
 def test_reads_back_bit_for_bit(tmp_path: Path, file: str, write: Writer, mapping: str) -> None:
     columns = signals(2500)
     write(tmp_path / file, columns)
-    folder = importers.import_recordings(
-        write_mapping(tmp_path, file, mapping), tmp_path / file, tmp_path / "campaign"
-    )
+    folder = importers.import_recordings(write_mapping(tmp_path, file, mapping), tmp_path / file, tmp_path / "campaign")
     blocks = read_back(folder, "turn_1")
     stamps = np.rint(columns["t"] * 1e9).astype(np.int64)
     for key, names in {"wrench": ("Fx", "Fy", "Fz"), "encoder": ("angle",)}.items():
@@ -102,9 +100,7 @@ def test_waveforms_bring_their_own_clocks(tmp_path: Path) -> None:
     mapping = NO_TIME
     for name in ("Fx", "Fy", "Fz", "angle"):
         mapping = mapping.replace(f'"{name}"', f'"run/{name}"')
-    folder = importers.import_recordings(
-        write_mapping(tmp_path, "run.tdms", mapping), tmp_path, tmp_path / "c"
-    )
+    folder = importers.import_recordings(write_mapping(tmp_path, "run.tdms", mapping), tmp_path, tmp_path / "c")
     blocks = read_back(folder, "turn_1")
     zero = start.astype("datetime64[ns]").astype(np.int64)
     np.testing.assert_array_equal(blocks["wrench"][0], zero + np.arange(200) * 1_000_000)
@@ -134,17 +130,13 @@ def test_dates_and_absolute_start(tmp_path: Path) -> None:
     dated = MAPPING.replace('unit = "s"', 'unit = "datetime"')
     counted = MAPPING.replace('unit = "s"', 'unit = "ms"\nstart = 2026-01-31T13:00:00+01:00')
     first = importers.import_recordings(write_mapping(tmp_path, "dates.csv", dated), tmp_path, tmp_path / "a")
-    second = importers.import_recordings(
-        write_mapping(tmp_path, "counts.parquet", counted), tmp_path, tmp_path / "b"
-    )
+    second = importers.import_recordings(write_mapping(tmp_path, "counts.parquet", counted), tmp_path, tmp_path / "b")
     expected = dates.as_unit("ns").asi8
     np.testing.assert_array_equal(read_back(first, "turn_1")["wrench"][0], expected)
     np.testing.assert_array_equal(read_back(second, "turn_1")["wrench"][0], expected - 123)
 
 
-def test_units_signs_and_wrapped_angles_across_pieces(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_units_signs_and_wrapped_angles_across_pieces(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(text, "CHUNK_ROWS", 7)  # every piece ends at another angle
     t = np.arange(400) * 0.01
     degrees = 100.0 - 250.0 * t  # three turns backwards
@@ -155,9 +147,7 @@ def test_units_signs_and_wrapped_angles_across_pieces(
         .replace('"Fy", unit = "N"', '"Fy", unit = "N", scale = -2.0')
         .replace('unit = "rad"', 'unit = "deg", unwrap = true')
     )
-    folder = importers.import_recordings(
-        write_mapping(tmp_path, "run.csv", mapping), tmp_path, tmp_path / "c"
-    )
+    folder = importers.import_recordings(write_mapping(tmp_path, "run.csv", mapping), tmp_path, tmp_path / "c")
     blocks = read_back(folder, "turn_1")
     expected = np.column_stack([1000.0 * force, -2.0 * force, force])
     np.testing.assert_allclose(blocks["wrench"][1], expected, rtol=1e-15)
@@ -170,9 +160,7 @@ def test_a_motor_s_angle_is_unwrapped_before_it_is_geared_down(tmp_path: Path) -
     zero = 0.0 * t
     write_csv(tmp_path / "run.csv", {"t": t, "Fx": zero, "Fy": zero, "Fz": zero, "angle": degrees % 360.0})
     mapping = MAPPING.replace('unit = "rad"', 'unit = "deg", scale = 0.01, unwrap = 360')
-    folder = importers.import_recordings(
-        write_mapping(tmp_path, "run.csv", mapping), tmp_path, tmp_path / "c"
-    )
+    folder = importers.import_recordings(write_mapping(tmp_path, "run.csv", mapping), tmp_path, tmp_path / "c")
     found = read_back(folder, "turn_1")["encoder"][1][:, 0]
     np.testing.assert_allclose(found, 0.01 * np.radians(degrees), atol=1e-12)
 
@@ -206,9 +194,7 @@ def test_force_resolved_in_fixed_axes_is_turned_into_the_transducer(tmp_path: Pa
     down = {"t": t, "Fx": 0 * t, "Fy": 0 * t - 5.0, "Fz": 0 * t + 1.0, "angle": q}
     write_csv(tmp_path / "run.csv", down)
     mapping = MAPPING + '\n[turn]\njoint = "wheel"\naxis = [0, 0, 1]\nfactor = -1.0\n'
-    folder = importers.import_recordings(
-        write_mapping(tmp_path, "run.csv", mapping), tmp_path, tmp_path / "c"
-    )
+    folder = importers.import_recordings(write_mapping(tmp_path, "run.csv", mapping), tmp_path, tmp_path / "c")
     expected = np.column_stack([-5.0 * np.sin(q), -5.0 * np.cos(q), np.ones(100)])
     np.testing.assert_allclose(read_back(folder, "turn_1")["wrench"][1], expected, atol=1e-14)
 
@@ -218,9 +204,7 @@ def test_parts_of_one_file_share_no_sample(tmp_path: Path) -> None:
     write_csv(tmp_path / "run.csv", columns)
     second = MAPPING[MAPPING.index("[[recording]]") :].replace('"fit"\nrepeat = 1', '"held-out"\nrepeat = 2')
     mapping = MAPPING + "end_s = 4.0\n\n" + second + "start_s = 4.0\n"
-    folder = importers.import_recordings(
-        write_mapping(tmp_path, "run.csv", mapping), tmp_path, tmp_path / "c"
-    )
+    folder = importers.import_recordings(write_mapping(tmp_path, "run.csv", mapping), tmp_path, tmp_path / "c")
     parts = [read_back(folder, name)["wrench"][1] for name in ("turn_1", "turn_2")]
     assert [len(part) for part in parts] == [400, 600]
     np.testing.assert_array_equal(np.concatenate([part[:, 0] for part in parts]), columns["Fx"])

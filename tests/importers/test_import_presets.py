@@ -64,9 +64,7 @@ def test_smartwheel(tmp_path: Path) -> None:
 def test_treadmill(tmp_path: Path, speed: str) -> None:
     source = _source("treadmill_pitch")
     notices: list[str] = []
-    folder = importers.import_recordings(
-        f"treadmill_{speed}", source, tmp_path / "treadmill", notice=notices.append
-    )
+    folder = importers.import_recordings(f"treadmill_{speed}", source, tmp_path / "treadmill", notice=notices.append)
     for trial in (1, 2):
         raw = pd.read_csv(source / f"Random{speed.title()}Speed{trial}.txt", sep="\t").to_numpy()
         stamp, moment = _read(folder, f"random_{speed}_{trial}", "wrench")

@@ -30,9 +30,7 @@ def rewrite(source: Path, target: Path, *, compression: CompressionType, **optio
             if channel.id not in channels:
                 assert schema is not None
                 number = writer.register_schema(schema.name, schema.encoding, schema.data)
-                channels[channel.id] = writer.register_channel(
-                    channel.topic, channel.message_encoding, number
-                )
+                channels[channel.id] = writer.register_channel(channel.topic, channel.message_encoding, number)
             writer.add_message(
                 channels[channel.id], message.log_time, message.data, message.publish_time, message.sequence
             )

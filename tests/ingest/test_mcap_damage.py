@@ -92,12 +92,8 @@ def test_a_flipped_bit_is_never_a_wrong_number(whole: Path, tmp_path: Path) -> N
     assert kept > 0.9 * tried * N  # one bad block costs one block
 
 
-@pytest.mark.parametrize(
-    "options", [{"use_chunking": False}, {"index_types": IndexType.NONE, "chunk_size": 3000}]
-)
-def test_a_flipped_bit_is_noticed_by_the_data_section(
-    whole: Path, tmp_path: Path, options: dict[str, object]
-) -> None:
+@pytest.mark.parametrize("options", [{"use_chunking": False}, {"index_types": IndexType.NONE, "chunk_size": 3000}])
+def test_a_flipped_bit_is_noticed_by_the_data_section(whole: Path, tmp_path: Path, options: dict[str, object]) -> None:
     source, path = tmp_path / "b.mcap", tmp_path / "a.mcap"
     rewrite(whole, source, compression=CompressionType.NONE, enable_data_crcs=True, **options)
     data = source.read_bytes()
@@ -177,12 +173,7 @@ def test_a_broken_frame_costs_its_chunk_only(whole: Path, tmp_path: Path) -> Non
     data = whole.read_bytes()
     chunks = [(at, length) for opcode, at, length in top_records(data) if opcode == CHUNK]
     path = tmp_path / "a.mcap"
-    for replacement in (
-        b"\xff" * 9,
-        b"\x06" + b"\xff" * 7 + b"\x00",
-        bytes(60),
-        b"\x06" + struct.pack("<Q", 5),
-    ):
+    for replacement in (b"\xff" * 9, b"\x06" + b"\xff" * 7 + b"\x00", bytes(60), b"\x06" + struct.pack("<Q", 5)):
         at = chunks[2][0]
         path.write_bytes(data[:at] + replacement + data[at + len(replacement) :])
         block, losses = try_reading(path) or (None, ())
@@ -297,9 +288,7 @@ def test_an_index_that_overlaps_is_never_followed(whole: Path, tmp_path: Path) -
     assert losses == ()
 
 
-@pytest.mark.parametrize(
-    "content", [b"", b"\x89", b"not an MCAP file at all", b"%PDF-1.4" + bytes(99), MAGIC[:7]]
-)
+@pytest.mark.parametrize("content", [b"", b"\x89", b"not an MCAP file at all", b"%PDF-1.4" + bytes(99), MAGIC[:7]])
 def test_files_that_are_no_recordings(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "a.mcap"
     path.write_bytes(content)

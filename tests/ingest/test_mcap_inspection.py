@@ -42,10 +42,7 @@ def test_rates_gaps_repeats_and_ranges(tmp_path: Path, encoding: Encoding) -> No
     assert limits["wrench.torque.z"].high == wrench[:, 5].max()
     assert limits["wrench.force.y"].not_finite == 1
     assert encoder.names == ("az", "el")
-    assert [(e.field, e.low, e.high) for e in encoder.ranges][:2] == [
-        ("position[az]", 0, 1),
-        ("position[el]", 2, 3),
-    ]
+    assert [(e.field, e.low, e.high) for e in encoder.ranges][:2] == [("position[az]", 0, 1), ("position[el]", 2, 3)]
 
 
 def test_clean(tmp_path: Path) -> None:

@@ -17,12 +17,7 @@ from mcap_ros2._dynamic import serialize_dynamic
 
 from kbs_process.errors import RecordingError
 from kbs_process.recordings import Stream
-from kbs_process.recordings.mcap.messages.schemas import (
-    json_schema,
-    protobuf_name,
-    protobuf_schema,
-    ros2_schema,
-)
+from kbs_process.recordings.mcap.messages.schemas import json_schema, protobuf_name, protobuf_schema, ros2_schema
 
 WRENCH = ("geometry_msgs/msg/WrenchStamped", "ros2msg", ros2_schema("wrench"))
 JOINTS = ("sensor_msgs/msg/JointState", "ros2msg", ros2_schema("joints"))
@@ -64,9 +59,7 @@ JOINT_ROW = st.tuples(
 
 @SLOW
 @given(st.lists(JOINT_ROW, min_size=1, max_size=60))
-def test_names_in_any_order(
-    tmp_path: Path, rows: list[tuple[list[str], str, tuple[float, ...], bool]]
-) -> None:
+def test_names_in_any_order(tmp_path: Path, rows: list[tuple[list[str], str, tuple[float, ...], bool]]) -> None:
     encode = serialize_dynamic(JOINTS[0], JOINTS[2].decode())[JOINTS[0]]
     payloads, expected = [], []
     for names, frame, numbers, moving in rows:
@@ -197,13 +190,7 @@ def test_cdr_numbers_of_every_type(tmp_path: Path) -> None:
     whole = {f"{s}{n}": (s, n) for s in "iu" for n in (1, 2, 4, 8)}
     payloads, expected = [], []
     for _ in range(80):
-        numbers: dict[str, Any] = {
-            "flag": bool(rng.integers(2)),
-            "b": 7,
-            "c": 8,
-            "f4": 0.25,
-            "f8": rng.normal(),
-        }
+        numbers: dict[str, Any] = {"flag": bool(rng.integers(2)), "b": 7, "c": 8, "f4": 0.25, "f8": rng.normal()}
         for name, (sign, size) in whole.items():
             bits = min(8 * size, 50) - 1
             numbers[name] = int(rng.integers(-(2**bits) if sign == "i" else 0, 2**bits))
@@ -306,9 +293,7 @@ def test_json_in_odd_shapes(tmp_path: Path) -> None:
         (("a/B", "ros1msg", b""), "ros1", "cannot be read"),
     ],
 )
-def test_schemas_that_cannot_be_used(
-    tmp_path: Path, schema: tuple[str, str, bytes], encoding: str, word: str
-) -> None:
+def test_schemas_that_cannot_be_used(tmp_path: Path, schema: tuple[str, str, bytes], encoding: str, word: str) -> None:
     path = tmp_path / "a.mcap"
     path.write_bytes(build([(0, b"\0\1\0\0")], schema, encoding))
     with pytest.raises(RecordingError, match=word):

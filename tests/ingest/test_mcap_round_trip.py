@@ -181,10 +181,7 @@ def test_blocks_are_pieces_not_the_whole_file(tmp_path: Path) -> None:
     ("stream", "words"),
     [
         (Stream("w", "/wrensh", FORCE), ("no topic '/wrensh'", "did you mean '/wrench'", "/encoder")),
-        (
-            Stream("w", "/wrench", ("wrench.forces.x",)),
-            ("wrench.forces.x", "did you mean 'wrench.force.x'", "a.mcap"),
-        ),
+        (Stream("w", "/wrench", ("wrench.forces.x",)), ("wrench.forces.x", "did you mean 'wrench.force.x'", "a.mcap")),
         (Stream("w", "/encoder", FORCE), ("no number 'wrench.force.x'", "/encoder", "JointState")),
         (Stream("w", "/encoder", ("position[as]",)), ("'as' of position", "known: az, el")),
         (Stream("w", "/encoder", ("position",)), ("no number 'position'", "position[NAME]")),
@@ -193,9 +190,7 @@ def test_blocks_are_pieces_not_the_whole_file(tmp_path: Path) -> None:
     ],
 )
 @pytest.mark.parametrize("encoding", ENCODINGS)
-def test_what_is_not_there_is_named(
-    tmp_path: Path, encoding: Encoding, stream: Stream, words: tuple[str, ...]
-) -> None:
+def test_what_is_not_there_is_named(tmp_path: Path, encoding: Encoding, stream: Stream, words: tuple[str, ...]) -> None:
     write_mcap(tmp_path / "a.mcap", campaign(encoding, 50))
     with pytest.raises(RecordingError) as error:
         read(tmp_path / "a.mcap", stream)

@@ -45,10 +45,7 @@ def test_pieces_of_any_size_give_the_bytes_of_the_whole(
     encoding: Encoding, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(writer, "BATCH", 500)
-    whole = [
-        temperature(0, 3000, encoding=encoding),
-        temperature(0, 300, every=10_000_000, encoding=encoding),
-    ]
+    whole = [temperature(0, 3000, encoding=encoding), temperature(0, 300, every=10_000_000, encoding=encoding)]
     write_mcap(tmp_path / "whole.mcap", whole)
     logs = [message.log_time for message in messages(tmp_path / "whole.mcap")]
     assert logs == sorted(logs)

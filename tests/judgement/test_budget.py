@@ -28,9 +28,7 @@ def test_sensor_noise_within_a_band(rng):
     rate, sigma = 20.0, np.array([0.02] * 3 + [0.002] * 3)
     noise = signal(rng.normal(size=(200_000, 6)) * sigma)
     bandwidth = noise_bandwidth(Band("lt1Hz", 0.01, 1.0), DT)
-    assert (
-        0.8 < bandwidth < 1.0
-    )  # a filter run both ways passes less than the rectangle of its half-gain limits
+    assert 0.8 < bandwidth < 1.0  # a filter run both ways passes less than the rectangle of its half-gain limits
     entry = budget.sensor_noise(sigma, rate, bandwidth)
     np.testing.assert_allclose(budget.rms(cut(noise)), entry.sigma, rtol=0.02)
 

@@ -31,13 +31,7 @@ def recorded(name: str, peak: float) -> SimpleNamespace:
 def stated(name: str, sigma: float) -> list[results.Budget]:
     return [
         results.Budget(
-            channel=channel,
-            unit=unit,
-            frame="S",
-            band="lt1Hz",
-            contributions=(),
-            total=sigma,
-            recording=name,
+            channel=channel, unit=unit, frame="S", band="lt1Hz", contributions=(), total=sigma, recording=name
         )
         for channel, unit in zip(WRENCH_CHANNELS, WRENCH_UNITS, strict=True)
     ]
@@ -65,9 +59,7 @@ def test_a_recording_that_fails_is_told_before_one_that_may() -> None:
 
 def test_others_noise_does_not_widen_a_well_known_recording() -> None:
     found = verdict((0.05, 0.001), (0.01, 0.01))
-    below = coverage_below(
-        "peak", [one.pairs["S", "lt1Hz"].measured for one in (recorded("", 0.0),) * 2], BAND
-    )
+    below = coverage_below("peak", [one.pairs["S", "lt1Hz"].measured for one in (recorded("", 0.0),) * 2], BAND)
     assert (found.verdict, found.recording) == ("pass", "quiet")
     assert (found.low, found.high) == pytest.approx((0.05 - 0.001 * below, 0.052))
     (channel,) = [one for one in found.channels if one.channel == "Ty"]

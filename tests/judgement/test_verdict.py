@@ -70,9 +70,9 @@ def test_the_interval_of_a_peak_reaches_further_down_than_up():
 
 def test_how_often_noise_in_a_band_crosses_zero():
     band, dt, n = Band("lt2Hz", 0.01, 2.0), 0.05, 200_000
-    x = apply(
-        replace(run(np.random.default_rng(8).normal(size=(n, 2)), np.ones(n, dtype=bool)), dt=dt), band
-    ).column("Tx")
+    x = apply(replace(run(np.random.default_rng(8).normal(size=(n, 2)), np.ones(n, dtype=bool)), dt=dt), band).column(
+        "Tx"
+    )
     up = np.count_nonzero((x[:-1] < 0.0) & (x[1:] >= 0.0)) / (n * dt)
     assert crossing_rate(band, dt) == pytest.approx(up, rel=0.02)
 

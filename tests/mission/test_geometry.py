@@ -8,14 +8,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from kbs_process.mission.geometry import (
-    azimuth_elevation,
-    boresight,
-    line_of_sight,
-    local_frame,
-    occulted,
-    separation,
-)
+from kbs_process.mission.geometry import azimuth_elevation, boresight, line_of_sight, local_frame, occulted, separation
 from kbs_process.mission.orbit import EARTH_RADIUS, EARTH_RATE, relay, spacecraft
 from kbs_process.signals.records import Array
 from mission.reference import MISSION, ORBIT

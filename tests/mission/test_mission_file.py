@@ -52,17 +52,11 @@ def test_units_are_converted() -> None:
         ("value = [-165, 165]", "value = [165, -165]", "limits.azimuth: is empty"),
         ('unit = "deg/s"', 'unit = "deg"', "limits.rate.unit: unit 'deg' is a unit of angle"),
         ('until = "loss"', 'until = "los"', "did you mean 'loss'"),
-        (
-            'limit = { value = 0.054, unit = "deg" }',
-            'limit = { value = 0.054, unit = "m" }',
-            "unit of length",
-        ),
+        ('limit = { value = 0.054, unit = "deg" }', 'limit = { value = 0.054, unit = "m" }', "unit of length"),
         ("rate = { value = 2.0", "rate = { value = 0.0", "limits.rate.value"),
     ],
 )
-def test_faults_are_told_with_their_place(
-    changed: Callable[[str, str], Day], old: str, new: str, message: str
-) -> None:
+def test_faults_are_told_with_their_place(changed: Callable[[str, str], Day], old: str, new: str, message: str) -> None:
     with pytest.raises(ConfigError) as caught:
         changed(old, new)
     assert message in str(caught.value) and "mission.toml:" in str(caught.value)

@@ -63,9 +63,7 @@ def test_the_ascending_node_is_passed_at_22_h_local_time() -> None:
 
 def test_size_and_precession_are_those_of_a_sun_synchronous_orbit_of_800_km() -> None:
     made = satellite(ORBIT)
-    assert made.a * EARTH_RADIUS == pytest.approx(
-        7159.5e3, abs=200.0
-    )  # ENVISAT's published mean semi-major axis
+    assert made.a * EARTH_RADIUS == pytest.approx(7159.5e3, abs=200.0)  # ENVISAT's published mean semi-major axis
     per_year = made.nodedot / 60.0 * 86400.0 * 365.2422
     assert per_year == pytest.approx(2.0 * np.pi, rel=2e-4)
 
@@ -77,9 +75,7 @@ def test_propagation_agrees_with_an_integration_of_gravity() -> None:
     def gravity(_: float, y: Array) -> Array:
         x, n = y[:3], np.linalg.norm(y[:3])
         flat = 5.0 * (x[2] / n) ** 2 - np.array([1.0, 1.0, 3.0])
-        return np.concatenate(
-            [y[3:], -EARTH_MU * x / n**3 * (1.0 - 1.5 * J2 * (EARTH_RADIUS / n) ** 2 * flat)]
-        )
+        return np.concatenate([y[3:], -EARTH_MU * x / n**3 * (1.0 - 1.5 * J2 * (EARTH_RADIUS / n) ** 2 * flat)])
 
     found = solve_ivp(gravity, (0.0, t[-1]), np.concatenate([r[0], v[0]]), t_eval=t, rtol=1e-10, atol=1e-3)
     assert np.linalg.norm(found.y[:3].T - r, axis=1).max() < 1e3  # J3, J4 and SGP4's own truncation

@@ -16,9 +16,7 @@ places = st.floats(-165.0, 165.0)
 
 
 @given(places, rates, places, rates, st.floats(1.0, 2000.0))
-def test_a_transfer_keeps_its_ends_and_its_limits(
-    p0: float, v0: float, p1: float, v1: float, duration: float
-) -> None:
+def test_a_transfer_keeps_its_ends_and_its_limits(p0: float, v0: float, p1: float, v1: float, duration: float) -> None:
     made = transfer(State(p0, v0), State(p1, v1), duration, RATE, ACCELERATION)
     assume(made is not None)
     assert made is not None
@@ -37,9 +35,7 @@ def test_a_transfer_keeps_its_ends_and_its_limits(
 @given(st.floats(1.0, 330.0))
 def test_from_rest_to_rest_takes_as_long_as_the_limits_make_it(distance: float) -> None:
     ramps = RATE**2 / ACCELERATION
-    least = (
-        2.0 * np.sqrt(distance / ACCELERATION) if distance < ramps else distance / RATE + RATE / ACCELERATION
-    )
+    least = 2.0 * np.sqrt(distance / ACCELERATION) if distance < ramps else distance / RATE + RATE / ACCELERATION
     rest = State(0.0, 0.0), State(distance, 0.0)
     assert transfer(*rest, 0.999 * least, RATE, ACCELERATION) is None
     made = transfer(*rest, 1.001 * least, RATE, ACCELERATION)
@@ -47,9 +43,7 @@ def test_from_rest_to_rest_takes_as_long_as_the_limits_make_it(distance: float) 
 
 
 def test_more_time_makes_a_slower_transfer() -> None:
-    cruises = [
-        transfer(State(0.0, 0.0), State(100.0, 0.0), T, RATE, ACCELERATION) for T in (200.0, 400.0, 2000.0)
-    ]
+    cruises = [transfer(State(0.0, 0.0), State(100.0, 0.0), T, RATE, ACCELERATION) for T in (200.0, 400.0, 2000.0)]
     found = [one.cruise for one in cruises if one is not None]
     assert len(found) == 3 and found[0] > found[1] > found[2] == pytest.approx(0.05, rel=0.01)
 

@@ -59,9 +59,7 @@ def test_missing_points_and_tables_are_told(tmp_path: Path) -> None:
         read_f06(empty, 0.0, interface=100, ground=[101], damping=0.01)
 
 
-@pytest.mark.parametrize(
-    ("printed", "value"), [("1.5-3", 1.5e-3), ("2.0E+01", 20.0), ("1.0D+2", 100.0), ("4.0", 4.0)]
-)
+@pytest.mark.parametrize(("printed", "value"), [("1.5-3", 1.5e-3), ("2.0E+01", 20.0), ("1.0D+2", 100.0), ("4.0", 4.0)])
 def test_numbers_are_read_as_nastran_prints_them(printed: str, value: float, tmp_path: Path) -> None:
     path = tmp_path / "one.f06"
     path.write_text(F06.read_text().replace(" 6.134846E+00 ", f" {printed:>12} ", 1))

@@ -29,9 +29,7 @@ def links(rig: Rig, coordinates: Array) -> dict[str, tuple[Array, Array]]:
     placed = {"T": (plate(coordinates[:3]), np.zeros(3))}
     for joint, angle in zip(rig.joints, coordinates[3:], strict=True):
         R, o = placed[joint.parent]
-        own = Rotation.from_rotvec(joint.misalignment.value) * Rotation.from_rotvec(
-            angle * np.asarray(joint.axis)
-        )
+        own = Rotation.from_rotvec(joint.misalignment.value) * Rotation.from_rotvec(angle * np.asarray(joint.axis))
         placed[joint.name] = (R @ own.as_matrix(), o + R @ joint.origin.value)
     return placed
 
@@ -40,10 +38,7 @@ def axes(rig: Rig, coordinates: Array) -> Array:
     """Axis of each joint in undeflected T, (joints, 3)."""
     placed = links(rig, coordinates)
     return np.array(
-        [
-            placed[j.parent][0] @ Rotation.from_rotvec(j.misalignment.value).apply(np.asarray(j.axis))
-            for j in rig.joints
-        ]
+        [placed[j.parent][0] @ Rotation.from_rotvec(j.misalignment.value).apply(np.asarray(j.axis)) for j in rig.joints]
     )
 
 

@@ -8,27 +8,10 @@ import numpy as np
 
 from kbs_process.plant.predict import predict
 from kbs_process.plant.schedule import Schedule
-from kbs_process.rig.model import (
-    Amplifier,
-    Body,
-    Controller,
-    Drive,
-    Encoder,
-    Joint,
-    Quantity,
-    Rig,
-    Transducer,
-)
+from kbs_process.rig.model import Amplifier, Body, Controller, Drive, Encoder, Joint, Quantity, Rig, Transducer
 from kbs_process.signals.records import Array
 
-NOMINAL = (
-    "synchronous_motor",
-    "cogging",
-    "motor_viscous",
-    "dynamic_friction",
-    "tooth_stiction",
-    "flexspline",
-)
+NOMINAL = ("synchronous_motor", "cogging", "motor_viscous", "dynamic_friction", "tooth_stiction", "flexspline")
 CODE = 2.0 * np.pi / 2**14
 DRIVE = {
     "Tmax": 0.35, "Kangle": 100.0, "tcog": 6e-3, "phi_cog": 0.0, "b_m": 2e-3, "d0": 0.012, "d1": 0.006,
@@ -45,11 +28,7 @@ def body(name: str, on: str, mass: float, cog: Any, inertia: Any) -> Body:
     tensor = [*inertia, 0.0, 0.0, 0.0] if len(inertia) == 3 else inertia
     path = f"body.{name}"
     return Body(
-        name,
-        on,
-        quantity(f"{path}.mass", mass),
-        quantity(f"{path}.cog", cog),
-        quantity(f"{path}.inertia", tensor),
+        name, on, quantity(f"{path}.mass", mass), quantity(f"{path}.cog", cog), quantity(f"{path}.inertia", tensor)
     )
 
 
@@ -66,9 +45,7 @@ def joint(
     **parameters: float,
 ) -> Joint:
     path = f"joint.{name}"
-    values = {
-        key: quantity(f"{path}.drive.parameters.{key}", value) for key, value in (DRIVE | parameters).items()
-    }
+    values = {key: quantity(f"{path}.drive.parameters.{key}", value) for key, value in (DRIVE | parameters).items()}
     drive = Drive(
         quantity(f"{path}.drive.ratio", ratio),
         quantity(f"{path}.drive.rotor_inertia", rotor),
@@ -102,9 +79,7 @@ def rig(
     latency: int = 1,
 ) -> Rig:
     low_pass = (
-        None
-        if amplifier is None
-        else Amplifier(amplifier[0], quantity("transducer.amplifier.corner", amplifier[1]))
+        None if amplifier is None else Amplifier(amplifier[0], quantity("transducer.amplifier.corner", amplifier[1]))
     )
     transducer = Transducer(
         "lab",
@@ -128,9 +103,7 @@ def rig(
     return Rig(quantity("gravity.magnitude", gravity), transducer, bodies, joints, controller, None)
 
 
-def two_axis(
-    *, drive: dict[str, float] | None = None, misalignment: Any = (0.0, 0.0, 0.0), **settings: Any
-) -> Rig:
+def two_axis(*, drive: dict[str, float] | None = None, misalignment: Any = (0.0, 0.0, 0.0), **settings: Any) -> Rig:
     """The antenna pointing mechanism with the defaults of the plant's description."""
     bodies = (
         body("base", "T", 8.0, (0.0, 0.0, 0.06), (0.05, 0.05, 0.04)),

@@ -79,6 +79,4 @@ def test_measured_motion_shows_it_in_wrench_and_effort() -> None:
     moment = DRAG / SPEED**2 * RADIUS**3 * np.abs(rate) * rate
     np.testing.assert_allclose(added[:, 7], moment / 2.0, atol=1e-4 * moment.max())
     assert not added[:, 6].any()
-    np.testing.assert_allclose(
-        np.hypot(added[:, 0], added[:, 2])[2:-2], np.abs(moment[2:-2]) / RADIUS, atol=1e-3
-    )
+    np.testing.assert_allclose(np.hypot(added[:, 0], added[:, 2])[2:-2], np.abs(moment[2:-2]) / RADIUS, atol=1e-3)

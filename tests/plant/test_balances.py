@@ -29,9 +29,7 @@ def standing(position: Array) -> Schedule:
 
 def ramp(start: Array, rate: Array, duration: float) -> Schedule:
     t = np.arange(0.0, duration + 0.1, 0.1)
-    return Schedule(
-        t, np.asarray(start) + np.outer(t, rate), np.tile(np.asarray(rate, dtype=float), (len(t), 1))
-    )
+    return Schedule(t, np.asarray(start) + np.outer(t, rate), np.tile(np.asarray(rate, dtype=float), (len(t), 1)))
 
 
 def simulation(of: Rig, schedule: Schedule, step: float, end: float = 5.0) -> Simulation:
@@ -40,8 +38,7 @@ def simulation(of: Rig, schedule: Schedule, step: float, end: float = 5.0) -> Si
 
 def with_drive(of: Rig, **values: float) -> Rig:
     return substitute(
-        of,
-        {f"joint.{j.name}.drive.parameters.{key}": value for j in of.joints for key, value in values.items()},
+        of, {f"joint.{j.name}.drive.parameters.{key}": value for j in of.joints for key, value in values.items()}
     )
 
 
@@ -133,8 +130,7 @@ def test_wrench_at_rest_is_the_weight_and_its_moment(stiffness: Any) -> None:
     placed, R = lab.links(of, m.coordinates), lab.plate(m.coordinates[:3])
     force = sum(float(b.mass) for b in of.bodies) * lab.gravity(of)
     moment = sum(
-        np.cross(placed[b.on][1] + placed[b.on][0] @ b.cog.value, float(b.mass) * lab.gravity(of))
-        for b in of.bodies
+        np.cross(placed[b.on][1] + placed[b.on][0] @ b.cog.value, float(b.mass) * lab.gravity(of)) for b in of.bodies
     )
     np.testing.assert_allclose(made.wrench[:3], R.T @ force, atol=1e-9)
     np.testing.assert_allclose(made.wrench[3:], R.T @ moment, atol=1e-9)
@@ -167,15 +163,11 @@ def test_mirror_image_gives_mirrored_wrench() -> None:
             body("antenna", "el", 14.0, (0.07, s * 0.06, -0.02), (0.7, 0.9, 0.8, s * 0.03, 0.02, s * -0.01)),
         )
         joints = (
-            joint(
-                "az", "T", (0.0, 0.0, 1.0), (0.0, s * 0.01, 0.22), misalignment=(s * 0.01, 0.02, 0.0), d1=0.0
-            ),
+            joint("az", "T", (0.0, 0.0, 1.0), (0.0, s * 0.01, 0.22), misalignment=(s * 0.01, 0.02, 0.0), d1=0.0),
             joint("el", "az", (0.0, -1.0, 0.0), (0.0, 0.0, 0.0), misalignment=(s * 0.02, 0.01, s * -0.03)),
         )
         schedule = ramp(np.array([s * 0.3, 1.1]), np.radians([s * 1.5, 0.7]), 3.0)
-        blocks = predict(
-            rig(bodies, joints), NOMINAL, schedule, rate_Hz=100.0, angle_rate_Hz=10.0, duration_s=3.0
-        )
+        blocks = predict(rig(bodies, joints), NOMINAL, schedule, rate_Hz=100.0, angle_rate_Hz=10.0, duration_s=3.0)
         twin[mirrored] = next(b.values for key, b in blocks if key == "wrench")
     reflected = twin[False] * np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
     np.testing.assert_allclose(twin[True], reflected, atol=1e-6)
@@ -248,9 +240,7 @@ def test_base_resonance_is_the_eigenvalue() -> None:
         for j, b in enumerate(np.eye(size)):
             M[i, j] = 0.25 * sum(s * lab.energy(of, moved(zero, a + s * b), field)[0] for s in (1, -1)) * 2
             K[i, j] = sum(
-                s * t * lab.energy(of, moved(h * (s * a + t * b), zero), field)[1]
-                for s in (1, -1)
-                for t in (1, -1)
+                s * t * lab.energy(of, moved(h * (s * a + t * b), zero), field)[1] for s in (1, -1) for t in (1, -1)
             ) / (4 * h * h)
     values, modes = eigh(K, M)
     expected = np.sqrt(values[0]) / (2 * np.pi)

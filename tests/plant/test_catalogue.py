@@ -88,14 +88,7 @@ class TestSuspects:
         out = np.zeros((2, len(names), effect.port.components))
         _module(effect)(columns, np.array([values[name] for name in given]), dt, 1, out)
         middle = values | {name: values[name] + 0.5 * travel[name] for name in base} | {"rotor_travel": 5e-4}
-        middle |= {
-            "rotor_rate": 0.5,
-            "joint_rate": 4e-3,
-            "other_rate": 4e-3,
-            "vx": 0.01,
-            "vy": 0.02,
-            "vz": -0.01,
-        }
+        middle |= {"rotor_rate": 0.5, "joint_rate": 4e-3, "other_rate": 4e-3, "vx": 0.01, "vy": 0.02, "vz": -0.01}
         middle |= {"field_rate": 0.5, "field_travel": 2.5e-4}
         start = {state.name: state.initial for state in effect.states}
         zero = dict.fromkeys(names, 0.0)
@@ -123,9 +116,7 @@ def test_a_second_action_has_names_of_its_own_and_the_same_law() -> None:
     assert second == instance(first, 2)
     assert {"kinematic_sin_2", "kinematic_order_2", "Ka", "fsv"} <= set(second.arguments)
     values = around(first) | {"kinematic_sin": 1e-4, "kinematic_cos": 0.0}
-    renamed = values | {
-        name + "_2": values[name] for name in ("kinematic_sin", "kinematic_cos", "kinematic_order")
-    }
+    renamed = values | {name + "_2": values[name] for name in ("kinematic_sin", "kinematic_cos", "kinematic_order")}
     assert value(first, values) == value(second, renamed)
     assert find("kinematic_error_1") is None
     assert find("nothing_2") is None
@@ -179,8 +170,7 @@ def test_joint_hysteresis_is_elastic_after_a_reversal_and_a_single_stop_if_sharp
     effect = find("joint_hysteresis")
     assert effect is not None
     soft, sharp = (
-        along(effect, {"joint_angle": ANGLE}, {"slip_angle": 0.02, "slip_power": n}, DT)[:, 0, 0]
-        for n in (1.0, 5.0)
+        along(effect, {"joint_angle": ANGLE}, {"slip_angle": 0.02, "slip_power": n}, DT)[:, 0, 0] for n in (1.0, 5.0)
     )
     until = T < 7.4  # the first reversal is at 7.5 s
     np.testing.assert_allclose(soft[until], -(1.0 - np.exp(-ANGLE[until] / 0.02)), atol=2e-3)

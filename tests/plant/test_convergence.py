@@ -32,9 +32,7 @@ def steady(degrees_a_second: float, until: float) -> Schedule:
     return Schedule(t, np.array([0.3, 1.2]) + np.outer(t, rate), np.tile(rate, (len(t), 1)))
 
 
-def run(
-    schedule: Schedule, until: float, step: float, rate: float = 100.0, **settings: Any
-) -> dict[str, Array]:
+def run(schedule: Schedule, until: float, step: float, rate: float = 100.0, **settings: Any) -> dict[str, Array]:
     return streams(
         two_axis(**settings), NOMINAL, schedule, rate_Hz=rate, angle_rate_Hz=20.0, duration_s=until, step_s=step,
         quantise=False,
@@ -97,9 +95,7 @@ def test_states_that_follow_an_angle_do_not_drift_from_it(place: str, rate: floa
         for step in (DEFAULT_STEP, DEFAULT_STEP / 8)
     )  # fmt: skip
     wrench, angle = error(coarse, fine)
-    print(
-        f"{place}, {rate} deg/s: wrench rms in % of the noise", (100 * wrench).round(1), f"{angle:.3f} codes"
-    )
+    print(f"{place}, {rate} deg/s: wrench rms in % of the noise", (100 * wrench).round(1), f"{angle:.3f} codes")
     assert wrench.max() < 1.0
     assert angle < 0.1
 

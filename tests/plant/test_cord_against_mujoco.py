@@ -47,9 +47,7 @@ def test_wrench_and_angles_agree_on_a_cord() -> None:
     swing = (hung["wrench"] - free["wrench"]).std(axis=0) / NOISE
     rms = np.sqrt((wrench**2).mean(axis=0))
     print("\nwrench, rms of the difference in sensor noise:", rms.round(4), "greatest", np.abs(wrench).max())
-    print(
-        "angles, greatest in codes:", np.abs(angle).max(axis=0), "\nthe cord's own, in sensor noise:", swing
-    )
+    print("angles, greatest in codes:", np.abs(angle).max(axis=0), "\nthe cord's own, in sensor noise:", swing)
     assert rms.max() < 0.1
     assert np.abs(wrench).max() < 0.75
     assert np.abs(angle).max() < 0.01

@@ -29,9 +29,7 @@ def test_as_the_plant_at_rest(azimuth: float) -> None:
     """On the elastic transducer, where the cord changes the sag and the sag the weight's moment."""
     of = two_axis(amplifier=None, tilt=(2e-3, -1e-3))
     of = substitute(of, {f"joint.{name}.drive.parameters.tcog": 0.0 for name in of.joint_names})
-    hung, slack = (
-        attach(of, BUNGEE, CORD | change, on="el", point=COG) for change in ({}, {"stiffness": 0.0})
-    )
+    hung, slack = (attach(of, BUNGEE, CORD | change, on="el", point=COG) for change in ({}, {"stiffness": 0.0}))
     position = np.radians([azimuth, 0.0])
     with_cord, without = (equilibrium(each, (*NOMINAL, "bungee"), position) for each in (hung, slack))
     # The plant's joints yield to the cord: each at its own angles.

@@ -54,10 +54,7 @@ def shown(rig: Rig, effects: list[str], driven: Schedule) -> tuple[Array, Array]
 def test_a_changed_field_is_that_of_a_schedule_that_was_changed(name: str, number: str) -> None:
     t = np.arange(-1.0, SECONDS + 0.2, CYCLE)
     rig = two_axis(loop="open")
-    changed = {
-        "controller_latency": way(t - LATE),
-        "controller_gain": way(t) + SCALE * (way(t) - START),
-    }[name]
+    changed = {"controller_latency": way(t - LATE), "controller_gain": way(t) + SCALE * (way(t) - START)}[name]
     changed[:, 0] = way(t)[:, 0]  # of the second joint alone
     (effect,) = select([name])
     value = LATE if name == "controller_latency" else SCALE
@@ -103,9 +100,7 @@ def test_cycles_that_are_late_in_turn_are_those_of_a_schedule_that_is() -> None:
     expected = np.interp(samples - late, t, way(t)[:, 1]) * ratio[1]
     plain = np.interp(samples, t, way(t)[:, 1]) * ratio[1]
     assert np.abs(expected - plain).max() > 20.0 * microstep
-    np.testing.assert_allclose(
-        field[:, 1], expected, atol=0.05 * np.abs(expected - plain).max() + 0.51 * microstep
-    )
+    np.testing.assert_allclose(field[:, 1], expected, atol=0.05 * np.abs(expected - plain).max() + 0.51 * microstep)
 
 
 @pytest.mark.parametrize("late", [0.18, 0.03])
@@ -169,9 +164,7 @@ def test_the_field_is_in_whole_microsteps_of_the_drive_s_own(steps: float, recor
     codes = field * steps / (2.0 * np.pi)
     np.testing.assert_allclose(codes, np.round(codes), atol=1e-6)
     assert len(np.unique(np.round(codes[:, 0]))) > 20
-    expected = np.stack(
-        [np.interp(np.arange(len(field)) / 100.0, t, column) for column in (way(t) * ratios).T], axis=1
-    )
+    expected = np.stack([np.interp(np.arange(len(field)) / 100.0, t, column) for column in (way(t) * ratios).T], axis=1)
     np.testing.assert_allclose(field, expected, atol=0.501 * 2.0 * np.pi / steps)
 
 

@@ -31,22 +31,16 @@ def test_inverse_dynamics_of_a_step_give_its_wrench() -> None:
             axis = lab.axes(of, coordinates)[i]
             carrier = lab.angular(of, joint.parent, coordinates, still)
             ahead, behind = (
-                lab.angular(
-                    of, joint.parent, coordinates + s * 1e-4 * still, still + s * 1e-4 * np.r_[0, 0, 0, qdd]
-                )
+                lab.angular(of, joint.parent, coordinates + s * 1e-4 * still, still + s * 1e-4 * np.r_[0, 0, 0, qdd])
                 for s in (1, -1)
             )
             turning = axis @ (ahead - behind) / 2e-4
             taken = 2e-5 * np.array([axis @ carrier + 100.0 * rates[i], turning + 100.0 * qdd[i]])
-            true = 2e-5 * np.array(
-                [0.5 * (spin[i] + made.part("spin")[i]), (made.part("spin")[i] - spin[i]) / step]
-            )
+            true = 2e-5 * np.array([0.5 * (spin[i] + made.part("spin")[i]), (made.part("spin")[i] - spin[i]) / step])
             spin_momentum, change = true - taken
             expected[3:] -= change * axis + spin_momentum * np.cross(carrier, axis)
         errors.append(made.wrench - expected)
         size.append(expected)
-    print(
-        "forward against inverse dynamics, greatest:", np.abs(errors).max(axis=0), "of", np.std(size, axis=0)
-    )
+    print("forward against inverse dynamics, greatest:", np.abs(errors).max(axis=0), "of", np.std(size, axis=0))
     assert np.abs(errors).max() < 1e-5
     assert np.std(size, axis=0).min() > 1e-3

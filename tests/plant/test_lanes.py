@@ -34,9 +34,7 @@ def schedule(joints: int) -> Schedule:
 def loaded(loop: str) -> Rig:
     """With two delays of a field, a torque of the laboratory that has a state, and a force that pulls at a link."""
     lag, late, cable, bungee = select(["controller_lag", "controller_latency", "ground_cable", "bungee"])
-    rig = attach(
-        two_axis(loop=loop, latency=2), cable, {"cable_spring": 0.3, "cable_friction": 0.2}, joints=["el"]
-    )
+    rig = attach(two_axis(loop=loop, latency=2), cable, {"cable_spring": 0.3, "cable_friction": 0.2}, joints=["el"])
     rig = attach(rig, late, {"field_latency": 4e-3}, joints=["el"])
     rig = attach(rig, lag, {"set_point_lag": 0.13}, joints=["el"])
     numbers = {"stiffness": 30.0, "free_length": 0.5, "anchor_z": 1.5}
@@ -47,9 +45,7 @@ def crossed() -> Rig:
     """With a torque of the elevation over the azimuth's rate."""
     (law,) = select([CROSSING])
     bent = {f"other_rate_law_{k}": 0.05 * k**2 for k in range(10)}
-    return attach(
-        two_axis(), law, bent | {"other_rate_law_low": -0.05, "other_rate_law_high": 0.05}, joints=["el"]
-    )
+    return attach(two_axis(), law, bent | {"other_rate_law_low": -0.05, "other_rate_law_high": 0.05}, joints=["el"])
 
 
 def mounted() -> Rig:
@@ -126,9 +122,7 @@ def test_each_shows_what_it_shows_alone(rig: Rig, effects: list[str]) -> None:
 
 
 @pytest.mark.parametrize(
-    ("rig", "effects"),
-    [(loaded("open"), WITH_STATES), (mounted(), [*NOMINAL, *MOUNTING])],
-    ids=["loads", "mounting"],
+    ("rig", "effects"), [(loaded("open"), WITH_STATES), (mounted(), [*NOMINAL, *MOUNTING])], ids=["loads", "mounting"]
 )
 def test_no_bit_depends_on_what_runs_beside_it(rig: Rig, effects: list[str]) -> None:
     rigs = varied(rig, LANES + 3)

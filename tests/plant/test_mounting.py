@@ -24,12 +24,7 @@ from kbs_process.rig.model import Rig, substitute
 from kbs_process.signals.records import Array
 
 FREE = {"d0": 0.0, "d1": 0.0, "Ts0": 0.0, "b_m": 0.0, "fsv": 0.0, "tcog": 0.0}
-HARD = {
-    "base_hardening_x": 1.0,
-    "base_hardening_y": 0.7,
-    "base_hardening_z": 2.0,
-    "base_hardening_power": 3.0,
-}
+HARD = {"base_hardening_x": 1.0, "base_hardening_y": 0.7, "base_hardening_z": 2.0, "base_hardening_power": 3.0}
 LOOP = {"base_loop_x": 0.3, "base_loop_y": 0.2, "base_loop_z": 0.3, "base_slip_angle": 2e-5}
 NOISE = np.array([0.02] * 3 + [0.002] * 3)
 
@@ -52,9 +47,7 @@ def simulation(of: Rig, effects: tuple[Effect, ...], schedule: Schedule, step: f
 
 def lossless(damping: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Rig:
     of = two_axis(amplifier=None, damping=damping)
-    return substitute(
-        of, {f"joint.{j.name}.drive.parameters.{k}": v for j in of.joints for k, v in FREE.items()}
-    )
+    return substitute(of, {f"joint.{j.name}.drive.parameters.{k}": v for j in of.joints for k, v in FREE.items()})
 
 
 def shaken(of: Rig, effect: Effect, step: float, steps: int) -> tuple[Array, Array, Array]:
@@ -128,9 +121,7 @@ def test_slopes_of_the_mounting_are_those_of_the_plant() -> None:
         "test",
     )
     here, there = (
-        simulation(attach(of, held, {"hold": push}), (BASE_HARDENING, held), standing([0.3, 0.2])).part(
-            "alpha"
-        )
+        simulation(attach(of, held, {"hold": push}), (BASE_HARDENING, held), standing([0.3, 0.2])).part("alpha")
         for push in pushes
     )
     system = linearise(of, effects, np.array([0.3, 0.2]))
@@ -146,8 +137,7 @@ def holding(base_x: float, hold: float) -> tuple[float, float, float]:
 
 
 @pytest.mark.parametrize(
-    ("effect", "given", "begun"),
-    [(BASE_HARDENING, HARD, DEFAULT_STEP), (BASE_HYSTERESIS, LOOP, SLIPPING_STEP)],
+    ("effect", "given", "begun"), [(BASE_HARDENING, HARD, DEFAULT_STEP), (BASE_HYSTERESIS, LOOP, SLIPPING_STEP)]
 )
 def test_halving_the_step_moves_less_than_a_tenth_of_the_noise(
     effect: Effect, given: dict[str, float], begun: float
@@ -177,9 +167,7 @@ def test_a_slip_angle_passed_within_a_step_bounds_no_stability() -> None:
     assert np.ptp(taps[:, -6:-3], axis=0).max() < 2.0 * np.ptp(bare[:, -6:-3], axis=0).max()
 
 
-def creeping(
-    base_rate_x: float, strain: float, creep: float, creep_time: float
-) -> tuple[float, float, float, float]:
+def creeping(base_rate_x: float, strain: float, creep: float, creep_time: float) -> tuple[float, float, float, float]:
     return -creep * strain, 0.0, 0.0, base_rate_x - strain / creep_time
 
 
@@ -203,9 +191,7 @@ def test_a_state_settles_within_a_step_or_never() -> None:
         return np.asarray(angle - angle[0])
 
     bare = angles(two_axis())
-    fast, slow = (
-        angles(attach(two_axis(), creep, {"creep": 2e3, "creep_time": t}), creep) for t in (1e-7, 1e7)
-    )
+    fast, slow = (angles(attach(two_axis(), creep, {"creep": 2e3, "creep_time": t}), creep) for t in (1e-7, 1e7))
     stiffer = angles(substitute(two_axis(), {"transducer.stiffness": [6e3, 4e3, 6e3]}))
     size = np.abs(bare[:, 0]).max()
     assert np.abs(fast - bare).max() < 0.01 * size
@@ -221,8 +207,7 @@ def test_either_sense_is_like_the_other() -> None:
         known = signals | given | states
         opposite = known | {name: -number for name, number in (signals | states).items()}
         here, there = (
-            np.array(effect.equation(*(each[name] for name in effect.arguments)))
-            for each in (known, opposite)
+            np.array(effect.equation(*(each[name] for name in effect.arguments))) for each in (known, opposite)
         )
         np.testing.assert_array_equal(here, -there)
         assert np.all(here != 0.0)

@@ -97,9 +97,7 @@ def at_rest(of: Rig, position: Any) -> Simulation:
 
 def test_reaction_of_the_ground_is_felt_and_that_inside_a_joint_is_not() -> None:
     of, position = two_axis(stiffness=None, amplifier=None), np.radians([30.0, 70.0])
-    bare, inside, ground = (
-        at_rest(each, position) for each in (hung(of), pushed(hung(of), 2.0), hung(of, hold=2.0))
-    )
+    bare, inside, ground = (at_rest(each, position) for each in (hung(of), pushed(hung(of), 2.0), hung(of, hold=2.0)))
     windup = np.array([made.part("q") - bare.part("q") for made in (inside, ground)])
     np.testing.assert_allclose(windup[0], windup[1], rtol=1e-9)  # the encoder cannot tell them apart
     assert windup[0, 1] == pytest.approx(2.0 / 1e4, rel=0.1)
@@ -185,8 +183,7 @@ def test_wrench_is_weight_and_loads_less_rate_of_momentum() -> None:
         mass = sum(float(b.mass) for b in of.bodies)
         placed = lab.links(of, m.coordinates)
         weights = sum(
-            float(b.mass) * np.cross(placed[b.on][1] + placed[b.on][0] @ b.cog.value, falling)
-            for b in of.bodies
+            float(b.mass) * np.cross(placed[b.on][1] + placed[b.on][0] @ b.cog.value, falling) for b in of.bodies
         )
         states.append((P, L, mass * falling + force, weights + moment, R, made.advance(1, 1)[0][0]))
     errors, size = [], []
@@ -206,9 +203,7 @@ def test_cord_carries_what_its_stretch_says() -> None:
     of = two_axis(stiffness=None, amplifier=None)
     cord = {"stiffness": 60.0, "free_length": 3.0 - 137.3 / 60.0}
     cord |= {"anchor_x": 0.07, "anchor_y": 0.06, "anchor_z": 3.2}
-    free, made, slack = (
-        at_rest(hung(of, each), [0.0, 0.0]) for each in (None, cord, cord | {"free_length": 4.0})
-    )
+    free, made, slack = (at_rest(hung(of, each), [0.0, 0.0]) for each in (None, cord, cord | {"free_length": 4.0}))
     change = made.wrench - free.wrench
     np.testing.assert_allclose(change[:3], [0.0, 0.0, 137.3], atol=0.15)  # the gear unwinds by 0.9 mrad
     np.testing.assert_allclose(change[3:], [0.06 * 137.3, -0.07 * 137.3, 0.0], atol=0.02)

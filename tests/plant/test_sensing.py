@@ -103,18 +103,12 @@ def test_a_profile_repeats_has_no_mean_and_takes_smooth_curves() -> None:
     rng = np.random.default_rng(5)
     given = dict(zip(nodes, rng.standard_normal(15).tolist(), strict=True)) | {"profile_period": 0.3}
     angle = rng.uniform(-2.0, 2.0, 300)
-    np.testing.assert_allclose(
-        profile(reading=angle, **given), profile(reading=angle + 7 * 0.3, **given), atol=1e-12
-    )
+    np.testing.assert_allclose(profile(reading=angle, **given), profile(reading=angle + 7 * 0.3, **given), atol=1e-12)
     # Between its nodes a cubic spline of a sine is as near as h^4 / 384 of its fourth derivative.
     fine = np.linspace(0.0, 0.3, 400, endpoint=False)
     assert abs(np.mean(profile(reading=fine, **given))) < 1e-12
     columns = np.stack(
-        [
-            profile(reading=fine, **(dict.fromkeys(nodes, 0.0) | {n: 1.0, "profile_period": 0.3}))
-            for n in nodes
-        ],
-        axis=1,
+        [profile(reading=fine, **(dict.fromkeys(nodes, 0.0) | {n: 1.0, "profile_period": 0.3})) for n in nodes], axis=1
     )
     wave = np.sin(2.0 * np.pi * fine / 0.3)
     left = wave - columns @ np.linalg.lstsq(columns, wave, rcond=None)[0]
@@ -125,9 +119,7 @@ def test_an_s_shaped_channel_has_another_gain_about_one_load_and_is_odd_there() 
     shape, ends = law("channel_s_shape").equation, np.array([-1e9, 1e9])
     given = {"swing": 0.5, "swing_load": 0.3, "swing_width": 0.2}
     np.testing.assert_allclose(shape(reading=0.3 + ends, **given), [-0.5, 0.5], rtol=1e-6)
-    np.testing.assert_allclose(
-        shape(reading=np.array([0.1]), **given), -shape(reading=np.array([0.5]), **given)
-    )
+    np.testing.assert_allclose(shape(reading=np.array([0.1]), **given), -shape(reading=np.array([0.5]), **given))
     slope = np.diff(shape(reading=np.array([0.3 - 1e-6, 0.3 + 1e-6]), **given)) / 2e-6
     np.testing.assert_allclose(slope, 0.5 / 0.2, rtol=1e-6)
 
@@ -228,10 +220,7 @@ def test_a_power_of_any_reading_is_in_the_span_of_the_curved_characteristic() ->
 
 def test_a_curved_characteristic_is_held_beyond_its_range() -> None:
     effect = law("channel_nonlinearity")
-    numbers = {f"bend_{n}": 0.1 * n for n in range(1, 7)} | {
-        "bend_middle": float(READING.mean()),
-        "bend_range": 1e-3,
-    }
+    numbers = {f"bend_{n}": 0.1 * n for n in range(1, 7)} | {"bend_middle": float(READING.mean()), "bend_range": 1e-3}
     held = changed(effect, **numbers)
     assert set(np.round(held[np.abs(READING - READING.mean()) > 1e-3], 9)) <= {2.1, 0.3}
 
@@ -256,8 +245,7 @@ def test_two_relaxations_follow_what_has_many_times() -> None:
     def terms(tau: float) -> list[Array]:
         drift, names = law("drift_exponential"), ("creep", "creep_slow")
         return [
-            changed(drift, creep_time=tau, **{own: float(own == name) for own in names})[: len(t)]
-            for name in names
+            changed(drift, creep_time=tau, **{own: float(own == name) for own in names})[: len(t)] for name in names
         ]
 
     times = np.geomspace(2.0, 40.0, 30).tolist()

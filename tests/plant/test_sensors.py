@@ -44,13 +44,7 @@ def test_streams_have_stamps_and_shapes() -> None:
     stamps: dict[str, list[np.ndarray]] = {}
     done: list[float] = []
     for key, block in predict(
-        two_axis(),
-        NOMINAL,
-        climbing(12.0),
-        rate_Hz=250.0,
-        angle_rate_Hz=40.0,
-        duration_s=12.0,
-        progress=done.append,
+        two_axis(), NOMINAL, climbing(12.0), rate_Hz=250.0, angle_rate_Hz=40.0, duration_s=12.0, progress=done.append
     ):
         stamps.setdefault(key, []).append(block.stamp)
         assert block.values.shape == (len(block), 6 if key == "wrench" else 2)
@@ -93,8 +87,7 @@ def test_a_motor_too_weak_to_hold_is_refused() -> None:
 
 def test_an_unstable_solution_is_reported() -> None:
     of = substitute(
-        one_axis(stiffness=None),
-        {"body.load.inertia": [1e-9, 1e-9, 1e-9, 0, 0, 0], "body.load.cog": [0, 0, 0]},
+        one_axis(stiffness=None), {"body.load.inertia": [1e-9, 1e-9, 1e-9, 0, 0, 0], "body.load.cog": [0, 0, 0]}
     )
     schedule = Schedule(np.array([0.0, 0.1]), np.zeros((2, 1)), np.full((2, 1), 0.1))
     moving = Schedule(schedule.t, np.array([[0.0], [0.02]]), schedule.rate)

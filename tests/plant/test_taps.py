@@ -22,9 +22,7 @@ def moving(duration: float) -> Schedule:
 
 def test_signals_are_those_of_the_motion() -> None:
     of = three_axis(amplifier=None)
-    made = Simulation(
-        of, select(NOMINAL), moving(2.0), step=1e-3, per_sample=1, angle_rate=1e3, end=1.0, taps=True
-    )
+    made = Simulation(of, select(NOMINAL), moving(2.0), step=1e-3, per_sample=1, angle_rate=1e3, end=1.0, taps=True)
     made.advance(700, 1)
     motion = lab.motion(of, made)
     microsteps = np.floor((START + SPEED * made.first * made.step) * 100.0 * made.microsteps + 0.5)

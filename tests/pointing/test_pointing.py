@@ -18,9 +18,7 @@ DT, PERIOD, SMOOTHING = 0.05, 6000.0, 60.0
 def signal(values: Array, dt: float = DT) -> Signal:
     values = values.reshape(len(values), -1)
     names = ("az", "el")[: values.shape[1]]
-    return Signal(
-        0.0, dt, values, names, ("rad",) * len(names), "joint", np.ones(len(values), dtype=np.bool_)
-    )
+    return Signal(0.0, dt, values, names, ("rad",) * len(names), "joint", np.ones(len(values), dtype=np.bool_))
 
 
 def coloured(n: int, memory: float, rng: np.random.Generator) -> Array:

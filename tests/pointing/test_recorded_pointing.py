@@ -49,9 +49,7 @@ def analysis(run: Run, role: str = "fit") -> Analysis:
 
 
 def test_each_instrument_is_held_against_the_command() -> None:
-    found = {
-        (one.instrument, one.estimate.axis): one.estimate for one in recorded_pointing([analysis(recorded())])
-    }
+    found = {(one.instrument, one.estimate.axis): one.estimate for one in recorded_pointing([analysis(recorded())])}
     assert set(found) == {(name, axis) for name in ("encoder", "external") for axis in ("az", "el")}
     for axis in ("az", "el"):
         assert found["encoder", axis].bias == pytest.approx(OFFSET, abs=1e-7)

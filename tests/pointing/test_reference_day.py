@@ -121,10 +121,7 @@ def made_up(section: Section, errors: tuple[float, float], torque: float) -> Sec
     return replace(
         section,
         statistics=(one("az", errors[0]), one("el", errors[1])),
-        torques=(
-            Extreme(band, "up to 1 Hz", torque, "Tx", 0.0),
-            Extreme(band, "up to 8 Hz", torque, "Tx", 0.0),
-        ),
+        torques=(Extreme(band, "up to 1 Hz", torque, "Tx", 0.0), Extreme(band, "up to 8 Hz", torque, "Tx", 0.0)),
     )
 
 

@@ -21,9 +21,7 @@ SMALL, FULL = 6, 20
 def parser() -> argparse.ArgumentParser:
     """The command's options."""
     options = argparse.ArgumentParser(prog="python -m proof", description=__doc__)
-    options.add_argument(
-        "--full", action="store_true", help=f"a set of {FULL} validation trials, and all rivals"
-    )
+    options.add_argument("--full", action="store_true", help=f"a set of {FULL} validation trials, and all rivals")
     options.add_argument("--trials", type=int, metavar="N", help=f"how many [default: {SMALL}]")
     options.add_argument("--split", choices=("development", "validation"), help="[default: development]")
     options.add_argument("--seed", type=int, help="of the trials [default: secret until seals are broken]")
@@ -32,10 +30,7 @@ def parser() -> argparse.ArgumentParser:
     )
     options.add_argument("--work", type=Path, help="working folder; a bench begun there goes on")
     options.add_argument(
-        "--output",
-        "-o",
-        type=Path,
-        help="where score and page go [default: reports/proof/small; full with --full]",
+        "--output", "-o", type=Path, help="where score and page go [default: reports/proof/small; full with --full]"
     )
     options.add_argument("--jobs", type=int, default=len(os.sched_getaffinity(0)), help="processes")
     options.add_argument(
@@ -78,9 +73,7 @@ def failed(rows: tuple[Row, ...]) -> bool:
     """Whether we claimed a find where nothing is concealed, or left a trial without an answer."""
     ours = {row.metric: row for row in rows if row.method == OURS and row.group == "all"}
     answered, false = ours.get("answered"), ours.get("false find")
-    return (answered is not None and answered.right != answered.of) or (
-        false is not None and bool(false.right)
-    )
+    return (answered is not None and answered.right != answered.of) or (false is not None and bool(false.right))
 
 
 def table(rows: tuple[Row, ...]) -> list[str]:

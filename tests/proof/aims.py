@@ -67,9 +67,7 @@ def beaten(rows: Sequence[Row]) -> tuple[tuple[Row, Row], ...]:
         others = [
             row
             for row in rows
-            if row.method != OURS
-            and (row.metric, row.group) == (ours.metric, ours.group)
-            and row.value is not None
+            if row.method != OURS and (row.metric, row.group) == (ours.metric, ours.group) and row.value is not None
         ]
         best = max(others, key=lambda row: sign * (row.value or 0.0), default=None)
         if best is not None and (ours.value is None or sign * (best.value or 0.0) > sign * ours.value):

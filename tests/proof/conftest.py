@@ -17,11 +17,7 @@ def short(monkeypatch: pytest.MonkeyPatch) -> None:
         made = []
         for path in whole(*arguments):  # type: ignore[arg-type]
             late = path.t >= 20.0
-            made.append(
-                paths.Commands(path.t[late] - path.t[late][0], path.position[late], path.rate[late]).until(
-                    3.0
-                )
-            )
+            made.append(paths.Commands(path.t[late] - path.t[late][0], path.position[late], path.rate[late]).until(3.0))
         return made
 
     monkeypatch.setattr(paths, "draw", cut)

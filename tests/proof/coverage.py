@@ -68,9 +68,7 @@ def numbers(moved: Sequence[Mapping[str, Any]], nominal: Hardware, true: Hardwar
         at = tuple(map(int, _ELEMENT.findall(entry["name"])))
         given, value = (np.asarray(one[key], dtype=float)[at] for one in (nominal, true))
         if abs(float(given) - prior) > _EXACT * max(abs(prior), spread):
-            raise ValueError(
-                f"{entry['name']} is {prior} in the results, and {given} in the trial of that name"
-            )
+            raise ValueError(f"{entry['name']} is {prior} in the results, and {given} in the trial of that name")
         yield Number(entry["name"], (entry["value"] - float(value)) / spread, entry["sigma"] / spread)
 
 
@@ -95,9 +93,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         results = json.loads(paths[-1].read_text())
         told = [one for one in numbers(results["moved"], *hardware(spec)) if one.told]
         held += [one.covered for one in told]
-        outside = sorted(
-            (one for one in told if not one.covered), key=lambda one: -abs(one.error) / one.sigma
-        )
+        outside = sorted((one for one in told if not one.covered), key=lambda one: -abs(one.error) / one.sigma)
         worst = ", ".join(f"{one.name} {one.error / one.sigma:+.1f}" for one in outside[:3])
         print(f"{name} {results['answer']}: {len(told) - len(outside)} of {len(told)}  {worst}")
     if not held:

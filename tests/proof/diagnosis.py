@@ -64,8 +64,7 @@ def _claim(find: Find) -> Claim:
         probability=find.probability,
         parameters=tuple(_estimate(entry) for entry in find.parameters),
         alternatives=tuple(
-            Candidate(**_suspect(rival.place, rival.family), probability=rival.probability)
-            for rival in rivals
+            Candidate(**_suspect(rival.place, rival.family), probability=rival.probability) for rival in rivals
         ),
         indistinguishable_from=tuple(Suspect(**_of(rival)) for rival in alike),
         held_out_variance=find.held_out_variance,

@@ -44,12 +44,7 @@ def level() -> str:
 
 
 def run(
-    command: Sequence[str],
-    scratch: Path,
-    *,
-    hidden: Sequence[Path],
-    timeout_s: float,
-    path: Sequence[Path] = (),
+    command: Sequence[str], scratch: Path, *, hidden: Sequence[Path], timeout_s: float, path: Sequence[Path] = ()
 ) -> subprocess.CompletedProcess[str]:
     """Run `command` in `scratch`; `path` is where it may import from beside installed packages.
 

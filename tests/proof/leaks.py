@@ -101,9 +101,7 @@ def _ranked(numbers: Array) -> Array:
     ranks = np.asarray(rankdata(numbers, axis=0), dtype=float)
     ranks -= ranks.mean(axis=0)
     spread = ranks.std(axis=0)
-    return (
-        ranks[:, spread > 0.0] / spread[spread > 0.0] if (spread > 0.0).any() else np.zeros((len(ranks), 1))
-    )
+    return ranks[:, spread > 0.0] / spread[spread > 0.0] if (spread > 0.0).any() else np.zeros((len(ranks), 1))
 
 
 def _shares(ranked: Array, classes: NDArray[np.int64]) -> Array:

@@ -36,9 +36,7 @@ class Judged:
         """Right place among the claim and the alternatives that come next, `TOP` in all."""
         if self.claim is None:
             return False
-        return any(
-            same_place(entry, self.effect) for entry in (self.claim, *self.claim.alternatives[: TOP - 1])
-        )
+        return any(same_place(entry, self.effect) for entry in (self.claim, *self.claim.alternatives[: TOP - 1]))
 
     @property
     def physics(self) -> bool:
@@ -99,9 +97,7 @@ def match(answer: Answer, effects: Sequence[Concealed]) -> tuple[Judged, ...]:
     merit = np.array([[_merit(Judged(effect, claim)) for claim in claims] for effect in effects])
     rows, columns = linear_sum_assignment(merit, maximize=True)
     chosen = dict(zip(rows.tolist(), columns.tolist(), strict=True))
-    return tuple(
-        Judged(effect, claims[chosen[row]] if row in chosen else None) for row, effect in enumerate(effects)
-    )
+    return tuple(Judged(effect, claims[chosen[row]] if row in chosen else None) for row, effect in enumerate(effects))
 
 
 def superfluous(answer: Answer, judged: Sequence[Judged]) -> int:

@@ -78,9 +78,7 @@ def _run(
         scratch, why = Path(folder), ""
         unpack(job.content, scratch / job.trial)
         try:
-            done = isolate.run(
-                command, scratch, hidden=(*job.hidden, *hidden), timeout_s=job.timeout_s, path=path
-            )
+            done = isolate.run(command, scratch, hidden=(*job.hidden, *hidden), timeout_s=job.timeout_s, path=path)
             if done.returncode:
                 why = f"exit status {done.returncode}: {done.stderr.strip()[-500:]}"
         except subprocess.TimeoutExpired:
@@ -90,6 +88,4 @@ def _run(
 
 def failed(method: str, trial: str, seconds: float, why: str) -> Answer:
     """Return the answer of a method that gave none."""
-    return Answer(
-        method=method, trial=trial, detected=False, verdict="undecided", seconds=seconds, failure=why[:600]
-    )
+    return Answer(method=method, trial=trial, detected=False, verdict="undecided", seconds=seconds, failure=why[:600])

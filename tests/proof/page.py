@@ -9,19 +9,7 @@ from matplotlib.figure import Figure as Sheet
 
 import kbs_process
 from kbs_process.report import draw, page
-from kbs_process.report.panel import (
-    Block,
-    Caption,
-    Cell,
-    Figure,
-    Fold,
-    Grid,
-    Head,
-    Panel,
-    Picture,
-    Text,
-    Tone,
-)
+from kbs_process.report.panel import Block, Caption, Cell, Figure, Fold, Grid, Head, Panel, Picture, Text, Tone
 from kbs_process.report.text import MISSING, count, number, percent
 from kbs_process.results.records import Conclusion
 from proof.aims import AIMS, Aim, Reached, beaten, find, reached
@@ -53,9 +41,7 @@ def write_page(bench: Bench, path: Path) -> None:
         + (f", {count(len(met) - tried, 'is', 'are')} not tried." if tried < len(met) else "."),
     )
     nulls = sum(truth.kind in NULLS for truth in bench.truths)
-    about = (
-        f"{count(len(bench.truths), 'trial')}, {nulls} of them without a concealed effect · {bench.split} set"
-    )
+    about = f"{count(len(bench.truths), 'trial')}, {nulls} of them without a concealed effect · {bench.split} set"
     head = Head("Proof bench", bench.split, "Concealed effects", about, conclusion, kbs_process.__version__)
     path.write_text(page.render(head, _panels(bench), "screen"), encoding="utf-8")
 
@@ -83,9 +69,7 @@ def _aims(rows: Sequence[Row]) -> Grid:
         row = find(rows, OURS, aim.metric, aim.group)
         state = reached(aim, row)
         lines.append((aim.metric, _group(aim.group), _limits(aim), *_value(row), Cell(state, _TONES[state])))
-    note = (
-        "Intervals of 95 %. An aim is compared with the number itself; with few trials the interval is wide."
-    )
+    note = "Intervals of 95 %. An aim is compared with the number itself; with few trials the interval is wide."
     head = ("Number", "Trials", "Aim", "Here", "Interval", "Of", "")
     return Grid("Aims of the diagnosis", head, tuple(lines), "llrrrrl", note)
 
@@ -107,12 +91,7 @@ def _value(row: Row | None) -> tuple[str, str, str]:
 
 
 def _group(group: str) -> str:
-    named = {
-        ALL: "all",
-        STRONG: "strength ≥ 300",
-        "nothing": "nulls: nothing",
-        "within": "nulls: within sigma",
-    }
+    named = {ALL: "all", STRONG: "strength ≥ 300", "nothing": "nulls: nothing", "within": "nulls: within sigma"}
     return named.get(group, "nulls: beyond sigma" if group == "beyond" else f"strength {group}")
 
 
@@ -125,14 +104,9 @@ def _scores(rows: Sequence[Row], methods: Sequence[str]) -> tuple[Block, ...]:
             found = [find(rows, method, metric, group) for method in methods]
             if any(found):
                 lines.append(
-                    (
-                        metric,
-                        *(_cell(row, method == OURS) for row, method in zip(found, methods, strict=True)),
-                    )
+                    (metric, *(_cell(row, method == OURS) for row, method in zip(found, methods, strict=True)))
                 )
-        grid = Grid(
-            f"Score: {_group(group)}", ("Number", *methods), tuple(lines), "l" + "r" * len(methods), _NOTE
-        )
+        grid = Grid(f"Score: {_group(group)}", ("Number", *methods), tuple(lines), "l" + "r" * len(methods), _NOTE)
         blocks.append(grid if group == ALL else Fold(_group(group), (grid,)))
     return tuple(blocks)
 
@@ -149,9 +123,7 @@ def _cell(row: Row | None, whole: bool) -> str:
     if row is None:
         return MISSING
     scale, digits, sign = (100.0, 2, " %") if row.kind == "share" else (1.0, 3, "")
-    value, *ends = (
-        MISSING if x is None else number(scale * x, digits) for x in (row.value, row.low, row.high)
-    )
+    value, *ends = (MISSING if x is None else number(scale * x, digits) for x in (row.value, row.low, row.high))
     interval = "" if row.low is None or not whole else f" [{', '.join(ends)}]"
     return f"{value}{sign}{interval} {row.of if row.right is None else f'{row.right}/{row.of}'}"
 
@@ -168,18 +140,14 @@ def _curves(rows: Sequence[Row], methods: Sequence[str]) -> Picture:
                 ends = [[max(0.0, v - (r.low or 0.0)) for v, r in zip(y, mine, strict=True)],
                         [max(0.0, (r.high or 0.0) - v) for v, r in zip(y, mine, strict=True)]]  # fmt: skip
                 style = {"color": draw.SERIES[index % len(draw.SERIES)], "markersize": 3.5, "linewidth": 1.0}
-                axes.errorbar(
-                    x, y, yerr=ends if mine else None, marker="o", elinewidth=0.5, label=method, **style
-                )
+                axes.errorbar(x, y, yerr=ends if mine else None, marker="o", elinewidth=0.5, label=method, **style)
             axes.set(title=metric, xlabel="strength", ylim=(-0.03, 1.03), xscale="log", xlim=(30.0, 1400.0))
             axes.set_xticks([40.0, 100.0, 300.0, 1000.0], ["40", "100", "300", "1000"])
             axes.minorticks_off()
         sheet.axes[0].set_ylabel("share")
         handles, labels = sheet.axes[0].get_legend_handles_labels()
         sheet.legend(handles, labels, loc="outside lower center", ncols=min(6, len(methods)))
-        return draw.picture(
-            sheet, "Share of trials detected, placed and named against strength, a curve a method"
-        )
+        return draw.picture(sheet, "Share of trials detected, placed and named against strength, a curve a method")
 
 
 def _beaten(rows: Sequence[Row]) -> tuple[Block, ...]:
@@ -188,8 +156,7 @@ def _beaten(rows: Sequence[Row]) -> tuple[Block, ...]:
         tried = {row.method for row in rows} - {OURS}
         return (Text("Nowhere in this table." if tried and tried != set() else "No rival was run."),)
     lines = tuple(
-        (ours.metric, _group(ours.group), _cell(ours, True), best.method, _cell(best, True))
-        for ours, best in pairs
+        (ours.metric, _group(ours.group), _cell(ours, True), best.method, _cell(best, True)) for ours, best in pairs
     )
     note = "By the number itself: where the intervals overlap, the difference may be chance."
     return (Grid("Better rivals", ("Number", "Trials", OURS, "Rival", "Its number"), lines, "llrlr", note),)
@@ -212,9 +179,7 @@ def _trials(bench: Bench) -> tuple[Block, ...]:
 
 def _concealed(truth: Truth) -> str:
     if truth.kind != "concealed":
-        return _group(truth.kind) + "".join(
-            f"; {e.name} by {number(e.sigmas, 2)} sigma" for e in truth.beyond
-        )
+        return _group(truth.kind) + "".join(f"; {e.name} by {number(e.sigmas, 2)} sigma" for e in truth.beyond)
     return "; ".join(f"{_suspect(effect)} ({effect.name})" for effect in truth.effects)
 
 
@@ -245,8 +210,5 @@ def _made(bench: Bench) -> tuple[Block, ...]:
                 "told to any method.",
             ),
         ),
-        Text(
-            "Rivals, all on the same recordings and the same plant",
-            tuple(f"{k}: {v}" for k, v in RIVALS.items()),
-        ),
+        Text("Rivals, all on the same recordings and the same plant", tuple(f"{k}: {v}" for k, v in RIVALS.items())),
     )

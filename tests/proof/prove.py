@@ -43,9 +43,7 @@ def workers(jobs: int, dask: str | None) -> Iterator[Executor]:
     try:
         from distributed import Client
     except ImportError:
-        raise BenchError(
-            "a Dask cluster needs the package distributed\n  -> pip install -e '.[test]'"
-        ) from None
+        raise BenchError("a Dask cluster needs the package distributed\n  -> pip install -e '.[test]'") from None
     try:
         client = Client(dask, timeout=_PATIENCE)
     except (OSError, ValueError) as error:

@@ -136,9 +136,7 @@ def _finds(verdict: str) -> Tally:
 SHARES: Mapping[str, Tally] = {
     "answered": lambda trial: (not trial.answer.failure,),
     "mismatch detected": lambda trial: (trial.answer.detected,) if trial.truth.kind == "concealed" else (),
-    "false alarm": lambda trial: (
-        (trial.answer.detected,) if trial.truth.kind in ("nothing", "within") else ()
-    ),
+    "false alarm": lambda trial: (trial.answer.detected,) if trial.truth.kind in ("nothing", "within") else (),
     "false find": lambda trial: (bool(trial.answer.finds),) if trial.truth.kind in NULLS else (),
     "called parameters off": _called_beyond,
     "port": _if(single, lambda entry: entry.port),
@@ -147,9 +145,7 @@ SHARES: Mapping[str, Tally] = {
     "physics": _if(single, lambda entry: entry.physics),
     "port, in no catalogue": _if(foreign, lambda entry: entry.port),
     "called unnamed": _if(foreign, lambda entry: entry.claim is not None and not entry.claim.named),
-    "called unnamed, though named": _if(
-        single, lambda entry: entry.claim is not None and not entry.claim.named
-    ),
+    "called unnamed, though named": _if(single, lambda entry: entry.claim is not None and not entry.claim.named),
     "all of several": lambda trial: (all(e.place for e in trial.judged),) if several(trial) else (),
     "one of several": lambda trial: (any(e.place for e in trial.judged),) if several(trial) else (),
     "superfluous find": lambda trial: (
@@ -222,9 +218,7 @@ def score(truths: Sequence[Truth], answers: Iterable[Answer]) -> tuple[Row, ...]
         missing = {truth.trial for truth in truths} - set(given)
         if missing:
             raise ValueError(f"{method} has no answer for {sorted(missing)}")
-        trials = [
-            Trial(truth, given[truth.trial], match(given[truth.trial], truth.effects)) for truth in truths
-        ]
+        trials = [Trial(truth, given[truth.trial], match(given[truth.trial], truth.effects)) for truth in truths]
         groups: dict[str, list[Trial]] = {ALL: trials}
         for trial in sorted(trials, key=lambda trial: (trial.truth.level, trial.group)):
             groups.setdefault(trial.group, []).append(trial)

@@ -55,9 +55,7 @@ def unseal(sealed: bytes, key: bytes, trial: str) -> bytes:
         shared = X25519PrivateKey.from_private_bytes(key).exchange(X25519PublicKey.from_public_bytes(sender))
         padded = AESGCM(_derived(shared, sender, public(key))).decrypt(_NONCE, cipher, trial.encode())
     except (InvalidTag, ValueError) as error:
-        raise SealError(
-            f"the seal of {trial} is broken, of another trial, or made for another key"
-        ) from error
+        raise SealError(f"the seal of {trial} is broken, of another trial, or made for another key") from error
     end = _LENGTH + int.from_bytes(padded[:_LENGTH], "big")
     return padded[_LENGTH:end]
 

@@ -20,12 +20,7 @@ from proof.truth import Truth
 
 FOLDER = Path(__file__).parent / "small"
 KEY = FOLDER / "key"
-_KEPT = (
-    ("calibration", 1),
-    ("fit", 1),
-    ("fit", 2),
-    ("held-out", 3),
-)  # role and repeat, of the first trajectory
+_KEPT = (("calibration", 1), ("fit", 1), ("fit", 2), ("held-out", 3))  # role and repeat, of the first trajectory
 _SPECIFICATIONS = {
     "T00000000A1": Spec("development", 7, 1, "within"),
     "T00000000B7": chosen("development", 7, 0, ["rounded triangle of transmission error"], 300.0),

@@ -8,11 +8,7 @@ from pathlib import Path
 BENCH = Path(__file__).parent
 # What each file may use of the package, by the first two parts of a module's name.
 ALLOWED = {
-    "diagnosis.py": {
-        "kbs_process.errors",
-        "kbs_process.results",
-        "kbs_process.studies",
-    },  # reads results.json
+    "diagnosis.py": {"kbs_process.errors", "kbs_process.results", "kbs_process.studies"},  # reads results.json
     "page.py": {"kbs_process", "kbs_process.report", "kbs_process.results"},  # looks like all reports
     "isolate.py": {"kbs_process.plant"},  # where compiled plants are kept
     "prepare.py": {"kbs_process.campaign", "kbs_process.diagnosis", "kbs_process.signals"},
@@ -44,7 +40,5 @@ def test_what_judges_uses_nothing_of_what_is_judged() -> None:
 
 def test_rivals_take_no_find_from_the_diagnosis() -> None:
     source = (BENCH / "rivals" / "prepare.py").read_text(encoding="utf-8")
-    names = [
-        name for name in ("screen", "rounds", "gate", "signature", "localise", "ports") if name in source
-    ]
+    names = [name for name in ("screen", "rounds", "gate", "signature", "localise", "ports") if name in source]
     assert names == []

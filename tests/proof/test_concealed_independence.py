@@ -38,6 +38,4 @@ def test_only_the_engine_and_numerics_are_imported(generator: str) -> None:
             parts = 2 if name.startswith("proof.") else 1
             known = ".".join(name.split(".")[:parts]) in allowed | library
             assert known, f"{path.name} imports {name}"
-        assert "importlib" not in source and "__import__" not in source and "kbs_process" not in source, (
-            path.name
-        )
+        assert "importlib" not in source and "__import__" not in source and "kbs_process" not in source, path.name

@@ -36,8 +36,7 @@ def drawn(name: str, **shapes: float) -> Effect:
     physics = BY_NAME[name]
     if shapes:
         physics = replace(
-            physics,
-            shapes=tuple(replace(s, drawn=float(shapes.get(s.name, 0.0))) for s in physics.shapes),
+            physics, shapes=tuple(replace(s, drawn=float(shapes.get(s.name, 0.0))) for s in physics.shapes)
         )
     return effects.draw(physics, np.random.default_rng(3), "development", SWEPT)
 
@@ -110,12 +109,7 @@ def test_an_appendage_hangs_still_and_rings_at_its_frequency() -> None:
 
 @pytest.mark.parametrize(
     ("law", "shapes"),
-    [
-        (Law.BOUC_WEN, (1e-5, 1.5)),
-        (Law.STOPS, (1e-3,)),
-        (Law.ELASTOPLASTIC, (1e-2,)),
-        (Law.STRIBECK, (0.1, 1, 0.3, 0)),
-    ],
+    [(Law.BOUC_WEN, (1e-5, 1.5)), (Law.STOPS, (1e-3,)), (Law.ELASTOPLASTIC, (1e-2,)), (Law.STRIBECK, (0.1, 1, 0.3, 0))],
 )
 def test_friction_and_hysteresis_only_take_energy_out(law: Law, shapes: tuple[float, ...]) -> None:
     """Work over whole cycles of a motion back and forth is negative."""
@@ -152,6 +146,4 @@ def test_places_within_what_is_swept() -> None:
     for physics in PHYSICS:
         for shape, value in zip(physics.shapes, drawn(physics.name).shapes, strict=True):
             if isinstance(shape.drawn, Within):
-                assert (
-                    min(low for low, _ in SWEPT.values()) <= value <= max(high for _, high in SWEPT.values())
-                )
+                assert min(low for low, _ in SWEPT.values()) <= value <= max(high for _, high in SWEPT.values())

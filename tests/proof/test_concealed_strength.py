@@ -97,15 +97,12 @@ def test_an_inertia_changes_how_the_whole_rings() -> None:
 def test_the_engines_own_error_is_far_below_the_weakest_effect() -> None:
     setting = bench().settings[0]
     coarse, fine = (
-        read(HARDWARE, integrate(HARDWARE, PATH, time_step=step, field=setting.motion.field))
-        for step in (1e-4, 5e-5)
+        read(HARDWARE, integrate(HARDWARE, PATH, time_step=step, field=setting.motion.field)) for step in (1e-4, 5e-5)
     )
     assert strength(bench().settings, [setting.whiten(coarse - fine)]).rho < 2.0
 
 
-@pytest.mark.parametrize(
-    "name", ["cogging of another shape", "mass on a spring", "interpolation of the code"]
-)
+@pytest.mark.parametrize("name", ["cogging of another shape", "mass on a spring", "interpolation of the code"])
 def test_strength_does_not_depend_on_the_step(name: str) -> None:
     effect = effects.draw(BY_NAME[name], np.random.default_rng(3), "development", {})
     coarse, fine = (at_step(step).strength([effect]).rho for step in (5e-4, 2e-4))

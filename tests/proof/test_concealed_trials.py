@@ -31,9 +31,7 @@ def test_more_trials_begin_with_the_same_ones_and_every_physics_comes() -> None:
 
 def test_splits_draw_from_different_ranges() -> None:
     rng = np.random.default_rng(0)
-    development, validation = (
-        [share(rng, split) for _ in range(500)] for split in ("development", "validation")
-    )
+    development, validation = ([share(rng, split) for _ in range(500)] for split in ("development", "validation"))
     assert all(0.3 <= u <= 0.7 for u in development)
     assert all(not 0.3 < u < 0.7 for u in validation)
     assert min(validation) < 0.02 and max(validation) > 0.98
@@ -50,11 +48,7 @@ def test_trajectories_stay_within_the_limits_and_move_both_axes(split: ranges.Sp
 
 
 def files(folder: Path) -> dict[str, bytes]:
-    return {
-        str(path.relative_to(folder)): path.read_bytes()
-        for path in sorted(folder.rglob("*"))
-        if path.is_file()
-    }
+    return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
 
 
 def test_a_trial_comes_out_the_same_and_says_nothing_of_what_it_conceals(short: None, tmp_path: Path) -> None:
@@ -103,13 +97,7 @@ def test_when_messages_were_logged_says_nothing_of_what_their_clock_does() -> No
     for clocks in ({}, {"wrench": lambda t: 0.05 * np.sin(0.8 * t)}):
         run = np.random.SeedSequence(1)
         made[bool(clocks)] = record(
-            hardware,
-            path,
-            replace(NONE, clocks=clocks),
-            seed=run,
-            epoch_ns=0,
-            wrench_hz=100.0,
-            encoder_hz=50.0,
+            hardware, path, replace(NONE, clocks=clocks), seed=run, epoch_ns=0, wrench_hz=100.0, encoder_hz=50.0
         )
     moved = made[True].wrench.stamp - made[False].wrench.stamp
     assert np.ptp(moved) > 9e7  # ns

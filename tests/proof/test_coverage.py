@@ -29,9 +29,7 @@ def moved() -> list[dict[str, Any]]:
     gain, cog = (name for name in ("transducer.cross_coupling", "body.antenna.cog"))
     spread = float(np.asarray(nominal.sigmas[key]))
     return [
-        entry(
-            "joint.az.drive.Tmax", float(nominal[key]), spread, float(true[key]) + 0.1 * spread, 0.1 * spread
-        ),
+        entry("joint.az.drive.Tmax", float(nominal[key]), spread, float(true[key]) + 0.1 * spread, 0.1 * spread),
         entry(f"{gain}[1][3]", nominal[gain][1, 3], 0.1, true[gain][1, 3] + 0.03, 0.01),
         entry(f"{cog}[2]", nominal[cog][2], 0.01, true[cog][2], 0.009),
     ]
@@ -48,9 +46,7 @@ def test_results_of_another_trial_are_refused(moved: list[dict[str, Any]]) -> No
         list(coverage.numbers(moved, *coverage.hardware(Spec("development", 6, 0, "within"))))
 
 
-def test_the_share_is_printed(
-    moved: list[dict[str, Any]], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_share_is_printed(moved: list[dict[str, Any]], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = tmp_path / trials.name_of(SPEC)
     folder.mkdir()
     (folder / "results.json").write_text(json.dumps({"answer": "none", "moved": moved}))

@@ -24,17 +24,9 @@ def truth(index: int) -> Truth:
     if index % 4 == 0:
         return Truth(trial=name, kind="nothing", split="development")
     effect = Concealed(
-        port=PORTS[index % 3],
-        axis="el",
-        channels=("Tx",),
-        family="unnamed",
-        name="law",
-        rho=300.0,
-        rho_eff=300.0,
+        port=PORTS[index % 3], axis="el", channels=("Tx",), family="unnamed", name="law", rho=300.0, rho_eff=300.0
     )  # type: ignore[arg-type]
-    return Truth(
-        trial=name, kind="concealed", split="development", level=300.0, effects=(effect,), rho_eff=300.0
-    )
+    return Truth(trial=name, kind="concealed", split="development", level=300.0, effects=(effect,), rho_eff=300.0)
 
 
 def recording(generator: np.random.Generator, epoch_s: float, samples: int) -> bytes:
@@ -71,9 +63,7 @@ def trials(folder: Path, *, leak: str) -> tuple[dict[str, bytes], list[Truth]]:
     return packed, truths
 
 
-@pytest.mark.parametrize(
-    ("leak", "told_by"), [("epoch", {"epoch"}), ("text", {"description", "lines", "size"})]
-)
+@pytest.mark.parametrize(("leak", "told_by"), [("epoch", {"epoch"}), ("text", {"description", "lines", "size"})])
 def test_a_leak_is_found_and_named(leak: str, told_by: set[str], tmp_path: Path) -> None:
     found = examine(*trials(tmp_path, leak=leak))["anything concealed"]
     assert found["p"] < 0.001
@@ -88,8 +78,5 @@ def test_where_there_is_none_nothing_is_told(tmp_path: Path) -> None:
 
 def test_p_values_of_no_relation_are_uniform() -> None:
     generator = np.random.default_rng(3)
-    p = [
-        permutation_p(generator.standard_normal((24, 8)), generator.integers(0, 2, 24), seed)
-        for seed in range(12)
-    ]
+    p = [permutation_p(generator.standard_normal((24, 8)), generator.integers(0, 2, 24), seed) for seed in range(12)]
     assert 0.2 < np.mean(p) < 0.8 and min(p) > 0.002

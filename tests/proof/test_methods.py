@@ -71,28 +71,13 @@ def results(port: str = "motor torque") -> DiagnosisResults:
 def test_a_diagnosis_is_translated_word_by_word() -> None:
     said = answer_of(encode(results()), "T1", 12.0)
     (claim,) = said.finds
-    assert (said.method, said.trial, said.detected, said.verdict, said.log10_p) == (
-        OURS,
-        "T1",
-        True,
-        "physics",
-        -250.0,
-    )
-    assert (claim.port, claim.axis, claim.family, claim.probability) == (
-        "motor torque",
-        "el",
-        "motor order",
-        0.9,
-    )
+    assert (said.method, said.trial, said.detected, said.verdict, said.log10_p) == (OURS, "T1", True, "physics", -250.0)
+    assert (claim.port, claim.axis, claim.family, claim.probability) == ("motor torque", "el", "motor order", 0.9)
     assert [entry.family for entry in claim.alternatives] == ["cogging", "cross-coupling"]
     assert claim.alternatives[1].axis == "" and claim.alternatives[1].channels == ("Tx",)
     assert [entry.family for entry in claim.indistinguishable_from] == ["cogging"]
     assert claim.parameters[0].low == 1.8 and [entry.name for entry in said.moved] == ["joint.az.drive.Ka"]
-    assert (
-        said.held_out is not None
-        and said.held_out.before == pytest.approx(12.5**0.5)
-        and said.held_out.after == 1.0
-    )
+    assert said.held_out is not None and said.held_out.before == pytest.approx(12.5**0.5) and said.held_out.after == 1.0
 
 
 def test_a_place_without_a_law_is_a_claim() -> None:
@@ -111,9 +96,7 @@ def test_words_that_the_bench_does_not_know_are_told() -> None:
         answer_of(b"{}", "T1", 12.0)
 
 
-def test_a_method_that_fails_has_answered_with_its_failure(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_method_that_fails_has_answered_with_its_failure(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "campaign.toml").write_text("schema = 1\n")
     job = Job("T1", pack(tmp_path), (OURS,))
     given = answer.decode(answer_trial(job)[OURS])

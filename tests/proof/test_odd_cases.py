@@ -92,9 +92,7 @@ def test_no_encoders(encoder: Any, drive: str, short: None, tmp_path: Path) -> N
     assert len(topics["/command"]) == 31
     assert campaign["drive"] == drive
     instead = campaign["topics"].get("encoder")
-    assert instead == (
-        {"topic": "/command", "fields": ["position[az]", "position[el]"]} if drive == "motion" else None
-    )
+    assert instead == ({"topic": "/command", "fields": ["position[az]", "position[el]"]} if drive == "motion" else None)
 
 
 def test_the_clip_goes_over_at_either_end_of_its_sector() -> None:
@@ -112,9 +110,7 @@ def test_the_clip_goes_over_at_either_end_of_its_sector() -> None:
 
 
 def test_a_spring_aslant_acts_along_its_own_axis_alone_and_holds_back() -> None:
-    acting = aslant.extra(
-        replace(maker.effect(BY_NUMBER["13"].effects[0]), amplitude=3.0, shapes=(2.0, 0.0, 2.0))
-    )
+    acting = aslant.extra(replace(maker.effect(BY_NUMBER["13"].effects[0]), amplitude=3.0, shapes=(2.0, 0.0, 2.0)))
 
     def torque(*phi: float) -> list[float]:
         motion, out = np.zeros((3, 7)), np.zeros(OUT)

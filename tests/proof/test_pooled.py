@@ -25,21 +25,12 @@ class Sets:
 
     def all(self) -> list[Bench]:
         """Both sets."""
-        return [
-            bench(self.truths[:2], (*self.ours[:2], *self.rival), "1"),
-            bench(self.truths[1:], self.ours[1:], "2"),
-        ]
+        return [bench(self.truths[:2], (*self.ours[:2], *self.rival), "1"), bench(self.truths[1:], self.ours[1:], "2")]
 
 
 def bench(truths: tuple[Truth, ...], answers: tuple[Answer, ...], seed: str) -> Bench:
     return Bench(
-        split="validation",
-        seed=seed,
-        command="",
-        isolation="namespaces",
-        rows=(),
-        truths=truths,
-        answers=answers,
+        split="validation", seed=seed, command="", isolation="namespaces", rows=(), truths=truths, answers=answers
     )
 
 
@@ -64,9 +55,7 @@ def test_a_trial_of_two_sets_counts_once(sets: Sets) -> None:
 def test_methods_are_compared_on_the_same_trials(sets: Sets) -> None:
     found = pooled.pooled(sets.all(), (OURS, "sparse"), "")
     assert {truth.trial for truth in found.truths} == {"T0", "T1"}
-    shares = {
-        row.method: row.value for row in found.rows if (row.metric, row.group) == ("false alarm", "all")
-    }
+    shares = {row.method: row.value for row in found.rows if (row.metric, row.group) == ("false alarm", "all")}
     assert shares == {OURS: 0.0, "sparse": 1.0}
 
 

@@ -80,12 +80,8 @@ def test_a_bench_ends_with_a_score_a_ledger_and_a_page(tmp_path: Path) -> None:
     values = run((OURS,))
     assert values[OURS, "false find"] == 1.0 and values[OURS, "physics"] == 1.0
     assert sum(line.startswith("made") for line in said) == 4
-    score, ledger = (
-        json.loads((tmp_path / "out" / name).read_text()) for name in ("score.json", "ledger.json")
-    )
-    assert (
-        {truth["trial"] for truth in score["truths"]} == set(ledger["seals"]) == set(ledger["answers"][OURS])
-    )
+    score, ledger = (json.loads((tmp_path / "out" / name).read_text()) for name in ("score.json", "ledger.json"))
+    assert {truth["trial"] for truth in score["truths"]} == set(ledger["seals"]) == set(ledger["answers"][OURS])
     assert (tmp_path / "out" / "index.html").stat().st_size > 50_000
     said.clear()
     values = run((OURS, "sparse"))  # a rival that comes later finds trials and answers as they are

@@ -21,9 +21,7 @@ Law = Callable[[dict[str, Array]], Array]  # signals -> (n, channels), in units 
 def case(law: Law | None) -> Case:
     """Two trajectories to fit, each run twice, and another held out; white noise, and the law."""
     recordings = []
-    for index, (trajectory, held_out) in enumerate(
-        ((0, False), (0, False), (1, False), (1, False), (2, True))
-    ):
+    for index, (trajectory, held_out) in enumerate(((0, False), (0, False), (1, False), (1, False), (2, True))):
         t = np.arange(SAMPLES) * DT
         generator = np.random.default_rng(100 * trajectory + index)
         signals = {"time": t}

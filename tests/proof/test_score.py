@@ -20,28 +20,16 @@ RIPPLE = Suspect(port="motor torque", axis="el", family="motor order")
 
 
 def concealed(trial: str, *effects: Concealed, level: float = 300.0) -> Truth:
-    return Truth(
-        trial=trial, kind="concealed", split="development", level=level, effects=effects, rho_eff=level
-    )
+    return Truth(trial=trial, kind="concealed", split="development", level=level, effects=effects, rho_eff=level)
 
 
 def effect(suspect: Suspect = COGGING, **more: object) -> Concealed:
-    given = {
-        "port": suspect.port,
-        "axis": suspect.axis,
-        "channels": suspect.channels,
-        "family": suspect.family,
-    }
+    given = {"port": suspect.port, "axis": suspect.axis, "channels": suspect.channels, "family": suspect.family}
     return Concealed(**(given | {"name": "law", "rho": 310.0, "rho_eff": 300.0} | more))  # type: ignore[arg-type]
 
 
 def claim(suspect: Suspect = COGGING, **more: object) -> Claim:
-    given = {
-        "port": suspect.port,
-        "axis": suspect.axis,
-        "channels": suspect.channels,
-        "family": suspect.family,
-    }
+    given = {"port": suspect.port, "axis": suspect.axis, "channels": suspect.channels, "family": suspect.family}
     return Claim(**(given | more))  # type: ignore[arg-type]
 
 
@@ -53,9 +41,7 @@ def answer(trial: str, *finds: Claim, **more: object) -> Answer:
     return Answer(**(given | more))  # type: ignore[arg-type]
 
 
-def value(
-    rows: tuple[Row, ...], metric: str, group: str = "all", method: str = "kbs-process"
-) -> float | None:
+def value(rows: tuple[Row, ...], metric: str, group: str = "all", method: str = "kbs-process") -> float | None:
     row = find(rows, method, metric, group)
     assert row is not None, (metric, group)
     return row.value
@@ -99,9 +85,7 @@ def _fields(suspect: Suspect) -> dict[str, object]:
 def test_place_and_physics_are_judged_apart() -> None:
     (right,) = match(answer("A", claim()), [effect()])
     assert right.port and right.place and right.physics
-    (other_axis,) = match(
-        answer("A", claim(Suspect(port="motor torque", axis="az", family="cogging"))), [effect()]
-    )
+    (other_axis,) = match(answer("A", claim(Suspect(port="motor torque", axis="az", family="cogging"))), [effect()])
     assert other_axis.port and not other_axis.place and not other_axis.physics
     (other_law,) = match(answer("A", claim(RIPPLE)), [effect()])
     assert other_law.place and not other_law.physics
@@ -112,9 +96,7 @@ def test_place_and_physics_are_judged_apart() -> None:
 def test_channel_is_part_of_the_place_at_the_transducer() -> None:
     truth = effect(Suspect(port="transducer", channels=("Tx",), family="gain"))
     for channels, expected in ((("Tx", "Fz"), True), (("Fz", "Tx"), False), ((), False)):
-        (judged,) = match(
-            answer("A", claim(Suspect(port="transducer", channels=channels, family="gain"))), [truth]
-        )
+        (judged,) = match(answer("A", claim(Suspect(port="transducer", channels=channels, family="gain"))), [truth])
         assert judged.place is expected and judged.port
 
 
@@ -143,9 +125,7 @@ def test_undecided_is_right_only_if_it_is_said_and_true() -> None:
     (alone,) = match(answer("A", claim(RIPPLE, indistinguishable_from=(COGGING,))), [effect(equivalents=())])
     assert told.physics and not guessed.physics and not alone.physics
     truths = [concealed(name, both) for name in "AB"]
-    rows = score(
-        truths, [answer("A", claim(RIPPLE, indistinguishable_from=(COGGING,))), answer("B", claim(RIPPLE))]
-    )
+    rows = score(truths, [answer("A", claim(RIPPLE, indistinguishable_from=(COGGING,))), answer("B", claim(RIPPLE))])
     assert value(rows, "indistinguishable, and told") == 0.5
 
 
@@ -174,9 +154,7 @@ def test_parameters_are_measured_by_the_bound_and_phases_on_the_circle() -> None
         for value in (6.06745e-3, 5.8651e-3, 6.4e-3)
     ]
     finds = [claim(parameters=(estimate,)) for estimate in estimates]
-    rows = score(
-        [concealed(n, law) for n in "ABC"], [answer(n, f) for n, f in zip("ABC", finds, strict=True)]
-    )
+    rows = score([concealed(n, law) for n in "ABC"], [answer(n, f) for n, f in zip("ABC", finds, strict=True)])
     assert value(rows, "error over Cramer-Rao bound") == pytest.approx(2.0)
     assert value(rows, "interval covers") == pytest.approx(2 / 3)
 
@@ -196,12 +174,7 @@ def test_nulls_count_finds_and_parameters_off() -> None:
         Truth(trial=str(k), kind=kind, split="development", beyond=off.get(kind, ()))  # type: ignore[arg-type]
         for k, kind in enumerate(kinds)
     ]
-    given = [
-        answer("0"),
-        answer("1", claim()),
-        answer("2", verdict="parameters off", detected=True),
-        answer("3"),
-    ]
+    given = [answer("0"), answer("1", claim()), answer("2", verdict="parameters off", detected=True), answer("3")]
     rows = score(truths, given)
     assert value(rows, "false find") == 0.25 and value(rows, "false find", "within") == 1.0
     assert value(rows, "false alarm") == 0.5  # that parameters are off, beyond sigma, is no false alarm

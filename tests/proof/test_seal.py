@@ -16,9 +16,7 @@ from proof.truth import Concealed, Truth
 KEY = seal.new_key()
 NOTHING = Truth(trial="T1", kind="nothing", split="development")
 EFFECT = Concealed(port="motor torque", axis="el", family="cogging", name="law", rho=310.0, rho_eff=300.0)
-SOMETHING = Truth(
-    trial="T1", kind="concealed", split="development", level=300.0, effects=(EFFECT,) * 3, rho_eff=300.0
-)
+SOMETHING = Truth(trial="T1", kind="concealed", split="development", level=300.0, effects=(EFFECT,) * 3, rho_eff=300.0)
 
 
 def test_a_seal_opens_with_its_key_for_its_trial_and_as_it_was_made() -> None:
@@ -26,12 +24,7 @@ def test_a_seal_opens_with_its_key_for_its_trial_and_as_it_was_made() -> None:
     assert seal.unseal(sealed, KEY, "T1") == b"what is true"
     altered = bytearray(sealed)
     altered[1000] ^= 1
-    wrong = [
-        (sealed, seal.new_key(), "T1"),
-        (sealed, KEY, "T2"),
-        (bytes(altered), KEY, "T1"),
-        (b"", KEY, "T1"),
-    ]
+    wrong = [(sealed, seal.new_key(), "T1"), (sealed, KEY, "T2"), (bytes(altered), KEY, "T1"), (b"", KEY, "T1")]
     for broken, key, trial in wrong:
         with pytest.raises(seal.SealError):
             seal.unseal(broken, key, trial)

@@ -51,9 +51,7 @@ def finished(folder: Path) -> Work:
     return bench
 
 
-def test_what_is_answered_before_the_first_gap_can_be_judged_and_the_rest_stays_sealed(
-    tmp_path: Path,
-) -> None:
+def test_what_is_answered_before_the_first_gap_can_be_judged_and_the_rest_stays_sealed(tmp_path: Path) -> None:
     bench = work(tmp_path)
     for order in bench.orders():
         bench.keep_trial(order.name, trials.make_sealed(order))

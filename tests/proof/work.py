@@ -133,8 +133,7 @@ class Work:
             raise BenchError("the first trial has no answer yet\n  -> go on without --answered")
         seals = {name: seal.digest(member(self.trial(name), SEAL)) for name in names}
         answers = {
-            method: {name: seal.digest(self._answer(method, name).read_bytes()) for name in seals}
-            for method in methods
+            method: {name: seal.digest(self._answer(method, name).read_bytes()) for name in seals} for method in methods
         }
         path = self.folder / "ledger.json"
         ledger = Ledger(seals=seals, answers=answers)

@@ -44,14 +44,10 @@ class Processed:
 
     def valid(self, recording):
         """Where unfiltered measurement and prediction know enough, (n,)."""
-        return pq.read_table(self.target / "tables" / "bands" / f"{recording}.unfiltered.parquet")[
-            "valid"
-        ].to_numpy()
+        return pq.read_table(self.target / "tables" / "bands" / f"{recording}.unfiltered.parquet")["valid"].to_numpy()
 
     def angle(self, recording, joint):
-        return pq.read_table(self.target / "tables" / "aligned" / f"{recording}.parquet")[
-            f"angle.{joint}"
-        ].to_numpy()
+        return pq.read_table(self.target / "tables" / "aligned" / f"{recording}.parquet")[f"angle.{joint}"].to_numpy()
 
     def _table(self, stage, name, what):
         table = pq.read_table(self.target / "tables" / stage / f"{name}.parquet")
@@ -73,9 +69,7 @@ def exchanged(preset, folder):
     swapped = text.replace('role = "fit"', 'role = "?"').replace('"held-out"', '"fit"')
     template = (PRESETS / "treadmill").as_posix()
     mapping = folder / f"{preset}.toml"
-    mapping.write_text(
-        swapped.replace('"?"', '"held-out"').replace('"treadmill/', f'"{template}/'), encoding="utf-8"
-    )
+    mapping.write_text(swapped.replace('"?"', '"held-out"').replace('"treadmill/', f'"{template}/'), encoding="utf-8")
     return mapping
 
 

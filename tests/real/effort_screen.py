@@ -92,9 +92,7 @@ class Screen:
         """Amplitudes of known parameters and laws over the trials to be fitted, and what is left: by role, rms."""
         A = [np.hstack([t.known, *(self.columns(law)[k] for law in laws)]) for k, t in enumerate(self.trials)]
         used = [k for k, trial in enumerate(self.trials) if trial.role == "fit"]
-        x = np.linalg.lstsq(
-            np.vstack([A[k] for k in used]), np.concatenate([self.trials[k].measured for k in used])
-        )[0]
+        x = np.linalg.lstsq(np.vstack([A[k] for k in used]), np.concatenate([self.trials[k].measured for k in used]))[0]
         left = {role: [] for role in ("fit", "held-out")}
         for trial, columns in zip(self.trials, A, strict=True):
             left[trial.role].append(float(np.sqrt(np.mean((trial.measured - columns @ x) ** 2))))
@@ -102,9 +100,7 @@ class Screen:
 
     def best(self, laws, taken):
         """Of several laws, the one that leaves least of the fitted trials beside those that are taken."""
-        return min(
-            (law for law in laws if law not in taken), key=lambda law: self.fit([*taken, law])[1]["fit"][0]
-        )
+        return min((law for law in laws if law not in taken), key=lambda law: self.fit([*taken, law])[1]["fit"][0])
 
 
 def suspects(joint_order=(), **shapes):

@@ -108,9 +108,7 @@ def test_the_reports_residual_is_what_gravity_and_inertia_leave(wheel):
     """In the transducer's axes, which turn, where all filters know enough."""
     _, _, after = wheel.before_and_after("baseline_2")
     left = _rms(after[wheel.valid("baseline_2")])
-    merits = {
-        m.channel: m for m in wheel.results.merit if (m.recording, m.band) == ("baseline_2", "unfiltered")
-    }
+    merits = {m.channel: m for m in wheel.results.merit if (m.recording, m.band) == ("baseline_2", "unfiltered")}
     for index, channel in enumerate(WRENCH_CHANNELS):
         assert merits[channel].residual_rms == pytest.approx(left[index], rel=1e-6)
 
@@ -123,9 +121,7 @@ def test_held_out_recordings_of_the_wheel_are_tared_by_themselves_not_by_the_pus
     free = hand_free(read_run(wheel.campaign, wheel.campaign.recording("propulsion_1")))
     for index, channel in enumerate(tared["propulsion_1"].channels):
         constant = after[free, index].mean()
-        print(
-            f"  {channel.channel}: hand-free {constant:.3f}, all {after[:, index].mean():.3f} {channel.unit}"
-        )
+        print(f"  {channel.channel}: hand-free {constant:.3f}, all {after[:, index].mean():.3f} {channel.unit}")
         assert abs(constant) < 3.0 * channel.sigma
 
 

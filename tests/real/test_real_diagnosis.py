@@ -50,9 +50,7 @@ def left(outcome: Outcome) -> tuple[Array, Array]:
         trial = experiment.trials[k]
         shown = known.shown[trial.drive].values, standing.shown(k)
         low = butter(2, 2.0 * BAND_HZ * experiment.dt, output="sos")
-        rows.append(
-            [float(np.std(sosfiltfilt(low, trial.measured - one, axis=0)[trial.valid, 0])) for one in shown]
-        )
+        rows.append([float(np.std(sosfiltfilt(low, trial.measured - one, axis=0)[trial.valid, 0])) for one in shown])
     before, after = np.array(rows).T
     return before, after
 

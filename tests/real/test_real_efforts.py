@@ -22,12 +22,7 @@ pytestmark = pytest.mark.skipif(
 )
 
 EMPS_S, ODRIVE_S = 24.8, 9.5
-EMPS = {
-    0: 10.12,
-    1: 3.06,
-    2: 2.66,
-    3: 2.51,
-}  # N: viscous, + Coulomb and offset, + asymmetric viscous, + Stribeck
+EMPS = {0: 10.12, 1: 3.06, 2: 2.66, 3: 2.51}  # N: viscous, + Coulomb and offset, + asymmetric viscous, + Stribeck
 ODRIVE = {0: 0.61, 1: 0.262, 4: 0.134, 12: 0.094}  # A, by the number of orders of the angle
 FRICTION = ("asymmetric_coulomb", "asymmetric_viscous", "stribeck")
 
@@ -56,10 +51,7 @@ def test_mass_and_viscous_friction_leave_of_the_axis_what_a_plain_fit_leaves(axi
     )
     assert left[0] < EMPS[0] < left[1] < 1.02 * EMPS[0]
     fitted = {entry.name: entry for entry in axis.results.gravity.parameters}
-    assert set(fitted) == {
-        "body.car.mass",
-        "joint.axis.viscous",
-    }  # nothing else was free, no zero of the force either
+    assert set(fitted) == {"body.car.mass", "joint.axis.viscous"}  # nothing else was free, no zero of the force either
     mass = fitted["body.car.mass"]
     assert abs(mass.value - 95.1089) < mass.sigma  # as published
 
@@ -76,13 +68,7 @@ def test_inertia_and_viscous_friction_leave_of_the_motor_what_a_plain_fit_leaves
 
 def test_the_report_of_a_rig_without_a_transducer_is_silent_about_it(axis):
     page = (axis.target / "index.html").read_text(encoding="utf-8")
-    for section in (
-        "Cross-coupling",
-        "Static wrench",
-        "Transducer resonance",
-        "Signs and frames",
-        "Pointing",
-    ):
+    for section in ("Cross-coupling", "Static wrench", "Transducer resonance", "Signs and frames", "Pointing"):
         assert f">{section}<" not in page
     assert "Fit of the rigid bodies" in page
     assert axis.results.cross_coupling is None
@@ -105,8 +91,7 @@ def test_the_catalogue_has_the_friction_of_the_axis(axis):
         taken, left = _grown(Screen(axis.campaign, band, known), laws, 3)
         names = ["viscous", *(law.effect.name for law in taken)]
         rows = [
-            f"{name} {figures[0]:.2f} ({EMPS[k]})"
-            for k, (name, figures) in enumerate(zip(names, left, strict=True))
+            f"{name} {figures[0]:.2f} ({EMPS[k]})" for k, (name, figures) in enumerate(zip(names, left, strict=True))
         ]
         print(f"\nEMPS, pulses from sweeps, {band}, of {len(laws)} suspects, N (known): " + ", + ".join(rows))
         assert tuple(names[1:]) == FRICTION

@@ -78,9 +78,7 @@ def one_channel(folder: Path) -> Path:
         _spectrum(folder, name, ("Tz",), rng, predicted=True)
         _band(folder, name, BANDS[0], "T", 30.0, ("Tz",), rng)
     recordings = tuple(_recording(name, "trial", "held-out", 1, 30.0, ()) for name in names)
-    merit = tuple(
-        _merit(name, "held-out", "unfiltered", "T", "Tz", index) for index, name in enumerate(names)
-    )
+    merit = tuple(_merit(name, "held-out", "unfiltered", "T", "Tz", index) for index, name in enumerate(names))
     _write(
         folder,
         r.Results(
@@ -91,9 +89,7 @@ def one_channel(folder: Path) -> Path:
                 configuration="",
                 drive="motion",
             ),
-            verdict=r.Conclusion(
-                status="none", sentence="No requirement is stated; three trials were compared."
-            ),
+            verdict=r.Conclusion(status="none", sentence="No requirement is stated; three trials were compared."),
             provenance=PROVENANCE,
             recordings=recordings,
             bands=BANDS[:1],
@@ -106,9 +102,7 @@ def one_channel(folder: Path) -> Path:
 
 def command_results() -> r.Results:
     """Return the contents of a complete results.json."""
-    loss = r.LossEntry(
-        kind="gap", where="EL089P00_1.mcap /transducer/wrench", count=412, start_s=63.2, end_s=63.612
-    )
+    loss = r.LossEntry(kind="gap", where="EL089P00_1.mcap /transducer/wrench", count=412, start_s=63.2, end_s=63.612)
     recordings = tuple(
         _recording(name, trajectory, role, repeat, duration, (loss,) if name == "EL089P00_1" else ())
         for name, trajectory, role, repeat, duration in RUNS
@@ -147,12 +141,8 @@ def command_results() -> r.Results:
         recordings=recordings,
         conventions=(
             r.Convention(check="sign of gravity", expected="Fz < 0 at rest", found="Fz = −274.6 N", ok=True),
-            r.Convention(
-                check="Ty follows elevation", expected="slope > 0", found="slope +4.1 N m/rad", ok=True
-            ),
-            r.Convention(
-                check="taring", expected="raw mean of Fz near the weight", found="0.4 N apart", ok=True
-            ),
+            r.Convention(check="Ty follows elevation", expected="slope > 0", found="slope +4.1 N m/rad", ok=True),
+            r.Convention(check="taring", expected="raw mean of Fz near the weight", found="0.4 N apart", ok=True),
         ),
         gravity=_gravity_result(),
         cross_coupling=_coupling(),
@@ -197,9 +187,7 @@ def command_results() -> r.Results:
                     np.sqrt(
                         sum(
                             item.sigma**2
-                            for item in _contributions(
-                                SCALE[channel] * (0.08 if band == "lt1Hz" else 0.11), index
-                            )
+                            for item in _contributions(SCALE[channel] * (0.08 if band == "lt1Hz" else 0.11), index)
                         )
                     )
                 ),
@@ -212,13 +200,7 @@ def command_results() -> r.Results:
         methods="Recordings were condensed to 20 Hz by a linear-phase Kaiser FIR (gain error at most 1e-5).\n\n"
         "Gravity was fitted over three recordings and subtracted; the residual was band-passed.",
         parameters=(
-            r.Constant(
-                name="body.antenna.mass",
-                value=14.0,
-                unit="kg",
-                sigma=0.05,
-                source="weighed, dummy data sheet",
-            ),
+            r.Constant(name="body.antenna.mass", value=14.0, unit="kg", sigma=0.05, source="weighed, dummy data sheet"),
             r.Constant(
                 name="transducer.cross_coupling",
                 value="6 x 6, see Cross-coupling",
@@ -328,12 +310,7 @@ def _gravity_result() -> r.Gravity:
     return r.Gravity(
         parameters=(
             r.FittedParameter(
-                name="body.antenna.mass",
-                unit="kg",
-                prior=14.0,
-                prior_sigma=0.05,
-                value=14.021,
-                sigma=0.0041,
+                name="body.antenna.mass", unit="kg", prior=14.0, prior_sigma=0.05, value=14.021, sigma=0.0041
             ),
             *(
                 r.FittedParameter(
@@ -344,25 +321,13 @@ def _gravity_result() -> r.Gravity:
                     value=value + shift,
                     sigma=0.00012,
                 )
-                for axis, value, shift in zip(
-                    cog, (0.07, 0.06, -0.02), (0.0021, -0.0008, 0.0131), strict=True
-                )
+                for axis, value, shift in zip(cog, (0.07, 0.06, -0.02), (0.0021, -0.0008, 0.0131), strict=True)
             ),
             r.FittedParameter(
-                name="transducer.tilt[x]",
-                unit="rad",
-                prior=0.0,
-                prior_sigma=0.003,
-                value=0.00087,
-                sigma=0.00002,
+                name="transducer.tilt[x]", unit="rad", prior=0.0, prior_sigma=0.003, value=0.00087, sigma=0.00002
             ),
             r.FittedParameter(
-                name="transducer.bias[Fz]",
-                unit="N",
-                prior=None,
-                prior_sigma=None,
-                value=0.412,
-                sigma=0.013,
+                name="transducer.bias[Fz]", unit="N", prior=None, prior_sigma=None, value=0.412, sigma=0.013
             ),
         ),
         channels=tuple(
@@ -380,9 +345,7 @@ def _gravity_result() -> r.Gravity:
             r.Check(name="condition", ok=True, detail="condition number 41 of 1e6"),
             r.Check(name="residual", ok=True, detail="reduced chi-square 1.04"),
             r.Check(
-                name="priors",
-                ok=False,
-                detail="body.antenna.cog[z] moved 2.6 prior sigma; weigh the antenna again",
+                name="priors", ok=False, detail="body.antenna.cog[z] moved 2.6 prior sigma; weigh the antenna again"
             ),
         ),
         samples=26000,
@@ -422,9 +385,7 @@ def _valid(t: np.ndarray, name: str) -> np.ndarray:
     return ~((t > 63.2) & (t < 64.6)) if name == "EL089P00_1" else np.ones(len(t), dtype=bool)
 
 
-def _gravity(
-    folder: Path, name: str, duration: float, channels: tuple[str, ...], rng: np.random.Generator
-) -> None:
+def _gravity(folder: Path, name: str, duration: float, channels: tuple[str, ...], rng: np.random.Generator) -> None:
     t = _time(duration)
     columns: dict[str, np.ndarray] = {"t": t, "valid": _valid(t, name)}
     for channel in channels:
@@ -459,9 +420,7 @@ def _band(
     _table(folder / "tables" / kind / f"{name}.{band.name}.parquet", name, frame, columns)
 
 
-def _spectrum(
-    folder: Path, name: str, channels: tuple[str, ...], rng: np.random.Generator, *, predicted: bool
-) -> None:
+def _spectrum(folder: Path, name: str, channels: tuple[str, ...], rng: np.random.Generator, *, predicted: bool) -> None:
     f = np.arange(1, 4001) * 0.05
     columns = {"f": f}
     for channel in channels:

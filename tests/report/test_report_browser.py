@@ -81,9 +81,7 @@ class Browser:
 
     def open(self, page: Path, width: int) -> None:
         """Open a page and scroll through it, so that every figure is drawn."""
-        self.call(
-            "Emulation.setDeviceMetricsOverride", width=width, height=900, deviceScaleFactor=1, mobile=False
-        )
+        self.call("Emulation.setDeviceMetricsOverride", width=width, height=900, deviceScaleFactor=1, mobile=False)
         self.call("Page.navigate", url=page.as_uri())
         self.evaluate(
             "new Promise(done => document.readyState === 'complete' ? done() : addEventListener('load', done))"
@@ -145,9 +143,7 @@ def test_the_page_renders_without_error_or_overflow(opened: Callable[[int], Brow
     browser = opened(width)
     assert browser.evaluate("document.documentElement.scrollWidth") <= width
     assert browser.evaluate(PREPARED) == 12
-    assert browser.evaluate(
-        "[...document.images].every(i => i.complete && (i.naturalWidth || !i.offsetParent))"
-    )
+    assert browser.evaluate("[...document.images].every(i => i.complete && (i.naturalWidth || !i.offsetParent))")
     assert browser.complaints == []
 
 
@@ -159,9 +155,7 @@ def test_one_channel_renders_too(browser: Browser, one_channel: Path) -> None:
     assert browser.complaints == []
 
 
-def test_plots_take_the_place_of_plates_on_screen_and_give_it_back_on_paper(
-    opened: Callable[[int], Browser],
-) -> None:
+def test_plots_take_the_place_of_plates_on_screen_and_give_it_back_on_paper(opened: Callable[[int], Browser]) -> None:
     browser = opened(1280)
     displays = "['.live', '.plates'].map(s => getComputedStyle(document.querySelector(s)).display)"
     assert browser.evaluate(displays) == ["block", "none"]
@@ -170,26 +164,16 @@ def test_plots_take_the_place_of_plates_on_screen_and_give_it_back_on_paper(
     browser.call("Emulation.setEmulatedMedia", media="")
 
 
-def test_zooming_one_channel_zooms_all_and_another_recording_can_be_chosen(
-    opened: Callable[[int], Browser],
-) -> None:
+def test_zooming_one_channel_zooms_all_and_another_recording_can_be_chosen(opened: Callable[[int], Browser]) -> None:
     browser = opened(1280)
     axes = "[...document.querySelectorAll('.live')[0].querySelectorAll('.u-over')]"
     browser.evaluate(f"{axes}[0].scrollIntoView({{block: 'center', behavior: 'instant'}})")
-    box = browser.evaluate(
-        f"(() => {{ const r = {axes}[0].getBoundingClientRect(); return [r.x, r.y, r.width]; }})()"
-    )
+    box = browser.evaluate(f"(() => {{ const r = {axes}[0].getBoundingClientRect(); return [r.x, r.y, r.width]; }})()")
     before = _pixels(browser)
     x, y, width = box
     for kind, at in (("mousePressed", 0.3), ("mouseMoved", 0.4), ("mouseMoved", 0.5), ("mouseReleased", 0.5)):
         browser.call(
-            "Input.dispatchMouseEvent",
-            type=kind,
-            x=x + at * width,
-            y=y + 30,
-            button="left",
-            buttons=1,
-            clickCount=1,
+            "Input.dispatchMouseEvent", type=kind, x=x + at * width, y=y + 30, button="left", buttons=1, clickCount=1
         )
     browser.evaluate("new Promise(done => setTimeout(done, 200))")
     after = _pixels(browser)
@@ -212,15 +196,8 @@ def test_a_mark_gives_differences(opened: Callable[[int], Browser]) -> None:
     over = "document.querySelector('.live .u-over')"
     browser.evaluate(f"{over}.scrollIntoView({{block: 'center', behavior: 'instant'}})")
     x, y = browser.evaluate(f"(() => {{ const r = {over}.getBoundingClientRect(); return [r.x, r.y]; }})()")
-    for kind, place in (
-        ("mouseMoved", 200),
-        ("mousePressed", 200),
-        ("mouseReleased", 200),
-        ("mouseMoved", 420),
-    ):
-        browser.call(
-            "Input.dispatchMouseEvent", type=kind, x=x + place, y=y + 30, button="left", clickCount=1
-        )
+    for kind, place in (("mouseMoved", 200), ("mousePressed", 200), ("mouseReleased", 200), ("mouseMoved", 420)):
+        browser.call("Input.dispatchMouseEvent", type=kind, x=x + place, y=y + 30, button="left", clickCount=1)
     reading = browser.evaluate("document.querySelector('.reading').textContent")
     assert reading.startswith("From the mark: Δt ")
     assert "ΔTz" in reading

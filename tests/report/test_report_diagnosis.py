@@ -45,11 +45,7 @@ def find() -> d.Find:
         probability=0.93,
         distance=310.0,
         absorbed=0.2,
-        rivals=(
-            d.Rival(
-                name="dahl", family="friction", place=place, distance=2.1, probability=0.06, simulated=True
-            ),
-        ),
+        rivals=(d.Rival(name="dahl", family="friction", place=place, distance=2.1, probability=0.06, simulated=True),),
         gate=(d.Gated(recording="run_2", role="held-out", before=3.0, after=1.02, gain=900.0),),
         curve=d.Curve(
             regressor="angle of el",
@@ -174,9 +170,7 @@ def test_where_the_residual_lives_is_a_map_of_each_trajectory(tmp_path: Path) ->
     columns = {"t": t, "f": f, "before": 1.0 + 9.0 * (f > 5.0), "after": size, "significant": f > 5.0}
     columns = {name: np.asarray(values, dtype=float) for name, values in columns.items()}
     units = dict.fromkeys(columns, "1")
-    write_table(
-        tmp_path / "tables" / "residual_map" / "SWEEP.parquet", columns, units, frame="T", recording="run_1"
-    )
+    write_table(tmp_path / "tables" / "residual_map" / "SWEEP.parquet", columns, units, frame="T", recording="run_1")
     told = page(tmp_path, results(find()))
     assert "Where the residual lives" in told
     assert "before at most 10" in told.replace("\u00a0", " ")

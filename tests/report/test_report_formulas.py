@@ -23,9 +23,7 @@ def shown(law: Effect | Sensing) -> str:
 
 
 @pytest.mark.parametrize("law", EVERY, ids=lambda law: law.name)
-def test_every_law_has_an_equation_that_can_be_drawn(
-    law: Effect | Sensing, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_every_law_has_an_equation_that_can_be_drawn(law: Effect | Sensing, caplog: pytest.LogCaptureFixture) -> None:
     parts = equation(shown(law)).parts
     formulas = [part for part in parts if isinstance(part, Formula)]
     assert formulas

@@ -137,9 +137,7 @@ def test_nothing_is_loaded_from_elsewhere(page: Page) -> None:
 
 def test_the_policy_allows_the_pages_own_code_and_nothing_else(page: Page) -> None:
     policy = next(
-        str(entry["content"])
-        for entry in page.all("meta")
-        if entry.get("http-equiv") == "Content-Security-Policy"
+        str(entry["content"]) for entry in page.all("meta") if entry.get("http-equiv") == "Content-Security-Policy"
     )
     rules = dict(rule.split(" ", 1) for rule in policy.split("; "))
     assert rules["default-src"] == "'none'"
@@ -200,9 +198,7 @@ def test_hostile_data_cannot_leave_its_script_element(tmp_path: Path) -> None:
 def test_the_same_results_give_the_same_bytes_in_another_process(one_channel: Path, tmp_path: Path) -> None:
     folder = sample.one_channel(tmp_path)
     code = "import sys, pathlib; from kbs_process.studies.documents import render; render(pathlib.Path(sys.argv[1]))"
-    subprocess.run(
-        [sys.executable, "-c", code, folder], check=True, env={**os.environ, "PYTHONHASHSEED": "2"}
-    )
+    subprocess.run([sys.executable, "-c", code, folder], check=True, env={**os.environ, "PYTHONHASHSEED": "2"})
     assert (folder / "index.html").read_bytes() == one_channel.read_bytes()
     if paper.available():
         other = (folder / "report.pdf").read_bytes()
@@ -212,9 +208,7 @@ def test_the_same_results_give_the_same_bytes_in_another_process(one_channel: Pa
         assert other.rstrip().endswith(b"%%EOF")
 
 
-def test_a_demanded_pdf_without_weasyprint_is_refused(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_a_demanded_pdf_without_weasyprint_is_refused(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     (tmp_path / "results.json").write_bytes(r.encode(sample.command_results()))
     monkeypatch.setitem(sys.modules, "weasyprint", None)
     with pytest.raises(OutputError, match="no PDF without weasyprint") as caught:

@@ -30,9 +30,7 @@ def test_the_committed_schema_is_the_one_of_the_records(kind: str) -> None:
 
 @pytest.mark.parametrize("kind", DOCUMENTS)
 def test_results_say_of_what_kind_they_are(kind: str) -> None:
-    assert {field.name: field.default for field in msgspec.structs.fields(DOCUMENTS[kind].record)}[
-        "kind"
-    ] == kind
+    assert {field.name: field.default for field in msgspec.structs.fields(DOCUMENTS[kind].record)}["kind"] == kind
 
 
 def test_the_sample_satisfies_the_schema_and_survives_a_round_trip() -> None:

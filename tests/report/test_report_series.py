@@ -67,9 +67,7 @@ def _scene(n: int, curves: int) -> views.Scene:
 def test_curves_share_the_pages_budget() -> None:
     scenes = [_scene(1000, 3), _scene(50_000, 6)]
     short, long = views.views(scenes, budget=20_000)
-    lengths = [
-        len(base64.b64decode(str(c.curves[0]["codes"]))) // 2 for c in (*short.channels, *long.channels)
-    ]
+    lengths = [len(base64.b64decode(str(c.curves[0]["codes"]))) // 2 for c in (*short.channels, *long.channels)]
     assert lengths[:3] == [1000] * 3, "a short recording is kept sample by sample"
     assert sum(lengths) <= 20_000 * 1.02
     assert short.bin_s is None

@@ -40,9 +40,7 @@ def joint(
     at = f"joint.{name}"
     encoder = None
     if step is not None:
-        encoder = Encoder(
-            quantity(f"{at}.encoder.step", step), quantity(f"{at}.encoder.offset", 0.0, s_offset)
-        )
+        encoder = Encoder(quantity(f"{at}.encoder.step", step), quantity(f"{at}.encoder.offset", 0.0, s_offset))
     drive = None
     if rotor is not None:
         drive = Drive(

@@ -91,9 +91,7 @@ def test_the_outermost_slide_carries_its_own_weight_and_mass():
 def test_wrench_of_a_pointing_mechanism_holds_what_its_azimuth_drive_puts_in():
     """About the azimuth axis the transducer feels the reaction of the drive, and of the rotor that the drive turns."""
     rig = pointing_rig(stiffness=None, rotor=None)
-    rig = replace(
-        rig, joints=tuple(replace(one, misalignment=quantity("m", [0.0] * 3)) for one in rig.joints)
-    )
+    rig = replace(rig, joints=tuple(replace(one, misalignment=quantity("m", [0.0] * 3)) for one in rig.joints))
     _, q, qd, qdd = smooth_motion(2)
     torque = inverse_dynamics(rig, q, qd, qdd)[:, 5]
     np.testing.assert_allclose(joint_efforts(rig, q, qd, qdd)[:, 0], -torque, atol=1e-12)

@@ -119,12 +119,8 @@ def _mujoco_model(rig):
         '<body quat="{quat}"><inertial pos="0 0 0" mass="1e-9" diaginertia="{inertia}"/>'
         '<joint name="{name}" axis="{axis}"/></body>'
     )
-    r_az = rotor.format(
-        quat=quat(j_az.misalignment.value), inertia=f"1e-5 1e-5 {Jr}", name="r_az", axis="0 0 1"
-    )
-    r_el = rotor.format(
-        quat=quat(j_el.misalignment.value), inertia=f"1e-5 {Jr} 1e-5", name="r_el", axis="0 -1 0"
-    )
+    r_az = rotor.format(quat=quat(j_az.misalignment.value), inertia=f"1e-5 1e-5 {Jr}", name="r_az", axis="0 0 1")
+    r_el = rotor.format(quat=quat(j_el.misalignment.value), inertia=f"1e-5 {Jr} 1e-5", name="r_el", axis="0 -1 0")
     hold = "".join(f'<joint type="slide" axis="{a}"/>' for a in ("1 0 0", "0 1 0", "0 0 1"))
     hold += "".join(f'<joint type="hinge" axis="{a}"/>' for a in ("1 0 0", "0 1 0", "0 0 1"))
     pos_az, pos_el = (" ".join(map(str, j.origin.value)) for j in rig.joints)

@@ -24,9 +24,7 @@ POSE = np.radians([0.0, 30.0])
 
 def controller(Kp: float, Ki: float, latency: int, cycle: float = 0.1) -> Controller:
     def quantity(name: str, value: Any) -> Quantity:
-        return Quantity(
-            f"controller.{name}", np.asarray(value), "SI", np.zeros_like(np.asarray(value)), "test"
-        )
+        return Quantity(f"controller.{name}", np.asarray(value), "SI", np.zeros_like(np.asarray(value)), "test")
 
     return Controller(quantity("cycle", cycle), "closed", quantity("Kp", [Kp]), quantity("Ki", [Ki]), latency)
 
@@ -46,11 +44,7 @@ def flexible() -> tuple[Linear, Controller]:
 
 
 def test_what_is_without_friction_has_none_of_any_law() -> None:
-    laws = {
-        "coulomb": {"coulomb": 0.5},
-        "joint_viscous": {"joint_viscous": 3.0},
-        "motor_order": {"order_sin": 0.01},
-    }
+    laws = {"coulomb": {"coulomb": 0.5}, "joint_viscous": {"joint_viscous": 3.0}, "motor_order": {"order_sin": 0.01}}
     rig = two_axis()
     for name, values in laws.items():
         effect = next(one for one in CATALOGUE if one.name == name)

@@ -22,9 +22,7 @@ def test_a_campaign_is_analysed_and_reported(tmp_path: Path, monkeypatch: pytest
     monkeypatch.setattr(stability, "_SIMULATED", 1)
     campaign = load_campaign(ROOT / "campaigns" / "EL089", checksums=False)
     settings = {"joint": None, "low_deg": 0.0, "high_deg": 80.0, "points": 2}
-    outcome = stability.analyse_stability(
-        campaign, tmp_path / "out", **settings, progress=SilentProgress(), pdf=False
-    )
+    outcome = stability.analyse_stability(campaign, tmp_path / "out", **settings, progress=SilentProgress(), pdf=False)
     assert outcome.requirement_met
     assert "keeps the customary margins" in outcome.verdict_lines[0]
     results = json.loads((tmp_path / "out" / "results.json").read_text())

@@ -72,11 +72,7 @@ def test_the_solution_is_that_of_a_general_banded_solver(n: int) -> None:
     expected = np.zeros_like(x)
     if n > 2:
         band = np.zeros((3, n - 2))
-        band[0], band[1, : n - 3], band[2, : max(n - 4, 0)] = (
-            6.0 + (2.0 * np.sin(np.pi * 0.01 * DT)) ** 4,
-            -4.0,
-            1.0,
-        )
+        band[0], band[1, : n - 3], band[2, : max(n - 4, 0)] = (6.0 + (2.0 * np.sin(np.pi * 0.01 * DT)) ** 4, -4.0, 1.0)
         z = solveh_banded(band[: min(3, n - 2)], np.diff(x, 2, axis=0), lower=True)
         expected[:-2] += z
         expected[1:-1] -= 2.0 * z

@@ -25,9 +25,7 @@ def nothing(t: np.ndarray) -> np.ndarray:
 
 def pair(offset: float, skew: float, start: float, latency: float, seed: int, rate: float = 100.0) -> Clock:
     reference = read(stream(nothing, 1000.0, 200.0, skew=-12e-6, seed=seed))
-    other = read(
-        stream(nothing, rate, 200.0, start=start, offset=offset, skew=skew, latency=latency, seed=seed + 1)
-    )
+    other = read(stream(nothing, rate, 200.0, start=start, offset=offset, skew=skew, latency=latency, seed=seed + 1))
     return align({"wrench": reference, "angle": other}, "wrench")["angle"]
 
 
@@ -70,9 +68,7 @@ def test_streams_of_one_clock_stay_together() -> None:
     assert clocks["command"].source == "same as angle"
     assert clocks["command"].skew == clocks["angle"].skew
     lead = (command.first_stamp - encoder.first_stamp) * 1e-9
-    assert (
-        abs(clocks["command"].offset_s - clocks["angle"].offset_s - lead * (1 + clocks["angle"].skew)) < 1e-12
-    )
+    assert abs(clocks["command"].offset_s - clocks["angle"].offset_s - lead * (1 + clocks["angle"].skew)) < 1e-12
 
 
 def test_synchronised_sensors_are_left_as_they_are() -> None:

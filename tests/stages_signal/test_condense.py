@@ -138,26 +138,17 @@ def test_what_comes_too_late_to_be_put_in_order_is_a_loss() -> None:
 @pytest.mark.parametrize(
     ("stream_key", "column", "first", "words"),
     [
-        (
-            "wrench",
-            2,
-            0,
-            ("run.mcap: wrench: none of 60000 samples", "NaN or infinite: Fz in 60000", "channels"),
-        ),
+        ("wrench", 2, 0, ("run.mcap: wrench: none of 60000 samples", "NaN or infinite: Fz in 60000", "channels")),
         ("wrench", 2, 100, ("100 of 60000 samples", "Fz in 59900", "20 Hz need")),
         ("angle", 0, 0, ("run.mcap: encoder: none of 6200", "az in 6200", "`joints` of [topics.encoder]")),
         ("command", 1, 0, ("run.mcap: command: none of 620", "el in 620", "record the commands")),
     ],
 )
-def test_a_channel_without_numbers_is_named(
-    stream_key: str, column: int, first: int, words: tuple[str, ...]
-) -> None:
+def test_a_channel_without_numbers_is_named(stream_key: str, column: int, first: int, words: tuple[str, ...]) -> None:
     streams = recording()
     streams[stream_key].values[first:, column] = np.nan
     with pytest.raises(RecordingError) as caught:
-        condense(
-            "run", streams.items(), {key: CHANNELS[key] for key in streams}, SETTINGS, file="/data/run.mcap"
-        )
+        condense("run", streams.items(), {key: CHANNELS[key] for key in streams}, SETTINGS, file="/data/run.mcap")
     for word in words:
         assert word in str(caught.value)
     assert "record longer" not in str(caught.value)
@@ -240,9 +231,7 @@ def test_an_absolute_encoder_is_followed_through_full_turns() -> None:
     def turning(t: np.ndarray) -> np.ndarray:
         return np.column_stack((np.mod(2.0 * t, 2.0 * np.pi), np.mod(-3.0 * t, 2.0 * np.pi)))
 
-    run = condense(
-        "wheel", [("angle", stream(turning, 240.0, 30.0))], {"angle": ("wheel", "other")}, SETTINGS
-    )
+    run = condense("wheel", [("angle", stream(turning, 240.0, 30.0))], {"angle": ("wheel", "other")}, SETTINGS)
     assert run.angle is not None and run.wrench is None and run.spectrum is None and run.encoder is None
     np.testing.assert_allclose(run.angle.values[50:-50, 0], 2.0 * run.angle.t[50:-50], atol=1e-4)
     np.testing.assert_allclose(
@@ -268,10 +257,7 @@ def test_a_joint_that_slides_is_no_angle() -> None:
 
 
 def test_a_stream_that_begins_late_is_flagged_until_it_does() -> None:
-    streams = {
-        "wrench": stream(wrench, 1000.0, 40.0),
-        "angle": stream(angles, 100.0, 20.0, start=10.0),
-    }
+    streams = {"wrench": stream(wrench, 1000.0, 40.0), "angle": stream(angles, 100.0, 20.0, start=10.0)}
     run = run_of(streams)
     assert run.angle is not None
     t, valid = run.angle.t, run.angle.valid

@@ -71,11 +71,7 @@ def test_interpolation_between_samples_errs_by_what_is_stated(rate: float, state
     u = np.arange(5000) * (1.0 + 2e-4)  # slips a whole period against the grid: every phase occurs
     x = np.cos(2.0 * np.pi * 8.0 / rate * u)[:, None]
     regrid = Regridder(Grid(0, 1e9 / rate))
-    pieces = [
-        p
-        for start in range(0, 5000, 700)
-        for p in regrid.push(u[start : start + 700], x[start : start + 700])
-    ]
+    pieces = [p for start in range(0, 5000, 700) for p in regrid.push(u[start : start + 700], x[start : start + 700])]
     pieces += list(regrid.flush())
     y = np.concatenate([rows for rows, _ in pieces])[5:-5, 0]
     error = np.abs(y - np.cos(2.0 * np.pi * 8.0 / rate * np.arange(5, 5 + len(y))))

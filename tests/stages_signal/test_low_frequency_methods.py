@@ -93,9 +93,7 @@ def coloured(slope: float, rng: np.random.Generator, columns: int) -> np.ndarray
 def ramps(rng: np.random.Generator, columns: int) -> np.ndarray:
     """The sine of an elevation that goes from 70 to 87 deg at 0.3 deg/s and back, every 400 s."""
     t = (DT * np.arange(LONG)[:, None] + rng.uniform(0.0, 400.0, columns)) % 400.0
-    return np.sin(
-        np.deg2rad(70.0 + 17.0 * (np.clip((t - 70.0) / 57.0, 0, 1) - np.clip((t - 270.0) / 57.0, 0, 1)))
-    )
+    return np.sin(np.deg2rad(70.0 + 17.0 * (np.clip((t - 70.0) / 57.0, 0, 1) - np.clip((t - 270.0) / 57.0, 0, 1))))
 
 
 def low_pass(x: np.ndarray) -> np.ndarray:

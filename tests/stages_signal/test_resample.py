@@ -56,9 +56,7 @@ def test_the_impulse_response_is_symmetric(rate: float) -> None:
 
 def test_filter_and_time_reversal_commute() -> None:
     x = np.random.default_rng(3).normal(size=(10_001, 2)).cumsum(axis=0)
-    np.testing.assert_allclose(
-        resample(x[::-1], 1000.0, WORKING), resample(x, 1000.0, WORKING)[::-1], atol=1e-10
-    )
+    np.testing.assert_allclose(resample(x[::-1], 1000.0, WORKING), resample(x, 1000.0, WORKING)[::-1], atol=1e-10)
 
 
 def test_constants_pass_exactly_and_trends_continue_at_the_ends() -> None:

@@ -50,12 +50,7 @@ def test_a_short_recording_gets_a_coarser_spectrum() -> None:
 
 
 @settings(max_examples=40, deadline=None)
-@given(
-    n=st.integers(1, 3000),
-    stretches=st.integers(2, 64),
-    seed=st.integers(0, 99),
-    mean=st.floats(1.0, 500.0),
-)
+@given(n=st.integers(1, 3000), stretches=st.integers(2, 64), seed=st.integers(0, 99), mean=st.floats(1.0, 500.0))
 def test_the_envelope_is_exact_bounded_and_independent_of_the_pieces(
     n: int, stretches: int, seed: int, mean: float
 ) -> None:

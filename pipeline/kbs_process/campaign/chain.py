@@ -10,9 +10,7 @@ from kbs_process.errors import did_you_mean
 from kbs_process.rig.model import LAB, TRANSDUCER
 
 
-def order(
-    joints: Mapping[str, Tree], transducer_on: str | None, tables: Merged, problems: Problems
-) -> tuple[str, ...]:
+def order(joints: Mapping[str, Tree], transducer_on: str | None, tables: Merged, problems: Problems) -> tuple[str, ...]:
     """Return the names of the joints from the laboratory outwards; a rig without a transducer is a chain of joints.
 
     Notes a parent that does not exist, two links on one parent, and links that do not lead to the laboratory.
@@ -24,9 +22,7 @@ def order(
     places[TRANSDUCER] = ("transducer", "on")
 
     for reserved in {LAB, TRANSDUCER} & set(joints):
-        problems.add(
-            tables.place(("joint", reserved)), f"'{reserved}' is a reserved name", "rename the joint"
-        )
+        problems.add(tables.place(("joint", reserved)), f"'{reserved}' is a reserved name", "rename the joint")
     children: dict[str, str] = {}
     for link, parent in parents.items():
         place = tables.place(places[link])

@@ -59,18 +59,12 @@ def _check_drive(campaign: Campaign, document: Document, tables: Merged, problem
             problems.add(place, '"motion" needs measured angles or rates', remedy)
         return
     if topics.command is None:
-        problems.add(
-            place, '"command" needs commands', 'name their topic under [topics], or set drive = "motion"'
-        )
+        problems.add(place, '"command" needs commands', 'name their topic under [topics], or set drive = "motion"')
     if topics.angle is None:
-        problems.add(
-            place, '"command" needs encoder angles to compare with', "name their topic under [topics]"
-        )
+        problems.add(place, '"command" needs encoder angles to compare with', "name their topic under [topics]")
     elif topics.command is not None and topics.angle.topic == topics.command.topic:
         remedy = 'name the topic of what the encoders measure, or set drive = "motion"'
-        problems.add(
-            document.place(("topics", "encoder")), "is the commands' topic: nothing is measured", remedy
-        )
+        problems.add(document.place(("topics", "encoder")), "is the commands' topic: nothing is measured", remedy)
     if not campaign.effects:
         remedy = "name the effects of the nominal model under [model]"
         problems.add(place, '"command" needs a model of the drives', remedy)
@@ -133,9 +127,7 @@ def _check_external(campaign: Campaign, tables: Merged, problems: Problems) -> N
             continue
         if external is None:
             remedy = "say in a parameter file where it acts and how large it is, or leave the effect out"
-            problems.add(
-                tables.place(key), f"is missing, although the model contains '{effect.name}'", remedy
-            )
+            problems.add(tables.place(key), f"is missing, although the model contains '{effect.name}'", remedy)
             continue
         if effect.port is Port.EXTERNAL_FORCE:
             if external.on == LAB:
@@ -152,12 +144,7 @@ def _check_external(campaign: Campaign, tables: Merged, problems: Problems) -> N
 
 
 def _check_parameters(
-    effect: Effect,
-    given: Mapping[str, Quantity],
-    named: bool,
-    key: Key,
-    tables: Merged,
-    problems: Problems,
+    effect: Effect, given: Mapping[str, Quantity], named: bool, key: Key, tables: Merged, problems: Problems
 ) -> None:
     for parameter in effect.parameters:
         place = tables.place((*key, parameter.name))
@@ -242,9 +229,7 @@ def _check_recording(
     if not entry.path.is_file():
         place = document.place((*key, "file"))
         taken = {other.path.resolve() for other in campaign.recordings}
-        problems.add(
-            place, f"the recording '{shown(entry.path)}' does not exist", _neighbour(entry.path, taken)
-        )
+        problems.add(place, f"the recording '{shown(entry.path)}' does not exist", _neighbour(entry.path, taken))
     if entry.start is not None and entry.end is not None and entry.end <= entry.start:
         place = document.place((*key, "end_s"))
         problems.add(place, f"{entry.end:g} is not after start_s, {entry.start:g}", "give a later end")
@@ -266,11 +251,7 @@ def _neighbour(missing: Path, taken: Collection[Path]) -> str:
     others = [path for path in missing.parent.iterdir() if path.is_file()]
     listed = [path.name for path in others if path.resolve() in taken]
     names = [path.name for path in others]
-    return (
-        did_you_mean(missing.name, names, listed)
-        if names
-        else "its folder is empty: put the recordings there"
-    )
+    return did_you_mean(missing.name, names, listed) if names else "its folder is empty: put the recordings there"
 
 
 def _check_checksum(index: int, entry: RecordingEntry, document: Document, problems: Problems) -> None:

@@ -104,11 +104,7 @@ def _added(before: Rig, after: Rig, changed: Mapping[str, Quantity], source: str
     for joint in after.joints:
         if joint.drive is None:
             continue
-        own = {
-            name: found(quantity)
-            for name, quantity in joint.drive.parameters.items()
-            if quantity.name not in known
-        }
+        own = {name: found(quantity) for name, quantity in joint.drive.parameters.items() if quantity.name not in known}
         whole: Tree = {"parameters": own} if own else {}
         for name in _OF_DRIVE:
             quantity: Quantity = getattr(joint.drive, name)
@@ -120,11 +116,7 @@ def _added(before: Rig, after: Rig, changed: Mapping[str, Quantity], source: str
 
 
 def _description(
-    campaign: Campaign,
-    effects: Sequence[str],
-    sensing: Sequence[SensingLaw],
-    files: Sequence[Path],
-    folder: Path,
+    campaign: Campaign, effects: Sequence[str], sensing: Sequence[SensingLaw], files: Sequence[Path], folder: Path
 ) -> Tree:
     """The campaign's description with the corrected model, recordings named from `folder`, all else as it was."""
     document = read(campaign.folder / CAMPAIGN_FILE, role="the campaign's description", remedy=_REMEDY)
@@ -137,8 +129,6 @@ def _description(
     tree["model"] = model | {"effects": list(effects)}
     if sensing:
         tree["model"]["sensing"] = [table_of(law) for law in sensing]
-    tree["recording"] = [
-        recording | {"file": from_here(recording["file"])} for recording in tree.get("recording", [])
-    ]
+    tree["recording"] = [recording | {"file": from_here(recording["file"])} for recording in tree.get("recording", [])]
     tree["parameters"] = {"files": [f"parameters/{path.name}" for path in files]}
     return tree

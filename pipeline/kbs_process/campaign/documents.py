@@ -61,9 +61,7 @@ def read(path: Path, *, role: str, remedy: str) -> Document:
         ) from error
     except OSError as error:
         raise ConfigError(
-            f"cannot be read: {error.strerror}",
-            where=shown(path),
-            remedy="check the file and its permissions",
+            f"cannot be read: {error.strerror}", where=shown(path), remedy="check the file and its permissions"
         ) from error
     try:
         return Document(path, text, tomllib.loads(text))
@@ -89,9 +87,7 @@ def check_finite(document: Document, problems: Problems) -> None:
     """Refuse the NaN and infinities that TOML allows: no number of a campaign may be either."""
     for key, value in _leaves(document.tree):
         if isinstance(value, float) and not math.isfinite(value):
-            problems.add(
-                document.place(key), f"{value} is not a finite number", "give the number, or ask its source"
-            )
+            problems.add(document.place(key), f"{value} is not a finite number", "give the number, or ask its source")
 
 
 def _leaves(node: Any, key: Key = ()) -> Iterator[tuple[Key, Any]]:
@@ -127,9 +123,7 @@ def merge(documents: Sequence[Document], problems: Problems) -> Merged:
         for key in _merge_into(tree, document.tree, ()):
             first = next(other for other in documents[:index] if _depth(other.tree, key) == len(key))
             problems.add(
-                document.place(key),
-                f"is given in {first.place(key)} too",
-                "keep one of the two, delete the other",
+                document.place(key), f"is given in {first.place(key)} too", "keep one of the two, delete the other"
             )
     return Merged(tree, tuple(documents))
 

@@ -19,9 +19,7 @@ from kbs_process.rig.model import Rig
 from kbs_process.signals.records import WRENCH_CHANNELS, WRENCH_UNITS
 
 
-def load_campaign(
-    folder: Path, *, checksums: bool = True, flight: bool = False, recordings: bool = True
-) -> Campaign:
+def load_campaign(folder: Path, *, checksums: bool = True, flight: bool = False, recordings: bool = True) -> Campaign:
     """Read and check the campaign in `folder`.
 
     Raises ConfigError with the file, the key and the remedy of up to five faults. `checksums` says
@@ -32,9 +30,7 @@ def load_campaign(
     folder = folder.absolute()
     problems = Problems(subject=str(folder))
     document = read(
-        folder / CAMPAIGN_FILE,
-        role="the campaign's description",
-        remedy="name a folder that holds a campaign.toml",
+        folder / CAMPAIGN_FILE, role="the campaign's description", remedy="name a folder that holds a campaign.toml"
     )
     check_finite(document, problems)
     _check_schema(document, "campaign", problems)
@@ -45,9 +41,7 @@ def load_campaign(
         tables = _substitute_flight(folder, document, tables, problems)
     known = catalogue_with(document.tree.get("model", {}).get("effects", []))
     units = {effect: {entry.name: entry.unit for entry in effect.parameters} for effect in known}
-    of_drives = {
-        name: unit for effect, own in units.items() if effect.port.of_drive for name, unit in own.items()
-    }
+    of_drives = {name: unit for effect, own in units.items() if effect.port.of_drive for name, unit in own.items()}
     of_rig = {effect.name: own for effect, own in units.items() if not effect.port.of_drive}
     rig = RigBuilder(tables, folder, of_drives, of_rig, problems).build()
     problems.raise_any()
@@ -168,9 +162,7 @@ def _topics(tree: Tree, rig: Rig) -> Topics:
     given = tree.get("encoder")
     listed = given.get("joints", joints) if isinstance(given, dict) else joints
     read = {name: unit for name, unit in joints.items() if name in listed}
-    components = tuple(
-        f"wrench.{'force' if channel[0] == 'F' else 'torque'}.{channel[1]}" for channel in wrench
-    )
+    components = tuple(f"wrench.{'force' if channel[0] == 'F' else 'torque'}.{channel[1]}" for channel in wrench)
 
     def topic(name: str, key: str, fields: tuple[str, ...], units: dict[str, str]) -> Topic | None:
         given = tree.get(name)
@@ -192,10 +184,7 @@ def _topics(tree: Tree, rig: Rig) -> Topics:
         angle=topic("encoder", "angle", tuple(f"position[{name}]" for name in read), read),
         rate=topic("rate", "rate", velocity, rates),
         command=topic(
-            "command",
-            "command",
-            position + velocity,
-            joints | {f"{name}.rate": unit for name, unit in rates.items()},
+            "command", "command", position + velocity, joints | {f"{name}.rate": unit for name, unit in rates.items()}
         ),
         field=topic("field", "field", position, dict.fromkeys(joints, "rad")),
         temperature=topic("temperature", "temperature", ("temperature",), {"temperature": "degC"}),

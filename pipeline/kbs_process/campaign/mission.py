@@ -75,9 +75,7 @@ def load_day(campaign: Campaign) -> Day:
             where=str(campaign.folder / "campaign.toml"),
             remedy="describe [controller] in a parameter file",
         )
-    document = read(
-        campaign.mission, role="the mission file", remedy="correct [mission] file in campaign.toml"
-    )
+    document = read(campaign.mission, role="the mission file", remedy="correct [mission] file in campaign.toml")
     problems = Problems(subject=str(campaign.folder))
     check_finite(document, problems)
     for violation in violations(document.tree, "mission"):
@@ -105,9 +103,7 @@ class _Reader:
         try:
             quantity = read_quantity(name, node, kind, self.document.path.parent)
         except ConfigError as error:
-            self.problems.add(
-                self.document.place((*key, *filter(None, [error.where]))), error.what, error.remedy
-            )
+            self.problems.add(self.document.place((*key, *filter(None, [error.where]))), error.what, error.remedy)
             quantity = Quantity(name, np.ones(kind.shape), kind.unit, np.zeros(kind.shape), "")
         self.found[name] = quantity
         return quantity
@@ -121,9 +117,7 @@ def _day(reader: _Reader, cycle: float) -> Day:
     positive = Kind("s", (), low=0.0, strict=True)
     mission = Mission(
         orbit=_orbit(reader),
-        relays=tuple(
-            Relay(name, reader.number(_ANGLE, "relay", name, "longitude")) for name in tree["relay"]
-        ),
+        relays=tuple(Relay(name, reader.number(_ANGLE, "relay", name, "longitude")) for name in tree["relay"]),
         attitude=reader.quantity(Kind("rad", (3,)), "mounting", "attitude").value,
         yaw_steering=tree["mounting"]["yaw_steering"],
         limits=_limits(reader),
@@ -171,9 +165,7 @@ def _limits(reader: _Reader) -> Limits:
     ranges = {axis: reader.quantity(_PAIR, "limits", axis).value for axis in ("azimuth", "elevation")}
     for axis, (low, high) in ranges.items():
         if not low < high:
-            reader.problems.add(
-                reader.document.place(("limits", axis)), "is empty", "give the lower limit first"
-            )
+            reader.problems.add(reader.document.place(("limits", axis)), "is empty", "give the lower limit first")
     return Limits(
         low=np.array([pair[0] for pair in ranges.values()]),
         high=np.array([pair[1] for pair in ranges.values()]),

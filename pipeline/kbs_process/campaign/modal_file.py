@@ -24,9 +24,7 @@ def read_modal(path: Path, joints: Collection[str]) -> ModalTable:
     Raises ConfigError with the file, the key and the remedy.
     """
     problems = Problems(subject=str(path))
-    document = read(
-        path, role="the modal file", remedy="correct [model] modal in campaign.toml, or add the file"
-    )
+    document = read(path, role="the modal file", remedy="correct [model] modal in campaign.toml, or add the file")
     check_finite(document, problems)
     for violation in violations(document.tree, "modal"):
         problems.add(document.place(violation.key), violation.what, violation.remedy)
@@ -34,9 +32,7 @@ def read_modal(path: Path, joints: Collection[str]) -> ModalTable:
     tree = document.tree
     if tree["joint"] not in joints:
         problems.add(
-            document.place(("joint",)),
-            f"there is no joint '{tree['joint']}'",
-            did_you_mean(tree["joint"], joints),
+            document.place(("joint",)), f"there is no joint '{tree['joint']}'", did_you_mean(tree["joint"], joints)
         )
     _check_poses(document, problems)
     problems.raise_any()
@@ -57,9 +53,7 @@ def _check_poses(document: Document, problems: Problems) -> None:
             )
         angle = _angle(pose)
         if angle in angles:
-            problems.add(
-                document.place(("pose", index, "angle")), "is given twice", "delete one of the two poses"
-            )
+            problems.add(document.place(("pose", index, "angle")), "is given twice", "delete one of the two poses")
         angles.add(angle)
 
 

@@ -61,16 +61,12 @@ def from_csv(path: Path, key: str) -> Array:
     try:
         array = np.loadtxt(path, delimiter=",", ndmin=2)
     except FileNotFoundError as error:
-        raise ConfigError(
-            f"the CSV file '{path}' does not exist", where=key, remedy="check its name"
-        ) from error
+        raise ConfigError(f"the CSV file '{path}' does not exist", where=key, remedy="check its name") from error
     except (ValueError, UnicodeDecodeError) as error:
         remedy = "one row a line, numbers separated by commas, '#' before comments"
         raise ConfigError(f"the CSV file '{path}' is no matrix: {error}", where=key, remedy=remedy) from error
     if not np.isfinite(array).all():
-        raise ConfigError(
-            f"the CSV file '{path}' holds NaN or infinities", where=key, remedy="correct the file"
-        )
+        raise ConfigError(f"the CSV file '{path}' holds NaN or infinities", where=key, remedy="correct the file")
     matrix: Array = array[0] if len(array) == 1 else array
     return matrix
 
@@ -88,9 +84,7 @@ def _shaped(array: Array, kind: Kind, key: str, *, scalar_fills: bool) -> Array:
     wanted = _in_words(kind.shape)
     if kind.channels and len(kind.channels) < len(WRENCH_CHANNELS):
         wanted += f", or {len(kind.channels)}, one for each of {', '.join(kind.channels)}"
-    raise ConfigError(
-        f"is {_in_words(array.shape)}, where {wanted} is expected", where=key, remedy=f"give {wanted}"
-    )
+    raise ConfigError(f"is {_in_words(array.shape)}, where {wanted} is expected", where=key, remedy=f"give {wanted}")
 
 
 def _in_words(shape: tuple[int, ...]) -> str:
@@ -108,23 +102,17 @@ def _scale(unit: str | list[str], kind: Kind) -> Array:
     if unit == kind.unit:
         return np.asarray(1.0)
     if kind.unit == PAIRWISE:
-        raise ConfigError(
-            f"unit '{unit}' is not known here", where="unit", remedy=f'give unit = "{PAIRWISE}"'
-        )
+        raise ConfigError(f"unit '{unit}' is not known here", where="unit", remedy=f'give unit = "{PAIRWISE}"')
     if isinstance(unit, str):
         expected = set(_expected(kind, len(kind.channels)))
         if len(expected) == 1:
             return np.asarray(_factor(unit, expected.pop()))
         remedy = f'give a list, such as ["N", "N", "N", "N m", "N m", "N m"], or "{CHANNELWISE}"'
-        raise ConfigError(
-            f"unit '{unit}' does not go for forces and torques alike", where="unit", remedy=remedy
-        )
+        raise ConfigError(f"unit '{unit}' does not go for forces and torques alike", where="unit", remedy=remedy)
     expected_units = _expected(kind, len(unit))
     if len(unit) != len(expected_units):
         remedy = f"give one unit, or {len(expected_units)}"
-        raise ConfigError(
-            f"lists {len(unit)} units for {len(expected_units)} elements", where="unit", remedy=remedy
-        )
+        raise ConfigError(f"lists {len(unit)} units for {len(expected_units)} elements", where="unit", remedy=remedy)
     factors = [_factor(one, si) for one, si in zip(unit, expected_units, strict=True)]
     return _shaped(np.array(factors), kind, "unit", scalar_fills=False)
 

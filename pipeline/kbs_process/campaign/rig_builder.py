@@ -70,9 +70,7 @@ class RigBuilder:
             joints=tuple(self._joint(name, tree["joint"][name]) for name in joints),
             controller=self._controller(tree["controller"], joints) if "controller" in tree else None,
             spacecraft=self._spacecraft() if "spacecraft" in tree else None,
-            external=tuple(
-                self._external(name, table, links) for name, table in tree.get("external", {}).items()
-            ),
+            external=tuple(self._external(name, table, links) for name, table in tree.get("external", {}).items()),
         )
 
     def _quantity(self, kind: Kind, *key: str) -> Quantity:
@@ -82,9 +80,7 @@ class RigBuilder:
         try:
             return read_quantity(".".join(key), node, kind, self.folder)
         except ConfigError as error:
-            self.problems.add(
-                self.tables.place((*key, *filter(None, [error.where]))), error.what, error.remedy
-            )
+            self.problems.add(self.tables.place((*key, *filter(None, [error.where]))), error.what, error.remedy)
             zero = np.zeros(kind.shape)
             return Quantity(".".join(key), zero, "", zero, "")
 

@@ -59,28 +59,20 @@ def _explain(error: ValidationError) -> Iterator[Violation]:
         case "additionalProperties":
             known = error.schema.get("properties", {}) if isinstance(error.schema, dict) else {}
             for name in sorted(set(found) - set(known)):
-                yield Violation(
-                    (*key, name), "is not a key that is known here", did_you_mean(name, known, taken=found)
-                )
+                yield Violation((*key, name), "is not a key that is known here", did_you_mean(name, known, taken=found))
         case "required":
             for name in sorted(set(rule) - set(found)):
                 yield Violation((*key, name), "is missing", _how_to_give(name))
         case "dependentRequired":
             for present, others in rule.items():
                 for name in sorted(set(others) - set(found)) if present in found else ():
-                    yield Violation(
-                        (*key, name), f"is missing, although {present} is given", _how_to_give(name)
-                    )
+                    yield Violation((*key, name), f"is missing, although {present} is given", _how_to_give(name))
         case "enum":
             yield Violation(key, f"{_show(found)} is not allowed", did_you_mean(str(found), map(str, rule)))
         case "const":
-            yield Violation(
-                key, f"is {_show(found)}, not {_show(rule)}", f"this version reads {_show(rule)} only"
-            )
+            yield Violation(key, f"is {_show(found)}, not {_show(rule)}", f"this version reads {_show(rule)} only")
         case "type" if rule == "array" and isinstance(found, dict):
-            yield Violation(
-                key, "is one table, not a list of tables", f"write [[{key[-1]}]], in double brackets"
-            )
+            yield Violation(key, "is one table, not a list of tables", f"write [[{key[-1]}]], in double brackets")
         case "type":
             allowed = " or ".join(_TYPES[kind] for kind in ([rule] if isinstance(rule, str) else rule))
             yield Violation(key, f"{_show(found)} is {_kind(found)}, not {allowed}", f"write {allowed}")
@@ -108,10 +100,7 @@ def _limits(rule: str, found: Any, limit: Any) -> tuple[str, str]:
         case "uniqueItems":
             return f"{_show(found)} holds an element twice", "keep one of them"
         case "pattern":
-            return (
-                f"{_show(found)} does not have the form {limit}",
-                "use the characters that this form allows",
-            )
+            return (f"{_show(found)} does not have the form {limit}", "use the characters that this form allows")
         case _:
             return f"{_show(found)} does not satisfy {rule} = {_show(limit)}", "see the schema"
 
@@ -139,9 +128,7 @@ def _how_to_give(name: str) -> str:
 
 def _kind(value: Any) -> str:
     kinds: dict[type, str] = {dict: "object", list: "array", str: "string", bool: "boolean", int: "integer"}
-    return _TYPES.get(
-        kinds.get(type(value), ""), "a number" if isinstance(value, float) else "a date or time"
-    )
+    return _TYPES.get(kinds.get(type(value), ""), "a number" if isinstance(value, float) else "a date or time")
 
 
 def _show(value: Any) -> str:

@@ -37,19 +37,8 @@ DIMENSIONS: dict[str, dict[str, float]] = {
         "g cm^2": 1e-7,
         "g mm^2": 1e-9,
     },
-    "rotational stiffness": {
-        "N m/rad": 1.0,
-        "kN m/rad": 1e3,
-        "N mm/rad": 1e-3,
-        "N m/mrad": 1e3,
-        "N m/deg": 180.0 / pi,
-    },
-    "rotational damping": {
-        "N m s/rad": 1.0,
-        "N mm s/rad": 1e-3,
-        "N m s/deg": 180.0 / pi,
-        "N m/rpm": 30.0 / pi,
-    },
+    "rotational stiffness": {"N m/rad": 1.0, "kN m/rad": 1e3, "N mm/rad": 1e-3, "N m/mrad": 1e3, "N m/deg": 180.0 / pi},
+    "rotational damping": {"N m s/rad": 1.0, "N mm s/rad": 1e-3, "N m s/deg": 180.0 / pi, "N m/rpm": 30.0 / pi},
     "linear damping": {"N s/m": 1.0, "N s/mm": 1e3},
     "electric current": {"A": 1.0, "mA": 1e-3},
     "electric tension": {"V": 1.0, "mV": 1e-3},
@@ -91,8 +80,7 @@ def factor(unit: str, expected: str) -> float:
     examples = ", ".join(f"'{name}'" for name in allowed)
     if unit in _DIMENSION_OF:
         raise UnitMismatchError(
-            f"unit '{unit}' is a unit of {_DIMENSION_OF[unit]}, where {wanted} is expected",
-            f"use one of {examples}",
+            f"unit '{unit}' is a unit of {_DIMENSION_OF[unit]}, where {wanted} is expected", f"use one of {examples}"
         )
     hint = did_you_mean(unit, allowed)
     remedy = hint if hint.startswith("did") else f"use one of {examples}"

@@ -28,9 +28,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     debug = "--debug" in words
     try:
         with interruption.heeded():
-            cli.main(
-                [word for word in words if word != "--debug"], prog_name="kbs-process", standalone_mode=False
-            )
+            cli.main([word for word in words if word != "--debug"], prog_name="kbs-process", standalone_mode=False)
     except click.ClickException as error:
         error.show()
         sys.exit(error.exit_code)

@@ -18,16 +18,10 @@ from kbs_process.cli.shared import (
 )
 
 
-@click.command(
-    epilog=examples("identify campaign/DUMMY1", "identify campaign/DUMMY1 --starts 3 --run-to-run 0.01")
-)
+@click.command(epilog=examples("identify campaign/DUMMY1", "identify campaign/DUMMY1 --starts 3 --run-to-run 0.01"))
 @campaign_argument
 @click.option(
-    "--starts",
-    type=click.IntRange(min=1),
-    default=2,
-    show_default=True,
-    help="Starting points that are followed.",
+    "--starts", type=click.IntRange(min=1), default=2, show_default=True, help="Starting points that are followed."
 )
 @click.option(
     "--run-to-run",
@@ -40,9 +34,7 @@ from kbs_process.cli.shared import (
 @output_option("reports/NAME-identify")
 @pdf_option
 @quiet_option
-def identify(
-    campaign: str, starts: int, run_to_run: float, output: Path | None, pdf: bool | None, quiet: bool
-) -> None:
+def identify(campaign: str, starts: int, run_to_run: float, output: Path | None, pdf: bool | None, quiet: bool) -> None:
     """Identify the motor-gears of CAMPAIGN from its recordings with the role "fit".
 
     Writes corrected parameter files (identified/parameters), and a report with intervals, checks, correlations and the
@@ -96,23 +88,14 @@ def diagnose(campaign: str, output: Path | None, pdf: bool | None, quiet: bool) 
     "a concealed effect, or a trial without an answer."
 )
 @click.option(
-    "--full",
-    is_flag=True,
-    help="A set of validation trials and all rivals: two hours, to reports/proof/full.",
+    "--full", is_flag=True, help="A set of validation trials and all rivals: two hours, to reports/proof/full."
 )
 @click.option("--trials", type=click.IntRange(1), metavar="N", help="How many [default: 6; 20 with --full].")
 @click.option(
-    "--work",
-    type=FOLDER,
-    metavar="FOLDER",
-    help="Where trials and answers are kept [default: .proof/SPLIT-N].",
+    "--work", type=FOLDER, metavar="FOLDER", help="Where trials and answers are kept [default: .proof/SPLIT-N]."
 )
 @click.option(
-    "--output",
-    "-o",
-    type=FOLDER,
-    metavar="FOLDER",
-    help="Where the score goes [default: reports/proof/small or full].",
+    "--output", "-o", type=FOLDER, metavar="FOLDER", help="Where the score goes [default: reports/proof/small or full]."
 )
 @click.option("--jobs", type=click.IntRange(1), metavar="N", help="Processes [default: one a core].")
 @click.option("--dask", metavar="ADDRESS", help="Scheduler of a Dask cluster to run on: tcp://HOST:PORT.")

@@ -21,18 +21,12 @@ from kbs_process.cli.shared import (
 
 
 @click.command(
-    epilog=examples(
-        "stability campaign/EL089", "stability campaign/EL089 --joint el --from 0 --to 87 --points 30"
-    )
+    epilog=examples("stability campaign/EL089", "stability campaign/EL089 --joint el --from 0 --to 87 --points 30")
 )
 @campaign_argument
 @click.option("--joint", metavar="NAME", help="Joint to sweep [default: the last one].")
-@click.option(
-    "--from", "low", type=float, default=-30.0, show_default=True, metavar="DEG", help="Its first angle."
-)
-@click.option(
-    "--to", "high", type=float, default=90.0, show_default=True, metavar="DEG", help="Its last angle."
-)
+@click.option("--from", "low", type=float, default=-30.0, show_default=True, metavar="DEG", help="Its first angle.")
+@click.option("--to", "high", type=float, default=90.0, show_default=True, metavar="DEG", help="Its last angle.")
 @click.option("--points", type=click.IntRange(2), default=25, show_default=True, help="Poses.")
 @output_option("reports/NAME-stability")
 @pdf_option
@@ -63,14 +57,7 @@ def stability(
     from kbs_process.studies.stability.run import analyse_stability
 
     outcome = analyse_stability(
-        loaded,
-        target,
-        joint=joint,
-        low_deg=low,
-        high_deg=high,
-        points=points,
-        progress=progress(quiet),
-        pdf=pdf,
+        loaded, target, joint=joint, low_deg=low, high_deg=high, points=points, progress=progress(quiet), pdf=pdf
     )
     for line in outcome.verdict_lines:
         click.echo(line)
@@ -87,12 +74,8 @@ def stability(
 )
 @campaign_argument
 @click.argument("file", type=click.Path(path_type=Path, dir_okay=False))
-@click.option(
-    "--joint", metavar="NAME", help="Joint over whose angle modes are tabulated [default: the last one]."
-)
-@click.option(
-    "--at", "angles", type=float, multiple=True, metavar="DEG", help="Pose to derive modes at; repeatable."
-)
+@click.option("--joint", metavar="NAME", help="Joint over whose angle modes are tabulated [default: the last one].")
+@click.option("--at", "angles", type=float, multiple=True, metavar="DEG", help="Pose to derive modes at; repeatable.")
 @click.option(
     "--f06",
     type=(float, EXISTING_FILE),
@@ -101,9 +84,7 @@ def stability(
     help="Nastran results of a pose; repeatable.",
 )
 @click.option("--interface", type=int, help="Grid point of the interface, at T's origin.")
-@click.option(
-    "--ground", type=int, multiple=True, help="Constrained grid point at the same place; repeatable."
-)
+@click.option("--ground", type=int, multiple=True, help="Constrained grid point at the same place; repeatable.")
 @click.option("--damping", type=click.FloatRange(0.0, 1.0, True, True), default=0.01, show_default=True)
 def modal(
     campaign: str,

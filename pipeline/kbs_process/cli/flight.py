@@ -20,9 +20,7 @@ from kbs_process.cli.shared import (
 
 
 @click.command(
-    epilog=examples(
-        "flight campaign/EL089", "flight campaign/EL089 --command slew.csv --samples 500 --seed 3"
-    )
+    epilog=examples("flight campaign/EL089", "flight campaign/EL089 --command slew.csv --samples 500 --seed 3")
 )
 @campaign_argument
 @click.option(
@@ -71,8 +69,7 @@ def flight(
 
 
 @click.command(
-    "reference-day",
-    epilog=examples("reference-day", "reference-day campaign/REFDAY --output /data/day --check"),
+    "reference-day", epilog=examples("reference-day", "reference-day campaign/REFDAY --output /data/day --check")
 )
 @click.argument("campaign", default="campaign/REFDAY")
 @output_option("reports/NAME-reference-day")

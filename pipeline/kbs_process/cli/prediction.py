@@ -6,20 +6,12 @@ from pathlib import Path
 
 import click
 
-from kbs_process.cli.shared import (
-    EXISTING_FILE,
-    campaign_argument,
-    examples,
-    output_option,
-    progress,
-    quiet_option,
-)
+from kbs_process.cli.shared import EXISTING_FILE, campaign_argument, examples, output_option, progress, quiet_option
 
 
 @click.command(
     epilog=examples(
-        "simulate campaign/EL089 --trajectory EL089P00",
-        "simulate campaign/EL089 --command slew.csv --rate 200",
+        "simulate campaign/EL089 --trajectory EL089P00", "simulate campaign/EL089 --command slew.csv --rate 200"
     )
 )
 @campaign_argument
@@ -43,12 +35,7 @@ from kbs_process.cli.shared import (
 @output_option("reports/NAME-simulated")
 @quiet_option
 def simulate(
-    campaign: str,
-    trajectory: str | None,
-    command: Path | None,
-    rate: float | None,
-    output: Path | None,
-    quiet: bool,
+    campaign: str, trajectory: str | None, command: Path | None, rate: float | None, output: Path | None, quiet: bool
 ) -> None:
     """Run CAMPAIGN's plant on commands alone, through its controller.
 

@@ -40,9 +40,7 @@ if TYPE_CHECKING:
     "report is written [default: if the recordings allow it].",
 )
 @quiet_option
-def process(
-    campaign: str, output: Path | None, pdf: bool | None, check: bool, why: bool | None, quiet: bool
-) -> None:
+def process(campaign: str, output: Path | None, pdf: bool | None, check: bool, why: bool | None, quiet: bool) -> None:
     """Process CAMPAIGN: fit, compare with the prediction, and write the report.
 
     Where the two differ by more than repeats of one trajectory do, a diagnosis follows. One of the same inputs that
@@ -77,9 +75,7 @@ def process(
         sys.exit(NOT_MET)
 
 
-def _diagnose(
-    campaign: Campaign, results: Path, *, progress: Progress, pdf: bool | None, wanted: bool
-) -> None:
+def _diagnose(campaign: Campaign, results: Path, *, progress: Progress, pdf: bool | None, wanted: bool) -> None:
     """Diagnose what was processed; recordings that allow no diagnosis are an error only if one is wanted."""
     from kbs_process.studies.diagnose.diagnosing import diagnose_results
     from kbs_process.studies.documents import render

@@ -8,15 +8,7 @@ from pathlib import Path
 
 import click
 
-from kbs_process.cli.shared import (
-    BAD_INPUT,
-    EXISTING_FILE,
-    FOLDER,
-    NOT_MET,
-    examples,
-    progress,
-    quiet_option,
-)
+from kbs_process.cli.shared import BAD_INPUT, EXISTING_FILE, FOLDER, NOT_MET, examples, progress, quiet_option
 from kbs_process.studies.convert import preset_names
 
 
@@ -44,25 +36,17 @@ def inspect(files: tuple[Path, ...], check: bool) -> None:
 
 @click.command(
     "import",
-    epilog=examples(
-        "import --describe bench.tdms > mapping.toml", "import mapping.toml /data/bench campaigns/BENCH"
-    )
+    epilog=examples("import --describe bench.tdms > mapping.toml", "import mapping.toml /data/bench campaigns/BENCH")
     + f"\n\nPresets, for public recordings of other rigs: {', '.join(preset_names())}.",
 )
 @click.argument("mapping", required=False)
 @click.argument("source", required=False, type=click.Path(path_type=Path, exists=True))
 @click.argument("campaign", required=False, type=FOLDER)
 @click.option(
-    "--describe",
-    "file",
-    type=EXISTING_FILE,
-    metavar="FILE",
-    help="Print the beginning of a mapping for FILE.",
+    "--describe", "file", type=EXISTING_FILE, metavar="FILE", help="Print the beginning of a mapping for FILE."
 )
 @quiet_option
-def import_(
-    mapping: str | None, source: Path | None, campaign: Path | None, file: Path | None, quiet: bool
-) -> None:
+def import_(mapping: str | None, source: Path | None, campaign: Path | None, file: Path | None, quiet: bool) -> None:
     """Convert CSV, Parquet, HDF5, TDMS, MDF4, MATLAB or NumPy files in SOURCE into a new folder CAMPAIGN.
 
     MAPPING is a TOML file that says which columns are which channels, or the name of a preset.

@@ -28,9 +28,7 @@ class Descent:
     gained: float
 
 
-def descend(
-    residual: Residual, J: Array, parameters: Parameters, start: Array, *, gain: float, steps: int
-) -> Descent:
+def descend(residual: Residual, J: Array, parameters: Parameters, start: Array, *, gain: float, steps: int) -> Descent:
     """Go down from `start` with slopes J (n, p) until a step promises less than `gain`, at most `steps` residuals."""
     scale, root = parameters.scale, 1.0 / parameters.sigma
     unbounded = np.full(len(start), np.inf)

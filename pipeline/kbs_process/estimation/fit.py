@@ -231,9 +231,7 @@ def _refuse_singular(R: Array, names: tuple[str, ...]) -> None:
     length = np.linalg.norm(R, axis=0)
     dead = [name for name, size in zip(names, length, strict=True) if size == 0.0]
     if dead:
-        raise FitError(
-            f"the recordings say nothing about {', '.join(dead)}", remedy="give it a prior, or leave it out"
-        )
+        raise FitError(f"the recordings say nothing about {', '.join(dead)}", remedy="give it a prior, or leave it out")
     _, s, Vt = np.linalg.svd(R / length)
     if s[-1] > _SINGULAR * s[0]:
         return
@@ -270,9 +268,7 @@ def _bounds_check(theta: Array, parameters: Parameters) -> Check:
         )
         if value <= low or value >= high
     ]
-    return Check(
-        "within bounds", not stuck, f"at a bound: {', '.join(stuck)}" if stuck else "none at a bound"
-    )
+    return Check("within bounds", not stuck, f"at a bound: {', '.join(stuck)}" if stuck else "none at a bound")
 
 
 def _identifiable_check(J: Array, sigma: Array, covariance: Array, parameters: Parameters) -> Check:
@@ -290,9 +286,7 @@ def _identifiable_check(J: Array, sigma: Array, covariance: Array, parameters: P
             confused.append(f"{name} with {other}")
         elif np.isfinite(parameters.sigma[index]) and sigma[index] > _WEAK * parameters.sigma[index]:
             seen = informed[index] > _SEEN
-            prior_only.append(
-                f"{name} (hidden by {other})" if seen else f"{name} (no effect on these recordings)"
-            )
+            prior_only.append(f"{name} (hidden by {other})" if seen else f"{name} (no effect on these recordings)")
     parts = []
     if prior_only:
         parts.append("prior only: " + ", ".join(prior_only))

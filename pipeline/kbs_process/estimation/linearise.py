@@ -55,9 +55,7 @@ class Linearised:
         return self.at - C @ gradient, C
 
 
-def draws(
-    theta: Array, C: Array, parameters: Parameters, count: int, rng: np.random.Generator
-) -> list[Array]:
+def draws(theta: Array, C: Array, parameters: Parameters, count: int, rng: np.random.Generator) -> list[Array]:
     """`count` (even) points of N(theta, C) in pairs about theta, brought within bounds."""
     root = np.linalg.cholesky(C)
     half = [root @ rng.standard_normal(len(theta)) for _ in range(count // 2)]

@@ -32,11 +32,7 @@ class Profile:
 
 
 def profiles(
-    names: Sequence[str],
-    fit: Fit,
-    parameters: Parameters,
-    residuals: Residuals,
-    J: Array,
+    names: Sequence[str], fit: Fit, parameters: Parameters, residuals: Residuals, J: Array
 ) -> tuple[Profile, ...]:
     """Profile each of `names` with two points a side; J (n, p) is the Jacobian of the residual at the estimate.
 
@@ -72,9 +68,7 @@ def profiles(
         known = sorted({*points[k], *points[k + 1]})
         x = fit.value[i] + np.array([distance for distance, _ in known])
         ends = [fit.value[i] + side * _end(points[k + (side > 0)]) for side in (-1, 1)]
-        found.append(
-            Profile(fit.names[i], x, np.array([D for _, D in known]), float(ends[0]), float(ends[1]))
-        )
+        found.append(Profile(fit.names[i], x, np.array([D for _, D in known]), float(ends[0]), float(ends[1])))
     return tuple(found)
 
 

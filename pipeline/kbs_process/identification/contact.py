@@ -77,9 +77,7 @@ def _others_following(
     return responses.T @ responses - cross.T @ solved[:, :-1], responses.T @ r - cross.T @ solved[:, -1]
 
 
-def _responses(
-    residuals: Residuals, theta: Array, parameters: Parameters, contact: Contact
-) -> tuple[Array, Array]:
+def _responses(residuals: Residuals, theta: Array, parameters: Parameters, contact: Contact) -> tuple[Array, Array]:
     """Of narrow contacts side by side from -pi on, (n, narrow) per N m, and the residual without any (n,)."""
     points = [theta.copy()]
     points[0][contact.torque] = 0.0
@@ -93,9 +91,7 @@ def _responses(
     return (np.column_stack(found) - off[:, None]) / parameters.value[contact.torque], off
 
 
-def _minima(
-    gram: Array, slope: Array, parameters: Parameters, contact: Contact
-) -> list[tuple[float, float, float]]:
+def _minima(gram: Array, slope: Array, parameters: Parameters, contact: Contact) -> list[tuple[float, float, float]]:
     """Torque, where it begins and how wide it is, of the local minima of -2 log posterior, best first."""
     places = _NARROW * _FINE
     step = 2.0 * np.pi / places
@@ -113,11 +109,7 @@ def _minima(
     cost += ((half - mean[contact.width]) / sigma[contact.width]) ** 2
     around = np.pad(np.pad(cost, ((1, 1), (0, 0)), mode="wrap"), ((0, 0), (1, 1)), constant_values=np.inf)
     least = np.min(
-        [
-            around[1 + i : 1 + i + cost.shape[0], 1 + j : 1 + j + cost.shape[1]]
-            for i in (-1, 0, 1)
-            for j in (-1, 0, 1)
-        ],
+        [around[1 + i : 1 + i + cost.shape[0], 1 + j : 1 + j + cost.shape[1]] for i in (-1, 0, 1) for j in (-1, 0, 1)],
         axis=0,
     )
     rows, columns = np.nonzero((cost <= least) & (torque > 0.0))

@@ -15,13 +15,7 @@ from kbs_process.estimation.linearise import Unpredicted, draws, linearised
 from kbs_process.estimation.profile import Profile, profiles
 from kbs_process.identification.contact import left_to_contact
 from kbs_process.identification.objective import Objective, first_differences, lengths
-from kbs_process.identification.output_error import (
-    Experiment,
-    Spectra,
-    estimated_spectra,
-    sensor_spectra,
-    unexplained,
-)
+from kbs_process.identification.output_error import Experiment, Spectra, estimated_spectra, sensor_spectra, unexplained
 from kbs_process.identification.screening import Evaluate, contacts, match_resonances, starts
 from kbs_process.identification.search import Mode, follow
 from kbs_process.identification.unknowns import CRITICAL, frictions, gearbox, others, prior, with_factors
@@ -103,9 +97,7 @@ class Identification:
         )
 
 
-def identify(
-    experiment: Experiment, evaluate_with: Evaluators, settings: Settings, say: Say
-) -> Identification:
+def identify(experiment: Experiment, evaluate_with: Evaluators, settings: Settings, say: Say) -> Identification:
     """Identify the free numbers of `experiment` (see `unknowns.gearbox`) and of the rest that shows.
 
     The best of the followed starts is refined with central differences, a finer step, noise spectra taken from the
@@ -140,11 +132,7 @@ def identify(
 
 
 def _with_others(
-    experiment: Experiment,
-    values: Array,
-    spectra: Sequence[Spectra],
-    evaluate_with: Evaluators,
-    settings: Settings,
+    experiment: Experiment, values: Array, spectra: Sequence[Spectra], evaluate_with: Evaluators, settings: Settings
 ) -> tuple[Experiment, dict[int, list[Array]]]:
     """The experiment with every number free that shows, and the columns of those beyond the gearbox."""
     gears = len(experiment.free)
@@ -152,14 +140,10 @@ def _with_others(
     parameters = prior(wide)
     evaluate = evaluate_with(wide)
     blank: dict[int, list[Array]] = {index: [] for index in range(gears)}
-    objective = Objective(
-        wide, spectra, evaluate, first_differences(parameters), 0, central=False, columns=blank
-    )
+    objective = Objective(wide, spectra, evaluate, first_differences(parameters), 0, central=False, columns=blank)
     objective.difference(np.concatenate([values, parameters.value[gears:]]))
     length = lengths(objective.columns, range(gears, len(wide.free)))
-    shows = [
-        gears + k for k in np.flatnonzero(length * parameters.sigma[gears:] > settings.negligible).tolist()
-    ]
+    shows = [gears + k for k in np.flatnonzero(length * parameters.sigma[gears:] > settings.negligible).tolist()]
     columns = {gears + new: objective.columns[old] for new, old in enumerate(shows)}
     return replace(wide, free=(*experiment.free, *(wide.free[i] for i in shows))), columns
 
@@ -179,9 +163,7 @@ def _refine(
     objective = Objective(final, sensor, evaluate, first_differences(prior(final)), p, central=True)
     spectra = [
         estimated_spectra(final, recording, unexplained(final, recording, values, noise))
-        for recording, values, noise in zip(
-            final.recordings, objective.in_recordings(theta), sensor, strict=True
-        )
+        for recording, values, noise in zip(final.recordings, objective.in_recordings(theta), sensor, strict=True)
     ]
     objective = Objective(final, spectra, evaluate, objective.differences, p, central=True)
     scale = np.where(np.isfinite(parameters.sigma), parameters.sigma, _PHASE)[:p]
@@ -207,9 +189,7 @@ def _refine(
     objective.unpredicted = model.unpredicted
     fit = fit_map(objective.residual, parameters, jacobian=lambda at: model.slopes, start=theta, iterations=0)
     tests = {
-        final.free[contact.torque].name: left_to_contact(
-            objective.residuals, theta, model.slopes, parameters, contact
-        )
+        final.free[contact.torque].name: left_to_contact(objective.residuals, theta, model.slopes, parameters, contact)
         for contact in contacts(final.rig, final.effects, final.free)
     }
     told = f"the last of {rounds} linearisations moved the estimate by {moved:.2g} sigma, rms"

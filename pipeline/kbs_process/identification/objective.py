@@ -85,11 +85,7 @@ class Objective:
 
     def tasks(self, thetas: Sequence[Array]) -> list[Task]:
         """All recordings at the first point, at the second, and so on."""
-        return [
-            (r, values, self.spectra[r])
-            for theta in thetas
-            for r, values in enumerate(self.in_recordings(theta))
-        ]
+        return [(r, values, self.spectra[r]) for theta in thetas for r, values in enumerate(self.in_recordings(theta))]
 
     def residual(self, theta: Array) -> Array:
         """(n,) of all recordings."""
@@ -183,9 +179,7 @@ def settled(columns: Mapping[int, list[Array]], parameters: Parameters) -> Array
     """Differences that move the whitened residual by about `_SEEN`."""
     size = np.where(np.isfinite(parameters.sigma), parameters.sigma, 1.0)
     length = lengths(columns, range(len(size)))
-    settled: Array = np.clip(
-        _SEEN / np.maximum(length, 1e-30), _LEAST_DIFFERENCE * size, _MOST_DIFFERENCE * size
-    )
+    settled: Array = np.clip(_SEEN / np.maximum(length, 1e-30), _LEAST_DIFFERENCE * size, _MOST_DIFFERENCE * size)
     return settled
 
 

@@ -88,9 +88,7 @@ class Experiment:
 
     def bands(self, recording: Measured) -> tuple[tuple[float, float], ...]:
         """Hz, of each channel."""
-        highest = [
-            _PASS * min(rate, 1.0 / recording.dt) for rate in (recording.wrench_rate, recording.angle_rate)
-        ]
+        highest = [_PASS * min(rate, 1.0 / recording.dt) for rate in (recording.wrench_rate, recording.angle_rate)]
         wrench = (self.lowest_Hz, highest[0])
         angle = (self.lowest_Hz, highest[1])
         return (wrench,) * len(self.rig.transducer.channels) + (angle,) * len(self.rig.joints)
@@ -105,9 +103,7 @@ def sensor_spectra(experiment: Experiment, recording: Measured) -> Spectra:
     transducer = experiment.rig.transducer
     index = [WRENCH_CHANNELS.index(channel) for channel in transducer.channels]
     wrench = transducer.noise.value[index] ** 2 + transducer.resolution.value[index] ** 2 / 12.0
-    angle = [
-        float(joint.encoder.step) ** 2 / 12.0 if joint.encoder else 0.0 for joint in experiment.rig.joints
-    ]
+    angle = [float(joint.encoder.step) ** 2 / 12.0 if joint.encoder else 0.0 for joint in experiment.rig.joints]
     noise = [*(wrench * 2.0 / recording.wrench_rate), *(np.array(angle) * 2.0 / recording.angle_rate)]
     return tuple(flat(max(level, 1e-30)) for level in noise)
 
@@ -153,11 +149,7 @@ def residual(experiment: Experiment, recording: Measured, values: Array, spectra
     parts = [
         project(whiten(left[:, channel]), whiten(columns), priors)
         for channel, (whiten, (columns, priors)) in enumerate(
-            zip(
-                _whiteners(experiment, recording, spectra),
-                _nuisances(experiment, recording, output),
-                strict=True,
-            )
+            zip(_whiteners(experiment, recording, spectra), _nuisances(experiment, recording, output), strict=True)
         )
     ]
     return np.concatenate(parts)
@@ -168,9 +160,7 @@ def unexplained(experiment: Experiment, recording: Measured, values: Array, spec
     output = simulate(experiment, recording, values)
     left = difference(experiment, recording, output)
     for channel, (whiten, (columns, priors)) in enumerate(
-        zip(
-            _whiteners(experiment, recording, spectra), _nuisances(experiment, recording, output), strict=True
-        )
+        zip(_whiteners(experiment, recording, spectra), _nuisances(experiment, recording, output), strict=True)
     ):
         N, z = whiten(columns), whiten(left[:, channel])
         scale = 1.0 / np.sqrt(np.sum(N**2, axis=0) + priors**2 + 1e-300)

@@ -35,9 +35,7 @@ class Polar:
         places = [*self.amplitude, *self.phase]
         given = self.parameters
         assert given.lower is not None and given.upper is not None
-        value, sigma, lower, upper = (
-            array.copy() for array in (given.value, given.sigma, given.lower, given.upper)
-        )
+        value, sigma, lower, upper = (array.copy() for array in (given.value, given.sigma, given.lower, given.upper))
         value[list(self.phase)] = value[list(self.amplitude)]  # their scale
         sigma[places], lower[places], upper[places] = np.inf, -np.inf, np.inf
         return replace(given, value=value, sigma=sigma, lower=lower, upper=upper)
@@ -66,9 +64,7 @@ class Polar:
     def jacobian(self, J: Array, theta: Array) -> Array:
         """Slopes (n + k, p) in the chart of a residual with slopes J (n, p), and of `excess`, at numbers (p,)."""
         rows = np.zeros((len(self.amplitude), J.shape[1]))
-        rows[np.arange(len(self.amplitude)), list(self.amplitude)] = (
-            1.0 / self.parameters.sigma[list(self.amplitude)]
-        )
+        rows[np.arange(len(self.amplitude)), list(self.amplitude)] = 1.0 / self.parameters.sigma[list(self.amplitude)]
         whole = np.vstack([J, rows])
         for a, phi in zip(self.amplitude, self.phase, strict=True):
             c, s = np.cos(theta[phi]), np.sin(theta[phi])

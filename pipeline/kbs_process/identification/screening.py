@@ -102,9 +102,7 @@ def contacts(rig: Rig, effects: Sequence[str], free: Sequence[Scalar]) -> tuple[
 Run = Callable[[Experiment, Measured, Array], Output]
 
 
-def match_resonances(
-    experiment: Experiment, values: Array, spectra: Sequence[Spectra], run: Run = simulate
-) -> Array:
+def match_resonances(experiment: Experiment, values: Array, spectra: Sequence[Spectra], run: Run = simulate) -> Array:
     """Return `values` with the transducer's stiffness such that the plant's resonances lie where measured.
 
     Each torque channel's spectrum around the plant's lowest resonance about that axis is shifted along log f until it
@@ -133,10 +131,7 @@ def match_resonances(
                     continue
                 pair = (recording.wrench[:, column], output[:, WRENCH_CHANNELS.index(name)])
                 profile += _likeness(
-                    pair,
-                    recording.dt,
-                    own[0].frequency,
-                    float(noise[column].at(np.array([own[0].frequency]))[0]),
+                    pair, recording.dt, own[0].frequency, float(noise[column].at(np.array([own[0].frequency]))[0])
                 )
             shift = (int(np.argmax(profile)) - len(profile) // 2) * _STEP if profile.any() else 0.0
             changed[free[scalar]] *= math.exp(2.0 * shift)
@@ -181,11 +176,7 @@ def _level(x: Array, dt: float, u: Array, noise: float) -> Array:
 
 
 def starts(
-    experiment: Experiment,
-    values: Array,
-    spectra: Sequence[Spectra],
-    evaluate: Evaluate,
-    most: int,
+    experiment: Experiment, values: Array, spectra: Sequence[Spectra], evaluate: Evaluate, most: int
 ) -> tuple[Start, ...]:
     """Return up to `most` starting points, best first: the local minima over the phases of what is not smooth.
 

@@ -55,13 +55,7 @@ def follow(
     parameters = with_factors(prior(experiment), experiment, run_to_run)
     theta = np.concatenate([values, np.zeros(len(parameters.value) - len(values))])
     objective = Objective(
-        experiment,
-        spectra,
-        evaluate,
-        first_differences(prior(experiment)),
-        gears,
-        central=False,
-        columns=columns,
+        experiment, spectra, evaluate, first_differences(prior(experiment)), gears, central=False, columns=columns
     )
     polar = Polar.of(phases(experiment.rig, experiment.effects, experiment.free), parameters)
     searched = arrived = False
@@ -101,9 +95,7 @@ def _near(parameters: Parameters, u: Array) -> Parameters:
     Farther out friction may turn abrupt, and a mechanism whose friction chatters has no slopes to lead back.
     """
     assert parameters.lower is not None and parameters.upper is not None
-    reach = _TRUSTED * np.where(
-        np.isfinite(parameters.sigma) | (parameters.value != 0.0), parameters.scale, 0.5
-    )
+    reach = _TRUSTED * np.where(np.isfinite(parameters.sigma) | (parameters.value != 0.0), parameters.scale, 0.5)
     return replace(
         parameters,
         lower=np.maximum(parameters.lower, np.minimum(u - reach, parameters.upper)),
@@ -177,12 +169,7 @@ def _within(theta: Array, parameters: Parameters) -> Array:
 
 
 def _gained(
-    objective: Objective,
-    theta: Array,
-    trials: Sequence[Array],
-    own: list[int],
-    J: Array,
-    parameters: Parameters,
+    objective: Objective, theta: Array, trials: Sequence[Array], own: list[int], J: Array, parameters: Parameters
 ) -> Array:
     """Move from `theta` to the best of `trials`, which differ in their `own` numbers, or none; the rest follows."""
     rest = np.delete(np.arange(len(theta)), own)

@@ -40,9 +40,7 @@ def gearbox(rig: Rig, effects: Sequence[str]) -> tuple[Scalar, ...]:
             for parameter in effect.parameters:
                 name = f"joint.{joint.name}.drive.{parameter.name}"
                 # Effects add nothing to a measured motion where a drive has not their numbers.
-                if name in quantities and (
-                    quantities[name].sigma > 0.0 or isinstance(parameter.prior, Uniform)
-                ):
+                if name in quantities and (quantities[name].sigma > 0.0 or isinstance(parameter.prior, Uniform)):
                     found.append(Scalar(name))
     for name in ("transducer.stiffness", "transducer.damping"):
         if name in quantities:
@@ -108,9 +106,7 @@ def with_factors(parameters: Parameters, experiment: Experiment, run_to_run: flo
     """The free numbers' priors, and those of the run-to-run factors less 1."""
     scaled = frictions(experiment)
     names = tuple(
-        f"{recording.name}: {experiment.free[index].name}"
-        for recording in experiment.recordings
-        for index in scaled
+        f"{recording.name}: {experiment.free[index].name}" for recording in experiment.recordings for index in scaled
     )
     count = len(names)
     assert parameters.lower is not None and parameters.upper is not None

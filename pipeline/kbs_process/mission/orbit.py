@@ -83,9 +83,7 @@ def spacecraft(orbit: Orbit, t: Array) -> tuple[Array, Array]:
     errors, position, velocity = satellite(orbit).sgp4_array(np.full(len(t), day), fraction + t / 86400.0)
     if errors.any():
         raise MissionError(
-            f"SGP4 cannot propagate the orbit (code {errors.max()})",
-            where="[orbit]",
-            remedy="check its elements",
+            f"SGP4 cannot propagate the orbit (code {errors.max()})", where="[orbit]", remedy="check its elements"
         )
     return 1e3 * position, 1e3 * velocity
 

@@ -125,8 +125,7 @@ def _modes(track: Track, start: int, end: int) -> list[Phase]:
         {start, end, *(k for run in runs(track.bridged[start:end]) for k in (start + run[0], start + run[1]))}
     )
     return [
-        Phase("zenith" if track.bridged[a] else "tracking", track.relay.name, a, b)
-        for a, b in itertools.pairwise(cuts)
+        Phase("zenith" if track.bridged[a] else "tracking", track.relay.name, a, b) for a, b in itertools.pairwise(cuts)
     ]
 
 

@@ -34,23 +34,15 @@ class Transfer:
         first = (self.cruise - self.start.rate) / self.acceleration
         last = (self.end.rate - self.cruise) / self.acceleration
         t1, t2 = abs(first), self.duration - abs(last)
-        rising = (
-            self.start.position + self.start.rate * t + 0.5 * np.copysign(self.acceleration, first) * t**2
-        )
+        rising = self.start.position + self.start.rate * t + 0.5 * np.copysign(self.acceleration, first) * t**2
         at_cruise = self.start.position + 0.5 * (self.start.rate + self.cruise) * t1
         left = self.duration - t
-        falling = (
-            self.end.position - self.end.rate * left + 0.5 * np.copysign(self.acceleration, last) * left**2
-        )
-        position: Array = np.where(
-            t < t1, rising, np.where(t > t2, falling, at_cruise + self.cruise * (t - t1))
-        )
+        falling = self.end.position - self.end.rate * left + 0.5 * np.copysign(self.acceleration, last) * left**2
+        position: Array = np.where(t < t1, rising, np.where(t > t2, falling, at_cruise + self.cruise * (t - t1)))
         return position
 
 
-def transfer(
-    start: State, end: State, duration: float, rate_limit: float, acceleration: float
-) -> Transfer | None:
+def transfer(start: State, end: State, duration: float, rate_limit: float, acceleration: float) -> Transfer | None:
     """Return the transfer that takes exactly `duration` s, or None if the limits do not allow it.
 
     With ramps of magnitude a the distance covered, d(c) = sum of the three phases, grows with the cruising rate

@@ -113,13 +113,9 @@ def along_text(effect: Effect) -> str:
 
     column = {name: c for c, name in enumerate(signals_of(effect))}
     lines_of = {name: f"{name} = at(signals, i, share, {c})" for name, c in column.items()}
-    lines_of |= {
-        rate: f"{rate} = slope(signals, i, {column[of]}) / dt" for rate, of in SLOPES.items() if of in column
-    }
+    lines_of |= {rate: f"{rate} = slope(signals, i, {column[of]}) / dt" for rate, of in SLOPES.items() if of in column}
     if "rotor_angle" in column:
-        lines_of["rotor_travel"] = (
-            f"rotor_travel = slope(signals, i, {column['rotor_angle']}) / max(parts, 1)"
-        )
+        lines_of["rotor_travel"] = f"rotor_travel = slope(signals, i, {column['rotor_angle']}) / max(parts, 1)"
     if "field" in column:
         c = column["field"]
         lines_of["field_travel"] = f"field_travel = at(signals, i, share, {c}) - signals[0, {c}]"

@@ -33,10 +33,7 @@ def attach(
     if effect.port.of_drive:
         chosen = rig.joint_names if joints is None else joints
         return replace(
-            rig,
-            joints=tuple(
-                _joint(joint, effect, given if joint.name in chosen else {}) for joint in rig.joints
-            ),
+            rig, joints=tuple(_joint(joint, effect, given if joint.name in chosen else {}) for joint in rig.joints)
         )
     path = f"external.{effect.name}"
     at = None
@@ -70,8 +67,7 @@ def detach(rig: Rig, effect: Effect, others: Sequence[Effect]) -> Rig:
             else replace(
                 joint,
                 drive=replace(
-                    joint.drive,
-                    parameters={n: q for n, q in joint.drive.parameters.items() if n not in own},
+                    joint.drive, parameters={n: q for n, q in joint.drive.parameters.items() if n not in own}
                 ),
             )
             for joint in rig.joints
@@ -96,9 +92,7 @@ def _direct(joint: Joint) -> Drive:
         path = f"joint.{joint.name}.drive.{name}"
         return Quantity(path, np.asarray(value), unit, np.zeros(()), "definition of a direct drive")
 
-    return Drive(
-        exact("ratio", 1.0, "1"), exact("rotor_inertia", 0.0, "kg m^2"), exact("steps_per_turn", 1.0, "1"), {}
-    )
+    return Drive(exact("ratio", 1.0, "1"), exact("rotor_inertia", 0.0, "kg m^2"), exact("steps_per_turn", 1.0, "1"), {})
 
 
 def _quantity(path: str, entry: Parameter, given: Mapping[str, float], unit: str) -> Quantity:

@@ -86,12 +86,8 @@ class Port(Enum):
     TRANSMISSION = "torque of the gear on the output, N m; the rotor gets -1/ratio of it"
     JOINT_TORQUE = "torque on the output, N m, reacted by the body that carries the motor"
     GROUND_TORQUE = "torque on the output about the joint's axis, N m, reacted by the laboratory"
-    EXTERNAL_FORCE = (
-        "force (x, y, z) of the laboratory on a point of a link, N, along the undeflected T's axes"
-    )
-    BASE_ACCELERATION = (
-        "acceleration (x, y, z) of the laboratory's floor, m/s^2, along the undeflected T's axes"
-    )
+    EXTERNAL_FORCE = "force (x, y, z) of the laboratory on a point of a link, N, along the undeflected T's axes"
+    BASE_ACCELERATION = "acceleration (x, y, z) of the laboratory's floor, m/s^2, along the undeflected T's axes"
     BASE_TORQUE = (
         "moment (x, y, z) of the mounting on the plate about the axes of the base's angles, N m, beyond the "
         "transducer's stiffness and damping"
@@ -245,9 +241,7 @@ class Effect:
     delay: str = ""  # the parameter by which the field comes late, s: its equation is that to first order
     of_set_points: bool = False  # a delay of where cycles begin, between which the field goes straight
     tag: str = ""  # what `instance` has added to the names of parameters and states
-    wires: tuple[
-        tuple[str, str], ...
-    ] = ()  # argument of the equation -> signal or parameter, where they differ
+    wires: tuple[tuple[str, str], ...] = ()  # argument of the equation -> signal or parameter, where they differ
 
     def __post_init__(self) -> None:
         where = f"effect '{self.name}'"
@@ -258,17 +252,13 @@ class Effect:
         if clash := (set(own) & set(signals)) | {name for name in own if own.count(name) > 1}:
             raise TypeError(f"{where}: {sorted(clash)} declared twice, or named like a signal of the plant")
         if unknown := set(self.arguments) - set(signals) - set(own):
-            raise TypeError(
-                f"{where}: {sorted(unknown)} is neither a signal ({', '.join(signals)}) nor declared"
-            )
+            raise TypeError(f"{where}: {sorted(unknown)} is neither a signal ({', '.join(signals)}) nor declared")
         if unused := set(own) - set(self.arguments):
             raise TypeError(f"{where}: {sorted(unused)} is declared, but not an argument of the equation")
         if self.states and not self.port.stateful:
             raise TypeError(f"{where}: what acts at this port has no states of its own")
         hints = get_type_hints(self.equation)
-        untyped = [
-            name for name in inspect.signature(self.equation).parameters if hints.get(name) is not float
-        ]
+        untyped = [name for name in inspect.signature(self.equation).parameters if hints.get(name) is not float]
         count = self.port.components + len(self.states)
         returns: Any = float if count == 1 else tuple[(float,) * count]  # type: ignore[misc]
         if untyped or hints.get("return") != returns:
@@ -318,8 +308,7 @@ def instance(effect: Effect, number: int) -> Effect:
         effect,
         name=effect.name + tag,
         parameters=tuple(
-            entry if entry.role == "shared" else replace(entry, name=entry.name + tag)
-            for entry in effect.parameters
+            entry if entry.role == "shared" else replace(entry, name=entry.name + tag) for entry in effect.parameters
         ),
         states=tuple(replace(state, name=state.name + tag) for state in effect.states),
         delay=effect.delay and effect.delay + tag,

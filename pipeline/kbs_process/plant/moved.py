@@ -21,11 +21,7 @@ from kbs_process.signals.frames import cross, rotate
 from kbs_process.signals.records import Array
 
 # Ports whose torque acts on the joint as on its rotor, where nothing gives between them.
-RIGID = {
-    Port.JOINT_TORQUE: False,
-    Port.MOTOR_TORQUE: True,
-    Port.MOTOR_FRICTION: True,
-}  # times the gear's ratio?
+RIGID = {Port.JOINT_TORQUE: False, Port.MOTOR_TORQUE: True, Port.MOTOR_FRICTION: True}  # times the gear's ratio?
 
 
 def added_loads(rig: Rig, effects: Sequence[Effect], q: Array, qd: Array, dt: float) -> Array:

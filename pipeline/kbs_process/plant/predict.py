@@ -102,9 +102,7 @@ def simulation_of(
     )
 
 
-def predict_together(
-    simulations: Sequence[Simulation], rate_Hz: float, duration_s: float
-) -> list[tuple[Array, Array]]:
+def predict_together(simulations: Sequence[Simulation], rate_Hz: float, duration_s: float) -> list[tuple[Array, Array]]:
     """Return wrench (n, 6) and angles (m, joints), offset included and not rounded, of each of some simulations.
 
     As `predict` does of each alone, to rounding, and several times faster; a plant that diverges has samples that are
@@ -138,11 +136,7 @@ def step_for(rig: Rig, effects: Sequence[Effect], q: Array, rate_Hz: float) -> f
 
 
 def _blocks(
-    simulation: Simulation,
-    rate: float,
-    duration: float,
-    quantise: bool,
-    progress: Callable[[float], None] | None,
+    simulation: Simulation, rate: float, duration: float, quantise: bool, progress: Callable[[float], None] | None
 ) -> Iterator[tuple[str, Block]]:
     a_rate, per_sample = simulation.angle_rate, simulation.per_sample
     samples = int(np.ceil(duration * rate - 1e-9))
@@ -166,10 +160,7 @@ def _blocks(
         if len(angle):
             yield (
                 "angle",
-                _block(
-                    (angle_done + np.arange(len(angle))) / a_rate,
-                    _encoded(angle, simulation.encoder, quantise),
-                ),
+                _block((angle_done + np.arange(len(angle))) / a_rate, _encoded(angle, simulation.encoder, quantise)),
             )
         until = min(simulation.controlled, int(np.searchsorted(simulation.knots, duration - 1e-9)))
         if until > cycle:

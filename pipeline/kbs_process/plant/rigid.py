@@ -11,15 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kbs_process.rig.model import LAB, TRANSDUCER, Rig
-from kbs_process.signals.frames import (
-    about_axis,
-    cross,
-    from_rotation_vector,
-    from_tilt,
-    from_xyz,
-    rotate,
-    skew,
-)
+from kbs_process.signals.frames import about_axis, cross, from_rotation_vector, from_tilt, from_xyz, rotate, skew
 from kbs_process.signals.records import Array
 
 INERTIAL = ("m", "mcx", "mcy", "mcz", "Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz")
@@ -225,9 +217,7 @@ def _wrench(rig: Rig, links: dict[str, LinkMotion]) -> Array:
     return np.concatenate([rotate(R_TL, force), rotate(R_TL, moment)], axis=1)
 
 
-def _reaction(
-    rig: Rig, links: dict[str, LinkMotion], beyond: frozenset[str], about: Array
-) -> tuple[Array, Array]:
+def _reaction(rig: Rig, links: dict[str, LinkMotion], beyond: frozenset[str], about: Array) -> tuple[Array, Array]:
     """Force and moment (n, 3) that the bodies and rotors on the links `beyond` exert on what carries them.
 
     The moment is about points `about` (n, 3); all in the laboratory's axes.

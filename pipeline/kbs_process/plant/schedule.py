@@ -56,8 +56,7 @@ def _checked(schedule: Schedule, joints: int) -> Schedule:
     t = schedule.t
     if not len(t) or not np.isfinite(t).all() or not (np.diff(t) > 0.0).all():
         raise SimulationError(
-            "command times are empty, not finite or not increasing",
-            remedy="look at the recording with 'inspect'",
+            "command times are empty, not finite or not increasing", remedy="look at the recording with 'inspect'"
         )
     for entry in fields(schedule):
         values = getattr(schedule, entry.name)
@@ -68,9 +67,7 @@ def _checked(schedule: Schedule, joints: int) -> Schedule:
                 f"{entry.name} has shape {values.shape}, not {(len(t), joints)}: cycles by joints of the rig"
             )
         if not np.isfinite(values).any(axis=0).all():
-            raise SimulationError(
-                f"{entry.name} of a joint holds no number", remedy="check the recording's topic"
-            )
+            raise SimulationError(f"{entry.name} of a joint holds no number", remedy="check the recording's topic")
     return _at(schedule, t)
 
 

@@ -129,9 +129,7 @@ def structure_of(rig: Rig, effects: Sequence[Effect]) -> Structure:
         parents.append(links[joint.parent])
         links[joint.name] = index
     if not any(effect.port is Port.TRANSMISSION for effect in effects):
-        raise ConfigError(
-            "no effect connects motor and output", where="[model] effects", remedy="add 'flexspline'"
-        )
+        raise ConfigError("no effect connects motor and output", where="[model] effects", remedy="add 'flexspline'")
     if len(parents) < 2 and (crossed := next((effect.name for effect in effects if effect.crossed), None)):
         raise ConfigError(
             f"'{crossed}' depends on another joint, and there is one alone",
@@ -147,9 +145,7 @@ def structure_of(rig: Rig, effects: Sequence[Effect]) -> Structure:
             remedy="give the transducer's stiffness, or leave the effect out",
         )
     loads = tuple(
-        Load(effect, links.get(external_of(rig, effect).on, -1))
-        for effect in effects
-        if not effect.port.of_drive
+        Load(effect, links.get(external_of(rig, effect).on, -1)) for effect in effects if not effect.port.of_drive
     )
     of_drives = tuple(effect for effect in effects if effect.port.of_drive)
     return Structure(tuple(parents), elastic, of_drives, loads)
@@ -176,9 +172,7 @@ def external_of(rig: Rig, effect: Effect) -> External:
             )
         if given.point is None:
             raise ConfigError(
-                "the force needs a point to act at",
-                where=where,
-                remedy="add point, (x, y, z) in the link's axes",
+                "the force needs a point to act at", where=where, remedy="add point, (x, y, z) in the link's axes"
             )
     for parameter in effect.parameters:
         if parameter.name not in given.parameters:
@@ -208,9 +202,7 @@ def link_inertia(bodies: Sequence[Body]) -> Array:
     for body in bodies:
         m, r = float(body.mass), body.cog.value
         xx, yy, zz, xy, xz, yz = body.inertia.value
-        about = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) + m * (
-            r @ r * np.eye(3) - np.outer(r, r)
-        )
+        about = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) + m * (r @ r * np.eye(3) - np.outer(r, r))
         total += [m, *(m * r), *np.diag(about), about[0, 1], about[0, 2], about[1, 2]]
     return total
 
@@ -248,9 +240,7 @@ def _joint(rig: Rig, joint: Joint, structure: Structure) -> Array:
     drive = joint.drive
     if drive is None:
         raise ConfigError(
-            "the command-driven plant needs its drive",
-            where=f"[joint.{joint.name}.drive]",
-            remedy="describe it",
+            "the command-driven plant needs its drive", where=f"[joint.{joint.name}.drive]", remedy="describe it"
         )
     axis, rotation = turn(joint)
     body = link_inertia([body for body in rig.bodies if body.on == joint.name])

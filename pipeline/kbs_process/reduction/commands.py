@@ -58,17 +58,13 @@ def _read(path: Path) -> pa.Table:
         return pq.read_table(path) if path.suffix == ".parquet" else csv.read_csv(path)
     except (pa.ArrowInvalid, OSError) as error:
         raise RecordingError(
-            f"is not a table of commands: {error}",
-            where=str(path),
-            remedy="give a CSV file with a header, or Parquet",
+            f"is not a table of commands: {error}", where=str(path), remedy="give a CSV file with a header, or Parquet"
         ) from error
 
 
 def _column(table: pa.Table, name: str, path: Path) -> Array:
     if name not in table.column_names:
-        raise RecordingError(
-            f"has no column '{name}'", where=str(path), remedy=did_you_mean(name, table.column_names)
-        )
+        raise RecordingError(f"has no column '{name}'", where=str(path), remedy=did_you_mean(name, table.column_names))
     try:
         column: Array = table[name].cast(pa.float64()).to_numpy()
     except pa.ArrowInvalid as error:
@@ -76,8 +72,6 @@ def _column(table: pa.Table, name: str, path: Path) -> Array:
     if not np.isfinite(column).all():
         row = int(np.flatnonzero(~np.isfinite(column))[0]) + 1
         raise RecordingError(
-            f"column '{name}' is empty, NaN or infinite in row {row}",
-            where=str(path),
-            remedy="correct the row",
+            f"column '{name}' is empty, NaN or infinite in row {row}", where=str(path), remedy="correct the row"
         )
     return column

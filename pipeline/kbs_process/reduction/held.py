@@ -18,9 +18,7 @@ from kbs_process.rig.model import Rig
 from kbs_process.signals.records import Array, Block, Loss, Mask, Run
 from kbs_process.stages.align.ordering import concatenate, select
 
-HELD_S = (
-    0.5  # longer than any channel with noise shows one and the same reading, whatever its amplifier passes
-)
+HELD_S = 0.5  # longer than any channel with noise shows one and the same reading, whatever its amplifier passes
 DEAD = 0.5  # share of a recording beyond which a channel that is held is no channel
 
 
@@ -40,9 +38,7 @@ class Alive:
     def __init__(self, rig: Rig, entry: RecordingEntry, *, keep: bool = False) -> None:
         able = noisy(rig)
         self._entry = entry
-        self._stream = _Stream(
-            {place: name for place, name in enumerate(rig.transducer.channels) if able[name]}, keep
-        )
+        self._stream = _Stream({place: name for place, name in enumerate(rig.transducer.channels) if able[name]}, keep)
 
     def __call__(self, blocks: Iterator[tuple[str, Block]]) -> Iterator[tuple[str, Block]]:
         """Yield the blocks; raises RecordingError at the end where a channel was held for most of the time.

@@ -14,15 +14,7 @@ from kbs_process.reduction.measurable import judged_channels
 from kbs_process.results import judged as results
 from kbs_process.signals.records import Signal
 from kbs_process.stages.bandpass import Band, crossing_rate
-from kbs_process.stages.verdict import (
-    COVERAGE,
-    Extreme,
-    Judgement,
-    extremes,
-    interval,
-    judge,
-    peak_coverage,
-)
+from kbs_process.stages.verdict import COVERAGE, Extreme, Judgement, extremes, interval, judge, peak_coverage
 
 SEVERITY: dict[Judgement, int] = {"pass": 0, "undecided": 1, "fail": 2}
 
@@ -50,10 +42,7 @@ class _Candidate:
 
 
 def judged(
-    campaign: Campaign,
-    requirement: Requirement,
-    runs: Sequence[Analysis],
-    budgets: Sequence[results.Budget],
+    campaign: Campaign, requirement: Requirement, runs: Sequence[Analysis], budgets: Sequence[results.Budget]
 ) -> results.Requirement:
     """Judge a requirement by the channel and recording that are closest to failing it."""
     band = band_of(requirement, bands_of(campaign.bands))
@@ -61,14 +50,10 @@ def judged(
     channels = judged_channels(requirement, campaign.rig)
     pairs = [(analysis.entry.name, analysis.pairs[key]) for analysis in runs]
     below = coverage_below(requirement.statistic, [pair.measured for _, pair in pairs], band)
-    sigmas = {
-        (entry.recording, entry.channel): entry.total for entry in budgets if (entry.frame, entry.band) == key
-    }
+    sigmas = {(entry.recording, entry.channel): entry.total for entry in budgets if (entry.frame, entry.band) == key}
     measured = [
         _Candidate(extreme, sigmas[extreme.recording, extreme.channel], requirement.limit, below)
-        for extreme in extremes(
-            [(name, pair.measured) for name, pair in pairs], channels, requirement.statistic
-        )
+        for extreme in extremes([(name, pair.measured) for name, pair in pairs], channels, requirement.statistic)
     ]
     if not measured:
         raise ConfigError(
@@ -78,9 +63,7 @@ def judged(
             remedy="record longer, or raise the band's lower edge",
         )
     predicted = extremes(
-        [(name, pair.predicted) for name, pair in pairs if pair.predicted is not None],
-        channels,
-        requirement.statistic,
+        [(name, pair.predicted) for name, pair in pairs if pair.predicted is not None], channels, requirement.statistic
     )
     worst = max(measured, key=_Candidate.severity)
     return results.Requirement(
@@ -111,9 +94,7 @@ def judged(
     )
 
 
-def _channel(
-    channel: str, measured: Sequence[_Candidate], predicted: Sequence[Extreme]
-) -> results.ChannelResult:
+def _channel(channel: str, measured: Sequence[_Candidate], predicted: Sequence[Extreme]) -> results.ChannelResult:
     """The recording in which a channel is closest to failing, beside the largest prediction of any."""
     worst = max((one for one in measured if one.extreme.channel == channel), key=_Candidate.severity)
     return results.ChannelResult(

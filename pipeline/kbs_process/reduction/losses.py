@@ -41,6 +41,4 @@ def _extent(losses: Sequence[Loss], file: str) -> str:
         TRUNCATED
     }:  # how long it would have been, a file that breaks off does not say
         return f"{count}, from {first:.1f} s on"
-    return (
-        f"{count}, between {first:.1f} s and {last:.1f} s" if last > first else f"{count}, at {first:.1f} s"
-    )
+    return f"{count}, between {first:.1f} s and {last:.1f} s" if last > first else f"{count}, at {first:.1f} s"

@@ -37,11 +37,7 @@ def _against_command(run: Run, actual: Signal, instrument: Instrument) -> Iterat
     if error.valid.sum() < MIN_SAMPLES:
         return
     for one in pointing.statistics(error, period=len(error) * error.dt, smoothing=SMOOTHING):
-        yield RecordedPointing(
-            recording=run.name,
-            instrument=instrument,
-            estimate=estimate(one),
-        )
+        yield RecordedPointing(recording=run.name, instrument=instrument, estimate=estimate(one))
 
 
 def estimate(one: PointingStatistics) -> PointingEstimate:

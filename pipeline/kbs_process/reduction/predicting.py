@@ -13,9 +13,7 @@ from kbs_process.rig.model import Rig
 from kbs_process.signals.records import WRENCH_CHANNELS, Array, Events, Run, Signal
 from kbs_process.stages.align.condense import CondenseSettings, condense
 
-LEAD = (
-    10.0  # s at the first rate, after as long a ramp from rest: 3 to 4 time constants of 6 Hz at 1 % damping
-)
+LEAD = 10.0  # s at the first rate, after as long a ramp from rest: 3 to 4 time constants of 6 Hz at 1 % damping
 AT_REST = 1e-4  # rad/s; a start at this rate shakes the article by a fiftieth of one at 0.3 deg/s
 
 SAME_INSTANT = 1e-3  # s, between an encoder's sample and a cycle's start: what clocks are known to
@@ -37,11 +35,7 @@ def schedule_of(run: Run, rig: Rig) -> Schedule:
     command = run.command
     rates = tuple(f"{name}.rate" for name in names)
     position = _columns(command, names)
-    rate = (
-        _columns(command, rates)
-        if set(rates) <= set(command.channels)
-        else np.gradient(position, command.t, axis=0)
-    )
+    rate = _columns(command, rates) if set(rates) <= set(command.channels) else np.gradient(position, command.t, axis=0)
     return Schedule(
         t=command.t,
         position=position,

@@ -30,16 +30,12 @@ class Prepared:
     motion: Motion
 
 
-def prepare(
-    campaign: Campaign, entry: RecordingEntry, decoupling: Decoupling, progress: Progress
-) -> Prepared:
+def prepare(campaign: Campaign, entry: RecordingEntry, decoupling: Decoupling, progress: Progress) -> Prepared:
     """Read a recording as processing needs it."""
     with progress.task(f"Reading {entry.name}"):
         run = read_alive(campaign, entry, keep=True)
         if run.loads is None:
-            raise RecordingError(
-                "there is neither wrench nor effort in this recording", where=str(entry.path)
-            )
+            raise RecordingError("there is neither wrench nor effort in this recording", where=str(entry.path))
         return Prepared(
             entry,
             run.loads,
@@ -69,10 +65,7 @@ def fit_gravity(campaign: Campaign, prepared: Sequence[Prepared], progress: Prog
             if (loads := relieved(campaign, one.entry, one.run, one.motion).loads) is not None
         ]
         return gravity.fit(
-            samples,
-            campaign.rig,
-            include_inertia=campaign.drive == "motion",
-            settings=gravity_settings(campaign),
+            samples, campaign.rig, include_inertia=campaign.drive == "motion", settings=gravity_settings(campaign)
         )
 
 

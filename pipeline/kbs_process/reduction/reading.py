@@ -29,11 +29,7 @@ def read_run(campaign: Campaign, entry: RecordingEntry, through: Callable[[Block
     """
     source = open_recording(entry.path)
     there = {summary.topic for summary in source.topics}
-    topics = [
-        topic
-        for topic in campaign.topics.present()
-        if topic.topic in there or topic.key not in OPTIONAL_STREAMS
-    ]
+    topics = [topic for topic in campaign.topics.present() if topic.topic in there or topic.key not in OPTIONAL_STREAMS]
     blocks = source.read(
         [Stream(topic.key, topic.topic, topic.fields, _OTHERWISE.get(topic.key, "")) for topic in topics]
     )
@@ -67,7 +63,4 @@ def _within(blocks: Blocks, start: float | None, end: float | None) -> Blocks:
         since = (block.log - (first or 0)) * 1e-9
         # Another topic's first message may be older than that of the topic that is read first.
         inside = (since >= (float("-inf") if start is None else start)) & (since < (end or float("inf")))
-        yield (
-            key,
-            block if inside.all() else Block(block.stamp[inside], block.log[inside], block.values[inside]),
-        )
+        yield (key, block if inside.all() else Block(block.stamp[inside], block.log[inside], block.values[inside]))

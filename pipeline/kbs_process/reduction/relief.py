@@ -17,12 +17,7 @@ from kbs_process.signals.records import Array, Run, Signal
 from kbs_process.stages.motion import Motion
 
 _POINTS = 300  # of a recording at which the cords' uncertainty is computed, linear in between
-_SHARED = (
-    ".origin",
-    ".misalignment",
-    "transducer.tilt",
-    "transducer.stiffness",
-)  # where a cord pulls at what
+_SHARED = (".origin", ".misalignment", "transducer.tilt", "transducer.stiffness")  # where a cord pulls at what
 
 
 def forces_in(campaign: Campaign, entry: RecordingEntry) -> tuple[Effect, ...]:
@@ -40,9 +35,7 @@ def relieved(campaign: Campaign, entry: RecordingEntry, run: Run, motion: Motion
     return replace(run, wrench=less(run.wrench), effort=less(run.effort)) if forces else run
 
 
-def in_motion(
-    campaign: Campaign, entry: RecordingEntry, motion: Motion, channels: Sequence[str], rig: Rig
-) -> Array:
+def in_motion(campaign: Campaign, entry: RecordingEntry, motion: Motion, channels: Sequence[str], rig: Rig) -> Array:
     """(n, channels) what the model's effects add to the loads of a rig that its motion drives.
 
     Without what forces of the laboratory exert at rest, which is taken from its recordings; zero of any other rig.
@@ -55,9 +48,7 @@ def in_motion(
     return added - _pull(rig, forces, motion.q, channels) if forces else added
 
 
-def without_effects(
-    campaign: Campaign, entry: RecordingEntry, motion: Motion, loads: Signal, rig: Rig
-) -> Signal:
+def without_effects(campaign: Campaign, entry: RecordingEntry, motion: Motion, loads: Signal, rig: Rig) -> Signal:
     """Return loads less what the model's effects add to them along a measured motion, as a rig reads it."""
     added = in_motion(campaign, entry, motion, loads.channels, rig)
     return loads.derive(loads.values - added, "effects of the model removed") if added.any() else loads
@@ -68,9 +59,7 @@ def without_forces(loads: Signal, rig: Rig, forces: tuple[Effect, ...], q: Array
     if not forces:
         return loads
     names = ", ".join(effect.name for effect in forces)
-    return loads.derive(
-        loads.values - _pull(rig, forces, q, loads.channels), f"static wrench of {names} removed"
-    )
+    return loads.derive(loads.values - _pull(rig, forces, q, loads.channels), f"static wrench of {names} removed")
 
 
 def errors(loads: Signal, rig: Rig, forces: tuple[Effect, ...], q: Array) -> Iterator[Signal]:

@@ -29,12 +29,7 @@ def spectra(table: Table, channels: tuple[str, ...], title: str, *, below: str =
                 centre, level = _smoothed(f, table.columns[f"{channel}.{side}"])
                 axis.plot(centre, level, color=look["color"], linewidth=1.0, label=side)
             axis.plot(
-                f,
-                table.columns[f"{channel}.noise"],
-                color=draw.LIMIT,
-                linewidth=0.8,
-                linestyle="--",
-                label=below,
+                f, table.columns[f"{channel}.noise"], color=draw.LIMIT, linewidth=0.8, linestyle="--", label=below
             )
             shown = np.concatenate([line.get_ydata() for line in axis.lines])
             draw.logarithmic(axis, "x", float(f[0]), float(f[-1]))
@@ -74,9 +69,7 @@ def histories(table: Table, channels: tuple[str, ...], title: str) -> Picture:
                 f"{channel} / {unit(table.unit(f'{channel}.after'))}",
                 below="time / s" if row == len(channels) - 1 else None,
             )
-        return draw.picture(
-            sheet.figure, f"{title}: what is unexplained, before (pale) and after", title, "png"
-        )
+        return draw.picture(sheet.figure, f"{title}: what is unexplained, before (pale) and after", title, "png")
 
 
 def _extremes(x: Array, stride: int) -> Array:

@@ -32,16 +32,12 @@ def strips(
         for index, row in enumerate(rows):
             limits = _limits(row)
             shown = {"measured": row.measured, computed_name: row.computed}
-            together = _range(
-                *(curve[counts] for curve in shown.values() if curve is not None), np.array(limits)
-            )
+            together = _range(*(curve[counts] for curve in shown.values() if curve is not None), np.array(limits))
             panels = [sheet.panel(index, 0, time, together)]
             _curves(panels[0], t, shown)
             panels[0].across(limits, colors=draw.LIMIT, linewidths=0.8, linestyles=[(0, (4, 2))], zorder=2.5)
             if row.residual is not None:
-                panels.append(
-                    sheet.panel(index, 1, time, together if same_scale else _range(row.residual[counts]))
-                )
+                panels.append(sheet.panel(index, 1, time, together if same_scale else _range(row.residual[counts])))
                 _curves(panels[1], t, {"residual": row.residual})
             for place, panel in enumerate(panels):
                 panel.shade(shaded)

@@ -30,9 +30,7 @@ def panel(made: Provenance, recorded: Mapping[str, str] | None = None) -> Panel:
 
 def constants(entries: Sequence[Constant]) -> Fold:
     """Return a table of constants that a reader opens on demand."""
-    rows = tuple(
-        (entry.name, *_value(entry.value, entry.sigma), unit(entry.unit), entry.source) for entry in entries
-    )
+    rows = tuple((entry.name, *_value(entry.value, entry.sigma), unit(entry.unit), entry.source) for entry in entries)
     grid = Grid("Constants used", ("Name", "Value", "Unit", "Source"), rows, "lrll")
     return Fold(f"Constants ({count(len(rows), 'parameter')})", (grid,))
 

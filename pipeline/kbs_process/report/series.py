@@ -78,6 +78,4 @@ def pack(values: Array) -> dict[str, object]:
 def stretches(t: Array, mask: Mask) -> tuple[tuple[float, float], ...]:
     """Return first and last time of every stretch in which `mask` holds."""
     edges = np.flatnonzero(np.diff(np.concatenate(([0], mask.astype(np.int8), [0]))))
-    return tuple(
-        (float(t[start]), float(t[end - 1])) for start, end in zip(edges[::2], edges[1::2], strict=True)
-    )
+    return tuple((float(t[start]), float(t[end - 1])) for start, end in zip(edges[::2], edges[1::2], strict=True))

@@ -39,9 +39,7 @@ class Scale:
 
     def place(self, values: Array | float) -> Array:
         """Where values are on the sheet (in); those of a logarithmic scale must be positive."""
-        low, high = (
-            (math.log10(self.low), math.log10(self.high)) if self.logarithmic else (self.low, self.high)
-        )
+        low, high = (math.log10(self.low), math.log10(self.high)) if self.logarithmic else (self.low, self.high)
         along = np.log10(values) if self.logarithmic else np.asarray(values)
         return np.asarray(self.start + (along - low) * ((self.end - self.start) / ((high - low) or 1.0)))
 
@@ -84,9 +82,7 @@ class Panel:
     def shade(self, stretches: Iterable[tuple[float, float]]) -> None:
         """Shade stretches of the horizontal axis."""
         for start, end in stretches:
-            left, right = (
-                float(self.x.place(min(max(edge, self.x.low), self.x.high))) for edge in (start, end)
-            )
+            left, right = (float(self.x.place(min(max(edge, self.x.low), self.x.high))) for edge in (start, end))
             size = (right - left, self.y.end - self.y.start)
             self.sheet.axes.add_artist(
                 Rectangle((left, self.y.start), *size, facecolor=draw.SHADE, linewidth=0, zorder=0)
@@ -101,9 +97,7 @@ class Panel:
         self.upright(x_values, colors=draw.GRID, linewidths=0.6, zorder=0.5)
         self.across(y_values, colors=draw.GRID, linewidths=0.6, zorder=0.5)
         axes = [((left, self.y.end), (left, bottom)), ((left, bottom), (self.x.end, bottom))]
-        marks = [((x, bottom), (x, bottom - _TICK)) for x in at_x] + [
-            ((left, y), (left - _TICK, y)) for y in at_y
-        ]
+        marks = [((x, bottom), (x, bottom - _TICK)) for x in at_x] + [((left, y), (left - _TICK, y)) for y in at_y]
         self._lines(axes + marks, colors=draw.AXIS, linewidths=0.6, zorder=2.5)
         write = self.sheet.axes.text
         for y, text in zip(at_y, y_labels, strict=True):
@@ -136,21 +130,13 @@ class Sheet:
         self.axes.set(xlim=(0.0, draw.WIDTH), ylim=(0.0, self._height))
 
     def panel(
-        self,
-        row: int,
-        column: int,
-        x: tuple[float, float],
-        y: tuple[float, float],
-        *,
-        logarithmic: bool = False,
+        self, row: int, column: int, x: tuple[float, float], y: tuple[float, float], *, logarithmic: bool = False
     ) -> Panel:
         """Return the panel in a row and column with its ranges of values."""
         left = _LEFT + column * (self._width + _BETWEEN)
         top = self._height - _TOP - row * (self._row_height + self._gap)
         return Panel(
-            self,
-            Scale(*x, left, left + self._width, logarithmic),
-            Scale(*y, top - self._row_height, top, logarithmic),
+            self, Scale(*x, left, left + self._width, logarithmic), Scale(*y, top - self._row_height, top, logarithmic)
         )
 
     def key(self, column: int, names: Iterable[str]) -> None:
@@ -159,6 +145,4 @@ class Sheet:
         right = _LEFT + column * (self._width + _BETWEEN) + self._width
         place = (right / draw.WIDTH, 1.0)
         # Each column has a legend of its own, which `axes.legend` would replace by the next.
-        self.figure.legend(
-            handles=lines, loc="upper right", bbox_to_anchor=place, ncols=len(lines), borderaxespad=0.1
-        )
+        self.figure.legend(handles=lines, loc="upper right", bbox_to_anchor=place, ncols=len(lines), borderaxespad=0.1)

@@ -82,9 +82,7 @@ def read_table(path: Path) -> Table:
         about = json.loads((content.schema.metadata or {}).get(b"kbs", b"{}"))
     except (OSError, ValueError, pyarrow.lib.ArrowException) as error:
         raise OutputError(
-            f"not a readable table: {error}",
-            where=str(path),
-            remedy="process the campaign again: kbs-process CAMPAIGN",
+            f"not a readable table: {error}", where=str(path), remedy="process the campaign again: kbs-process CAMPAIGN"
         ) from None
     columns = {
         name: np.asarray(column.to_numpy(), dtype=np.float64)

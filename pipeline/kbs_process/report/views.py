@@ -56,15 +56,7 @@ def _points(lengths: Sequence[int], budget: int) -> int:
 def _view(scene: Scene, points: int) -> View:
     size = series.stride(len(scene.t), points)
     t0, step = series.times(scene.t, size)
-    channels = tuple(
-        Channel(
-            trace.channel,
-            trace.unit,
-            trace.limit,
-            _packed(trace, size),
-        )
-        for trace in scene.traces
-    )
+    channels = tuple(Channel(trace.channel, trace.unit, trace.limit, _packed(trace, size)) for trace in scene.traces)
     bin_s = 2.0 * step if size > 1 else None
     shaded = series.stretches(scene.t, np.logical_not(scene.valid))
     return View(scene.recording, scene.choice, t0, step, bin_s, shaded, channels)
@@ -73,6 +65,4 @@ def _view(scene: Scene, points: int) -> View:
 def _packed(trace: series.Trace, size: int) -> tuple[dict[str, object] | None, ...]:
     """Pack the curves; of three that are whole the middle one is left to be worked out by the page."""
     derived = trace.computed if size == 1 and len(trace.curves) == 3 else None
-    return tuple(
-        None if curve is derived else series.pack(series.envelope(curve, size)) for curve in trace.curves
-    )
+    return tuple(None if curve is derived else series.pack(series.envelope(curve, size)) for curve in trace.curves)

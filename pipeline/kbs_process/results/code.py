@@ -45,15 +45,10 @@ def _digest(package: Path) -> str:
 def _of_checkout(package: Path) -> str:
     inside = ["git", "-C", str(package)]
     try:
-        head = subprocess.run(
-            [*inside, "rev-parse", "HEAD"], capture_output=True, text=True, timeout=10, check=True
-        )
+        head = subprocess.run([*inside, "rev-parse", "HEAD"], capture_output=True, text=True, timeout=10, check=True)
         # A package installed below someone else's repository is not part of it.
         subprocess.run(
-            [*inside, "ls-files", "--error-unmatch", "__init__.py"],
-            capture_output=True,
-            timeout=10,
-            check=True,
+            [*inside, "ls-files", "--error-unmatch", "__init__.py"], capture_output=True, timeout=10, check=True
         )
         changed = subprocess.run(
             [*inside, "status", "--porcelain", "--untracked-files=no", "--", "."],

@@ -32,9 +32,7 @@ class Crew(Generic[Held]):
         self._pool: ProcessPoolExecutor | None = None
         if count > 1:
             context = multiprocessing.get_context("forkserver")
-            self._pool = ProcessPoolExecutor(
-                count, mp_context=context, initializer=_receive, initargs=(held,)
-            )
+            self._pool = ProcessPoolExecutor(count, mp_context=context, initializer=_receive, initargs=(held,))
 
     def __enter__(self) -> Crew[Held]:
         return self

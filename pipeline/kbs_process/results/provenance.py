@@ -19,18 +19,7 @@ from kbs_process.results.records import Constant, InputFile, Provenance
 from kbs_process.rig.model import Quantity, Rig
 
 # Libraries that compute, read or write; a report names their versions.
-LIBRARIES = (
-    "numpy",
-    "scipy",
-    "numba",
-    "pandas",
-    "pyarrow",
-    "mcap",
-    "zstandard",
-    "lz4",
-    "msgspec",
-    "matplotlib",
-)
+LIBRARIES = ("numpy", "scipy", "numba", "pandas", "pyarrow", "mcap", "zstandard", "lz4", "msgspec", "matplotlib")
 
 
 def sha256(path: Path) -> str:
@@ -73,9 +62,7 @@ def made(verb: str, folder: Path, files: Iterable[Path], options: str = "") -> P
         command=" ".join(part for part in ("kbs-process", verb, _named(folder.absolute()), options) if part),
         commit=about["commit"],
         source=about["source"],
-        inputs=tuple(
-            InputFile(file=file, sha256=digest) for file, digest in checksums(folder, files).items()
-        ),
+        inputs=tuple(InputFile(file=file, sha256=digest) for file, digest in checksums(folder, files).items()),
     )
 
 

@@ -117,12 +117,7 @@ def kind_of(folder: Path) -> str:
 def schema_of(record: type[Record], title: str) -> dict[str, Any]:
     """Return the JSON Schema of a kind of results.json."""
     (entry,), definitions = msgspec.json.schema_components((record,), ref_template="#/$defs/{name}")
-    whole = {
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "title": title,
-        **entry,
-        "$defs": definitions,
-    }
+    whole = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": title, **entry, "$defs": definitions}
     return msgspec.json.decode(msgspec.json.encode(whole), type=dict[str, Any])  # as a file holds it
 
 

@@ -69,9 +69,7 @@ def revising(target: Path, *, without: Collection[str] = (), marker: str = RESUL
     The files are links to the old ones: the block may add files, and must not write into those it finds.
     """
     if not (target / marker).is_file():
-        raise OutputError(
-            f"holds no results (no {marker})", where=str(target), remedy="process the campaign first"
-        )
+        raise OutputError(f"holds no results (no {marker})", where=str(target), remedy="process the campaign first")
     with writing(target, marker=marker) as private:
         link_tree(target, private, without=without)
         yield private

@@ -38,9 +38,7 @@ class TableWriter:
 
     def gravity(self, measured: Signal, static: Signal, residual: Signal) -> None:
         """Decoupled wrench, the static model, and what is left."""
-        self._together(
-            "gravity", self.recording, {"measured": measured, "static": static, "residual": residual}
-        )
+        self._together("gravity", self.recording, {"measured": measured, "static": static, "residual": residual})
 
     def band(self, kind: str, band: str, measured: Signal, predicted: Signal | None) -> None:
         """Measured and predicted wrench in one band; `kind` is "bands" (frame T) or "spacecraft" (frame S)."""

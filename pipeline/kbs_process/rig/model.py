@@ -148,9 +148,7 @@ class Transducer:
     """raw = (I + cross_coupling) wrench + bias + noise, quantised to `resolution`."""
 
     on: str  # "lab" or a joint
-    channels: tuple[
-        str, ...
-    ]  # those recorded, a subset of WRENCH_CHANNELS; none on a rig without a transducer
+    channels: tuple[str, ...]  # those recorded, a subset of WRENCH_CHANNELS; none on a rig without a transducer
     tilt: Quantity  # (2,) rad, tx about x and ty about y
     stiffness: Quantity | None  # (3,) N m/rad about x, y, z; None: rigid
     damping: Quantity | None  # (3,) N m s/rad
@@ -292,9 +290,7 @@ def _walk(node: object) -> Iterator[Quantity]:
             yield from _walk(getattr(node, entry.name))
 
 
-def substitute(
-    rig: Rig, values: dict[str, Array | float], sigmas: dict[str, Array | float] | None = None
-) -> Rig:
+def substitute(rig: Rig, values: dict[str, Array | float], sigmas: dict[str, Array | float] | None = None) -> Rig:
     """Return `rig` with new values (and sigmas, where given) for some quantities, named by dotted path.
 
     Raises KeyError for a name that the rig does not have and ValueError for a value of another shape.

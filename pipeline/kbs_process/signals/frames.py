@@ -44,9 +44,7 @@ def to_rotation_vector(R: Array) -> Array:
     trace = np.trace(R, axis1=-2, axis2=-1)
     K = np.empty((*R.shape[:-2], 4, 4))
     K[..., 0, 0] = 1.0 + trace
-    off = np.stack(
-        [R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]], -1
-    )
+    off = np.stack([R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]], -1)
     K[..., 0, 1:] = K[..., 1:, 0] = off
     K[..., 1:, 1:] = R + np.swapaxes(R, -1, -2) + (1.0 - trace)[..., None, None] * np.eye(3)
     best = np.argmax(np.diagonal(K, axis1=-2, axis2=-1), axis=-1)

@@ -12,10 +12,7 @@ def crop(signal: Signal, start: int, length: int) -> Signal:
     """Return `length` samples of a signal from its sample `start` on."""
     stop = start + length
     return replace(
-        signal,
-        t0=signal.t0 + start * signal.dt,
-        values=signal.values[start:stop],
-        valid=signal.valid[start:stop],
+        signal, t0=signal.t0 + start * signal.dt, values=signal.values[start:stop], valid=signal.valid[start:stop]
     )
 
 

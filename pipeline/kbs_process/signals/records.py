@@ -71,9 +71,7 @@ class Signal:
         column: Array = self.values[:, self.channels.index(channel)]
         return column
 
-    def derive(
-        self, values: Array, step: str, *, frame: str | None = None, valid: Mask | None = None
-    ) -> Signal:
+    def derive(self, values: Array, step: str, *, frame: str | None = None, valid: Mask | None = None) -> Signal:
         """Return the same channels with new values, `step` added to the history."""
         return replace(
             self,
@@ -194,12 +192,7 @@ class Run:
         """Rate (c,) at which each channel of `loads` was sampled, Hz."""
         measured = {"wrench": self.wrench, "effort": self.effort}
         return np.array(
-            [
-                self.rates[key]
-                for key, signal in measured.items()
-                if signal is not None
-                for _ in signal.channels
-            ],
+            [self.rates[key] for key, signal in measured.items() if signal is not None for _ in signal.channels],
             dtype=np.float64,
         )
 

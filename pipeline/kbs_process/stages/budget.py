@@ -58,9 +58,7 @@ def sensor_noise(noise: Array, rate: Array | float, bandwidth: float) -> Entry:
     return Entry("transducer", "noise of the transducer, white", noise * np.sqrt(2.0 * bandwidth / rate))
 
 
-def from_shapes(
-    stage: str, source: str, shapes: Sequence[Signal], band: Filter, moving: Mask | None = None
-) -> Entry:
+def from_shapes(stage: str, source: str, shapes: Sequence[Signal], band: Filter, moving: Mask | None = None) -> Entry:
     """Entry of a stage whose independent one-sigma errors have known time histories `shapes` (at least one)."""
     variance = np.zeros_like(shapes[0].values)
     valid = np.ones(len(shapes[0]), dtype=np.bool_)

@@ -82,8 +82,6 @@ def check_encoder_sense(encoder: Signal, command: Signal) -> tuple[SignCheck, ..
             continue
         slope = float(x @ y / (x @ x))
         tests.append(
-            SignCheck(
-                f"slope of encoder {joint} against its command", "+1", f"{slope:+.4f}", abs(slope - 1.0) < 0.1
-            )
+            SignCheck(f"slope of encoder {joint} against its command", "+1", f"{slope:+.4f}", abs(slope - 1.0) < 0.1)
         )
     return tuple(tests)

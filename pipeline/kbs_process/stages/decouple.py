@@ -68,8 +68,4 @@ def _envelope(envelope: Envelope, model: Decoupling) -> Envelope:
     """Outer bounds: the extremes of the raw channels are taken as if they fell together."""
     low, high = envelope.low - model.bias, envelope.high - model.bias
     positive, negative = np.maximum(model.matrix, 0.0), np.minimum(model.matrix, 0.0)
-    return replace(
-        envelope,
-        low=low @ positive.T + high @ negative.T,
-        high=high @ positive.T + low @ negative.T,
-    )
+    return replace(envelope, low=low @ positive.T + high @ negative.T, high=high @ positive.T + low @ negative.T)

@@ -55,9 +55,7 @@ class Motion:
     qd: Array  # (n, joints) rad/s
     qdd: Array  # (n, joints) rad/s^2
     sigma_q: Array  # (n, joints) rad, of both causes below
-    rounding: (
-        Array  # (phases, n, joints) rad, how encoder rounding may have erred, for positions within a code
-    )
+    rounding: Array  # (phases, n, joints) rad, how encoder rounding may have erred, for positions within a code
     missed: Array  # (joints,) rad rms, real motion that the source does not show
     offset: Array  # (joints,) rad, taken off the encoders' readings
     valid: Mask  # (n,)
@@ -70,9 +68,7 @@ class Motion:
     @property
     def sigma_rounding(self) -> Array:
         """The part (n, joints) of `sigma_q` that is the encoders' rounding, rad."""
-        return np.stack(
-            [rounding_error(of_joint, self.dt) for of_joint in self.rounding.T.swapaxes(1, 2)], axis=1
-        )
+        return np.stack([rounding_error(of_joint, self.dt) for of_joint in self.rounding.T.swapaxes(1, 2)], axis=1)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -119,11 +115,7 @@ def estimate(run: Run, rig: Rig, settings: MotionSettings = MotionSettings()) ->
         history=(
             *(f"{joint.name}: {angle.how}" for joint, angle in zip(rig.joints, angles, strict=True)),
             f"angles low-passed at {settings.band_Hz:g} Hz and differentiated",
-            *(
-                [f"angles delayed by {1e3 * delay:.1f} ms, as the amplifier delays the wrench"]
-                if delay
-                else []
-            ),
+            *([f"angles delayed by {1e3 * delay:.1f} ms, as the amplifier delays the wrench"] if delay else []),
         ),
         # Tails of a kernel are below 1 % beyond the half of its length.
         reach=0.5 * grid.dt * kernel_length(min(angle.corner for angle in angles), grid.dt),
@@ -189,9 +181,7 @@ def _integrated(rate: Array, dt: float, band: float) -> _Angle:
     q = np.concatenate([[0.0], np.cumsum(0.5 * dt * (rate[1:] + rate[:-1]))])
     noise = float(np.std(rate - smooth(rate, dt, band)))
     sigma = noise * dt * np.sqrt(np.arange(len(q)))
-    return _Angle(
-        q, np.zeros((len(_PHASES), len(q))), _rms(sigma), sigma, "integral of the measured rate", band
-    )
+    return _Angle(q, np.zeros((len(_PHASES), len(q))), _rms(sigma), sigma, "integral of the measured rate", band)
 
 
 def _from_encoder(measured: Array, dt: float, step: float, encoder_rate: float, band: float) -> _Angle:

@@ -107,9 +107,7 @@ def statistics(
             f"{np.count_nonzero(valid)} samples of the pointing error are no statistics",
             remedy="choose a longer stretch",
         )
-    return tuple(
-        _one(channel, error.column(channel)[valid], error.dt, period, smoothing) for channel in error.channels
-    )
+    return tuple(_one(channel, error.column(channel)[valid], error.dt, period, smoothing) for channel in error.channels)
 
 
 def _one(axis: str, e: Array, dt: float, period: float, smoothing: float) -> PointingStatistics:

@@ -93,9 +93,7 @@ def fit(runs: Sequence[Signal]) -> Repeatability:
     valid = _valid(runs)
     samples = int(np.count_nonzero(valid))
     if samples < 2:
-        raise RecordingError(
-            "the repeats have no valid sample in common", remedy="check gaps and the band's edges"
-        )
+        raise RecordingError("the repeats have no valid sample in common", remedy="check gaps and the band's edges")
     y = np.stack([run.values[:n] for run in runs])
     mean = y.mean(axis=0)
     rest = np.where(valid[:, None], y - mean, 0.0)
@@ -121,15 +119,12 @@ def fit(runs: Sequence[Signal]) -> Repeatability:
 
 def _same_axis(runs: Sequence[Signal]) -> None:
     if len(runs) < 2:
-        raise RecordingError(
-            "repeatability needs two repeats of a trajectory or more", remedy="record it again"
-        )
+        raise RecordingError("repeatability needs two repeats of a trajectory or more", remedy="record it again")
     first = runs[0]
     for run in runs[1:]:
         if (run.t0, run.dt, run.channels, run.frame) != (first.t0, first.dt, first.channels, first.frame):
             raise RecordingError(
-                "the repeats differ in time axis, channels or frame",
-                remedy="bring them to one before comparing",
+                "the repeats differ in time axis, channels or frame", remedy="bring them to one before comparing"
             )
 
 

@@ -24,8 +24,7 @@ def commanded(run: Run) -> Signal | None:
     grid = run.wrench
     names = tuple(name for name in run.command.channels if not name.endswith(".rate"))
     columns = [
-        np.interp(grid.t, run.command.t, run.command.values[:, run.command.channels.index(name)])
-        for name in names
+        np.interp(grid.t, run.command.t, run.command.values[:, run.command.channels.index(name)]) for name in names
     ]
     return Signal(
         t0=grid.t0,

@@ -31,8 +31,6 @@ def render(results: Path, pdf: bool | None = None) -> Path:
     kind = kind_of(results)
     if kind not in DOCUMENTS:
         raise OutputError(
-            f"there is no report of kind '{kind}'",
-            where=str(results / FILE),
-            remedy=did_you_mean(kind, DOCUMENTS),
+            f"there is no report of kind '{kind}'", where=str(results / FILE), remedy=did_you_mean(kind, DOCUMENTS)
         )
     return build(results, DOCUMENTS[kind], pdf)

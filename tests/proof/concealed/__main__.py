@@ -25,9 +25,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--truth", type=Path, help="folder for what is concealed; default: OUT-truth")
     parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument(
-        "--only", action="append", help="conceal this physics alone; repeated: these together"
-    )
+    parser.add_argument("--only", action="append", help="conceal this physics alone; repeated: these together")
     parser.add_argument("--null", choices=("nothing", "within", "beyond"), help="conceal nothing")
     parser.add_argument("--level", type=float, default=300.0, help="with --only: rho_eff of each")
     parser.add_argument("--first", type=int, default=0, help="number of the first trial")

@@ -61,9 +61,7 @@ class Bench:
         changes: list[Array] = []
         for setting, readings in zip(self.settings, self.readings, strict=True):
             duration = float(setting.motion.path.t[-1])
-            changes.append(
-                setting.whiten(setting.motion.observed(extra=self.extra(effects, duration)) - readings)
-            )
+            changes.append(setting.whiten(setting.motion.observed(extra=self.extra(effects, duration)) - readings))
         return strength(self.settings, changes)
 
 
@@ -114,9 +112,7 @@ def beyond(
             element = f"[{name[1]}]" if np.ndim(nominal[name[0]]) else ""
             moved.append({"name": f"{_dotted(name[0])}{element}", "sigmas": sigmas})
             total = [part + sigmas * c[name] for part, c in zip(total, bench.columns, strict=True)]
-        seen = strength(
-            bench.settings, [s.whiten(part) for s, part in zip(bench.settings, total, strict=True)]
-        )
+        seen = strength(bench.settings, [s.whiten(part) for s, part in zip(bench.settings, total, strict=True)])
         if seen.rho > _LEAST_BEYOND:
             return hardware, moved
     raise ValueError("no parameter of this rig can be seen to be off")

@@ -240,9 +240,7 @@ PHYSICS: tuple[Physics, ...] = (
 BY_NAME = {physics.name: physics for physics in PHYSICS}
 
 
-def draw(
-    physics: Physics, rng: np.random.Generator, split: Split, swept: dict[str, tuple[float, float]]
-) -> Effect:
+def draw(physics: Physics, rng: np.random.Generator, split: Split, swept: dict[str, tuple[float, float]]) -> Effect:
     """Draw a place and shapes; `swept` is each joint's range of angles (rad) in the fit recordings."""
     place = str(rng.choice(physics.places))
     shapes: list[float] = []

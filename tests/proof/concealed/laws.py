@@ -23,9 +23,7 @@ class Law(IntEnum):
     """Laws by number; `s` are shapes, `A` the amplitude, th and w angle and rate, x = th_r/R - th_l."""
 
     STRIBECK = 10  # -A (S(w/s0) + s1 S(w/s0) exp(-|w/s2|)), S a sigmoid (tanh, or algebraic where s3 > 0.5)
-    ELASTOPLASTIC = (
-        11  # -A z/s0; dz/dt = w (1 - a(z) sgn(w) z/s0), a rising smoothly from 0 at |z| = 0.6 s0 to 1 at s0
-    )
+    ELASTOPLASTIC = 11  # -A z/s0; dz/dt = w (1 - a(z) sgn(w) z/s0), a rising smoothly from 0 at |z| = 0.6 s0 to 1 at s0
     TOOTH_SHAPE = 12  # A sin(u)/(1 + s1 cos u), u = 200 s0 th + s2
     MOTOR_ORDER = 13  # A sin(u + s1 sin u), u = s0 th + s2
     ODD_POWER = 14  # -A (w/s0)^3, bent off beyond 3 s0, where only vibration gets
@@ -47,9 +45,7 @@ class Law(IntEnum):
     CABLE_BOUC_WEN = 41  # -A z/s0 likewise
     CORD = 42  # tension A ln(L/s0) where L > s0, from the antenna's point s4..6 to the anchor s1..3
     AIR = 43  # -A |v|^0.8 v at the antenna's point s0..2, which turns with plate and joints
-    SHIFTING_MASS = (
-        50  # static moment A S(f/s0) along the antenna's axis s1, f the specific force along that axis in g
-    )
+    SHIFTING_MASS = 50  # static moment A S(f/s0) along the antenna's axis s1, f the specific force along that axis in g
     FLOOR_VIBRATION = 60  # acceleration A sin(2 pi (s0 t + s1 t^2) + s2) along s3..5
     PLATE_STIFFENING = 61  # -A s1 (sinh((phi)/s1) - phi/s1) on the plate's axis s0
     PLATE_STOPS = 62  # -A mean of stops on the plate's axis s0, travels s1 (1, 2, 4)
@@ -243,9 +239,7 @@ def _structure(p: Any, z: Any, t: float, dt: float, motion: Any, bodies: Any, ou
     body = bodies[1]
     if law == Law.SHIFTING_MASS:
         column = 3 + int(s[1])
-        along = (
-            body[column] * body[15] + body[column + 3] * body[16] + body[column + 6] * body[17]
-        ) / 9.80665
+        along = (body[column] * body[15] + body[column + 3] * body[16] + body[column + 6] * body[17]) / 9.80665
         moment = -A * sigmoid(along / s[0], s[3])
         u0, u1, u2 = body[column], body[column + 3], body[column + 6]
         out[16] += moment * (-u1 * body[17] + u2 * body[16])

@@ -13,9 +13,7 @@ from engine.rigid import AZ, EL
 from engine.simulation import Dense, amplify, at, integrate
 from engine.trajectories import Commands
 
-COARSE = (
-    5e-4  # s; strengths within a few per cent of those at the recordings' step (test_concealed_strength.py)
-)
+COARSE = 5e-4  # s; strengths within a few per cent of those at the recordings' step (test_concealed_strength.py)
 FINE_HZ, WORKING_HZ = 100.0, 20.0
 _EVERY = round(FINE_HZ / WORKING_HZ)
 _RATE_SPAN = 5e-3  # s
@@ -39,9 +37,7 @@ class Motion:
 
     def simulated(self, hardware: Hardware | None = None, extra: Extra = NONE) -> Dense:
         """Simulate it again along the same field, with other hardware or more physics."""
-        return integrate(
-            hardware or self.hardware, self.path, time_step=self.step, extra=extra, field=self.field
-        )
+        return integrate(hardware or self.hardware, self.path, time_step=self.step, extra=extra, field=self.field)
 
     def observed(self, hardware: Hardware | None = None, extra: Extra = NONE) -> Array:
         """Readings (n, 8) at the working rate: coupled wrench and angles shown, neither noise nor rounding."""
@@ -53,9 +49,7 @@ class Motion:
 def read(hardware: Hardware, dense: Dense, extra: Extra = NONE) -> Array:
     """Readings (n, 8) at the working rate of a simulation."""
     t = np.arange(0.0, dense.field_t[-1] + 1e-9, 1.0 / FINE_HZ)
-    wrench_t, angle_t = (
-        t - extra.clocks[key](t) if key in extra.clocks else t for key in ("wrench", "encoder")
-    )
+    wrench_t, angle_t = (t - extra.clocks[key](t) if key in extra.clocks else t for key in ("wrench", "encoder"))
     coupled = at(dense.t, amplify(hardware, dense), wrench_t)
     coupled = coupled @ (np.eye(6) + hardware["transducer.cross_coupling"]).T
     if extra.transducer is not None:

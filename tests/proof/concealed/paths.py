@@ -91,11 +91,7 @@ def hand_over(rng: np.random.Generator, number: Draw) -> tuple[Axis, Axis]:
     def axis(start: float, slew: float) -> Axis:
         creep = number("rate.slow") * 0.3
         moved = Axis(start).rest(2.0).accelerate(creep, 0.02).rest(8.0).accelerate(0.0, 0.02)
-        return (
-            moved.move(slew, rate=1.2, acceleration=number("acceleration"))
-            .accelerate(-creep, 0.02)
-            .rest(60.0)
-        )
+        return moved.move(slew, rate=1.2, acceleration=number("acceleration")).accelerate(-creep, 0.02).rest(60.0)
 
     return axis(number("az.start"), _sign(rng) * float(rng.uniform(8, 20))), axis(
         number("el.low"), float(rng.uniform(5, 10))

@@ -35,9 +35,7 @@ class Physics:
     port: str
     family: str
     law: IntEnum | Sense  # Law, or a law that somebody else lets act
-    places: tuple[
-        str, ...
-    ]  # joints, links, streams, or channels "Tx" and "Tx<-Fz"; "" where there is but one
+    places: tuple[str, ...]  # joints, links, streams, or channels "Tx" and "Tx<-Fz"; "" where there is but one
     unit: str  # of the amplitude
     first: float  # amplitude tried first
     most: float  # beyond it, the physics would be another one

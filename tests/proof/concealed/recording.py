@@ -41,10 +41,7 @@ def record(
     """Simulate one run with what is concealed, and record it. The same arguments give the same bits."""
     run, clocks, noise, jitter, *arrivals = (np.random.default_rng(s) for s in seed.spawn(8))
     hardware = vary(hardware, run)
-    wrench_clock, encoder_clock = (
-        sensors.draw_clock(clocks, wrench_hz),
-        sensors.draw_clock(clocks, encoder_hz),
-    )
+    wrench_clock, encoder_clock = (sensors.draw_clock(clocks, wrench_hz), sensors.draw_clock(clocks, encoder_hz))
     dense = integrate(hardware, path, time_step=time_step, extra=extra)
     duration = float(path.t[-1])
     wrench_reading, wrench_t = sensors.ticks(wrench_clock, wrench_hz, duration)
@@ -70,14 +67,10 @@ def record(
         name: sensors.stream(epoch_ns, *columns, rng)
         for (name, columns), rng in zip(streams.items(), arrivals, strict=True)
     }
-    return Recording(
-        **made, hardware=hardware, drift=drift, wrench_clock=wrench_clock, encoder_clock=encoder_clock
-    )
+    return Recording(**made, hardware=hardware, drift=drift, wrench_clock=wrench_clock, encoder_clock=encoder_clock)
 
 
-def _stamped(
-    name: str, reading: Array, t: Array, extra: Extra, jitter: float, rng: np.random.Generator
-) -> Array:
+def _stamped(name: str, reading: Array, t: Array, extra: Extra, jitter: float, rng: np.random.Generator) -> Array:
     """What the clock reads, with its jitter (s, one sigma); never backwards."""
     read = reading + jitter * rng.standard_normal(len(t))
     return np.asarray(np.maximum.accumulate(read + _by_clock(name, t, extra) - t))

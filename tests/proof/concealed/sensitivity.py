@@ -37,9 +37,7 @@ def columns(motion: Motion) -> tuple[dict[Named, Array], Array]:
         for name in RUN_FRICTION:
             key = f"joint.{axis}.drive.{name}"
             own.append(_relative(hardware, simulated, key) * RUN_TO_RUN["friction"])
-    warmth = [
-        _relative(hardware, simulated, f"joint.{axis}.drive.{n}") for axis in AXES for n in ("b_m", "d0")
-    ]
+    warmth = [_relative(hardware, simulated, f"joint.{axis}.drive.{n}") for axis in AXES for n in ("b_m", "d0")]
     own.append(np.sum(warmth, axis=0) * RUN_TO_RUN["temperature"])
     tilt = hardware.sigmas["transducer.tilt"]
     own += [simulated["transducer.tilt", k] * (RUN_TO_RUN["tilt"] / tilt[k]) for k in (0, 1)]

@@ -115,9 +115,7 @@ def prepare(spec: Spec, folder: Path) -> tuple[Bench, list[dict[str, Any]]]:
     return replace(bench, hardware=hardware), moved
 
 
-def describe_article(
-    folder: Path, rng: np.random.Generator, split: Split, loop: str = ""
-) -> tuple[float, float]:
+def describe_article(folder: Path, rng: np.random.Generator, split: Split, loop: str = "") -> tuple[float, float]:
     """Write a drawn article's campaign, without recordings; return the rates of wrench and encoders, Hz.
 
     The loop is drawn, too, where none is given.
@@ -229,9 +227,7 @@ def told(effect: Effect, found: Strength) -> dict[str, Any]:
     }
 
 
-def _record(
-    spec: Spec, folder: Path, bench: Bench, hidden: Sequence[Effect], seed: np.random.SeedSequence
-) -> None:
+def _record(spec: Spec, folder: Path, bench: Bench, hidden: Sequence[Effect], seed: np.random.SeedSequence) -> None:
     """Record all runs and describe the campaign."""
     names, starts, *streams = seed.spawn(10)
     runs = named(np.random.default_rng(names), planned(len(bench.trajectories)))

@@ -77,9 +77,7 @@ def truth(case: Case) -> dict[str, Any]:
         "trial": case.name,
         "kind": "concealed" if case.effects else "beyond" if case.moved else "within",
         "split": _SPLIT,
-        "effects": [
-            trials.told(effect(one), Strength(one.rho, one.kappa, one.rho_eff)) for one in case.effects
-        ],
+        "effects": [trials.told(effect(one), Strength(one.rho, one.kappa, one.rho_eff)) for one in case.effects],
         "beyond": [{"name": f"{one.name}[{one.element}]", "sigmas": one.sigmas} for one in case.moved],
         "rho_eff": together,
         "case": f"{case.number}: {case.title}",

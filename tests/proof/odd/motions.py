@@ -12,9 +12,7 @@ from proof.concealed.ranges import Split
 from proof.odd.cases import Case
 
 
-def driven(
-    case: Case, split: Split, drawing: np.random.Generator, calibrating: np.random.Generator
-) -> list[Commands]:
+def driven(case: Case, split: Split, drawing: np.random.Generator, calibrating: np.random.Generator) -> list[Commands]:
     """Return all trajectories, the calibration last: path -1 of a run."""
     made = [*paths.draw(drawing, split, case.trajectories), paths.calibration(calibrating)]
     if case.long_h:

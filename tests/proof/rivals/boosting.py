@@ -14,16 +14,7 @@ from sklearn.ensemble import HistGradientBoostingRegressor
 
 from proof.answer import Answer
 from proof.rivals.case import Array, Case, Recording, detrended
-from proof.rivals.inputs import (
-    Input,
-    Learnt,
-    answer,
-    channels_worth_learning,
-    explained,
-    folds,
-    inputs,
-    matrix,
-)
+from proof.rivals.inputs import Input, Learnt, answer, channels_worth_learning, explained, folds, inputs, matrix
 
 _TREES = 200
 

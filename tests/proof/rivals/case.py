@@ -28,9 +28,7 @@ class Recording:
     valid: NDArray[np.bool_]  # (n,)
     residual: Array  # (n, c)
     signals: Mapping[str, Array]  # (n,) each: see `library`
-    whiten: Callable[
-        [Array], Array
-    ]  # (n, c) in the residual's units -> white numbers of unit variance at the floor
+    whiten: Callable[[Array], Array]  # (n, c) in the residual's units -> white numbers of unit variance at the floor
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -18,16 +18,7 @@ from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 
 from proof.answer import Answer
 from proof.rivals.case import Array, Case, Recording, detrended
-from proof.rivals.inputs import (
-    Input,
-    Learnt,
-    answer,
-    channels_worth_learning,
-    explained,
-    folds,
-    inputs,
-    matrix,
-)
+from proof.rivals.inputs import Input, Learnt, answer, channels_worth_learning, explained, folds, inputs, matrix
 
 _SAMPLES = 300
 
@@ -62,18 +53,12 @@ def _fit(
     y = np.concatenate([detrended(r, r.residual[:, [channel]])[:, 0] for r in recordings])
     middle, spread = X.mean(axis=0), X.std(axis=0) + 1e-12
     some = np.linspace(0, len(X) - 1, min(_SAMPLES, len(X))).astype(int)
-    start = ConstantKernel(1.0, (1e-3, 1e4)) * RBF(np.ones(X.shape[1]), (0.1, 1e3)) + WhiteKernel(
-        1.0, (1e-3, 1e4)
-    )
+    start = ConstantKernel(1.0, (1e-3, 1e4)) * RBF(np.ones(X.shape[1]), (0.1, 1e3)) + WhiteKernel(1.0, (1e-3, 1e4))
     model = GaussianProcessRegressor(
-        start if kernel is None else kernel,
-        optimizer="fmin_l_bfgs_b" if kernel is None else None,
-        random_state=0,
+        start if kernel is None else kernel, optimizer="fmin_l_bfgs_b" if kernel is None else None, random_state=0
     )
     with warnings.catch_warnings():
-        warnings.simplefilter(
-            "ignore", ConvergenceWarning
-        )  # a length scale at its bound: an irrelevant input
+        warnings.simplefilter("ignore", ConvergenceWarning)  # a length scale at its bound: an irrelevant input
         model.fit((X[some] - middle) / spread, y[some])
 
     def predict(recording: Recording) -> Array:

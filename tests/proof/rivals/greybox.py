@@ -91,9 +91,7 @@ def _prewhitener(noise: Array, block: Array) -> Callable[[Array], Array]:
     edges = np.flatnonzero(np.diff(block)) + 1
 
     def whiten(columns: Array) -> Array:
-        return np.concatenate(
-            [lfilter(taps, 1.0, part, axis=0)[_ORDER:] for part in np.split(columns, edges)]
-        )
+        return np.concatenate([lfilter(taps, 1.0, part, axis=0)[_ORDER:] for part in np.split(columns, edges)])
 
     return whiten
 

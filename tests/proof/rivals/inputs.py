@@ -13,9 +13,7 @@ from proof.rivals.library import Term, suspect
 from proof.rivals.regress import merged
 from proof.words import Family, Port
 
-_WORTH = (
-    0.05  # share of a trajectory's variance that a discrepancy must predict, left out of the fit, to be one
-)
+_WORTH = 0.05  # share of a trajectory's variance that a discrepancy must predict, left out of the fit, to be one
 _MOST_CHANNELS = 4
 
 
@@ -37,9 +35,7 @@ def _inputs(case: Case) -> Iterator[Input]:
         def column(recording: Recording) -> Array:
             return recording.signals[signal]
 
-        return Input(
-            Term(name, port, axis, family, column, channel), lambda recording: column(recording)[:, None]
-        )
+        return Input(Term(name, port, axis, family, column, channel), lambda recording: column(recording)[:, None])
 
     for joint in case.joints:
 
@@ -47,9 +43,7 @@ def _inputs(case: Case) -> Iterator[Input]:
             angle = recording.signals[f"rotor_angle.{joint}"]
             return np.stack([np.sin(angle), np.cos(angle)], axis=1)
 
-        turn = Term(
-            f"rotor phase {joint}", "motor torque", joint, "motor order", lambda r, p=phase: p(r)[:, 0]
-        )
+        turn = Term(f"rotor phase {joint}", "motor torque", joint, "motor order", lambda r, p=phase: p(r)[:, 0])
         yield Input(turn, phase)
         yield one(f"rate {joint}", "joint torque", joint, "friction", f"joint_rate.{joint}")
         yield one(f"angle {joint}", "joint torque", joint, "harness", f"joint_angle.{joint}")
@@ -83,9 +77,7 @@ def channels_worth_learning(case: Case) -> tuple[int, ...]:
     return tuple(int(k) for k in np.argsort(rms)[::-1][:_MOST_CHANNELS])
 
 
-def answer(
-    method: str, case: Case, chosen: Sequence[Input], learnt: Mapping[int, Learnt], seconds: float
-) -> Answer:
+def answer(method: str, case: Case, chosen: Sequence[Input], learnt: Mapping[int, Learnt], seconds: float) -> Answer:
     """Claim what the discrepancies that predict depend on most; the next inputs are alternatives.
 
     A function learnt has no name: the claim gets the one that a dependence on that input would have, to be fair.
@@ -101,8 +93,7 @@ def answer(
     claims = []
     for place, entry in enumerate(chosen):
         energy = {
-            case.channels[channel]: float(found.relevance[place] * found.left_out)
-            for channel, found in kept.items()
+            case.channels[channel]: float(found.relevance[place] * found.left_out) for channel, found in kept.items()
         }
         if energy and sum(energy.values()) > 0.0:
             told = suspect(entry.stands_for, energy)

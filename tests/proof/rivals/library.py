@@ -79,17 +79,13 @@ def _drive(joint: str, dt: float, case: Case) -> Iterator[Term]:
             )  # fmt: skip
     yield Term(f"sign(w.{joint})", "joint torque", joint, "friction", on("joint_rate", _sign))
     yield Term(f"w.{joint}", "joint torque", joint, "viscous", on("joint_rate", _same))
-    yield Term(
-        f"w|w|.{joint}", "external wrench", "el", "air drag", on("joint_rate", lambda w: w * np.abs(w))
-    )
+    yield Term(f"w|w|.{joint}", "external wrench", "el", "air drag", on("joint_rate", lambda w: w * np.abs(w)))
     yield Term(
         f"sign(w.{joint}) exp(-t/{_WARM:g} s)", "joint torque", joint, "warm-up",
         lambda r: _sign(r.signals[f"joint_rate.{joint}"]) * np.exp(-r.signals["time"] / _WARM),
     )  # fmt: skip
     for power in (1, 2, 3):
-        yield Term(
-            f"q^{power}.{joint}", "joint torque", joint, "harness", on("joint_angle", lambda q, p=power: q**p)
-        )
+        yield Term(f"q^{power}.{joint}", "joint torque", joint, "harness", on("joint_angle", lambda q, p=power: q**p))
     yield Term(f"play(q.{joint})", "transmission", joint, "hysteresis", on("joint_angle", _play))
     for name, wave in (("sin", np.sin), ("cos", np.cos)):
         yield Term(f"{name}(q.{joint})", "mass properties", joint, "mass", on("joint_angle", wave))
@@ -157,7 +153,5 @@ def suspect(term: Term, energy: Mapping[str, float]) -> Suspect:
     if term.port == "transducer":
         wrench = tuple(channel for channel in read if not channel.startswith("angle.")) or (term.channel,)
         crossed = term.family == "gain" and wrench[0] != term.channel
-        return Suspect(
-            port="transducer", channels=wrench, family="cross-coupling" if crossed else term.family
-        )
+        return Suspect(port="transducer", channels=wrench, family="cross-coupling" if crossed else term.family)
     return Suspect(port=term.port, axis=term.axis, channels=read, family=term.family)

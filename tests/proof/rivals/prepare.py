@@ -31,9 +31,7 @@ def prepare(folder: Path) -> Case:
     with Simulators(experiment) as simulate:
         explained = explain(experiment, simulate, SilentProgress().task)
     found, predicted = explained.known, explained.known.shown
-    signals = {
-        drive: _signals(experiment, found.hypothesis, drive, seen.wrench) for drive, seen in predicted.items()
-    }
+    signals = {drive: _signals(experiment, found.hypothesis, drive, seen.wrench) for drive, seen in predicted.items()}
     left = [trial.measured - predicted[trial.drive].values for trial in experiment.trials]
     unit = _repeatability(experiment, left)
     angles = experiment.channels[experiment.wrench_channels :]

@@ -36,12 +36,7 @@ class Problem:
         terms = tuple(term for term, moves in zip(terms, moving, strict=True) if moves)
         block = np.concatenate([np.full(int(r.valid.sum()), k) for k, r in enumerate(chosen)])
         return cls(
-            case,
-            terms,
-            scale[moving],
-            X[:, moving] / scale[moving],
-            stacked(chosen, lambda r: r.residual),
-            block,
+            case, terms, scale[moving], X[:, moving] / scale[moving], stacked(chosen, lambda r: r.residual), block
         )
 
     @property
@@ -62,9 +57,7 @@ def least_squares(X: Array, Y: Array) -> Array:
     return np.linalg.solve(X.T @ X + 1e-6 * len(X) * np.eye(X.shape[1]), X.T @ Y)
 
 
-def answer(
-    method: str, problem: Problem, coefficients: Array, *, log10_p: float | None, seconds: float
-) -> Answer:
+def answer(method: str, problem: Problem, coefficients: Array, *, log10_p: float | None, seconds: float) -> Answer:
     """Turn coefficients (terms, c) into an answer: a claim for each group that has one, strongest first."""
     case = problem.case
     claims: list[tuple[float, Claim]] = []
@@ -104,9 +97,7 @@ def merged(claims: Sequence[tuple[float, Claim]]) -> tuple[Claim, ...]:
     finds = []
     for place, (energy, claim) in enumerate(ranked):
         following = tuple(
-            Candidate(
-                port=c.port, axis=c.axis, channels=c.channels, family=c.family, probability=e / everything
-            )
+            Candidate(port=c.port, axis=c.axis, channels=c.channels, family=c.family, probability=e / everything)
             for e, c in ranked[place + 1 : place + 3]
         )
         finds.append(

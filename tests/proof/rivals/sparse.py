@@ -75,7 +75,5 @@ def _refitted(problem: Problem, chosen: Array) -> Array:
     for channel in range(problem.Y.shape[1]):
         columns = np.flatnonzero(chosen[:, channel])
         if len(columns):
-            coefficients[columns, channel] = least_squares(problem.X[:, columns], problem.Y[:, [channel]])[
-                :, 0
-            ]
+            coefficients[columns, channel] = least_squares(problem.X[:, columns], problem.Y[:, [channel]])[:, 0]
     return coefficients

@@ -80,9 +80,7 @@ def find_of(
         # Along the linear plant the distance is what the best leaves of the other's lack of gain.
         rho = float(np.sqrt(max(taken.found.score.gain - found.score.gain, 0.0)))
         alternatives.append(
-            Alternative(
-                identity(found.suspect), 0.0, rho, float(chi2.sf(0.25 * rho**2, 1) / 2.0), rho < RIVALS, False
-            )
+            Alternative(identity(found.suspect), 0.0, rho, float(chi2.sf(0.25 * rho**2, 1) / 2.0), rho < RIVALS, False)
         )
     if own.family != UNNAMED:
         chance, alternatives = _alike_likely(chance, alternatives)
@@ -114,9 +112,7 @@ def _alike_likely(chance: float, others: Sequence[Alternative]) -> tuple[float, 
 
     Schwarz's criterion would tell them apart by how many numbers they have: so it does for formulas that are nature's.
     """
-    alike = [
-        one for one in others if one.refitted and one.indistinguishable and one.identity.family != UNNAMED
-    ]
+    alike = [one for one in others if one.refitted and one.indistinguishable and one.identity.family != UNNAMED]
     even = (chance + sum(one.probability for one in alike)) / (1 + len(alike))
     return even, [replace(one, probability=even) if one in alike else one for one in others]
 
@@ -150,8 +146,7 @@ def _equation(law: Effect | Sensing) -> str:
     if begin is None:
         return lines[0] if lines else ""
     end = next(
-        (k for k in range(begin + 1, len(lines)) if lines[k].startswith(("Units:", "Validity:", "Source:"))),
-        len(lines),
+        (k for k in range(begin + 1, len(lines)) if lines[k].startswith(("Units:", "Validity:", "Source:"))), len(lines)
     )
     return " ".join(lines[begin:end]).removeprefix("Equation:").strip()
 
@@ -159,9 +154,7 @@ def _equation(law: Effect | Sensing) -> str:
 def _estimates(taken: Tried, before: Standing) -> tuple[Estimate, ...]:
     suspect, known = taken.found.suspect, taken.standing.known
     begin = len(before.known.value)
-    units = {
-        f"{name}{action}": "m" for name in POINT for action in ("", *(f"_{k}" for k in range(2, ACTIONS + 1)))
-    }
+    units = {f"{name}{action}": "m" for name in POINT for action in ("", *(f"_{k}" for k in range(2, ACTIONS + 1)))}
     fixed: dict[str, float] = {}
     if isinstance(suspect, Catalogued):
         for action in suspect.candidate.actions:
@@ -293,9 +286,7 @@ def trusted(finds: Sequence[Find], share: float) -> tuple[Find, ...]:
         replace(
             find,
             probability=share * find.probability,
-            alternatives=tuple(
-                replace(other, probability=share * other.probability) for other in find.alternatives
-            ),
+            alternatives=tuple(replace(other, probability=share * other.probability) for other in find.alternatives),
         )
         for find in finds
     )

@@ -57,9 +57,7 @@ class Gate:
     sigmas: float
     whiteness: tuple[float, float]  # before and after, see `whiteness`
     reasons: tuple[str, ...]  # of a refusal
-    scattered: bool = (
-        False  # whether its coefficients are near zero by the scatter of parts, and not by the noise
-    )
+    scattered: bool = False  # whether its coefficients are near zero by the scatter of parts, and not by the noise
 
     @property
     def uneven(self) -> bool:
@@ -116,9 +114,7 @@ def gate(
     ):
         reasons.append("recordings that were not used gain much less than those that it was fitted to")
     few = by_noise >= least and sigmas >= GATE_FEW
-    near_zero = not (
-        sigmas >= least or (few and (_all_of_much(before, after) or _elsewhere(before, after, blind)))
-    )
+    near_zero = not (sigmas >= least or (few and (_all_of_much(before, after) or _elsewhere(before, after, blind))))
     if near_zero:
         size = f"{sigmas:.1f} sigma off zero" if np.isfinite(sigmas) else "not determined"
         reasons.append(f"its coefficients are {size}")
@@ -181,8 +177,7 @@ def _evenly(known: Known, C: Array, index: NDArray[np.intp]) -> float:
     steps = (C[:, index] @ a)[:, None]
     experiment = known.experiment
     of_trials = {
-        k: parts(experiment, k, known.metric[k], known.along(k, steps)[:, 0], known.residual[k])
-        for k in experiment.fit
+        k: parts(experiment, k, known.metric[k], known.along(k, steps)[:, 0], known.residual[k]) for k in experiment.fit
     }
     return evenly(experiment, of_trials)
 
@@ -260,12 +255,7 @@ def _spread(known: Known) -> float:
 
 def _held_out(before: Known, after: Known) -> tuple[Fold, ...]:
     return tuple(
-        _fold(
-            after,
-            k,
-            float(before.residual[k] @ before.residual[k]),
-            float(after.residual[k] @ after.residual[k]),
-        )
+        _fold(after, k, float(before.residual[k] @ before.residual[k]), float(after.residual[k] @ after.residual[k]))
         for k in after.experiment.held_out
     )
 

@@ -59,9 +59,7 @@ def _gained(before: Known, after: Known, acts: Sequence[NDArray[np.bool_]]) -> f
     """Share of the gain in whitened squares, in time, that falls on some samples of the fit trials."""
     there = everywhere = 0.0
     for k, mask in zip(before.experiment.fit, acts, strict=True):
-        gain = np.sum(
-            _in_time(before, before.residual[k], k) ** 2 - _in_time(after, after.residual[k], k) ** 2, axis=1
-        )
+        gain = np.sum(_in_time(before, before.residual[k], k) ** 2 - _in_time(after, after.residual[k], k) ** 2, axis=1)
         there += float(gain[mask].sum())
         everywhere += float(gain.sum())
     return there / everywhere if everywhere > 0.0 else 0.0

@@ -39,9 +39,7 @@ def in_the_shade(found: Found, accepted: Sequence[Accepted]) -> tuple[str, ...]:
         there = other.find.identity
         share = found.score.rho_eff / other.find.rho_eff
         if _where(identity(found.suspect)) == _where(there) and not share >= SHADE:
-            return (
-                f"is {100.0 * share:.1f} % of {there.law} there: its formula may be as far from nature's",
-            )
+            return (f"is {100.0 * share:.1f} % of {there.law} there: its formula may be as far from nature's",)
     return ()
 
 

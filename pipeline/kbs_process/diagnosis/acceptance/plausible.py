@@ -32,9 +32,7 @@ def undone(suspect: Catalogued, amplitudes: Mapping[str, float]) -> frozenset[st
         return frozenset()
     rig = scene.hypothesis.rig
     units = np.concatenate([port_inputs(candidate, tapped, rig) for tapped in scene.signals.values()])
-    together = np.max(
-        np.abs(np.einsum("nmc,m->nc", units, [amplitudes[e.name] for e in candidate.amplitudes]))
-    )
+    together = np.max(np.abs(np.einsum("nmc,m->nc", units, [amplitudes[e.name] for e in candidate.amplitudes])))
     alone = np.max(np.abs(units), axis=(0, 2))
     return frozenset(
         entry.name
@@ -62,9 +60,7 @@ def implausible(
         # Written so that what is no number is refused.
         if not least - SIGMAS * sigma <= value <= most + SIGMAS * sigma:
             unit = "" if parameter.unit == "1" else f" {parameter.unit}"
-            reasons.append(
-                f"{parameter.name} = {value:.3g}{unit}, and it may be {least:.3g} to {most:.3g}{unit}"
-            )
+            reasons.append(f"{parameter.name} = {value:.3g}{unit}, and it may be {least:.3g} to {most:.3g}{unit}")
     return tuple(reasons)
 
 
@@ -79,6 +75,4 @@ def oversized(
         return ()
     numbers = zip(map(float, values), map(float, sigmas), strict=True)
     named = dict(zip(suspect.amplitudes, numbers, strict=False))
-    return tuple(
-        reason for action in suspect.candidate.actions for reason in implausible(action.effect, named, free)
-    )
+    return tuple(reason for action in suspect.candidate.actions for reason in implausible(action.effect, named, free))

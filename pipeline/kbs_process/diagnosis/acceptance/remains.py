@@ -58,9 +58,7 @@ def too_little(
     reasons = []
     share = taken(there, here)
     if not (more or share >= TAKEN):
-        reasons.append(
-            f"takes {100.0 * share:.0f} % of what exceeds the floor: it follows what something else does"
-        )
+        reasons.append(f"takes {100.0 * share:.0f} % of what exceeds the floor: it follows what something else does")
     left = here.ratios
     most = max(ratio - left[trajectory] for trajectory, ratio in there.ratios.items())
     # What known numbers had taken up shows where they are.
@@ -83,9 +81,7 @@ def missed(before: Known, after: Known, blind: Collection[int] = ()) -> tuple[st
         left, gained = after.chi2[k] - after.rows[k], before.chi2[k] - after.chi2[k]
         if left > UNFORESEEN * after.rows[k] and not gained >= TAKEN_UNUSED * (left + gained):
             share = 100.0 * gained / (left + gained)
-            reasons.append(
-                f"takes {share:.0f} % of what {after.experiment.trials[k].name} exceeds the floor by"
-            )
+            reasons.append(f"takes {share:.0f} % of what {after.experiment.trials[k].name} exceeds the floor by")
     return tuple(reasons)
 
 

@@ -32,9 +32,7 @@ class Noted:
         for one in tried:
             known = one.standing.known
             left = 1.0 + known.excess / known.fit_rows
-            self.refused.append(
-                Refused(identity(one.found.suspect), one.found.score.rho_eff, one.gate.reasons, left)
-            )
+            self.refused.append(Refused(identity(one.found.suspect), one.found.score.rho_eff, one.gate.reasons, left))
             self.fallen.append(one)
 
     def forget(self, tried: Tried) -> None:

@@ -84,9 +84,7 @@ class Experiment:
     rig: Rig
     effects: tuple[str, ...]
     dt: float  # s
-    channels: tuple[
-        str, ...
-    ]  # loads (wrench decoupled, then efforts), then the joints whose angle is measured
+    channels: tuple[str, ...]  # loads (wrench decoupled, then efforts), then the joints whose angle is measured
     units: tuple[str, ...]
     drives: tuple[Drive, ...]
     trials: tuple[Trial, ...]
@@ -121,8 +119,7 @@ class Experiment:
         """Trials of each trajectory."""
         count = 1 + max(trial.trajectory for trial in self.trials)
         return tuple(
-            tuple(k for k, trial in enumerate(self.trials) if trial.trajectory == number)
-            for number in range(count)
+            tuple(k for k, trial in enumerate(self.trials) if trial.trajectory == number) for number in range(count)
         )
 
     def reference(self, trajectory: int) -> int:
@@ -199,9 +196,7 @@ def _seen(one: Recorded, channels: Sequence[str]) -> Mask:
     return np.asarray(seen, dtype=np.bool_)
 
 
-def _trajectories(
-    recorded: Sequence[Recorded], channels: Sequence[str]
-) -> list[list[tuple[Recorded, float]]]:
+def _trajectories(recorded: Sequence[Recorded], channels: Sequence[str]) -> list[list[tuple[Recorded, float]]]:
     """Recordings that repeat each other with the time (s) by which each is later than the first, the longest.
 
     Those of which gaps leave too little at the same time stay apart, whatever they repeat, and so do those that were
@@ -277,9 +272,7 @@ def _on_grid(motion: Motion, shift: float, n: int) -> Motion:
     joints = motion.q.shape[1]
     parts = [moved[:, k * joints : (k + 1) * joints] for k in range(4 + count)]
     q, qd, qdd, sigma_q = parts[:4]
-    return replace(
-        motion, t0=0.0, q=q, qd=qd, qdd=qdd, sigma_q=sigma_q, rounding=np.stack(parts[4:]), valid=valid
-    )
+    return replace(motion, t0=0.0, q=q, qd=qd, qdd=qdd, sigma_q=sigma_q, rounding=np.stack(parts[4:]), valid=valid)
 
 
 def _alike(one: Drive, other: Drive, rig: Rig) -> bool:
@@ -308,9 +301,7 @@ def _at(t: Array, own: Array, values: Array) -> Array:
     return np.stack([np.interp(t, own, column) for column in values.T], axis=1)
 
 
-def _trial(
-    one: Recorded, shift: float, trajectory: int, drive: int, n: int, channels: Sequence[str]
-) -> Trial:
+def _trial(one: Recorded, shift: float, trajectory: int, drive: int, n: int, channels: Sequence[str]) -> Trial:
     run, loads = one.run, _loads(one.run)
     columns = []
     for channel in channels:

@@ -32,9 +32,7 @@ _CELLS_A_DECADE = 8.0
 _KNEE = 0.05  # Hz: where 1/f noise equals white noise, taken of a transducer whose runs are not repeated
 _PHASES = 8  # of an encoder code, over which rounding is averaged
 _LEAST_ROUNDING = 0.05  # of the density of white rounding: less is not believed
-_EXACT = (
-    1e-2  # of the density of stated noise: to a tenth of its amplitude an integrator's step is good enough
-)
+_EXACT = 1e-2  # of the density of stated noise: to a tenth of its amplitude an integrator's step is good enough
 _MOVING = 2.0  # codes a second below which an encoder says no more than which code it shows
 _SETTLE = 0.5  # s around
 _UNKNOWN_ANGLE = 1e-6  # rad rms a sample, of an encoder whose code is not stated
@@ -71,9 +69,7 @@ class Floor:
             return np.full(len(f), np.inf)
         low, share = _places(f, self.centres)
         high = np.minimum(low + 1, len(self.nu) - 1)
-        return np.asarray(
-            1.0 / ((1.0 - share) ** 2 / self.nu[low] + share**2 / self.nu[high]), dtype=np.float64
-        )
+        return np.asarray(1.0 / ((1.0 - share) ** 2 / self.nu[low] + share**2 / self.nu[high]), dtype=np.float64)
 
     def shared(self, trial: Trial, path: Array, windows: Array, f: Array) -> Array:
         """Density (b, c) of what repeats share although no model explains it, beyond `repeats`.
@@ -87,13 +83,7 @@ class Floor:
         return np.maximum(alike - differing, 0.0)
 
     def whitener(
-        self,
-        trial: Trial,
-        path: Array,
-        lowest_Hz: float = 0.0,
-        *,
-        valid: Mask | None = None,
-        repeats: int = 1,
+        self, trial: Trial, path: Array, lowest_Hz: float = 0.0, *, valid: Mask | None = None, repeats: int = 1
     ) -> Whitener:
         """The whitener of a trial from `lowest_Hz` on; `path` (n, c) is a prediction of its channels.
 
@@ -107,9 +97,7 @@ class Floor:
         f = f[inside]
         c = len(experiment.channels)
         nu = self.freedom(f)
-        inflation = np.where(
-            np.isfinite(nu), 1.0 + c / np.maximum(np.where(np.isfinite(nu), nu, 1.0) - c, 1.0), 1.0
-        )
+        inflation = np.where(np.isfinite(nu), 1.0 + c / np.maximum(np.where(np.isfinite(nu), nu, 1.0) - c, 1.0), 1.0)
         density = self.repeats(trial, f) * inflation[:, None, None] / repeats
         density = density + self.shared(trial, path, windows, f)[:, :, None] * np.eye(c)
         return whitener(windows, experiment.dt, band, density)
@@ -307,9 +295,7 @@ def _between(f: Array, centres: Array, C: Complex) -> Complex:
     """C (b, c, c) at frequencies between the cells' centres: a mean of positive matrices is one."""
     low, share = _places(f, centres)
     high = np.minimum(low + 1, len(centres) - 1)
-    return np.asarray(
-        (1.0 - share)[:, None, None] * C[low] + share[:, None, None] * C[high], dtype=np.complex128
-    )
+    return np.asarray((1.0 - share)[:, None, None] * C[low] + share[:, None, None] * C[high], dtype=np.complex128)
 
 
 def channel_windows(experiment: Experiment, trial: Trial, valid: Mask) -> Array:
@@ -367,9 +353,7 @@ def rounding(experiment: Experiment, trial: Trial, path: Array, windows: Array, 
         codes = fine[:, None] + np.arange(_PHASES) / _PHASES
         error = resample(step * (np.round(codes) - codes), rate, 1.0 / dt)
         error = np.pad(error, ((0, max(0, n - len(error))), (0, 0)), mode="edge")[:n]
-        spectrum = (
-            np.mean(np.abs(np.fft.rfft(error * window[:, None], axis=0)) ** 2, axis=1) * 2.0 * dt / power
-        )
+        spectrum = np.mean(np.abs(np.fft.rfft(error * window[:, None], axis=0)) ** 2, axis=1) * 2.0 * dt / power
         level = np.interp(f, every[inside], _smoothed(every[inside], spectrum[inside]))
         found[:, k] = np.maximum(level, _LEAST_ROUNDING * white)
     return found

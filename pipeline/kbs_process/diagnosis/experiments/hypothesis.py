@@ -83,9 +83,7 @@ class _Rates(TypedDict):
 
 
 Task = tuple[int, Hypothesis]  # drive
-Simulate = Callable[
-    [Sequence[Task]], list[Prediction]
-]  # in the order of the tasks, however they are shared out
+Simulate = Callable[[Sequence[Task]], list[Prediction]]  # in the order of the tasks, however they are shared out
 
 
 def predict(hypothesis: Hypothesis, experiment: Experiment, drive: int) -> Prediction:
@@ -107,9 +105,7 @@ def predict(hypothesis: Hypothesis, experiment: Experiment, drive: int) -> Predi
     return _shown(hypothesis, experiment, wrench, rest)
 
 
-def predict_together(
-    hypotheses: Sequence[Hypothesis], experiment: Experiment, drive: int
-) -> list[Prediction]:
+def predict_together(hypotheses: Sequence[Hypothesis], experiment: Experiment, drive: int) -> list[Prediction]:
     """As `predict` of each, to rounding: plants of one structure side by side, several times faster."""
     driven = experiment.drives[drive]
     if driven.schedule is None:
@@ -130,20 +126,15 @@ def predict_together(
             continue
         alike.setdefault(simulation.structure, []).append((k, simulation))
     for group in alike.values():
-        shown = simulate_together(
-            [one for _, one in group], rate, _seconds(experiment, driven, rate, angle_rate)
-        )
+        shown = simulate_together([one for _, one in group], rate, _seconds(experiment, driven, rate, angle_rate))
         for (k, _), (wrench, angle) in zip(group, shown, strict=True):
             whole = np.isfinite(wrench).all() and np.isfinite(angle).all()
             found[k] = (
-                _working(experiment, driven, wrench, rate, angle, angle_rate)
-                if whole
-                else _nowhere(experiment, driven)
+                _working(experiment, driven, wrench, rate, angle, angle_rate) if whole else _nowhere(experiment, driven)
             )
     joints = list(experiment.angle_joints)
     return [
-        _shown(hypothesis, experiment, found[k][0], found[k][1][:, joints])
-        for k, hypothesis in enumerate(hypotheses)
+        _shown(hypothesis, experiment, found[k][0], found[k][1][:, joints]) for k, hypothesis in enumerate(hypotheses)
     ]
 
 
@@ -243,13 +234,7 @@ def _rates(experiment: Experiment, driven: Drive, rate: float, angle_rate: float
 
 
 def _streams(
-    hypothesis: Hypothesis,
-    experiment: Experiment,
-    drive: Drive,
-    rate: float,
-    angle_rate: float,
-    *,
-    taps: bool,
+    hypothesis: Hypothesis, experiment: Experiment, drive: Drive, rate: float, angle_rate: float, *, taps: bool
 ) -> dict[str, list[Array]]:
     assert drive.schedule is not None
     streams: dict[str, list[Array]] = {"wrench": [], "angle": [], "field": [], "state": []}

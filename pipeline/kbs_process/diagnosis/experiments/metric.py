@@ -62,10 +62,7 @@ def counted(whiten: Whitener, share: Array, x: Array) -> Array:
 
 
 def metrics(
-    experiment: Experiment,
-    floor: Floor,
-    predicted: Mapping[int, Prediction],
-    hypothesis: Hypothesis | None = None,
+    experiment: Experiment, floor: Floor, predicted: Mapping[int, Prediction], hypothesis: Hypothesis | None = None
 ) -> tuple[Metric, ...]:
     """Those of all trials, by predictions of all drives (whose path is where encoders round).
 

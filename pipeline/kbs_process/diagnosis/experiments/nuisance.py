@@ -37,10 +37,7 @@ def nuisances(
             columns.append(column)
             precision.append(0.0)
     late = slope(prediction.values, experiment.dt)
-    for channels, sigma in (
-        (slice(0, wrench), trial.wrench_clock_sigma),
-        (slice(wrench, c), trial.angle_clock_sigma),
-    ):
+    for channels, sigma in ((slice(0, wrench), trial.wrench_clock_sigma), (slice(wrench, c), trial.angle_clock_sigma)):
         if sigma > 0.0 and channels.start < c:
             column = np.zeros((n, c))
             column[:, channels] = late[:, channels]

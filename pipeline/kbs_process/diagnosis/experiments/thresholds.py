@@ -24,9 +24,7 @@ LINES: Final = 6  # strongest, which are tried
 LINE_ALPHA: Final = 0.05  # of a line by chance; the screen judges what is proposed
 
 # -- screen --------------------------------------------------------------------------------------------------------
-FALSE_ALARM: Final = (
-    1e-3  # of the best candidate of a screen under the null, after Bonferroni; the gate follows
-)
+FALSE_ALARM: Final = 1e-3  # of the best candidate of a screen under the null, after Bonferroni; the gate follows
 # rho_eff that a suspect needs to be looked at: neither plant nor floor is exact, and what they lack (rounding of
 # encoders along repeated paths most) gave the best suspect of campaigns without any effect up to 8.7.
 LEAST_RHO: Final = 12.0
@@ -94,9 +92,7 @@ SHOWN: Final = 100.0  # square of what a law changes in a recording, from which 
 # stands near zero, and one that has just passed would fall by chance. A friction beside an eccentric disc, both right
 # (development), went from 8 to 7.0 when numbers had settled once more.
 STAYS_SIGMA: Final = 6.0
-GATE_GAIN: Final = (
-    12.0  # of -2 log likelihood on each held-out trial's share: p = 5e-4 for one degree of freedom
-)
+GATE_GAIN: Final = 12.0  # of -2 log likelihood on each held-out trial's share: p = 5e-4 for one degree of freedom
 # Of what recordings that were fitted gain, row by row: what was fitted to one motion alone does less for another.
 GATE_SHARE: Final = 0.2
 # Or else of the square of what a law changes there, all of which one that is right gains. The step of a converter that

@@ -65,9 +65,7 @@ def limits_of(drives: Sequence[Drive], dt: float) -> Limits:
 
 def family(limits: Limits, joints: Sequence[str], seconds: float, axis: str = "") -> tuple[Trajectory, ...]:
     """Return trajectories of `seconds`: of `axis`, or of each joint that moved, alone, and of all of them together."""
-    moving = [
-        k for k in range(len(joints)) if limits.rate[k] > _RESTS and limits.high[k] - limits.low[k] > _RESTS
-    ]
+    moving = [k for k in range(len(joints)) if limits.rate[k] > _RESTS and limits.high[k] - limits.low[k] > _RESTS]
     alone = [k for k in moving if joints[k] == axis] or moving
     # The axis in question goes first: the others run slower.
     together = [*alone, *(k for k in moving if k not in alone)]
@@ -90,19 +88,14 @@ def _of(limits: Limits, joints: Sequence[str], group: Sequence[int], seconds: fl
 
     for share in _SCANS:
         ways = [_back_and_forth(t, limits, k, share * _SLOWER**place, 1.0) for place, k in enumerate(group)]
-        rates = ", ".join(
-            f"{np.degrees(share * _SLOWER**p * limits.rate[k]):.3g}" for p, k in enumerate(group)
-        )
+        rates = ", ".join(f"{np.degrees(share * _SLOWER**p * limits.rate[k]):.3g}" for p, k in enumerate(group))
         yield made(f"scans of the whole range at {rates} deg/s", ways)
     for share in (_SCANS[0], _SCANS[-1]):
-        ways = [
-            _back_and_forth(t, limits, k, share * _SLOWER**place, _SHORT) for place, k in enumerate(group)
-        ]
+        ways = [_back_and_forth(t, limits, k, share * _SLOWER**place, _SHORT) for place, k in enumerate(group)]
         yield made(f"reversals over a tenth of the range at {share:.0%} of the greatest rate", ways)
     low, high = _SWEEP_HZ
     yield made(
-        f"a sine from {low:g} to {high:g} Hz within rate and acceleration",
-        [_sweep(t, limits, k) for k in group],
+        f"a sine from {low:g} to {high:g} Hz within rate and acceleration", [_sweep(t, limits, k) for k in group]
     )
 
 
@@ -135,9 +128,7 @@ def _sweep(t: Array, limits: Limits, k: int) -> Array:
     phase = 2.0 * np.pi * low * span / growth * np.expm1(growth * since / span)
     half = 0.5 * float(limits.high[k] - limits.low[k])
     # Half of the bounds each: amplitude and frequency change while the sine runs.
-    width = np.minimum(
-        half, np.minimum(0.5 * limits.rate[k] / omega, 0.5 * limits.acceleration[k] / omega**2)
-    )
+    width = np.minimum(half, np.minimum(0.5 * limits.rate[k] / omega, 0.5 * limits.acceleration[k] / omega**2))
     fade = np.minimum(1.0, np.minimum(since, span - since) / 5.0)
     way = width * fade**2 * (3.0 - 2.0 * fade) * np.sin(phase)
     rate = np.gradient(way, t)

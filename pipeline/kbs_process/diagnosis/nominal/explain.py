@@ -93,9 +93,7 @@ def explain(experiment: Experiment, simulate: Simulate, task: Task) -> Explained
             free = refit(experiment, stood.known.hypothesis, floor, simulate, leaps=0)
         freed = _moved_on(_stood(free, floor), floor, simulate, LEAPS)
         # Without any being off, searches end as far from each other.
-        if freed.known.cost < stood.known.cost - LEAST_RHO**2 and not _unseen(freed, floor) > _unseen(
-            stood, floor
-        ):
+        if freed.known.cost < stood.known.cost - LEAST_RHO**2 and not _unseen(freed, floor) > _unseen(stood, floor):
             stood = freed
     if near is None and stood.after.left and stood.known.gross and searched(experiment):
         with task("Phases again, beside numbers that are about right"):

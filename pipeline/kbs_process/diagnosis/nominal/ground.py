@@ -46,9 +46,7 @@ class Ground:
         """
         search = self.search
         low, high = search.room(theta)
-        du = bounded_minimum(
-            self.A + (_RIDGE + damping) * np.eye(len(pull)), pull, low / self.scale, high / self.scale
-        )
+        du = bounded_minimum(self.A + (_RIDGE + damping) * np.eye(len(pull)), pull, low / self.scale, high / self.scale)
         point = search.clipped(search.polar.back(search.polar.flat(theta) + self.scale * du))
         return point, float(2.0 * pull @ du - du @ self.A @ du) / self.weight
 

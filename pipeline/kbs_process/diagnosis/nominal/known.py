@@ -57,9 +57,7 @@ class Known:
     covariance: Array  # (p, p)
     metric: tuple[Metric, ...]  # of each trial
     slopes: dict[int, Slopes]  # by drive
-    shown: dict[
-        int, Prediction
-    ]  # what they predict, by drive, laws that are columns in it; {}: to be predicted
+    shown: dict[int, Prediction]  # what they predict, by drive, laws that are columns in it; {}: to be predicted
     residual: tuple[Array, ...]  # of each trial, whitened
     chi2_before: Array  # (trials,)
     checks: tuple[Check, ...]
@@ -270,14 +268,7 @@ def leapt(known: Known, simulate: Simulate, *, smooth: bool) -> Known:
 def _again(known: Known, simulate: Simulate, laws: Laws | None = None) -> tuple[Search, Found]:
     """A search that begins where another ended."""
     search = Search(
-        known.experiment,
-        known.metric,
-        simulate,
-        known.hypothesis,
-        known.free,
-        known.parameters,
-        laws,
-        known.scale,
+        known.experiment, known.metric, simulate, known.hypothesis, known.free, known.parameters, laws, known.scale
     )
     return search, search.begin(known.value, known.slopes, known.shown)
 
@@ -320,11 +311,7 @@ def known_of(search: Search, found: Found, before: Array) -> Known:
 
 
 def _checks(known: Known, found: Found) -> tuple[Check, ...]:
-    far = [
-        f"{name} ({moved:+.1f})"
-        for name, moved in zip(known.names, known.moved, strict=True)
-        if abs(moved) > MOVED
-    ]
+    far = [f"{name} ({moved:+.1f})" for name, moved in zip(known.names, known.moved, strict=True) if abs(moved) > MOVED]
     limits = known.parameters
     assert limits.lower is not None and limits.upper is not None
     stuck = [

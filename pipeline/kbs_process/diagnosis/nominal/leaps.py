@@ -82,9 +82,7 @@ def stride(search: Search, found: Found, steps: int, most: int) -> Found | None:
                 if not cost < _FAR * standing:
                     continue
                 gradients = search.slopes(point, found.gradients)
-                gone = replace(
-                    found, theta=point, predicted=predicted, gradients=gradients, rounds=begun.rounds
-                )
+                gone = replace(found, theta=point, predicted=predicted, gradients=gradients, rounds=begun.rounds)
                 reached.append(search.descend(gone, steps, most=most))
             costs = [sum(search.cost(one.theta, one.predicted)) for one in reached]
             best = int(np.argmin(costs))
@@ -102,9 +100,7 @@ def _contacts(search: Search, joints: Sequence[str]) -> list[Contact]:
     return [contact for contact in found if search.free[contact.phase].name.startswith(_paths(joints))]
 
 
-def _followed(
-    search: Search, found: Found, theta: Array, moved: Sequence[int]
-) -> tuple[Array, Predictions, float]:
+def _followed(search: Search, found: Found, theta: Array, moved: Sequence[int]) -> tuple[Array, Predictions, float]:
     """`theta` with as much of how the others follow as does best, what is predicted there, and its cost.
 
     What the others are to follow by is linear, and may be far from true.
@@ -130,12 +126,7 @@ class Moving:
     """Some trials in which some numbers, `own`, are moved; the other trials hold the rest by what they already say."""
 
     def __init__(
-        self,
-        search: Search,
-        found: Found,
-        J: Mapping[int, Array],
-        trials: Sequence[int],
-        own: tuple[int, ...],
+        self, search: Search, found: Found, J: Mapping[int, Array], trials: Sequence[int], own: tuple[int, ...]
     ) -> None:
         self.search, self.trials, self.own = search, trials, list(own)
         self.J = np.concatenate([J[k] for k in trials])
@@ -179,9 +170,7 @@ class Moving:
 
     def followed(self, points: Sequence[Array]) -> list[Followed]:
         """Judge points by their residuals and the priors."""
-        new = list(
-            {point.tobytes(): point for point in points if point.tobytes() not in self.judged}.values()
-        )
+        new = list({point.tobytes(): point for point in points if point.tobytes() not in self.judged}.values())
         for point, z in zip(new, self.residuals(new), strict=True):
             self.judged[point.tobytes()] = self._judge(point, z)
         return [self.judged[point.tobytes()] for point in points]
@@ -230,8 +219,7 @@ class Moving:
             moves = [(offset, width + 0.5 * offset) for offset in _WALK if width + 0.5 * offset > _NARROWEST]
             # The contact is centred at minus its phase.
             points = [
-                self.at(point, (torque * width / wide, wide, phase - 0.5 * side * offset))
-                for offset, wide in moves
+                self.at(point, (torque * width / wide, wide, phase - 0.5 * side * offset)) for offset, wide in moves
             ]
             point = min(self.followed([point, *points]), key=lambda one: one.cost).point
         return [point, *self.stepped([point])] if point is not theta else []
@@ -240,9 +228,7 @@ class Moving:
         """Gauss-Newton steps from some points in the own numbers and the rest together; only the own are taken."""
         around = [[point, *self._differenced(point)] for point in points]
         found = iter(self.residuals([one for own in around for one in own]))
-        return [
-            self._step(point, [next(found) for _ in own]) for point, own in zip(points, around, strict=True)
-        ]
+        return [self._step(point, [next(found) for _ in own]) for point, own in zip(points, around, strict=True)]
 
     def _differences(self, point: Array) -> Array:
         return np.array([0.05 * max(abs(point[self.own[0]]), 1e-9), _DIFFERENCE, _DIFFERENCE])

@@ -36,9 +36,7 @@ def prior(rig: Rig, nominal: Rig, effects: Sequence[str], free: Sequence[Scalar]
     """
     known = nominal.quantities()
     own = {name: quantity for name, quantity in rig.quantities().items() if name in known}
-    mixed = substitute(
-        rig, {name: known[name].value for name in own}, {name: known[name].sigma for name in own}
-    )
+    mixed = substitute(rig, {name: known[name].value for name in own}, {name: known[name].sigma for name in own})
     return identification.prior(output_error.Experiment(mixed, tuple(effects), tuple(free), (), 0.0))
 
 
@@ -99,9 +97,7 @@ def slopes(
         columns[drive][index] = (moved_prediction.values - bases[drive].values) / differences[index]
     for drive, index in places:
         if not np.isfinite(columns[drive][index]).all():
-            columns[drive][index] = _inward(
-                hypothesis, free[index], -differences[index], bases[drive], simulate, drive
-            )
+            columns[drive][index] = _inward(hypothesis, free[index], -differences[index], bases[drive], simulate, drive)
     M, wrench = decoupling(experiment), experiment.wrench_channels
     rows = [WRENCH_CHANNELS.index(channel) for channel in experiment.rig.transducer.channels]
     for index, scalar in enumerate(free):
@@ -114,12 +110,7 @@ def slopes(
 
 
 def _inward(
-    hypothesis: Hypothesis,
-    scalar: Scalar,
-    difference: float,
-    base: Prediction,
-    simulate: Simulate,
-    drive: int,
+    hypothesis: Hypothesis, scalar: Scalar, difference: float, base: Prediction, simulate: Simulate, drive: int
 ) -> Array:
     """A slope to the other side, where the plant cannot run on the first; none, where it cannot run on either."""
     value = hypothesis.values([scalar]) + difference

@@ -68,12 +68,7 @@ class _Stage:
     """The search of some joints' phases in some trials."""
 
     def __init__(
-        self,
-        experiment: Experiment,
-        floor: Floor,
-        simulate: Simulate,
-        used: tuple[int, ...],
-        joints: tuple[str, ...],
+        self, experiment: Experiment, floor: Floor, simulate: Simulate, used: tuple[int, ...], joints: tuple[str, ...]
     ) -> None:
         self.experiment, self.floor, self.simulate, self.used = experiment, floor, simulate, used
         self.prefixes = tuple(f"joint.{name}.drive." for name in joints)
@@ -104,9 +99,7 @@ class _Stage:
         ]
 
         def evaluate(tasks: Sequence[Task]) -> list[Array]:
-            found = self.simulate(
-                [(drives[index], hypothesis.at(free, values)) for index, values, _ in tasks]
-            )
+            found = self.simulate([(drives[index], hypothesis.at(free, values)) for index, values, _ in tasks])
             return [
                 whiteners[index](experiment.trials[self.used[index]].measured - prediction.values)
                 for (index, _, _), prediction in zip(tasks, found, strict=True)
@@ -132,9 +125,7 @@ def _measured(experiment: Experiment, k: int) -> Measured:
         name=trial.name,
         dt=experiment.dt,
         wrench=trial.measured[:, :wrench],
-        angle=np.interp(np.arange(drive.n) * experiment.dt, drive.schedule.t, drive.schedule.position[:, 0])[
-            :, None
-        ]
+        angle=np.interp(np.arange(drive.n) * experiment.dt, drive.schedule.t, drive.schedule.position[:, 0])[:, None]
         if wrench == trial.measured.shape[1]
         else trial.measured[:, wrench:],
         valid=trial.valid,

@@ -56,9 +56,7 @@ class Search(Tangents):
             return ended
         return min(ended, self.descend(before, giving_up=True), key=self.height)
 
-    def descend(
-        self, found: Found, rounds: int = _ROUNDS, *, most: int = ALL, giving_up: bool = False
-    ) -> Found:
+    def descend(self, found: Found, rounds: int = _ROUNDS, *, most: int = ALL, giving_up: bool = False) -> Found:
         """Steps until slopes that are all taken anew promise little, or do not keep what they promise.
 
         All of them, or only those of suspects' own numbers, as `most` says. When `giving_up`, also until a step does
@@ -133,9 +131,7 @@ class Search(Tangents):
             tried = dict(zip(places, self.predict([*places.values()], self.drives), strict=True))
             found_costs = self.costs([*places.values()], [*tried.values()])
             before = costs
-            costs = {
-                damping: ground.weight * d + e for damping, (d, e) in zip(places, found_costs, strict=True)
-            }
+            costs = {damping: ground.weight * d + e for damping, (d, e) in zip(places, found_costs, strict=True)}
             least = min(costs, key=costs.__getitem__)
             gained = data + (excess - costs[least]) / ground.weight
             if gained > best.gained:

@@ -36,9 +36,7 @@ class Step:
 class Tangents(Costs):
     """Costs, and how predictions answer to the free numbers where a search stands."""
 
-    def begin(
-        self, theta: Array, gradients: Gradients | None = None, predicted: Predictions | None = None
-    ) -> Found:
+    def begin(self, theta: Array, gradients: Gradients | None = None, predicted: Predictions | None = None) -> Found:
         """Numbers to begin with, and their slopes; some `gradients` may be of the first numbers alone."""
         predicted = predicted or self.predict([theta], self.everything)[0]
         if gradients is None:
@@ -92,9 +90,7 @@ class Tangents(Costs):
             if columns is not None:
                 keep[drive] = (sorted(same), columns)
         here, free = self.at(theta), self.free
-        taken = slopes(
-            self.experiment, here, free, self.differences, self.references, self.simulate, keep=keep
-        )
+        taken = slopes(self.experiment, here, free, self.differences, self.references, self.simulate, keep=keep)
         whole = {drive: replace(one, base=self.shown(theta, drive, one.base)) for drive, one in taken.items()}
         return along_valleys(self, theta, whole)
 
@@ -132,9 +128,7 @@ class Tangents(Costs):
         """
         length = np.sqrt(np.maximum(np.diag(H), 1e-300))
         self.differences = np.clip(
-            np.maximum(_SEEN / length, _SPAN * moved),
-            _LEAST_DIFFERENCE * self.spread,
-            _MOST_DIFFERENCE * self.spread,
+            np.maximum(_SEEN / length, _SPAN * moved), _LEAST_DIFFERENCE * self.spread, _MOST_DIFFERENCE * self.spread
         )
 
 

@@ -56,9 +56,7 @@ def _again(law: Effect | Sensing, site: str, find: Find) -> tuple[Candidate, ...
         return ()
     numbers = {one.name: one for one in find.estimates}
     actions = (instance(law, number) for number in range(2, ACTIONS + 1))
-    told = [action for action in (law, *actions) if _tells(numbers, action)][
-        1:
-    ]  # the first has the law's names
+    told = [action for action in (law, *actions) if _tells(numbers, action)][1:]  # the first has the law's names
     return tuple(Candidate(action, site, _shape(action, numbers)) for action in told)
 
 

@@ -81,9 +81,7 @@ def timed(bench: Bench, found: Found, among: Sequence[Suspect]) -> Found:
         return found
     score = replace(found.score, gain=gain, amplitude=np.array([size]), rank=1)
     more = evidence(score, bench.background.rows) - evidence(found.score, bench.background.rows)
-    return replace(
-        found, suspect=replace(suspect, size=size), score=score, log_evidence=found.log_evidence + more
-    )
+    return replace(found, suspect=replace(suspect, size=size), score=score, log_evidence=found.log_evidence + more)
 
 
 def _latest(bench: Bench, suspect: Catalogued, about: float | None = None) -> tuple[Catalogued, float, float]:
@@ -109,9 +107,7 @@ def _latest(bench: Bench, suspect: Catalogued, about: float | None = None) -> tu
     best = int(np.argmin(heights))
     low, high = places[max(best - 1, 0)], places[min(best + 1, len(places) - 1)]
     found = minimize_scalar(height, bounds=(low, high), method="bounded", options={"maxiter": _STEPS})
-    late, least = min(
-        (float(found.x), float(found.fun)), (float(places[best]), heights[best]), key=lambda one: one[1]
-    )
+    late, least = min((float(found.x), float(found.fun)), (float(places[best]), heights[best]), key=lambda one: one[1])
     return suspect, late, least
 
 

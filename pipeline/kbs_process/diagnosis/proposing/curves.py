@@ -16,14 +16,7 @@ from kbs_process.diagnosis.screening.inlets import Inlet
 from kbs_process.diagnosis.screening.scene import Scene
 from kbs_process.diagnosis.screening.suspects import felt_from_the_ground
 from kbs_process.plant.effect import CROSSED, Port
-from kbs_process.plant.effects.measured_law import (
-    COEFFICIENTS,
-    DENSE,
-    INTERVALS,
-    MEASURED,
-    SLIDES,
-    Measured,
-)
+from kbs_process.plant.effects.measured_law import COEFFICIENTS, DENSE, INTERVALS, MEASURED, SLIDES, Measured
 from kbs_process.plant.structure import other_joint
 from kbs_process.signals.records import Array
 

@@ -36,9 +36,7 @@ def periods(known: Known, scene: Scene) -> dict[str, tuple[float, ...]]:
             if all(abs(orders[k] - other) >= 0.5 / turns for other in best):
                 best.append(float(orders[k]))
         near = {order + aside for order in best[:_PERIODS] for aside in (-1.0, 0.0, 1.0)}
-        found[experiment.channels[channel]] = tuple(
-            2.0 * np.pi / order for order in orders.tolist() if order in near
-        )
+        found[experiment.channels[channel]] = tuple(2.0 * np.pi / order for order in orders.tolist() if order in near)
     return found
 
 

@@ -21,12 +21,7 @@ from kbs_process.signals.records import Array
 
 
 def inserted(
-    hypothesis: Hypothesis,
-    law: Measured,
-    joint: str,
-    ends: tuple[float, float],
-    coefficients: Array,
-    sigma: Array,
+    hypothesis: Hypothesis, law: Measured, joint: str, ends: tuple[float, float], coefficients: Array, sigma: Array
 ) -> tuple[Hypothesis, tuple[Scalar, ...]]:
     """Return a hypothesis with a measured law in its plant, and the rig's numbers that its coefficients are.
 
@@ -39,9 +34,7 @@ def inserted(
     values = dict(zip(names, (*map(float, coefficients), *shape), strict=True))
     rig = attach(hypothesis.rig, effect, values, joints=[joint])
     spread = dict(zip(names, (*map(float, sigma), *(0.0 for _ in shape)), strict=True))
-    new = {
-        one.name for one in hypothesis.rig.joints if one.drive is None or names[0] not in one.drive.parameters
-    }
+    new = {one.name for one in hypothesis.rig.joints if one.drive is None or names[0] not in one.drive.parameters}
     rig = replace(
         rig,
         joints=tuple(
@@ -60,9 +53,7 @@ def _stated(joint: Joint, spread: Mapping[str, float]) -> Joint:
     """A joint with the law's sigmas; where the law does not act, its numbers are exact."""
     assert joint.drive is not None  # that of the law
     parameters = {
-        name: replace(quantity, sigma=np.asarray(spread[name]), source="measured law")
-        if name in spread
-        else quantity
+        name: replace(quantity, sigma=np.asarray(spread[name]), source="measured law") if name in spread else quantity
         for name, quantity in joint.drive.parameters.items()
     }
     return replace(joint, drive=replace(joint.drive, parameters=parameters))

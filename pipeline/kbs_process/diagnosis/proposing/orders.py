@@ -48,9 +48,7 @@ def with_orders(view: View, found: Found) -> Found:
     spent = 0.5 * (best.rank - found.score.rank) * np.log(view.bench.background.rows)
     again = tuple(_as(action, others[k].candidate) for action, k in zip(actions, chosen, strict=False))
     whole = replace(suspect, candidate=replace(suspect.candidate, again=again))
-    return replace(
-        found, suspect=whole, score=best, log_evidence=found.log_evidence + 0.5 * gained - float(spent)
-    )
+    return replace(found, suspect=whole, score=best, log_evidence=found.log_evidence + 0.5 * gained - float(spent))
 
 
 def _others(view: View, suspect: Catalogued) -> list[float]:
@@ -124,11 +122,7 @@ def _added(
     whole = sum(float(z @ z) for z in bench.background.z.values()) / rows
     while len(chosen) < most:
         before = _columns([-1, *chosen], m)
-        left = [
-            k
-            for k in range(len(others))
-            if k not in chosen and _own(sums.SS, before, _columns([k], m)) > ITS_OWN
-        ]
+        left = [k for k in range(len(others)) if k not in chosen and _own(sums.SS, before, _columns([k], m)) > ITS_OWN]
         if not left:
             break
         tried = [score(bench.background, sums.pick(_columns([-1, *chosen, k], m))) for k in left]

@@ -87,9 +87,7 @@ def _frequencies(known: Known) -> tuple[float, ...]:
     found: list[tuple[float, float]] = []
     for k, (f, best) in total.items():
         bound = -2.0 * np.log(LINE_ALPHA / (len(f) * len(total)))
-        peaks = (
-            np.flatnonzero((best[1:-1] >= best[:-2]) & (best[1:-1] >= best[2:]) & (best[1:-1] > bound)) + 1
-        )
+        peaks = np.flatnonzero((best[1:-1] >= best[:-2]) & (best[1:-1] >= best[2:]) & (best[1:-1] > bound)) + 1
         series = _in_time(known, k)
         found += [
             (float(best[i]), _between_bins(series, known.experiment.dt, float(f[i])))
@@ -158,10 +156,7 @@ def _orders(known: Known, scene: Scene) -> dict[str, tuple[float, ...]]:
             inner = power[1:-1]
             peaks = np.flatnonzero((inner >= power[:-2]) & (inner >= power[2:]) & (inner > bound)) + 1
             found[joint] += [(float(power[i]), float(np.round(orders[i] * 2.0) / 2.0)) for i in peaks]
-    return {
-        joint: _apart([value for _, value in sorted(lines, reverse=True)], 0.5)
-        for joint, lines in found.items()
-    }
+    return {joint: _apart([value for _, value in sorted(lines, reverse=True)], 0.5) for joint, lines in found.items()}
 
 
 def _in_turns_of_the_motor(known: Known, joint: str, lines: tuple[float, ...]) -> tuple[float, ...]:

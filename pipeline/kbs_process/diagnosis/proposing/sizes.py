@@ -60,8 +60,7 @@ def sized(bench: Bench, found: Found, among: Sequence[Suspect], simulate: Simula
         return found
     present = bench.scene.hypothesis
     models = [
-        inserted(one.candidate, dict(zip(one.amplitudes, map(float, a), strict=True)), present)
-        for one, a in tried
+        inserted(one.candidate, dict(zip(one.amplitudes, map(float, a), strict=True)), present) for one, a in tried
     ]
     heights = _heights(bench, models, simulate)
     nothing = height_of(bench, bench.background.z)
@@ -93,9 +92,7 @@ def _heights(bench: Bench, models: list[Hypothesis], simulate: Simulate) -> list
 def _amplitudes(bench: Bench, suspect: Catalogued) -> Iterator[Array]:
     """(m,) one amplitude after the other at all sizes; either way, where it may have both signs."""
     mounted = suspect.candidate.port is Port.BASE_TORQUE
-    columns = [
-        column for drive in bench.scene.paths for column in [suspect.inputs(drive)] if column is not None
-    ]
+    columns = [column for drive in bench.scene.paths for column in [suspect.inputs(drive)] if column is not None]
     for index, entry in enumerate(suspect.candidate.amplitudes):
         units: dict[str, float] = {}
         for column in columns:
@@ -132,7 +129,5 @@ def _through(bench: Bench, joint: str) -> float:
     square = 0.0
     for signals in bench.scene.signals.values():
         column = dict(zip(signals.columns, signals.values.T, strict=True))
-        square += float(
-            np.var(column[f"rotor_angle.{joint}"] / float(drive.ratio) - column[f"joint_angle.{joint}"])
-        )
+        square += float(np.var(column[f"rotor_angle.{joint}"] / float(drive.ratio) - column[f"joint_angle.{joint}"]))
     return float(drive.parameters["Ka"]) * float(np.sqrt(square))

@@ -37,9 +37,7 @@ class Inlet:
 
 def inlets_of(rig: Rig) -> tuple[Inlet, ...]:
     """Every inlet of a rig: drives, wrenches on each link beyond T, the floor, the mounting of a plate that turns."""
-    drives = [
-        Inlet(port, joint.name) for joint in rig.joints if joint.drive is not None for port in DRIVE_PORTS
-    ]
+    drives = [Inlet(port, joint.name) for joint in rig.joints if joint.drive is not None for port in DRIVE_PORTS]
     grounds = [Inlet(GROUND_PORT, joint.name) for joint in rig.joints if joint.drive is not None]
     links = [name for name in (TRANSDUCER, *rig.joint_names) if name in links_beyond(rig)]
     wrenches = [Inlet(WRENCH_PORT, link, axis) for link in links for axis in WRENCH_CHANNELS]
@@ -68,9 +66,7 @@ def generalised(rig: Rig, system: Linear, inlets: Sequence[Inlet], q: Array) -> 
     reaching = [_reach(freedom, R_TL, T.r[0]) for freedom in system.freedoms]
     size, turning = len(system.M), len(system.freedoms)
     force, direct = np.zeros((size, len(inlets))), np.zeros((6, len(inlets)))
-    rigid = (
-        _rigid_inertia(rig, links) if any(inlet.port == BASE_PORT for inlet in inlets) else np.zeros((6, 6))
-    )
+    rigid = _rigid_inertia(rig, links) if any(inlet.port == BASE_PORT for inlet in inlets) else np.zeros((6, 6))
     for column, inlet in enumerate(inlets):
         if inlet.port in DRIVE_PORTS:
             out = system.output(inlet.where)

@@ -91,9 +91,7 @@ def cells_and_ports(
         slopes = _level(np.moveaxis(known.slopes[reference].columns, 0, 2), valid)
         seen = channel_windows(experiment, trials[0], valid)
         late = np.gradient(predicted[reference].values, experiment.dt, axis=0)
-        for window in _windows(
-            known, floor, trajectory, len(members), valid, (predicted[reference].values, seen)
-        ):
+        for window in _windows(known, floor, trajectory, len(members), valid, (predicted[reference].values, seen)):
             z.append(window(mean))
             J.append(window(slopes))
             nu.append(window.nu)
@@ -131,9 +129,7 @@ def _no_cells(c: int, p: int) -> Cells:
 
 def _ports(rig: Rig, channels: Sequence[str], wrench: int) -> tuple[PortName, ...]:
     driven = [joint.name for joint in rig.joints if joint.drive is not None]
-    internal = [
-        PortName(port, name) for name in driven for port in ("motor torque", "transmission", "joint torque")
-    ]
+    internal = [PortName(port, name) for name in driven for port in ("motor torque", "transmission", "joint torque")]
     grounds = [PortName("ground torque", name) for name in driven]
     links = [name for name in (TRANSDUCER, *rig.joint_names) if name in links_beyond(rig)]
     outside = [PortName("external wrench", link) for link in links] + [PortName("base")] * bool(links)
@@ -203,9 +199,7 @@ def frequency_response(path: Path, time: float, inlets: Sequence[Inlet], f: Arra
     chosen = [path.inlets.index(inlet) for inlet in inlets]
     force, direct = path.force[index][:, chosen], path.direct[index][:, chosen]
     s = 2j * np.pi * f[:, None, None]
-    x = np.linalg.solve(
-        system.K + s * system.C + s**2 * system.M, np.broadcast_to(force, (len(f), *force.shape))
-    )
+    x = np.linalg.solve(system.K + s * system.C + s**2 * system.M, np.broadcast_to(force, (len(f), *force.shape)))
     wrench = (system.gravity + s * system.drag - s**2 * system.momentum) @ x + direct
     wrench = wrench * amplified(path.rig.transducer.amplifier, f)[:, None, None]
     angles = x[:, [system.output(name) for name in path.joints]]
@@ -252,9 +246,7 @@ def _windows(
         # A channel that shows nothing is one of unit noise without any relation to the others.
         relation = density * np.outer(channels, channels) + np.diag(1.0 * ~channels)
         weights = np.linalg.inv(np.linalg.cholesky(relation)) * np.sqrt(2.0 * dt)
-        found.append(
-            _Window(trajectory, start, sine_window(width), bins, f, weights * channels, floor.freedom(f))
-        )
+        found.append(_Window(trajectory, start, sine_window(width), bins, f, weights * channels, floor.freedom(f)))
     return found
 
 

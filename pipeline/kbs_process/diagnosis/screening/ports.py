@@ -120,16 +120,7 @@ def port_test(cells: Cells, ports: Sequence[PortModel], transfer_error: float = 
         sufficient[index] = False
     classes = alike(cells, ports)
     found = [
-        PortVerdict(
-            port.name,
-            port.H.shape[2],
-            float(logs[i]),
-            bool(sufficient[i]),
-            share,
-            left,
-            p,
-            classes[port.name],
-        )
+        PortVerdict(port.name, port.H.shape[2], float(logs[i]), bool(sufficient[i]), share, left, p, classes[port.name])
         for i, (port, p, left, share) in enumerate(verdicts)
     ]
     found.sort(key=lambda v: (not v.sufficient, v.inputs if v.sufficient else 0, v.left))

@@ -33,12 +33,7 @@ class Scene:
 
     @classmethod
     def of(
-        cls,
-        experiment: Experiment,
-        hypothesis: Hypothesis,
-        predicted: Mapping[int, Prediction],
-        *,
-        linear: bool = True,
+        cls, experiment: Experiment, hypothesis: Hypothesis, predicted: Mapping[int, Prediction], *, linear: bool = True
     ) -> Scene:
         """Tap the plant of a hypothesis; linearise it, if asked to, for what goes through. `predicted` by drive."""
         drives = [experiment.reference(trajectory) for trajectory in range(len(experiment.repeats))]
@@ -64,10 +59,7 @@ def _path(experiment: Experiment, hypothesis: Hypothesis, signals: Tapped, drive
     rate = working * decimation
     t = np.arange(experiment.drives[drive].n * decimation) / rate
     own = np.arange(len(signals.values)) / signals.rate
-    taps = {
-        name: np.interp(t, own, column)
-        for name, column in zip(signals.columns, signals.values.T, strict=True)
-    }
+    taps = {name: np.interp(t, own, column) for name, column in zip(signals.columns, signals.values.T, strict=True)}
     return follow(hypothesis.rig, select(acting(hypothesis, experiment.drives[drive])), taps, rate)
 
 

@@ -160,9 +160,7 @@ def uncovered(bench: Bench, found: Found, grid: Sequence[Catalogued]) -> Found:
     best, own = max((_descended(bench, start, _whole) for start, _ in starts), key=lambda end: _whole(*end))
     all_of_it = replace(own, gain=own.whole_gain, rank=own.whole_rank, amplitude=own.whole)
     more = evidence(all_of_it, bench.background.rows) - evidence(found.score, bench.background.rows)
-    return replace(
-        found, suspect=best, score=all_of_it, log_evidence=found.log_evidence + more, absorbed_by=()
-    )
+    return replace(found, suspect=best, score=all_of_it, log_evidence=found.log_evidence + more, absorbed_by=())
 
 
 def _everywhere(suspect: Catalogued) -> list[Catalogued]:

@@ -117,9 +117,7 @@ def sensed(
     return out
 
 
-def reduced(
-    candidate: Candidate, tapped: Tapped, channels: Sequence[str], rig: Rig, dt: float, n: int
-) -> Array:
+def reduced(candidate: Candidate, tapped: Tapped, channels: Sequence[str], rig: Rig, dt: float, n: int) -> Array:
     """As `sensed` at the working rate, (n, c, amplitudes), of what a sensor does to all that it reads.
 
     Vibration beyond the working band takes a play to and fro and rounds a step off: a sensor that is not linear shows

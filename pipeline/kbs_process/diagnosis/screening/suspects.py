@@ -44,11 +44,7 @@ class Candidate:
     @property
     def name(self) -> str:
         """The law's, whichever of its actions this is."""
-        return (
-            self.effect.name.removesuffix(self.effect.tag)
-            if isinstance(self.effect, Effect)
-            else self.effect.name
-        )
+        return self.effect.name.removesuffix(self.effect.tag) if isinstance(self.effect, Effect) else self.effect.name
 
     @property
     def port(self) -> Port | SensingPort:
@@ -129,9 +125,7 @@ def _sites(effect: Effect, rig: Rig, columns: Sequence[str]) -> list[str]:
         own = {} if joint.drive is None else joint.drive.parameters
         turned = joint.drive is not None or "ratio" not in effect.arguments
         return (
-            turned
-            and all(name in own for name in shared)
-            and all(f"{name}.{joint.name}" in columns for name in needed)
+            turned and all(name in own for name in shared) and all(f"{name}.{joint.name}" in columns for name in needed)
         )
 
     return [joint.name for joint in rig.joints if fits(joint)]
@@ -190,9 +184,7 @@ def _grid(
     # Whichever action of a law it is, its shape's grid has one name.
     tag = effect.tag if isinstance(effect, Effect) else ""
     grids = [replace(entry, name=entry.name.removesuffix(tag)) for entry in shapes]
-    choices = [
-        ranges.choices(grid, site, own.get(entry.name)) for entry, grid in zip(shapes, grids, strict=True)
-    ]
+    choices = [ranges.choices(grid, site, own.get(entry.name)) for entry, grid in zip(shapes, grids, strict=True)]
     for point in product(*choices):
         yield tuple((entry.name, value) for entry, value in zip(shapes, point, strict=True))
 
@@ -208,12 +200,7 @@ def products(channels: Sequence[str]) -> list[str]:
     return [BY.join((reads, *pair)) for reads in channels for pair in pairs if pair != (reads, reads)]
 
 
-def _sensed_sites(
-    law: Sensing,
-    rig: Rig,
-    channels: Sequence[str],
-    ranges: Ranges,
-) -> list[str]:
+def _sensed_sites(law: Sensing, rig: Rig, channels: Sequence[str], ranges: Ranges) -> list[str]:
     encoders = [name for name in rig.joint_names if name in channels]
     loads = [name for name in channels if name not in encoders]
     if "temperature" in law.arguments and not ranges.temperature:

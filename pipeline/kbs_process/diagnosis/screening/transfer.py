@@ -94,9 +94,7 @@ def follow(rig: Rig, effects: Sequence[Effect], taps: Mapping[str, Array], rate:
             points = around if moves else around[:1]
             damping = np.zeros((2, 2))
             for sample in points:
-                at = dict.fromkeys(SIGNALS, 0.0) | {
-                    name: float(values[sample]) for name, values in signals.items()
-                }
+                at = dict.fromkeys(SIGNALS, 0.0) | {name: float(values[sample]) for name, values in signals.items()}
                 near = slice(max(0, sample - half), sample + half + 1)
                 reach = {name: 0.5 * float(np.ptp(signals[name][near])) for name in _RATES}
                 K[pair] += drive_stiffness(joint.drive, steady, at) / len(points)
@@ -108,9 +106,7 @@ def follow(rig: Rig, effects: Sequence[Effect], taps: Mapping[str, Array], rate:
         systems.append(replace(bare, C=C, K=K))
     step, push = _discretised(systems, 1.0 / rate)
     inlets = inlets_of(rig)
-    entered = [
-        generalised(rig, system, inlets, pose) for system, pose in zip(systems, angles[knots], strict=True)
-    ]
+    entered = [generalised(rig, system, inlets, pose) for system, pose in zip(systems, angles[knots], strict=True)]
     return Path(
         rig,
         tuple(joint.name for joint in driven),
@@ -125,10 +121,7 @@ def follow(rig: Rig, effects: Sequence[Effect], taps: Mapping[str, Array], rate:
         inlets,
         np.stack([force for force, _ in entered]),
         np.stack([direct for _, direct in entered]),
-        np.stack(
-            [_ripple(joint, effects, _signals(taps, joint.name, joint.name), rate) for joint in driven],
-            axis=1,
-        ),
+        np.stack([_ripple(joint, effects, _signals(taps, joint.name, joint.name), rate) for joint in driven], axis=1),
     )
 
 
@@ -262,12 +255,7 @@ def _along(
     n = series.shape[1]
     out = np.empty((rows + joints, columns, n))
     x = start.copy()
-    new, load, mean, change = (
-        np.empty_like(x),
-        np.empty((c, columns)),
-        np.empty((c, columns)),
-        np.empty((c, columns)),
-    )
+    new, load, mean, change = (np.empty_like(x), np.empty((c, columns)), np.empty((c, columns)), np.empty((c, columns)))
     value = np.empty(columns)
     A, B = np.empty((size, size)), np.empty((size, c))
     W, V, L = np.empty((rows, c)), np.empty((rows, c)), np.empty((rows, c))
@@ -367,9 +355,7 @@ def _post(path: Path, decimation: int, samples: int) -> _Post:
     # Means over steps lie in their middle; below Nyquist all three averages are known and invertible.
     exact = np.exp(-1j * np.pi * f / path.rate) / np.sinc(f / path.rate) ** 3
     exact[-1] = 0.0
-    return _Post(
-        length, decimation, n // decimation, exact * amplified(path.rig.transducer.amplifier, f), exact
-    )
+    return _Post(length, decimation, n // decimation, exact * amplified(path.rig.transducer.amplifier, f), exact)
 
 
 def amplified(amplifier: Amplifier | None, f: Array) -> Array:

@@ -26,9 +26,7 @@ class View:
     screening: Screening
 
     @classmethod
-    def of(
-        cls, standing: Standing, among: Callable[[Suspect], bool] = lambda _: True, *, linear: bool = True
-    ) -> View:
+    def of(cls, standing: Standing, among: Callable[[Suspect], bool] = lambda _: True, *, linear: bool = True) -> View:
         """Of all suspects, or of those for which `among` is true; none of the plant's, if it is not made `linear`."""
         known = standing.known
         scene = Scene.of(known.experiment, standing.hypothesis, standing.predicted, linear=linear)

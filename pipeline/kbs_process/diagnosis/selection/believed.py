@@ -16,14 +16,7 @@ from kbs_process.diagnosis.acceptance.rivals import evidences
 from kbs_process.diagnosis.acceptance.supposed import Noted
 from kbs_process.diagnosis.experiments.floor import Floor
 from kbs_process.diagnosis.experiments.hypothesis import Simulate
-from kbs_process.diagnosis.experiments.thresholds import (
-    CONTESTED,
-    GATE_SIGMA,
-    MOST,
-    SECOND,
-    SETTLED,
-    TOLERATED,
-)
+from kbs_process.diagnosis.experiments.thresholds import CONTESTED, GATE_SIGMA, MOST, SECOND, SETTLED, TOLERATED
 from kbs_process.diagnosis.nominal.joint import Standing
 from kbs_process.diagnosis.nominal.settling import released, resettled
 from kbs_process.diagnosis.proposing.families import UNNAMED
@@ -220,9 +213,7 @@ def beaten(passed: Sequence[Tried], fallen: Sequence[Tried]) -> Tried | None:
     uneven = [
         one
         for one in fallen
-        if one.gate.uneven
-        and _law(one).family != UNNAMED
-        and not any(_as_good(other, one) for other in passed)
+        if one.gate.uneven and _law(one).family != UNNAMED and not any(_as_good(other, one) for other in passed)
     ]
     return min(uneven, key=lambda one: one.standing.known.cost, default=None)
 

@@ -142,9 +142,7 @@ def taken_off_again(chosen: Tried) -> Tried:
     told = replace(chosen.found, score=replace(chosen.found.score, amplitude=whole))
     sizes = np.abs(whole.reshape(-1, len(suspect.amplitudes))).max(axis=0)
     sigmas = np.max([one.sigma for one in off], axis=0)
-    return replace(
-        chosen, found=told, standing=standing, gate=chosen.gate.but(*oversized(suspect, sizes, sigmas))
-    )
+    return replace(chosen, found=told, standing=standing, gate=chosen.gate.but(*oversized(suspect, sizes, sigmas)))
 
 
 def _each(suspect: Suspect, known: Known, plain: Mapping[int, Array]) -> list[_Off]:
@@ -172,9 +170,7 @@ def _each(suspect: Suspect, known: Known, plain: Mapping[int, Array]) -> list[_O
     return found
 
 
-def _by_the_clock(
-    suspect: Catalogued, known: Known, k: int, whitened: Array, precision: Array, first: _Off
-) -> _Off:
+def _by_the_clock(suspect: Catalogued, known: Known, k: int, whitened: Array, precision: Array, first: _Off) -> _Off:
     """A recording stamped by a clock that is right: to first order, then from where each step leads.
 
     Where much is left, from the best of many sizes, as a jump by a period of what moves is none to first order.
@@ -191,9 +187,7 @@ def _by_the_clock(
     def at(amplitude: Array) -> tuple[_Off, Background]:
         measured, left = by_a_right_clock(suspect, known, k, late @ amplitude)
         here = Background.of({k: left}, {k: J}, precision)
-        return replace(
-            best, measured=measured, left=left, amplitude=amplitude, gain=nothing - _height(here, k)
-        ), here
+        return replace(best, measured=measured, left=left, amplitude=amplitude, gain=nothing - _height(here, k)), here
 
     def from_here(here: Background) -> Array:
         return score(here, Sums.over(here, {k: whitened})).amplitude

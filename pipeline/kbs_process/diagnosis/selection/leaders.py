@@ -39,14 +39,7 @@ from kbs_process.diagnosis.proposing.families import UNNAMED
 from kbs_process.diagnosis.proposing.orders import with_orders
 from kbs_process.diagnosis.proposing.sizes import springs
 from kbs_process.diagnosis.screening.screen import Catalogued, Found, Suspect
-from kbs_process.diagnosis.screening.shapes import (
-    bends,
-    bettered,
-    fitted,
-    possible,
-    standing_still,
-    uncovered,
-)
+from kbs_process.diagnosis.screening.shapes import bends, bettered, fitted, possible, standing_still, uncovered
 from kbs_process.diagnosis.screening.suspects import BY
 from kbs_process.diagnosis.screening.view import View
 from kbs_process.diagnosis.selection.each_recording import taken_off, taken_off_again
@@ -114,9 +107,7 @@ def _covered(view: View, among: Callable[[Found], bool]) -> list[Found]:
     if not any(_pulls(found) and found.score.gain >= MOST * most for found in view.able):
         return []
     taken_up = [
-        found
-        for found in view.screening.candidates
-        if _anywhere(found) and found.score.rank == 0 and among(found)
+        found for found in view.screening.candidates if _anywhere(found) and found.score.rank == 0 and among(found)
     ]
     hidden = side_by_side(partial(_uncovered, view), taken_up)
     least = most / PROMISED if view.standing.known.gross else most
@@ -189,13 +180,7 @@ def tried(
 
 
 def gated(
-    found: Found,
-    before: Standing,
-    after: Standing,
-    own: Own,
-    simulate: Simulate,
-    *,
-    least: float = GATE_SIGMA,
+    found: Found, before: Standing, after: Standing, own: Own, simulate: Simulate, *, least: float = GATE_SIGMA
 ) -> Gate:
     """The gate's verdict on a law that `after` has and `before` is without; sizes have to be such as it may have."""
     known = after.known
@@ -211,9 +196,7 @@ def gated(
         if share is None and known.experiment.held_out and not foretold(before.known, known, nothing()):
             verdict = verdict.but("recordings that were held out leave nothing that would show a curve")
         if share is not None and not share >= LAW_VARIANCE:
-            verdict = verdict.but(
-                f"a curve that explains {100.0 * share:.0f} % of the held-out excess is no law"
-            )
+            verdict = verdict.but(f"a curve that explains {100.0 * share:.0f} % of the held-out excess is no law")
     if isinstance(found.suspect, CurveSuspect):
         return verdict.but(*pushes(found.suspect, a, C))
     if not isinstance(found.suspect, Catalogued):

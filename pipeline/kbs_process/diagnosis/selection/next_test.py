@@ -40,9 +40,7 @@ from kbs_process.signals.records import Array
 _SECONDS = 200.0  # of a proposed test, or as long as the longest recording
 _CLEAR_S = 3.0  # at either end of a recording that are not compared
 _WEAK = 0.1  # error of a law over the law: what is less is known well enough
-_JUDGED = (
-    2  # trajectories on which the known parameters are refitted: each costs a simulation of every number
-)
+_JUDGED = 2  # trajectories on which the known parameters are refitted: each costs a simulation of every number
 _FEW = 3  # rivals that are told from
 _BATCH = 16  # suspects whose signatures are made together
 _DEPENDENT = 1e-10
@@ -73,9 +71,7 @@ class Proposal:
     tried: tuple[Tried, ...]  # best first
 
 
-def propose(
-    standing: Standing, finds: Sequence[Find], floor: Floor, simulating: Simulating
-) -> Proposal | None:
+def propose(standing: Standing, finds: Sequence[Find], floor: Floor, simulating: Simulating) -> Proposal | None:
     """Return the next test for what is open after a diagnosis; None where nothing is, or commands drive nothing."""
     asked = _question(finds)
     if asked is None or any(drive.schedule is None for drive in standing.known.experiment.drives):
@@ -83,9 +79,7 @@ def propose(
     find, rivals = asked
     experiment = standing.known.experiment
     limits = limits_of(experiment.drives, experiment.dt)
-    trajectories = family(
-        limits, experiment.rig.joint_names, min(_SECONDS, limits.seconds), find.identity.axis
-    )
+    trajectories = family(limits, experiment.rig.joint_names, min(_SECONDS, limits.seconds), find.identity.axis)
     if not trajectories:
         return None
     planned = _planned(experiment, trajectories)
@@ -161,10 +155,7 @@ def _planned(experiment: Experiment, trajectories: Sequence[Trajectory]) -> Expe
 
 def _as_predicted(planned: Experiment, predicted: Mapping[int, Prediction]) -> Experiment:
     """Planned recordings with what is to be expected of them: where a joint moves, its encoder shows something."""
-    trials = [
-        replace(trial, measured=predicted[trial.drive].values * trial.valid[:, None])
-        for trial in planned.trials
-    ]
+    trials = [replace(trial, measured=predicted[trial.drive].values * trial.valid[:, None]) for trial in planned.trials]
     return replace(planned, trials=tuple(trials))
 
 
@@ -181,9 +172,7 @@ class _Stage:
     free: tuple[int, ...]  # places of these among all free numbers
 
     @classmethod
-    def of(
-        cls, standing: Standing, planned: Experiment, floor: Floor, find: Find, simulate: Simulate
-    ) -> _Stage | None:
+    def of(cls, standing: Standing, planned: Experiment, floor: Floor, find: Find, simulate: Simulate) -> _Stage | None:
         known, hypothesis = standing.known, standing.hypothesis
         drives = range(len(planned.drives))
         predicted = dict(zip(drives, simulate([(drive, hypothesis) for drive in drives]), strict=True))
@@ -198,9 +187,7 @@ class _Stage:
         suspect, amplitude = found
         empty = {k: np.zeros(0) for k in drives}
         background = Background.of(empty, {k: np.zeros((0, 0)) for k in drives}, np.zeros(0))
-        bare = replace(
-            known, experiment=planned, metric=metric, slopes={}, shown={}, residual=tuple(empty.values())
-        )
+        bare = replace(known, experiment=planned, metric=metric, slopes={}, shown={}, residual=tuple(empty.values()))
         bench = Bench(bare, scene, background, ())
         columns = {k: metric[k](bench.signatures([suspect], k)) for k in drives}
         # The planned recordings show the law: what proposes shapes of rivals looks at that.

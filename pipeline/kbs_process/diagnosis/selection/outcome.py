@@ -96,9 +96,7 @@ class Find:
     ports_alike: tuple[str, ...]  # ports that these channels cannot tell from its own
     held_out_variance: float | None  # share of the excess on held-out recordings that it explains
     curve: Curve | None
-    parts: tuple[
-        tuple[Estimate, ...], ...
-    ] = ()  # of a law that was found more than once: each action's estimates
+    parts: tuple[tuple[Estimate, ...], ...] = ()  # of a law that was found more than once: each action's estimates
 
     @property
     def actions(self) -> tuple[tuple[Estimate, ...], ...]:
@@ -117,9 +115,7 @@ class Refused:
     identity: Identity
     rho_eff: float
     reasons: tuple[str, ...]
-    left: float | None = (
-        None  # power over the floor's beside it, of recordings that are fitted; None: not simulated
-    )
+    left: float | None = None  # power over the floor's beside it, of recordings that are fitted; None: not simulated
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,9 +164,7 @@ class Outcome:
     left: Place | None  # after all finds
     known: Known  # refitted, without any law: what stood before the first find
     standing: Standing  # the corrected model
-    bent: bool = (
-        False  # whether known numbers leave nothing, but are farther off together than chance has them
-    )
+    bent: bool = False  # whether known numbers leave nothing, but are farther off together than chance has them
     otherwise: tuple[Moved, ...] = ()  # known parameters that would have to be off if there were no law
     ended: bool = False  # whether the search had cost so much that no more laws were looked for
 

@@ -17,14 +17,7 @@ import numpy as np
 
 from kbs_process.diagnosis.acceptance.remains import detected
 from kbs_process.diagnosis.experiments.floor import Floor
-from kbs_process.diagnosis.experiments.thresholds import (
-    FAR_BEHIND,
-    FIRST,
-    MOST,
-    SETTLED_TIMES,
-    TOLERATED,
-    WAYS,
-)
+from kbs_process.diagnosis.experiments.thresholds import FAR_BEHIND, FIRST, MOST, SETTLED_TIMES, TOLERATED, WAYS
 from kbs_process.diagnosis.nominal.joint import Entered, Own, Standing, bare, entered, moved_on, with_extra
 from kbs_process.diagnosis.nominal.settling import released
 from kbs_process.diagnosis.proposing.sizes import of_mounting, sized
@@ -73,13 +66,9 @@ def raced(chosen: Sequence[Found], view: View, floor: Floor, simulate: Effort) -
         return min(runner, new, key=lambda one: one.cost)
 
     if view.standing.known.gross:
-        chosen = [
-            sized(view.bench, one, view.suspects, simulate) if of_mounting(one) else one for one in chosen
-        ]
+        chosen = [sized(view.bench, one, view.suspects, simulate) if of_mounting(one) else one for one in chosen]
     heat = side_by_side(begun, chosen)
-    far = FAR_BEHIND * max(
-        min((one.left for one in heat), default=0.0), TOLERATED * view.standing.known.fit_rows
-    )
+    far = FAR_BEHIND * max(min((one.left for one in heat), default=0.0), TOLERATED * view.standing.known.fit_rows)
     ahead = side_by_side(gone_on, heat)
     runners = [Runner(found, one.standing) for found, one in zip(chosen, ahead, strict=True)]
     runners.sort(key=lambda one: -one.found.score.gain)

@@ -92,21 +92,13 @@ def _alone(known: Known, near: Known, beside: Known, floor: Floor, simulate: Sim
     unseen = known.experiment.held_out
     start = near.hypothesis.at(near.free, beside.value[: len(near.free)])
     again = refit(known.experiment, start, floor, simulate, leaps=1)
-    here, there = (
-        detected(standing_of(one, {}), floor, unseen).ratio if unseen else 1.0 for one in (again, known)
-    )
+    here, there = (detected(standing_of(one, {}), floor, unseen).ratio if unseen else 1.0 for one in (again, known))
     better = again.cost < known.cost and not here > there
     return replace(again, chi2_before=known.chi2_before) if better else known
 
 
 def _diagnosed(
-    known: Known,
-    floor: Floor,
-    simulate: Effort,
-    before: Detection,
-    *,
-    at_once: bool = False,
-    pulled: bool = True,
+    known: Known, floor: Floor, simulate: Effort, before: Detection, *, at_once: bool = False, pulled: bool = True
 ) -> Outcome:
     """Find what one refit of the known parameters leaves out.
 
@@ -159,9 +151,7 @@ def _diagnosed(
         bent=bent(standing, floor),
         ended=simulate.ended,
     )
-    return replace(
-        outcome, finds=trusted(outcome.finds, TRUST_PART if outcome.verdict == "undecided" else TRUST)
-    )
+    return replace(outcome, finds=trusted(outcome.finds, TRUST_PART if outcome.verdict == "undecided" else TRUST))
 
 
 def _goes_on(standing: Standing, floor: Floor) -> bool:
@@ -182,12 +172,7 @@ def _mismatch(before: Detection, first: Screening, kept: Sequence[Accepted]) -> 
 
 
 def _round(
-    standing: Standing,
-    seen: Standing,
-    floor: Floor,
-    simulate: Effort,
-    accepted: Sequence[Accepted],
-    least: float = 0.0,
+    standing: Standing, seen: Standing, floor: Floor, simulate: Effort, accepted: Sequence[Accepted], least: float = 0.0
 ) -> _Round:
     """Look for one more law from where numbers are `seen` at, which may have been drawn back.
 
@@ -222,9 +207,7 @@ def _pair(last: _Round, floor: Floor, simulate: Effort, accepted: Sequence[Accep
         if other.accepted is None or not enough(last.standing.known, other.standing.known):
             continue
         seen = bare(other.standing, one.own, simulate)
-        again = _round(
-            without(other.standing, one.own, simulate), seen, floor, simulate, [*accepted, other.accepted]
-        )
+        again = _round(without(other.standing, one.own, simulate), seen, floor, simulate, [*accepted, other.accepted])
         if again.accepted is not None and enough(last.standing.known, again.standing.known):
             return other, again
     return ()
@@ -257,9 +240,7 @@ def _passed(
     if own and (jumped := _jumped(view, floor, simulate)):
         yield jumped
     first, others = leaders(
-        view,
-        simulate,
-        lambda found: (own or not found.suspect.each_trial) and not in_the_shade(found, accepted),
+        view, simulate, lambda found: (own or not found.suspect.each_trial) and not in_the_shade(found, accepted)
     )
     if least > 0.0 and _hopeless(first, least):
         noted.refuse(first[0], "the best beside it would leave far too much")
@@ -312,9 +293,7 @@ def _jumped(view: View, floor: Floor, simulate: Effort) -> list[Tried]:
     return [one for one, gain in jumps if gain > most]
 
 
-def _hidden(
-    view: View, before: Standing, floor: Floor, simulate: Effort, accepted: Sequence[Accepted]
-) -> list[Tried]:
+def _hidden(view: View, before: Standing, floor: Floor, simulate: Effort, accepted: Sequence[Accepted]) -> list[Tried]:
     """Springs in the way of a drive's torque, from numbers near the files': those that were pulled had taken them up.
 
     A gear that is softer, or joints that seem to rub, leave little of one, and that has the form of something else.

@@ -79,11 +79,7 @@ def in_plant(suspect: Suspect) -> bool:
     """Whether it is simulated in the non-linear plant."""
     if isinstance(suspect, CurveSuspect):
         return True
-    return (
-        isinstance(suspect, Catalogued)
-        and isinstance(suspect.candidate.effect, Effect)
-        and not suspect.each_trial
-    )
+    return isinstance(suspect, Catalogued) and isinstance(suspect.candidate.effect, Effect) and not suspect.each_trial
 
 
 def of_every_clock(found: Found) -> bool:
@@ -133,9 +129,7 @@ def extra_of(found: Found, standing: Standing, bench: Bench, scene: Scene) -> Ex
     assert isinstance(suspect, Catalogued) and isinstance(suspect.candidate.effect, Effect)
     candidate, effect = suspect.candidate, suspect.candidate.effect
     present = standing.hypothesis
-    hypothesis = inserted(
-        candidate, dict(zip(suspect.amplitudes, map(float, amplitude), strict=True)), present
-    )
+    hypothesis = inserted(candidate, dict(zip(suspect.amplitudes, map(float, amplitude), strict=True)), present)
     path = f"joint.{candidate.site}.drive" if effect.port.of_drive else f"external.{effect.name}"
     shaped = bends(candidate, present.rig)
     size = np.sqrt(np.maximum(np.diag(found.score.covariance), 0.0))
@@ -145,10 +139,7 @@ def extra_of(found: Found, standing: Standing, bench: Bench, scene: Scene) -> Ex
     least = np.array([0.0 if entry.bounds[0] >= 0.0 else -np.inf for entry in candidate.amplitudes])
     return Extra(
         hypothesis=hypothesis,
-        plant=(
-            *(Scalar(f"{path}.{name}") for name in suspect.amplitudes),
-            *(one.scalar(path) for one in shaped),
-        ),
+        plant=(*(Scalar(f"{path}.{name}") for name in suspect.amplitudes), *(one.scalar(path) for one in shaped)),
         start=np.concatenate([amplitude, begin]),
         prior=np.concatenate([0.0 * amplitude, begin]),
         sigma=np.concatenate([_widths(suspect), [one.sigma for one in shaped]]),

@@ -77,9 +77,7 @@ def cache_folder() -> Path:
     if chosen := os.environ.get("KBS_CACHE"):
         return Path(chosen)
     if sys.platform == "win32":
-        return (
-            Path(os.environ.get("LOCALAPPDATA", Path.home() / "AppData" / "Local")) / "kbs-process" / "Cache"
-        )
+        return Path(os.environ.get("LOCALAPPDATA", Path.home() / "AppData" / "Local")) / "kbs-process" / "Cache"
     if sys.platform == "darwin":
         return Path.home() / "Library" / "Caches" / "kbs-process"
     return Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "kbs-process"

@@ -36,10 +36,7 @@ PI_HIGH, PI_LOW = 3.1415926218032837, 3.178650954705639e-08  # the first has 26 
 INVERSE_PI = 0.3183098861837907
 LN2_HIGH, LN2_LOW = 0.6931471803691238, 1.9082149292705877e-10  # likewise, with 32 bits
 INVERSE_LN2 = 1.4426950408889634
-WHOLE, WHOLE_BITS = (
-    6755399441055744.0,
-    0x4338000000000000,
-)  # 1.5 * 2^52: a whole number added stands in its last bits
+WHOLE, WHOLE_BITS = (6755399441055744.0, 0x4338000000000000)  # 1.5 * 2^52: a whole number added stands in its last bits
 ROOT_HALF_BITS = 0x3FE6A09E667F3BCD  # of sqrt(1/2)
 LEAST, GREATEST = -708.0, 709.0  # arguments whose exponential is an ordinary number
 
@@ -75,9 +72,7 @@ def sin(x: float) -> float:
     r = (x - n * PI_HIGH) - n * PI_LOW
     sign = 1.0 - 2.0 * (n - 2.0 * floor(0.5 * n))
     u = r * r
-    low = (0.9999999999999999 - 0.1666666666666603 * u) + u * u * (
-        0.008333333333279716 - 0.00019841269824043476 * u
-    )
+    low = (0.9999999999999999 - 0.1666666666666603 * u) + u * u * (0.008333333333279716 - 0.00019841269824043476 * u)
     high = (2.7557316505206813e-06 - 2.5051875237403865e-08 * u) + u * u * (
         1.6047954942468953e-10 - 7.371737705211996e-13 * u
     )
@@ -168,8 +163,6 @@ def log(x: float) -> float:
     s = (s - 1.0) / (s + 1.0)
     n = from_bits(exponent + WHOLE_BITS) - WHOLE
     u = s * s
-    low = (0.666666666666667 + 0.39999999999899444 * u) + u * u * (
-        0.2857142862600327 + 0.22222211130259878 * u
-    )
+    low = (0.666666666666667 + 0.39999999999899444 * u) + u * u * (0.2857142862600327 + 0.22222211130259878 * u)
     high = (0.18182889455674947 + 0.15331710618210773 * u) + u * u * 0.14616585424888623
     return n * LN2_HIGH + (2.0 * s + (s * u * (low + u * u * (u * u) * high) + n * LN2_LOW))

@@ -19,9 +19,7 @@ GAINED = 0.1  # share left at a standstill by a step that did not meet rounding
 LEAST_SHARE = 1e-4  # of a step
 # rad, by which gears are wound up to begin with: one with play has no stiffness unloaded
 WOUND = (0.0, 3e-4, 2.1e-3, 1.1e-2)
-UNHELD = (
-    1e8  # condition of the accelerations' slopes above which something turns freely; held, it is some 1e5
-)
+UNHELD = 1e8  # condition of the accelerations' slopes above which something turns freely; held, it is some 1e5
 
 
 def at_rest(plant: Compiled, structure: Structure, p: Array, field: Array) -> tuple[Array, Array]:
@@ -39,10 +37,7 @@ def at_rest(plant: Compiled, structure: Structure, p: Array, field: Array) -> tu
     x[layout["z"]] = np.tile(structure.states, structure.joints)
     x[layout["y"]] = structure.mounted
     free = np.concatenate(
-        [
-            np.arange(x.size)[layout[name]]
-            for name in (("alpha",) if structure.elastic else ()) + ("q", "theta")
-        ]
+        [np.arange(x.size)[layout[name]] for name in (("alpha",) if structure.elastic else ()) + ("q", "theta")]
     )
     rows = np.arange(0 if structure.elastic else 3, 3 + 2 * structure.joints)
 

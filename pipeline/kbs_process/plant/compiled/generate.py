@@ -116,17 +116,12 @@ def _arriving(structure: Structure) -> list[str]:
 
 def _late(structure: Structure) -> list[str]:
     """Emit where a field is as it arrives at its motor, which costs nothing where none comes late."""
-    delays = [
-        (effect.of_set_points, wires[effect.delay]) for effect, wires in _wired(structure) if effect.delay
-    ]
+    delays = [(effect.of_set_points, wires[effect.delay]) for effect, wires in _wired(structure) if effect.delay]
     on_its_way = [wire for set_points, wire in delays if not set_points]
     set_late = [wire for set_points, wire in delays if set_points]
     body = [f"    k = {JOINTS + DRIVE} + joint * {structure.stride}"] * bool(delays)
     if on_its_way:
-        body += [
-            f"    time = time - ({' + '.join(on_its_way)})",
-            "    cycle = cycle_of(time, cycle, known, knots)",
-        ]
+        body += [f"    time = time - ({' + '.join(on_its_way)})", "    cycle = cycle_of(time, cycle, known, knots)"]
     if set_late:
         body += [
             f"    late = {' + '.join(set_late)}",

@@ -106,18 +106,7 @@ def joint_rotation(p: Array, k: int, angle: float) -> Matrix:
 @compiled
 def inertia(p: Array, k: int) -> Inertia:
     """Inertia of a link about its own origin, in its own axes."""
-    return (
-        p[k],
-        p[k + 1],
-        p[k + 2],
-        p[k + 3],
-        p[k + 4],
-        p[k + 5],
-        p[k + 6],
-        p[k + 7],
-        p[k + 8],
-        p[k + 9],
-    )
+    return (p[k], p[k + 1], p[k + 2], p[k + 3], p[k + 4], p[k + 5], p[k + 6], p[k + 7], p[k + 8], p[k + 9])
 
 
 @compiled
@@ -181,14 +170,7 @@ def screw(a: Vector, o: Vector) -> Spatial:
 @compiled
 def add6(a: Spatial, b: Spatial, x: float) -> Spatial:
     """a + x b"""
-    return (
-        a[0] + x * b[0],
-        a[1] + x * b[1],
-        a[2] + x * b[2],
-        a[3] + x * b[3],
-        a[4] + x * b[4],
-        a[5] + x * b[5],
-    )
+    return (a[0] + x * b[0], a[1] + x * b[1], a[2] + x * b[2], a[3] + x * b[3], a[4] + x * b[4], a[5] + x * b[5])
 
 
 @compiled
@@ -302,11 +284,7 @@ def from_plate(alpha: Vector, v: Vector) -> Vector:
 @compiled
 def velocity_at(v: Spatial, r: Vector) -> Vector:
     """Velocity of the point at `r` of a body that moves with `v`."""
-    return (
-        v[3] + v[1] * r[2] - v[2] * r[1],
-        v[4] + v[2] * r[0] - v[0] * r[2],
-        v[5] + v[0] * r[1] - v[1] * r[0],
-    )
+    return (v[3] + v[1] * r[2] - v[2] * r[1], v[4] + v[2] * r[0] - v[0] * r[2], v[5] + v[0] * r[1] - v[1] * r[0])
 
 
 @compiled

@@ -64,9 +64,7 @@ def shaking(structure: Structure, instant: str) -> list[str]:
     if not structure.shakes:
         return []
     sums = ["    shaken = (0.0, 0.0, 0.0)"]
-    return sums + [
-        f"    shaken = add3(shaken, load_{load.effect.name}({instant}, p))" for load in structure.shakes
-    ]
+    return sums + [f"    shaken = add3(shaken, load_{load.effect.name}({instant}, p))" for load in structure.shakes]
 
 
 def carrier(structure: Structure, joint: int) -> str:
@@ -179,9 +177,7 @@ def _accelerate(structure: Structure) -> list[str]:
     ]
     for load in structure.forces:
         name, link = load.effect.name, "T" if load.link < 0 else load.link
-        lines.append(
-            f"    F_{link} = add6(F_{link}, load_{name}(alpha, V_{link}, r_{name}, instant, p), -1.0)"
-        )
+        lines.append(f"    F_{link} = add6(F_{link}, load_{name}(alpha, V_{link}, r_{name}, instant, p), -1.0)")
     for j in reversed(range(n)):
         c = carrier(structure, j)
         lines += [

@@ -245,13 +245,9 @@ def kicked(structure: Structure, state: InVector) -> list[str]:
     for j in range(n):
         k, o = joint_offset(structure, j), structure.other(j)
 
-        def gear(
-            tag: str, angle: str, rate: str, own: str = f"z_{j}", j: int = j, k: int = k, o: int = o
-        ) -> str:
+        def gear(tag: str, angle: str, rate: str, own: str = f"z_{j}", j: int = j, k: int = k, o: int = o) -> str:
             rotor, other = f"0.0, theta_{j}, w_{j}, 0.0", f"q_{o}, qd_{o}, " * structure.crossed
-            given = (
-                f"{rotor}, {angle}, {rate}, {other}p[{k + RATIO}], time + half, {own}, p, int({k + DRIVE})"
-            )
+            given = f"{rotor}, {angle}, {rate}, {other}p[{k + RATIO}], time + half, {own}, p, int({k + DRIVE})"
             rates = [f"d{i}{tag}" for i in range(z)]
             results = ", ".join(["_", "_", f"gear{tag}", f"joint{tag}", *rates, *["_"] * structure.grounded])
             return f"    {results} = drive({given})"
@@ -276,10 +272,7 @@ def kicked(structure: Structure, state: InVector) -> list[str]:
     lines += [*shaking(structure, "instant"), *accelerated(structure)]
     if structure.elastic:
         for i in range(3):
-            lines += [
-                f"    {state.at('omegad', i)} = omegad[{i}]",
-                f"    {state.at('omega', i)} += H * omegad[{i}]",
-            ]
+            lines += [f"    {state.at('omegad', i)} = omegad[{i}]", f"    {state.at('omega', i)} += H * omegad[{i}]"]
         lines.append(f"    drifted = drift(drifted, plate_rates(alpha, {state.vector('omega')}), half)")
         lines += [f"    {state.at('alpha', i)} = drifted[{i}]" for i in range(3)]
     for j in range(n):

@@ -146,8 +146,6 @@ def select(names: Sequence[str]) -> tuple[Effect, ...]:
     for name in names:
         effect = find(name)
         if effect is None:
-            raise ConfigError(
-                f"unknown effect '{name}'", where="[model] effects", remedy=did_you_mean(name, _POSITION)
-            )
+            raise ConfigError(f"unknown effect '{name}'", where="[model] effects", remedy=did_you_mean(name, _POSITION))
         chosen[_POSITION[name.removesuffix(effect.tag)], effect.tag] = effect
     return tuple(chosen[key] for key in sorted(chosen))

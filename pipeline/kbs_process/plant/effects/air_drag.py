@@ -10,9 +10,7 @@ SPEED = 0.01  # m/s of reference: 0.3 m from an axis at 2 deg/s
 _LEAST = 1e-6  # of it, below which the force is in proportion to the velocity
 
 
-def force(
-    vx: float, vy: float, vz: float, air_drag: float, air_drag_power: float
-) -> tuple[float, float, float]:
+def force(vx: float, vy: float, vz: float, air_drag: float, air_drag_power: float) -> tuple[float, float, float]:
     r"""Force on the centre of the area, against its velocity, along the undeflected T's axes.
 
     Equation: $F = -D (|v| / v_0)^{n-1}\, v / v_0$, $v_0$ = 0.01 m/s.

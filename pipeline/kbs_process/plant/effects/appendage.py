@@ -8,12 +8,7 @@ from kbs_process.plant.effect import Effect, LogNormal, Normal, Parameter, Port,
 
 
 def torque(
-    joint_rate: float,
-    sway: float,
-    sway_rate: float,
-    sway_inertia: float,
-    sway_frequency: float,
-    sway_damping: float,
+    joint_rate: float, sway: float, sway_rate: float, sway_inertia: float, sway_frequency: float, sway_damping: float
 ) -> tuple[float, float, float]:
     r"""Torque of the appendage on its link about the joint's axis; what reacts it is the appendage's own momentum.
 
@@ -35,9 +30,7 @@ APPENDAGE = Effect(
     port=Port.GROUND_TORQUE,
     equation=torque,
     parameters=(
-        Parameter(
-            "sway_inertia", "kg m^2", Normal(0.0, 0.1), "inertia of the mode", (0.0, 10.0), role="amplitude"
-        ),
+        Parameter("sway_inertia", "kg m^2", Normal(0.0, 0.1), "inertia of the mode", (0.0, 10.0), role="amplitude"),
         Parameter(
             "sway_frequency",
             "Hz",
@@ -46,14 +39,9 @@ APPENDAGE = Effect(
             (0.05, 50.0),
             grid=tuple(0.3 * 1.25**i for i in range(17)),
         ),
-        Parameter(
-            "sway_damping", "1", LogNormal(0.01, 0.7), "its damping ratio", (0.0, 1.0), grid=(0.005, 0.03)
-        ),
+        Parameter("sway_damping", "1", LogNormal(0.01, 0.7), "its damping ratio", (0.0, 1.0), grid=(0.005, 0.03)),
     ),
     reference="P. W. Likins, Dynamics and control of flexible space vehicles, JPL Technical Report 32-1329 (1970)",
-    states=(
-        State("sway", "rad", 0.0, "angle against the link"),
-        State("sway_rate", "rad/s", 0.0, "rate"),
-    ),
+    states=(State("sway", "rad", 0.0, "angle against the link"), State("sway_rate", "rad/s", 0.0, "rate")),
     of_article=True,
 )

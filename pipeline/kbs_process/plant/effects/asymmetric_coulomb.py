@@ -26,22 +26,10 @@ ASYMMETRIC_COULOMB = Effect(
     equation=torque,
     parameters=(
         Parameter(
-            "coulomb_ahead",
-            "N m",
-            Normal(0.0, 0.5),
-            "of positive rates",
-            (-100.0, 100.0),
-            role="amplitude",
-            dry=True,
+            "coulomb_ahead", "N m", Normal(0.0, 0.5), "of positive rates", (-100.0, 100.0), role="amplitude", dry=True
         ),
         Parameter(
-            "coulomb_astern",
-            "N m",
-            Normal(0.0, 0.5),
-            "of negative rates",
-            (-100.0, 100.0),
-            role="amplitude",
-            dry=True,
+            "coulomb_astern", "N m", Normal(0.0, 0.5), "of negative rates", (-100.0, 100.0), role="amplitude", dry=True
         ),
         Parameter("sense_rate", "rad/s", LogNormal(5e-4, 1.0), "rate of full friction", (1e-5, 1.0)),
     ),

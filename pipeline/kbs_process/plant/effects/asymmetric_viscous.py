@@ -22,22 +22,8 @@ ASYMMETRIC_VISCOUS = Effect(
     port=Port.JOINT_TORQUE,
     equation=torque,
     parameters=(
-        Parameter(
-            "viscous_ahead",
-            "N m s/rad",
-            Normal(0.0, 10.0),
-            "of positive rates",
-            (-1e4, 1e4),
-            role="amplitude",
-        ),
-        Parameter(
-            "viscous_astern",
-            "N m s/rad",
-            Normal(0.0, 10.0),
-            "of negative rates",
-            (-1e4, 1e4),
-            role="amplitude",
-        ),
+        Parameter("viscous_ahead", "N m s/rad", Normal(0.0, 10.0), "of positive rates", (-1e4, 1e4), role="amplitude"),
+        Parameter("viscous_astern", "N m s/rad", Normal(0.0, 10.0), "of negative rates", (-1e4, 1e4), role="amplitude"),
     ),
     reference="B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, A survey of models, analysis tools and "
     "compensation methods for the control of machines with friction, Automatica 30 (1994) 1083",

@@ -51,12 +51,7 @@ BASE_HARDENING = Effect(
         Parameter("base_hardening_y", "N m", _PRIOR, "about y", _BOUNDS, role="amplitude"),
         Parameter("base_hardening_z", "N m", _PRIOR, "about z", _BOUNDS, role="amplitude"),
         Parameter(
-            "base_hardening_power",
-            "1",
-            LogNormal(3.0, 0.3),
-            "power of the angle",
-            (1.2, 9.0),
-            grid=(2.0, 3.0, 5.0),
+            "base_hardening_power", "1", LogNormal(3.0, 0.3), "power of the angle", (1.2, 9.0), grid=(2.0, 3.0, 5.0)
         ),
     ),
     reference="R. D. Mindlin, Dynamics of package cushioning, Bell System Technical J. 24 (1945) 353",

@@ -56,15 +56,7 @@ BASE_HYSTERESIS = Effect(
     port=Port.BASE_TORQUE,
     equation=moment,
     parameters=(
-        Parameter(
-            "base_loop_x",
-            "N m",
-            _PRIOR,
-            "half height of the loop about x",
-            _BOUNDS,
-            role="amplitude",
-            dry=True,
-        ),
+        Parameter("base_loop_x", "N m", _PRIOR, "half height of the loop about x", _BOUNDS, role="amplitude", dry=True),
         Parameter("base_loop_y", "N m", _PRIOR, "about y", _BOUNDS, role="amplitude", dry=True),
         Parameter("base_loop_z", "N m", _PRIOR, "about z", _BOUNDS, role="amplitude", dry=True),
         Parameter(
@@ -75,9 +67,7 @@ BASE_HYSTERESIS = Effect(
             (1e-6, 1e-3),
             grid=tuple(3e-6 * 2.4**i for i in range(5)),
         ),
-        Parameter(
-            "base_slip_power", "1", LogNormal(1.5, 0.3), "sharpness of yielding", (1.0, 5.0), grid=(1.5, 3.0)
-        ),
+        Parameter("base_slip_power", "1", LogNormal(1.5, 0.3), "sharpness of yielding", (1.0, 5.0), grid=(1.5, 3.0)),
     ),
     reference="Y. K. Wen, Method for random vibration of hysteretic systems, J. Engineering Mechanics Division ASCE "
     "102 (1976) 249",

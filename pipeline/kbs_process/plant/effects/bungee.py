@@ -37,9 +37,7 @@ BUNGEE = Effect(
     port=Port.EXTERNAL_FORCE,
     equation=force,
     parameters=(
-        Parameter(
-            "stiffness", "N/m", LogNormal(60.0, 0.3), "of the cord", bounds=(0.0, 1e5), role="amplitude"
-        ),
+        Parameter("stiffness", "N/m", LogNormal(60.0, 0.3), "of the cord", bounds=(0.0, 1e5), role="amplitude"),
         Parameter("free_length", "m", Normal(0.7, 0.2), "of the cord when slack", bounds=(0.0, 100.0)),
         Parameter("anchor_x", "m", Normal(0.0, 0.5), "cord's upper end, along T's x axis", (-100.0, 100.0)),
         Parameter("anchor_y", "m", Normal(0.0, 0.5), "along T's y axis", (-100.0, 100.0)),

@@ -33,12 +33,7 @@ COGGING = Effect(
             dry=True,
         ),
         Parameter(
-            "phi_cog",
-            "rad",
-            Uniform(-math.pi, math.pi),
-            "phase of cogging",
-            bounds=(-math.pi, math.pi),
-            grid=EIGHTHS,
+            "phi_cog", "rad", Uniform(-math.pi, math.pi), "phase of cogging", bounds=(-math.pi, math.pi), grid=EIGHTHS
         ),
     ),
     reference="Measurement and prediction of the performance of a satellite based antenna pointing mechanism "

@@ -21,9 +21,7 @@ CONTROLLER_GAIN = Effect(
     name="controller_gain",
     port=Port.FIELD,
     equation=change,
-    parameters=(
-        Parameter("field_gain", "1", Normal(0.0, 1e-3), "error of the scale", (-0.1, 0.1), role="amplitude"),
-    ),
+    parameters=(Parameter("field_gain", "1", Normal(0.0, 1e-3), "error of the scale", (-0.1, 0.1), role="amplitude"),),
     reference="G. F. Franklin, J. D. Powell, M. Workman, Digital Control of Dynamic Systems (1998), chapter 5",
     recorded=True,
 )

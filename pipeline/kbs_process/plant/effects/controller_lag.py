@@ -26,9 +26,7 @@ CONTROLLER_LAG = Effect(
     port=Port.FIELD,
     equation=change,
     parameters=(
-        Parameter(
-            "set_point_lag", "s", Normal(0.0, 0.05), "of the set points", (-0.5, 0.5), role="amplitude"
-        ),
+        Parameter("set_point_lag", "s", Normal(0.0, 0.05), "of the set points", (-0.5, 0.5), role="amplitude"),
     ),
     reference="K. J. Astroem, B. Wittenmark, Computer-Controlled Systems (1997), chapters 3 and 9",
     delay="set_point_lag",

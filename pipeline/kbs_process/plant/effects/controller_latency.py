@@ -23,9 +23,7 @@ CONTROLLER_LATENCY = Effect(
     name="controller_latency",
     port=Port.FIELD,
     equation=change,
-    parameters=(
-        Parameter("field_latency", "s", Normal(0.0, 0.05), "of the field", (-0.5, 0.5), role="amplitude"),
-    ),
+    parameters=(Parameter("field_latency", "s", Normal(0.0, 0.05), "of the field", (-0.5, 0.5), role="amplitude"),),
     reference="G. F. Franklin, J. D. Powell, M. Workman, Digital Control of Dynamic Systems (1998), chapter 5",
     delay="field_latency",
 )

@@ -24,9 +24,7 @@ COULOMB = Effect(
     port=Port.JOINT_TORQUE,
     equation=torque,
     parameters=(
-        Parameter(
-            "coulomb", "N m", Normal(0.0, 0.5), "friction torque", (-100.0, 100.0), role="amplitude", dry=True
-        ),
+        Parameter("coulomb", "N m", Normal(0.0, 0.5), "friction torque", (-100.0, 100.0), role="amplitude", dry=True),
         Parameter("coulomb_rate", "rad/s", LogNormal(5e-4, 1.0), "rate of full friction", (1e-5, 1.0)),
     ),
     reference="B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, A survey of models, analysis tools and "

@@ -5,9 +5,7 @@ from __future__ import annotations
 from kbs_process.plant.effect import Effect, LogNormal, Normal, Parameter, Port, State
 
 
-def torque(
-    joint_rate: float, dahl_strain: float, dahl: float, dahl_displacement: float
-) -> tuple[float, float]:
+def torque(joint_rate: float, dahl_strain: float, dahl: float, dahl_displacement: float) -> tuple[float, float]:
     r"""Torque on the output, reacted by the body that carries the motor.
 
     Equation: $T = -T_c z$, $\dot z = (\omega_l - |\omega_l| z) / x_0$.
@@ -24,9 +22,7 @@ DAHL = Effect(
     port=Port.JOINT_TORQUE,
     equation=torque,
     parameters=(
-        Parameter(
-            "dahl", "N m", Normal(0.0, 0.5), "friction torque", (-100.0, 100.0), role="amplitude", dry=True
-        ),
+        Parameter("dahl", "N m", Normal(0.0, 0.5), "friction torque", (-100.0, 100.0), role="amplitude", dry=True),
         Parameter(
             "dahl_displacement",
             "rad",

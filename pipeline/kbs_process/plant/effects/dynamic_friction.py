@@ -7,9 +7,7 @@ import math
 from kbs_process.plant.effect import EIGHTHS, Effect, LogNormal, Parameter, Port, Uniform
 
 
-def torque(
-    rotor_angle: float, rotor_rate: float, d0: float, d1: float, phi_dyn: float, w_dyn: float
-) -> float:
+def torque(rotor_angle: float, rotor_rate: float, d0: float, d1: float, phi_dyn: float, w_dyn: float) -> float:
     r"""Torque on the rotor by the resistance of the elliptical bearing.
 
     Equation: $T = -(d_0 + d_1 \sin(2 \theta_r + \phi_{dyn})) \min(|\omega_r|/w_{dyn}, 1)
@@ -28,13 +26,7 @@ DYNAMIC_FRICTION = Effect(
     equation=torque,
     parameters=(
         Parameter(
-            "d0",
-            "N m",
-            LogNormal(0.012, 0.25),
-            "mean resistance torque",
-            bounds=(0.0, 1.0),
-            role="amplitude",
-            dry=True,
+            "d0", "N m", LogNormal(0.012, 0.25), "mean resistance torque", bounds=(0.0, 1.0), role="amplitude", dry=True
         ),
         Parameter(
             "d1",
@@ -45,14 +37,7 @@ DYNAMIC_FRICTION = Effect(
             role="amplitude",
             dry=True,
         ),
-        Parameter(
-            "phi_dyn",
-            "rad",
-            Uniform(-math.pi, math.pi),
-            "its phase",
-            bounds=(-math.pi, math.pi),
-            grid=EIGHTHS,
-        ),
+        Parameter("phi_dyn", "rad", Uniform(-math.pi, math.pi), "its phase", bounds=(-math.pi, math.pi), grid=EIGHTHS),
         Parameter("w_dyn", "rad/s", LogNormal(0.05, 0.2), "rate of full resistance", bounds=(1e-4, 10.0)),
     ),
     reference="Measurement and prediction of the performance of a satellite based antenna pointing mechanism "

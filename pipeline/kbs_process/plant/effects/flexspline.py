@@ -6,13 +6,7 @@ from kbs_process.plant.effect import Effect, LogNormal, Parameter, Port
 
 
 def torque(
-    rotor_angle: float,
-    rotor_rate: float,
-    joint_angle: float,
-    joint_rate: float,
-    ratio: float,
-    fsv: float,
-    Ka: float,
+    rotor_angle: float, rotor_rate: float, joint_angle: float, joint_rate: float, ratio: float, fsv: float, Ka: float
 ) -> float:
     r"""Torque of the gear on the output.
 

@@ -27,9 +27,7 @@ FLOOR_TILT = Effect(
     port=Port.BASE_ACCELERATION,
     equation=acceleration,
     parameters=(
-        Parameter(
-            "tilt_x", "rad", Normal(0.0, 1e-4), "inclination towards x at last", (-0.1, 0.1), role="amplitude"
-        ),
+        Parameter("tilt_x", "rad", Normal(0.0, 1e-4), "inclination towards x at last", (-0.1, 0.1), role="amplitude"),
         Parameter("tilt_y", "rad", Normal(0.0, 1e-4), "towards y", (-0.1, 0.1), role="amplitude"),
         Parameter(
             "tilt_time",

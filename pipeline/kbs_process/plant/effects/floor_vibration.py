@@ -58,12 +58,7 @@ FLOOR_VIBRATION = Effect(
             over="spectrum",
         ),
         Parameter(
-            "floor_sweep",
-            "Hz/s",
-            Normal(0.0, 1e-2),
-            "change of the frequency with time",
-            (-10.0, 10.0),
-            grid=(0.0,),
+            "floor_sweep", "Hz/s", Normal(0.0, 1e-2), "change of the frequency with time", (-10.0, 10.0), grid=(0.0,)
         ),
     ),
     reference="C. G. Gordon, Generic criteria for vibration-sensitive equipment, Proc. SPIE 1619 (1991) 71",

@@ -8,12 +8,7 @@ from kbs_process.plant.effect import Effect, LogNormal, Normal, Parameter, Port
 
 
 def torque(
-    rotor_angle: float,
-    rotor_rate: float,
-    ripple_sin: float,
-    ripple_cos: float,
-    ripple_order: float,
-    ripple_rate: float,
+    rotor_angle: float, rotor_rate: float, ripple_sin: float, ripple_cos: float, ripple_order: float, ripple_rate: float
 ) -> float:
     r"""Torque on the rotor by the fluctuation of a friction about its mean.
 
@@ -23,9 +18,7 @@ def torque(
     Source: T. D. Tuttle, W. P. Seering, A nonlinear model of a harmonic drive gear transmission, IEEE Trans. Robotics
         and Automation 12 (1996) 368.
     """
-    resistance = ripple_sin * math.sin(ripple_order * rotor_angle) + ripple_cos * math.cos(
-        ripple_order * rotor_angle
-    )
+    resistance = ripple_sin * math.sin(ripple_order * rotor_angle) + ripple_cos * math.cos(ripple_order * rotor_angle)
     return -resistance * max(-1.0, min(1.0, rotor_rate / ripple_rate))
 
 
@@ -34,23 +27,9 @@ FRICTION_RIPPLE = Effect(
     port=Port.MOTOR_TORQUE,
     equation=torque,
     parameters=(
+        Parameter("ripple_sin", "N m", Normal(0.0, 3e-3), "sine of the order", (-1.0, 1.0), role="amplitude", dry=True),
         Parameter(
-            "ripple_sin",
-            "N m",
-            Normal(0.0, 3e-3),
-            "sine of the order",
-            (-1.0, 1.0),
-            role="amplitude",
-            dry=True,
-        ),
-        Parameter(
-            "ripple_cos",
-            "N m",
-            Normal(0.0, 3e-3),
-            "cosine of the order",
-            (-1.0, 1.0),
-            role="amplitude",
-            dry=True,
+            "ripple_cos", "N m", Normal(0.0, 3e-3), "cosine of the order", (-1.0, 1.0), role="amplitude", dry=True
         ),
         Parameter(
             "ripple_order",

@@ -28,18 +28,8 @@ FRICTION_WARMUP = Effect(
     port=Port.MOTOR_TORQUE,
     equation=torque,
     parameters=(
-        Parameter(
-            "warmup", "N m s/rad", Normal(0.0, 1e-3), "viscous friction lost", (-0.1, 0.1), role="amplitude"
-        ),
-        Parameter(
-            "warmup_dry",
-            "N m",
-            Normal(0.0, 5e-3),
-            "dry friction lost",
-            (-1.0, 1.0),
-            role="amplitude",
-            dry=True,
-        ),
+        Parameter("warmup", "N m s/rad", Normal(0.0, 1e-3), "viscous friction lost", (-0.1, 0.1), role="amplitude"),
+        Parameter("warmup_dry", "N m", Normal(0.0, 5e-3), "dry friction lost", (-1.0, 1.0), role="amplitude", dry=True),
         Parameter(
             "warmup_time",
             "s",

@@ -42,25 +42,13 @@ GROUND_CABLE = Effect(
     port=Port.GROUND_TORQUE,
     equation=torque,
     parameters=(
-        Parameter(
-            "cable_offset", "N m", Normal(0.0, 1.0), "torque in the middle", (-100.0, 100.0), role="amplitude"
-        ),
+        Parameter("cable_offset", "N m", Normal(0.0, 1.0), "torque in the middle", (-100.0, 100.0), role="amplitude"),
         Parameter("cable_spring", "N m/rad", Normal(0.0, 3.0), "stiffness", (-1e3, 1e3), role="amplitude"),
         Parameter("cable_curve", "N m/rad^2", Normal(0.0, 3.0), "its slope", (-1e4, 1e4), role="amplitude"),
+        Parameter("cable_cubic", "N m/rad^3", Normal(0.0, 10.0), "its curvature", (-1e5, 1e5), role="amplitude"),
+        Parameter("cable_taut", "N m", Normal(0.0, 1.0), "at which it yields", (-100.0, 100.0), role="amplitude"),
         Parameter(
-            "cable_cubic", "N m/rad^3", Normal(0.0, 10.0), "its curvature", (-1e5, 1e5), role="amplitude"
-        ),
-        Parameter(
-            "cable_taut", "N m", Normal(0.0, 1.0), "at which it yields", (-100.0, 100.0), role="amplitude"
-        ),
-        Parameter(
-            "cable_friction",
-            "N m",
-            Normal(0.0, 0.5),
-            "between its wires",
-            (-100.0, 100.0),
-            role="amplitude",
-            dry=True,
+            "cable_friction", "N m", Normal(0.0, 0.5), "between its wires", (-100.0, 100.0), role="amplitude", dry=True
         ),
         Parameter(
             "cable_middle",

@@ -43,22 +43,11 @@ HARNESS = Effect(
     port=Port.JOINT_TORQUE,
     equation=torque,
     parameters=(
-        Parameter(
-            "harness_offset",
-            "N m",
-            Normal(0.0, 1.0),
-            "torque in the middle",
-            (-100.0, 100.0),
-            role="amplitude",
-        ),
+        Parameter("harness_offset", "N m", Normal(0.0, 1.0), "torque in the middle", (-100.0, 100.0), role="amplitude"),
         Parameter("harness_spring", "N m/rad", Normal(0.0, 3.0), "stiffness", (-1e3, 1e3), role="amplitude"),
         Parameter("harness_curve", "N m/rad^2", Normal(0.0, 3.0), "its slope", (-1e4, 1e4), role="amplitude"),
-        Parameter(
-            "harness_cubic", "N m/rad^3", Normal(0.0, 10.0), "its curvature", (-1e5, 1e5), role="amplitude"
-        ),
-        Parameter(
-            "harness_taut", "N m", Normal(0.0, 1.0), "at which it yields", (-100.0, 100.0), role="amplitude"
-        ),
+        Parameter("harness_cubic", "N m/rad^3", Normal(0.0, 10.0), "its curvature", (-1e5, 1e5), role="amplitude"),
+        Parameter("harness_taut", "N m", Normal(0.0, 1.0), "at which it yields", (-100.0, 100.0), role="amplitude"),
         Parameter(
             "harness_friction",
             "N m",

@@ -26,22 +26,10 @@ JOINT_ORDER = Effect(
     equation=torque,
     parameters=(
         Parameter(
-            "joint_sin",
-            "N m",
-            Normal(0.0, 0.2),
-            "sine of the order",
-            (-100.0, 100.0),
-            role="amplitude",
-            dry=True,
+            "joint_sin", "N m", Normal(0.0, 0.2), "sine of the order", (-100.0, 100.0), role="amplitude", dry=True
         ),
         Parameter(
-            "joint_cos",
-            "N m",
-            Normal(0.0, 0.2),
-            "cosine of the order",
-            (-100.0, 100.0),
-            role="amplitude",
-            dry=True,
+            "joint_cos", "N m", Normal(0.0, 0.2), "cosine of the order", (-100.0, 100.0), role="amplitude", dry=True
         ),
         Parameter(
             "joint_order",

@@ -22,9 +22,7 @@ JOINT_VISCOUS = Effect(
     port=Port.JOINT_TORQUE,
     equation=torque,
     parameters=(
-        Parameter(
-            "joint_viscous", "N m s/rad", Normal(0.0, 10.0), "viscous friction", (-1e4, 1e4), role="amplitude"
-        ),
+        Parameter("joint_viscous", "N m s/rad", Normal(0.0, 10.0), "viscous friction", (-1e4, 1e4), role="amplitude"),
     ),
     reference="B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, A survey of models, analysis tools and "
     "compensation methods for the control of machines with friction, Automatica 30 (1994) 1083",

@@ -38,12 +38,8 @@ KINEMATIC_ERROR = Effect(
     port=Port.TRANSMISSION,
     equation=torque,
     parameters=(
-        Parameter(
-            "kinematic_sin", "rad", Normal(0.0, 5e-4), "sine of the error", (-0.01, 0.01), role="amplitude"
-        ),
-        Parameter(
-            "kinematic_cos", "rad", Normal(0.0, 5e-4), "cosine of the error", (-0.01, 0.01), role="amplitude"
-        ),
+        Parameter("kinematic_sin", "rad", Normal(0.0, 5e-4), "sine of the error", (-0.01, 0.01), role="amplitude"),
+        Parameter("kinematic_cos", "rad", Normal(0.0, 5e-4), "cosine of the error", (-0.01, 0.01), role="amplitude"),
         Parameter(
             "kinematic_order",
             "1",

@@ -34,15 +34,7 @@ LOAD_FRICTION = Effect(
     port=Port.JOINT_TORQUE,
     equation=torque,
     parameters=(
-        Parameter(
-            "load_share",
-            "1",
-            Normal(0.0, 0.05),
-            "friction over load",
-            (-1.0, 1.0),
-            role="amplitude",
-            dry=True,
-        ),
+        Parameter("load_share", "1", Normal(0.0, 0.05), "friction over load", (-1.0, 1.0), role="amplitude", dry=True),
         Parameter("load_rate", "rad/s", LogNormal(5e-4, 1.0), "rate of full friction", (1e-5, 1.0)),
         shared(FLEXSPLINE, "Ka"),
     ),

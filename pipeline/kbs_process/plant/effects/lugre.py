@@ -8,12 +8,7 @@ from kbs_process.plant.effect import Effect, LogNormal, Normal, Parameter, Port,
 
 
 def torque(
-    joint_rate: float,
-    bristle: float,
-    lugre: float,
-    lugre_displacement: float,
-    lugre_excess: float,
-    lugre_rate: float,
+    joint_rate: float, bristle: float, lugre: float, lugre_displacement: float, lugre_excess: float, lugre_rate: float
 ) -> tuple[float, float]:
     r"""Torque on the output, reacted by the body that carries the motor.
 
@@ -35,9 +30,7 @@ LUGRE = Effect(
     port=Port.JOINT_TORQUE,
     equation=torque,
     parameters=(
-        Parameter(
-            "lugre", "N m", Normal(0.0, 0.5), "Coulomb torque", (-100.0, 100.0), role="amplitude", dry=True
-        ),
+        Parameter("lugre", "N m", Normal(0.0, 0.5), "Coulomb torque", (-100.0, 100.0), role="amplitude", dry=True),
         Parameter(
             "lugre_displacement",
             "rad",

@@ -7,9 +7,7 @@ import math
 from kbs_process.plant.effect import Effect, LogNormal, Normal, Parameter, Port
 
 
-def torque(
-    joint_angle: float, shift_sin: float, shift_cos: float, shift_angle: float, shift_width: float
-) -> float:
+def torque(joint_angle: float, shift_sin: float, shift_cos: float, shift_angle: float, shift_width: float) -> float:
     r"""Moment of its weight about the joint's axis, on the output: the laboratory's gravity reacts it.
 
     Equation: $T = (a \sin\theta_l + b \cos\theta_l) (1 + \tanh((\theta_l - \theta_0) / w)) / 2$.
@@ -28,9 +26,7 @@ MASS_SHIFT = Effect(
     equation=torque,
     parameters=(
         Parameter("shift_sin", "N m", Normal(0.0, 0.5), "with its sine", (-100.0, 100.0), role="amplitude"),
-        Parameter(
-            "shift_cos", "N m", Normal(0.0, 0.5), "with the angle's cosine", (-100.0, 100.0), role="amplitude"
-        ),
+        Parameter("shift_cos", "N m", Normal(0.0, 0.5), "with the angle's cosine", (-100.0, 100.0), role="amplitude"),
         Parameter(
             "shift_angle",
             "rad",

@@ -36,12 +36,8 @@ MICROSTEP_ERROR = Effect(
     port=Port.MOTOR_TORQUE,
     equation=torque,
     parameters=(
-        Parameter(
-            "microstep_sin", "rad", Normal(0.0, 5e-4), "sine of the error", (-0.01, 0.01), role="amplitude"
-        ),
-        Parameter(
-            "microstep_cos", "rad", Normal(0.0, 5e-4), "cosine of the error", (-0.01, 0.01), role="amplitude"
-        ),
+        Parameter("microstep_sin", "rad", Normal(0.0, 5e-4), "sine of the error", (-0.01, 0.01), role="amplitude"),
+        Parameter("microstep_cos", "rad", Normal(0.0, 5e-4), "cosine of the error", (-0.01, 0.01), role="amplitude"),
         Parameter(
             "microstep_order",
             "1",

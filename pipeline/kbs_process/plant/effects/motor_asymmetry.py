@@ -25,22 +25,9 @@ MOTOR_ASYMMETRY = Effect(
     equation=torque,
     parameters=(
         Parameter(
-            "sense_level",
-            "N m",
-            Normal(0.0, 5e-3),
-            "of Coulomb friction",
-            (-1.0, 1.0),
-            role="amplitude",
-            dry=True,
+            "sense_level", "N m", Normal(0.0, 5e-3), "of Coulomb friction", (-1.0, 1.0), role="amplitude", dry=True
         ),
-        Parameter(
-            "sense_slope",
-            "N m s/rad",
-            Normal(0.0, 1e-3),
-            "of viscous friction",
-            (-0.1, 0.1),
-            role="amplitude",
-        ),
+        Parameter("sense_slope", "N m s/rad", Normal(0.0, 1e-3), "of viscous friction", (-0.1, 0.1), role="amplitude"),
         Parameter("sense_start", "rad/s", LogNormal(0.05, 0.5), "rate of full friction", (1e-4, 10.0)),
     ),
     reference="B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, A survey of models, analysis tools and "

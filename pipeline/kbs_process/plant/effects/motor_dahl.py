@@ -24,15 +24,7 @@ MOTOR_DAHL = Effect(
     port=Port.MOTOR_TORQUE,
     equation=torque,
     parameters=(
-        Parameter(
-            "presliding",
-            "N m",
-            Normal(0.0, 5e-3),
-            "friction torque",
-            (-10.0, 10.0),
-            role="amplitude",
-            dry=True,
-        ),
+        Parameter("presliding", "N m", Normal(0.0, 5e-3), "friction torque", (-10.0, 10.0), role="amplitude", dry=True),
         Parameter(
             "presliding_angle",
             "rad",

@@ -25,9 +25,7 @@ MOTOR_DRAG = Effect(
     port=Port.MOTOR_TORQUE,
     equation=torque,
     parameters=(
-        Parameter(
-            "churning", "N m", Normal(0.0, 5e-3), "at the rate of reference", (-1.0, 1.0), role="amplitude"
-        ),
+        Parameter("churning", "N m", Normal(0.0, 5e-3), "at the rate of reference", (-1.0, 1.0), role="amplitude"),
         Parameter("churning_power", "1", Normal(2.0, 0.5), "its power", (0.2, 5.0), grid=(0.5, 2.0, 3.0)),
         Parameter("churning_rate", "rad/s", LogNormal(1.0, 0.5), "rate of reference", (1e-3, 1e3)),
     ),

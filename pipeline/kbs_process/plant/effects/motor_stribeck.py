@@ -7,13 +7,7 @@ import math
 from kbs_process.plant.effect import Effect, LogNormal, Normal, Parameter, Port
 
 
-def torque(
-    rotor_rate: float,
-    sliding: float,
-    breakaway: float,
-    breakaway_rate: float,
-    breakaway_start: float,
-) -> float:
+def torque(rotor_rate: float, sliding: float, breakaway: float, breakaway_rate: float, breakaway_start: float) -> float:
     r"""Torque on the rotor beyond that of `dynamic_friction`, which begins at one rate of its own.
 
     Equation: $T = -(T_c + T_s e^{-(\omega_r/\omega_s)^2}) \tanh(\omega_r / \omega_0)$.
@@ -32,23 +26,9 @@ MOTOR_STRIBECK = Effect(
     port=Port.MOTOR_TORQUE,
     equation=torque,
     parameters=(
+        Parameter("sliding", "N m", Normal(0.0, 0.01), "excess at speed", (-1.0, 1.0), role="amplitude", dry=True),
         Parameter(
-            "sliding",
-            "N m",
-            Normal(0.0, 0.01),
-            "excess at speed",
-            (-1.0, 1.0),
-            role="amplitude",
-            dry=True,
-        ),
-        Parameter(
-            "breakaway",
-            "N m",
-            Normal(0.0, 0.01),
-            "excess at breakaway",
-            (-1.0, 1.0),
-            role="amplitude",
-            dry=True,
+            "breakaway", "N m", Normal(0.0, 0.01), "excess at breakaway", (-1.0, 1.0), role="amplitude", dry=True
         ),
         Parameter(
             "breakaway_rate",
@@ -59,12 +39,7 @@ MOTOR_STRIBECK = Effect(
             grid=(0.05, 0.15, 0.5, 1.5),
         ),
         Parameter(
-            "breakaway_start",
-            "rad/s",
-            LogNormal(0.02, 1.0),
-            "rate of full friction",
-            (1e-4, 10.0),
-            grid=(0.02, 0.1),
+            "breakaway_start", "rad/s", LogNormal(0.02, 1.0), "rate of full friction", (1e-4, 10.0), grid=(0.02, 0.1)
         ),
     ),
     reference="B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, A survey of models, analysis tools and "

@@ -23,9 +23,7 @@ STIFFNESS_HARDENING = Effect(
     port=Port.TRANSMISSION,
     equation=torque,
     parameters=(
-        Parameter(
-            "hardening", "N m/rad^3", Normal(0.0, 3e9), "cubic stiffness", (-1e12, 1e12), role="amplitude"
-        ),
+        Parameter("hardening", "N m/rad^3", Normal(0.0, 3e9), "cubic stiffness", (-1e12, 1e12), role="amplitude"),
     ),
     reference="H. D. Taghirad, P. R. Belanger, Modeling and parameter identification of harmonic drive systems, "
     "J. Dynamic Systems, Measurement, and Control 120 (1998) 439",

@@ -8,11 +8,7 @@ from kbs_process.plant.effect import Effect, LogNormal, Normal, Parameter, Port
 
 
 def torque(
-    joint_rate: float,
-    stribeck_level: float,
-    stribeck_excess: float,
-    stribeck_rate: float,
-    stribeck_start: float,
+    joint_rate: float, stribeck_level: float, stribeck_excess: float, stribeck_rate: float, stribeck_start: float
 ) -> float:
     r"""Torque on the output, reacted by the body that carries the motor.
 
@@ -33,13 +29,7 @@ STRIBECK = Effect(
     equation=torque,
     parameters=(
         Parameter(
-            "stribeck_level",
-            "N m",
-            Normal(0.0, 0.5),
-            "Coulomb torque",
-            (-100.0, 100.0),
-            role="amplitude",
-            dry=True,
+            "stribeck_level", "N m", Normal(0.0, 0.5), "Coulomb torque", (-100.0, 100.0), role="amplitude", dry=True
         ),
         Parameter(
             "stribeck_excess",

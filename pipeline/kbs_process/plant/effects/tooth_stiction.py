@@ -55,14 +55,7 @@ TOOTH_STICTION = Effect(
             bounds=(0.0, math.pi),
             grid=(0.25, 0.5, 1.0),
         ),
-        Parameter(
-            "phi_stat",
-            "rad",
-            Uniform(-math.pi, math.pi),
-            "its phase",
-            bounds=(-math.pi, math.pi),
-            grid=EIGHTHS,
-        ),
+        Parameter("phi_stat", "rad", Uniform(-math.pi, math.pi), "its phase", bounds=(-math.pi, math.pi), grid=EIGHTHS),
     ),
     reference="Measurement and prediction of the performance of a satellite based antenna pointing mechanism "
     "and controller, Trans. Built Environment 19 (1996), section 5",

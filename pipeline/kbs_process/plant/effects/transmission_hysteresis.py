@@ -26,13 +26,7 @@ TRANSMISSION_HYSTERESIS = Effect(
     equation=torque,
     parameters=(
         Parameter(
-            "windup_loss",
-            "N m",
-            Normal(0.0, 0.5),
-            "half height of the loop",
-            (-50.0, 50.0),
-            role="amplitude",
-            dry=True,
+            "windup_loss", "N m", Normal(0.0, 0.5), "half height of the loop", (-50.0, 50.0), role="amplitude", dry=True
         ),
         Parameter(
             "windup_memory",

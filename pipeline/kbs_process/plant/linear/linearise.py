@@ -107,9 +107,7 @@ def linearise(rig: Rig, effects: Sequence[Effect], q: Array) -> Linear:
         stiffness, damping, B[[out, rotor], index] = drive_slopes(joint.drive, effects)
         K[pair] += stiffness
         C[pair] += damping
-        grounded = ground_slopes(
-            joint.drive, effects, {"joint_angle": float(q[rig.joint_names.index(joint.name)])}
-        )
+        grounded = ground_slopes(joint.drive, effects, {"joint_angle": float(q[rig.joint_names.index(joint.name)])})
         for matrix, external, slope in zip((K, C), (gravity, drag), grounded, strict=True):
             inboard = [i for i in range(out) if joint.name in freedoms[i].carries]
             matrix[inboard, out] -= slope * np.array([freedoms[i].axis @ axis for i in inboard])
@@ -155,10 +153,7 @@ def drive_stiffness(drive: Drive, effects: Sequence[Effect], at: Mapping[str, fl
 
 
 def drive_damping(
-    drive: Drive,
-    effects: Sequence[Effect],
-    at: Mapping[str, float],
-    reach: Mapping[str, float] | None = None,
+    drive: Drive, effects: Sequence[Effect], at: Mapping[str, float], reach: Mapping[str, float] | None = None
 ) -> Array:
     """Return the damping (2, 2) of `drive_slopes` at all signals of the plant.
 
@@ -189,10 +184,7 @@ def _torques(drive: Drive, effects: Sequence[Effect]) -> Callable[[Mapping[str, 
 
 
 def _slope(
-    torques: Callable[[Mapping[str, float]], Array],
-    at: Mapping[str, float],
-    signal: str,
-    reach: float = _STEP,
+    torques: Callable[[Mapping[str, float]], Array], at: Mapping[str, float], signal: str, reach: float = _STEP
 ) -> Array:
     ends = [torques({**at, signal: at[signal] + step}) for step in (reach, -reach)]
     return np.asarray((ends[0] - ends[1]) / (2.0 * reach), dtype=np.float64)
@@ -292,16 +284,13 @@ def _add_force(
 
     def slope(signals: Sequence[str]) -> Array:
         ahead, behind = (
-            np.array([effect.value(rest | {name: rest[name] + step}) for name in signals])
-            for step in (_STEP, -_STEP)
+            np.array([effect.value(rest | {name: rest[name] + step}) for name in signals]) for step in (_STEP, -_STEP)
         )
         slopes: Array = (ahead - behind).T / (2.0 * _STEP)
         return slopes
 
     spin = np.stack([R_TL @ f.axis * (external.on in f.carries) for f in freedoms], axis=1)
-    arm = np.stack(
-        [R_TL @ np.cross(f.axis, point - f.point) * (external.on in f.carries) for f in freedoms], 1
-    )
+    arm = np.stack([R_TL @ np.cross(f.axis, point - f.point) * (external.on in f.carries) for f in freedoms], 1)
     on_plate = np.array([TRANSDUCER in f.carries for f in freedoms])
     count = len(freedoms)
     for matrix, out, change in zip(matrices, wrench, (slope("xyz"), slope(("vx", "vy", "vz"))), strict=True):

@@ -68,9 +68,7 @@ class ModalModel:
         """
         w, wk = 2.0 * np.pi * np.asarray(f, dtype=float)[:, None], 2.0 * np.pi * self.frequency
         answer = 1.0 / (wk**2 - w**2 + 2j * self.damping * wk * w)
-        H: npt.NDArray[np.complex128] = np.einsum(
-            "ik,nk,jk->nij", self.participation, answer * w**2, self.shape
-        )
+        H: npt.NDArray[np.complex128] = np.einsum("ik,nk,jk->nij", self.participation, answer * w**2, self.shape)
         H += np.einsum("ik,nk,jk->nij", self.gravity, answer, self.shape)
         H += np.eye(6)
         return H
@@ -103,13 +101,7 @@ _FIELDS = tuple(ModalModel.__dataclass_fields__)[1:]
 
 
 def derive(
-    rig: Rig,
-    effects: Sequence[Effect],
-    joint: str,
-    angles: Array,
-    q: Array,
-    *,
-    highest_Hz: float = HIGHEST_HZ,
+    rig: Rig, effects: Sequence[Effect], joint: str, angles: Array, q: Array, *, highest_Hz: float = HIGHEST_HZ
 ) -> ModalTable:
     """Derive the modal models from the plant itself at angles (p,) rad of `joint`, the others at q (joints,).
 
@@ -176,8 +168,7 @@ def tracked(models: Sequence[ModalModel]) -> tuple[ModalModel, ...]:
         sign = np.where(cosine[np.arange(len(order)), order] < 0.0, -1.0, 1.0)
         followed.append(
             ModalModel(
-                chosen.angle,
-                *(getattr(chosen, n) * (sign if getattr(chosen, n).ndim == 2 else 1.0) for n in _FIELDS),
+                chosen.angle, *(getattr(chosen, n) * (sign if getattr(chosen, n).ndim == 2 else 1.0) for n in _FIELDS)
             )
         )
     return tuple(followed)

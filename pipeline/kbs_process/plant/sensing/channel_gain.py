@@ -22,8 +22,6 @@ CHANNEL_GAIN = Sensing(
     name="channel_gain",
     port=SensingPort.CHANNEL,
     equation=change,
-    parameters=(
-        Parameter("gain", "1", Normal(0.0, 0.01), "error of the sensitivity", (-1.0, 1.0), role="amplitude"),
-    ),
+    parameters=(Parameter("gain", "1", Normal(0.0, 0.01), "error of the sensitivity", (-1.0, 1.0), role="amplitude"),),
     reference="VDI/VDE 2638, Characteristics of force transducers (2008)",
 )

@@ -31,16 +31,9 @@ CHANNEL_LAG = Sensing(
     port=SensingPort.CHANNEL,
     equation=change,
     parameters=(
+        Parameter("lag_share", "1", Normal(0.0, 0.5), "share that follows late", (-10.0, 10.0), role="amplitude"),
         Parameter(
-            "lag_share", "1", Normal(0.0, 0.5), "share that follows late", (-10.0, 10.0), role="amplitude"
-        ),
-        Parameter(
-            "lag_time",
-            "s",
-            LogNormal(0.1, 1.5),
-            "time constant",
-            (1e-4, 1e5),
-            grid=(0.02, 0.1, 0.5, 2.0, 10.0, 50.0),
+            "lag_time", "s", LogNormal(0.1, 1.5), "time constant", (1e-4, 1e5), grid=(0.02, 0.1, 0.5, 2.0, 10.0, 50.0)
         ),
     ),
     reference="VDI/VDE 2638, Characteristics of force transducers (2008)",

@@ -46,23 +46,9 @@ CHANNEL_NONLINEARITY = Sensing(
     parameters=(
         *(_of_order(n) for n in range(1, _ORDERS + 1)),
         Parameter(
-            "bend_middle",
-            "1",
-            Normal(0.0, 1e3),
-            "middle of the range",
-            (-1e6, 1e6),
-            grid=(0.5,),
-            over="reading",
+            "bend_middle", "1", Normal(0.0, 1e3), "middle of the range", (-1e6, 1e6), grid=(0.5,), over="reading"
         ),
-        Parameter(
-            "bend_range",
-            "1",
-            LogNormal(10.0, 2.0),
-            "half of it",
-            (1e-9, 1e6),
-            grid=(0.5,),
-            over="reading.span",
-        ),
+        Parameter("bend_range", "1", LogNormal(10.0, 2.0), "half of it", (1e-9, 1e6), grid=(0.5,), over="reading.span"),
     ),
     reference="VDI/VDE 2638, Characteristics of force transducers (2008)",
     whole_band=True,

@@ -26,14 +26,7 @@ CHANNEL_STEP = Sensing(
     port=SensingPort.CHANNEL,
     equation=change,
     parameters=(
-        Parameter(
-            "jump",
-            "1",
-            Normal(0.0, 0.5),
-            "of the error, in the channel's unit",
-            (-1e3, 1e3),
-            role="amplitude",
-        ),
+        Parameter("jump", "1", Normal(0.0, 0.5), "of the error, in the channel's unit", (-1e3, 1e3), role="amplitude"),
         Parameter(
             "jump_load",
             "1",

@@ -25,9 +25,7 @@ CLOCK_OFFSET = Sensing(
     port=SensingPort.STREAM,
     equation=lateness,
     parameters=(
-        Parameter(
-            "late", "s", Normal(0.0, 0.01), "by which its stamps are late", (-10.0, 10.0), role="amplitude"
-        ),
+        Parameter("late", "s", Normal(0.0, 0.01), "by which its stamps are late", (-10.0, 10.0), role="amplitude"),
     ),
     reference="D. W. Allan, N. Ashby, C. C. Hodge, The science of timekeeping, Hewlett-Packard AN 1289 (1997)",
 )

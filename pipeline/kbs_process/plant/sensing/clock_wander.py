@@ -26,9 +26,7 @@ CLOCK_WANDER = Sensing(
     port=SensingPort.STREAM,
     equation=lateness,
     parameters=(
-        Parameter(
-            "wander_sin", "s", Normal(0.0, 0.02), "sine of the deviation", (-10.0, 10.0), role="amplitude"
-        ),
+        Parameter("wander_sin", "s", Normal(0.0, 0.02), "sine of the deviation", (-10.0, 10.0), role="amplitude"),
         Parameter("wander_cos", "s", Normal(0.0, 0.02), "its cosine", (-10.0, 10.0), role="amplitude"),
         Parameter(
             "wander_period",

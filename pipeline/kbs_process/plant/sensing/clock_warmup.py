@@ -25,14 +25,7 @@ CLOCK_WARMUP = Sensing(
     port=SensingPort.STREAM,
     equation=lateness,
     parameters=(
-        Parameter(
-            "cold_skew",
-            "1",
-            Normal(0.0, 1e-4),
-            "rate of the cold clock, less 1",
-            (-0.1, 0.1),
-            role="amplitude",
-        ),
+        Parameter("cold_skew", "1", Normal(0.0, 1e-4), "rate of the cold clock, less 1", (-0.1, 0.1), role="amplitude"),
         Parameter(
             "cold_time",
             "s",

@@ -24,12 +24,7 @@ CROSS_COUPLING = Sensing(
     equation=change,
     parameters=(
         Parameter(
-            "coupling",
-            "SI by channel pair",
-            Normal(0.0, 0.02),
-            "entry of the matrix",
-            (-10.0, 10.0),
-            role="amplitude",
+            "coupling", "SI by channel pair", Normal(0.0, 0.02), "entry of the matrix", (-10.0, 10.0), role="amplitude"
         ),
     ),
     reference="VDI/VDE 2638, Characteristics of force transducers (2008)",

@@ -28,14 +28,7 @@ DRIFT_EXPONENTIAL = Sensing(
     port=SensingPort.CHANNEL,
     equation=change,
     parameters=(
-        Parameter(
-            "creep",
-            "1",
-            Normal(0.0, 1.0),
-            "at time zero, in the channel's unit",
-            (-1e4, 1e4),
-            role="amplitude",
-        ),
+        Parameter("creep", "1", Normal(0.0, 1.0), "at time zero, in the channel's unit", (-1e4, 1e4), role="amplitude"),
         Parameter(
             "creep_slow",
             "1",
@@ -44,14 +37,7 @@ DRIFT_EXPONENTIAL = Sensing(
             (-1e4, 1e4),
             role="amplitude",
         ),
-        Parameter(
-            "creep_time",
-            "s",
-            LogNormal(60.0, 1.0),
-            "time constant",
-            (0.1, 1e6),
-            grid=(5.0, 15.0, 50.0, 150.0),
-        ),
+        Parameter("creep_time", "s", LogNormal(60.0, 1.0), "time constant", (0.1, 1e6), grid=(5.0, 15.0, 50.0, 150.0)),
     ),
     reference="VDI/VDE 2638, Characteristics of force transducers (2008)",
     each_trial=True,

@@ -23,9 +23,7 @@ DRIFT_LINEAR = Sensing(
     port=SensingPort.CHANNEL,
     equation=change,
     parameters=(
-        Parameter(
-            "drift", "1/s", Normal(0.0, 1e-3), "in the channel's unit", (-10.0, 10.0), role="amplitude"
-        ),
+        Parameter("drift", "1/s", Normal(0.0, 1e-3), "in the channel's unit", (-10.0, 10.0), role="amplitude"),
     ),
     reference="VDI/VDE 2638, Characteristics of force transducers (2008)",
     each_trial=True,

@@ -25,12 +25,7 @@ DRIFT_TEMPERATURE = Sensing(
     equation=change,
     parameters=(
         Parameter(
-            "thermal",
-            "1/K",
-            Normal(0.0, 0.05),
-            "for 1 degC, in the channel's unit",
-            (-1e3, 1e3),
-            role="amplitude",
+            "thermal", "1/K", Normal(0.0, 0.05), "for 1 degC, in the channel's unit", (-1e3, 1e3), role="amplitude"
         ),
     ),
     reference="VDI/VDE 2638, Characteristics of force transducers (2008)",

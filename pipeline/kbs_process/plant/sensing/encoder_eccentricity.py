@@ -19,9 +19,7 @@ def change(reading: Array, eccentric_sin: float, eccentric_cos: float, eccentric
     Source: L. M. Sanchez-Brea, T. Morlanes, Metrological errors in optical encoders, Measurement Science and
         Technology 19 (2008) 115104.
     """
-    return eccentric_sin * np.sin(eccentric_order * reading) + eccentric_cos * np.cos(
-        eccentric_order * reading
-    )
+    return eccentric_sin * np.sin(eccentric_order * reading) + eccentric_cos * np.cos(eccentric_order * reading)
 
 
 ENCODER_ECCENTRICITY = Sensing(
@@ -29,15 +27,9 @@ ENCODER_ECCENTRICITY = Sensing(
     port=SensingPort.ENCODER,
     equation=change,
     parameters=(
-        Parameter(
-            "eccentric_sin", "rad", Normal(0.0, 2e-4), "sine of the error", (-0.1, 0.1), role="amplitude"
-        ),
-        Parameter(
-            "eccentric_cos", "rad", Normal(0.0, 2e-4), "cosine of the error", (-0.1, 0.1), role="amplitude"
-        ),
-        Parameter(
-            "eccentric_order", "1", Normal(1.0, 1.0), "periods in a turn", (0.0, 1e5), grid=(1.0, 2.0, 4.0)
-        ),
+        Parameter("eccentric_sin", "rad", Normal(0.0, 2e-4), "sine of the error", (-0.1, 0.1), role="amplitude"),
+        Parameter("eccentric_cos", "rad", Normal(0.0, 2e-4), "cosine of the error", (-0.1, 0.1), role="amplitude"),
+        Parameter("eccentric_order", "1", Normal(1.0, 1.0), "periods in a turn", (0.0, 1e5), grid=(1.0, 2.0, 4.0)),
     ),
     reference="L. M. Sanchez-Brea, T. Morlanes, Metrological errors in optical encoders, Measurement Science and "
     "Technology 19 (2008) 115104",

@@ -33,9 +33,7 @@ ENCODER_INTERPOLATION = Sensing(
     equation=change,
     parameters=(
         Parameter("interpolation_sin", "rad", _AMPLITUDE, "sine of the error", (-0.1, 0.1), role="amplitude"),
-        Parameter(
-            "interpolation_cos", "rad", _AMPLITUDE, "cosine of the error", (-0.1, 0.1), role="amplitude"
-        ),
+        Parameter("interpolation_cos", "rad", _AMPLITUDE, "cosine of the error", (-0.1, 0.1), role="amplitude"),
         Parameter(
             "interpolation_bits",
             "1",

@@ -55,12 +55,7 @@ def change(
 
 def _at_node(k: int) -> Parameter:
     return Parameter(
-        f"profile_{k}",
-        "rad",
-        Normal(0.0, 2e-4),
-        f"about the error at node {k}",
-        (-0.1, 0.1),
-        role="amplitude",
+        f"profile_{k}", "rad", Normal(0.0, 2e-4), f"about the error at node {k}", (-0.1, 0.1), role="amplitude"
     )
 
 

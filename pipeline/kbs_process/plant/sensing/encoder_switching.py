@@ -28,12 +28,7 @@ ENCODER_SWITCHING = Sensing(
     equation=change,
     parameters=(
         Parameter(
-            "switching",
-            "rad",
-            Normal(0.0, 2e-4),
-            "half the error of the bit's weight",
-            (-0.1, 0.1),
-            role="amplitude",
+            "switching", "rad", Normal(0.0, 2e-4), "half the error of the bit's weight", (-0.1, 0.1), role="amplitude"
         ),
         Parameter(
             "switching_bit",

@@ -26,24 +26,10 @@ MAINS = Sensing(
     port=SensingPort.CHANNEL,
     equation=change,
     parameters=(
+        Parameter("mains_sin", "1", Normal(0.0, 0.05), "sine, in the channel's unit", (-1e3, 1e3), role="amplitude"),
+        Parameter("mains_cos", "1", Normal(0.0, 0.05), "cosine, in the channel's unit", (-1e3, 1e3), role="amplitude"),
         Parameter(
-            "mains_sin", "1", Normal(0.0, 0.05), "sine, in the channel's unit", (-1e3, 1e3), role="amplitude"
-        ),
-        Parameter(
-            "mains_cos",
-            "1",
-            Normal(0.0, 0.05),
-            "cosine, in the channel's unit",
-            (-1e3, 1e3),
-            role="amplitude",
-        ),
-        Parameter(
-            "mains_frequency",
-            "Hz",
-            LogNormal(1.0, 2.0),
-            "of the tone in the band",
-            (1e-3, 1e4),
-            over="spectrum",
+            "mains_frequency", "Hz", LogNormal(1.0, 2.0), "of the tone in the band", (1e-3, 1e4), over="spectrum"
         ),
     ),
     reference="H. W. Ott, Electromagnetic Compatibility Engineering (2009), chapter 2",

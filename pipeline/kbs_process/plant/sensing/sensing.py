@@ -62,9 +62,7 @@ class Sensing:
         if not self.name.isidentifier():
             raise TypeError(f"{where}: the name is not an identifier")
         if unknown := set(self.arguments) - known - own:
-            raise TypeError(
-                f"{where}: {sorted(unknown)} is neither a signal ({', '.join(known)}) nor declared"
-            )
+            raise TypeError(f"{where}: {sorted(unknown)} is neither a signal ({', '.join(known)}) nor declared")
         if unused := own - set(self.arguments):
             raise TypeError(f"{where}: {sorted(unused)} is declared, but not an argument of the equation")
         hints = get_type_hints(self.equation)

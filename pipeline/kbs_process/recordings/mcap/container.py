@@ -55,9 +55,7 @@ class Container:
         self._crc: int | None = crc32(mcap.MAGIC)  # of all before the buffer; None where some was skipped
         self._loose = False  # the file has messages outside chunks
 
-    def lose(
-        self, kind: str, detail: str, *, count: int = 1, start: int | None = None, end: int | None = None
-    ) -> None:
+    def lose(self, kind: str, detail: str, *, count: int = 1, start: int | None = None, end: int | None = None) -> None:
         """Note a loss; `start` and `end` are log times in ns."""
         self.losses.append(Loss(kind, self.path.name, count, self.seconds(start), self.seconds(end), detail))
 
@@ -246,11 +244,7 @@ class Container:
         self._crc = None
         for place in self._candidates(file, broken + 1):
             if self._consistent(file, place):
-                self.lose(
-                    "undecodable",
-                    f"{place - broken} bytes from byte {broken} are no records",
-                    start=self._last,
-                )
+                self.lose("undecodable", f"{place - broken} bytes from byte {broken} are no records", start=self._last)
                 self._seek(file, place)
                 return
         self._truncated(broken, head)
@@ -298,6 +292,4 @@ class Container:
         end = None
         if len(head) >= mcap.RECORD_HEAD.size + mcap.CHUNK_HEAD.size and head[0] == mcap.CHUNK_OP:
             end = mcap.CHUNK_HEAD.unpack_from(head, mcap.RECORD_HEAD.size)[1]
-        self.lose(
-            TRUNCATED, f"{self.size - at} bytes unread; the file was not closed", start=self._last, end=end
-        )
+        self.lose(TRUNCATED, f"{self.size - at} bytes unread; the file was not closed", start=self._last, end=end)

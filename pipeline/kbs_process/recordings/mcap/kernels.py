@@ -79,9 +79,7 @@ def walk(buffer: Bytes, stop: np.uint64, chunk: bool) -> Words:
     count = 0
     at = U(0)
     whole = (
-        min(stop, U(len(buffer)) - U(RECORD_HEAD + MESSAGE_HEAD))
-        if len(buffer) > RECORD_HEAD + MESSAGE_HEAD
-        else U(0)
+        min(stop, U(len(buffer)) - U(RECORD_HEAD + MESSAGE_HEAD)) if len(buffer) > RECORD_HEAD + MESSAGE_HEAD else U(0)
     )
     while at + U(RECORD_HEAD) <= stop:
         opcode = U(buffer[at])
@@ -245,9 +243,7 @@ def decode(
             for c in range(2):
                 time = time * 1_000_000_000
                 if clocks[found, c, 2] != ZERO:
-                    part = _load(
-                        buffer, at[i] + clocks[found, c, 0], clocks[found, c, 1], clocks[found, c, 2]
-                    )
+                    part = _load(buffer, at[i] + clocks[found, c, 0], clocks[found, c, 1], clocks[found, c, 2])
                     time += _signed(part, clocks[found, c, 1], clocks[found, c, 2])
             stamp[i] = time
         if plain[found]:

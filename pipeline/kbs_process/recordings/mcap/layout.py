@@ -15,16 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kbs_process.recordings.mcap.framing import MalformedError
-from kbs_process.recordings.mcap.kernels import (
-    FLOAT64,
-    LITTLE,
-    MISSING,
-    UNSIGNED,
-    ZERO,
-    Bytes,
-    Words,
-    decode,
-)
+from kbs_process.recordings.mcap.kernels import FLOAT64, LITTLE, MISSING, UNSIGNED, ZERO, Bytes, Words, decode
 from kbs_process.signals.records import Array, Mask, Stamps
 
 KNOWN_LAYOUTS = 32  # kept for a stream

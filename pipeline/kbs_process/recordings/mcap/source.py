@@ -131,9 +131,7 @@ class Source:
                     topic = channels[number].topic
                     texts = list(islice(payloads(segment.buffer, table[AT], table[SIZE]), SAMPLES))
                     try:
-                        found[topic] = Sample(
-                            type_of(segment.dictionary, number, iter(texts), topic), texts[0]
-                        )
+                        found[topic] = Sample(type_of(segment.dictionary, number, iter(texts), topic), texts[0])
                     except RecordingError as error:
                         found[topic] = error.what
             if wanted <= found.keys():
@@ -159,9 +157,7 @@ class Source:
                 remedy = did_you_mean(stream.topic, topics)
                 if topics and not remedy.startswith("known"):
                     remedy += f" (known: {', '.join(topics)})"
-                raise RecordingError(
-                    f"there is no topic '{stream.topic}'", where=str(self.path), remedy=remedy
-                )
+                raise RecordingError(f"there is no topic '{stream.topic}'", where=str(self.path), remedy=remedy)
 
     def _conclude(self, container: Container, counter: Counter) -> None:
         """Note what only shows at the end of a pass."""
@@ -178,9 +174,7 @@ class Source:
         found = counter.found()
         unknown = sum(count for number, count in found.items() if number not in container.dictionary.channels)
         if unknown:
-            container.lose(
-                "undecodable", "messages of channels that the file does not describe", count=unknown
-            )
+            container.lose("undecodable", "messages of channels that the file does not describe", count=unknown)
         promised = self._summary.counts if self._summary is not None and self._summary.counts else {}
         for number, count in promised.items():
             if found.get(number, 0) < count and number in container.dictionary.channels:
@@ -196,9 +190,7 @@ def _topics(dictionary: mcap.Dictionary, counts: dict[int, int] | None) -> tuple
         before = found.get(channel.topic)
         if before is not None and before.count is not None and count is not None:
             count += before.count
-        found[channel.topic] = TopicSummary(
-            channel.topic, dictionary.schema_of(channel).name, channel.encoding, count
-        )
+        found[channel.topic] = TopicSummary(channel.topic, dictionary.schema_of(channel).name, channel.encoding, count)
     return tuple(found[topic] for topic in sorted(found))
 
 

@@ -14,13 +14,7 @@ from mcap.writer import CompressionType, Writer
 
 from kbs_process.errors import OutputError
 from kbs_process.recordings.mcap.messages.encoding import OutStream, payloads
-from kbs_process.recordings.mcap.messages.schemas import (
-    TYPES,
-    json_schema,
-    protobuf_name,
-    protobuf_schema,
-    ros2_schema,
-)
+from kbs_process.recordings.mcap.messages.schemas import TYPES, json_schema, protobuf_name, protobuf_schema, ros2_schema
 from kbs_process.recordings.mcap.source import open_recording
 from kbs_process.recordings.mcap.streams import Stream
 from kbs_process.signals.records import Block
@@ -79,9 +73,7 @@ class _Digest:
 
 def _head(stream: OutStream) -> OutStream:
     """Return the stream without its messages."""
-    return replace(
-        stream, stamp=stream.stamp[:0].copy(), log=stream.log[:0].copy(), values=stream.values[:0].copy()
-    )
+    return replace(stream, stamp=stream.stamp[:0].copy(), log=stream.log[:0].copy(), values=stream.values[:0].copy())
 
 
 class _Topic:
@@ -176,9 +168,7 @@ def _register(writer: Writer, stream: OutStream) -> int:
         schema = writer.register_schema(TYPES[kind], "jsonschema", json_schema(kind))
     else:
         schema = writer.register_schema(protobuf_name(kind), "protobuf", protobuf_schema())
-    return writer.register_channel(
-        stream.topic, "cdr" if stream.encoding == "ros2" else stream.encoding, schema
-    )
+    return writer.register_channel(stream.topic, "cdr" if stream.encoding == "ros2" else stream.encoding, schema)
 
 
 def _verify(path: Path, topics: Sequence[_Topic]) -> None:

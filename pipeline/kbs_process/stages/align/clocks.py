@@ -135,12 +135,7 @@ def align(streams: dict[str, ClockData], reference: str) -> dict[str, Clock]:
     base = streams[reference]
     clocks = {
         reference: Clock(
-            0.0,
-            0.0,
-            0.0,
-            0.0,
-            base.line.latency if base.line else float("nan"),
-            _own_source(base, "reference"),
+            0.0, 0.0, 0.0, 0.0, base.line.latency if base.line else float("nan"), _own_source(base, "reference")
         )
     }
     for key, data in streams.items():
@@ -165,9 +160,7 @@ def _place(data: ClockData, streams: dict[str, ClockData], clocks: dict[str, Clo
         logged = data.by_recorder != base.by_recorder
         begins = (data.first_log, base.first_log) if logged else (data.first_stamp, base.first_stamp)
         start = (begins[0] - begins[1]) * 1e-9
-        return Clock(
-            start, 0.0, float("nan"), float("nan"), float("nan"), _own_source(data, "not comparable")
-        )
+        return Clock(start, 0.0, float("nan"), float("nan"), float("nan"), _own_source(data, "not comparable"))
     fitted = _against(data, data.line, base, base.line, _own_source(data, "fitted"))
     for key, clock in clocks.items():
         other = streams[key]

@@ -130,9 +130,7 @@ def condense(
         command=events.get("command"),
         field=events.get("field"),
         temperature=_temperature(events["temperature"], dt, count) if "temperature" in events else None,
-        encoder=Events(_on_axis(encoder[0], clocks["angle"]), encoder[1], channels["angle"])
-        if encoder
-        else None,
+        encoder=Events(_on_axis(encoder[0], clocks["angle"]), encoder[1], channels["angle"]) if encoder else None,
         spectrum=loaded.welch.result() if loaded and loaded.welch else None,
         envelope=_envelope(loaded) if loaded else None,
         epoch_ns=present[reference].first_stamp,
@@ -146,11 +144,7 @@ def condense(
 
 
 def _losses(lines: dict[str, Timeline], clocks: dict[str, Clock]) -> list[Loss]:
-    return [
-        loss
-        for key, line in lines.items()
-        for loss in line.losses(clocks[key].offset_s, 1.0 + clocks[key].skew)
-    ]
+    return [loss for key, line in lines.items() for loss in line.losses(clocks[key].offset_s, 1.0 + clocks[key].skew)]
 
 
 def _missing(line: Timeline) -> Loss:
@@ -226,12 +220,7 @@ def _on_axis(own: Array, clock: Clock) -> Array:
 
 
 def _signal(
-    kept: Kept,
-    columns: tuple[str, ...],
-    meaning: tuple[tuple[str, ...], str],
-    clock: Clock,
-    dt: float,
-    count: int,
+    kept: Kept, columns: tuple[str, ...], meaning: tuple[tuple[str, ...], str], clock: Clock, dt: float, count: int
 ) -> Signal:
     t = dt * np.arange(count, dtype=np.float64)
     values, doubt = kept.at((t - clock.offset_s) / (1.0 + clock.skew))
@@ -239,9 +228,7 @@ def _signal(
     return Signal(0.0, dt, values, columns, units, frame, doubt <= DOUBT, (_story(kept, clock, dt),))
 
 
-def _meaning(
-    key: str, columns: tuple[str, ...], units: tuple[str, ...] | None
-) -> tuple[tuple[str, ...], str]:
+def _meaning(key: str, columns: tuple[str, ...], units: tuple[str, ...] | None) -> tuple[tuple[str, ...], str]:
     """Units and frame of a stream."""
     if key == "wrench":
         return tuple(WRENCH_UNITS[WRENCH_CHANNELS.index(channel)] for channel in columns), "T"

@@ -133,9 +133,7 @@ class Regridder:
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _interpolate(
-    u: Array, x: Array, gap: Mask, first: int, on_grid: float, rows: Array, invented: Mask
-) -> None:
+def _interpolate(u: Array, x: Array, gap: Mask, first: int, on_grid: float, rows: Array, invented: Mask) -> None:
     last = len(u) - 1
     weight = np.empty(6)
     i = 0

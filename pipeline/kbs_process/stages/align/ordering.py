@@ -75,9 +75,7 @@ def judge(block: Block) -> ClockSense:
     if len(block) < 2:
         return ClockSense(stamp=bool(block.stamp.any()), log=False)
     half = len(block) // 2
-    stamp = float(
-        np.median(block.stamp[half:] - block.stamp[0]) - np.median(block.stamp[:half] - block.stamp[0])
-    )
+    stamp = float(np.median(block.stamp[half:] - block.stamp[0]) - np.median(block.stamp[:half] - block.stamp[0]))
     log = float(np.median(block.log[half:] - block.log[0]) - np.median(block.log[:half] - block.log[0]))
     if stamp <= 0.0:
         return ClockSense(stamp=False, log=log > 0.0)

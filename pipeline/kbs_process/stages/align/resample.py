@@ -176,9 +176,7 @@ class Decimator:
         if count:
             self._rows.append(_every(x[:-1], taps, factor, count))
             doubtful = self._doubtful
-            self._weights.append(
-                _every(x[-1:], np.abs(taps), factor, count)[0] if doubtful else np.zeros(count)
-            )
+            self._weights.append(_every(x[-1:], np.abs(taps), factor, count)[0] if doubtful else np.zeros(count))
         self._held = end - count * factor
         x[:, : self._held] = x[:, count * factor : end].copy()
         self._doubtful = self._doubtful and bool(x[-1, : self._held].any())

@@ -66,9 +66,7 @@ class Welch:
         self._f: Array = f[f <= self._limit]
         self._window: Array = get_window("hann", length)
         one_sided = np.where((self._f > 0.0) & (self._f < 0.5 * self._rate), 2.0, 1.0)
-        self._scale: Array = np.asarray(
-            one_sided / (self._rate * float(self._window @ self._window)), dtype=np.float64
-        )
+        self._scale: Array = np.asarray(one_sided / (self._rate * float(self._window @ self._window)), dtype=np.float64)
         self._sum = np.zeros((len(self._f), len(self._channels), len(self._channels)), dtype=np.complex128)
 
     def _add(self, rows: Array, flags: Mask) -> None:

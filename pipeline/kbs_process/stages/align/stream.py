@@ -48,9 +48,7 @@ class Timeline:
     _floor: LatencyFloor | None = None
     _first: int = 0
     _last: int = 0
-    _near: Stamps = field(
-        default_factory=lambda: np.empty(0, dtype=np.int64)
-    )  # of steps that are not judged yet
+    _near: Stamps = field(default_factory=lambda: np.empty(0, dtype=np.int64))  # of steps that are not judged yet
     _judged: int = 0  # steps between these that are
 
     def push(self, chunk: Block) -> list[Block]:

@@ -29,8 +29,7 @@ def entries(motion: Motion, static: Static, model: GravityModel, band: Filter) -
     """
     in_motion = moving(motion)
     shapes = [
-        static.wrench.derive(shape, "error of the gravity model")
-        for shape in _shapes(motion, model, static.taring)
+        static.wrench.derive(shape, "error of the gravity model") for shape in _shapes(motion, model, static.taring)
     ]
     parameters = from_shapes("gravity", "covariance of the fitted parameters", shapes, band, in_motion)
     constant = np.broadcast_to(static.taring.noise, static.wrench.values.shape)
@@ -42,9 +41,7 @@ def entries(motion: Motion, static: Static, model: GravityModel, band: Filter) -
     )
     slope = _slope(motion, model)
     rounding = [
-        static.wrench.derive(
-            slope[:, :, joint] * history[:, None] / np.sqrt(len(motion.rounding)), "rounding"
-        )
+        static.wrench.derive(slope[:, :, joint] * history[:, None] / np.sqrt(len(motion.rounding)), "rounding")
         for phase in motion.rounding
         for joint, history in enumerate(phase.T)
     ]

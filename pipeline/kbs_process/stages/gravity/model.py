@@ -22,14 +22,7 @@ from kbs_process.rig.model import Rig
 from kbs_process.signals.records import Array, Signal
 from kbs_process.stages.gravity.equation import Equation, Prepared, at_rest, prepare
 from kbs_process.stages.gravity.parameters import Index
-from kbs_process.stages.gravity.solve import (
-    first_sigma,
-    least_sigma,
-    refuse_uninformed,
-    residual_sigma,
-    solve,
-    zeros,
-)
+from kbs_process.stages.gravity.solve import first_sigma, least_sigma, refuse_uninformed, residual_sigma, solve, zeros
 from kbs_process.stages.gravity.taring import Taring, estimate, of_fit
 from kbs_process.stages.motion import Motion
 
@@ -117,11 +110,7 @@ class Static:
 
 
 def fit(
-    samples: Sequence[Sample],
-    rig: Rig,
-    *,
-    include_inertia: bool,
-    settings: GravitySettings = GravitySettings(),
+    samples: Sequence[Sample], rig: Rig, *, include_inertia: bool, settings: GravitySettings = GravitySettings()
 ) -> GravityModel:
     """Fit the model to all samples, calibrations first.
 
@@ -152,8 +141,7 @@ def fit(
     refuse_uninformed(equation, data, sigmas, theta)
     biases = zeros(equation, result, len(data))[:, 0]
     taring = {
-        p.name: of_fit(equation, theta, p, bias, sigma)
-        for p, bias, sigma in zip(data, biases, weighed, strict=True)
+        p.name: of_fit(equation, theta, p, bias, sigma) for p, bias, sigma in zip(data, biases, weighed, strict=True)
     }
     return GravityModel(
         rig=equation.rig_at(theta, result.sigma[: equation.size]),
@@ -172,11 +160,7 @@ def fit(
 
 
 def _spread(
-    samples: Sequence[Sample],
-    equation: Equation,
-    settings: GravitySettings,
-    theta: Array,
-    biases: Sequence[Array],
+    samples: Sequence[Sample], equation: Equation, settings: GravitySettings, theta: Array, biases: Sequence[Array]
 ) -> Array:
     """Rms (c,) of what the model leaves of all samples below `taring_Hz`, each weighing the same."""
     powers = []
@@ -296,8 +280,7 @@ def _from_motion(motion: Motion, equation: Equation) -> Prepared:
 def _refuse_no_motion(samples: Sequence[Sample], rig: Rig) -> None:
     if not samples:
         raise FitError(
-            "no recording to fit gravity to",
-            remedy="give a recording the role 'calibration' or 'fit' in campaign.toml",
+            "no recording to fit gravity to", remedy="give a recording the role 'calibration' or 'fit' in campaign.toml"
         )
     for sample in samples:
         noise = _STILL * np.maximum(sample.motion.sigma_q.max(axis=0), 1e-6)

@@ -11,9 +11,7 @@ from kbs_process.signals.records import Array
 from kbs_process.stages.gravity.model import GravityModel, Sample, error_of, prepared
 from kbs_process.stages.gravity.taring import Taring
 
-_FACTOR = (
-    3.0  # what one sound recording leaves differs from another's by half, through drift and disturbances
-)
+_FACTOR = 3.0  # what one sound recording leaves differs from another's by half, through drift and disturbances
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,9 +44,7 @@ class Misfit:
     channel: str
     unit: str
     left: float  # N or N m
-    explained: (
-        float  # by the model's and the angles' uncertainty, and by what pseudo-static recordings have left
-    )
+    explained: float  # by the model's and the angles' uncertainty, and by what pseudo-static recordings have left
 
     @property
     def ratio(self) -> float:
@@ -60,9 +56,7 @@ class Misfit:
         return self.ratio < _FACTOR
 
 
-def misfits(
-    sample: Sample, model: GravityModel, taring: Taring, others: Array | float = 0.0
-) -> tuple[Misfit, ...]:
+def misfits(sample: Sample, model: GravityModel, taring: Taring, others: Array | float = 0.0) -> tuple[Misfit, ...]:
     """Compare what the model leaves of a recording with what its uncertainty lets it leave, channel by channel.
 
     `others` (c,) is the rms of what else the recording may err by.

@@ -28,11 +28,7 @@ _TERMS = len(_ZERO)
 
 
 def solve(
-    equation: Equation,
-    prepared: Sequence[Prepared],
-    sigmas: Sequence[Array],
-    theta: Array,
-    low_pass_Hz: float,
+    equation: Equation, prepared: Sequence[Prepared], sigmas: Sequence[Array], theta: Array, low_pass_Hz: float
 ) -> Fit:
     c, size = len(equation.channels), equation.size
     loose = _loose(equation)
@@ -68,9 +64,7 @@ def solve(
         noise = flicker_scores(r, J, series, intervals, low_pass_Hz)
         return noise + rounding_scores(equation, theta, prepared, sigmas, J)
 
-    names = tuple(
-        f"{term}[{p.name}].{equation.channels[index]}" for p in prepared for term in _ZERO for index in loose
-    )
+    names = tuple(f"{term}[{p.name}].{equation.channels[index]}" for p in prepared for term in _ZERO for index in loose)
     parameters = Parameters(
         names=equation.names + names,
         value=np.concatenate([equation.start(), np.zeros(len(names))]),
@@ -82,12 +76,7 @@ def solve(
         for p, basis in zip(prepared, bases, strict=True)
     ]
     return fit_map(
-        residual,
-        parameters,
-        jacobian=jacobian,
-        series=series,
-        scores=scores,
-        start=np.concatenate([theta, *first]),
+        residual, parameters, jacobian=jacobian, series=series, scores=scores, start=np.concatenate([theta, *first])
     )
 
 
@@ -147,9 +136,7 @@ def least_sigma(p: Prepared, rig: Rig) -> Array:
     return floor
 
 
-def refuse_uninformed(
-    equation: Equation, prepared: Sequence[Prepared], sigmas: Sequence[Array], theta: Array
-) -> None:
+def refuse_uninformed(equation: Equation, prepared: Sequence[Prepared], sigmas: Sequence[Array], theta: Array) -> None:
     """Refuse data whose strongest message about the rig, zero and drift aside, is weaker than the prior."""
     if equation.size == 0:
         return  # the files know the rig exactly

@@ -132,18 +132,14 @@ def open_mdf(path: Path) -> Iterator[Series]:
             if index == master or not rows:
                 continue
             name = channel.name if len(file.channels_db[channel.name]) == 1 else f"{number}/{channel.name}"
-            yield Series(
-                Column(name, str(channel.unit or ""), clock), rows, _mdf_data(file, number, index, rows)
-            )
+            yield Series(Column(name, str(channel.unit or ""), clock), rows, _mdf_data(file, number, index, rows))
 
 
 def _mdf_data(file: Any, group: int, index: int, rows: int) -> Slice:
     def read(first: int, count: int) -> Cells:
         if first >= rows:
             return np.empty(0)
-        signal = file.get(
-            group=group, index=index, record_offset=first, record_count=min(count, rows - first)
-        )
+        signal = file.get(group=group, index=index, record_offset=first, record_count=min(count, rows - first))
         samples = np.asarray(signal.samples)
         return np.char.decode(samples, "utf-8", "replace") if samples.dtype.kind == "S" else samples
 

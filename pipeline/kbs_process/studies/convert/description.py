@@ -44,9 +44,7 @@ def prepare(mapping: Mapping, folder: Path) -> Campaign:
 
     So a fault of the description shows before hours of conversion, not after.
     """
-    template = read(
-        mapping.template, role="the mapping's campaign", remedy="correct `campaign` in the mapping"
-    )
+    template = read(mapping.template, role="the mapping's campaign", remedy="correct `campaign` in the mapping")
     for name in _parameter_files(template):
         parameters = read(
             template.path.parent / name,
@@ -73,13 +71,9 @@ def prepare(mapping: Mapping, folder: Path) -> Campaign:
     return campaign
 
 
-def write_campaign(
-    mapping: Mapping, folder: Path, checksums: MappingOf[str, str], origins: tuple[Origin, ...]
-) -> None:
+def write_campaign(mapping: Mapping, folder: Path, checksums: MappingOf[str, str], origins: tuple[Origin, ...]) -> None:
     """Write campaign.toml: the template's text without its recordings, then those of the mapping."""
-    template = read(
-        mapping.template, role="the mapping's campaign", remedy="correct `campaign` in the mapping"
-    )
+    template = read(mapping.template, role="the mapping's campaign", remedy="correct `campaign` in the mapping")
     blocks = [_without_recordings(template)]
     for part in mapping.parts:
         table: dict[str, Any] = {
@@ -91,9 +85,7 @@ def write_campaign(
         if part.stem in checksums:
             table["sha256"] = checksums[part.stem]
         blocks.append("[[recording]]\n" + _lines(table))
-    stated = {
-        name: text for name in ("origin", "licence", "reference") if (text := getattr(mapping.source, name))
-    }
+    stated = {name: text for name in ("origin", "licence", "reference") if (text := getattr(mapping.source, name))}
     blocks.append("[source]\n" + _lines(stated))
     for origin in origins:
         row: dict[str, Any] = {"name": origin.name, "sha256": origin.sha256}

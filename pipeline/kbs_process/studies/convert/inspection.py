@@ -44,9 +44,7 @@ class Range:
     def line(self, number: int) -> str:
         """Return the column's line in the table of columns."""
         if self.dates:
-            low, high = (
-                str(np.datetime64(int(x), "ns")) if math.isfinite(x) else "" for x in (self.low, self.high)
-            )
+            low, high = (str(np.datetime64(int(x), "ns")) if math.isfinite(x) else "" for x in (self.low, self.high))
         elif self.low <= self.high:
             low, high = f"{self.low:.7g}", f"{self.high:.7g}"
         else:
@@ -59,13 +57,9 @@ def inspect(source: Path) -> str:
     """Return a mapping to be completed, whose comments list the columns of `source` with their ranges."""
     table = open_table(source)
     ranges = _ranges(table)
-    header = (
-        f"# {'no.':>4}  {'rows':>9}  {'no num.':>7}  {'least':>12}  {'greatest':>12}  {'unit':<8}  column"
-    )
+    header = f"# {'no.':>4}  {'rows':>9}  {'no num.':>7}  {'least':>12}  {'greatest':>12}  {'unit':<8}  column"
     listing = "\n".join([header, *(entry.line(1 + index) for index, entry in enumerate(ranges))])
-    return (
-        f"#:schema import.schema.json\n# Columns of {source.name}\n{listing}\n\n{_skeleton(source, ranges)}"
-    )
+    return f"#:schema import.schema.json\n# Columns of {source.name}\n{listing}\n\n{_skeleton(source, ranges)}"
 
 
 def _ranges(table: Table) -> list[Range]:

@@ -111,19 +111,11 @@ class Mapping(msgspec.Struct, frozen=True):
 
 
 WRENCH_FIELDS = dict(
-    zip(
-        WRENCH_CHANNELS,
-        [f"wrench.{kind}.{axis}" for kind in ("force", "torque") for axis in "xyz"],
-        strict=True,
-    )
+    zip(WRENCH_CHANNELS, [f"wrench.{kind}.{axis}" for kind in ("force", "torque") for axis in "xyz"], strict=True)
 )
 STREAMS = ("wrench", "effort", "encoder", "rate", "command", "field", "temperature")
 # SI units that the numbers of a joint may have: of one that turns first, then of one that slides.
-JOINT_UNITS = {
-    "position": ("rad", "m"),
-    "velocity": ("rad/s", "m/s"),
-    "effort": ("N m", "N", "A", "V"),
-}
+JOINT_UNITS = {"position": ("rad", "m"), "velocity": ("rad/s", "m/s"), "effort": ("N m", "N", "A", "V")}
 
 
 def find_mapping(mapping: Path | str) -> Path:
@@ -133,8 +125,7 @@ def find_mapping(mapping: Path | str) -> Path:
     path = Path(mapping)
     if not path.exists() and path.suffix != ".toml":
         raise ConfigError(
-            f"no preset '{mapping}'",
-            remedy=did_you_mean(str(mapping), preset_names()) + "; or give a mapping file",
+            f"no preset '{mapping}'", remedy=did_you_mean(str(mapping), preset_names()) + "; or give a mapping file"
         )
     return path
 
@@ -144,9 +135,7 @@ def load_mapping(path: Path) -> Mapping:
 
     Raises ConfigError, naming file, line and key, and what to do.
     """
-    document = read(
-        path, role="mapping", remedy="give a mapping file, or a preset: " + ", ".join(preset_names())
-    )
+    document = read(path, role="mapping", remedy="give a mapping file, or a preset: " + ", ".join(preset_names()))
     problems = Problems(shown(path))
     for violation in violations(document.tree, "import"):
         problems.add(document.place(violation.key), violation.what, violation.remedy)
@@ -188,20 +177,13 @@ def _stream(document: Document, key: str, problems: Problems) -> StreamMap:
             rows = [((key,), "temperature", ("degC",), table)]
         case _:
             part = {"rate": "velocity", "effort": "effort"}.get(key, "position")
-            rows = [
-                ((key, joint), f"{part}[{joint}]", JOINT_UNITS[part], cell) for joint, cell in table.items()
-            ]
+            rows = [((key, joint), f"{part}[{joint}]", JOINT_UNITS[part], cell) for joint, cell in table.items()]
     channels = tuple(_channel(document, *row, problems) for row in rows)
     return StreamMap(key, _time(document, key, problems), channels)
 
 
 def _channel(
-    document: Document,
-    key: Key,
-    field: str,
-    allowed: tuple[str, ...],
-    cell: MappingOf[str, Any],
-    problems: Problems,
+    document: Document, key: Key, field: str, allowed: tuple[str, ...], cell: MappingOf[str, Any], problems: Problems
 ) -> Channel:
     unit, scale, radius = cell["unit"], float(cell.get("scale", 1.0)), cell.get("radius_m")
     # A way along a surface of some radius is an angle; any other unit tells by itself which one it is of.
@@ -241,9 +223,7 @@ def _time(document: Document, key: str, problems: Problems) -> Time | None:
         )
         table = {name: value for name, value in table.items() if name != "start"}
     if "column" not in table and "rate_Hz" not in table:
-        problems.add(
-            document.place(place), "says nothing about the samples' time", "give column and unit, or rate_Hz"
-        )
+        problems.add(document.place(place), "says nothing about the samples' time", "give column and unit, or rate_Hz")
     if "unit" in table and "rate_Hz" in table:
         problems.add(
             document.place((*place, "unit")),
@@ -264,9 +244,7 @@ def _check_parts(document: Document, parts: tuple[Part, ...], problems: Problems
             )
         stems.add(part.stem)
         if part.end_s <= part.start_s:
-            problems.add(
-                document.place(("recording", index, "end_s")), "is not after start_s", "give a later moment"
-            )
+            problems.add(document.place(("recording", index, "end_s")), "is not after start_s", "give a later moment")
         if Path(part.source).is_absolute() or ".." in Path(part.source).parts:
             problems.add(
                 document.place(("recording", index, "source")),
@@ -280,9 +258,7 @@ def _check_turn(document: Document, turn: Turn, streams: tuple[StreamMap, ...], 
     angles = mapped.get("encoder")
     fields = [channel.field for channel in angles.channels] if angles else []
     if "wrench" not in mapped:
-        problems.add(
-            document.place(("turn",)), "no wrench is mapped, and only that is turned", "delete [turn]"
-        )
+        problems.add(document.place(("turn",)), "no wrench is mapped, and only that is turned", "delete [turn]")
         return
     if f"position[{turn.joint}]" not in fields:
         problems.add(
@@ -291,9 +267,7 @@ def _check_turn(document: Document, turn: Turn, streams: tuple[StreamMap, ...], 
             did_you_mean(turn.joint, document.tree.get("encoder", {})),
         )
     elif angles and (angles.time is None or angles.time != mapped["wrench"].time):
-        problems.add(
-            document.place(("turn",)), "needs wrench and angle row by row", "give both the same time column"
-        )
+        problems.add(document.place(("turn",)), "needs wrench and angle row by row", "give both the same time column")
     for kind in ("F", "T"):
         given = [name for name in document.tree["wrench"] if name.startswith(kind)]
         if len(given) in (1, 2):

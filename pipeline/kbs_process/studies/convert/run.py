@@ -21,26 +21,14 @@ from kbs_process.results.store import writing
 from kbs_process.signals.records import Array, Block
 from kbs_process.studies.convert.description import Origin, prepare, recording_file, write_campaign
 from kbs_process.studies.convert.formats import open_table
-from kbs_process.studies.convert.mapping import (
-    WRENCH_FIELDS,
-    Mapping,
-    Part,
-    StreamMap,
-    find_mapping,
-    load_mapping,
-)
+from kbs_process.studies.convert.mapping import WRENCH_FIELDS, Mapping, Part, StreamMap, find_mapping, load_mapping
 from kbs_process.studies.convert.streams import Findings, read_part
 
 LATEST_NS = (1 << 31) * 1_000_000_000  # the seconds of a ROS 2 time stamp are a signed 32-bit number
 
 
 def convert(
-    mapping: Path | str,
-    source: Path,
-    target: Path,
-    *,
-    progress: Progress | None,
-    notice: Callable[[str], None] | None,
+    mapping: Path | str, source: Path, target: Path, *, progress: Progress | None, notice: Callable[[str], None] | None
 ) -> Path:
     """Do what `importers.import_recordings` promises."""
     progress = progress or SilentProgress()
@@ -105,9 +93,7 @@ def _refuse_occupied(target: Path) -> None:
         )
 
 
-def _convert_part(
-    mapping: Mapping, part: Part, path: Path, campaign: Campaign, folder: Path
-) -> tuple[str, ...]:
+def _convert_part(mapping: Mapping, part: Part, path: Path, campaign: Campaign, folder: Path) -> tuple[str, ...]:
     """Write one recording; return what was found wrong with its source."""
     table = open_table(path, mapping.format, mapping.text)
     findings = Findings()

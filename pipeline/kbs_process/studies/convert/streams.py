@@ -34,9 +34,7 @@ class Findings:
         if len(block):
             steps = np.diff(block.stamp, prepend=self.last.get(key, int(block.stamp[0]) - 1))
             self.counts[f"time stamps of '{key}' repeat the one before, kept"] += int((steps == 0).sum())
-            self.counts[f"time stamps of '{key}' lie before their predecessor, put in order"] += int(
-                (steps < 0).sum()
-            )
+            self.counts[f"time stamps of '{key}' lie before their predecessor, put in order"] += int((steps < 0).sum())
             self.last[key] = int(block.stamp[-1])
 
     def lines(self) -> tuple[str, ...]:
@@ -44,9 +42,7 @@ class Findings:
         return tuple(f"{count} {what}" for what, count in self.counts.most_common() if count)
 
 
-def read_part(
-    table: Table, mapping: Mapping, part: Part, findings: Findings
-) -> Iterator[tuple[StreamMap, Block]]:
+def read_part(table: Table, mapping: Mapping, part: Part, findings: Findings) -> Iterator[tuple[StreamMap, Block]]:
     """Yield the streams of one recording a piece at a time, those of several passes side by side in time.
 
     The first piece of each stream is empty: so all are known before the first sample. Raises RecordingError,
@@ -76,9 +72,7 @@ def read_part(
     for key in streams:
         if key in empty:
             raise RecordingError(
-                f"no sample of '{key}' for recording '{part.stem}'",
-                where=str(table.path),
-                remedy=_why_empty(findings),
+                f"no sample of '{key}' for recording '{part.stem}'", where=str(table.path), remedy=_why_empty(findings)
             )
 
 
@@ -116,9 +110,7 @@ def _passes(streams: Sequence[StreamMap]) -> list[list[StreamMap]]:
     return passes
 
 
-def _pieces(
-    table: Table, mapping: Mapping, streams: Sequence[StreamMap], findings: Findings
-) -> Iterator[Piece]:
+def _pieces(table: Table, mapping: Mapping, streams: Sequence[StreamMap], findings: Findings) -> Iterator[Piece]:
     time = streams[0].time
     channels = [channel for stream in streams for channel in stream.channels]
     columns = [find_column(table, channel.column) for channel in channels]

@@ -38,9 +38,7 @@ class TextTable:
         width = max(len(cells[0]), len(cells[min(named + options.units_row, len(cells) - 1)]))
         names = _unique(_widened(cells[0] if named else [], width))
         units = _widened(cells[named] if options.units_row and len(cells) > named else [], width)
-        self.columns = tuple(
-            Column(name, unit.strip("()[] ")) for name, unit in zip(names, units, strict=True)
-        )
+        self.columns = tuple(Column(name, unit.strip("()[] ")) for name, unit in zip(names, units, strict=True))
 
     def chunks(self, names: Sequence[str]) -> Iterator[tuple[Cells, ...]]:
         every = [column.name for column in self.columns]
@@ -145,6 +143,4 @@ def _cells(series: pd.Series[float], decimal: str) -> Cells:
     """Return a parsed column as numbers where pandas found nothing else in this piece, else as text with points."""
     if series.dtype.kind in "iuf":
         return series.to_numpy()
-    return np.array(
-        ["" if pd.isna(cell) else str(cell).replace(decimal, ".") for cell in series], dtype=np.str_
-    )
+    return np.array(["" if pd.isna(cell) else str(cell).replace(decimal, ".") for cell in series], dtype=np.str_)

@@ -46,9 +46,7 @@ def earlier_diagnosis(campaign: Campaign, results: Path) -> EarlierDiagnosis | N
     if not changed:
         return EarlierDiagnosis(folder, "")
     others = f" and {len(changed) - 3} more" if len(changed) > 3 else ""
-    return EarlierDiagnosis(
-        folder, f"is of other inputs ({', '.join(changed[:3])}{others} changed, came or went)"
-    )
+    return EarlierDiagnosis(folder, f"is of other inputs ({', '.join(changed[:3])}{others} changed, came or went)")
 
 
 def keep_diagnosis(campaign: Campaign, before: Path, after: Path) -> None:

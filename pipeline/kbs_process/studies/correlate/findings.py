@@ -37,9 +37,7 @@ class Findings:
     resonances: tuple[results.Resonance, ...]
 
 
-def find(
-    campaign: Campaign, analyses: Sequence[Analysis], model: GravityModel, decoupling: Decoupling
-) -> Findings:
+def find(campaign: Campaign, analyses: Sequence[Analysis], model: GravityModel, decoupling: Decoupling) -> Findings:
     """Gather the findings; calibration recordings serve the fit and are judged by its residual alone."""
     runs = [analysis for analysis in analyses if analysis.entry.role != "calibration"]
     bands = bands_of(campaign.bands)
@@ -51,9 +49,7 @@ def find(
         repeatability=repeated,
         merit=tuple(_merits(campaign, runs, bands, found)),
         budget=found,
-        requirements=tuple(
-            judged(campaign, requirement, runs, found) for requirement in campaign.requirements
-        ),
+        requirements=tuple(judged(campaign, requirement, runs, found) for requirement in campaign.requirements),
         bands=tuple(_band(statements[band.name]) for band in bands if band.name in statements),
         resonances=resonances,
     )
@@ -152,9 +148,7 @@ def _merits(
                 )
 
 
-def _resonances(
-    campaign: Campaign, runs: Sequence[Analysis], model: GravityModel
-) -> tuple[results.Resonance, ...]:
+def _resonances(campaign: Campaign, runs: Sequence[Analysis], model: GravityModel) -> tuple[results.Resonance, ...]:
     """Modes on the transducer at the first and the last pose of the first run: they move with the joints."""
     if not runs:
         return ()
@@ -162,17 +156,14 @@ def _resonances(
     found = []
     for where, pose in (("first pose", q[0]), ("last pose", q[-1])):
         angles = ", ".join(
-            f"{name} {np.degrees(angle):.1f} deg"
-            for name, angle in zip(campaign.rig.joint_names, pose, strict=True)
+            f"{name} {np.degrees(angle):.1f} deg" for name, angle in zip(campaign.rig.joint_names, pose, strict=True)
         )
         for mode in modes(model.rig, select(campaign.effects), pose):
             if mode.frequency > nyquist:
                 continue
             source = f"turning about {mode.axis}, {where} ({angles})"
             found.append(
-                results.Resonance(
-                    axis=mode.axis, frequency_Hz=mode.frequency, sigma_Hz=mode.sigma, source=source
-                )
+                results.Resonance(axis=mode.axis, frequency_Hz=mode.frequency, sigma_Hz=mode.sigma, source=source)
             )
     return tuple(found)
 

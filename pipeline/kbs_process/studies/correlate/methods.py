@@ -69,9 +69,7 @@ def _plant(campaign: Campaign) -> str:
 
 
 def _relief(campaign: Campaign) -> str:
-    acting = {
-        entry.name: [force.name for force in forces_in(campaign, entry)] for entry in campaign.recordings
-    }
+    acting = {entry.name: [force.name for force in forces_in(campaign, entry)] for entry in campaign.recordings}
     names = sorted({force for forces in acting.values() for force in forces})
     if not names:
         return ""

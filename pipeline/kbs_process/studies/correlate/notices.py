@@ -95,15 +95,11 @@ def _fit(model: GravityModel) -> Iterable[results.Notice]:
         if not check.passed:
             detail = check.detail if len(check.detail) < LONG else f"{check.detail[:LONG]} ..."
             yield results.Notice(
-                severity="info",
-                what=f"gravity fit, {check.name}: {detail}",
-                remedy="see the gravity fit's table",
+                severity="info", what=f"gravity fit, {check.name}: {detail}", remedy="see the gravity fit's table"
             )
 
 
-def _static_load(
-    campaign: Campaign, analyses: Sequence[Analysis], model: GravityModel
-) -> Iterable[results.Notice]:
+def _static_load(campaign: Campaign, analyses: Sequence[Analysis], model: GravityModel) -> Iterable[results.Notice]:
     """A recording whose slow part the model leaves: what is judged or compared is then that load."""
     matter = "the verdict is" if campaign.requirements else "the figures of merit are"
     for analysis in analyses:
@@ -140,9 +136,7 @@ def _taring(analyses: Sequence[Analysis]) -> Iterable[results.Notice]:
 def _peaks(campaign: Campaign, analyses: Sequence[Analysis], findings: Findings) -> Iterable[results.Notice]:
     """Peaks that noise alone may make: the largest of many samples exceeds the true one, never falls short of it."""
     for requirement in findings.requirements:
-        band = band_of(
-            campaign.requirements[findings.requirements.index(requirement)], bands_of(campaign.bands)
-        )
+        band = band_of(campaign.requirements[findings.requirements.index(requirement)], bands_of(campaign.bands))
         key = (requirement.frame, band.name)
         signals = [one.pairs[key].measured for one in analyses if one.entry.role != "calibration"]
         below = coverage_below(requirement.statistic, signals, band)

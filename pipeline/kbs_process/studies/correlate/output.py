@@ -58,9 +58,7 @@ def _tables(writer: TableWriter, analysis: Analysis) -> None:
         whole = loads if run.wrench is None else run.wrench  # what has an envelope
         writer.envelope(run.envelope, whole.channels, whole.units)
     if run.spectrum is not None:
-        writer.spectrum(
-            run.spectrum, None if analysis.predicted is None else analysis.predicted.spectrum, units
-        )
+        writer.spectrum(run.spectrum, None if analysis.predicted is None else analysis.predicted.spectrum, units)
     for (frame, band), pair in analysis.pairs.items():
         writer.band("spacecraft" if frame == "S" else "bands", band, pair.measured, pair.predicted)
 
@@ -97,14 +95,10 @@ def _streams(topic: str, signal: Signal, epoch_ns: int) -> Iterator[OutStream]:
         unknown = np.full((len(signal), 2 * len(efforts)), np.nan)  # positions and velocities
         values = np.column_stack([unknown, *(signal.column(channel) for channel in efforts)])
         names = tuple(channel.removesuffix(".effort") for channel in efforts)
-        yield OutStream(
-            topic=f"{topic}/joints", kind="joints", stamp=stamp, log=stamp, values=values, names=names
-        )
+        yield OutStream(topic=f"{topic}/joints", kind="joints", stamp=stamp, log=stamp, values=values, names=names)
 
 
 def _joints(topic: str, signal: Signal, epoch_ns: int) -> OutStream:
     """Angles of the joints that a signal has."""
     stamp = epoch_ns + np.rint(signal.t * 1e9).astype(np.int64)
-    return OutStream(
-        topic=topic, kind="joints", stamp=stamp, log=stamp, values=signal.values, names=signal.channels
-    )
+    return OutStream(topic=topic, kind="joints", stamp=stamp, log=stamp, values=signal.values, names=signal.channels)

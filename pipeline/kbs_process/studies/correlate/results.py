@@ -216,9 +216,7 @@ class Merit(Record, frozen=True, kw_only=True):
     @property
     def at_the_noise(self) -> bool:
         """Whether there is too little signal for these figures to say anything of the prediction."""
-        return (
-            self.sigma is not None and self.measured_rms is not None and self.measured_rms < 2.0 * self.sigma
-        )
+        return self.sigma is not None and self.measured_rms is not None and self.measured_rms < 2.0 * self.sigma
 
 
 class Resonance(Record, frozen=True, kw_only=True):

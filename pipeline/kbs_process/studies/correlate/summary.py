@@ -28,11 +28,7 @@ RESPONSE_UNITS = dict(zip(RESPONSE, ("s", "s^2"), strict=True))
 
 
 def summarise(
-    campaign: Campaign,
-    analyses: Sequence[Analysis],
-    model: GravityModel,
-    decoupling: Decoupling,
-    findings: Findings,
+    campaign: Campaign, analyses: Sequence[Analysis], model: GravityModel, decoupling: Decoupling, findings: Findings
 ) -> results.Results:
     """Return the contents of results.json."""
     conventions = tuple(_conventions(campaign, analyses))
@@ -128,8 +124,7 @@ def _conventions(campaign: Campaign, analyses: Sequence[Analysis]) -> Iterable[r
         if command is not None and angle is not None:
             found += check_encoder_sense(angle, command)
         checks += [
-            SignCheck(f"{check.check}, {analysis.entry.name}", check.expected, check.found, check.ok)
-            for check in found
+            SignCheck(f"{check.check}, {analysis.entry.name}", check.expected, check.found, check.ok) for check in found
         ]
     for check in checks:
         yield results.Convention(check=check.check, expected=check.expected, found=check.found, ok=check.ok)
@@ -176,9 +171,7 @@ def _static_recording(analysis: Analysis, model: GravityModel) -> results.Static
             explained=misfit.explained,
             ok=misfit.ok,
         )
-        for misfit, constant, sigma in zip(
-            analysis.misfits, taring.bias, taring_error(model, taring), strict=True
-        )
+        for misfit, constant, sigma in zip(analysis.misfits, taring.bias, taring_error(model, taring), strict=True)
     )
     return results.StaticRecording(recording=analysis.entry.name, fitted=taring.fitted, channels=channels)
 

@@ -27,13 +27,7 @@ from kbs_process.stages.budget import sensor_noise
 from kbs_process.stages.motion import estimate
 from kbs_process.stages.resonance import Transmitted, amplification, filter_errors, transmit
 from kbs_process.stages.to_cog import to_spacecraft
-from kbs_process.studies.correlate.on_transducer import (
-    BothWays,
-    FilterErrorIn,
-    GainAt,
-    ModeAt,
-    OnTransducer,
-)
+from kbs_process.studies.correlate.on_transducer import BothWays, FilterErrorIn, GainAt, ModeAt, OnTransducer
 
 SPACING = np.radians(2.5)  # of the poses at which modes are derived
 STILL = np.radians(5.0)  # a joint that turns by no more leaves the modes as they are
@@ -47,9 +41,7 @@ class Study:
 
     findings: OnTransducer
     gains: dict[str, Array]  # columns of a table: f, and for each pose and torque the gain
-    spectra: dict[
-        str, Array
-    ]  # columns of a table: f, and of each torque on a rigid base, through the modes, coupled
+    spectra: dict[str, Array]  # columns of a table: f, and of each torque on a rigid base, through the modes, coupled
 
 
 def rigid_base(rig: Rig) -> Rig:
@@ -57,9 +49,7 @@ def rigid_base(rig: Rig) -> Rig:
     return replace(rig, transducer=replace(rig.transducer, stiffness=None, damping=None))
 
 
-def study(
-    campaign: Campaign, analyses: Sequence[Analysis], rig: Rig, update: Callable[[float], None]
-) -> Study | None:
+def study(campaign: Campaign, analyses: Sequence[Analysis], rig: Rig, update: Callable[[float], None]) -> Study | None:
     """Study the first recording that has a prediction; None without one, or on a rigid transducer.
 
     `rig` has the masses and CoGs that the gravity fit found.
@@ -96,9 +86,7 @@ def _table(campaign: Campaign, rig: Rig, q: Array) -> tuple[ModalTable | None, s
     index = names.index(joint)
     others = [name for name, turned in zip(names, travel, strict=True) if name != joint and turned > STILL]
     if others:
-        reason = (
-            f"Besides '{joint}', '{', '.join(others)}' turns too; the modes are tabulated over one joint."
-        )
+        reason = f"Besides '{joint}', '{', '.join(others)}' turns too; the modes are tabulated over one joint."
         return None, reason
     if given is not None:
         return given, ""
@@ -180,9 +168,7 @@ def _agreement(campaign: Campaign, analysis: Analysis, found: Transmitted) -> It
         coupled, modal, rigid = overlap(coupled, modal, rigid)
         valid = coupled.valid & modal.valid
         bandwidth = bandpass.noise_bandwidth(band, coupled.dt)
-        noise = sensor_noise(
-            campaign.rig.transducer.noise.value, analysis.run.rates["wrench"], bandwidth
-        ).sigma
+        noise = sensor_noise(campaign.rig.transducer.noise.value, analysis.run.rates["wrench"], bandwidth).sigma
         for channel, unit in zip(coupled.channels, coupled.units, strict=True):
             one, other = coupled.column(channel)[valid], modal.column(channel)[valid]
             yield BothWays(

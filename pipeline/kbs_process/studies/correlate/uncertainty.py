@@ -41,9 +41,7 @@ def budgets(
                 continue
             of_band = [entry for entry in repeated if (entry.frame, entry.band) == (own, band.name)]
             noise = _repeat_noise(of_band, measured.channels, analysis.entry.trajectory)
-            entries = _entries(
-                campaign, analysis, model, decoupling, band, statements[band.name], noise, lowest
-            )
+            entries = _entries(campaign, analysis, model, decoupling, band, statements[band.name], noise, lowest)
             frame: Frame = "joint" if own == "joint" else "T"
             yield from _rows(entries, frame, band.name, analysis.entry.name, measured)
             if spacecraft is not None and set(WRENCH_CHANNELS) <= set(measured.channels):
@@ -101,9 +99,7 @@ def _entries(
     return entries
 
 
-def _cross_coupling(
-    analysis: Analysis, model: GravityModel, decoupling: Decoupling, band: Band
-) -> budget.Entry:
+def _cross_coupling(analysis: Analysis, model: GravityModel, decoupling: Decoupling, band: Band) -> budget.Entry:
     """What the matrix's uncertainty makes of a recording's wrench, counted once.
 
     Where the gravity fit estimates what the calibration left, its covariance holds the leak of the static wrench; here
@@ -130,9 +126,7 @@ def late_sigma(clocks: Mapping[str, Clock], amplifier: Amplifier | None) -> floa
     return float(np.hypot(late, amplifier.delay * float(amplifier.corner.sigma) / float(amplifier.corner)))
 
 
-def _repeat_noise(
-    of_band: Sequence[results.Repeatability], channels: Sequence[str], trajectory: str
-) -> Array | None:
+def _repeat_noise(of_band: Sequence[results.Repeatability], channels: Sequence[str], trajectory: str) -> Array | None:
     """The noise of a trajectory's repeats, (c,); the largest of all where it was not repeated; else None."""
     own = [entry for entry in of_band if entry.trajectory == trajectory]
     worst = np.zeros(len(channels))

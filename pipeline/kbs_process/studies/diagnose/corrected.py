@@ -46,9 +46,7 @@ def write_corrected(campaign: Campaign, outcome: Outcome, folder: Path) -> tuple
             sigma = quantity.sigma.copy()
             sigma[scalar.element] = known.sigma[index]
             changed[scalar.quantity] = replace(quantity, sigma=sigma, source=source)
-    sensing = tuple(
-        _sensing(find, own, source) for find in outcome.finds if _reads(find) for own in find.actions
-    )
+    sensing = tuple(_sensing(find, own, source) for find in outcome.finds if _reads(find) for own in find.actions)
     return write_model(campaign, hypothesis.rig, hypothesis.effects, changed, folder, source, sensing)
 
 

@@ -44,9 +44,7 @@ def diagnose_results(
     if found.log_p > np.log(DETECTED):
         return (*told, f"Prediction and recordings differ by {ratio}: there is nothing to diagnose.")
     with revising(results, without=(FOLDER, "index.html", "report.pdf")) as folder:
-        outcome = diagnose(
-            campaign, folder / FOLDER, progress=progress, pdf=pdf, experiment=experiment, verb=""
-        )
+        outcome = diagnose(campaign, folder / FOLDER, progress=progress, pdf=pdf, experiment=experiment, verb="")
         render(folder, pdf)
     return (
         *told,

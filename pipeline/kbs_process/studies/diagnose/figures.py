@@ -33,9 +33,7 @@ def trials(entries: tuple[Trial, ...]) -> Picture:
         axis.set_xlabel("residual over floor, rms")
         axis.legend(ncols=4, loc="lower right", bbox_to_anchor=(1.0, 1.0))
         worst = max(entries, key=lambda entry: entry.corrected)
-        alt = (
-            f"Residual over floor of {len(entries)} recordings; corrected, at most {number(worst.corrected)}"
-        )
+        alt = f"Residual over floor of {len(entries)} recordings; corrected, at most {number(worst.corrected)}"
         return draw.picture(figure, alt)
 
 
@@ -44,9 +42,7 @@ def law(find: Find, curve: Curve) -> Picture:
     x, y, sigma = (np.asarray(values) for values in (curve.x, curve.y, curve.sigma))
     with draw.style():
         figure, axis = draw.canvas(2.3)
-        axis.fill_between(
-            x, y - 2.0 * sigma, y + 2.0 * sigma, color=draw.SHADE, linewidth=0.0, label="2 sigma"
-        )
+        axis.fill_between(x, y - 2.0 * sigma, y + 2.0 * sigma, color=draw.SHADE, linewidth=0.0, label="2 sigma")
         axis.plot(x, y, color=draw.MEASURED, linewidth=0.9, label="measured")
         if curve.fitted:
             axis.plot(x, curve.fitted, color=draw.PREDICTED, linewidth=1.6, zorder=1, label=find.name)
@@ -73,9 +69,7 @@ def channels(entries: tuple[Trial, ...]) -> Picture:
             color = "white" if value > 0.5 * (1.0 + top) else draw.INK
             axis.text(column, row, number(value), ha="center", va="center", color=color, fontsize=6)
         figure.colorbar(image, ax=axis, label="over floor")
-        return draw.picture(
-            figure, f"Residual over floor by channel, at most {number(float(np.nanmax(values)))}"
-        )
+        return draw.picture(figure, f"Residual over floor by channel, at most {number(float(np.nanmax(values)))}")
 
 
 def where(table: Table, title: str) -> Picture:

@@ -52,12 +52,7 @@ def write_diagnosis(
             _spectra(folder, known, outcome.standing.known, k)
             _histories(folder, known.experiment, known.shown, outcome.standing, k)
         results = results_of(
-            campaign,
-            floor,
-            outcome,
-            [path.relative_to(folder).as_posix() for path in files],
-            proposal,
-            verb,
+            campaign, floor, outcome, [path.relative_to(folder).as_posix() for path in files], proposal, verb
         )
         (folder / "results.json").write_bytes(encode(results))
         from kbs_process.studies.diagnose.report import DOCUMENT  # draws: takes its time to import

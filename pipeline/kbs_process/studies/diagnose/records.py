@@ -185,9 +185,7 @@ def _trials(known: Known, corrected: Known) -> Iterator[records.Trial]:
 
 def _moved(known: Known) -> Iterator[records.Moved]:
     units = {name: quantity.unit for name, quantity in known.hypothesis.rig.quantities().items()}
-    entries = zip(
-        known.free, known.value, known.sigma, known.parameters.value, known.parameters.sigma, strict=True
-    )
+    entries = zip(known.free, known.value, known.sigma, known.parameters.value, known.parameters.sigma, strict=True)
     for scalar, value, sigma, prior, spread in entries:
         if scalar.quantity not in units:
             continue

@@ -153,9 +153,7 @@ class Planned(Record, frozen=True, kw_only=True):
     """A trajectory that could be run next."""
 
     trajectory: str
-    worth: (
-        float  # distance of the nearest rival; without rivals, root of the information's smallest eigenvalue
-    )
+    worth: float  # distance of the nearest rival; without rivals, root of the information's smallest eigenvalue
 
 
 class NextTest(Record, frozen=True, kw_only=True):
@@ -203,8 +201,4 @@ class DiagnosisResults(Record, frozen=True, kw_only=True):
     @property
     def model(self) -> str:
         """What the folder of the corrected model holds, in words."""
-        return (
-            "Corrected model"
-            if self.finds
-            else "Model with its known numbers refitted, to which nothing was added"
-        )
+        return "Corrected model" if self.finds else "Model with its known numbers refitted, to which nothing was added"

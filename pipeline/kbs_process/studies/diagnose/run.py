@@ -111,12 +111,7 @@ def diagnose(
         explained = explain(experiment, simulate, progress.task)
         with progress.task("Suspects: what the known parameters leave"):
             outcome = rounds.diagnose(
-                explained.known,
-                explained.floor,
-                simulate,
-                explained.after,
-                explained.near,
-                beside=explained.beside,
+                explained.known, explained.floor, simulate, explained.after, explained.near, beside=explained.beside
             )
     with progress.task("Next test"):
         proposal = proposed(outcome, explained.floor)

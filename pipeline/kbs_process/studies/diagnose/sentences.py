@@ -85,10 +85,7 @@ def _law_in_words(find: Find) -> str:
 
 
 def sentence(
-    outcome: Outcome,
-    trials: Sequence[records.Trial],
-    requirements: Sequence[records.Unexplained],
-    floor: Floor,
+    outcome: Outcome, trials: Sequence[records.Trial], requirements: Sequence[records.Unexplained], floor: Floor
 ) -> str:
     """The answer, in one sentence or a few."""
     if not outcome.finds:
@@ -149,9 +146,7 @@ def _shown(trials: Sequence[records.Trial]) -> str:
             power[name] += max(0.0, ratio**2 - 1.0)
     total = sum(power.values())
     return "".join(
-        f" {name} shows {100.0 * own / total:.0f} % of its power."
-        for name, own in power.items()
-        if own > 0.5 * total
+        f" {name} shows {100.0 * own / total:.0f} % of its power." for name, own in power.items() if own > 0.5 * total
     )
 
 
@@ -186,11 +181,7 @@ def _unnamed(outcome: Outcome, trials: Sequence[records.Trial], floor: Floor) ->
     if outcome.untried and not outcome.after.left and not outcome.unforeseen:
         return _UNTRIED.format(floor=_FLOOR[floor.source], moved=_off(outcome))
     if not outcome.unforeseen:
-        words = _WORDS[outcome.verdict].format(
-            floor=_FLOOR[floor.source],
-            near=_nearest(outcome),
-            moved=_off(outcome),
-        )
+        words = _WORDS[outcome.verdict].format(floor=_FLOOR[floor.source], near=_nearest(outcome), moved=_off(outcome))
         return words + (_stopped(outcome.standing.known) if outcome.verdict == "none" else "")
     worst = max((trial for trial in trials if trial.role == "held-out"), key=lambda trial: trial.corrected)
     channel = max(worst.channels, key=lambda name: worst.channels[name])
@@ -212,9 +203,7 @@ def _stopped(known: Known) -> str:
     if not known.stopped:
         return ""
     names = ", ".join(known.stopped)
-    return (
-        f" For that {names} went as far as chance may have it ({NEAR:.2g} sigma): check that at its source."
-    )
+    return f" For that {names} went as far as chance may have it ({NEAR:.2g} sigma): check that at its source."
 
 
 def farthest(known: Known, most: int = 3) -> list[str]:

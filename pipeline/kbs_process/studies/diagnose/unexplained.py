@@ -44,9 +44,7 @@ def unexplained(campaign: Campaign, known: Standing, corrected: Standing) -> Ite
             )
 
 
-def _worst(
-    campaign: Campaign, requirement: Requirement, channels: Sequence[str], standing: Standing
-) -> Extreme | None:
+def _worst(campaign: Campaign, requirement: Requirement, channels: Sequence[str], standing: Standing) -> Extreme | None:
     """The greatest statistic of measured less predicted; None where no sample of the band is known."""
     experiment = standing.known.experiment
     band = band_of(requirement, bands_of(campaign.bands))

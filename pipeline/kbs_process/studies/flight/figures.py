@@ -40,9 +40,7 @@ def distribution(requirement: FlightRequirement, index: int, units: Table) -> Pi
         axis.set_ylabel("units below / %")
         axis.legend(loc="lower right")
         alt = ", ".join(f"{entry.channel} {number(entry.q95)}" for entry in requirement.channels)
-        return draw.picture(
-            figure, f"Distributions over the units; 95 % stay below: {alt} {requirement.unit}"
-        )
+        return draw.picture(figure, f"Distributions over the units; 95 % stay below: {alt} {requirement.unit}")
 
 
 def histories(requirement: FlightRequirement, table: Table) -> Picture:
@@ -53,12 +51,8 @@ def histories(requirement: FlightRequirement, table: Table) -> Picture:
         figure = Figure(figsize=(draw.WIDTH, 0.5 + 1.15 * len(rows)), layout="constrained")
         axes = np.atleast_1d(figure.subplots(len(rows), 1, sharex=True))
         for axis, row in zip(axes, rows, strict=True):
-            low, high, q05, q95 = (
-                table.columns[f"{row.channel}.{name}"] for name in ("low", "high", "q05", "q95")
-            )
-            axis.fill_between(
-                t, q05, q95, color=draw.PREDICTED, alpha=0.5, linewidth=0.0, label="90 % of units"
-            )
+            low, high, q05, q95 = (table.columns[f"{row.channel}.{name}"] for name in ("low", "high", "q05", "q95"))
+            axis.fill_between(t, q05, q95, color=draw.PREDICTED, alpha=0.5, linewidth=0.0, label="90 % of units")
             axis.fill_between(t, low, high, color=draw.MEASURED, linewidth=0.4, label="nominal unit")
             if row.greatest > 0.5 * requirement.limit:
                 for level in (-requirement.limit, requirement.limit):

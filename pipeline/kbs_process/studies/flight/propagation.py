@@ -55,9 +55,7 @@ def importance(parameters: Array, cyclic: Mask, outcomes: Array) -> Array:
     y = (y - y.mean()) / np.linalg.norm(y - y.mean())
     shares = np.empty(parameters.shape[1])
     for index, column in enumerate(parameters.T):
-        terms = (
-            np.stack([np.sin(column), np.cos(column)], axis=1) if cyclic[index] else rankdata(column)[:, None]
-        )
+        terms = np.stack([np.sin(column), np.cos(column)], axis=1) if cyclic[index] else rankdata(column)[:, None]
         basis, _ = np.linalg.qr(terms - terms.mean(axis=0))
         shares[index] = float(np.sum((basis.T @ y) ** 2))
     return shares

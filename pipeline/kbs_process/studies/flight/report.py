@@ -13,9 +13,7 @@ from kbs_process.studies.flight.sections import compliance, drivers, histories
 def head(results: FlightResults) -> Head:
     """Name, article and verdict."""
     about = f"{results.article} · {results.samples} units along {results.trajectory}"
-    return Head(
-        "Flight prediction", results.name, results.title, about, results.verdict, results.provenance.version
-    )
+    return Head("Flight prediction", results.name, results.title, about, results.verdict, results.provenance.version)
 
 
 def _provenance(results: FlightResults, tables: Tables) -> Panel:

@@ -113,9 +113,7 @@ def predict_flight(
         *(Judged(requirement, None, rig.joint_names) for requirement in campaign.flight_pointing),
     )
     if not judged:
-        raise ConfigError(
-            "the campaign states no requirement", where=campaign.name, remedy="add [[requirement]]"
-        )
+        raise ConfigError("the campaign states no requirement", where=campaign.name, remedy="add [[requirement]]")
     name, schedule, sources = _commanded(campaign, trajectory, commands, progress)
     duration = float(schedule.t[-1])
     numbers = uncertain(rig, select(campaign.effects))
@@ -146,11 +144,7 @@ def in_orbit(rig: Rig) -> Rig:
         rig,
         gravity=weightless,
         transducer=replace(
-            bench,
-            stiffness=None,
-            damping=None,
-            tilt=upright,
-            amplifier=bench.amplifier or Amplifier(2, corner),
+            bench, stiffness=None, damping=None, tilt=upright, amplifier=bench.amplifier or Amplifier(2, corner)
         ),
     )
 
@@ -232,9 +226,7 @@ def _commanded(
     first = {entry.trajectory: entry for entry in reversed(campaign.recordings)}
     name = trajectory or campaign.recordings[-1].trajectory
     if name not in first:
-        raise ConfigError(
-            f"there is no trajectory '{name}'", where=campaign.name, remedy=did_you_mean(name, first)
-        )
+        raise ConfigError(f"there is no trajectory '{name}'", where=campaign.name, remedy=did_you_mean(name, first))
     with progress.task(f"Reading {first[name].name}"):
         run = read_run(campaign, first[name])
     schedule = schedule_of(run, campaign.rig)

@@ -42,9 +42,7 @@ def profiles(entries: tuple[Identified, ...], title: str) -> Picture:
 
 def correlations(found: Correlations) -> Picture:
     """Draw the correlation matrix."""
-    names = [
-        name.removeprefix("joint.").replace(".drive.", " ").replace("transducer.", "") for name in found.names
-    ]
+    names = [name.removeprefix("joint.").replace(".drive.", " ").replace("transducer.", "") for name in found.names]
     with draw.style():
         figure = Figure(figsize=(draw.WIDTH, draw.WIDTH * 0.9), layout="constrained")
         axis = figure.subplots()
@@ -54,7 +52,6 @@ def correlations(found: Correlations) -> Picture:
         axis.grid(visible=False)
         figure.colorbar(image, ax=axis, shrink=0.7, label="correlation")
         worst = max(
-            (abs(value) for i, row in enumerate(found.matrix) for j, value in enumerate(row) if i != j),
-            default=0.0,
+            (abs(value) for i, row in enumerate(found.matrix) for j, value in enumerate(row) if i != j), default=0.0
         )
         return draw.picture(figure, f"Correlations of {len(names)} estimates, at most {number(worst, 2)}")

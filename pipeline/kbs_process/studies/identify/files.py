@@ -48,9 +48,7 @@ def write_identification(campaign: Campaign, outcomes: Outcomes, target: Path, p
     """Write results, tables, parameter files and report to `target`."""
     with writing(target) as folder:
         source = "identified from " + ", ".join(r.name for r in outcomes.found.experiment.recordings)
-        written = write_parameters(
-            folder / PARAMETERS, corrected(campaign, _quantities(outcomes, source), source)
-        )
+        written = write_parameters(folder / PARAMETERS, corrected(campaign, _quantities(outcomes, source), source))
         for prediction in outcomes.predictions:
             _tables(folder, outcomes, prediction)
         files = tuple(path.relative_to(folder).as_posix() for path in written)
@@ -93,9 +91,7 @@ def _results(campaign: Campaign, outcomes: Outcomes, files: tuple[str, ...]) -> 
     found = outcomes.found
     parameters = tuple(_identified(outcomes))
     checks = tuple(_checks(outcomes, parameters))
-    misfits = tuple(
-        misfit for prediction in outcomes.predictions for misfit in _misfits(outcomes, prediction)
-    )
+    misfits = tuple(misfit for prediction in outcomes.predictions for misfit in _misfits(outcomes, prediction))
     return records.IdentifyResults(
         name=campaign.name,
         title=campaign.title,
@@ -128,9 +124,7 @@ def _results(campaign: Campaign, outcomes: Outcomes, files: tuple[str, ...]) -> 
         correlations=_correlations(outcomes, parameters),
         files=files,
         warnings=tuple(
-            Notice(severity="warning", what=f"{check.name}: {check.detail}")
-            for check in checks
-            if not check.ok
+            Notice(severity="warning", what=f"{check.name}: {check.detail}") for check in checks if not check.ok
         ),
         notes=_NOTES,
     )
@@ -193,26 +187,14 @@ def _checks(outcomes: Outcomes, parameters: Sequence[records.Identified]) -> Ite
         for one in gears
         if one.sigma > _WEAK * (np.pi / np.sqrt(3.0) if one.prior_sigma is None else one.prior_sigma)
     ]
-    yield Check(
-        name="identifiable",
-        ok=not weak,
-        detail="weak: " + ", ".join(weak) if weak else "every gearbox number",
-    )
+    yield Check(name="identifiable", ok=not weak, detail="weak: " + ", ".join(weak) if weak else "every gearbox number")
     confused = [
-        f"{one.name} with {one.partner} ({one.correlation:+.3f})"
-        for one in gears
-        if abs(one.correlation) > _CONFUSED
+        f"{one.name} with {one.partner} ({one.correlation:+.3f})" for one in gears if abs(one.correlation) > _CONFUSED
     ]
     yield Check(name="told apart", ok=not confused, detail=", ".join(confused) or "no pair above 0.95")
-    lost = [
-        profile.name
-        for profile in outcomes.profiles
-        if float(np.min(profile.D)) < -outcomes.settings.gain - 3.0
-    ]
+    lost = [profile.name for profile in outcomes.profiles if float(np.min(profile.D)) < -outcomes.settings.gain - 3.0]
     yield Check(
-        name="least cost",
-        ok=not lost,
-        detail="lower on the profile of " + ", ".join(lost) if lost else "on no profile",
+        name="least cost", ok=not lost, detail="lower on the profile of " + ", ".join(lost) if lost else "on no profile"
     )
     unsettled = [str(number) for number, mode in enumerate(outcomes.found.modes, 1) if not mode.settled]
     best = min(outcomes.found.modes, key=lambda mode: mode.cost, default=None)
@@ -243,18 +225,14 @@ def _misfits(outcomes: Outcomes, prediction: Prediction) -> Iterator[records.Mis
     """Root of the mean ratio of the residual's periodogram to the sensor's noise, over the channel's band."""
     experiment = outcomes.found.experiment
     recording = prediction.recording
-    for column, (channel, band) in enumerate(
-        zip(experiment.channels, experiment.bands(recording), strict=True)
-    ):
+    for column, (channel, band) in enumerate(zip(experiment.channels, experiment.bands(recording), strict=True)):
         ratios = []
         for left in (prediction.before, prediction.after):
             f, power = periodogram(left[:, column], recording.valid, recording.dt)
             inside = (f >= band[0]) & (f <= band[1])
             ratios.append(float(np.sqrt(np.mean(power[inside] / prediction.spectra[column].at(f[inside])))))
         role: Literal["fit", "held-out"] = "fit" if prediction.role == "fit" else "held-out"
-        yield records.Misfit(
-            recording=recording.name, role=role, channel=channel, before=ratios[0], after=ratios[1]
-        )
+        yield records.Misfit(recording=recording.name, role=role, channel=channel, before=ratios[0], after=ratios[1])
 
 
 def _verdict(
@@ -290,10 +268,7 @@ def _tables(folder: Path, outcomes: Outcomes, prediction: Prediction) -> None:
     units = [WRENCH_UNITS[WRENCH_CHANNELS.index(c)] for c in experiment.rig.transducer.channels]
     units += ["rad"] * len(experiment.rig.joints)
     n, lowest = len(recording.valid), experiment.lowest_Hz
-    history: dict[str, Array | Mask] = {
-        "t": recording.dt * np.arange(n, dtype=np.float64),
-        "valid": recording.valid,
-    }
+    history: dict[str, Array | Mask] = {"t": recording.dt * np.arange(n, dtype=np.float64), "valid": recording.valid}
     spectrum: dict[str, Array | Mask] = {}
     named, powers = {"t": "s"}, {"f": "Hz"}
     for column, (channel, unit) in enumerate(zip(experiment.channels, units, strict=True)):

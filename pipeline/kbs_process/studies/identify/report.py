@@ -13,12 +13,7 @@ from kbs_process.studies.identify.sections import parameters, residuals
 def head(results: IdentifyResults) -> Head:
     """Name, article and outcome."""
     return Head(
-        "Identification",
-        results.name,
-        results.title,
-        results.article,
-        results.verdict,
-        results.provenance.version,
+        "Identification", results.name, results.title, results.article, results.verdict, results.provenance.version
     )
 
 

@@ -21,9 +21,7 @@ class Identified(Record, frozen=True, kw_only=True):
 
     name: str
     unit: str
-    group: Literal[
-        "critical", "gearbox", "rig"
-    ]  # the paper's five; the rest of drives and transducer; all else
+    group: Literal["critical", "gearbox", "rig"]  # the paper's five; the rest of drives and transducer; all else
     prior: float
     prior_sigma: float | None  # None: nothing was known, a phase
     value: float

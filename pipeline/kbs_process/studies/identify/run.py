@@ -15,13 +15,7 @@ from kbs_process.errors import ConfigError
 from kbs_process.estimation.profile import Profile
 from kbs_process.identification import estimate as identification
 from kbs_process.identification.estimate import Identification, Settings
-from kbs_process.identification.output_error import (
-    Experiment,
-    Measured,
-    Spectra,
-    sensor_spectra,
-    unexplained,
-)
+from kbs_process.identification.output_error import Experiment, Measured, Spectra, sensor_spectra, unexplained
 from kbs_process.identification.unknowns import gearbox
 from kbs_process.progress import Progress
 from kbs_process.reduction.reading import read_run
@@ -68,19 +62,14 @@ def identify(
     """Identify over the recordings with the role "fit", predict those held out, and write the results to `target`."""
     if campaign.drive == "motion":
         raise ConfigError(
-            "this campaign is driven by measured motion: there is no motor-gear to identify",
-            where=campaign.name,
+            "this campaign is driven by measured motion: there is no motor-gear to identify", where=campaign.name
         )
     fitted = _read(campaign, "fit", progress)
     if not fitted:
         raise ConfigError("no recording has the role 'fit'", where=campaign.name, remedy="give one that role")
     held_out = _read(campaign, "held-out", progress)
     base = Experiment(
-        campaign.rig,
-        campaign.effects,
-        gearbox(campaign.rig, campaign.effects),
-        fitted,
-        settings.lowest_Hz,
+        campaign.rig, campaign.effects, gearbox(campaign.rig, campaign.effects), fitted, settings.lowest_Hz
     )
 
     @contextmanager
@@ -110,9 +99,7 @@ def _read(campaign: Campaign, role: str, progress: Progress) -> tuple[Measured, 
         if entry.role == role:
             with progress.task(f"Reading {entry.name}"):
                 slow = read_run(campaign, entry)
-                full = replace(
-                    campaign.bands, working_rate=float(np.rint(min(slow.rates["wrench"], _HIGHEST_RATE)))
-                )
+                full = replace(campaign.bands, working_rate=float(np.rint(min(slow.rates["wrench"], _HIGHEST_RATE))))
                 found.append(measured(read_run(replace(campaign, bands=full), entry), campaign.rig))
     return tuple(found)
 

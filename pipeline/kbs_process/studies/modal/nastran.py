@@ -20,15 +20,9 @@ from kbs_process.plant.linear.modal import ModalModel
 from kbs_process.signals.records import Array
 
 _NUMBER = r"[-+]?\d+\.\d*(?:[ED]?[-+]\d+)?"
-_EIGENVALUE = re.compile(
-    rf"^0?\s*(\d+)\s+\d+\s+({_NUMBER})\s+({_NUMBER})\s+({_NUMBER})\s+({_NUMBER})\s+{_NUMBER}\s*$"
-)
+_EIGENVALUE = re.compile(rf"^0?\s*(\d+)\s+\d+\s+({_NUMBER})\s+({_NUMBER})\s+({_NUMBER})\s+({_NUMBER})\s+{_NUMBER}\s*$")
 _POINT = re.compile(rf"^0?\s*(\d+)\s+G\s+({_NUMBER}(?:\s+{_NUMBER}){{5}})\s*$")
-_EIGENVALUES, _EIGENVECTOR, _CONSTRAINT = (
-    "REALEIGENVALUES",
-    "REALEIGENVECTOR",
-    "FORCESOFSINGLE-POINTCONSTRAINT",
-)
+_EIGENVALUES, _EIGENVECTOR, _CONSTRAINT = ("REALEIGENVALUES", "REALEIGENVECTOR", "FORCESOFSINGLE-POINTCONSTRAINT")
 
 
 def read_f06(
@@ -79,9 +73,7 @@ def _tables(path: Path) -> tuple[Array, dict[tuple[str, int], list[Array]]]:
         text = path.read_text(encoding="latin-1")
     except OSError as error:
         raise RecordingError(
-            f"cannot be read: {error.strerror}",
-            where=shown(path),
-            remedy="check the file's name and permissions",
+            f"cannot be read: {error.strerror}", where=shown(path), remedy="check the file's name and permissions"
         ) from error
     eigenvalues: dict[int, list[float]] = {}
     points: dict[tuple[str, int], list[Array]] = {}
@@ -99,9 +91,7 @@ def _tables(path: Path) -> tuple[Array, dict[tuple[str, int], list[Array]]]:
     return np.array([eigenvalues[mode] for mode in sorted(eigenvalues)]), points
 
 
-def _rows(
-    points: dict[tuple[str, int], list[Array]], heading: str, grid: int, modes: int, path: Path
-) -> Array:
+def _rows(points: dict[tuple[str, int], list[Array]], heading: str, grid: int, modes: int, path: Path) -> Array:
     """Return the rows (modes, 6) of one grid point: its k-th row belongs to the k-th mode."""
     found = points.get((heading, grid), [])
     if len(found) != modes:

@@ -16,9 +16,7 @@ from kbs_process.plant.linear.modal import ModalTable, derive, tracked
 from kbs_process.studies.modal.nastran import read_f06
 
 
-def derive_modes(
-    campaign: Campaign, joint: str | None, angles_deg: Sequence[float], target: Path
-) -> ModalTable:
+def derive_modes(campaign: Campaign, joint: str | None, angles_deg: Sequence[float], target: Path) -> ModalTable:
     """Derive the modes from the campaign's plant at angles of `joint` (default: the last one), and write them."""
     names = campaign.rig.joint_names
     swept = _known(joint, names, campaign.name)
@@ -28,9 +26,7 @@ def derive_modes(
             where="[transducer] stiffness",
             remedy="give stiffness and damping",
         )
-    table = derive(
-        campaign.rig, select(campaign.effects), swept, np.radians(angles_deg), np.zeros(len(names))
-    )
+    table = derive(campaign.rig, select(campaign.effects), swept, np.radians(angles_deg), np.zeros(len(names)))
     _write(table, target)
     return table
 
@@ -56,8 +52,7 @@ def import_modes(
             f"{shown(path)}: {len(m.frequency)}" for (_, path), m in zip(sorted(files), models, strict=True)
         )
         raise ConfigError(
-            f"the poses have different numbers of modes ({counts})",
-            remedy="ask Nastran for the same number at each",
+            f"the poses have different numbers of modes ({counts})", remedy="ask Nastran for the same number at each"
         )
     names = ", ".join(path.name for _, path in sorted(files))
     table = ModalTable(swept, tracked(models), f"Nastran: {names}")
@@ -76,8 +71,6 @@ def _write(table: ModalTable, target: Path) -> None:
         with target.open("x", encoding="utf-8") as file:
             file.write(modal_text(table))
     except FileExistsError:
-        raise OutputError(
-            "is there already", where=shown(target), remedy="name another file, or delete it"
-        ) from None
+        raise OutputError("is there already", where=shown(target), remedy="name another file, or delete it") from None
     except OSError as error:
         raise OutputError(f"cannot be written: {error.strerror}", where=shown(target)) from error

@@ -59,9 +59,7 @@ def write_prediction(
             "campaign": campaign.name,
             kind: name,
             "sources": [{"file": shown(path), "sha256": provenance.sha256(path)} for path in sources],
-            "description": [
-                {"file": shown(path), "sha256": provenance.sha256(path)} for path in campaign.inputs
-            ],
+            "description": [{"file": shown(path), "sha256": provenance.sha256(path)} for path in campaign.inputs],
             "effects": list(campaign.effects),
             "parameters": provenance.parameters(campaign.rig),
             "software": provenance.software(),

@@ -27,9 +27,7 @@ from kbs_process.studies.predict.reading_laws import read_through
 TABLES = (".csv", ".parquet")  # of commands, by the file's name
 
 
-def simulate_commands(
-    campaign: Campaign, commands: Path, target: Path, *, rate_Hz: float, progress: Progress
-) -> Path:
+def simulate_commands(campaign: Campaign, commands: Path, target: Path, *, rate_Hz: float, progress: Progress) -> Path:
     """Simulate the commands of a CSV or Parquet file through the controller; return `target`."""
     _require_commands(campaign)
     schedule = read_commands(commands, campaign.rig.joint_names)
@@ -49,9 +47,7 @@ def simulate_trajectory(
     first = {entry.trajectory: entry for entry in reversed(campaign.recordings)}
     name = trajectory or campaign.recordings[-1].trajectory
     if name not in first:
-        raise ConfigError(
-            f"there is no trajectory '{name}'", where=campaign.name, remedy=did_you_mean(name, first)
-        )
+        raise ConfigError(f"there is no trajectory '{name}'", where=campaign.name, remedy=did_you_mean(name, first))
     run = _read(campaign, first[name], progress)
     # Before a test nobody knows what field and encoders will do: the controller is simulated too.
     schedule = approached(replace(schedule_of(run, campaign.rig), field=None, encoder=None))
@@ -79,14 +75,10 @@ def predict_recording(campaign: Campaign, recording: str, target: Path, *, progr
             rates = run.rates["wrench"], run.rates.get("angle", run.rates["wrench"])
             streams = _command_driven(campaign, effects, schedule, *rates, _duration(run), task.update)
         read = read_through(campaign, streams, run.temperature)
-        return write_prediction(
-            campaign, read, target, "predicted", entry.name, (entry.path,), epoch_ns=run.epoch_ns
-        )
+        return write_prediction(campaign, read, target, "predicted", entry.name, (entry.path,), epoch_ns=run.epoch_ns)
 
 
-def predict_with(
-    model: Campaign, recording: str, target: Path, *, rate_Hz: float = 100.0, progress: Progress
-) -> Path:
+def predict_with(model: Campaign, recording: str, target: Path, *, rate_Hz: float = 100.0, progress: Progress) -> Path:
     """Predict a recording, or commands of a CSV or Parquet file, with a model; return `target`."""
     path = Path(recording)
     if path.suffix.lower() in TABLES and path.is_file():

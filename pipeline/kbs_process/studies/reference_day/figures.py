@@ -23,9 +23,7 @@ def trajectory(table: Table, phases: Sequence[Phase], sections: Sequence[Section
     with draw.style():
         figure, axis = draw.canvas(3.3)
         for column, name, color in AXES:
-            axis.plot(
-                t[::thin], np.degrees(table.columns[column][::thin]), color=color, linewidth=1.1, label=name
-            )
+            axis.plot(t[::thin], np.degrees(table.columns[column][::thin]), color=color, linewidth=1.1, label=name)
         axis.set_ylim(-60.0, 205.0)
         for phase in phases:
             if phase.mode in ("hand-over", "pre-pointing"):
@@ -35,9 +33,7 @@ def trajectory(table: Table, phases: Sequence[Phase], sections: Sequence[Section
                 axis.text(0.0, 200.0, f" {phase.relay}", ha="left", va="top", fontsize=6.5)
         for section in sections:
             axis.axvline(section.end_s, color=draw.GRID, linewidth=0.8, zorder=0.6)
-            axis.text(
-                0.5 * (section.start_s + section.end_s), -57.0, section.name, ha="center", color=draw.TICK
-            )
+            axis.text(0.5 * (section.start_s + section.end_s), -57.0, section.name, ha="center", color=draw.TICK)
         axis.set_xlim(0.0, float(t[-1]))
         axis.set_xlabel("time / s")
         axis.set_ylabel("angle / °")
@@ -121,9 +117,7 @@ def against_published(sections: Sequence[Section]) -> Picture:
             axis.grid(visible=False, axis="x")
             axis.set_title(which)
             axis.set_xlabel("section")
-        figure.axes[0].set_ylim(
-            bottom=0.0
-        )  # shared; an error of a statistic may be greater than the statistic
+        figure.axes[0].set_ylim(bottom=0.0)  # shared; an error of a statistic may be greater than the statistic
         figure.axes[0].set_ylabel("95 % error / mdeg")
         figure.axes[0].legend(loc="upper left", fontsize=6.5)
         return draw.picture(figure, "95 % of the pointing error of each section, simulated and published")

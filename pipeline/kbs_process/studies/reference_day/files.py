@@ -45,13 +45,7 @@ def write_tables(folder: Path, planned: Plan, found: Assessed) -> None:
         codes[phase.start : phase.end] = MODES.index(phase.mode)
     write_table(
         folder / "tables" / "day" / "trajectory.parquet",
-        {
-            "t": planned.t,
-            "az": planned.q[:, 0],
-            "el": planned.q[:, 1],
-            "offset": planned.offset,
-            "mode": codes,
-        },
+        {"t": planned.t, "az": planned.q[:, 0], "el": planned.q[:, 1], "offset": planned.offset, "mode": codes},
         {"t": "s", "az": "rad", "el": "rad", "offset": "rad", "mode": "1"},
         frame="T",
         history=("desired angles at every cycle", "mode: " + ", ".join(MODES)),
@@ -120,9 +114,7 @@ def _section(section: Section) -> records.Section:
         azimuth=estimate(azimuth),
         elevation=estimate(elevation),
         torques=tuple(
-            records.Torque(
-                band=one.band.name, label=one.label, value=one.value, axis=one.axis, time_s=one.time
-            )
+            records.Torque(band=one.band.name, label=one.label, value=one.value, axis=one.axis, time_s=one.time)
             for one in section.torques
         ),
         published=None
@@ -189,12 +181,7 @@ def _shown(one: records.Judged) -> tuple[float, float, float, str]:
     """Value, sigma and limit in the unit that requirements on pointing are written in."""
     if one.unit != "rad":
         return one.value, one.sigma, one.limit, one.unit
-    return (
-        float(np.degrees(one.value)),
-        float(np.degrees(one.sigma)),
-        round(float(np.degrees(one.limit)), 9),
-        "deg",
-    )
+    return (float(np.degrees(one.value)), float(np.degrees(one.sigma)), round(float(np.degrees(one.limit)), 9), "deg")
 
 
 def _geometry(day: Day, planned: Plan) -> records.Geometry:

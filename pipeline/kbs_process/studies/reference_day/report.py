@@ -13,9 +13,7 @@ from kbs_process.studies.reference_day.sections import compliance, errors, secti
 def head(results: ReferenceDayResults) -> Head:
     """Name, article and verdict."""
     about = f"{results.article} · {len(results.sections)} sections, {results.sections[-1].end_s:.0f} s"
-    return Head(
-        "Reference day", results.name, results.title, about, results.verdict, results.provenance.version
-    )
+    return Head("Reference day", results.name, results.title, about, results.verdict, results.provenance.version)
 
 
 def _constants(results: ReferenceDayResults, tables: Tables) -> Panel:

@@ -70,9 +70,7 @@ def commands(planned: Plan, rig: Rig) -> Schedule:
     return Schedule(planned.t, position, rate)
 
 
-def fly(
-    campaign: Campaign, planned: Plan, duration: float, update: Callable[[float], None] | None = None
-) -> Flown:
+def fly(campaign: Campaign, planned: Plan, duration: float, update: Callable[[float], None] | None = None) -> Flown:
     """Simulate the day in one piece, a block at a time; only the working rate is kept."""
     rig, rate = campaign.rig, campaign.bands.working_rate
     angles: list[Array] = []
@@ -87,19 +85,14 @@ def fly(
         progress=update,
     )
     run = condense(
-        campaign.name,
-        _aside(blocks, angles),
-        {"wrench": WRENCH_CHANNELS},
-        CondenseSettings(working_rate_Hz=rate),
+        campaign.name, _aside(blocks, angles), {"wrench": WRENCH_CHANNELS}, CondenseSettings(working_rate_Hz=rate)
     )
     assert run.wrench is not None  # the plant gives one
     offsets = [float(joint.encoder.offset) if joint.encoder else 0.0 for joint in rig.joints]
     q = np.concatenate(angles) - np.array(offsets)
     names = rig.joint_names
     valid = np.ones(len(q), dtype=np.bool_)
-    angle = Signal(
-        0.0, 1.0 / rate, q, names, ("rad",) * len(names), "joint", valid, ("true angle of the plant",)
-    )
+    angle = Signal(0.0, 1.0 / rate, q, names, ("rad",) * len(names), "joint", valid, ("true angle of the plant",))
     return Flown(angle, run.wrench)
 
 

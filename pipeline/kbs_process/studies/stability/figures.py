@@ -14,12 +14,7 @@ from kbs_process.report.tables import Table
 from kbs_process.studies.stability.results import OnsetAt, StabilityResults
 
 _SMOOTH: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 4.5, "color": draw.MEASURED}
-_FRICTION: dict[str, Any] = {
-    **_SMOOTH,
-    "marker": "s",
-    "markerfacecolor": "white",
-    "markeredgecolor": draw.LIMIT,
-}
+_FRICTION: dict[str, Any] = {**_SMOOTH, "marker": "s", "markerfacecolor": "white", "markeredgecolor": draw.LIMIT}
 
 
 def margins(results: StabilityResults, alt: str) -> Picture:
@@ -36,11 +31,7 @@ def margins(results: StabilityResults, alt: str) -> Picture:
             gain.plot(angle, decibel, color=color, label=joint)
             phase.plot(angle, degrees, color=color)
             peak.plot(angle, [entry.sensitivity_peak for entry in mine], color=color)
-        limits = (
-            (gain, 6.0, "gain margin / dB"),
-            (phase, 30.0, "phase margin / °"),
-            (peak, 2.0, "sensitivity peak"),
-        )
+        limits = ((gain, 6.0, "gain margin / dB"), (phase, 30.0, "phase margin / °"), (peak, 2.0, "sensitivity peak"))
         for axis, limit, label in limits:
             axis.axhline(limit, color=draw.LIMIT, linewidth=0.8, linestyle=(0, (4, 2)))
             axis.set_ylim(bottom=0.0)
@@ -85,10 +76,7 @@ def onsets(results: StabilityResults, alt: str) -> Picture:
         factor = np.array([entry.factor or np.nan for entry in results.critical])
         over.plot(angle, factor, color=draw.PREDICTED, linewidth=1.6, label="predicted")
         at_one = [entry for entry in results.onsets if entry.integral_weight == 1.0]
-        for friction, look, name in (
-            (False, _SMOOTH, "simulated"),
-            (True, _FRICTION, "simulated, with friction"),
-        ):
+        for friction, look, name in ((False, _SMOOTH, "simulated"), (True, _FRICTION, "simulated, with friction")):
             _marks(over, [e for e in at_one if e.friction is friction], look, name)
         middle = float(np.nanmean(factor)) if np.isfinite(factor).any() else 1.0
         over.set_ylim(0.8 * middle, 1.2 * middle)
@@ -100,9 +88,7 @@ def onsets(results: StabilityResults, alt: str) -> Picture:
             [entry.proportional for entry in results.boundary],
             color=draw.PREDICTED, linewidth=1.6, label="boundary",
         )  # fmt: skip
-        there = [
-            e for e in results.onsets if not e.friction and e.angle_rad == results.worst_angle_rad and e.found
-        ]
+        there = [e for e in results.onsets if not e.friction and e.angle_rad == results.worst_angle_rad and e.found]
         plane.plot([e.integral_weight * (e.found or 0.0) for e in there], [e.found for e in there], **_SMOOTH)
         plane.plot([1.0], [1.0], linestyle="none", marker="*", markersize=8, color=draw.LIMIT, label="as run")
         plane.set_xlim(left=0.0)
@@ -115,6 +101,4 @@ def onsets(results: StabilityResults, alt: str) -> Picture:
 
 def _marks(axis: Axes, entries: list[OnsetAt], look: dict[str, Any], name: str) -> None:
     found = [entry for entry in entries if entry.found is not None]
-    axis.plot(
-        np.degrees([e.angle_rad for e in found]), [e.found or np.nan for e in found], label=name, **look
-    )
+    axis.plot(np.degrees([e.angle_rad for e in found]), [e.found or np.nan for e in found], label=name, **look)

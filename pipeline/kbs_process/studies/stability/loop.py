@@ -130,9 +130,7 @@ def natural(system: Linear) -> Complex:
 def poles(loop: Loop) -> Complex:
     """Return the closed loop's poles as rates (N,) 1/s, log(z) / Tc: those above 1 / (2 Tc) appear folded below it."""
     z = np.linalg.eigvals(loop.closed()).astype(np.complex128)
-    rates: Complex = np.asarray(
-        np.log(z[np.abs(z) > 1e-300]) / loop.cycle, np.complex128
-    )  # at nought: a pure delay
+    rates: Complex = np.asarray(np.log(z[np.abs(z) > 1e-300]) / loop.cycle, np.complex128)  # at nought: a pure delay
     return rates
 
 
@@ -154,9 +152,7 @@ def critical_near(system: Linear, controller: Controller, factor: float) -> floa
     return float(np.exp(brentq(excess, low, high, xtol=1e-9)))
 
 
-def critical(
-    system: Linear, controller: Controller, *, proportional: float = 1.0, integral: float = 1.0
-) -> Critical:
+def critical(system: Linear, controller: Controller, *, proportional: float = 1.0, integral: float = 1.0) -> Critical:
     """Return the factor on the gains, Kp times `proportional` and Ki times `integral`, at which stability is lost.
 
     The first crossing of the unit circle as the factor grows in steps of 3 %, refined by Brent's method.
@@ -188,13 +184,9 @@ def margins(loop: Loop, joint: str, points: int = 1000) -> Margins:
     from control import FrequencyResponseData, stability_margins
 
     nyquist = 0.5 / loop.cycle
-    f = np.unique(
-        np.concatenate([np.geomspace(1e-4 * nyquist, nyquist, points), np.linspace(0, nyquist, points)[1:]])
-    )
+    f = np.unique(np.concatenate([np.geomspace(1e-4 * nyquist, nyquist, points), np.linspace(0, nyquist, points)[1:]]))
     L = loop.response(joint, f)
-    gm, pm, sm, gain_w, phase_w, nearest_w = stability_margins(
-        FrequencyResponseData(L, 2.0 * np.pi * f, smooth=True)
-    )
+    gm, pm, sm, gain_w, phase_w, nearest_w = stability_margins(FrequencyResponseData(L, 2.0 * np.pi * f, smooth=True))
     turn = 2.0 * np.pi
     return Margins(
         gain=float(gm) if np.isfinite(gm) and gm > 0.0 else float("inf"),

@@ -137,9 +137,7 @@ def onset(
     def tried(factor: float) -> Ring | None:
         """None: the motion is no longer finite."""
         try:
-            return ring(
-                rig, effects, q, proportional=factor * proportional, integral=factor * integral, kick=kick
-            )
+            return ring(rig, effects, q, proportional=factor * proportional, integral=factor * integral, kick=kick)
         except SimulationError:
             return None
 
@@ -174,10 +172,7 @@ def _is_smooth(rig: Rig) -> bool:
 
 
 def _with_gains(rig: Rig, controller: Controller, proportional: float, integral: float) -> Rig:
-    gains = {
-        controller.Kp.name: proportional * controller.Kp.value,
-        controller.Ki.name: integral * controller.Ki.value,
-    }
+    gains = {controller.Kp.name: proportional * controller.Kp.value, controller.Ki.name: integral * controller.Ki.value}
     gained = substitute(rig, dict(gains))
     assert gained.controller is not None
     return replace(gained, controller=replace(gained.controller, loop="closed"))

@@ -58,9 +58,7 @@ def analyse_stability(
     names = rig.joint_names
     swept = names[-1] if joint is None else joint
     if swept not in names:
-        raise ConfigError(
-            f"there is no joint '{swept}'", where=campaign.name, remedy=did_you_mean(swept, names)
-        )
+        raise ConfigError(f"there is no joint '{swept}'", where=campaign.name, remedy=did_you_mean(swept, names))
     structure_of(rig, select(campaign.effects))  # refuses a rig without drives or on a turning transducer
     angles = np.radians(np.linspace(low_deg, high_deg, points))
     with writing(target) as folder:
@@ -78,9 +76,7 @@ def analyse_stability(
             sensitivities = _sensitivities(campaign, swept, angles[worst], controller)
         with progress.task("Looking for the onset by simulation") as task:
             simulated = angles[np.unique(np.linspace(0, points - 1, _SIMULATED).astype(int))]
-            onsets, cycles = _simulated(
-                campaign, swept, simulated, float(angles[worst]), controller, task.update
-            )
+            onsets, cycles = _simulated(campaign, swept, simulated, float(angles[worst]), controller, task.update)
         found = StabilityResults(
             name=campaign.name,
             title=campaign.title,
@@ -97,9 +93,7 @@ def analyse_stability(
             worst_angle_rad=float(angles[worst]),
             worst_sigma=float(np.linalg.norm([entry.sigma_of_factor for entry in sensitivities])),
             kick_rad=onset.KICK,
-            encoder_step_rad=max(
-                (float(j.encoder.step) for j in rig.joints if j.encoder is not None), default=0.0
-            ),
+            encoder_step_rad=max((float(j.encoder.step) for j in rig.joints if j.encoder is not None), default=0.0),
             margins=tuple(margins),
             critical=tuple(critical),
             boundary=boundary,
@@ -133,9 +127,7 @@ def _pose(rig: Rig, joint: str, angle: float) -> Array:
 
 def _system(campaign: Campaign, rig: Rig, joint: str, angle: float, *, at_rest: bool = False) -> Linear:
     """Linearise without friction, or with the slopes that it has at standstill."""
-    return linearise(
-        rig if at_rest else onset.smooth_rig(rig), select(campaign.effects), _pose(rig, joint, angle)
-    )
+    return linearise(rig if at_rest else onset.smooth_rig(rig), select(campaign.effects), _pose(rig, joint, angle))
 
 
 def _margins(system: Linear, controller: Controller, angle: float) -> Iterable[LoopMargins]:
@@ -154,9 +146,7 @@ def _margins(system: Linear, controller: Controller, angle: float) -> Iterable[L
         )
 
 
-def _critical(
-    campaign: Campaign, joint: str, system: Linear, controller: Controller, angle: float
-) -> CriticalAt:
+def _critical(campaign: Campaign, joint: str, system: Linear, controller: Controller, angle: float) -> CriticalAt:
     found = stability.critical(system, controller)
     resting = stability.critical(_system(campaign, campaign.rig, joint, angle, at_rest=True), controller)
     return CriticalAt(
@@ -190,9 +180,7 @@ def _boundary(system: Linear, controller: Controller) -> Iterable[Boundary]:
             yield Boundary(integral_weight=weight, proportional=found.factor, integral=weight * found.factor)
 
 
-def _sensitivities(
-    campaign: Campaign, joint: str, angle: float, controller: Controller
-) -> tuple[Sensitivity, ...]:
+def _sensitivities(campaign: Campaign, joint: str, angle: float, controller: Controller) -> tuple[Sensitivity, ...]:
     """Move every uncertain number of the rig by a sigma; those of a quantity add in squares."""
     rig = campaign.rig
 
@@ -219,12 +207,7 @@ def _sensitivities(
 
 
 def _simulated(
-    campaign: Campaign,
-    joint: str,
-    angles: Array,
-    worst: float,
-    controller: Controller,
-    update: Callable[[float], None],
+    campaign: Campaign, joint: str, angles: Array, worst: float, controller: Controller, update: Callable[[float], None]
 ) -> tuple[list[OnsetAt], list[LimitCycle]]:
     rig, smooth = campaign.rig, onset.smooth_rig(campaign.rig)
     jobs = [(float(angle), 1.0, friction) for angle in angles for friction in (False, True)]
@@ -235,11 +218,7 @@ def _simulated(
         predicted = stability.critical(system, controller, integral=weight).factor
         if np.isfinite(predicted):
             found = onset.onset(
-                rig if friction else smooth,
-                campaign.effects,
-                _pose(rig, joint, angle),
-                predicted,
-                integral=weight,
+                rig if friction else smooth, campaign.effects, _pose(rig, joint, angle), predicted, integral=weight
             )
             onsets.append(
                 OnsetAt(
@@ -261,19 +240,13 @@ def _simulated(
 def _limit_cycle(campaign: Campaign, q: Array, share: float, critical: float) -> LimitCycle:
     factor = share * critical
     found = onset.ring(campaign.rig, campaign.effects, q, proportional=factor, integral=factor)
-    return LimitCycle(
-        factor=factor, share_of_critical=share, rms_rad=found.late, frequency_Hz=found.frequency
-    )
+    return LimitCycle(factor=factor, share_of_critical=share, rms_rad=found.late, frequency_Hz=found.frequency)
 
 
-def _conclusion(
-    margins: Sequence[LoopMargins], worst: CriticalAt, sensitivities: Sequence[Sensitivity]
-) -> Conclusion:
+def _conclusion(margins: Sequence[LoopMargins], worst: CriticalAt, sensitivities: Sequence[Sensitivity]) -> Conclusion:
     """Judge by the customary margins of 6 dB and 30 deg."""
     if worst.factor is None:
-        return Conclusion(
-            status="pass", sentence="No gain up to the largest that was tried makes the loop unstable."
-        )
+        return Conclusion(status="pass", sentence="No gain up to the largest that was tried makes the loop unstable.")
     gain = min(worst.factor, *(entry.gain or np.inf for entry in margins))
     phase = min((entry.phase_rad for entry in margins if entry.phase_rad is not None), default=np.inf)
     ok = gain >= GAIN_MARGIN and phase >= PHASE_MARGIN

@@ -93,9 +93,7 @@ class _CdrLayout:
         names = [f"f{i}" for i in range(len(self.parts))]
         offsets = [offset for offset, _, _ in self.parts]
         formats = [kind for _, kind, _ in self.parts]
-        table = np.zeros(
-            n, np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": self.size})
-        )
+        table = np.zeros(n, np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": self.size}))
         for name, (_, _, values) in zip(names, self.parts, strict=True):
             table[name] = values
         return table.view(np.uint8).reshape(n, self.size)
@@ -151,14 +149,10 @@ def _protobuf(stream: OutStream) -> Iterator[bytes]:
         time = number_field(1, seconds) + number_field(2, nanoseconds)
         header = delimited(1, delimited(1, time) + frame)
         if stream.kind == "wrench":
-            yield header + delimited(
-                2, delimited(1, _doubles(1, row[:3])) + delimited(2, _doubles(1, row[3:]))
-            )
+            yield header + delimited(2, delimited(1, _doubles(1, row[:3])) + delimited(2, _doubles(1, row[3:])))
         elif stream.kind == "joints":
             parts = (row[:joints], row[joints : 2 * joints], row[2 * joints :])
-            yield (
-                header + names + b"".join(_packed(number, part) for number, part in enumerate(parts, start=3))
-            )
+            yield (header + names + b"".join(_packed(number, part) for number, part in enumerate(parts, start=3)))
         else:
             yield header + _doubles(2, row)
 

@@ -12,15 +12,7 @@ from itertools import count
 
 from kbs_process.recordings.mcap.framing import MalformedError
 from kbs_process.recordings.mcap.kernels import FLOAT32, FLOAT64, LITTLE, SIGNED, UNSIGNED, VARINT, ZIGZAG
-from kbs_process.recordings.mcap.layout import (
-    LACKING,
-    LEFT_OUT,
-    Cell,
-    Guards,
-    Layout,
-    LayoutDecoder,
-    layout,
-)
+from kbs_process.recordings.mcap.layout import LACKING, LEFT_OUT, Cell, Guards, Layout, LayoutDecoder, layout
 from kbs_process.recordings.mcap.messages.fields import Elements, Field, Step, find_stamp, sibling
 
 WIRE_VARINT, WIRE_64, WIRE_BYTES, WIRE_32 = 0, 1, 2, 5
@@ -113,9 +105,7 @@ def parse_descriptors(data: bytes) -> Descriptors:
 
 
 def _children(data: bytes, number: int) -> list[bytes]:
-    return [
-        data[i.at : i.end] for i in items(data, 0, len(data)) if (i.number, i.wire) == (number, WIRE_BYTES)
-    ]
+    return [data[i.at : i.end] for i in items(data, 0, len(data)) if (i.number, i.wire) == (number, WIRE_BYTES)]
 
 
 def _add_message(found: Descriptors, prefix: str, data: bytes, depth: int) -> None:
@@ -124,12 +114,8 @@ def _add_message(found: Descriptors, prefix: str, data: bytes, depth: int) -> No
     name = prefix + next((text.decode() for text in _children(data, 1)), "")
     found[name] = {}
     for field in _children(data, 2):
-        numbers = {
-            i.number: _varint(field, i.at, i.end)[0] for i in items(field, 0, len(field)) if i.wire == 0
-        }
-        texts = {
-            i.number: field[i.at : i.end].decode() for i in items(field, 0, len(field)) if i.number in (1, 6)
-        }
+        numbers = {i.number: _varint(field, i.at, i.end)[0] for i in items(field, 0, len(field)) if i.wire == 0}
+        texts = {i.number: field[i.at : i.end].decode() for i in items(field, 0, len(field)) if i.number in (1, 6)}
         found[name][numbers.get(3, 0)] = Member(
             texts.get(1, ""), numbers.get(5, 0), texts.get(6, "").lstrip("."), numbers.get(4) == REPEATED
         )

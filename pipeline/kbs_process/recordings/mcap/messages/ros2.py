@@ -92,9 +92,7 @@ def _members(body: str, package: str, blocks: dict[str, str]) -> tuple[Member, .
             base = next((choice for choice in choices if choice in blocks), "")
             if not base:
                 raise MalformedError(f"the definition of {match['base']} is missing")
-        count = (
-            None if not match["array"] else -1 if match["bound"] or not match["size"] else int(match["size"])
-        )
+        count = None if not match["array"] else -1 if match["bound"] or not match["size"] else int(match["size"])
         members.append(Member(match["name"], base, count))
     return tuple(members)
 

@@ -11,13 +11,7 @@ from matplotlib.figure import Figure
 from kbs_process.report import draw
 from kbs_process.report.panel import Picture
 from kbs_process.report.text import label, number, unit
-from kbs_process.studies.correlate.results import (
-    Budget,
-    ChannelResult,
-    FittedParameter,
-    Repeatability,
-    Requirement,
-)
+from kbs_process.studies.correlate.results import Budget, ChannelResult, FittedParameter, Repeatability, Requirement
 
 _ROWS = 24  # of parameters in one column
 
@@ -39,11 +33,7 @@ def against_limit(requirement: Requirement, alt: str) -> Picture:
         )
         if any(row.predicted is not None for row in rows):
             axis.barh(
-                place + 0.19,
-                [row.predicted or 0.0 for row in rows],
-                0.34,
-                color=draw.PREDICTED,
-                label="predicted",
+                place + 0.19, [row.predicted or 0.0 for row in rows], 0.34, color=draw.PREDICTED, label="predicted"
             )
         axis.axvline(requirement.limit, color=draw.LIMIT, linewidth=1.2, label="limit")
         axis.set_yticks(place, [label(row.channel) for row in rows])
@@ -100,10 +90,7 @@ def variance_shares(budgets: Sequence[Budget], alt: str) -> Picture:
                 axis.barh(row, share, 0.62, left=left, color=color, edgecolor="white", linewidth=0.5)
                 left += share
             axis.annotate(
-                f"{number(budget.total, 2)} {unit(budget.unit)}",
-                (101.0, row),
-                va="center",
-                annotation_clip=False,
+                f"{number(budget.total, 2)} {unit(budget.unit)}", (101.0, row), va="center", annotation_clip=False
             )
         axis.set_yticks(range(len(budgets)), [label(budget.channel) for budget in budgets])
         axis.invert_yaxis()
@@ -127,9 +114,7 @@ def shifts(parameters: Sequence[FittedParameter], alt: str) -> Picture:
     error = np.array([entry.sigma for entry in moved]) / width
     reach = max(3.0, 1.15 * float(np.max(np.abs(pull), initial=0.0)))
     with draw.style():
-        figure = Figure(
-            figsize=(draw.WIDTH, 0.7 + (0.2 if columns == 1 else 0.155) * rows), layout="constrained"
-        )
+        figure = Figure(figsize=(draw.WIDTH, 0.7 + (0.2 if columns == 1 else 0.155) * rows), layout="constrained")
         axes = figure.subplots(1, columns, squeeze=False)[0]
         for column, axis in enumerate(axes):
             shown = slice(column * rows, min((column + 1) * rows, len(moved)))

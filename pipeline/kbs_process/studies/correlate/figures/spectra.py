@@ -34,16 +34,12 @@ def spectra(
                 _range(*(f for f, _ in curves.values())),
                 _range(*(density for _, density in curves.values())),
             )
-            panel = sheet.panel(
-                row, column, frequencies, (0.5 * densities[0], 2.0 * densities[1]), logarithmic=True
-            )
+            panel = sheet.panel(row, column, frequencies, (0.5 * densities[0], 2.0 * densities[1]), logarithmic=True)
             for name, (frequency, density) in curves.items():
                 panel.curve(frequency, density, draw.LINES[name])
             _marks(panel, resonances, edges, named=index == 0)
             lowest = row == rows - 1 or index == len(channels) - 1
-            panel.frame(
-                f"{channel} / {unit(table.unit(channel))}", below="frequency / Hz" if lowest else None
-            )
+            panel.frame(f"{channel} / {unit(table.unit(channel))}", below="frequency / Hz" if lowest else None)
             names |= curves.keys()
         sheet.key(0, sorted(names))
         return draw.picture(sheet.figure, alt, title, "png")

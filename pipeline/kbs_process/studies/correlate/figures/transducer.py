@@ -34,9 +34,7 @@ def gains(table: Table, edges: Sequence[float], filters: dict[str, Array], alt: 
                 axis.plot(f, table.columns[name], label=name.split(".", 1)[1], **look)
             for index, (name, gain) in enumerate(filters.items()):
                 color = draw.SERIES[(index + 1) % len(draw.SERIES)]
-                axis.plot(
-                    f, gain * table.columns[names[-1]], label=f"behind {name}", color=color, linewidth=0.9
-                )
+                axis.plot(f, gain * table.columns[names[-1]], label=f"behind {name}", color=color, linewidth=0.9)
             for edge in edges:
                 axis.axvline(edge, color=draw.INK, linewidth=0.7, linestyle=(0, (1, 1.5)))
             draw.logarithmic(axis, "x", 0.2, float(f[-1]))

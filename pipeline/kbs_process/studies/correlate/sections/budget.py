@@ -63,14 +63,7 @@ def _tables(results: Results, rows: tuple[Budget, ...]) -> tuple[Grid, ...]:
 def _table(results: Results, rows: tuple[Budget, ...]) -> Grid:
     """One row a stage, one column a channel."""
     stages = dict.fromkeys((item.stage, item.source) for row in rows for item in row.contributions)
-    body = [
-        (
-            stage,
-            source,
-            *(number(_sigma(row, stage, source), 2) for row in rows),
-        )
-        for stage, source in stages
-    ]
+    body = [(stage, source, *(number(_sigma(row, stage, source), 2) for row in rows)) for stage, source in stages]
     body.append(("Total", "root sum of squares", *(number(row.total, 2) for row in rows)))
     head = ("Stage", "Source", *(f"{row.channel} / {unit(row.unit)}" for row in rows))
     title = f"Standard uncertainties, {_label(results, rows[0])}"
@@ -78,6 +71,4 @@ def _table(results: Results, rows: tuple[Budget, ...]) -> Grid:
 
 
 def _sigma(row: Budget, stage: str, source: str) -> float | None:
-    return next(
-        (item.sigma for item in row.contributions if (item.stage, item.source) == (stage, source)), None
-    )
+    return next((item.sigma for item in row.contributions if (item.stage, item.source) == (stage, source)), None)

@@ -4,17 +4,7 @@ from __future__ import annotations
 
 from kbs_process.report.panel import Block, Caption, Cell, Figure, Fold, Grid, Notices, Panel, Text
 from kbs_process.report.tables import Tables
-from kbs_process.report.text import (
-    MISSING,
-    band_hz,
-    count,
-    exact,
-    frame_label,
-    measure,
-    number,
-    percent,
-    unit,
-)
+from kbs_process.report.text import MISSING, band_hz, count, exact, frame_label, measure, number, percent, unit
 from kbs_process.studies.correlate.figures import bars
 from kbs_process.studies.correlate.results import Notice, Requirement, Results
 
@@ -22,8 +12,7 @@ _CAPTION = Caption(
     shown="Each channel's measured value in the recording that is nearest to failing, with the interval that holds the "
     "true one at 95 %, the prediction's largest, and the limit. The interval of a peak reaches further down than up: "
     "noise raises a peak and never lowers it.",
-    good="Every bar with its interval ends left of the limit, and the prediction is a little above "
-    "the measurement.",
+    good="Every bar with its interval ends left of the limit, and the prediction is a little above the measurement.",
     bad="An error bar that reaches the limit: the verdict is then undecided. A prediction well below the "
     "measurement: it must not be used to extrapolate to flight.",
     do="For the channel nearest to its limit, go to its time history, then to the uncertainty budget for "
@@ -46,9 +35,7 @@ def panel(results: Results, tables: Tables) -> Panel:
     if results.notes:
         blocks.append(Text("Assumptions behind these figures:", results.notes))
     blocks.extend(_figure(requirement) for requirement in results.requirements if requirement.channels)
-    return Panel(
-        "compliance", "Compliance", "Is every requirement met, and what qualifies the answer?", tuple(blocks)
-    )
+    return Panel("compliance", "Compliance", "Is every requirement met, and what qualifies the answer?", tuple(blocks))
 
 
 def _predicted(entry: Requirement) -> str:

@@ -11,8 +11,7 @@ _CAPTION = Caption(
     shown="Frame T on the transducer's top plate, with the positive sense of each torque (right-handed). "
     "The wrench in this report is what the unit exerts on the transducer, about T's origin, in T's axes.",
     good="All self-tests below pass.",
-    bad="A failed test: a sign, an axis or a taring differs between the recorder and the campaign's "
-    "description.",
+    bad="A failed test: a sign, an axis or a taring differs between the recorder and the campaign's description.",
     do="Correct the rig's description, or the recorder's channel signs, and process again; never correct "
     "a sign in the results.",
 )
@@ -21,9 +20,7 @@ _DEFINITIONS = (
     "Wrench: force and torque that the unit exerts on the transducer; at rest, with z up, Fz is minus the weight.",
     "Torques: Tx = Σ (y Fz − z Fy), and so on: r × F.",
 )
-_SPACECRAFT = (
-    "S: at the spacecraft's centre of mass; its place and attitude with respect to T are the campaign's."
-)
+_SPACECRAFT = "S: at the spacecraft's centre of mass; its place and attitude with respect to T are the campaign's."
 
 
 def panel(results: Results, tables: Tables) -> Panel:
@@ -32,27 +29,15 @@ def panel(results: Results, tables: Tables) -> Panel:
     spacecraft = "S" in frames_used
     picture = frames.frames("Frame T with its axes and positive torques", spacecraft=spacecraft)
     definitions = (*_DEFINITIONS, _SPACECRAFT) if spacecraft else _DEFINITIONS
-    blocks: list[Block] = [
-        Text("Definitions:", definitions),
-        Figure("Frames and signs", (picture,), _CAPTION),
-    ]
+    blocks: list[Block] = [Text("Definitions:", definitions), Figure("Frames and signs", (picture,), _CAPTION)]
     rows = tuple(
-        (
-            entry.check,
-            entry.expected,
-            entry.found,
-            Cell("ok" if entry.ok else "failed", "pass" if entry.ok else "fail"),
-        )
+        (entry.check, entry.expected, entry.found, Cell("ok" if entry.ok else "failed", "pass" if entry.ok else "fail"))
         for entry in results.conventions
     )
     if rows:
         blocks.append(
-            Grid(
-                "Self-tests on this campaign's data", ("Check", "Expected", "Found", "Outcome"), rows, "lllc"
-            )
+            Grid("Self-tests on this campaign's data", ("Check", "Expected", "Found", "Outcome"), rows, "lllc")
         )
     else:
         blocks.append(Text("No self-test of signs and frames was made."))
-    return Panel(
-        "conventions", "Signs and frames", "Do recorder and model mean the same by every sign?", tuple(blocks)
-    )
+    return Panel("conventions", "Signs and frames", "Do recorder and model mean the same by every sign?", tuple(blocks))

@@ -47,15 +47,10 @@ def panel(results: Results, tables: Tables) -> Panel:
     bursts = (_whole_band(results), results.campaign.frame)
     live = views(scenes)
     shown = {view.choice for view in live}
-    shortcuts = {
-        "Requirement" if results.requirements else "Narrowest band": main,
-        "Bursts (unfiltered)": bursts,
-    }
+    shortcuts = {"Requirement" if results.requirements else "Narrowest band": main, "Bursts (unfiltered)": bursts}
     figure = Figure(
         "Disturbance, measured and predicted",
-        tuple(
-            _plate(results, *entry) for key in dict.fromkeys((main, bursts)) for entry in _plates(found, key)
-        ),
+        tuple(_plate(results, *entry) for key in dict.fromkeys((main, bursts)) for entry in _plates(found, key)),
         _CAPTION,
         Live(
             "disturbance",
@@ -63,9 +58,7 @@ def panel(results: Results, tables: Tables) -> Panel:
             live,
             two_scales=False,
             shortcuts=tuple(
-                (name, _choice(results, *key))
-                for name, key in shortcuts.items()
-                if _choice(results, *key) in shown
+                (name, _choice(results, *key)) for name, key in shortcuts.items() if _choice(results, *key) in shown
             ),
         ),
     )

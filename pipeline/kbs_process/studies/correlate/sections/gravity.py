@@ -58,19 +58,12 @@ def panel(results: Results, tables: Tables) -> Panel:
 
 def _parameters(gravity: Gravity) -> Grid:
     rows = tuple(
-        (
-            entry.name,
-            measure(entry.prior, entry.prior_sigma),
-            measure(entry.value, entry.sigma),
-            unit(entry.unit),
-        )
+        (entry.name, measure(entry.prior, entry.prior_sigma), measure(entry.value, entry.sigma), unit(entry.unit))
         for entry in gravity.parameters
     )
     quality = ""
     if gravity.samples:
-        quality = (
-            f"{count(gravity.samples, 'sample')}; reduced chi-square {number(gravity.reduced_chi_square)}."
-        )
+        quality = f"{count(gravity.samples, 'sample')}; reduced chi-square {number(gravity.reduced_chi_square)}."
     if any(entry.name.startswith("transducer.cross_coupling") for entry in gravity.parameters):
         quality += " Cross-coupling: dX in (I + X) = (I + X₀)(I + dX), X₀ as stated."
     return Grid("Fitted parameters", ("Parameter", "Before (prior)", "Fitted", "Unit"), rows, "lrrl", quality)

@@ -9,14 +9,7 @@ from kbs_process.report.tables import Tables
 from kbs_process.report.text import frame_label, measure, number, percent, unit
 from kbs_process.studies.correlate.figures import merit
 from kbs_process.studies.correlate.results import Merit, Results
-from kbs_process.studies.correlate.sections.choose import (
-    ROLES,
-    band_label,
-    band_names,
-    folded,
-    main_band,
-    main_frame,
-)
+from kbs_process.studies.correlate.sections.choose import ROLES, band_label, band_names, folded, main_band, main_frame
 
 _CAPTION = Caption(
     shown="Predicted against measured peak, one mark a recording and channel. On the line they are "

@@ -18,9 +18,7 @@ def panel(results: Results, tables: Tables) -> Panel:
     clocks = _clocks(results.recordings)
     if clocks.rows:
         blocks.append(Fold(f"Clocks ({count(len(clocks.rows), 'stream')})", (clocks,)))
-    return Panel(
-        "recordings", "Recordings", "What was recorded, how completely, and on which clocks?", tuple(blocks)
-    )
+    return Panel("recordings", "Recordings", "What was recorded, how completely, and on which clocks?", tuple(blocks))
 
 
 def _recordings(recordings: tuple[Recording, ...]) -> Grid:
@@ -51,9 +49,7 @@ def _losses(recordings: tuple[Recording, ...]) -> Grid:
         for loss in entry.losses
     )
     head = ("Recording", "Kind", "Where", "Count", "Time", "Detail")
-    return Grid(
-        "Data losses", head, rows, "kklrkl", "Count: messages or blocks. Time: on the recording's own axis."
-    )
+    return Grid("Data losses", head, rows, "kklrkl", "Count: messages or blocks. Time: on the recording's own axis.")
 
 
 def _when(start: float | None, end: float | None) -> str:

@@ -45,10 +45,7 @@ def panel(results: Results, tables: Tables) -> Panel:
     blocks: list[Block] = [figure]
     if len(found) > PLATES:
         blocks.append(
-            Text(
-                f"On paper: {PLATES} of {count(len(found), 'recording')}; all of them in the page.",
-                tone="muted",
-            )
+            Text(f"On paper: {PLATES} of {count(len(found), 'recording')}; all of them in the page.", tone="muted")
         )
     return Panel("static", "Static wrench", question, tuple(blocks))
 

@@ -16,9 +16,7 @@ from kbs_process.studies.correlate.on_transducer import FilterErrorIn, OnTransdu
 from kbs_process.studies.correlate.results import Results
 from kbs_process.studies.correlate.sections.choose import band_label, main_frame
 
-QUESTION = (
-    "How much of a band's torque does the transducer's resonance make, and do both ways to compute it agree?"
-)
+QUESTION = "How much of a band's torque does the transducer's resonance make, and do both ways to compute it agree?"
 _GAINS = Caption(
     shown="Torque that the transducer reads over the torque that the article would exert on a rigid base, over "
     "frequency, at the first, middle and last pose; dotted: the bands' upper edges; coloured: the same behind each "
@@ -59,17 +57,12 @@ def panel(results: Results, tables: Tables) -> Panel:
         alt = "Root densities of three torques on a rigid base, through the modes, coupled"
         blocks.append(
             Figure(
-                f"The disturbance of {found.recording}, both ways",
-                (figures.spectra(spectrum, edges, alt),),
-                _SPECTRA,
+                f"The disturbance of {found.recording}, both ways", (figures.spectra(spectrum, edges, alt),), _SPECTRA
             )
         )
     others = [other for other in ("T", "S") if other != frame and any(e.frame == other for e in found.errors)]
     folded = [_error_table(results, found, other) for other in others]
-    blocks += [
-        _agreement_table(results, found),
-        Fold("Modes, and other frames", (_mode_table(found), *folded)),
-    ]
+    blocks += [_agreement_table(results, found), Fold("Modes, and other frames", (_mode_table(found), *folded))]
     return Panel("transducer", "Transducer resonance", QUESTION, tuple(blocks))
 
 
@@ -79,11 +72,7 @@ def _low_passes(edges: Iterable[float], f: Array) -> dict[str, Array]:
 
 
 def _words(results: Results, found: OnTransducer) -> Text:
-    torques = [
-        entry
-        for entry in found.errors
-        if entry.frame == main_frame(results) and entry.channel.startswith("T")
-    ]
+    torques = [entry for entry in found.errors if entry.frame == main_frame(results) and entry.channel.startswith("T")]
     items = []
     for band in dict.fromkeys(entry.band for entry in torques):
         worst = max((e for e in torques if e.band == band), key=lambda e: e.error_peak)
@@ -121,25 +110,13 @@ def _gain_table(found: OnTransducer) -> Grid:
         )
         for pose in poses
     )
-    head = (
-        f"Angle of {found.joint}",
-        *(f"{channel} at {edge:g} Hz" for edge in edges for channel in channels),
-    )
+    head = (f"Angle of {found.joint}", *(f"{channel} at {edge:g} Hz" for edge in edges for channel in channels))
     note = "±: one standard deviation, from those of the modes' frequencies and dampings."
     return Grid("Gain at the bands' edges", head, rows, "k" + "r" * (len(head) - 1), note)
 
 
 def _error_table(results: Results, found: OnTransducer, frame: str) -> Grid:
-    head = (
-        "Band",
-        "Channel",
-        "Rigid rms",
-        "Error rms",
-        "Of which leak",
-        "Rigid peak",
-        "Error peak",
-        "Error / peak",
-    )
+    head = ("Band", "Channel", "Rigid rms", "Error rms", "Of which leak", "Rigid peak", "Error peak", "Error / peak")
     rows = tuple(
         (
             band_label(results, e.band),
@@ -190,12 +167,7 @@ def _agreement_table(results: Results, found: OnTransducer) -> Grid:
 
 
 def _mode_table(found: OnTransducer) -> Grid:
-    head = (
-        f"Angle of {found.joint}",
-        "Frequency / Hz",
-        "Damping / %",
-        *(f"About {a} / kg·m²" for a in "xyz"),
-    )
+    head = (f"Angle of {found.joint}", "Frequency / Hz", "Damping / %", *(f"About {a} / kg·m²" for a in "xyz"))
     rows = tuple(
         (
             f"{number(math.degrees(mode.angle_rad))}°",

@@ -29,9 +29,7 @@ def panel(results: DiagnosisResults, tables: Tables) -> Panel:
     blocks: list[Block] = [Text(results.paragraph)]
     if results.warnings:
         blocks.append(
-            Notices(
-                tuple((entry.severity, entry.what, entry.where, entry.remedy) for entry in results.warnings)
-            )
+            Notices(tuple((entry.severity, entry.what, entry.where, entry.remedy) for entry in results.warnings))
         )
     if results.finds:
         blocks.append(_finds(results.finds, results.answer))
@@ -65,15 +63,7 @@ def _finds(finds: tuple[Find, ...], answer: Answer) -> Grid:
         )
         for find in finds
     )
-    head = (
-        "Find",
-        "Physics",
-        "Enters at",
-        "Seen in",
-        "Probability",
-        "Distance / sigma",
-        "Of the held-out excess",
-    )
+    head = ("Find", "Physics", "Enters at", "Seen in", "Probability", "Distance / sigma", "Of the held-out excess")
     title = "Nearest to what was left out" if answer == "undecided" else "Physics that was left out"
     return Grid(title, head, rows, "klllrrr")
 

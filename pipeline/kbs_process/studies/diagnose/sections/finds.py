@@ -31,9 +31,7 @@ def panel(results: DiagnosisResults, tables: Tables) -> Panel:
 
 def _find(find: Find) -> Iterator[Block]:
     known = "" if find.named else " No effect of the catalogue passed the gate: the law is as measured."
-    alike = (
-        f" These channels cannot tell that port from {', '.join(find.same_ports)}." if find.same_ports else ""
-    )
+    alike = f" These channels cannot tell that port from {', '.join(find.same_ports)}." if find.same_ports else ""
     digits = 2 if find.absorbed < 0.99 else 4  # what a weight leaves of a cord is not nothing
     yield Text(
         f"{find.name}, {where(find.place)}.{known} Known parameters could have taken up "

@@ -32,9 +32,7 @@ _HISTORIES = Caption(
 
 def panel(results: DiagnosisResults, tables: Tables) -> Panel:
     """Channels of all recordings, spectra and histories of those held out."""
-    blocks: list[Block] = [
-        Figure("What is left, channel by channel", (figures.channels(results.trials),), _CHANNELS)
-    ]
+    blocks: list[Block] = [Figure("What is left, channel by channel", (figures.channels(results.trials),), _CHANNELS)]
     shown = [entry for entry in results.trials if entry.role == "held-out"] or list(results.trials)
     spectra, histories = [], []
     for entry in shown:

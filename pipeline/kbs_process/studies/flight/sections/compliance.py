@@ -31,10 +31,7 @@ def panel(results: FlightResults, tables: Tables) -> Panel:
             blocks.append(Figure(title, (figures.distribution(requirement, index, units),), _SPREAD))
         blocks.append(_statistics(requirement, title))
     return Panel(
-        "compliance",
-        "Compliance",
-        "With which probability does a flight unit meet its requirements?",
-        tuple(blocks),
+        "compliance", "Compliance", "With which probability does a flight unit meet its requirements?", tuple(blocks)
     )
 
 
@@ -51,15 +48,7 @@ def _probabilities(results: FlightResults) -> Grid:
         )
         for one in results.requirements
     )
-    head = (
-        "Requirement",
-        "Band",
-        "Limit",
-        "Nominal",
-        "90 % of units",
-        "95 %/95 % bound",
-        "Probability of meeting",
-    )
+    head = ("Requirement", "Band", "Limit", "Nominal", "90 % of units", "95 %/95 % bound", "Probability of meeting")
     note = (
         f"{count(results.samples, 'unit')} drawn by Latin hypercube (seed {results.seed}), flown along "
         f"{results.trajectory} for {number(results.duration_s)} s. The bound holds 95 % of all units with 95 % "
@@ -80,9 +69,6 @@ def _statistics(requirement: FlightRequirement, title: str) -> Grid:
         values = (entry.nominal, entry.mean, entry.q05, entry.median, entry.q95, entry.greatest)
         return (name, *(number(value) for value in values), number(entry.bound))
 
-    rows = (
-        *(row(entry.channel, entry) for entry in requirement.channels),
-        row("worst of them", requirement.worst),
-    )
+    rows = (*(row(entry.channel, entry) for entry in requirement.channels), row("worst of them", requirement.worst))
     head = ("Channel", "Nominal", "Mean", "5 %", "Median", "95 %", "Greatest", "95 %/95 % bound")
     return Grid(f"{title}, {unit(requirement.unit)}", head, rows, "krrrrrrr")

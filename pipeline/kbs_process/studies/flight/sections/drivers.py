@@ -30,9 +30,7 @@ def panel(results: FlightResults, tables: Tables) -> Panel:
             blocks.append(Text(line))
             continue
         picture = figures.drivers(found, results.by_chance, requirement)
-        blocks.append(
-            Figure(f"What drives the {requirement.statistic}: {requirement.name}", (picture,), _CAPTION)
-        )
+        blocks.append(Figure(f"What drives the {requirement.statistic}: {requirement.name}", (picture,), _CAPTION))
         rows = tuple(
             (driver.name, measure(driver.value, driver.sigma), unit(driver.unit), percent(driver.share))
             for driver in found

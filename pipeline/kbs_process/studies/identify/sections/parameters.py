@@ -39,9 +39,7 @@ def panel(results: IdentifyResults, tables: Tables) -> Panel:
         entries = tuple(entry for entry in results.parameters if entry.group == group)
         if entries:
             grid = _grid(title, entries)
-            blocks.append(
-                grid if group != "rig" else Fold(f"{title} ({count(len(entries), 'number')})", (grid,))
-            )
+            blocks.append(grid if group != "rig" else Fold(f"{title} ({count(len(entries), 'number')})", (grid,)))
     profiled = tuple(entry for entry in results.parameters if entry.interval is not None)
     joints = dict.fromkeys(entry.name.split(".drive.")[0] for entry in profiled)
     pictures = tuple(
@@ -64,17 +62,10 @@ def panel(results: IdentifyResults, tables: Tables) -> Panel:
         for index, start in enumerate(results.starts, 1)
     )
     blocks.append(
-        Grid(
-            "Starts followed",
-            ("Start", "Cost there", "Cost after the search", "Phases found / rad"),
-            rows,
-            "rrrl",
-        )
+        Grid("Starts followed", ("Start", "Cost there", "Cost after the search", "Phases found / rad"), rows, "rrrl")
     )
     blocks.append(Text("Corrected parameter files, for [parameters] files of a campaign:", results.files))
-    return Panel(
-        "parameters", "Parameters", "What are the numbers, and how well are they known?", tuple(blocks)
-    )
+    return Panel("parameters", "Parameters", "What are the numbers, and how well are they known?", tuple(blocks))
 
 
 def _grid(title: str, entries: tuple[Identified, ...]) -> Grid:

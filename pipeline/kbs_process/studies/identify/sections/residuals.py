@@ -42,9 +42,7 @@ def panel(results: IdentifyResults, tables: Tables) -> Panel:
     )
     head = ("Recording", "Role", "Channel", "Before", "After")
     blocks: list[Block] = [Grid("Residual over noise", head, rows, "llcrr", note)]
-    shown = [m.recording for m in results.misfits if m.role == "held-out"] or [
-        m.recording for m in results.misfits
-    ]
+    shown = [m.recording for m in results.misfits if m.role == "held-out"] or [m.recording for m in results.misfits]
     spectra, histories = [], []
     for name in dict.fromkeys(shown):
         channels = tuple(dict.fromkeys(m.channel for m in results.misfits if m.recording == name))
@@ -57,8 +55,5 @@ def panel(results: IdentifyResults, tables: Tables) -> Panel:
     if histories:
         blocks.append(Figure("Histories of the residual", tuple(histories), _HISTORIES))
     return Panel(
-        "residuals",
-        "Held-out predictions",
-        "Does it predict recordings that the fit has not seen?",
-        tuple(blocks),
+        "residuals", "Held-out predictions", "Does it predict recordings that the fit has not seen?", tuple(blocks)
     )

@@ -17,11 +17,7 @@ def panel(results: ReferenceDayResults, tables: Tables) -> Panel:
     sources = "; ".join(dict.fromkeys(one.source for one in results.requirements))
     blocks: list[Block] = [
         Grid(
-            "Compliance",
-            head,
-            tuple(_row(one) for one in results.requirements),
-            "lrrrlc",
-            f"{note} Source: {sources}.",
+            "Compliance", head, tuple(_row(one) for one in results.requirements), "lrrrlc", f"{note} Source: {sources}."
         )
     ]
     if results.warnings:

@@ -38,9 +38,7 @@ def panel(results: ReferenceDayResults, tables: Tables) -> Panel:
         history = figures.errors(table, min(limits, default=0.0))
         blocks.append(Figure("Pointing error over the day", (history,), _HISTORY))
         others = tuple(
-            Figure(
-                f"Distribution of the pointing error, section {one.name}", _densities(table, one), _DENSITY
-            )
+            Figure(f"Distribution of the pointing error, section {one.name}", _densities(table, one), _DENSITY)
             for one in rest
         )
         if others:
@@ -52,6 +50,4 @@ def _densities(table: Table, section: Section) -> tuple[Picture, ...]:
     t = table.columns["t"]
     inside = np.logical_and(table.valid, (t >= section.start_s) & (t < section.end_s))
     found = (("azimuth", "az", section.azimuth), ("elevation", "el", section.elevation))
-    return (
-        pointing.distributions([(name, table.columns[column][inside], one) for name, column, one in found]),
-    )
+    return (pointing.distributions([(name, table.columns[column][inside], one) for name, column, one in found]),)

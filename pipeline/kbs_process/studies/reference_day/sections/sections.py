@@ -76,9 +76,7 @@ def _statistics(results: ReferenceDayResults) -> Grid:
         for name, one in (("azimuth", section.azimuth), ("elevation", section.elevation))
     ]
     rows += [_line("whole day", one.axis, one) for one in results.boresight]
-    note = (
-        "Whole day: in the boresight's own frame; the line of sight is the resultant, whose mean is no bias."
-    )
+    note = "Whole day: in the boresight's own frame; the line of sight is the resultant, whose mean is no bias."
     return Grid("Statistics of the pointing error", head, tuple(rows), "kkrrrr", note)
 
 

@@ -38,16 +38,8 @@ def panel(results: ReferenceDayResults, tables: Tables) -> Panel:
         )
     )
     rows = tuple(
-        (
-            phase.mode,
-            phase.relay,
-            f"{phase.start_s:.1f}",
-            f"{phase.end_s:.1f}",
-            number(phase.end_s - phase.start_s, 4),
-        )
+        (phase.mode, phase.relay, f"{phase.start_s:.1f}", f"{phase.end_s:.1f}", number(phase.end_s - phase.start_s, 4))
         for phase in results.phases
     )
     blocks.append(Grid("Phases", ("Mode", "Satellite", "From / s", "To / s", "Duration / s"), rows, "llrrr"))
-    return Panel(
-        "trajectory", "Trajectory", "Which satellite is tracked when, and by which angles?", tuple(blocks)
-    )
+    return Panel("trajectory", "Trajectory", "Which satellite is tracked when, and by which angles?", tuple(blocks))

@@ -50,16 +50,7 @@ def _words(results: StabilityResults) -> Text:
 
 
 def _table(onsets: tuple[OnsetAt, ...], joint: str) -> Grid:
-    head = (
-        f"Angle of {joint}",
-        "Ki weight",
-        "Friction",
-        "Predicted",
-        "Found",
-        "±",
-        "Deviation",
-        "Frequency / Hz",
-    )
+    head = (f"Angle of {joint}", "Ki weight", "Friction", "Predicted", "Found", "±", "Deviation", "Frequency / Hz")
     rows = tuple(
         (
             f"{number(math.degrees(e.angle_rad))}°",
@@ -91,11 +82,5 @@ def _cycles(results: StabilityResults) -> Grid:
         )
         for e in results.limit_cycles
     )
-    head = (
-        "Factor on the gains",
-        "of the critical one",
-        "Joint's rms",
-        "of an encoder code",
-        "Frequency / Hz",
-    )
+    head = ("Factor on the gains", "of the critical one", "Joint's rms", "of an encoder code", "Frequency / Hz")
     return Grid("Limit cycles", head, rows, "rrrrr", _LIMIT_CYCLES)
