@@ -8,9 +8,10 @@ it is linear in its amplitudes.
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum
+from itertools import combinations_with_replacement
 from typing import get_type_hints
 
 from kbs_process.plant.effect import LAST, Parameter
@@ -27,6 +28,9 @@ SCALARS = {
     "code": "rad, one code of the encoder",
     "drop_time": "s, when the clock of this recording's stream seems to jump",
 }
+
+
+BY = "<-"  # in the site of a coupling: channel that reads, channel that acts, or the two of which the product does
 
 
 class SensingPort(Enum):
@@ -75,3 +79,14 @@ class Sensing:
     def arguments(self) -> tuple[str, ...]:
         """Names of the equation's arguments, in order."""
         return tuple(inspect.signature(self.equation).parameters)
+
+
+def couplings(channels: Sequence[str]) -> list[str]:
+    """Sites of what one channel does to another."""
+    return [f"{reads}{BY}{acts}" for reads in channels for acts in channels if reads != acts]
+
+
+def products(channels: Sequence[str]) -> list[str]:
+    """Sites of what the product of two channels does to one; its own square is its non-linearity's."""
+    pairs = list(combinations_with_replacement(channels, 2))
+    return [BY.join((reads, *pair)) for reads in channels for pair in pairs if pair != (reads, reads)]
