@@ -177,7 +177,12 @@ def _trials(one: Sealed) -> Iterable[str]:
     answers = {answer.trial: answer for answer in one.bench.answers if answer.method == OURS}
     ordered = sorted(one.bench.truths, key=lambda truth: (-truth.level, truth.kind, truth.trial))
     rows = (
-        (_strength(truth), said(answers[truth.trial]), answers[truth.trial].verdict, _judged(truth, answers[truth.trial]))
+        (
+            _strength(truth),
+            said(answers[truth.trial]),
+            answers[truth.trial].verdict,
+            _judged(truth, answers[truth.trial]),
+        )
         for truth in ordered
     )
     yield from ("", f"### Set {one.number}", "", *_table(("concealed", "said", "answer", "right"), rows))
