@@ -56,8 +56,8 @@ def supposed(fallen: Sequence[Tried], before: Known) -> list[Tried]:
     much = [one for one in fallen if one.own.names and taken(before, one.standing.known) >= TAKEN]
     best: dict[tuple[str, ...], Tried] = {}
     for one in sorted(much, key=lambda one: one.standing.known.cost):
-        own = identity(one.found.suspect)
-        best.setdefault((own.port, own.axis, *own.channels[:1]), one)
+        own = identity(one.found.suspect).place
+        best.setdefault((own.port, own.site, *own.channels[:1]), one)
     return list(best.values())[:WAYS]
 
 

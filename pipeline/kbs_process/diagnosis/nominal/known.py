@@ -18,6 +18,7 @@ from kbs_process.diagnosis.experiments.floor import Floor
 from kbs_process.diagnosis.experiments.hypothesis import Hypothesis, Prediction, Simulate
 from kbs_process.diagnosis.experiments.metric import Metric, metrics
 from kbs_process.diagnosis.experiments.softened import softened
+from kbs_process.diagnosis.facts import Moved
 from kbs_process.diagnosis.nominal.costs import ALL, GROSS, Found, Laws
 from kbs_process.diagnosis.nominal.ground import information
 from kbs_process.diagnosis.nominal.parameters import Slopes, known_parameters, prior, within
@@ -160,6 +161,25 @@ class Known:
         """Whether these numbers are together farther from their priors than chance has them."""
         strain = self.strain
         return strain.count > 0 and bool(chi2.sf(strain.squares, strain.count) < STRAINED)
+
+    @property
+    def numbers(self) -> tuple[Moved, ...]:
+        """Each of the rig's own, before and after; those of laws at a sensor are left out."""
+        units = {name: quantity.unit for name, quantity in self.hypothesis.rig.quantities().items()}
+        entries = zip(self.free, self.value, self.sigma, self.parameters.value, self.parameters.sigma, strict=True)
+        return tuple(
+            Moved(
+                name=scalar.name,
+                unit=units[scalar.quantity],
+                prior=float(prior),
+                prior_sigma=float(spread) if (bounded := bool(np.isfinite(spread) and spread > 0.0)) else None,
+                value=float(value),
+                sigma=float(sigma),
+                sigmas=float((value - prior) / spread) if bounded else None,
+            )
+            for scalar, value, sigma, prior, spread in entries
+            if scalar.quantity in units
+        )
 
     @property
     def stopped(self) -> tuple[str, ...]:

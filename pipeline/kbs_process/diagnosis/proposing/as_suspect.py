@@ -32,10 +32,10 @@ def suspect_of(find: Find, scene: Scene) -> tuple[Suspect, Array] | None:
         over, x = find.curve.law, find.curve.x
         ends = float(x[0]), float(x[-1])
         coefficients = np.linalg.lstsq(basis(over, x, *ends), find.curve.value, rcond=None)[0]
-        return CurveSuspect(scene, over, own.axis, ends), np.asarray(coefficients)
+        return CurveSuspect(scene, over, own.place.site, ends), np.asarray(coefficients)
     law = _LAWS.get(own.law)
     mounting = isinstance(law, Effect) and law.port is Port.BASE_TORQUE
-    site = TRANSDUCER if mounting else BY.join(own.channels) or own.axis
+    site = TRANSDUCER if mounting else BY.join(own.place.channels) or own.place.site
     if law is None or law.each_trial or not site:
         return None
     # Of a sensor's law that was found more than once, the action that was found first.

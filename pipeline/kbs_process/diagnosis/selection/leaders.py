@@ -142,7 +142,7 @@ def various(chosen: Sequence[Found]) -> list[Found]:
     families: dict[tuple[str, ...], Found] = {}
     for found in chosen:
         own = identity(found.suspect)
-        place = own.port, own.axis, *own.channels
+        place = own.place.port, own.place.site, *own.place.channels
         several = isinstance(found.suspect, Catalogued) and bool(found.suspect.candidate.again)
         kind = own.law if _delays(found.suspect) else own.family
         places.setdefault(place, found)
@@ -157,7 +157,7 @@ def _delays(suspect: Suspect) -> bool:
 
 def _way(found: Found) -> tuple[str, ...]:
     own = identity(found.suspect)
-    return own.port, own.axis, own.law, *own.channels[:1]
+    return own.place.port, own.place.site, own.law, *own.place.channels[:1]
 
 
 def tried(

@@ -24,6 +24,7 @@ from kbs_process.diagnosis.experiments.thresholds import (
     TRUST,
     TRUST_PART,
 )
+from kbs_process.diagnosis.facts import Moved
 from kbs_process.diagnosis.nominal.joint import Standing, bare, standing_of, without
 from kbs_process.diagnosis.nominal.known import MOVED, Known, refit
 from kbs_process.diagnosis.nominal.scatter import scattered
@@ -40,7 +41,7 @@ from kbs_process.diagnosis.selection.believed import believed
 from kbs_process.diagnosis.selection.each_recording import jump_gain
 from kbs_process.diagnosis.selection.effort import Effort
 from kbs_process.diagnosis.selection.leaders import leaders, tried
-from kbs_process.diagnosis.selection.outcome import Absorbed, Moved, Outcome, Place
+from kbs_process.diagnosis.selection.outcome import Absorbed, Location, Outcome
 from kbs_process.diagnosis.selection.side_by_side import side_by_side
 from kbs_process.diagnosis.selection.tryout import identity, of_every_clock
 
@@ -52,7 +53,7 @@ class _Round:
     seen: Standing  # from where laws were looked for, and `place` is
     screening: Screening
     noted: Noted
-    place: Place | None
+    place: Location | None
 
 
 def diagnose(
@@ -335,23 +336,20 @@ def _hopeless(first: Sequence[Found], least: float) -> bool:
     return PROMISED * most < least and not any(of_mounting(found) for found in first)
 
 
-def _place(standing: Standing, floor: Floor, scene: Scene) -> Place | None:
+def _place(standing: Standing, floor: Floor, scene: Scene) -> Location | None:
     if not scene.paths:
         return None
     cells, models, names = cells_and_ports(standing, floor, scene.paths)
     if not len(cells.z):
         return None
     test = port_test(cells, models)
-    return Place(test, cells, tuple(names[port] for port in test.only))
+    return Location(test, cells, tuple(names[port] for port in test.only))
 
 
 def _moved(known: Known) -> tuple[Moved, ...]:
+    stated = {name for name, own in zip(known.names, known.stated, strict=True) if own}
     return tuple(
-        Moved(name, float(value), float(sigma), float(sigmas))
-        for name, value, sigma, sigmas, stated in zip(
-            known.names, known.value, known.sigma, known.moved, known.stated, strict=True
-        )
-        if stated and abs(sigmas) > MOVED
+        one for one in known.numbers if one.name in stated and one.sigmas is not None and abs(one.sigmas) > MOVED
     )
 
 

@@ -21,6 +21,7 @@ from kbs_process.plant.sensing import SENSING
 from kbs_process.rig.model import Quantity, substitute
 from kbs_process.signals.records import Array
 
+CORRECTED = "corrected"  # folder of the model, in that of the results
 _SENSORS = {law.name: law for law in SENSING}
 _EACH_TIME = {
     *(effect.name for effect in CATALOGUE if effect.each_trial),
@@ -75,7 +76,7 @@ def _reads(find: Find) -> bool:
 def _sensing(find: Find, estimates: Sequence[Estimate], source: str) -> SensingLaw:
     """A find, or one of its actions, as the model's sensors have it."""
     law, own = _SENSORS[find.identity.law], find.identity
-    site = BY.join(own.channels) or own.axis
+    site = BY.join(own.place.channels) or own.place.site
     numbers = {}
     for one in estimates:
         # A second action of the same law has numbered amplitudes.

@@ -17,7 +17,8 @@ from kbs_process.diagnosis.experiments.thresholds import DETECTED
 from kbs_process.progress import Progress
 from kbs_process.results.diagnosed import FOLDER
 from kbs_process.results.store import revising
-from kbs_process.studies.diagnose.run import diagnose, experiment_of
+from kbs_process.studies.diagnose.reading import experiment_of
+from kbs_process.studies.diagnose.run import diagnose
 from kbs_process.studies.diagnose.simulators import Simulators
 
 
