@@ -16,8 +16,7 @@ from kbs_process.campaign.corrected_model import write_model
 from kbs_process.campaign.load import load_campaign
 from kbs_process.campaign.mission import load_day
 from kbs_process.diagnosis.experiments.hypothesis import Hypothesis
-from kbs_process.diagnosis.facts import Place
-from kbs_process.diagnosis.selection.outcome import Estimate, Identity
+from kbs_process.diagnosis.facts import Estimate, Identity, Place
 from kbs_process.errors import ConfigError
 from kbs_process.identification.output_error import Scalar
 from kbs_process.plant.attach import attach

@@ -14,25 +14,16 @@ from test_rounds import standing
 from kbs_process.campaign.load import load_campaign
 from kbs_process.diagnosis.acceptance.finding import _alike_likely, merged, trusted
 from kbs_process.diagnosis.acceptance.gate import Fold, Gate
-from kbs_process.diagnosis.experiments.detection import Detection
+from kbs_process.diagnosis.acceptance.outcome import Absorbed, Alternative, Curve, Find, Outcome, Refused
 from kbs_process.diagnosis.experiments.floor import declared
-from kbs_process.diagnosis.experiments.trajectories import family, limits_of
-from kbs_process.diagnosis.facts import Moved, Place, Planned
+from kbs_process.diagnosis.facts import Estimate, Identity, Moved, Place, Planned
+from kbs_process.diagnosis.nominal.detection import Detection
 from kbs_process.diagnosis.nominal.joint import standing_of
 from kbs_process.diagnosis.nominal.known import MOVED, NEAR
 from kbs_process.diagnosis.proposing.curves import basis
 from kbs_process.diagnosis.proposing.measured import inserted
 from kbs_process.diagnosis.selection.next_test import Proposal
-from kbs_process.diagnosis.selection.outcome import (
-    Absorbed,
-    Alternative,
-    Curve,
-    Estimate,
-    Find,
-    Identity,
-    Outcome,
-    Refused,
-)
+from kbs_process.diagnosis.selection.trajectories import family, limits_of
 from kbs_process.plant.effects.measured_law import COEFFICIENTS, MEASURED
 from kbs_process.reduction.commands import read_commands
 from kbs_process.results.records import load

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 from kbs_process.diagnosis.acceptance.gate import Gate
+from kbs_process.diagnosis.acceptance.outcome import Alternative, Find
 from kbs_process.diagnosis.experiments.floor import declared
-from kbs_process.diagnosis.experiments.trajectories import family, limits_of
-from kbs_process.diagnosis.facts import Place
+from kbs_process.diagnosis.facts import Estimate, Identity, Place
 from kbs_process.diagnosis.nominal.joint import Standing
 from kbs_process.diagnosis.selection.next_test import Proposal, propose
-from kbs_process.diagnosis.selection.outcome import Alternative, Estimate, Find, Identity
+from kbs_process.diagnosis.selection.trajectories import family, limits_of
 from kbs_process.identification.output_error import Scalar
 from kbs_process.reduction.commands import read_commands
 from kbs_process.studies.diagnose.output import commands_of

@@ -15,27 +15,26 @@ from kbs_process.diagnosis.acceptance import supposed as supposed_laws
 from kbs_process.diagnosis.acceptance.finding import Tried, as_it_stands, find_of
 from kbs_process.diagnosis.acceptance.gate import Gate, gate
 from kbs_process.diagnosis.acceptance.needed import Accepted
-from kbs_process.diagnosis.acceptance.remains import detected
 from kbs_process.diagnosis.acceptance.rivals import probabilities, rivalry
 from kbs_process.diagnosis.acceptance.supposed import Noted
+from kbs_process.diagnosis.acceptance.verdict import gated
 from kbs_process.diagnosis.experiments.experiment import Experiment
 from kbs_process.diagnosis.experiments.floor import declared
 from kbs_process.diagnosis.experiments.hypothesis import Hypothesis, Simulate, predict
 from kbs_process.diagnosis.experiments.thresholds import told_apart
-from kbs_process.diagnosis.facts import Place
+from kbs_process.diagnosis.facts import Identity, Place
 from kbs_process.diagnosis.nominal.joint import Own, Standing, with_extra
 from kbs_process.diagnosis.nominal.scatter import scattered
-from kbs_process.diagnosis.proposing.as_suspect import sigma_of, suspect_of
+from kbs_process.diagnosis.nominal.settling import detected
+from kbs_process.diagnosis.proposing.tryout import extra_of, identity
 from kbs_process.diagnosis.screening.gls import Sums, score
 from kbs_process.diagnosis.screening.scene import Scene
 from kbs_process.diagnosis.screening.screen import Bench, Catalogued, Found, Screening, screen
 from kbs_process.diagnosis.screening.suspects import Candidate
 from kbs_process.diagnosis.selection import believed, effort, rounds
+from kbs_process.diagnosis.selection.as_suspect import sigma_of, suspect_of
 from kbs_process.diagnosis.selection.effort import Effort
-from kbs_process.diagnosis.selection.leaders import gated
-from kbs_process.diagnosis.selection.outcome import Identity
 from kbs_process.diagnosis.selection.race import own_of
-from kbs_process.diagnosis.selection.tryout import extra_of, identity
 from kbs_process.identification.output_error import Scalar
 from kbs_process.plant.attach import attach
 from kbs_process.plant.effects import CATALOGUE, select

@@ -13,8 +13,8 @@ from scipy.signal import butter, sosfiltfilt
 
 from gravity.real_sets import DATA
 from kbs_process.campaign.load import load_campaign
-from kbs_process.diagnosis.nominal.explain import explain
-from kbs_process.diagnosis.selection.outcome import Outcome
+from kbs_process.diagnosis.acceptance.outcome import Outcome
+from kbs_process.diagnosis.selection.explain import explain
 from kbs_process.diagnosis.selection.rounds import diagnose
 from kbs_process.progress import SilentProgress
 from kbs_process.signals.records import Array

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from typing import Literal
 
 from kbs_process.results.records import Record
@@ -44,3 +45,42 @@ class Planned(Record, frozen=True):
 
     trajectory: str
     worth: float  # distance of the nearest rival; without rivals, root of the information's smallest eigenvalue
+
+
+@dataclass(frozen=True, slots=True)
+class Identity:
+    """What a law is and where it acts, in the field's words."""
+
+    place: Place
+    # Of physics, "unnamed" for a measured law; by it alone laws do not differ: orders of one motor may be of two.
+    family: str = field(compare=False)
+    law: str  # name in the catalogue, or what the measured law is a function of
+
+    @property
+    def name(self) -> str:
+        """The law in words."""
+        return self.law.replace("_", " ")
+
+    @property
+    def words(self) -> str:
+        """The law and its place."""
+        return f"{self.name} ({self.place.words})"
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """A number of a law with its 95 % interval; `sigma` 0 where it was chosen from a grid."""
+
+    name: str
+    unit: str
+    value: float
+    sigma: float
+    about: float = 0.0  # what was fitted is how far it is from this
+
+    @property
+    def low(self) -> float:
+        return self.value - 1.96 * self.sigma
+
+    @property
+    def high(self) -> float:
+        return self.value + 1.96 * self.sigma

@@ -10,11 +10,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from kbs_process.diagnosis.acceptance.finding import Tried
+from kbs_process.diagnosis.acceptance.outcome import Refused
 from kbs_process.diagnosis.experiments.thresholds import MOSTLY_DONE, TAKEN, WAYS
+from kbs_process.diagnosis.facts import Identity
 from kbs_process.diagnosis.nominal.known import Known
+from kbs_process.diagnosis.proposing.tryout import identity
 from kbs_process.diagnosis.screening.screen import Found
-from kbs_process.diagnosis.selection.outcome import Identity, Refused
-from kbs_process.diagnosis.selection.tryout import identity
 
 
 @dataclass(slots=True)

@@ -11,7 +11,7 @@ from kbs_process.diagnosis.experiments.experiment import Experiment
 from kbs_process.diagnosis.experiments.hypothesis import Hypothesis, Prediction, Simulate
 from kbs_process.diagnosis.experiments.metric import Metric
 from kbs_process.diagnosis.nominal.parameters import Slopes, known_parameters
-from kbs_process.diagnosis.selection.side_by_side import side_by_side
+from kbs_process.diagnosis.side_by_side import side_by_side
 from kbs_process.estimation.fit import Parameters
 from kbs_process.identification.estimate import gearbox
 from kbs_process.identification.output_error import Scalar

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from kbs_process.diagnosis.nominal.phasing import stages
-from kbs_process.diagnosis.selection.side_by_side import side_by_side
+from kbs_process.diagnosis.side_by_side import side_by_side
 from kbs_process.identification.contact import edge_minima
 from kbs_process.identification.screening import Contact, contacts
 from kbs_process.signals.records import Array

@@ -11,23 +11,24 @@ from scipy.special import softmax
 from kbs_process.diagnosis.acceptance.finding import Tried, find_of
 from kbs_process.diagnosis.acceptance.moments import only_while
 from kbs_process.diagnosis.acceptance.needed import Accepted
+from kbs_process.diagnosis.acceptance.outcome import Location
 from kbs_process.diagnosis.acceptance.remains import too_little
 from kbs_process.diagnosis.acceptance.rivals import evidences
 from kbs_process.diagnosis.acceptance.supposed import Noted
+from kbs_process.diagnosis.acceptance.verdict import gated
 from kbs_process.diagnosis.experiments.floor import Floor
 from kbs_process.diagnosis.experiments.hypothesis import Simulate
 from kbs_process.diagnosis.experiments.thresholds import CONTESTED, GATE_SIGMA, MOST, SECOND, SETTLED, TOLERATED
-from kbs_process.diagnosis.facts import Place
+from kbs_process.diagnosis.facts import Identity, Place
 from kbs_process.diagnosis.nominal.joint import Standing
 from kbs_process.diagnosis.nominal.settling import released, resettled
 from kbs_process.diagnosis.proposing.families import UNNAMED
+from kbs_process.diagnosis.proposing.tryout import identity
+from kbs_process.diagnosis.proposing.view import View
 from kbs_process.diagnosis.screening.screen import Found
 from kbs_process.diagnosis.screening.shapes import bettered
-from kbs_process.diagnosis.screening.view import View
 from kbs_process.diagnosis.selection.effort import Effort
-from kbs_process.diagnosis.selection.leaders import gated, reread, tried
-from kbs_process.diagnosis.selection.outcome import Identity, Location
-from kbs_process.diagnosis.selection.tryout import identity
+from kbs_process.diagnosis.selection.leaders import reread, tried
 from kbs_process.signals.records import Array
 
 

@@ -20,22 +20,22 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import norm
 
+from kbs_process.diagnosis.acceptance.outcome import Find
 from kbs_process.diagnosis.experiments.experiment import Drive, Experiment, Trial
 from kbs_process.diagnosis.experiments.floor import Floor
 from kbs_process.diagnosis.experiments.hypothesis import Prediction, Simulate
 from kbs_process.diagnosis.experiments.metric import metrics
 from kbs_process.diagnosis.experiments.thresholds import RIVALS
-from kbs_process.diagnosis.experiments.trajectories import Trajectory, family, limits_of
-from kbs_process.diagnosis.facts import Planned
+from kbs_process.diagnosis.facts import Identity, Planned
 from kbs_process.diagnosis.nominal.joint import Standing
 from kbs_process.diagnosis.nominal.parameters import slopes
-from kbs_process.diagnosis.proposing.as_suspect import sigma_of, suspect_of
+from kbs_process.diagnosis.proposing.tryout import identity
+from kbs_process.diagnosis.proposing.view import suspects_of
 from kbs_process.diagnosis.screening.gls import Background
 from kbs_process.diagnosis.screening.scene import Scene
 from kbs_process.diagnosis.screening.screen import Bench, Suspect
-from kbs_process.diagnosis.screening.view import suspects_of
-from kbs_process.diagnosis.selection.outcome import Find, Identity
-from kbs_process.diagnosis.selection.tryout import identity
+from kbs_process.diagnosis.selection.as_suspect import sigma_of, suspect_of
+from kbs_process.diagnosis.selection.trajectories import Trajectory, family, limits_of
 from kbs_process.signals.records import Array
 
 _SECONDS = 200.0  # of a proposed test, or as long as the longest recording

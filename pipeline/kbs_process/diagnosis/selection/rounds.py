@@ -9,9 +9,9 @@ import numpy as np
 
 from kbs_process.diagnosis.acceptance.finding import Tried, as_it_stands, find_of, merged, trusted
 from kbs_process.diagnosis.acceptance.needed import Accepted, in_the_shade, needed
-from kbs_process.diagnosis.acceptance.remains import detected, promises_little, searched
+from kbs_process.diagnosis.acceptance.outcome import Absorbed, Location, Outcome
+from kbs_process.diagnosis.acceptance.remains import promises_little
 from kbs_process.diagnosis.acceptance.supposed import Noted, enough, supposed, wanting
-from kbs_process.diagnosis.experiments.detection import Detection
 from kbs_process.diagnosis.experiments.floor import Floor
 from kbs_process.diagnosis.experiments.hypothesis import Simulate
 from kbs_process.diagnosis.experiments.thresholds import (
@@ -25,25 +25,25 @@ from kbs_process.diagnosis.experiments.thresholds import (
     TRUST_PART,
 )
 from kbs_process.diagnosis.facts import Moved
+from kbs_process.diagnosis.nominal.detection import Detection
 from kbs_process.diagnosis.nominal.joint import Standing, bare, standing_of, without
 from kbs_process.diagnosis.nominal.known import MOVED, Known, refit
 from kbs_process.diagnosis.nominal.scatter import scattered
-from kbs_process.diagnosis.nominal.settling import bent, drawn_back, nominal, resettled
+from kbs_process.diagnosis.nominal.settling import bent, detected, drawn_back, nominal, resettled, searched
 from kbs_process.diagnosis.proposing.clocks import timed
 from kbs_process.diagnosis.proposing.sizes import in_the_way, of_mounting, springs
+from kbs_process.diagnosis.proposing.tryout import identity, of_every_clock
+from kbs_process.diagnosis.proposing.view import View
 from kbs_process.diagnosis.screening.localise import cells_and_ports
 from kbs_process.diagnosis.screening.ports import port_test
 from kbs_process.diagnosis.screening.scene import Scene
 from kbs_process.diagnosis.screening.screen import Catalogued, Found, Screening
 from kbs_process.diagnosis.screening.shapes import possible
-from kbs_process.diagnosis.screening.view import View
 from kbs_process.diagnosis.selection.believed import believed
 from kbs_process.diagnosis.selection.each_recording import jump_gain
 from kbs_process.diagnosis.selection.effort import Effort
 from kbs_process.diagnosis.selection.leaders import leaders, tried
-from kbs_process.diagnosis.selection.outcome import Absorbed, Location, Outcome
-from kbs_process.diagnosis.selection.side_by_side import side_by_side
-from kbs_process.diagnosis.selection.tryout import identity, of_every_clock
+from kbs_process.diagnosis.side_by_side import side_by_side
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -12,9 +12,10 @@ import numpy as np
 from kbs_process.campaign.config import Campaign, SensingLaw
 from kbs_process.campaign.corrected_model import write_model
 from kbs_process.campaign.sensing_laws import belongs_to_model
+from kbs_process.diagnosis.acceptance.outcome import Find, Outcome
 from kbs_process.diagnosis.experiments.hypothesis import Hypothesis
+from kbs_process.diagnosis.facts import Estimate
 from kbs_process.diagnosis.screening.suspects import BY
-from kbs_process.diagnosis.selection.outcome import Estimate, Find, Outcome
 from kbs_process.plant.effect import Uniform
 from kbs_process.plant.effects import CATALOGUE, select
 from kbs_process.plant.sensing import SENSING

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from kbs_process.campaign.config import Campaign
+from kbs_process.diagnosis.acceptance.outcome import Location, Outcome
 from kbs_process.diagnosis.experiments.experiment import Experiment
 from kbs_process.diagnosis.experiments.floor import Floor
 from kbs_process.diagnosis.experiments.hypothesis import Prediction
@@ -15,7 +16,6 @@ from kbs_process.diagnosis.experiments.nuisance import unknown_terms
 from kbs_process.diagnosis.nominal.joint import Standing
 from kbs_process.diagnosis.nominal.known import Known
 from kbs_process.diagnosis.selection.next_test import Proposal
-from kbs_process.diagnosis.selection.outcome import Location, Outcome
 from kbs_process.report.build import build
 from kbs_process.results.outcome import Outcome as Told
 from kbs_process.results.records import encode

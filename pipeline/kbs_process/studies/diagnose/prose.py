@@ -9,20 +9,22 @@ import numpy as np
 from scipy.stats import chi2
 
 from kbs_process.campaign.config import Campaign
+from kbs_process.diagnosis.acceptance.outcome import Find, Outcome
 from kbs_process.diagnosis.experiments.experiment import Experiment
 from kbs_process.diagnosis.experiments.floor import Floor
 from kbs_process.diagnosis.experiments.thresholds import RIVALS, told_apart
 from kbs_process.diagnosis.nominal.known import LEARNT, NEAR, Known
 from kbs_process.diagnosis.proposing.families import UNNAMED
-from kbs_process.diagnosis.selection.outcome import Find, Outcome
 from kbs_process.reduction.losses import lost
-from kbs_process.report.prose import lines, prose
+from kbs_process.report.prose import Prose
 from kbs_process.results.records import Notice
 from kbs_process.studies.diagnose import results as records
 from kbs_process.studies.diagnose.corrected import CORRECTED, left_out
 from kbs_process.studies.diagnose.reading import PASSED_OVER, passed_over
 
-_STUDY = "diagnose"
+_TOLD = Prose("kbs_process.studies.diagnose", "answer")
+_NOTICES = Prose("kbs_process.studies.diagnose", "notices")
+_NOTES = ("floor", "refit", "gate", "order")  # on how to read the results
 _FLOOR = {
     "repeats": "what repeats of one trajectory differ by",
     "declared": "what their sensors' stated noise explains",
@@ -39,7 +41,7 @@ def answer(
 ) -> str:
     """The answer, in one sentence or a few."""
     laws = [law_in_words(find) for find in outcome.finds]
-    return prose(_STUDY, "answer", laws=laws, **_facts(outcome, trials, requirements, floor))
+    return _TOLD("answer", laws=laws, **_facts(outcome, trials, requirements, floor))
 
 
 def paragraph(
@@ -52,8 +54,7 @@ def paragraph(
     """Plain words, to be pasted into a test report."""
     held_out = [trial for trial in trials if trial.role == "held-out"]
     steps = ("nominal", "known", "corrected")
-    return prose(
-        _STUDY,
+    return _TOLD(
         "paragraph",
         held_out=held_out,
         most={step: max(getattr(trial, step) for trial in held_out or trials) for step in steps},
@@ -201,28 +202,38 @@ def notices(campaign: Campaign, floor: Floor, outcome: Outcome) -> Iterator[Noti
     experiment = outcome.standing.known.experiment
     angle, command = campaign.topics.angle, campaign.topics.command
     mismatch = outcome.verdict != "none"
-    for line in lines(
-        _STUDY,
-        "notices",
-        finds=[
-            {"law": one.identity.law, "held_out": one.gate.held_out, "each_time": left_out(one)}
-            for one in outcome.finds
-        ],
-        corrected=CORRECTED,
-        held_out=experiment.held_out,
-        unforeseen=outcome.unforeseen,
-        repeated=outcome.finds and experiment.held_out and not _other_motions(experiment),
-        ended=outcome.ended and mismatch,
-        commanded=mismatch and angle and command and angle.topic == command.topic,
-        declared=floor.statement if floor.source == "declared" else None,
-    ):
-        severity, what, where, remedy = (part.strip() for part in line.split("|"))
-        yield Notice(severity="warning" if severity == "warning" else "info", what=what, where=where, remedy=remedy)
+    for find in outcome.finds:
+        if not find.gate.held_out:
+            yield _notice("not_held_out", law=find.identity.law)
+        if left_out(find):
+            yield _notice("each_time", law=find.identity.law, corrected=CORRECTED)
+    if not experiment.held_out:
+        yield _notice("none_held_out")
+    if outcome.unforeseen:
+        yield _notice("unforeseen")
+    elif outcome.finds and experiment.held_out and not _other_motions(experiment):
+        yield _notice("repeated")
+    if outcome.ended and mismatch:
+        yield _notice("ended")
+    if mismatch and angle and command and angle.topic == command.topic:
+        yield _notice("commanded")
+    if floor.source == "declared":
+        yield _notice("declared", floor=floor.statement)
     for entry in campaign.recordings:
         for trial in experiment.trials:
             if trial.name == entry.name:
                 yield from lost(entry, [loss for loss in trial.losses if loss.kind != PASSED_OVER])
                 yield from passed_over(entry, trial.losses)
+
+
+def _notice(passage: str, **facts: str) -> Notice:
+    severity, what, where, remedy = (part.strip() for part in _NOTICES(passage, **facts).split("|"))
+    return Notice(severity="warning" if severity == "warning" else "info", what=what, where=where, remedy=remedy)
+
+
+def notes() -> tuple[str, ...]:
+    """How to read the results."""
+    return tuple(_NOTICES(f"note_{name}") for name in _NOTES)
 
 
 def _other_motions(experiment: Experiment) -> bool:

@@ -9,20 +9,19 @@ import msgspec
 import numpy as np
 
 from kbs_process.campaign.config import Campaign
+from kbs_process.diagnosis.acceptance.outcome import Curve, Find, Outcome
 from kbs_process.diagnosis.experiments.experiment import Experiment
 from kbs_process.diagnosis.experiments.floor import Floor
 from kbs_process.diagnosis.nominal.joint import Standing
 from kbs_process.diagnosis.nominal.known import Known
 from kbs_process.diagnosis.selection.next_test import Proposal
-from kbs_process.diagnosis.selection.outcome import Curve, Find, Outcome
 from kbs_process.plant.effects.measured_law import Measured, unit_of
 from kbs_process.plant.structure import other_joint
-from kbs_process.report.prose import lines
 from kbs_process.results import provenance
 from kbs_process.results.records import Check, Conclusion
 from kbs_process.rig.model import Joint, Rig
 from kbs_process.studies.diagnose import results as records
-from kbs_process.studies.diagnose.prose import answer, notices, paragraph, rms
+from kbs_process.studies.diagnose.prose import answer, notes, notices, paragraph, rms
 from kbs_process.studies.diagnose.unexplained import unexplained
 
 COMMANDS = "next-test.csv"  # file of the next test's commands, in the results' folder
@@ -71,7 +70,7 @@ def results_of(
         files=tuple(files),
         next_test=None if proposal is None else next_test(proposal),
         warnings=tuple(notices(campaign, floor, outcome)),
-        notes=tuple(lines("diagnose", "notes")),
+        notes=notes(),
     )
 
 

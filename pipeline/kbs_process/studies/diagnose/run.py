@@ -6,8 +6,8 @@ from pathlib import Path
 
 from kbs_process.campaign.config import Campaign
 from kbs_process.diagnosis.experiments.experiment import Experiment
-from kbs_process.diagnosis.nominal.explain import explain
 from kbs_process.diagnosis.selection import rounds
+from kbs_process.diagnosis.selection.explain import explain
 from kbs_process.diagnosis.selection.next_test import propose
 from kbs_process.progress import Progress
 from kbs_process.results.outcome import Outcome

@@ -8,12 +8,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from kbs_process.diagnosis.acceptance.outcome import Find
+from kbs_process.diagnosis.facts import Estimate
 from kbs_process.diagnosis.proposing.curves import CurveSuspect, basis
 from kbs_process.diagnosis.screening.places import POINT, Place
 from kbs_process.diagnosis.screening.scene import Scene
 from kbs_process.diagnosis.screening.screen import Catalogued, Suspect
 from kbs_process.diagnosis.screening.suspects import BY, Candidate
-from kbs_process.diagnosis.selection.outcome import Estimate, Find
 from kbs_process.plant.effect import ACTION, ACTIONS, Effect, Port, instance
 from kbs_process.plant.effects import CATALOGUE
 from kbs_process.plant.effects.measured_law import Measured

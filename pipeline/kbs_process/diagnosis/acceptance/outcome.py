@@ -2,57 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from kbs_process.diagnosis.acceptance.gate import Gate
-from kbs_process.diagnosis.experiments.detection import Detection
 from kbs_process.diagnosis.experiments.thresholds import DISPUTED
-from kbs_process.diagnosis.facts import Answer, Moved, Place
+from kbs_process.diagnosis.facts import Answer, Estimate, Identity, Moved, Place
+from kbs_process.diagnosis.nominal.detection import Detection
 from kbs_process.diagnosis.nominal.joint import Standing
 from kbs_process.diagnosis.nominal.known import Known
 from kbs_process.diagnosis.screening.ports import Cells, PortTest
 from kbs_process.plant.effects.measured_law import Measured
 from kbs_process.plant.sensing import Sensing
 from kbs_process.signals.records import Array
-
-
-@dataclass(frozen=True, slots=True)
-class Identity:
-    """What a law is and where it acts, in the field's words."""
-
-    place: Place
-    # Of physics, "unnamed" for a measured law; by it alone laws do not differ: orders of one motor may be of two.
-    family: str = field(compare=False)
-    law: str  # name in the catalogue, or what the measured law is a function of
-
-    @property
-    def name(self) -> str:
-        """The law in words."""
-        return self.law.replace("_", " ")
-
-    @property
-    def words(self) -> str:
-        """The law and its place."""
-        return f"{self.name} ({self.place.words})"
-
-
-@dataclass(frozen=True, slots=True)
-class Estimate:
-    """A number of a law with its 95 % interval; `sigma` 0 where it was chosen from a grid."""
-
-    name: str
-    unit: str
-    value: float
-    sigma: float
-    about: float = 0.0  # what was fitted is how far it is from this
-
-    @property
-    def low(self) -> float:
-        return self.value - 1.96 * self.sigma
-
-    @property
-    def high(self) -> float:
-        return self.value + 1.96 * self.sigma
 
 
 @dataclass(frozen=True, slots=True)

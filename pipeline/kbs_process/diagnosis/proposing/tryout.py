@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from kbs_process.diagnosis.experiments.hypothesis import Hypothesis
-from kbs_process.diagnosis.facts import Place
+from kbs_process.diagnosis.facts import Identity, Place
 from kbs_process.diagnosis.nominal.joint import Extra, Standing
 from kbs_process.diagnosis.proposing import measured
 from kbs_process.diagnosis.proposing.curves import CurveSuspect
@@ -19,7 +19,6 @@ from kbs_process.diagnosis.screening.scene import Scene
 from kbs_process.diagnosis.screening.screen import Bench, Catalogued, Found, Suspect
 from kbs_process.diagnosis.screening.shapes import Bend, along, bends
 from kbs_process.diagnosis.screening.suspects import BY, Candidate
-from kbs_process.diagnosis.selection.outcome import Identity
 from kbs_process.identification.output_error import Scalar
 from kbs_process.plant.attach import attach
 from kbs_process.plant.effect import Effect, Port
