@@ -83,7 +83,6 @@ class Known:
     def room(self) -> tuple[Array, Array]:
         """How far numbers may go down and up, (p,) each."""
         limits = self.parameters
-        assert limits.lower is not None and limits.upper is not None
         return np.minimum(limits.lower - self.value, 0.0), np.maximum(limits.upper - self.value, 0.0)
 
     @property
@@ -332,13 +331,7 @@ def known_of(search: Search, found: Found, before: Array) -> Known:
 
 def _checks(known: Known, found: Found) -> tuple[Check, ...]:
     far = [f"{name} ({moved:+.1f})" for name, moved in zip(known.names, known.moved, strict=True) if abs(moved) > MOVED]
-    limits = known.parameters
-    assert limits.lower is not None and limits.upper is not None
-    stuck = [
-        name
-        for name, value, low, high in zip(known.names, known.value, limits.lower, limits.upper, strict=True)
-        if value <= low or value >= high
-    ]
+    stuck = known.parameters.stuck(known.value)
     within, strain = f"all within {MOVED:g} sigma", known.strain
     return (
         Check(CONVERGED, found.converged, f"{found.rounds} rounds"),
