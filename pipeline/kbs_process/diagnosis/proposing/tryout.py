@@ -9,24 +9,22 @@ from dataclasses import replace
 import numpy as np
 
 from kbs_process.diagnosis.experiments.hypothesis import Hypothesis
+from kbs_process.diagnosis.facts import Identity, Place
 from kbs_process.diagnosis.nominal.joint import Extra, Standing
 from kbs_process.diagnosis.proposing import measured
 from kbs_process.diagnosis.proposing.curves import CurveSuspect
 from kbs_process.diagnosis.proposing.families import PORTS, UNNAMED, family, port_word
-from kbs_process.diagnosis.screening.localise import PortName
 from kbs_process.diagnosis.screening.places import point_of
 from kbs_process.diagnosis.screening.scene import Scene
 from kbs_process.diagnosis.screening.screen import Bench, Catalogued, Found, Suspect
 from kbs_process.diagnosis.screening.shapes import Bend, along, bends
 from kbs_process.diagnosis.screening.suspects import Candidate
-from kbs_process.diagnosis.selection.outcome import Identity
 from kbs_process.identification.output_error import Scalar
 from kbs_process.plant.attach import attach
 from kbs_process.plant.effect import Effect, Port
 from kbs_process.plant.laws import select
 from kbs_process.plant.laws.motor.motor_order import MOTOR_ORDER
-from kbs_process.plant.sensing import SensingPort
-from kbs_process.plant.sensing.sensing import BY
+from kbs_process.plant.sensing import BY, SensingPort
 from kbs_process.rig.model import Rig
 from kbs_process.signals.records import Array
 
@@ -37,7 +35,7 @@ def identity(suspect: Suspect) -> Identity:
     """In the field's words."""
     if isinstance(suspect, CurveSuspect):
         port = PORTS[suspect.law.effect.port]
-        return Identity(port, suspect.joint, (), UNNAMED, suspect.law.words)
+        return Identity(Place(port, suspect.joint), UNNAMED, suspect.law.words)
     assert isinstance(suspect, Catalogued)
     candidate = suspect.candidate
     port = port_word(candidate.name, candidate.port)
@@ -45,7 +43,7 @@ def identity(suspect: Suspect) -> Identity:
     channels = tuple(candidate.site.split(BY)) if of_channel else ()
     axis = "" if of_channel or port == PORTS[Port.BASE_ACCELERATION] else candidate.site
     own = "cogging" if _with_cycles(candidate, suspect.scene.hypothesis.rig) else family(candidate.name)
-    return Identity(port, axis, channels, own, candidate.name)
+    return Identity(Place(port, axis, channels), own, candidate.name)
 
 
 def _with_cycles(candidate: Candidate, rig: Rig) -> bool:
@@ -64,16 +62,16 @@ def _with_cycles(candidate: Candidate, rig: Rig) -> bool:
 def port_label(suspect: Suspect) -> str:
     """The port of the port test at which a suspect acts: more exact than the word for it."""
     if isinstance(suspect, CurveSuspect):
-        return PortName(suspect.port.replace("_", " "), suspect.joint).label
+        return Place(suspect.port.replace("_", " "), suspect.joint).label
     assert isinstance(suspect, Catalogued)
-    candidate, own = suspect.candidate, identity(suspect)
+    candidate, own = suspect.candidate, identity(suspect).place
     if candidate.port is Port.GROUND_TORQUE:
-        return PortName("ground torque", candidate.site).label
+        return Place("ground torque", candidate.site).label
     if candidate.port is Port.BASE_ACCELERATION:
-        return PortName("base").label
+        return Place("base", "").label
     if candidate.port is Port.BASE_TORQUE:
-        return PortName("base torque").label
-    return PortName(own.port, own.axis, own.channels[:1]).label
+        return Place("base torque", "").label
+    return Place(own.port, own.site, own.channels[:1]).label
 
 
 def in_plant(suspect: Suspect) -> bool:

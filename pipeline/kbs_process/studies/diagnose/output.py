@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from kbs_process.campaign.config import Campaign
+from kbs_process.diagnosis.acceptance.outcome import Location, Outcome
 from kbs_process.diagnosis.experiments.experiment import Experiment
 from kbs_process.diagnosis.experiments.floor import Floor
 from kbs_process.diagnosis.experiments.hypothesis import Prediction
@@ -15,18 +16,17 @@ from kbs_process.diagnosis.experiments.nuisance import unknown_terms
 from kbs_process.diagnosis.nominal.joint import Standing
 from kbs_process.diagnosis.nominal.known import Known
 from kbs_process.diagnosis.selection.next_test import Proposal
-from kbs_process.diagnosis.selection.outcome import Outcome
 from kbs_process.report.build import build
 from kbs_process.results.outcome import Outcome as Told
 from kbs_process.results.records import encode
 from kbs_process.results.store import writing
 from kbs_process.results.tables import write_table
+from kbs_process.rig.model import Rig
 from kbs_process.signals.records import Array
-from kbs_process.studies.diagnose.corrected import write_corrected
-from kbs_process.studies.diagnose.next_test import commands_of
-from kbs_process.studies.diagnose.records import results_of, seen_channels
-from kbs_process.studies.diagnose.residual_maps import write_maps
-from kbs_process.studies.diagnose.terms import COMMANDS, CORRECTED
+from kbs_process.studies.diagnose.corrected import CORRECTED, write_corrected
+from kbs_process.studies.diagnose.records import COMMANDS, results_of, seen_channels
+
+MAPS = "residual_map"
 
 
 def write_diagnosis(
@@ -47,7 +47,7 @@ def write_diagnosis(
         files = write_corrected(campaign, outcome, folder / CORRECTED)
         if proposal is not None:
             (folder / COMMANDS).write_text(commands_of(proposal, campaign.rig), encoding="utf-8")
-        write_maps(folder, outcome)
+        _maps(folder, outcome)
         for k in range(len(known.experiment.trials)):
             _spectra(folder, known, outcome.standing.known, k)
             _histories(folder, known.experiment, known.shown, outcome.standing, k)
@@ -100,3 +100,37 @@ def _histories(
             units[f"{experiment.channels[c]}.{side}"] = experiment.units[c]
     path = folder / "tables" / "residual" / f"{trial.name}.parquet"
     write_table(path, columns, units, frame="T", recording=trial.name)
+
+
+def _maps(folder: Path, outcome: Outcome) -> None:
+    """Write a table for each trajectory that was fitted: rms over the floor before any find, and after all."""
+    before, after = outcome.place, outcome.left
+    if before is None or after is None or len(before.cells.t) != len(after.cells.t):
+        return
+    cells = before.cells
+    sizes = {"before": _size(before), "after": _size(after)}
+    found = before.test.significant.astype(np.float64)
+    trials = outcome.standing.known.experiment.trials
+    for number in np.unique(cells.trajectory):
+        own = cells.trajectory == number
+        recording = next(trial.name for trial in trials if trial.trajectory == number)
+        columns = {"t": cells.t[own], "f": cells.f[own]} | {name: size[own] for name, size in sizes.items()}
+        columns["significant"] = found[own]
+        units = dict.fromkeys(columns, "1") | {"t": "s", "f": "Hz"}
+        path = folder / "tables" / MAPS / f"{number}.parquet"
+        write_table(path, columns, units, frame="T", recording=recording)
+
+
+def _size(place: Location) -> Array:
+    """(cells,) rms of the whitened mean residual over all channels that are seen; 1 at the floor."""
+    power = np.sum(np.abs(place.cells.z) ** 2, axis=1)
+    return np.asarray(np.sqrt(power / np.maximum(place.cells.seen, 1)), dtype=np.float64)
+
+
+def commands_of(proposal: Proposal, rig: Rig) -> str:
+    """CSV as `simulate --command` reads it: t (s), angles (rad) and rates (rad/s) of all joints."""
+    schedule, names = proposal.trajectory.schedule, rig.joint_names
+    head = ["t", *names, *(f"{name}.rate" for name in names)]
+    rows = np.column_stack([schedule.t, schedule.position, schedule.rate])
+    lines = [",".join([f"{row[0]:.6g}", *(f"{value:.9f}" for value in row[1:])]) for row in rows]
+    return "\n".join([",".join(head), *lines]) + "\n"

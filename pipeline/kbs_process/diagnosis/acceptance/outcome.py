@@ -2,57 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Literal
+from dataclasses import dataclass
 
 from kbs_process.diagnosis.acceptance.gate import Gate
-from kbs_process.diagnosis.experiments.detection import Detection
 from kbs_process.diagnosis.experiments.thresholds import DISPUTED
+from kbs_process.diagnosis.facts import Answer, Estimate, Identity, Moved, Place
+from kbs_process.diagnosis.nominal.detection import Detection
 from kbs_process.diagnosis.nominal.joint import Standing
 from kbs_process.diagnosis.nominal.known import Known
-from kbs_process.diagnosis.screening.localise import PortName
 from kbs_process.diagnosis.screening.ports import Cells, PortTest
 from kbs_process.plant.laws.position.measured_law import Measured
 from kbs_process.plant.sensing import Sensing
 from kbs_process.signals.records import Array
-
-Verdict = Literal["none", "parameters off", "physics", "undecided"]
-
-
-@dataclass(frozen=True, slots=True)
-class Identity:
-    """What a law is and where it acts, in the field's words."""
-
-    port: str
-    axis: str  # joint, link or stream; "" for base and transducer
-    channels: tuple[str, ...]  # that it touches directly, of a transducer; else empty
-    # Of physics, "unnamed" for a measured law; by it alone laws do not differ: orders of one motor may be of two.
-    family: str = field(compare=False)
-    law: str  # name in the catalogue, or what the measured law is a function of
-
-    @property
-    def place(self) -> tuple[str, ...]:
-        """Where it acts."""
-        return self.port, self.axis, *self.channels
-
-
-@dataclass(frozen=True, slots=True)
-class Estimate:
-    """A number of a law with its 95 % interval; `sigma` 0 where it was chosen from a grid."""
-
-    name: str
-    unit: str
-    value: float
-    sigma: float
-    about: float = 0.0  # what was fitted is how far it is from this
-
-    @property
-    def low(self) -> float:
-        return self.value - 1.96 * self.sigma
-
-    @property
-    def high(self) -> float:
-        return self.value + 1.96 * self.sigma
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,24 +89,14 @@ class Absorbed:
     by: tuple[str, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Moved:
-    """A known parameter that went beyond what was known of it."""
-
-    name: str
-    value: float
-    sigma: float
-    sigmas: float  # of its prior
-
-
 @dataclass(frozen=True, slots=True, eq=False)
-class Place:
+class Location:
     """Where the residual lives: the port test and its cells."""
 
     test: PortTest
     cells: Cells
     # The port where it enters, and those that look the same; none, where others can do it.
-    only: tuple[PortName, ...]
+    only: tuple[Place, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -160,8 +111,8 @@ class Outcome:
     finds: tuple[Find, ...]
     refused: tuple[Refused, ...]
     absorbed: tuple[Absorbed, ...]
-    place: Place | None  # before any find; None for a rig that its motion drives
-    left: Place | None  # after all finds
+    place: Location | None  # before any find; None for a rig that its motion drives
+    left: Location | None  # after all finds
     known: Known  # refitted, without any law: what stood before the first find
     standing: Standing  # the corrected model
     bent: bool = False  # whether known numbers leave nothing, but are farther off together than chance has them
@@ -169,7 +120,7 @@ class Outcome:
     ended: bool = False  # whether the search had cost so much that no more laws were looked for
 
     @property
-    def verdict(self) -> Verdict:
+    def verdict(self) -> Answer:
         """The answer in a word: finds beside which much is left are no more than the nearest that is known."""
         if (
             self.much
@@ -195,7 +146,7 @@ class Outcome:
         return self.ended and bool(self.moved)
 
     @property
-    def located(self) -> tuple[PortName, ...]:
+    def located(self) -> tuple[Place, ...]:
         """Ports, which look the same, of what is left without a law; nothing where other ports may be it as well."""
         if self.verdict != "undecided" or self.finds or self.unforeseen or self.left is None:
             return ()

@@ -8,12 +8,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from kbs_process.diagnosis.acceptance.outcome import Find
+from kbs_process.diagnosis.facts import Estimate
 from kbs_process.diagnosis.proposing.curves import CurveSuspect, basis
 from kbs_process.diagnosis.screening.places import POINT, Place
 from kbs_process.diagnosis.screening.scene import Scene
 from kbs_process.diagnosis.screening.screen import Catalogued, Suspect
 from kbs_process.diagnosis.screening.suspects import Candidate
-from kbs_process.diagnosis.selection.outcome import Estimate, Find
 from kbs_process.plant.effect import ACTION, ACTIONS, Effect, Port, instance
 from kbs_process.plant.laws import CATALOGUE, SENSING
 from kbs_process.plant.laws.position.measured_law import Measured
@@ -32,10 +33,10 @@ def suspect_of(find: Find, scene: Scene) -> tuple[Suspect, Array] | None:
         over, x = find.curve.law, find.curve.x
         ends = float(x[0]), float(x[-1])
         coefficients = np.linalg.lstsq(basis(over, x, *ends), find.curve.value, rcond=None)[0]
-        return CurveSuspect(scene, over, own.axis, ends), np.asarray(coefficients)
+        return CurveSuspect(scene, over, own.place.site, ends), np.asarray(coefficients)
     law = _LAWS.get(own.law)
     mounting = isinstance(law, Effect) and law.port is Port.BASE_TORQUE
-    site = TRANSDUCER if mounting else BY.join(own.channels) or own.axis
+    site = TRANSDUCER if mounting else BY.join(own.place.channels) or own.place.site
     if law is None or law.each_trial or not site:
         return None
     # Of a sensor's law that was found more than once, the action that was found first.

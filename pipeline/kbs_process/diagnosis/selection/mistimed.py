@@ -18,10 +18,10 @@ from kbs_process.diagnosis.nominal import phasing
 from kbs_process.diagnosis.nominal.joint import Standing
 from kbs_process.diagnosis.nominal.known import Known, as_it_is, confined, refit
 from kbs_process.diagnosis.proposing.clocks import by_a_right_clock, height_of, timed
+from kbs_process.diagnosis.proposing.view import View
 from kbs_process.diagnosis.screening.screen import Catalogued, Found, Suspect
-from kbs_process.diagnosis.screening.view import View
 from kbs_process.diagnosis.selection.each_recording import gained_by_chance, taken_off, unread_only
-from kbs_process.diagnosis.selection.side_by_side import side_by_side
+from kbs_process.diagnosis.side_by_side import side_by_side
 
 _TIMES = 3  # that recordings are stamped anew, each time by what the numbers of before leave
 

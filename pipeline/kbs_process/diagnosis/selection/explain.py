@@ -18,17 +18,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kbs_process.diagnosis.acceptance.remains import searched
-from kbs_process.diagnosis.experiments.detection import Detection, detect
 from kbs_process.diagnosis.experiments.experiment import Experiment
 from kbs_process.diagnosis.experiments.floor import Floor, estimate, smaller
 from kbs_process.diagnosis.experiments.hypothesis import Hypothesis, Prediction, Simulate
 from kbs_process.diagnosis.experiments.thresholds import EXPLAINED, LEAST_RHO, MOST
 from kbs_process.diagnosis.nominal import phasing
+from kbs_process.diagnosis.nominal.detection import Detection, detect
 from kbs_process.diagnosis.nominal.known import NEAR, Known, confined, leapt, refit
-from kbs_process.diagnosis.nominal.mistimed import by_another_clock
 from kbs_process.diagnosis.nominal.parameters import prior
 from kbs_process.diagnosis.nominal.search import LITTLE, SLIGHT
+from kbs_process.diagnosis.nominal.settling import searched
+from kbs_process.diagnosis.selection.mistimed import by_another_clock
 from kbs_process.signals.records import Array
 
 LEAPS = 4  # after a descent
