@@ -51,15 +51,17 @@ def import_(mapping: str | None, source: Path | None, campaign: Path | None, fil
 
     MAPPING is a TOML file that says which columns are which channels, or the name of a preset.
     """
-    from kbs_process.studies import convert as importers
-
     if file is not None:
-        click.echo(importers.describe(file), nl=False)
+        from kbs_process.studies.convert.describe import describe
+
+        click.echo(describe(file), nl=False)
         return
     if mapping is None or source is None or campaign is None:
         raise click.UsageError(
             f"Give MAPPING, SOURCE and CAMPAIGN, or --describe FILE. Presets: {', '.join(preset_names())}"
         )
+    from kbs_process.studies.convert.run import import_recordings
+
     notice = functools.partial(click.echo, err=True)
-    made = importers.import_recordings(mapping, source, campaign, progress=progress(quiet), notice=notice)
+    made = import_recordings(mapping, source, campaign, progress=progress(quiet), notice=notice)
     click.echo(f"Campaign: {made}")
