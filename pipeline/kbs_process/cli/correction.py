@@ -28,7 +28,7 @@ if TYPE_CHECKING:
         help="By how much a friction torque differs from run to run, one sigma, of itself.",
     ),
     example=("identify campaign/DUMMY1", "identify campaign/DUMMY1 --starts 3 --run-to-run 0.01"),
-    output="reports/NAME-identify",
+    output="results/NAME-identify",
     pdf=True,
 )
 def identify(campaign: Campaign, starts: int, run_to_run: float, **options: Any) -> Outcome:
@@ -45,7 +45,7 @@ def identify(campaign: Campaign, starts: int, run_to_run: float, **options: Any)
 
 @verb(
     example=("diagnose campaign/EL089", "diagnose campaign/EL089 -o /data/why --no-pdf"),
-    output="reports/NAME-diagnosis",
+    output="results/NAME-diagnosis",
     pdf=True,
 )
 def diagnose(campaign: Campaign, **options: Any) -> Outcome:
@@ -66,14 +66,14 @@ def diagnose(campaign: Campaign, **options: Any) -> Outcome:
     "a concealed effect, or a trial without an answer."
 )
 @click.option(
-    "--full", is_flag=True, help="A set of validation trials and all rivals: two hours, to reports/proof/full."
+    "--full", is_flag=True, help="A set of validation trials and all rivals: two hours, to results/proof/full."
 )
 @click.option("--trials", type=click.IntRange(1), metavar="N", help="How many [default: 6; 20 with --full].")
 @click.option(
     "--work", type=FOLDER, metavar="FOLDER", help="Where trials and answers are kept [default: .proof/SPLIT-N]."
 )
 @click.option(
-    "--output", "-o", type=FOLDER, metavar="FOLDER", help="Where the score goes [default: reports/proof/small or full]."
+    "--output", "-o", type=FOLDER, metavar="FOLDER", help="Where the score goes [default: results/proof/small or full]."
 )
 @click.option("--jobs", type=click.IntRange(1), metavar="N", help="Processes [default: one a core].")
 @click.option("--dask", metavar="ADDRESS", help="Scheduler of a Dask cluster to run on: tcp://HOST:PORT.")

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     ),
     click.option("--points", type=click.IntRange(2), default=25, show_default=True, help="Poses."),
     example=("stability campaign/EL089", "stability campaign/EL089 --joint el --from 0 --to 87 --points 30"),
-    output="reports/NAME-stability",
+    output="results/NAME-stability",
     pdf=True,
     check="the margins are not kept",
     checksums=False,

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     click.option("--samples", type=click.IntRange(2), default=200, show_default=True, help="Units to fly."),
     click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of the draw."),
     example=("flight campaign/EL089", "flight campaign/EL089 --command slew.csv --samples 500 --seed 3"),
-    output="reports/NAME-flight",
+    output="results/NAME-flight",
     pdf=True,
     checksums=False,
     flight=True,
@@ -40,7 +40,7 @@ def flight(campaign: Campaign, trajectory: str | None, command: Path | None, **o
 @verb(
     campaign="campaign/REFDAY",
     example=("reference-day", "reference-day campaign/REFDAY --output /data/day --check"),
-    output="reports/NAME-reference-day",
+    output="results/NAME-reference-day",
     pdf=True,
     check="a requirement is not met",
     recordings=False,

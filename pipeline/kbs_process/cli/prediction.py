@@ -47,7 +47,7 @@ def commanded_by(table: str) -> tuple[Any, ...]:
         help="Sampling rate of the wrench [default: the recording's; 100 with --command].",
     ),
     example=("simulate campaign/EL089 --trajectory EL089P00", "simulate campaign/EL089 --command slew.csv --rate 200"),
-    output="reports/NAME-simulated",
+    output="results/NAME-simulated",
     checksums=False,
 )
 def simulate(
@@ -75,7 +75,7 @@ def simulate(
     epilog=examples(
         "predict campaign/EL089 EL089P00_1",
         "predict campaign/EL089 other.mcap -o /tmp/other",
-        "predict --model reports/EL089-diagnosis/corrected other.mcap",
+        "predict --model results/EL089-diagnosis/corrected other.mcap",
     )
 )
 @click.argument("words", nargs=-1, required=True, metavar="[CAMPAIGN] RECORDING")
@@ -85,7 +85,7 @@ def simulate(
     metavar="FOLDER",
     help="A corrected model that 'diagnose' wrote, in the place of CAMPAIGN.",
 )
-@output_option("reports/NAME-predicted; with --model, reports/NAME-corrected-predicted")
+@output_option("results/NAME-predicted; with --model, results/NAME-corrected-predicted")
 @quiet_option
 def predict(words: tuple[str, ...], model: Path | None, output: Path | None, quiet: bool) -> None:
     """Predict one RECORDING: a name from CAMPAIGN, or any MCAP file with the same topics.
@@ -105,7 +105,7 @@ def predict(words: tuple[str, ...], model: Path | None, output: Path | None, qui
     # The recordings that a model came from may be elsewhere by now.
     loaded = load_campaign(folder, checksums=False, recordings=model is None)
     if model is not None:
-        output = output or Path("reports") / f"{loaded.name}-corrected-predicted"
+        output = output or Path("results") / f"{loaded.name}-corrected-predicted"
     target = results_folder(folder, output, suffix="-predicted")
     run = predict_recording if model is None else predict_with
     conclude((f"Predicted: {run(loaded, words[-1], target, progress=progress(quiet))}",))

@@ -74,7 +74,7 @@ def verb(
     """Return what makes a command of a study: it finds and loads the campaign, runs, prints, and sets the exit status.
 
     The function is given the campaign, and by name `progress`, the folder of its results (`target`) where there is an
-    `output` (its default, reports/NAME...), and every option; it returns an outcome, or lines to be printed. Its
+    `output` (its default, results/NAME...), and every option; it returns an outcome, or lines to be printed. Its
     docstring is the help. `campaign` is that argument's default, `pdf` offers a report.pdf, `check` says when --check
     makes a status of the outcome, `loading` is handed to `load_campaign`. The function imports what computes: bad input
     is told before that.
@@ -97,7 +97,7 @@ def verb(
 
             folder = find_campaign(campaign)
             if output is not None:
-                suffix = output.removeprefix("reports/NAME")
+                suffix = output.removeprefix("results/NAME")
                 given["target"] = results_folder(folder, given.pop("output"), suffix=suffix)
             # Where commands come from a table, no recording need be there.
             loaded = load_campaign(folder, **{"recordings": given.get("command") is None, **loading})
