@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from kbs_process.campaign.config import Campaign
-from kbs_process.campaign.mission import Published
+from kbs_process.campaign.formats.mission_file import Published
 from kbs_process.rig.model import Rig
 from kbs_process.studies.reference_day.day import Section
 
