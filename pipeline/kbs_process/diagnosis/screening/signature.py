@@ -20,7 +20,7 @@ from kbs_process.diagnosis.screening.places import point_of
 from kbs_process.diagnosis.screening.suspects import Candidate, own_values
 from kbs_process.plant.along import along, signals_of
 from kbs_process.plant.effect import Effect, Port
-from kbs_process.plant.effects import select
+from kbs_process.plant.laws import select
 from kbs_process.plant.linear.linearise import drive_slopes
 from kbs_process.plant.sensing import Sensing, SensingPort
 from kbs_process.plant.sensing.sensing import BY

@@ -13,11 +13,10 @@ from kbs_process.diagnosis.screening.places import Place, points_of
 from kbs_process.diagnosis.screening.ranges import Ranges
 from kbs_process.plant.along import signals_of
 from kbs_process.plant.effect import ACTIONS, VELOCITIES, Effect, Parameter, Port, instance
-from kbs_process.plant.effects import CATALOGUE
-from kbs_process.plant.effects.joint_order import JOINT_ORDER
+from kbs_process.plant.laws import CATALOGUE, SENSING
+from kbs_process.plant.laws.position.joint_order import JOINT_ORDER
 from kbs_process.plant.rigid import links_beyond, poses
-from kbs_process.plant.sensing import SENSING, Sensing, SensingPort
-from kbs_process.plant.sensing.sensing import couplings, products
+from kbs_process.plant.sensing import Sensing, SensingPort, couplings, products
 from kbs_process.plant.taps import plate_column
 from kbs_process.rig.model import LAB, TRANSDUCER, Joint, Rig
 from kbs_process.signals.records import WRENCH_CHANNELS

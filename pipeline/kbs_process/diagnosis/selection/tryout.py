@@ -23,8 +23,8 @@ from kbs_process.diagnosis.selection.outcome import Identity
 from kbs_process.identification.output_error import Scalar
 from kbs_process.plant.attach import attach
 from kbs_process.plant.effect import Effect, Port
-from kbs_process.plant.effects import select
-from kbs_process.plant.effects.motor_order import MOTOR_ORDER
+from kbs_process.plant.laws import select
+from kbs_process.plant.laws.motor.motor_order import MOTOR_ORDER
 from kbs_process.plant.sensing import SensingPort
 from kbs_process.plant.sensing.sensing import BY
 from kbs_process.rig.model import Rig
