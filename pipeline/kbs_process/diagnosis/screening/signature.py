@@ -22,8 +22,7 @@ from kbs_process.plant.along import along, signals_of
 from kbs_process.plant.effect import Effect, Port
 from kbs_process.plant.laws import select
 from kbs_process.plant.linear.linearise import drive_slopes
-from kbs_process.plant.sensing import Sensing, SensingPort
-from kbs_process.plant.sensing.sensing import BY
+from kbs_process.plant.sensing import BY, Sensing, SensingPort
 from kbs_process.plant.taps import plate_column
 from kbs_process.rig.model import Rig
 from kbs_process.signals.records import WRENCH_CHANNELS, Array

@@ -47,7 +47,7 @@ from kbs_process.diagnosis.selection.race import at_floor, own_of, raced
 from kbs_process.diagnosis.selection.side_by_side import side_by_side
 from kbs_process.diagnosis.selection.tryout import extra_of, identity, in_plant, of_every_clock
 from kbs_process.plant.effect import Effect, Port
-from kbs_process.plant.sensing.sensing import BY
+from kbs_process.plant.sensing import BY
 from kbs_process.signals.records import Array
 
 

@@ -25,8 +25,7 @@ from kbs_process.plant.attach import attach
 from kbs_process.plant.effect import Effect, Port
 from kbs_process.plant.laws import select
 from kbs_process.plant.laws.motor.motor_order import MOTOR_ORDER
-from kbs_process.plant.sensing import SensingPort
-from kbs_process.plant.sensing.sensing import BY
+from kbs_process.plant.sensing import BY, SensingPort
 from kbs_process.rig.model import Rig
 from kbs_process.signals.records import Array
 
