@@ -5,17 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from kbs_process.diagnosis.proposing.curves import CurveSuspect, along
-from kbs_process.diagnosis.proposing.families import family
 from kbs_process.diagnosis.screening.screen import Catalogued
 from kbs_process.diagnosis.screening.signature import port_inputs
 from kbs_process.diagnosis.screening.suspects import Candidate
-from kbs_process.plant.effect import Effect, Port
+from kbs_process.plant.effect import Effect
 from kbs_process.signals.records import Array
 
-_TAKES = ("friction", "viscous")  # families
-_EVEN = ("motor_asymmetry",)  # laws that push in one sense what they brake in the other: either sign is right
 _SHARE = 0.1  # of the work that it does and takes, below which what it does is the motion's asymmetry
-_RATES = {Port.MOTOR_TORQUE: "rotor_rate", Port.JOINT_TORQUE: "joint_rate", Port.GROUND_TORQUE: "joint_rate"}
 SIGMAS = 3.0  # by which work has to be done for a friction to be refused
 
 
@@ -30,13 +26,11 @@ def drives(suspect: Catalogued, amplitudes: Array, covariance: Array) -> tuple[s
     Source: J. C. Willems, Dissipative dynamical systems I, Arch. Rational Mech. Anal. 45 (1972) 321.
     """
     candidate = suspect.candidate
-    if not (isinstance(candidate.effect, Effect) and candidate.port in _RATES):
-        return ()
-    if family(candidate.name) not in _TAKES or candidate.name in _EVEN:
+    if not (isinstance(candidate.effect, Effect) and candidate.effect.brakes):
         return ()
     # Several actions of one law have amplitudes one after the other.
     actions = len(amplitudes) // len(candidate.amplitudes)
-    power = np.tile(_power(suspect, candidate, _RATES[candidate.port]), actions)
+    power = np.tile(_power(suspect, candidate, candidate.port.rate), actions)
     work, all_of_it = power.sum(axis=0), float(np.abs(power @ amplitudes).sum())
     done, variance = float(work @ amplitudes), float(work @ (covariance @ work))
     if not done > max(SIGMAS * float(np.sqrt(max(variance, 0.0))), _SHARE * all_of_it):

@@ -15,10 +15,8 @@ import numpy as np
 
 from kbs_process.diagnosis.screening.screen import Catalogued, Suspect
 from kbs_process.diagnosis.screening.signature import port_inputs
-from kbs_process.plant.effect import Effect
-from kbs_process.plant.sensing import Sensing
+from kbs_process.plant.effect import Effect, Law
 
-SPREADS = 100.0  # of a sensor's law, beyond which it is no sensor's
 SIGMAS = 3.0  # by which an amplitude has to be beyond
 
 
@@ -41,22 +39,17 @@ def undone(suspect: Catalogued, amplitudes: Mapping[str, float]) -> frozenset[st
     )
 
 
-def implausible(
-    law: Effect | Sensing, amplitudes: Mapping[str, tuple[float, float]], free: Collection[str] = ()
-) -> tuple[str, ...]:
+def implausible(law: Law, amplitudes: Mapping[str, tuple[float, float]], free: Collection[str] = ()) -> tuple[str, ...]:
     """Return why a law is refused that has amplitudes of such values and sigmas, by name; nothing, if it may have.
 
     Those that are `free` may have any.
     """
     reasons = []
-    for parameter in law.parameters:
-        if parameter.role != "amplitude" or parameter.name not in amplitudes or parameter.name in free:
+    for parameter in law.amplitudes:
+        if parameter.name not in amplitudes or parameter.name in free:
             continue
         value, sigma = amplitudes[parameter.name]
-        least, most = parameter.bounds
-        if isinstance(law, Sensing):
-            usual = SPREADS * parameter.prior.spread
-            least, most = max(least, -usual), min(most, usual)
+        least, most = law.plausible(parameter)
         # Written so that what is no number is refused.
         if not least - SIGMAS * sigma <= value <= most + SIGMAS * sigma:
             unit = "" if parameter.unit == "1" else f" {parameter.unit}"

@@ -19,7 +19,6 @@ from kbs_process.diagnosis.experiments.hypothesis import Simulate
 from kbs_process.diagnosis.experiments.thresholds import CONTESTED, GATE_SIGMA, MOST, SECOND, SETTLED, TOLERATED
 from kbs_process.diagnosis.nominal.joint import Standing
 from kbs_process.diagnosis.nominal.settling import released, resettled
-from kbs_process.diagnosis.proposing.families import UNNAMED
 from kbs_process.diagnosis.screening.screen import Found
 from kbs_process.diagnosis.screening.shapes import bettered
 from kbs_process.diagnosis.screening.view import View
@@ -27,6 +26,7 @@ from kbs_process.diagnosis.selection.effort import Effort
 from kbs_process.diagnosis.selection.leaders import gated, reread, tried
 from kbs_process.diagnosis.selection.outcome import Identity, Place
 from kbs_process.diagnosis.selection.tryout import identity
+from kbs_process.plant.effect import UNNAMED
 from kbs_process.signals.records import Array
 
 

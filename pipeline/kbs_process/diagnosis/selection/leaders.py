@@ -35,19 +35,18 @@ from kbs_process.diagnosis.nominal.joint import Own, Standing, bare, moved_on, w
 from kbs_process.diagnosis.nominal.settling import resettled
 from kbs_process.diagnosis.proposing.clocks import timed
 from kbs_process.diagnosis.proposing.curves import CurveSuspect
-from kbs_process.diagnosis.proposing.families import UNNAMED
 from kbs_process.diagnosis.proposing.orders import with_orders
 from kbs_process.diagnosis.proposing.sizes import springs
 from kbs_process.diagnosis.screening.screen import Catalogued, Found, Suspect
 from kbs_process.diagnosis.screening.shapes import bends, bettered, fitted, possible, standing_still, uncovered
-from kbs_process.diagnosis.screening.suspects import BY
 from kbs_process.diagnosis.screening.view import View
 from kbs_process.diagnosis.selection.each_recording import taken_off, taken_off_again
 from kbs_process.diagnosis.selection.effort import Effort
 from kbs_process.diagnosis.selection.race import at_floor, own_of, raced
 from kbs_process.diagnosis.selection.side_by_side import side_by_side
 from kbs_process.diagnosis.selection.tryout import extra_of, identity, in_plant, of_every_clock
-from kbs_process.plant.effect import Effect, Port
+from kbs_process.plant.effect import UNNAMED, Port
+from kbs_process.plant.sensing import BY
 from kbs_process.signals.records import Array
 
 
@@ -123,8 +122,7 @@ def _pulls(found: Found) -> bool:
 
 
 def _anywhere(found: Found) -> bool:
-    law = found.suspect.candidate.effect if isinstance(found.suspect, Catalogued) else None
-    return _pulls(found) and isinstance(law, Effect) and law.anywhere
+    return isinstance(found.suspect, Catalogued) and found.suspect.candidate.effect.anywhere
 
 
 def _same(one: Suspect, other: Suspect) -> TypeGuard[Catalogued]:
@@ -151,8 +149,7 @@ def various(chosen: Sequence[Found]) -> list[Found]:
 
 
 def _delays(suspect: Suspect) -> bool:
-    law = suspect.candidate.effect if isinstance(suspect, Catalogued) else None
-    return isinstance(law, Effect) and bool(law.delay)
+    return isinstance(suspect, Catalogued) and bool(suspect.candidate.effect.delay)
 
 
 def _way(found: Found) -> tuple[str, ...]:

@@ -13,6 +13,7 @@ from kbs_process.diagnosis.nominal.joint import Standing
 from kbs_process.diagnosis.nominal.known import Known
 from kbs_process.diagnosis.selection.next_test import Proposal
 from kbs_process.diagnosis.selection.outcome import Curve, Find, Outcome
+from kbs_process.plant.effect import Port
 from kbs_process.plant.laws.position.measured_law import Measured, unit_of
 from kbs_process.plant.structure import other_joint
 from kbs_process.results import provenance
@@ -34,7 +35,7 @@ _NOTES = (
     "prediction of recordings that it was not fitted to, all together, and makes none of them markedly worse.",
     "Channels are whitened in their order: each is judged given those before it.",
 )
-_PORTS = {"ground torque": "external wrench"}  # of the port test, in the words of finds
+_PORTS = {Port.GROUND_TORQUE.tested: Port.GROUND_TORQUE.word}  # of the port test, in the words of finds
 
 
 def results_of(

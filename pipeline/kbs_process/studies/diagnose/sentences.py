@@ -12,8 +12,8 @@ from kbs_process.diagnosis.experiments.detection import Detection
 from kbs_process.diagnosis.experiments.floor import Floor
 from kbs_process.diagnosis.experiments.thresholds import RIVALS, told_apart
 from kbs_process.diagnosis.nominal.known import LEARNT, NEAR, Known
-from kbs_process.diagnosis.proposing.families import UNNAMED
 from kbs_process.diagnosis.selection.outcome import Find, Outcome
+from kbs_process.plant.effect import UNNAMED
 from kbs_process.studies.diagnose import results as records
 from kbs_process.studies.diagnose.terms import place_of, rms
 
