@@ -10,19 +10,20 @@ import numpy as np
 from scipy.stats import chi2
 
 from kbs_process.diagnosis.acceptance.gate import Gate
+from kbs_process.diagnosis.acceptance.outcome import Alternative, Curve, Find, Location
 from kbs_process.diagnosis.acceptance.rivals import rivalry
 from kbs_process.diagnosis.experiments.jumps import jump
 from kbs_process.diagnosis.experiments.thresholds import RIVALS, told_apart
+from kbs_process.diagnosis.facts import Estimate, Identity, Place
 from kbs_process.diagnosis.nominal.joint import Own, Standing
 from kbs_process.diagnosis.nominal.known import Known
 from kbs_process.diagnosis.proposing.curves import CurveSuspect, along, basis
+from kbs_process.diagnosis.proposing.tryout import identity, in_plant, port_label
 from kbs_process.diagnosis.screening.places import POINT
 from kbs_process.diagnosis.screening.ranges import swept
 from kbs_process.diagnosis.screening.screen import Catalogued, Found, Screening, Suspect
 from kbs_process.diagnosis.screening.signature import per_unit
 from kbs_process.diagnosis.screening.suspects import Candidate, weighed
-from kbs_process.diagnosis.selection.outcome import Alternative, Curve, Estimate, Find, Identity, Place
-from kbs_process.diagnosis.selection.tryout import identity, in_plant, port_label
 from kbs_process.plant.effect import ACTION, ACTIONS, UNNAMED, Effect
 from kbs_process.plant.laws import CATALOGUE
 from kbs_process.plant.laws.position.measured_law import Measured
@@ -50,7 +51,7 @@ def find_of(
     best: int,
     chances: Array,
     before: Standing,
-    place: Place | None,
+    place: Location | None,
     refused: Sequence[Identity] = (),
 ) -> Find:
     """The find of the `best` of some laws that passed, each right with a chance; `before` stood without it.
@@ -128,18 +129,9 @@ def _equivalents(suspect: Suspect, rig: Rig) -> tuple[Alternative, ...]:
     if not weighed(rig, rig.joint(suspect.joint)):
         return ()
     law = "weight over joint angle"
-    return tuple(
-        Alternative(
-            Identity(weight.port_word, suspect.joint, (), weight.family, law),
-            0.0,
-            0.0,
-            0.5,
-            indistinguishable=True,
-            refitted=False,
-        )
-        for weight in CATALOGUE
-        if weight.of_weight
-    )
+    weights = (one for one in CATALOGUE if one.of_weight)
+    same = (Identity(Place(weight.port_word, suspect.joint), weight.family, law) for weight in weights)
+    return tuple(Alternative(one, 0.0, 0.0, 0.5, indistinguishable=True, refitted=False) for one in same)
 
 
 def _law(suspect: Suspect) -> Effect | Sensing:

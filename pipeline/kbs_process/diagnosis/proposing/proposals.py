@@ -12,7 +12,7 @@ from kbs_process.diagnosis.nominal.known import Known
 from kbs_process.diagnosis.proposing.folding import periods
 from kbs_process.diagnosis.proposing.sweeps import sweeping
 from kbs_process.diagnosis.screening.scene import Scene
-from kbs_process.diagnosis.selection.side_by_side import side_by_side
+from kbs_process.diagnosis.side_by_side import side_by_side
 from kbs_process.plant.laws import CATALOGUE, SENSING
 from kbs_process.signals.records import Array
 
