@@ -129,18 +129,9 @@ def _equivalents(suspect: Suspect, rig: Rig) -> tuple[Alternative, ...]:
     if not weighed(rig, rig.joint(suspect.joint)):
         return ()
     law = "weight over joint angle"
-    return tuple(
-        Alternative(
-            Identity(Place(weight.port_word, suspect.joint), weight.family, law),
-            0.0,
-            0.0,
-            0.5,
-            indistinguishable=True,
-            refitted=False,
-        )
-        for weight in CATALOGUE
-        if weight.of_weight
-    )
+    weights = (one for one in CATALOGUE if one.of_weight)
+    same = (Identity(Place(weight.port_word, suspect.joint), weight.family, law) for weight in weights)
+    return tuple(Alternative(one, 0.0, 0.0, 0.5, indistinguishable=True, refitted=False) for one in same)
 
 
 def _law(suspect: Suspect) -> Effect | Sensing:

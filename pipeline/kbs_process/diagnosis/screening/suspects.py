@@ -12,11 +12,11 @@ from kbs_process.diagnosis.screening.inlets import plate_turns
 from kbs_process.diagnosis.screening.places import Place, points_of
 from kbs_process.diagnosis.screening.ranges import Ranges
 from kbs_process.plant.along import signals_of
+from kbs_process.plant.compiled.taps import plate_column
 from kbs_process.plant.effect import ACTIONS, VELOCITIES, Effect, Parameter, Port, instance
 from kbs_process.plant.laws import CATALOGUE, SENSING
 from kbs_process.plant.rigid import links_beyond, poses
 from kbs_process.plant.sensing import Sensing, SensingPort
-from kbs_process.plant.taps import plate_column
 from kbs_process.rig.model import LAB, TRANSDUCER, Joint, Rig
 from kbs_process.signals.records import WRENCH_CHANNELS
 
