@@ -8,31 +8,25 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from kbs_process.campaign.config import Campaign
 from kbs_process.recordings import OutStream, write_mcap
 from kbs_process.reduction.analysis import Analysis
+from kbs_process.results.records import FILE, encode
 from kbs_process.results.tables import TableWriter, write_table
 from kbs_process.signals.records import WRENCH_CHANNELS, Signal
 from kbs_process.stages.repeats import commanded
-from kbs_process.studies.correlate import results
+from kbs_process.studies.correlate.results import Results
 from kbs_process.studies.correlate.transducer import Study
 
 
-def write_results(
-    folder: Path,
-    campaign: Campaign,
-    analyses: Sequence[Analysis],
-    summary: results.Results,
-    on_transducer: Study | None,
-) -> None:
+def write_results(folder: Path, analyses: Sequence[Analysis], found: Results, on_transducer: Study | None) -> None:
     """Write results.json, the tables of every stage, and the processed signals as MCAP."""
     for analysis in analyses:
         _tables(TableWriter(folder, analysis.entry.name), analysis)
         _recording(folder / "processed", analysis)
     if on_transducer is not None:
         _curves(folder / "tables" / "transducer", on_transducer)
-        summary = msgspec.structs.replace(summary, transducer=on_transducer.findings)
-    (folder / "results.json").write_bytes(results.encode(summary))
+        found = msgspec.structs.replace(found, transducer=on_transducer.findings)
+    (folder / FILE).write_bytes(encode(found))
 
 
 def _curves(folder: Path, found: Study) -> None:

@@ -15,10 +15,9 @@ from kbs_process.results.outcome import Outcome
 from kbs_process.results.store import writing
 from kbs_process.stages import decouple
 from kbs_process.stages.gravity.model import GravityModel
-from kbs_process.studies.correlate import results
 from kbs_process.studies.correlate.earlier_diagnosis import keep_diagnosis
-from kbs_process.studies.correlate.findings import find
 from kbs_process.studies.correlate.output import write_results
+from kbs_process.studies.correlate.results import Results
 from kbs_process.studies.correlate.summary import summarise
 from kbs_process.studies.correlate.transducer import study
 
@@ -35,17 +34,16 @@ def process(campaign: Campaign, target: Path, *, progress: Progress, pdf: bool |
         model = fit_gravity(campaign, prepared, progress)
         analyses = [_analyse(campaign, one, model, progress) for one in prepared]
         with progress.task("Comparing, summing up uncertainties"):
-            findings = find(campaign, analyses, model, decoupling)
-            summary = summarise(campaign, analyses, model, decoupling, findings)
+            found = summarise(campaign, analyses, model, decoupling)
         with progress.task("Following the transducer's resonance") as task:
             on_transducer = study(campaign, analyses, model.rig, task.update)
         with progress.task("Writing the report"):
-            write_results(folder, campaign, analyses, summary, on_transducer)
+            write_results(folder, analyses, found, on_transducer)
             keep_diagnosis(campaign, target, folder)
             from kbs_process.studies.correlate.report import DOCUMENT  # draws: takes its time to import
 
             page = build(folder, DOCUMENT, pdf)
-    return _outcome(summary, target / page.name)
+    return _outcome(found, target / page.name)
 
 
 def _analyse(campaign: Campaign, one: Prepared, model: GravityModel, progress: Progress) -> Analysis:
@@ -54,11 +52,11 @@ def _analyse(campaign: Campaign, one: Prepared, model: GravityModel, progress: P
         return analyse(campaign, one.entry, one.raw, run, one.motion, model, task.update)
 
 
-def _outcome(summary: results.Results, report: Path) -> Outcome:
+def _outcome(found: Results, report: Path) -> Outcome:
     """The verdict in words: one line a requirement, then what a reader has to know about it."""
-    lines = [summary.verdict.sentence]
-    serious = sum(notice.severity != "info" for notice in summary.warnings)
+    lines = [found.verdict.sentence]
+    serious = sum(notice.severity != "info" for notice in found.warnings)
     if serious:
         lines.append(f"{serious} warning{'s' if serious > 1 else ''}: see the top of the report")
-    met = {"pass": True, "fail": False}.get(summary.verdict.status)
+    met = {"pass": True, "fail": False}.get(found.verdict.status)
     return Outcome(tuple(lines), met, report)

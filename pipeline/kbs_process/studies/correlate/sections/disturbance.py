@@ -10,6 +10,7 @@ from kbs_process.report.prose import Prose
 from kbs_process.report.tables import Table, Tables
 from kbs_process.report.text import frame_label
 from kbs_process.report.views import Scene, views
+from kbs_process.results.judged import Frame
 from kbs_process.studies.correlate.choose import (
     PLATES,
     band_label,
@@ -19,7 +20,7 @@ from kbs_process.studies.correlate.choose import (
     main_frame,
     peak_limit,
 )
-from kbs_process.studies.correlate.results import Frame, Results
+from kbs_process.studies.correlate.results import Results
 
 _SAYS = Prose("kbs_process.studies.correlate", "disturbance")
 
