@@ -8,7 +8,8 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from kbs_process.recordings import OutStream, write_mcap
+from kbs_process.recordings.mcap.messages.encoding import OutStream
+from kbs_process.recordings.mcap.writer import write_mcap
 from kbs_process.reduction.analysis import Analysis
 from kbs_process.results.records import FILE, encode
 from kbs_process.results.tables import TableWriter, write_table
