@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from kbs_process.errors import OutputError
-from kbs_process.report import pdf as paper
+from kbs_process.report import build as paper
 from kbs_process.results.records import encode
 from kbs_process.studies.documents import render as build
 from report import sample
