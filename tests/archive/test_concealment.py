@@ -43,8 +43,7 @@ sys.addaudithook(lambda event, args: opened.add(args[0]) if event in ("open", "o
 from kbs_process.studies.correlate import run
 from kbs_process.campaign.load import load_campaign
 from kbs_process.progress import SilentProgress
-run.build = lambda folder, document, pdf: folder / "index.html"
-run.process(load_campaign(campaign), target, progress=SilentProgress(), pdf=False)
+run.process(load_campaign(campaign), target, progress=SilentProgress(), page=False)
 for path in sorted({str(path) for path in opened if isinstance(path, (str, bytes, Path))}):
     print(path)
 """

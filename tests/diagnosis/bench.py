@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
-from kbs_process.campaign.load import load_campaign
+from archived import CAMPAIGNS, campaign
 from kbs_process.diagnosis.experiments.experiment import Drive, Experiment, Trial
 from kbs_process.diagnosis.experiments.floor import declared
 from kbs_process.diagnosis.experiments.hypothesis import Hypothesis, predict
@@ -20,14 +19,14 @@ from kbs_process.plant.predict import Schedule
 from kbs_process.rig.model import Rig
 from kbs_process.signals.records import Array
 
-CAMPAIGN = Path(__file__).parents[2] / "campaigns" / "EL089"
+CAMPAIGN = CAMPAIGNS / "EL089"
 DT = 0.05
 SECONDS = 12.0
 
 
 def rig() -> Rig:
     """EL089's."""
-    return load_campaign(CAMPAIGN, recordings=False).rig
+    return campaign("EL089", recordings=False).rig
 
 
 def unrounded(given: Rig) -> Rig:
@@ -36,7 +35,7 @@ def unrounded(given: Rig) -> Rig:
 
 
 def effects() -> tuple[str, ...]:
-    return load_campaign(CAMPAIGN, recordings=False).effects
+    return campaign("EL089", recordings=False).effects
 
 
 def schedule(seconds: float = SECONDS) -> Schedule:

@@ -23,10 +23,13 @@ from kbs_process.studies.correlate.summary import summarise
 from kbs_process.studies.correlate.transducer import study
 
 
-def process(campaign: Campaign, target: Path, *, progress: Progress, pdf: bool | None = None) -> Outcome:
+def process(
+    campaign: Campaign, target: Path, *, progress: Progress, pdf: bool | None = None, page: bool = True
+) -> Outcome:
     """Process a campaign and put its results in `target`, in one step, when all is done.
 
-    A diagnosis of the same inputs that is there already stays.
+    A diagnosis of the same inputs that is there already stays. Without `page`, results.json and the tables are
+    written alone, of which the report can be rendered later.
     """
     check_requirements(campaign)
     with writing(target) as folder:
@@ -42,10 +45,14 @@ def process(campaign: Campaign, target: Path, *, progress: Progress, pdf: bool |
         with progress.task("Writing the report"):
             write_results(folder, campaign, analyses, summary, on_transducer)
             keep_diagnosis(campaign, target, folder)
-            from kbs_process.studies.correlate.report import DOCUMENT  # draws: takes its time to import
+            shown = _page(folder, pdf) if page else folder / "results.json"
+    return _outcome(summary, target / shown.name)
 
-            page = build(folder, DOCUMENT, pdf)
-    return _outcome(summary, target / page.name)
+
+def _page(folder: Path, pdf: bool | None) -> Path:
+    from kbs_process.studies.correlate.report import DOCUMENT  # draws: takes its time to import
+
+    return build(folder, DOCUMENT, pdf)
 
 
 def _analyse(campaign: Campaign, one: Prepared, model: GravityModel, progress: Progress) -> Analysis:
