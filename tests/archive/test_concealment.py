@@ -72,6 +72,7 @@ def test_code_names_neither_campaigns_nor_truth(folder: str):
         assert not found, f"{module.relative_to(ROOT)}: {found}"
 
 
+@pytest.mark.slow
 def test_processing_opens_nothing_but_the_campaign(tmp_path: Path):
     campaign = ROOT / "campaigns" / "ALSTPP00"
     done = subprocess.run(

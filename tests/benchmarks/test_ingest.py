@@ -29,6 +29,8 @@ from ingest.mcap_files import rewrite
 from kbs_process.recordings import OutStream, Stream, open_recording, write_mcap
 from kbs_process.recordings.mcap.messages.encoding import Encoding
 
+pytestmark = pytest.mark.slow
+
 MESSAGES = 1_000_000  # of each topic
 PEER_MESSAGES = 20_000
 FORCE = tuple(f"wrench.{part}.{axis}" for part in ("force", "torque") for axis in "xyz")

@@ -41,6 +41,8 @@ from kbs_process.studies.diagnose.files import write_diagnosis
 from kbs_process.studies.diagnose.results import DiagnosisResults, Trial
 from kbs_process.studies.diagnose.sentences import _law_in_words, _shown, _stopped
 
+pytestmark = pytest.mark.slow
+
 OVER_ANGLE = next(one for one in MEASURED if one.effect.name == "ground_angle_law")
 LAW = Identity("external wrench", "el", (), "unnamed", "curve over joint angle")
 CABLE = Identity("external wrench", "el", (), "cable", "ground_cable")

@@ -31,6 +31,8 @@ from kbs_process.plant.effects.air_drag import AIR_DRAG
 from kbs_process.plant.effects.bungee import BUNGEE
 from kbs_process.plant.predict import Schedule
 
+pytestmark = pytest.mark.slow
+
 DRAG, POWER, POINT = 0.8, 1.75, np.array([0.3, -0.1, 0.12])  # N at 0.01 m/s, 1, m
 FREE = (Scalar("body.antenna.cog", (0,)), Scalar("joint.el.drive.Ka"))
 

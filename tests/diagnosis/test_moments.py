@@ -19,6 +19,8 @@ from kbs_process.diagnosis.selection.tryout import extra_of
 from kbs_process.plant.effects.local_torque import LOCAL_TORQUE
 from kbs_process.signals.records import Array
 
+pytestmark = pytest.mark.slow
+
 Changes = tuple[Array, ...]
 
 

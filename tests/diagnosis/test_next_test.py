@@ -20,6 +20,8 @@ from kbs_process.identification.output_error import Scalar
 from kbs_process.reduction.commands import read_commands
 from kbs_process.studies.diagnose.next_test import commands_of, next_test
 
+pytestmark = pytest.mark.slow
+
 FREE = (Scalar("joint.el.drive.Ka"), Scalar("joint.el.drive.b_m"))
 VISCOUS = Identity("joint torque", "el", (), "viscous", "joint_viscous")
 COULOMB = Identity("joint torque", "el", (), "friction", "coulomb")

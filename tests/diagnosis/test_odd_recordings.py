@@ -37,6 +37,8 @@ from kbs_process.studies.diagnose.diagnosable import LEAST_S, check_copies, chec
 from kbs_process.studies.diagnose.stretch import LONGEST_S, busiest, read_stretch
 from kbs_process.studies.diagnose.warnings import passed_over
 
+pytestmark = pytest.mark.slow
+
 ENTRY = RecordingEntry("a", Path("recordings/a.mcap"), "SWING", "fit", 1, None, None, None)
 
 

@@ -26,6 +26,8 @@ from kbs_process.diagnosis.selection.leaders import gated, leaders, tried, vario
 from kbs_process.diagnosis.selection.race import Runner, raced
 from kbs_process.diagnosis.selection.tryout import extra_of, identity
 
+pytestmark = pytest.mark.slow
+
 RIGHT, WRONG, CURVE = ("ground_cable", "el"), ("harness", "el"), ("ground_angle_law", "el")
 KIN = ("tether", "el")  # of the right one's family and place
 

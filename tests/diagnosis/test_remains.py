@@ -18,6 +18,8 @@ from kbs_process.diagnosis.screening.view import View
 from kbs_process.diagnosis.selection import rounds
 from kbs_process.diagnosis.selection.tryout import extra_of
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def made() -> Experiment:

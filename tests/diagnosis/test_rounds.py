@@ -41,6 +41,8 @@ from kbs_process.plant.effects import CATALOGUE, select
 from kbs_process.plant.sensing import SENSING
 from kbs_process.signals.records import Array
 
+pytestmark = pytest.mark.slow
+
 FREE = (
     Scalar("body.antenna.cog", (0,)),
     Scalar("joint.el.drive.Ka"),

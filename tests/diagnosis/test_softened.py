@@ -19,6 +19,8 @@ from kbs_process.diagnosis.nominal.known import Known, as_it_is, refit
 from kbs_process.diagnosis.nominal.settling import bent, drawn_back
 from kbs_process.signals.records import Array
 
+pytestmark = pytest.mark.slow
+
 CHANNEL, HZ = 4, 3.0
 
 

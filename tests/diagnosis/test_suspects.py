@@ -27,6 +27,8 @@ from kbs_process.rig.model import Rig
 from kbs_process.signals.records import Array
 from kbs_process.stages.align.resample import resample
 
+pytestmark = pytest.mark.slow
+
 CHANNELS = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz", "az", "el")
 NOMINAL = tuple(effect.name for effect in CATALOGUE[:6])
 RATE, DT = 100.0, 0.05

@@ -16,6 +16,8 @@ from kbs_process.identification.output_error import Scalar
 from kbs_process.signals.records import Array
 from kbs_process.studies.diagnose.unexplained import unexplained
 
+pytestmark = pytest.mark.slow
+
 SECONDS = 120.0
 FREE = (Scalar("joint.el.drive.b_m", ()),)
 PEAK = Requirement("peak at T", "torque", "T", "peak", 0.1, "N m", (0.01, 1.0), "here")

@@ -17,6 +17,8 @@ from kbs_process.diagnosis.experiments.witnesses import blind
 from kbs_process.diagnosis.nominal.joint import Own, Standing
 from kbs_process.diagnosis.nominal.known import Known
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def made() -> Experiment:

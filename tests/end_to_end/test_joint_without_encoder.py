@@ -32,6 +32,8 @@ from kbs_process.studies.correlate.run import process
 from kbs_process.studies.diagnose.run import experiment_of
 from kbs_process.studies.identify.run import identify
 
+pytestmark = pytest.mark.slow
+
 TOPIC = 'encoder = "/encoder"'
 READ = 'encoder = { topic = "/encoder", joints = ["el"] }'
 

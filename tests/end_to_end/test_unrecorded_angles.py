@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow.parquet as pq
+import pytest
 
 from end_to_end.short_campaign import JOINTS, short_campaign
 from kbs_process.campaign.load import load_campaign
@@ -14,6 +15,8 @@ from kbs_process.progress import SilentProgress
 from kbs_process.recordings.mcap.messages.encoding import OutStream
 from kbs_process.recordings.mcap.writer import write_mcap
 from kbs_process.studies.correlate.run import process
+
+pytestmark = pytest.mark.slow
 
 STOPPED = 12.0  # s, of twenty
 

@@ -16,6 +16,8 @@ from kbs_process.signals.records import Array, Stamps
 from kbs_process.studies import convert as importers
 from kbs_process.studies.convert.mapping import find_mapping, load_mapping
 
+pytestmark = pytest.mark.slow
+
 DATA = Path(__file__).parents[3] / "shared" / "data"
 
 

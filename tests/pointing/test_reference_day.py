@@ -29,6 +29,8 @@ from kbs_process.studies.reference_day.results import ReferenceDayResults
 from kbs_process.studies.reference_day.run import commands, fly, simulate_day
 from mission.reference import FOLDER
 
+pytestmark = pytest.mark.slow
+
 
 def short_campaign(folder: Path, duration: float, sections: str) -> Campaign:
     """Return a copy of the reference day that ends early."""

@@ -23,6 +23,8 @@ from proof.concealed.physics import Effect
 from proof.concealed.recording import record
 from proof.concealed.strength import Strength, Whitening, strength
 
+pytestmark = pytest.mark.slow
+
 CAMPAIGN = Path(__file__).parents[2] / "campaigns" / "EL089"
 HARDWARE = Hardware.from_campaign(CAMPAIGN, seed=5)
 PATH = commands(

@@ -20,6 +20,8 @@ from proof.diagnosis import answer_of
 from proof.methods import Job, answer_trial
 from proof.words import OURS, Family, Port
 
+pytestmark = pytest.mark.slow
+
 R = TypeVar("R", bound=msgspec.Struct)
 
 

@@ -21,6 +21,8 @@ from proof.methods import Job, failed
 from proof.words import OURS
 from proof.work import BenchError, Work
 
+pytestmark = pytest.mark.slow
+
 COGGING = {"port": "motor torque", "axis": "el", "family": "cogging"}
 
 

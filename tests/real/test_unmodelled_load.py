@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import shutil
 
+import pytest
+
 from engine.campaigns import CAMPAIGNS_FOLDER
 from kbs_process.campaign.load import load_campaign
 from kbs_process.progress import SilentProgress
 from kbs_process.studies.correlate import run
 from real.campaigns import Processed
+
+pytestmark = pytest.mark.slow
 
 
 def _warnings(name, folder):
