@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -53,14 +54,20 @@ def noise(rng: np.random.Generator, n: int, c: int) -> Array:
 
 
 def experiment(
-    truth: Rig, roles: tuple[str, ...], seed: int, seconds: float = SECONDS, *, bare_encoders: bool = False
+    truth: Rig,
+    roles: tuple[str, ...],
+    seed: int,
+    seconds: float = SECONDS,
+    *,
+    bare_encoders: bool = False,
+    path: Callable[[float], Schedule] = schedule,
 ) -> Experiment:
     """Trials of one trajectory with `truth` for hardware, biases and noise of their own; encoders do not round."""
     nominal = unrounded(rig()) if bare_encoders else rig()
     n = round(seconds / DT)
     channels = (*nominal.transducer.channels, *nominal.joint_names)
     units = ("N",) * 3 + ("N m",) * 3 + ("rad",) * 2
-    drive = Drive(0, n, schedule(seconds), None, 100.0, 100.0)
+    drive = Drive(0, n, path(seconds), None, 100.0, 100.0)
     bare = Experiment(nominal, effects(), DT, channels, units, (drive,), (), 8.0)
     exact = predict(Hypothesis(truth, effects()), bare, 0).values
     rng = np.random.default_rng(seed)
