@@ -15,6 +15,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import pytest
 
 if TYPE_CHECKING:
+    from campaign.campaign_folder import CampaignFolder
     from end_to_end.archive_run import Processed
 
 SPEEDS = ("fast", "slow", "validation")
@@ -49,6 +50,14 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
         terminalreporter.section(f"marked fast, over {FAST_S:g} s: mark them slow")
         for one in sorted(late, key=lambda one: -one.duration):
             terminalreporter.line(f"{one.duration:6.1f} s  {one.nodeid}")
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> CampaignFolder:
+    """A campaign folder that may be damaged."""
+    from campaign.campaign_folder import make_folder
+
+    return make_folder(tmp_path / "campaigns" / "EL089")
 
 
 @pytest.fixture(scope="session")
