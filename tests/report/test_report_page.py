@@ -195,6 +195,7 @@ def test_hostile_data_cannot_leave_its_script_element(tmp_path: Path) -> None:
     assert all(str(image["src"]).startswith("data:") for image in page.all("img"))
 
 
+@pytest.mark.slow
 def test_the_same_results_give_the_same_bytes_in_another_process(one_channel: Path, tmp_path: Path) -> None:
     folder = sample.one_channel(tmp_path)
     code = "import sys, pathlib; from kbs_process.studies.documents import render; render(pathlib.Path(sys.argv[1]))"
