@@ -32,6 +32,8 @@ from kbs_process.plant.laws.position.bell import LOCAL_TORQUE
 from kbs_process.plant.laws.position.detent import DETENT
 from kbs_process.plant.laws.position.order import JOINT_ORDER
 
+pytestmark = pytest.mark.slow
+
 FREE = (Scalar("body.antenna.cog", (0,)), Scalar("joint.el.drive.Ka"))
 TORQUE, ANGLE, WIDTH = 0.6, 1.27941, 1e-3  # N m, rad, rad: a fortieth of the swing
 

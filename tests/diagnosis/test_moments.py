@@ -19,6 +19,8 @@ from kbs_process.diagnosis.screening.suspects import Candidate
 from kbs_process.plant.laws.position.bell import LOCAL_TORQUE
 from kbs_process.signals.records import Array
 
+pytestmark = pytest.mark.slow
+
 Changes = tuple[Array, ...]
 
 
