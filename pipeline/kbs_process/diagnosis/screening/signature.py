@@ -54,7 +54,7 @@ def port_inputs(candidate: Candidate, tapped: Tapped, rig: Rig, course: Course |
     if joint is not None and joint.drive is not None:
         values["ratio"] = float(joint.drive.ratio)
     whole = along(effect, signals, values, 1.0 / tapped.rate)
-    every = [entry.name for entry in effect.parameters if entry.role == "amplitude"]
+    every = [entry.name for entry in effect.amplitudes]
     return whole[:, [every.index(entry.name) for entry in candidate.amplitudes]]
 
 
