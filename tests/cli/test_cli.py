@@ -119,7 +119,7 @@ def test_help_tells_exit_statuses_defaults_and_presets(capsys: pytest.CaptureFix
         told[verb] = " ".join(capsys.readouterr().out.split())
     for status in (cli.NOT_MET, cli.BAD_INPUT, cli.INTERNAL, cli.INTERRUPTED):
         assert f" {status} " in told[""].partition("Exit status:")[2]
-    for verb, default in (("simulate", "reports/NAME-simulated"), ("flight", "reports/NAME-flight")):
+    for verb, default in (("simulate", "results/NAME-simulated"), ("flight", "results/NAME-flight")):
         assert f"[default: {default}]" in told[verb]
         assert "the last one listed]" in told[verb]
     assert all(name in told["import"].partition("Presets")[2] for name in preset_names())
@@ -143,7 +143,7 @@ def test_a_campaign_without_a_verb_is_processed(
 ) -> None:  # fmt: skip
     monkeypatch.chdir(folder.path.parents[1])
     assert run("campaign/EL089", "--no-diagnose") == 0
-    target = folder.path.parents[1] / "reports" / "EL089"
+    target = folder.path.parents[1] / "results" / "EL089"
     assert processed.called == ("EL089", target, None)
     out = capsys.readouterr().out.splitlines()
     assert out == ["torque 0.04 N m, limit 0.06 N m: met", f"Report: {target / 'index.html'}"]

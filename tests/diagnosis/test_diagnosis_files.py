@@ -24,7 +24,7 @@ from kbs_process.diagnosis.proposing.curves import basis
 from kbs_process.diagnosis.proposing.measured import inserted
 from kbs_process.diagnosis.selection.next_test import Proposal
 from kbs_process.diagnosis.selection.trajectories import family, limits_of
-from kbs_process.plant.effects.measured_law import COEFFICIENTS, MEASURED
+from kbs_process.plant.laws.position.measured_law import COEFFICIENTS, MEASURED
 from kbs_process.reduction.commands import read_commands
 from kbs_process.results.records import load
 from kbs_process.studies.diagnose.corrected import write_corrected

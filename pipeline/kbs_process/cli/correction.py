@@ -31,7 +31,7 @@ from kbs_process.cli.shared import (
     metavar="SHARE",
     help="By how much a friction torque differs from run to run, one sigma, of itself.",
 )
-@output_option("reports/NAME-identify")
+@output_option("results/NAME-identify")
 @pdf_option
 @quiet_option
 def identify(campaign: str, starts: int, run_to_run: float, output: Path | None, pdf: bool | None, quiet: bool) -> None:
@@ -58,7 +58,7 @@ def identify(campaign: str, starts: int, run_to_run: float, output: Path | None,
 
 @click.command(epilog=examples("diagnose campaign/EL089", "diagnose campaign/EL089 -o /data/why --no-pdf"))
 @campaign_argument
-@output_option("reports/NAME-diagnosis")
+@output_option("results/NAME-diagnosis")
 @pdf_option
 @quiet_option
 def diagnose(campaign: str, output: Path | None, pdf: bool | None, quiet: bool) -> None:
@@ -88,14 +88,14 @@ def diagnose(campaign: str, output: Path | None, pdf: bool | None, quiet: bool) 
     "a concealed effect, or a trial without an answer."
 )
 @click.option(
-    "--full", is_flag=True, help="A set of validation trials and all rivals: two hours, to reports/proof/full."
+    "--full", is_flag=True, help="A set of validation trials and all rivals: two hours, to results/proof/full."
 )
 @click.option("--trials", type=click.IntRange(1), metavar="N", help="How many [default: 6; 20 with --full].")
 @click.option(
     "--work", type=FOLDER, metavar="FOLDER", help="Where trials and answers are kept [default: .proof/SPLIT-N]."
 )
 @click.option(
-    "--output", "-o", type=FOLDER, metavar="FOLDER", help="Where the score goes [default: reports/proof/small or full]."
+    "--output", "-o", type=FOLDER, metavar="FOLDER", help="Where the score goes [default: results/proof/small or full]."
 )
 @click.option("--jobs", type=click.IntRange(1), metavar="N", help="Processes [default: one a core].")
 @click.option("--dask", metavar="ADDRESS", help="Scheduler of a Dask cluster to run on: tcp://HOST:PORT.")

@@ -28,7 +28,7 @@ from kbs_process.cli.shared import (
 @click.option("--from", "low", type=float, default=-30.0, show_default=True, metavar="DEG", help="Its first angle.")
 @click.option("--to", "high", type=float, default=90.0, show_default=True, metavar="DEG", help="Its last angle.")
 @click.option("--points", type=click.IntRange(2), default=25, show_default=True, help="Poses.")
-@output_option("reports/NAME-stability")
+@output_option("results/NAME-stability")
 @pdf_option
 @click.option("--check", is_flag=True, help="Exit with 1 when the margins are not kept.")
 @quiet_option

@@ -31,7 +31,7 @@ from kbs_process.cli.shared import (
 @click.option("--command", type=EXISTING_FILE, help="Commands from a table, as for simulate.")
 @click.option("--samples", type=click.IntRange(2), default=200, show_default=True, help="Units to fly.")
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of the draw.")
-@output_option("reports/NAME-flight")
+@output_option("results/NAME-flight")
 @pdf_option
 @quiet_option
 def flight(
@@ -72,7 +72,7 @@ def flight(
     "reference-day", epilog=examples("reference-day", "reference-day campaign/REFDAY --output /data/day --check")
 )
 @click.argument("campaign", default="campaign/REFDAY")
-@output_option("reports/NAME-reference-day")
+@output_option("results/NAME-reference-day")
 @pdf_option
 @click.option("--check", is_flag=True, help="Exit with 1 when a requirement is not met.")
 @quiet_option

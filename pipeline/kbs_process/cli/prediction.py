@@ -32,7 +32,7 @@ from kbs_process.cli.shared import EXISTING_FILE, campaign_argument, examples, o
     metavar="HZ",
     help="Sampling rate of the wrench [default: the recording's; 100 with --command].",
 )
-@output_option("reports/NAME-simulated")
+@output_option("results/NAME-simulated")
 @quiet_option
 def simulate(
     campaign: str, trajectory: str | None, command: Path | None, rate: float | None, output: Path | None, quiet: bool
@@ -61,7 +61,7 @@ def simulate(
     epilog=examples(
         "predict campaign/EL089 EL089P00_1",
         "predict campaign/EL089 other.mcap -o /tmp/other",
-        "predict --model reports/EL089-diagnosis/corrected other.mcap",
+        "predict --model results/EL089-diagnosis/corrected other.mcap",
     )
 )
 @click.argument("words", nargs=-1, required=True, metavar="[CAMPAIGN] RECORDING")
@@ -71,7 +71,7 @@ def simulate(
     metavar="FOLDER",
     help="A corrected model that 'diagnose' wrote, in the place of CAMPAIGN.",
 )
-@output_option("reports/NAME-predicted; with --model, reports/NAME-corrected-predicted")
+@output_option("results/NAME-predicted; with --model, results/NAME-corrected-predicted")
 @quiet_option
 def predict(words: tuple[str, ...], model: Path | None, output: Path | None, quiet: bool) -> None:
     """Predict one RECORDING: a name from CAMPAIGN, or any MCAP file with the same topics.
@@ -94,6 +94,6 @@ def predict(words: tuple[str, ...], model: Path | None, output: Path | None, qui
         target = results_folder(folder, output, suffix="-predicted")
         written = predict_recording(loaded, words[1], target, progress=progress(quiet))
     else:
-        named = output or Path("reports") / f"{loaded.name}-corrected-predicted"
+        named = output or Path("results") / f"{loaded.name}-corrected-predicted"
         written = predict_with(loaded, words[0], results_folder(folder, named), progress=progress(quiet))
     click.echo(f"Predicted: {written}")

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 @click.command(epilog=examples("campaign/EL089", "process campaign/EL089 --check --output /data/EL089"))
 @campaign_argument
-@output_option("reports/NAME")
+@output_option("results/NAME")
 @pdf_option
 @click.option("--check", is_flag=True, help="Exit with 1 when a requirement is not met.")
 @click.option(
@@ -115,7 +115,7 @@ def validate(campaign: str, check: bool, quiet: bool) -> None:
         sys.exit(NOT_MET)
 
 
-@click.command(epilog=examples("report reports/EL089", "report reports/EL089 --no-pdf"))
+@click.command(epilog=examples("report results/EL089", "report results/EL089 --no-pdf"))
 @click.argument("results", type=click.Path(path_type=Path))
 @pdf_option
 def report(results: Path, pdf: bool | None) -> None:

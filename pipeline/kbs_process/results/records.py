@@ -129,5 +129,5 @@ def _content(folder: Path) -> bytes:
         raise OutputError(
             "no results here",
             where=str(path),
-            remedy="give a results folder (reports/NAME), or process the campaign first",
+            remedy="give a results folder (results/NAME), or process the campaign first",
         ) from None

@@ -26,7 +26,7 @@ from kbs_process.diagnosis.screening.screen import Catalogued, Found, Screening,
 from kbs_process.diagnosis.screening.signature import per_unit
 from kbs_process.diagnosis.screening.suspects import weighed
 from kbs_process.plant.effect import ACTION, ACTIONS, Effect
-from kbs_process.plant.effects.measured_law import Measured
+from kbs_process.plant.laws.position.measured_law import Measured
 from kbs_process.plant.sensing import Sensing
 from kbs_process.rig.model import Rig
 from kbs_process.signals.records import Array

@@ -20,7 +20,7 @@ from kbs_process.diagnosis.screening.screen import Catalogued, Suspect
 from kbs_process.diagnosis.screening.signature import port_inputs
 from kbs_process.diagnosis.screening.suspects import Candidate
 from kbs_process.plant.effect import Effect, Port
-from kbs_process.plant.sensing.sensing import Sensing
+from kbs_process.plant.sensing import Sensing
 from kbs_process.signals.records import Array
 
 _SPREADS = 100.0  # of a sensor's law, beyond which it is no sensor's

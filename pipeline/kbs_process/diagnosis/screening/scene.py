@@ -13,7 +13,7 @@ from kbs_process.diagnosis.experiments.hypothesis import Hypothesis, Prediction,
 from kbs_process.diagnosis.screening.inlets import Inlet
 from kbs_process.diagnosis.screening.transfer import Path, follow
 from kbs_process.diagnosis.side_by_side import side_by_side
-from kbs_process.plant.effects import select
+from kbs_process.plant.laws import select
 from kbs_process.plant.rigid import poses
 from kbs_process.rig.model import TRANSDUCER, Rig
 from kbs_process.signals.frames import rotate

@@ -34,12 +34,12 @@ from kbs_process.diagnosis.proposing.tryout import extra_of, identity, in_plant,
 from kbs_process.diagnosis.proposing.view import View
 from kbs_process.diagnosis.screening.screen import Catalogued, Found, Suspect
 from kbs_process.diagnosis.screening.shapes import bettered, possible, uncovered
-from kbs_process.diagnosis.screening.suspects import BY
 from kbs_process.diagnosis.selection.each_recording import taken_off, taken_off_again
 from kbs_process.diagnosis.selection.effort import Effort
 from kbs_process.diagnosis.selection.race import at_floor, own_of, raced
 from kbs_process.diagnosis.side_by_side import side_by_side
 from kbs_process.plant.effect import Effect, Port
+from kbs_process.plant.sensing import BY
 
 
 def leaders(
