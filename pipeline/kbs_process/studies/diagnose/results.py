@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Literal
 
 from kbs_process.diagnosis.facts import Answer, Moved, Place, Planned
-from kbs_process.results.records import Check, Conclusion, Notice, Provenance, Record
+from kbs_process.results.records import Check, Conclusion, Notice, Provenance, Record, ResultsFile
 
 
 class Fitted(Record, frozen=True, kw_only=True):
@@ -143,7 +143,7 @@ class NextTest(Record, frozen=True, kw_only=True):
     tried: tuple[Planned, ...]  # best first, known parameters as they stand
 
 
-class DiagnosisResults(Record, frozen=True, kw_only=True):
+class DiagnosisResults(ResultsFile, frozen=True, kw_only=True):
     """results.json of a diagnosis."""
 
     name: str
@@ -152,7 +152,6 @@ class DiagnosisResults(Record, frozen=True, kw_only=True):
     verdict: Conclusion
     provenance: Provenance
     kind: Literal["diagnosis"] = "diagnosis"
-    schema: Literal[1] = 1
     answer: Answer
     paragraph: str  # to be pasted into a test report
     floor: str  # where it comes from, and what it is worth

@@ -7,6 +7,7 @@ from kbs_process.report.text import band_hz
 from kbs_process.studies.correlate.results import Band, Frame, Recording, Requirement, Results
 
 ROLES = ("held-out", "fit", "calibration")
+PLATES = 6  # of recordings, on paper
 _ROWS = 24
 
 
