@@ -13,11 +13,11 @@ from kbs_process.diagnosis.experiments.metric import Metric
 from kbs_process.diagnosis.nominal.parameters import Slopes, known_parameters
 from kbs_process.diagnosis.side_by_side import side_by_side
 from kbs_process.estimation.fit import Parameters
-from kbs_process.identification.estimate import gearbox
 from kbs_process.identification.objective import DIFFERENCE
 from kbs_process.identification.output_error import Scalar
 from kbs_process.identification.polar import Polar
 from kbs_process.identification.screening import phases
+from kbs_process.identification.unknowns import gearbox
 from kbs_process.signals.records import Array
 
 GROSS = 1.0  # of the noise: wrong phases alone have left 0.8

@@ -80,6 +80,16 @@ class Known:
         return np.where(finite, (self.value - self.parameters.value) / np.where(finite, spread, 1.0), np.nan)
 
     @property
+    def precision(self) -> Array:
+        """(p,) that of the priors; 0 for phases, which have none."""
+        return np.asarray(self.parameters.sigma**-2.0, dtype=np.float64)
+
+    @property
+    def offset(self) -> Array:
+        """(p,) how far the priors' means are from where numbers are; 0 for phases."""
+        return np.where(self.precision > 0.0, self.parameters.value - self.value, 0.0)
+
+    @property
     def room(self) -> tuple[Array, Array]:
         """How far numbers may go down and up, (p,) each."""
         limits = self.parameters

@@ -77,7 +77,7 @@ def believed(
         others = [k for k in order[number + 1 :] if _law(passed[k]) != _law(told)]
         chance = chances[others] / max(float(chances[order[number:]].sum()), np.finfo(np.float64).tiny)
         find = find_of(
-            [told, *(passed[k] for k in others)], 0, np.array([1.0 - float(chance.sum()), *chance]), standing,
+            [told, *(passed[k] for k in others)], np.array([1.0 - float(chance.sum()), *chance]), standing,
             place, noted.identities,
         )  # fmt: skip
         return Accepted(told, find, standing)
