@@ -19,11 +19,10 @@ from kbs_process.diagnosis.nominal.known import Known
 from kbs_process.diagnosis.proposing.curves import CurveSuspect, along, basis
 from kbs_process.diagnosis.proposing.families import UNNAMED, family
 from kbs_process.diagnosis.proposing.tryout import identity, in_plant, port_label
-from kbs_process.diagnosis.screening.places import POINT
 from kbs_process.diagnosis.screening.ranges import swept
 from kbs_process.diagnosis.screening.screen import Catalogued, Found, Screening, Suspect
 from kbs_process.diagnosis.screening.signature import per_unit
-from kbs_process.diagnosis.screening.suspects import weighed
+from kbs_process.diagnosis.screening.suspects import POINT, weighed
 from kbs_process.plant.effect import ACTION, ACTIONS, Effect
 from kbs_process.plant.laws.position.measured_law import Measured
 from kbs_process.plant.sensing import Sensing

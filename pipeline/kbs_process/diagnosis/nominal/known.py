@@ -16,11 +16,9 @@ from scipy.stats import chi2
 from kbs_process.diagnosis.experiments.experiment import Experiment
 from kbs_process.diagnosis.experiments.floor import Floor
 from kbs_process.diagnosis.experiments.hypothesis import Hypothesis, Prediction, Simulate
-from kbs_process.diagnosis.experiments.metric import Metric, metrics
-from kbs_process.diagnosis.experiments.softened import softened
+from kbs_process.diagnosis.experiments.metric import Metric, metrics, softened
 from kbs_process.diagnosis.facts import Moved
-from kbs_process.diagnosis.nominal.costs import ALL, GROSS, Found, Laws
-from kbs_process.diagnosis.nominal.ground import information
+from kbs_process.diagnosis.nominal.costs import ALL, GROSS, Found, Laws, information
 from kbs_process.diagnosis.nominal.parameters import Slopes, known_parameters, prior, within
 from kbs_process.diagnosis.nominal.search import EARLY, Search
 from kbs_process.estimation.fit import Check, Parameters

@@ -9,10 +9,9 @@ import numpy as np
 from scipy.optimize import minimize
 
 from kbs_process.diagnosis.screening.gls import Score, Sums, per_trial, score
-from kbs_process.diagnosis.screening.places import half_lengths
 from kbs_process.diagnosis.screening.ranges import SPECTRUM, WHILE_RECORDED, is_place, swept
 from kbs_process.diagnosis.screening.screen import Bench, Catalogued, Found
-from kbs_process.diagnosis.screening.suspects import Candidate
+from kbs_process.diagnosis.screening.suspects import Candidate, half_lengths
 from kbs_process.identification.output_error import Scalar
 from kbs_process.plant.effect import Effect, LogNormal, Parameter, Uniform
 from kbs_process.rig.model import Rig

@@ -9,10 +9,9 @@ import numpy as np
 from scipy.special import softmax
 
 from kbs_process.diagnosis.acceptance.finding import Tried, find_of
-from kbs_process.diagnosis.acceptance.moments import only_while
 from kbs_process.diagnosis.acceptance.needed import Accepted
 from kbs_process.diagnosis.acceptance.outcome import Location
-from kbs_process.diagnosis.acceptance.remains import too_little
+from kbs_process.diagnosis.acceptance.remains import only_while, too_little
 from kbs_process.diagnosis.acceptance.rivals import evidences
 from kbs_process.diagnosis.acceptance.supposed import Noted
 from kbs_process.diagnosis.acceptance.verdict import gated

@@ -19,7 +19,7 @@ from kbs_process.results.diagnosed import FOLDER
 from kbs_process.results.store import revising
 from kbs_process.studies.diagnose.reading import experiment_of
 from kbs_process.studies.diagnose.run import diagnose
-from kbs_process.studies.diagnose.simulators import Simulators
+from kbs_process.studies.diagnose.simulators import simulating
 
 
 def diagnose_results(
@@ -57,7 +57,7 @@ def diagnose_results(
 
 def _detected(experiment: Experiment) -> tuple[Floor, Detection]:
     """The floor, and what the parameter files' numbers leave beyond it."""
-    with Simulators(experiment) as simulate:
+    with simulating(experiment) as simulate:
         predicted = predicted_by(experiment, Hypothesis(experiment.rig, experiment.effects), simulate)
     noise = floor_of(experiment, predicted)
     return noise, detect(experiment, noise, predicted, range(len(experiment.trials)))
