@@ -1,4 +1,4 @@
-"""Parquet as columns, a record batch at a time."""
+"""Parquet: columns by name, read a record batch at a time; a column's unit is its field's metadata "unit"."""
 
 from __future__ import annotations
 
@@ -7,16 +7,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 
-from kbs_process.studies.convert.tables import CHUNK_ROWS, Cells, Column
+from kbs_process.recordings.formats import Format, Text
+from kbs_process.recordings.tables import CHUNK_ROWS, Cells, Column
 
 
 class ParquetTable:
-    """A Parquet file; a column's unit is its field's metadata "unit", where that is given."""
+    """A Parquet file."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, _: Text) -> None:
+        import pyarrow.parquet as pq
+
         self.path = path
         self._file = pq.ParquetFile(path, page_checksum_verification=True)
         self.columns = tuple(Column(field.name, _unit(field)) for field in self._file.schema_arrow)
@@ -33,6 +34,8 @@ def _unit(field: Any) -> str:
 
 def _cells(array: Any) -> Cells:
     """Return a column of a batch; what is absent becomes NaN, or "" in a text."""
+    import pyarrow as pa
+
     if pa.types.is_timestamp(array.type):
         return np.asarray(array.cast(pa.timestamp("ns", array.type.tz)).to_numpy(zero_copy_only=False))
     if pa.types.is_integer(array.type) and array.null_count == 0:
@@ -40,3 +43,6 @@ def _cells(array: Any) -> Cells:
     if pa.types.is_integer(array.type) or pa.types.is_floating(array.type) or pa.types.is_decimal(array.type):
         return np.asarray(array.cast(pa.float64(), safe=False).to_numpy(zero_copy_only=False))
     return np.array(["" if cell is None else str(cell) for cell in array.to_pylist()], dtype=np.str_)
+
+
+FORMAT = Format(suffixes=(".parquet", ".pq"), read=ParquetTable)

@@ -22,17 +22,10 @@ from typing import IO
 import numpy as np
 
 from kbs_process.errors import KbsError, RecordingError
-from kbs_process.studies.convert.tables import Cells, Column, Table
+from kbs_process.recordings.formats import Format, Text, format_named
+from kbs_process.recordings.tables import Cells, Column
 
-LIBRARIES = {
-    "parquet": "pyarrow",
-    "hdf5": "h5py",
-    "tdms": "nptdms",
-    "mdf": "asammdf",
-    "matlab": "scipy",  # and h5py, for what MATLAB has written since 7.3
-    "numpy": "numpy",
-}
-MODULE = "kbs_process.studies.convert.isolated"
+MODULE = "kbs_process.recordings.isolated"
 SILENCE_S = 300.0  # a child that sends nothing for so long hangs
 DATA_FLOOR = 1 << 30  # bytes that a file of any size may expand to
 DATA_BY_SIZE = 1000  # and so many times its size: the best that compression makes of constants
@@ -43,16 +36,15 @@ MEMORY_BY_SIZE = 8  # and so many times the file's size
 class IsolatedTable:
     """A binary file, read by a child process."""
 
-    def __init__(self, path: Path, format_name: str) -> None:
-        library = LIBRARIES[format_name]
-        if find_spec(library) is None:
+    def __init__(self, path: Path, name: str, declared: Format) -> None:
+        if declared.library and find_spec(declared.library) is None:
             raise KbsError(
-                f"reading {format_name} needs the package '{library}'",
+                f"reading {name} needs the package '{declared.library}'",
                 where=str(path),
                 remedy="pip install 'kbs-process[formats]'",
             )
         self.path = path
-        self._format = format_name
+        self._format = name
         with self._child(()) as child, _watched(child) as stream:
             line = stream.readline()
             entries = json.loads(line) if line.endswith(b"\n") else []
@@ -132,24 +124,6 @@ def _receive(child: subprocess.Popen[bytes]) -> Cells | None:
     return np.frombuffer(data, dtype) if len(data) == count * dtype.itemsize else None
 
 
-def _open(format_name: str, path: Path) -> Table:
-    from kbs_process.studies.convert import arrays, binary, parquet
-
-    match format_name:
-        case "parquet":
-            return parquet.ParquetTable(path)
-        case "hdf5":
-            return binary.SeriesTable(path, binary.open_hdf5(path))
-        case "tdms":
-            return binary.SeriesTable(path, binary.open_tdms(path))
-        case "matlab":
-            return binary.SeriesTable(path, arrays.open_matlab(path))
-        case "numpy":
-            return binary.SeriesTable(path, arrays.open_numpy(path))
-        case _:
-            return binary.SeriesTable(path, binary.open_mdf(path))
-
-
 def _limit_memory(path: Path) -> None:
     if sys.platform != "win32":
         import resource
@@ -158,13 +132,13 @@ def _limit_memory(path: Path) -> None:
         resource.setrlimit(resource.RLIMIT_AS, (limit, resource.getrlimit(resource.RLIMIT_AS)[1]))
 
 
-def main(format_name: str, path: Path, names: Sequence[str]) -> None:
+def main(name: str, path: Path, names: Sequence[str]) -> None:
     """Be the child: send the columns, or, where `names` are given, the cells."""
     # Whatever a library prints must not get between the arrays.
     with os.fdopen(os.dup(1), "wb") as out:
         os.dup2(2, 1)
         _limit_memory(path)
-        table = _open(format_name, path)
+        table = format_named(name).read(path, Text())
         if not names:
             entries = [(column.name, column.unit, column.clock) for column in table.columns]
             out.write(json.dumps(entries).encode() + b"\n")

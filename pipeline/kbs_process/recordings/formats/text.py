@@ -7,13 +7,16 @@ import itertools
 import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from kbs_process.errors import RecordingError
-from kbs_process.studies.convert.mapping import Text
-from kbs_process.studies.convert.tables import CHUNK_ROWS, Cells, Column
+from kbs_process.recordings.formats import Format, Text
+from kbs_process.recordings.tables import CHUNK_ROWS, Cells, Column
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 DELIMITERS = "\t;,|"
 _HEAD_LINES = 32
@@ -41,6 +44,8 @@ class TextTable:
         self.columns = tuple(Column(name, unit.strip("()[] ")) for name, unit in zip(names, units, strict=True))
 
     def chunks(self, names: Sequence[str]) -> Iterator[tuple[Cells, ...]]:
+        import pandas as pd
+
         every = [column.name for column in self.columns]
         try:
             with pd.read_csv(
@@ -143,4 +148,8 @@ def _cells(series: pd.Series[float], decimal: str) -> Cells:
     """Return a parsed column as numbers where pandas found nothing else in this piece, else as text with points."""
     if series.dtype.kind in "iuf":
         return series.to_numpy()
-    return np.array(["" if pd.isna(cell) else str(cell).replace(decimal, ".") for cell in series], dtype=np.str_)
+    cells = zip(series, series.isna(), strict=True)
+    return np.array(["" if absent else str(cell).replace(decimal, ".") for cell, absent in cells], dtype=np.str_)
+
+
+FORMAT = Format(suffixes=(".csv", ".tsv", ".txt", ".dat", ".asc"), read=TextTable, isolated=False)

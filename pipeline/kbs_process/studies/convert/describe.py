@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
+from kbs_process.recordings.open_table import open_table
+from kbs_process.recordings.tables import Cells, Column, Table
 from kbs_process.studies.convert.clock import numbers
-from kbs_process.studies.convert.formats import open_table
-from kbs_process.studies.convert.tables import Cells, Column, Table
 
 BATCH = 64  # columns read at a time
 
@@ -53,8 +53,11 @@ class Range:
         return f"# {counts}  {low:>12}  {high:>12}  {self.column.unit:<8}  {self.column.name}"
 
 
-def inspect(source: Path) -> str:
-    """Return a mapping to be completed, whose comments list the columns of `source` with their ranges."""
+def describe(source: Path) -> str:
+    """Return a mapping to be completed, whose comments list the columns of `source` with their ranges.
+
+    Raises RecordingError where the file cannot be read.
+    """
     table = open_table(source)
     ranges = _ranges(table)
     header = f"# {'no.':>4}  {'rows':>9}  {'no num.':>7}  {'least':>12}  {'greatest':>12}  {'unit':<8}  column"
