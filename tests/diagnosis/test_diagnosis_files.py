@@ -64,11 +64,8 @@ def outcome() -> Outcome:
         free=(*known.free, *scalars),
         value=np.concatenate([known.value, NODES]),
         covariance=spread,
-        parameters=replace(
-            known.parameters,
-            names=(*known.parameters.names, *(one.name for one in scalars)),
-            value=np.concatenate([known.parameters.value, np.zeros(COEFFICIENTS)]),
-            sigma=np.concatenate([known.parameters.sigma, np.full(COEFFICIENTS, np.inf)]),
+        parameters=known.parameters.extended(
+            [one.name for one in scalars], np.zeros(COEFFICIENTS), np.full(COEFFICIENTS, np.inf), -np.inf, np.inf
         ),
     )
     x = np.linspace(*ends, 101)
