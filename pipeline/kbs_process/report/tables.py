@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import pyarrow.lib
-import pyarrow.parquet
 
-from kbs_process.errors import OutputError
+from kbs_process.results.tables import read_columns
 from kbs_process.signals.records import WRENCH_CHANNELS, Array, Mask
 
 
@@ -77,13 +74,7 @@ class Tables:
 
 def read_table(path: Path) -> Table:
     """Read one Parquet table, its columns as float64."""
-    try:
-        content = pyarrow.parquet.read_table(path)
-        about = json.loads((content.schema.metadata or {}).get(b"kbs", b"{}"))
-    except (OSError, ValueError, pyarrow.lib.ArrowException) as error:
-        raise OutputError(
-            f"not a readable table: {error}", where=str(path), remedy="process the campaign again: kbs-process CAMPAIGN"
-        ) from None
+    content, about = read_columns(path)
     columns = {
         name: np.asarray(column.to_numpy(), dtype=np.float64)
         for name, column in zip(content.column_names, content.columns, strict=True)
