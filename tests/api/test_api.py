@@ -57,7 +57,7 @@ def test_results_are_records_and_tables(archived: Callable[[str], Processed]) ->
     assert frame.attrs["units"]["Tx.measured"] == "N m"
     for name in table.column_names[1:]:
         np.testing.assert_array_equal(frame[name], table[name])
-    with pytest.raises(kbs_process.KbsError, match="did you mean 'spacecraft/EL089P00_2.lt1Hz'"):
+    with pytest.raises(kbs_process.KbsError, match=r"did you mean 'spacecraft/EL089P00_2\.lt1Hz'"):
         results.table("spacecraft", "EL089P00_2", "lt1")
 
 

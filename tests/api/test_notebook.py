@@ -8,7 +8,6 @@ from typing import Any
 
 import matplotlib
 import matplotlib.pyplot as plt
-import numpy as np
 import pytest
 
 NOTEBOOK = Path(__file__).resolve().parents[2] / "docs" / "notebook.ipynb"
@@ -33,5 +32,6 @@ def test_the_notebook_runs(monkeypatch: pytest.MonkeyPatch, capfd: pytest.Captur
     assert known["results"].verdict.status == "pass"
     assert list(known["labelled"].columns[:1]) == ["Fx.measured, (N)^2/Hz"]
     measured, predicted = known["frame"]["Ty.measured"], known["frame"]["Ty.predicted"]
-    assert np.corrcoef(measured, predicted)[0, 1] > 0.5
+    assert measured.std() == pytest.approx(predicted.std(), rel=0.1)
+    assert abs(measured.abs().idxmax() - predicted.abs().idxmax()) < 10.0  # s: in the same burst
     assert known["predicted"]["wrench"]["Ty"].abs().max() > 0.0

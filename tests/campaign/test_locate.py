@@ -43,10 +43,10 @@ def test_a_wrong_name_is_answered_with_a_right_one(root: Path, monkeypatch: pyte
 def test_results_go_beside_the_campaigns(root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     campaign = root / "campaigns" / "EL089"
-    assert results_folder(campaign, None) == root / "reports" / "EL089"
-    assert results_folder(campaign, None, "-predicted") == root / "reports" / "EL089-predicted"
+    assert results_folder(campaign, None) == root / "results" / "EL089"
+    assert results_folder(campaign, None, "-predicted") == root / "results" / "EL089-predicted"
     assert results_folder(campaign, Path("out")) == tmp_path / "out"
-    assert results_folder(tmp_path / "elsewhere" / "X", None) == tmp_path / "reports" / "X"
+    assert results_folder(tmp_path / "elsewhere" / "X", None) == tmp_path / "results" / "X"
 
 
 @pytest.mark.parametrize("output", [".", "results", "..", "../.."])

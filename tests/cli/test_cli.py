@@ -23,6 +23,7 @@ from kbs_process import cli
 from kbs_process.errors import RecordingError
 from kbs_process.recordings.mcap.messages.encoding import OutStream
 from kbs_process.recordings.mcap.writer import write_mcap
+from kbs_process.results.outcome import Outcome
 from kbs_process.studies.convert import preset_names
 
 VERBS = ("process", "validate", "inspect", "simulate", "predict", "import", "report", "prove")
@@ -73,15 +74,11 @@ def processed(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
     """Replaces the pipeline; `met` and `error` say how it ends, `called` what it was asked."""
     state = SimpleNamespace(met=True, error=None, called=None)
 
-    def process(campaign: Any, target: Path, *, progress: Any, pdf: bool | None) -> SimpleNamespace:
+    def process(campaign: Any, target: Path, *, progress: Any, pdf: bool | None) -> Outcome:
         state.called = (campaign.name, target, pdf)
         if state.error is not None:
             raise state.error
-        return SimpleNamespace(
-            verdict_lines=("torque 0.04 N m, limit 0.06 N m: met",),
-            requirement_met=state.met,
-            report=target / "index.html",
-        )
+        return Outcome(("torque 0.04 N m, limit 0.06 N m: met",), state.met, target / "index.html")
 
     importlib.import_module("kbs_process.studies.diagnose.run")  # which the real one is read by
     fake = ModuleType("kbs_process.studies.correlate.run")
@@ -119,7 +116,7 @@ def test_help_tells_exit_statuses_defaults_and_presets(capsys: pytest.CaptureFix
         told[verb] = " ".join(capsys.readouterr().out.split())
     for status in (cli.NOT_MET, cli.BAD_INPUT, cli.INTERNAL, cli.INTERRUPTED):
         assert f" {status} " in told[""].partition("Exit status:")[2]
-    for verb, default in (("simulate", "reports/NAME-simulated"), ("flight", "reports/NAME-flight")):
+    for verb, default in (("simulate", "results/NAME-simulated"), ("flight", "results/NAME-flight")):
         assert f"[default: {default}]" in told[verb]
         assert "the last one listed]" in told[verb]
     assert all(name in told["import"].partition("Presets")[2] for name in preset_names())
@@ -143,7 +140,7 @@ def test_a_campaign_without_a_verb_is_processed(
 ) -> None:  # fmt: skip
     monkeypatch.chdir(folder.path.parents[1])
     assert run("campaign/EL089", "--no-diagnose") == 0
-    target = folder.path.parents[1] / "reports" / "EL089"
+    target = folder.path.parents[1] / "results" / "EL089"
     assert processed.called == ("EL089", target, None)
     out = capsys.readouterr().out.splitlines()
     assert out == ["torque 0.04 N m, limit 0.06 N m: met", f"Report: {target / 'index.html'}"]

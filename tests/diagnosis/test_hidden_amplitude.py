@@ -12,14 +12,14 @@ from kbs_process.diagnosis.experiments.experiment import Experiment
 from kbs_process.diagnosis.experiments.hypothesis import Hypothesis, predict
 from kbs_process.diagnosis.nominal.joint import Extra, Standing, with_extra
 from kbs_process.diagnosis.nominal.known import Known
+from kbs_process.diagnosis.proposing.tryout import extra_of
 from kbs_process.diagnosis.screening.scene import Scene
 from kbs_process.diagnosis.screening.screen import Bench, Catalogued, screen
 from kbs_process.diagnosis.screening.suspects import Candidate
-from kbs_process.diagnosis.selection.tryout import extra_of
 from kbs_process.identification.output_error import Scalar
 from kbs_process.plant.attach import attach
-from kbs_process.plant.effects.ground_cable import GROUND_CABLE
-from kbs_process.plant.sensing.channel_step import CHANNEL_STEP
+from kbs_process.plant.laws.hysteresis.ground_cable import GROUND_CABLE
+from kbs_process.plant.laws.transducer.channel_step import CHANNEL_STEP
 
 SHAPE = (("cable_middle", 0.0), ("cable_reach", 0.05), ("cable_memory", 0.02))
 

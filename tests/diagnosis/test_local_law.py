@@ -16,21 +16,21 @@ from kbs_process.diagnosis.experiments.hypothesis import Hypothesis, predict
 from kbs_process.diagnosis.nominal.joint import Standing, with_extra
 from kbs_process.diagnosis.proposing import proposals
 from kbs_process.diagnosis.proposing.proposals import proposed
+from kbs_process.diagnosis.proposing.tryout import extra_of
 from kbs_process.diagnosis.screening.ranges import Ranges
 from kbs_process.diagnosis.screening.scene import Scene
 from kbs_process.diagnosis.screening.screen import Bench, Catalogued, screen
 from kbs_process.diagnosis.screening.shapes import bettered
 from kbs_process.diagnosis.screening.suspects import Candidate
 from kbs_process.diagnosis.selection import leaders
-from kbs_process.diagnosis.selection.tryout import extra_of
 from kbs_process.identification.output_error import Scalar
 from kbs_process.plant.attach import attach
 from kbs_process.plant.effect import Effect
-from kbs_process.plant.effects import select
-from kbs_process.plant.effects.detent import DETENT
-from kbs_process.plant.effects.harness import HARNESS
-from kbs_process.plant.effects.joint_order import JOINT_ORDER
-from kbs_process.plant.effects.local_torque import LOCAL_TORQUE
+from kbs_process.plant.laws import select
+from kbs_process.plant.laws.hysteresis.harness import HARNESS
+from kbs_process.plant.laws.position.detent import DETENT
+from kbs_process.plant.laws.position.joint_order import JOINT_ORDER
+from kbs_process.plant.laws.position.local_torque import LOCAL_TORQUE
 
 FREE = (Scalar("body.antenna.cog", (0,)), Scalar("joint.el.drive.Ka"))
 TORQUE, ANGLE, WIDTH = 0.6, 1.27941, 1e-3  # N m, rad, rad: a fortieth of the swing

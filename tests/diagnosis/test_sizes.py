@@ -16,13 +16,13 @@ from kbs_process.diagnosis.experiments.thresholds import HIDDEN
 from kbs_process.diagnosis.nominal.joint import standing_of
 from kbs_process.diagnosis.nominal.known import Known, refit
 from kbs_process.diagnosis.proposing.sizes import in_the_way, of_mounting, sized
+from kbs_process.diagnosis.proposing.view import View
 from kbs_process.diagnosis.screening.screen import Catalogued, Found
-from kbs_process.diagnosis.screening.view import View
 from kbs_process.diagnosis.selection import race, rounds
 from kbs_process.diagnosis.selection.effort import Effort
 from kbs_process.diagnosis.selection.leaders import leaders
 from kbs_process.plant.attach import attach
-from kbs_process.plant.effects import find
+from kbs_process.plant.laws import find
 from kbs_process.rig.model import TRANSDUCER
 from kbs_process.signals.records import Array
 

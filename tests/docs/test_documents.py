@@ -14,8 +14,8 @@ from typing import get_args
 import pytest
 
 from kbs_process.cli import cli
+from kbs_process.diagnosis.facts import Answer
 from kbs_process.studies.diagnose.report import _HEADLINES
-from kbs_process.studies.diagnose.results import Answer
 
 ROOT = Path(__file__).parents[2]
 NOT_OURS = {"build", "node_modules", "reports"}
@@ -112,7 +112,7 @@ def test_every_answer_of_a_diagnosis_is_explained() -> None:
 
 
 def test_every_dependency_is_justified_and_nothing_else() -> None:
-    text = (ROOT / "docs" / "dependencies.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "dev" / "dependencies.md").read_text(encoding="utf-8")
     rows = [[cell.strip() for cell in row.strip("|").split("|")] for row in re.findall(r"^\|.*\|$", text, re.M)]
     justified = [name for row in rows for name in row[-2].split(", ") if not set(name) <= set("- ")]
     runtime, test = dependencies()
@@ -135,5 +135,5 @@ def test_what_is_imported_is_declared_or_comes_with_what_is() -> None:
     extra = imported("pipeline") - {"kbs-process"} - runtime
     along = {canonical(one) for name in runtime & imported("pipeline") for one in requires(name) or ()}
     assert extra <= along
-    text = (ROOT / "docs" / "dependencies.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "dev" / "dependencies.md").read_text(encoding="utf-8")
     assert {name for name in extra if f"`{name}`" in text} == extra

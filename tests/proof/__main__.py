@@ -30,7 +30,7 @@ def parser() -> argparse.ArgumentParser:
     )
     options.add_argument("--work", type=Path, help="working folder; a bench begun there goes on")
     options.add_argument(
-        "--output", "-o", type=Path, help="where score and page go [default: reports/proof/small; full with --full]"
+        "--output", "-o", type=Path, help="where score and page go [default: results/proof/small; full with --full]"
     )
     options.add_argument("--jobs", type=int, default=len(os.sched_getaffinity(0)), help="processes")
     options.add_argument(
@@ -50,7 +50,7 @@ def main() -> int:
     count = asked.trials or (FULL if asked.full else SMALL)
     methods = tuple(dict.fromkeys(asked.method or (METHODS if asked.full else (OURS,))))
     folder = asked.work or CHECKOUT / ".proof" / f"{split}-{count}"
-    target = asked.output or CHECKOUT / "reports" / "proof" / ("full" if asked.full else "small")
+    target = asked.output or CHECKOUT / "results" / "proof" / ("full" if asked.full else "small")
     begin = monotonic()
 
     def tell(line: str) -> None:

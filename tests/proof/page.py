@@ -171,19 +171,21 @@ def _trials(bench: Bench) -> tuple[Block, ...]:
         lines = []
         for truth in sorted(bench.truths, key=lambda truth: (truth.level, truth.kind, truth.trial)):
             answer = next(entry for entry in given[truth.trial] if entry.method == method)
-            lines.append((truth.trial, number(truth.level), _concealed(truth), _said(answer)))
+            lines.append((truth.trial, number(truth.level), concealed(truth), said(answer)))
         grid = Grid(f"Trials: {method}", ("Trial", "Strength", "Concealed", "Said"), tuple(lines), "krll")
         blocks.append(grid if method == OURS else Fold(method, (grid,)))
     return tuple(blocks)
 
 
-def _concealed(truth: Truth) -> str:
+def concealed(truth: Truth) -> str:
+    """What was concealed in a trial."""
     if truth.kind != "concealed":
         return _group(truth.kind) + "".join(f"; {e.name} by {number(e.sigmas, 2)} sigma" for e in truth.beyond)
     return "; ".join(f"{_suspect(effect)} ({effect.name})" for effect in truth.effects)
 
 
-def _said(answer: Answer) -> str:
+def said(answer: Answer) -> str:
+    """What a method said of a trial."""
     if answer.failure:
         return f"no answer: {answer.failure[:120]}"
     if answer.finds:

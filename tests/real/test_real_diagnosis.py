@@ -13,13 +13,13 @@ from scipy.signal import butter, sosfiltfilt
 
 from gravity.real_sets import DATA
 from kbs_process.campaign.load import load_campaign
-from kbs_process.diagnosis.nominal.explain import explain
-from kbs_process.diagnosis.selection.outcome import Outcome
+from kbs_process.diagnosis.acceptance.outcome import Outcome
+from kbs_process.diagnosis.selection.explain import explain
 from kbs_process.diagnosis.selection.rounds import diagnose
 from kbs_process.progress import SilentProgress
 from kbs_process.signals.records import Array
 from kbs_process.studies.convert.run import import_recordings
-from kbs_process.studies.diagnose.run import experiment_of
+from kbs_process.studies.diagnose.reading import experiment_of
 from kbs_process.studies.diagnose.simulators import Simulators
 from real.campaigns import sampling_error
 from real.test_real_efforts import EMPS, EMPS_S, ODRIVE

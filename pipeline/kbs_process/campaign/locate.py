@@ -7,7 +7,7 @@ from pathlib import Path, PurePath
 from kbs_process.errors import ConfigError, OutputError, did_you_mean
 
 CAMPAIGNS = "campaigns"
-REPORTS = "reports"
+RESULTS = "results"
 CAMPAIGN_FILE = "campaign.toml"
 
 
@@ -50,7 +50,7 @@ def known_campaigns() -> tuple[str, ...]:
 
 
 def results_folder(campaign: Path, output: Path | None, suffix: str = "") -> Path:
-    """Return where results go: X/reports/NAME for X/campaigns/NAME, else reports/NAME here, or `output`.
+    """Return where results go: X/results/NAME for X/campaigns/NAME, else results/NAME here, or `output`.
 
     Raises OutputError for a place inside the campaign's own folder, or around it.
     """
@@ -58,9 +58,9 @@ def results_folder(campaign: Path, output: Path | None, suffix: str = "") -> Pat
     if output is not None:
         target = output.absolute()
     elif campaign.parent.name == CAMPAIGNS:
-        target = campaign.parents[1] / REPORTS / (campaign.name + suffix)
+        target = campaign.parents[1] / RESULTS / (campaign.name + suffix)
     else:
-        target = Path.cwd() / REPORTS / (campaign.name + suffix)
+        target = Path.cwd() / RESULTS / (campaign.name + suffix)
     inner, outer = target.resolve(), campaign.resolve()
     if inner.is_relative_to(outer) or outer.is_relative_to(inner):
         raise OutputError(

@@ -8,13 +8,22 @@ from pathlib import Path
 
 import click
 
-from kbs_process.cli.shared import BAD_INPUT, EXISTING_FILE, FOLDER, NOT_MET, examples, progress, quiet_option
+from kbs_process.cli.shared import (
+    BAD_INPUT,
+    EXISTING_FILE,
+    FOLDER,
+    NOT_MET,
+    check_option,
+    examples,
+    progress,
+    quiet_option,
+)
 from kbs_process.studies.convert import preset_names
 
 
 @click.command(epilog=examples("inspect recording.mcap", "inspect --check campaigns/EL089/recordings/*.mcap"))
 @click.argument("files", nargs=-1, required=True, type=EXISTING_FILE, metavar="FILE...")
-@click.option("--check", is_flag=True, help="Exit with 1 when a recording has losses.")
+@check_option("a recording has losses")
 def inspect(files: tuple[Path, ...], check: bool) -> None:
     """Show what is in recordings: topics, rates, gaps, ranges, damage.
 

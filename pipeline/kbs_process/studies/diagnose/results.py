@@ -8,17 +8,8 @@ from __future__ import annotations
 
 from typing import Literal
 
-from kbs_process.results.records import Check, Conclusion, Notice, Provenance, Record
-
-Answer = Literal["none", "parameters off", "physics", "undecided"]
-
-
-class Place(Record, frozen=True, kw_only=True):
-    """Where physics enters: a port, the joint, link, stream or channel it belongs to, and the channels that show it."""
-
-    port: str
-    site: str
-    channels: tuple[str, ...] = ()  # strongest first
+from kbs_process.diagnosis.facts import Answer, Moved, Place, Planned
+from kbs_process.results.records import Check, Conclusion, Notice, Provenance, Record, ResultsFile
 
 
 class Fitted(Record, frozen=True, kw_only=True):
@@ -85,18 +76,6 @@ class Find(Record, frozen=True, kw_only=True):
     same_ports: tuple[str, ...] = ()  # that these channels cannot tell from its own
 
 
-class Moved(Record, frozen=True, kw_only=True):
-    """A known parameter, before and after."""
-
-    name: str
-    unit: str
-    prior: float
-    prior_sigma: float | None  # None: nothing was known, as of a phase
-    value: float
-    sigma: float
-    sigmas: float | None  # from the prior, in its sigma
-
-
 class Trial(Record, frozen=True, kw_only=True):
     """A recording's residual over the floor at each step."""
 
@@ -149,13 +128,6 @@ class Suspect(Record, frozen=True, kw_only=True):
     outcome: str  # "accepted", "refused: ...", "absorbed by ..."
 
 
-class Planned(Record, frozen=True, kw_only=True):
-    """A trajectory that could be run next."""
-
-    trajectory: str
-    worth: float  # distance of the nearest rival; without rivals, root of the information's smallest eigenvalue
-
-
 class NextTest(Record, frozen=True, kw_only=True):
     """The test that would tell what these recordings leave open."""
 
@@ -171,7 +143,7 @@ class NextTest(Record, frozen=True, kw_only=True):
     tried: tuple[Planned, ...]  # best first, known parameters as they stand
 
 
-class DiagnosisResults(Record, frozen=True, kw_only=True):
+class DiagnosisResults(ResultsFile, frozen=True, kw_only=True):
     """results.json of a diagnosis."""
 
     name: str
@@ -180,7 +152,6 @@ class DiagnosisResults(Record, frozen=True, kw_only=True):
     verdict: Conclusion
     provenance: Provenance
     kind: Literal["diagnosis"] = "diagnosis"
-    schema: Literal[1] = 1
     answer: Answer
     paragraph: str  # to be pasted into a test report
     floor: str  # where it comes from, and what it is worth

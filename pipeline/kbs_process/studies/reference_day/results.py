@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Literal
 
 from kbs_process.results.pointing import PointingEstimate
-from kbs_process.results.records import Conclusion, Constant, Notice, Provenance, Record, Status
+from kbs_process.results.records import Constant, Record, ResultsFile, Status
 
 
 class PublishedSection(Record, frozen=True, kw_only=True):
@@ -82,22 +82,18 @@ class Geometry(Record, frozen=True, kw_only=True):
     elevation: tuple[float, float]
 
 
-class ReferenceDayResults(Record, frozen=True, kw_only=True):
+class ReferenceDayResults(ResultsFile, frozen=True, kw_only=True):
     """results.json of a simulated reference day."""
 
     name: str
     title: str
     article: str
-    verdict: Conclusion
-    provenance: Provenance
     kind: Literal["reference-day"] = "reference-day"
-    schema: Literal[1] = 1
     geometry: Geometry
     phases: tuple[Phase, ...]
     sections: tuple[Section, ...]
     requirements: tuple[Judged, ...]
     boresight: tuple[PointingEstimate, ...]  # over the whole day
     discussion: tuple[str, ...] = ()
-    warnings: tuple[Notice, ...] = ()
     parameters: tuple[Constant, ...] = ()
     notes: tuple[str, ...] = ()
