@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +14,7 @@ from kbs_process.plant.moved import added_loads
 from kbs_process.plant.predict import Schedule, predict
 from kbs_process.plant.rigid import loads
 from kbs_process.progress import Progress
-from kbs_process.reduction.commands import read_commands
+from kbs_process.reduction.commands import of_table, of_trajectory
 from kbs_process.reduction.predicting import approached, schedule_of
 from kbs_process.reduction.reading import read_run
 from kbs_process.reduction.settings import motion_settings
@@ -30,13 +29,11 @@ TABLES = (".csv", ".parquet")  # of commands, by the file's name
 def simulate_commands(campaign: Campaign, commands: Path, target: Path, *, rate_Hz: float, progress: Progress) -> Path:
     """Simulate the commands of a CSV or Parquet file through the controller; return `target`."""
     _require_commands(campaign)
-    schedule = read_commands(commands, campaign.rig.joint_names)
-    schedule = replace(schedule, t=schedule.t - schedule.t[0])
+    given = of_table(commands, campaign.rig)
     with progress.task(f"Simulating {commands.name}") as task:
-        streams = _command_driven(
-            campaign, campaign.effects, schedule, rate_Hz, rate_Hz, float(schedule.t[-1]), task.update
-        )
-        return write_prediction(campaign, streams, target, "simulated", commands.stem, (commands,))
+        until = float(given.schedule.t[-1])
+        streams = _command_driven(campaign, campaign.effects, given.schedule, rate_Hz, rate_Hz, until, task.update)
+        return write_prediction(campaign, streams, target, "simulated", given.name, (commands,))
 
 
 def simulate_trajectory(
@@ -44,18 +41,14 @@ def simulate_trajectory(
 ) -> Path:
     """Simulate the commands recorded in a trajectory's first run (default: the last one listed)."""
     _require_commands(campaign)
-    first = {entry.trajectory: entry for entry in reversed(campaign.recordings)}
-    name = trajectory or campaign.recordings[-1].trajectory
-    if name not in first:
-        raise ConfigError(f"there is no trajectory '{name}'", where=campaign.name, remedy=did_you_mean(name, first))
-    run = _read(campaign, first[name], progress)
-    # Before a test nobody knows what field and encoders will do: the controller is simulated too.
-    schedule = approached(replace(schedule_of(run, campaign.rig), field=None, encoder=None))
-    with progress.task(f"Simulating {name}") as task:
+    given = of_trajectory(campaign, trajectory, progress)
+    run = given.run
+    assert run is not None  # a recording's
+    with progress.task(f"Simulating {given.name}") as task:
         rates = rate_Hz or run.rates["wrench"], run.rates.get("angle", run.rates["wrench"])
-        streams = _command_driven(campaign, campaign.effects, schedule, *rates, _duration(run), task.update)
+        streams = _command_driven(campaign, campaign.effects, given.schedule, *rates, _duration(run), task.update)
         return write_prediction(
-            campaign, streams, target, "simulated", name, (first[name].path,), epoch_ns=run.epoch_ns
+            campaign, streams, target, "simulated", given.name, (given.source,), epoch_ns=run.epoch_ns
         )
 
 
@@ -65,7 +58,8 @@ def predict_recording(campaign: Campaign, recording: str, target: Path, *, progr
     `recording` is a name of the campaign's, or any other file with its topics. The model's laws of sensors act on it.
     """
     entry = _entry(campaign, recording)
-    run = _read(campaign, entry, progress)
+    with progress.task(f"Reading {entry.name}"):
+        run = read_run(campaign, entry)
     with progress.task(f"Predicting {entry.name}") as task:
         effects = campaign.acting(entry)
         if campaign.drive == "motion":
@@ -145,13 +139,5 @@ def _entry(campaign: Campaign, recording: str) -> RecordingEntry:
     )
 
 
-def _read(campaign: Campaign, entry: RecordingEntry, progress: Progress) -> Run:
-    with progress.task(f"Reading {entry.name}"):
-        return read_run(campaign, entry)
-
-
 def _duration(run: Run) -> float:
-    signals: Sequence[float] = [
-        signal.t0 + len(signal) * signal.dt for signal in (run.wrench, run.angle) if signal is not None
-    ]
-    return max(signals)
+    return max(float(one.t0 + len(one) * one.dt) for one in (run.wrench, run.angle) if one is not None)

@@ -108,7 +108,7 @@ def _onsets(results: StabilityResults, alt: str) -> Picture:
             color=draw.PREDICTED, linewidth=1.6, label="boundary",
         )  # fmt: skip
         there = [e for e in results.onsets if not e.friction and e.angle_rad == results.worst_angle_rad and e.found]
-        plane.plot([e.integral_weight * (e.found or 0.0) for e in there], [e.found for e in there], **_SMOOTH)
+        plane.plot([e.integral_weight * (e.found or 0.0) for e in there], [e.found or 0.0 for e in there], **_SMOOTH)
         plane.plot([1.0], [1.0], linestyle="none", marker="*", markersize=8, color=draw.LIMIT, label="as run")
         plane.set_xlim(left=0.0)
         plane.set_ylim(bottom=0.0)
