@@ -20,7 +20,6 @@ from kbs_process.progress import SilentProgress
 from kbs_process.signals.records import Array
 from kbs_process.studies.convert.run import import_recordings
 from kbs_process.studies.diagnose.reading import experiment_of
-from kbs_process.studies.diagnose.run import experiment_of
 from kbs_process.studies.diagnose.simulators import Simulators
 from real.campaigns import sampling_error
 from real.test_real_efforts import EMPS, EMPS_S, ODRIVE

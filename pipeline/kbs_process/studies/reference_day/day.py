@@ -9,7 +9,8 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from kbs_process.campaign.config import Campaign, PointingRequirement
-from kbs_process.campaign.mission import Day, SectionEntry
+from kbs_process.campaign.formats.mission_file import SectionEntry
+from kbs_process.campaign.mission import Day
 from kbs_process.errors import ConfigError
 from kbs_process.mission.planner import Plan
 from kbs_process.reduction.analysis import bands_of, passband
