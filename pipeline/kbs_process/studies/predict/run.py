@@ -31,8 +31,15 @@ def simulate_commands(campaign: Campaign, commands: Path, target: Path, *, rate_
     _require_commands(campaign)
     given = of_table(commands, campaign.rig)
     with progress.task(f"Simulating {commands.name}") as task:
-        until = float(given.schedule.t[-1])
-        streams = _command_driven(campaign, campaign.effects, given.schedule, rate_Hz, rate_Hz, until, task.update)
+        streams = predict(
+            campaign.rig,
+            campaign.effects,
+            given.schedule,
+            rate_Hz=rate_Hz,
+            angle_rate_Hz=rate_Hz,
+            duration_s=float(given.schedule.t[-1]),
+            progress=task.update,
+        )
         return write_prediction(campaign, streams, target, "simulated", given.name, (commands,))
 
 
@@ -45,8 +52,7 @@ def simulate_trajectory(
     run = given.run
     assert run is not None  # a recording's
     with progress.task(f"Simulating {given.name}") as task:
-        rates = rate_Hz or run.rates["wrench"], run.rates.get("angle", run.rates["wrench"])
-        streams = _command_driven(campaign, campaign.effects, given.schedule, *rates, _duration(run), task.update)
+        streams = _as_recorded(campaign, campaign.effects, given.schedule, run, task.update, rate_Hz)
         return write_prediction(
             campaign, streams, target, "simulated", given.name, (given.source,), epoch_ns=run.epoch_ns
         )
@@ -66,8 +72,7 @@ def predict_recording(campaign: Campaign, recording: str, target: Path, *, progr
             streams = _motion_driven(campaign, effects, run)
         else:
             schedule = approached(schedule_of(run, campaign.rig))
-            rates = run.rates["wrench"], run.rates.get("angle", run.rates["wrench"])
-            streams = _command_driven(campaign, effects, schedule, *rates, _duration(run), task.update)
+            streams = _as_recorded(campaign, effects, schedule, run, task.update)
         read = read_through(campaign, streams, run.temperature)
         return write_prediction(campaign, read, target, "predicted", entry.name, (entry.path,), epoch_ns=run.epoch_ns)
 
@@ -95,22 +100,23 @@ def _motion_driven(campaign: Campaign, effects: Sequence[str], run: Run) -> Iter
     yield "angle", Block(stamp, stamp, motion.q + motion.offset)
 
 
-def _command_driven(
+def _as_recorded(
     campaign: Campaign,
     effects: Sequence[str],
     schedule: Schedule,
-    rate_Hz: float,
-    angle_rate_Hz: float,
-    duration_s: float,
+    run: Run,
     update: Callable[[float], None],
+    rate_Hz: float | None = None,
 ) -> Iterable[tuple[str, Block]]:
+    """Return what the plant does on commands, sampled as a run was (the wrench at `rate_Hz`), and for as long."""
+    wrench = run.rates["wrench"]
     return predict(
         campaign.rig,
         effects,
         schedule,
-        rate_Hz=rate_Hz,
-        angle_rate_Hz=angle_rate_Hz,
-        duration_s=duration_s,
+        rate_Hz=rate_Hz or wrench,
+        angle_rate_Hz=run.rates.get("angle", wrench),
+        duration_s=max(float(one.t0 + len(one) * one.dt) for one in (run.wrench, run.angle) if one is not None),
         progress=update,
     )
 
@@ -137,7 +143,3 @@ def _entry(campaign: Campaign, recording: str) -> RecordingEntry:
         where=campaign.name,
         remedy=did_you_mean(recording, names),
     )
-
-
-def _duration(run: Run) -> float:
-    return max(float(one.t0 + len(one) * one.dt) for one in (run.wrench, run.angle) if one is not None)
