@@ -1,9 +1,8 @@
-"""Laws of sensors and clocks that a campaign's model names: read, checked, written."""
+"""Laws of sensors and clocks that a campaign's model names: read and checked."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 from kbs_process.campaign.config import SensingLaw
 from kbs_process.campaign.documents import Document, Key
@@ -73,20 +72,3 @@ def _sites(law: Sensing, rig: Rig) -> tuple[str, ...]:
             return STREAMS
         case _:
             return rig.joint_names
-
-
-def table_of(law: SensingLaw) -> dict[str, Any]:
-    """A law as [model] sensing has it, in SI."""
-    return {
-        "law": law.law,
-        "site": law.site,
-        "parameters": {
-            name: {
-                "value": float(quantity),
-                "unit": quantity.unit,
-                "sigma": float(quantity.sigma),
-                "source": quantity.source,
-            }
-            for name, quantity in law.parameters.items()
-        },
-    }

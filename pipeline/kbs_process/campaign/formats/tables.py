@@ -51,14 +51,14 @@ SomeDistinct = Annotated[
 ]
 Version = Annotated[int, AfterValidator(_first_version), Field(json_schema_extra={"const": 1})]
 
-# Alternatives are told apart by what TOML has; their tags are in a fault's place, where no key can begin like that.
-TAGS = "\0"
-TABLE, ARRAY, TEXT, TRUTH, NUMBER = (Tag(f"{TAGS}{kind}") for kind in ("table", "array", "text", "truth", "number"))
+# Alternatives are told apart by what TOML has; their tags stand in a fault's place, and are no keys.
+TABLE, ARRAY, TEXT, TRUTH, NUMBER = (Tag(f"\0{kind}") for kind in ("table", "array", "text", "truth", "number"))
+_TAGS = {dict: TABLE, list: ARRAY, str: TEXT, bool: TRUTH, int: NUMBER, float: NUMBER}
+TAGS = {tag.tag for tag in _TAGS.values()}
 
 
 def _kind(value: Any) -> str:
-    kinds = {dict: TABLE, list: ARRAY, str: TEXT, bool: TRUTH, int: NUMBER, float: NUMBER}
-    return kinds[type(value)].tag if type(value) in kinds else f"{TAGS}other"
+    return _TAGS[type(value)].tag if type(value) in _TAGS else "a date or time"
 
 
 by_kind = Discriminator(_kind)

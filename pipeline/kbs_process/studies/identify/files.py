@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from kbs_process.campaign.config import Campaign
-from kbs_process.campaign.parameter_files import corrected, write_parameters
+from kbs_process.campaign.writing.parameter_files import corrected, write_parameters
 from kbs_process.estimation.whittle import periodogram
 from kbs_process.identification.output_error import Measured
 from kbs_process.identification.screening import Phase, phases
