@@ -107,7 +107,7 @@ def _limits(kind: str, found: Any, context: dict[str, Any]) -> tuple[str, str]:
             return f"{_shown(found)} is greater than {context['le']:g}", f"give at most {context['le']:g}"
         case "less_than":
             return f"{_shown(found)} is not less than {context['lt']:g}", f"give less than {context['lt']:g}"
-        case "too_short" if isinstance(found, dict):
+        case "empty" | "too_short" if isinstance(found, dict):
             return "is empty", "describe at least one"
         case "too_short":
             least = context["min_length"]

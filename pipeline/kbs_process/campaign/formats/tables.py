@@ -74,6 +74,8 @@ def _documented(schema: dict[str, Any], model: type[Table]) -> None:
             if isinstance(kind, Kind):
                 words = "; ".join(filter(None, (kind.in_words(), field.description)))
                 schema["properties"][field.alias or name]["description"] = words
+    if model.filled:
+        schema["minProperties"] = 1
     schema.update(model.rules)
 
 
@@ -85,10 +87,13 @@ class Table(BaseModel):
     )
     spread: ClassVar[bool] = False  # may its keys be spread over several files?
     together: ClassVar[tuple[str, ...]] = ()  # keys of which all are given, or none
+    filled: ClassVar[bool] = False  # must it have a key?
     rules: ClassVar[dict[str, Any]] = {}  # what its JSON Schema says besides
 
     @model_validator(mode="after")
     def _complete(self) -> Self:
+        if self.filled and not self.model_fields_set:
+            raise PydanticCustomError("empty", "a table without a key")
         given = [name for name in self.together if name in self.model_fields_set]
         for name in self.together:
             if given and name not in given:
