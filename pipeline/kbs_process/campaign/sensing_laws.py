@@ -7,8 +7,9 @@ from collections.abc import Sequence
 from kbs_process.campaign.config import SensingLaw
 from kbs_process.campaign.documents import Document, Key
 from kbs_process.campaign.formats.campaign_file import SensingTable
+from kbs_process.campaign.formats.kind import Kind
 from kbs_process.campaign.problems import Problems
-from kbs_process.campaign.quantities import Kind, read_quantity
+from kbs_process.campaign.quantities import read_quantity
 from kbs_process.errors import ConfigError, did_you_mean
 from kbs_process.plant.laws import SENSING
 from kbs_process.plant.sensing import Sensing, SensingPort, couplings, products

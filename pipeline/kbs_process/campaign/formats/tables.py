@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar, Self, TypeVar
 from pydantic import AfterValidator, BaseModel, ConfigDict, Discriminator, Field, Tag, model_validator
 from pydantic_core import PydanticCustomError
 
-from kbs_process.campaign.quantities import Kind
+from kbs_process.campaign.formats.kind import Kind
 
 # Patterns of texts, and what they ask for in words.
 NAME = "^[A-Za-z0-9][A-Za-z0-9._-]*$"

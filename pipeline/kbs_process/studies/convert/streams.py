@@ -149,7 +149,7 @@ def _stamps(
     if time is not None and not clocks:
         count = len(next(iter(named.values())))
         return nanoseconds(np.arange(rows, rows + count), time, str(table.path))
-    stamp, known = nanoseconds(named[clocks[0]], time or Time(), f"{table.path}: {clocks[0]}")
+    stamp, known = nanoseconds(named[clocks[0]], time or Time.model_construct(), f"{table.path}: {clocks[0]}")
     for clock in clocks[1:]:
         if not np.array_equal(named[clock], named[clocks[0]]):
             raise RecordingError(
