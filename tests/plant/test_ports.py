@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-import energetics as lab
 import numpy as np
 import pytest
-from plant_rigs import NOMINAL, three_axis, two_axis
 
 from kbs_process.errors import ConfigError
 from kbs_process.plant.attach import attach
@@ -19,6 +17,8 @@ from kbs_process.plant.linear.linearise import linearise
 from kbs_process.plant.schedule import Schedule
 from kbs_process.rig.model import Rig, substitute
 from kbs_process.signals.records import Array
+from plant import energetics as lab
+from plant.plant_rigs import NOMINAL, three_axis, two_axis
 
 FREE = {"d0": 0.0, "d1": 0.0, "Ts0": 0.0, "b_m": 0.0, "fsv": 0.0}
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from plant_rigs import CODE, NOMINAL, one_axis, quantity, streams, two_axis
 from scipy.signal import butter, freqs
 
 from kbs_process.errors import ConfigError, SimulationError
@@ -12,6 +11,7 @@ from kbs_process.plant.amplifier import discretised, steady
 from kbs_process.plant.predict import predict
 from kbs_process.plant.schedule import Schedule
 from kbs_process.rig.model import Amplifier, substitute
+from plant.plant_rigs import CODE, NOMINAL, one_axis, quantity, streams, two_axis
 
 
 def climbing(duration: float) -> Schedule:
