@@ -93,6 +93,7 @@ def at_rest(of: Rig, position: Any) -> Simulation:
     return simulation(of, LOADS, standing(position))
 
 
+@pytest.mark.slow
 def test_reaction_of_the_ground_is_felt_and_that_inside_a_joint_is_not() -> None:
     of, position = two_axis(stiffness=None, amplifier=None), np.radians([30.0, 70.0])
     bare, inside, ground = (at_rest(each, position) for each in (hung(of), pushed(hung(of), 2.0), hung(of, hold=2.0)))
@@ -135,6 +136,7 @@ def loaded(shake: float, **settings: Any) -> tuple[Rig, tuple[Effect, ...]]:
     return attach(of, SHAKE, {"shake": shake}), (GROUND, PULL, SHAKE)
 
 
+@pytest.mark.slow
 def test_energy_gained_is_the_loads_work_less_what_is_dissipated() -> None:
     step = 5e-5
     of, effects = loaded(0.0, damping=(3.0, 2.0, 4.0))
