@@ -58,8 +58,8 @@ _EACH = {
     "port, in no catalogue": "port, outside the catalogue",
     "all of several": "all of several",
 }
-_LIMITS = """- The code and the test bench changed between sets. The table says how often the answers of that time were right. It
-  measures no single version.
+_LIMITS = """- The code and the test bench changed between sets. The table says how often the answers were right.
+  It measures no single version.
 - A right family can still be wrong in fact. One of the right ones is the curve of another channel.
 - "Undecided" with the right effect as the nearest one counts as right.
 - The catalogue grew towards what the generator makes: 14 of its effects were outside at first, 6 are now.
@@ -100,7 +100,8 @@ def sentence(rows: Sequence[Row], sets: int, trials: int) -> str:
         _row(rows, name) for name in ("place", "physics", "false find", "port, in no catalogue")
     )
     return (
-        f"The diagnosis is experimental. In {trials} sealed trials ({sets} sets, with changes of the code between them) it\n"
+        f"The diagnosis is experimental. In {trials} sealed trials "
+        f"({sets} sets, with changes of the code between them) it\n"
         f"named the right physics for {physics.right} of {physics.of} single effects of its catalogue "
         f"({_interval(physics)}).\nThe place was right for {place.right}. "
         f"Of effects outside the catalogue it found the port in {outside.right} of {outside.of}.\n"
@@ -109,7 +110,7 @@ def sentence(rows: Sequence[Row], sets: int, trials: int) -> str:
 
 
 def document(sets: Sequence[Sealed], whole: Bench, line: str, rivals: Bench) -> str:
-    """The page on how often the diagnosis is right: `line`, all sets as one, rivals, each set, each trial, each case."""
+    """The page on how often the diagnosis is right: `line`, all sets as one, rivals, each set, trial and case."""
     made = sum(one.made for one in sets)
     return "\n".join(
         (
@@ -118,13 +119,13 @@ def document(sets: Sequence[Sealed], whole: Bench, line: str, rivals: Bench) -> 
             "<!-- Written by `cd tests && python -m proof.validations`; do not edit. -->",
             "",
             line,
-            "A sealed trial is a campaign with effects that its model lacks. What they are is encrypted until all answers",
-            "are written ([how](dev/proof.md)). Brackets hold exact binomial intervals of 95 %.",
+            "A sealed trial is a campaign with effects that its model lacks. What they are is encrypted until all",
+            "answers are written ([how](dev/proof.md)). Brackets hold exact binomial intervals of 95 %.",
             "",
             "## All sets together",
             "",
-            f"{made} trials were sealed. {len(whole.truths)} are scored. The others were not answered when the time was "
-            "up, and stayed sealed.",
+            f"{made} trials were sealed. {len(whole.truths)} are scored. The others were not answered when the time",
+            "was up, and stayed sealed.",
             "",
             *_table(("number", "all strengths", "strength 300 and more"), _together(whole.rows)),
             "",
@@ -134,8 +135,8 @@ def document(sets: Sequence[Sealed], whole: Bench, line: str, rivals: Bench) -> 
             "",
             "## Beside other methods",
             "",
-            f"{len(rivals.truths)} of the trials were answered by the rivals, too. All methods get the same recordings,",
-            "the same repeatability and the same refit of the nominal parameters.",
+            f"{len(rivals.truths)} of the trials were answered by the rivals, too. All methods get the same",
+            "recordings, the same repeatability and the same refit of the nominal parameters.",
             "",
             *(f"- *{name}*: {what}." for name, what in RIVALS.items()),
             "",
@@ -176,15 +177,8 @@ def _one(one: Sealed) -> Sequence[str]:
 def _trials(one: Sealed) -> Iterable[str]:
     answers = {answer.trial: answer for answer in one.bench.answers if answer.method == OURS}
     ordered = sorted(one.bench.truths, key=lambda truth: (-truth.level, truth.kind, truth.trial))
-    rows = (
-        (
-            _strength(truth),
-            said(answers[truth.trial]),
-            answers[truth.trial].verdict,
-            _judged(truth, answers[truth.trial]),
-        )
-        for truth in ordered
-    )
+    pairs = ((truth, answers[truth.trial]) for truth in ordered)
+    rows = ((_strength(truth), said(answer), answer.verdict, _judged(truth, answer)) for truth, answer in pairs)
     yield from ("", f"### Set {one.number}", "", *_table(("concealed", "said", "answer", "right"), rows))
 
 
