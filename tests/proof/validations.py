@@ -104,7 +104,7 @@ def sentence(rows: Sequence[Row], sets: int, trials: int) -> str:
         f"({sets} sets, with changes of the code between them) it\n"
         f"named the right physics for {physics.right} of {physics.of} single effects of its catalogue "
         f"({_interval(physics)}).\nThe place was right for {place.right}. "
-        f"Of effects outside the catalogue it found the port in {outside.right} of {outside.of}.\n"
+        f"Of effects outside the catalogue it found where they enter for {outside.right} of {outside.of}.\n"
         f"It reported an effect in {false.right} of {false.of} trials that had none.\n"
     )
 
