@@ -18,7 +18,7 @@ from kbs_process.studies.diagnose.report import _HEADLINES
 from kbs_process.studies.diagnose.results import Answer
 
 ROOT = Path(__file__).parents[2]
-NOT_OURS = {"build", "node_modules", "reports"}
+NOT_OURS = {"build", "node_modules", "results"}
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 PYPROJECT = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
 # Packages that are run, not imported, and where one sees it.
