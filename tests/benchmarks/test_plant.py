@@ -22,7 +22,7 @@ from pytest_benchmark.fixture import BenchmarkFixture
 from engine import TRAJECTORIES, Hardware, simulate
 from kbs_process.campaign.load import load_campaign
 from kbs_process.plant.compiled.simulation import Simulation
-from kbs_process.plant.effects import select
+from kbs_process.plant.laws import select
 from kbs_process.plant.predict import DEFAULT_STEP, LANES, predict, predict_together, simulation_of
 from kbs_process.plant.schedule import Schedule
 from kbs_process.plant.structure import link_inertia

@@ -20,7 +20,7 @@ from kbs_process.diagnosis.selection.outcome import Estimate, Identity
 from kbs_process.errors import ConfigError
 from kbs_process.identification.output_error import Scalar
 from kbs_process.plant.attach import attach
-from kbs_process.plant.effects import select
+from kbs_process.plant.laws import select
 from kbs_process.rig.model import Quantity, substitute
 from kbs_process.signals.records import WRENCH_CHANNELS
 from kbs_process.studies.diagnose.corrected import write_corrected

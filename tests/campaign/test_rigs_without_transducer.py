@@ -13,7 +13,7 @@ from kbs_process.campaign.corrected_model import write_model
 from kbs_process.campaign.load import load_campaign
 from kbs_process.errors import ConfigError
 from kbs_process.plant.attach import attach
-from kbs_process.plant.effects import select
+from kbs_process.plant.laws import select
 from kbs_process.reduction.relief import in_motion, without_effects
 from kbs_process.signals.records import Signal
 from kbs_process.stages.motion import Motion

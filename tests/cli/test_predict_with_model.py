@@ -19,7 +19,7 @@ from kbs_process.campaign.corrected_model import write_model
 from kbs_process.campaign.load import load_campaign
 from kbs_process.diagnosis.experiments.hypothesis import Hypothesis
 from kbs_process.diagnosis.proposing.measured import inserted
-from kbs_process.plant.effects.measured_law import MEASURED
+from kbs_process.plant.laws.position.measured_law import MEASURED
 from kbs_process.recordings.inspection import inspect_recording
 from kbs_process.rig.model import Quantity
 from kbs_process.signals.records import Array

@@ -33,7 +33,7 @@ from kbs_process.diagnosis.selection.outcome import (
     Outcome,
     Refused,
 )
-from kbs_process.plant.effects.measured_law import COEFFICIENTS, MEASURED
+from kbs_process.plant.laws.position.measured_law import COEFFICIENTS, MEASURED
 from kbs_process.reduction.commands import read_commands
 from kbs_process.results.records import load
 from kbs_process.studies.diagnose.corrected import write_corrected

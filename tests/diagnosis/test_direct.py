@@ -19,8 +19,8 @@ from kbs_process.diagnosis.screening.signature import inputs
 from kbs_process.diagnosis.screening.suspects import Candidate, felt_from_the_ground
 from kbs_process.plant.attach import attach
 from kbs_process.plant.effect import Port
-from kbs_process.plant.effects import CATALOGUE
-from kbs_process.plant.effects.measured_law import MEASURED, Measured
+from kbs_process.plant.laws import CATALOGUE
+from kbs_process.plant.laws.position.measured_law import MEASURED, Measured
 from kbs_process.plant.moved import added_loads, grounded, pressed
 from kbs_process.plant.rigid import kinematics, loads
 from kbs_process.reduction.relief import without_forces

@@ -11,7 +11,7 @@ from kbs_process.diagnosis.experiments.hypothesis import Hypothesis, predict
 from kbs_process.diagnosis.screening.scene import Scene
 from kbs_process.diagnosis.screening.screen import Catalogued
 from kbs_process.diagnosis.screening.suspects import Candidate
-from kbs_process.plant.effects import CATALOGUE
+from kbs_process.plant.laws import CATALOGUE
 from kbs_process.signals.records import Array
 
 

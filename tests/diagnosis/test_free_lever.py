@@ -26,9 +26,9 @@ from kbs_process.diagnosis.selection.tryout import extra_of, identity
 from kbs_process.identification.output_error import Scalar
 from kbs_process.plant.attach import attach
 from kbs_process.plant.effect import Effect
-from kbs_process.plant.effects import select
-from kbs_process.plant.effects.air_drag import AIR_DRAG
-from kbs_process.plant.effects.bungee import BUNGEE
+from kbs_process.plant.laws import select
+from kbs_process.plant.laws.environment.air_drag import AIR_DRAG
+from kbs_process.plant.laws.environment.bungee import BUNGEE
 from kbs_process.plant.predict import Schedule
 
 DRAG, POWER, POINT = 0.8, 1.75, np.array([0.3, -0.1, 0.12])  # N at 0.01 m/s, 1, m

@@ -21,7 +21,7 @@ from kbs_process.diagnosis.nominal.known import Known
 from kbs_process.diagnosis.selection.outcome import Find
 from kbs_process.diagnosis.selection.race import own_of
 from kbs_process.diagnosis.selection.tryout import extra_of, identity
-from kbs_process.plant.effects import CATALOGUE
+from kbs_process.plant.laws import CATALOGUE
 
 LAG, CABLE, HARNESS = ("channel_lag", "Tx"), ("ground_cable", "el"), ("harness", "el")
 HARNESS_EFFECT = next(one for one in CATALOGUE if one.name == "harness")

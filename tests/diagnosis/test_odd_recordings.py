@@ -21,9 +21,8 @@ from kbs_process.diagnosis.screening.localise import cells_and_ports
 from kbs_process.diagnosis.screening.scene import Scene
 from kbs_process.errors import ConfigError, RecordingError
 from kbs_process.identification.output_error import Scalar
-from kbs_process.plant.effects import CATALOGUE
+from kbs_process.plant.laws import CATALOGUE, SENSING
 from kbs_process.plant.rigid import loads
-from kbs_process.plant.sensing import SENSING
 from kbs_process.progress import SilentProgress
 from kbs_process.recordings.mcap.messages.encoding import OutStream
 from kbs_process.recordings.mcap.writer import write_mcap

@@ -20,7 +20,7 @@ from kbs_process.diagnosis.selection.outcome import Estimate, Find, Identity
 from kbs_process.diagnosis.selection.tryout import extra_of, identity
 from kbs_process.identification.output_error import Scalar
 from kbs_process.plant.attach import attach
-from kbs_process.plant.effects import find, select
+from kbs_process.plant.laws import find, select
 
 GRID = (150.0, 250.0, 350.0, 500.0, 620.0, 750.0, 900.0)
 RIPPLE = {250.0: 0.3, 500.0: -0.2, 750.0: 0.15}  # N m, sines

@@ -37,8 +37,7 @@ from kbs_process.diagnosis.selection.race import own_of
 from kbs_process.diagnosis.selection.tryout import extra_of, identity
 from kbs_process.identification.output_error import Scalar
 from kbs_process.plant.attach import attach
-from kbs_process.plant.effects import CATALOGUE, select
-from kbs_process.plant.sensing import SENSING
+from kbs_process.plant.laws import CATALOGUE, SENSING, select
 from kbs_process.signals.records import Array
 
 FREE = (

@@ -22,7 +22,7 @@ from kbs_process.diagnosis.selection import race, rounds
 from kbs_process.diagnosis.selection.effort import Effort
 from kbs_process.diagnosis.selection.leaders import leaders
 from kbs_process.plant.attach import attach
-from kbs_process.plant.effects import find
+from kbs_process.plant.laws import find
 from kbs_process.rig.model import TRANSDUCER
 from kbs_process.signals.records import Array
 

@@ -20,10 +20,9 @@ from kbs_process.diagnosis.screening.suspects import Candidate, candidates
 from kbs_process.diagnosis.screening.transfer import follow, respond
 from kbs_process.plant.attach import attach
 from kbs_process.plant.effect import Effect
-from kbs_process.plant.effects import CATALOGUE, select
-from kbs_process.plant.effects.joint_order import JOINT_ORDER
+from kbs_process.plant.laws import CATALOGUE, SENSING, select
+from kbs_process.plant.laws.position.joint_order import JOINT_ORDER
 from kbs_process.plant.predict import Schedule, predict, tap_columns
-from kbs_process.plant.sensing import SENSING
 from kbs_process.rig.model import Rig
 from kbs_process.signals.records import Array
 from kbs_process.stages.align.resample import resample

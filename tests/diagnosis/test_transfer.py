@@ -18,7 +18,7 @@ from kbs_process.diagnosis.screening.suspects import Candidate
 from kbs_process.diagnosis.screening.transfer import amplified, respond
 from kbs_process.plant.attach import attach
 from kbs_process.plant.effect import SIGNALS, Effect, Port
-from kbs_process.plant.effects import CATALOGUE, select
+from kbs_process.plant.laws import CATALOGUE, select
 from kbs_process.plant.linear.linearise import drive_damping
 from kbs_process.rig.model import Amplifier, Drive, Quantity, Rig, substitute
 from kbs_process.signals.records import WRENCH_CHANNELS, Array

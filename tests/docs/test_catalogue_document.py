@@ -6,8 +6,8 @@ import re
 from pathlib import Path
 
 from kbs_process.plant.effect import Port
-from kbs_process.plant.effects import CATALOGUE, MEASURED
-from kbs_process.plant.sensing import SENSING, SensingPort
+from kbs_process.plant.laws import CATALOGUE, MEASURED, SENSING
+from kbs_process.plant.sensing import SensingPort
 
 TEXT = (Path(__file__).parents[2] / "docs" / "catalogue.md").read_text(encoding="utf-8")
 WORDS: dict[Port | SensingPort, str] = {

@@ -20,7 +20,7 @@ from kbs_process.diagnosis.nominal import phasing
 from kbs_process.errors import ConfigError, RecordingError
 from kbs_process.identification.estimate import Settings
 from kbs_process.identification.screening import _pose
-from kbs_process.plant.effects import select
+from kbs_process.plant.laws import select
 from kbs_process.plant.linear.modes import modes
 from kbs_process.progress import SilentProgress
 from kbs_process.reduction.predicting import schedule_of

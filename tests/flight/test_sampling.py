@@ -8,7 +8,7 @@ import pytest
 from scipy.stats import kstest, norm
 
 from kbs_process.campaign.load import load_campaign
-from kbs_process.plant.effects import select
+from kbs_process.plant.laws import select
 from kbs_process.plant.sampling import draw, uncertain, values
 from kbs_process.rig.model import substitute
 from kbs_process.studies.flight.propagation import by_chance, importance, probability, upper_bound

@@ -11,7 +11,7 @@ from kbs_process.plant.attach import attach
 from kbs_process.plant.compiled.compile import compiled_plant
 from kbs_process.plant.compiled.equilibrium import at_rest
 from kbs_process.plant.compiled.generate import state_layout
-from kbs_process.plant.effects import CATALOGUE, select
+from kbs_process.plant.laws import CATALOGUE, select
 from kbs_process.plant.linear.linearise import linearise
 from kbs_process.plant.linear.modal import ModalModel, ModalTable, derive, respond, select_modes, tracked
 from kbs_process.plant.schedule import Schedule

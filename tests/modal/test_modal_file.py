@@ -9,7 +9,7 @@ import pytest
 
 from kbs_process.campaign.modal_file import modal_text, read_modal
 from kbs_process.errors import ConfigError
-from kbs_process.plant.effects import select
+from kbs_process.plant.laws import select
 from kbs_process.plant.linear.modal import ModalTable, derive
 from plant.plant_rigs import NOMINAL, two_axis
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from kbs_process.errors import RecordingError
-from kbs_process.plant.effects import select
+from kbs_process.plant.laws import select
 from kbs_process.plant.linear.modal import ModalModel, derive
 from kbs_process.signals.records import Array
 from kbs_process.studies.modal.nastran import read_f06

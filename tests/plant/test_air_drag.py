@@ -9,10 +9,10 @@ import pytest
 from plant_rigs import quantity, two_axis
 
 from kbs_process.plant.attach import attach
-from kbs_process.plant.effects.air_drag import AIR_DRAG, SPEED
-from kbs_process.plant.effects.bungee import BUNGEE
-from kbs_process.plant.effects.tether import TETHER
 from kbs_process.plant.external import external_efforts, external_wrench, pulls_at_rest
+from kbs_process.plant.laws.environment.air_drag import AIR_DRAG, SPEED
+from kbs_process.plant.laws.environment.bungee import BUNGEE
+from kbs_process.plant.laws.environment.tether import TETHER
 from kbs_process.plant.moved import added_loads
 from kbs_process.rig.model import Effort, Rig
 from kbs_process.signals.records import Array

@@ -12,7 +12,7 @@ from scipy.linalg import eigh
 
 from kbs_process.plant.attach import attach
 from kbs_process.plant.compiled.simulation import Simulation
-from kbs_process.plant.effects import find, select
+from kbs_process.plant.laws import find, select
 from kbs_process.plant.linear.modes import modes as modes_on_transducer
 from kbs_process.plant.predict import predict
 from kbs_process.plant.schedule import Schedule

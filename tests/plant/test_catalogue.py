@@ -11,7 +11,7 @@ import pytest
 from kbs_process.campaign.units import DIMENSIONS
 from kbs_process.plant.along import _module, along, signals_of
 from kbs_process.plant.effect import Effect, Port, instance, shared
-from kbs_process.plant.effects import CATALOGUE, MEASURED, find, select
+from kbs_process.plant.laws import CATALOGUE, MEASURED, find, select
 from kbs_process.signals.records import Array
 
 KNOWN_UNITS = {unit for units in DIMENSIONS.values() for unit in units}

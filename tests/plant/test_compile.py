@@ -15,7 +15,7 @@ from kbs_process.plant.compiled import compile as compiling
 from kbs_process.plant.compiled.generate import module_text
 from kbs_process.plant.compiled.simulation import Simulation
 from kbs_process.plant.effect import Effect, LogNormal, Parameter, Port, State
-from kbs_process.plant.effects import CATALOGUE, select
+from kbs_process.plant.laws import CATALOGUE, select
 from kbs_process.plant.schedule import Schedule
 from kbs_process.plant.structure import Structure
 
@@ -83,7 +83,7 @@ def test_edited_equation_gets_another_file(monkeypatch: pytest.MonkeyPatch) -> N
 RACE = """
 import numpy as np
 from kbs_process.plant.compiled.compile import compiled_plant
-from kbs_process.plant.effects import select
+from kbs_process.plant.laws import select
 from kbs_process.plant.structure import Structure
 plant = compiled_plant(Structure((-1,), False, select(["synchronous_motor", "flexspline"])))
 print(plant.path.name)

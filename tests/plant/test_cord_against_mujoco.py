@@ -9,7 +9,7 @@ from engine import TRAJECTORIES, simulate
 from engine.campaigns import ABOVE_ANTENNA, CAMPAIGNS
 from kbs_process.campaign.load import load_campaign
 from kbs_process.plant.attach import attach
-from kbs_process.plant.effects.bungee import BUNGEE
+from kbs_process.plant.laws.environment.bungee import BUNGEE
 from kbs_process.plant.schedule import Schedule
 from kbs_process.rig.model import substitute
 

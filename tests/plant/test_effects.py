@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from kbs_process.campaign.units import DIMENSIONS
 from kbs_process.errors import ConfigError
 from kbs_process.plant.effect import Effect, LogNormal, Parameter, Port, State
-from kbs_process.plant.effects import CATALOGUE, MEASURED, select
-from kbs_process.plant.effects.detent import torque as detent
-from kbs_process.plant.effects.tooth_stiction import limit as tooth_stiction
+from kbs_process.plant.laws import CATALOGUE, MEASURED, select
+from kbs_process.plant.laws.friction.tooth_stiction import limit as tooth_stiction
+from kbs_process.plant.laws.position.detent import torque as detent
 
 UNITS = {unit for units in DIMENSIONS.values() for unit in units}
 

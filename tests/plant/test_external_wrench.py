@@ -8,9 +8,9 @@ from plant_rigs import NOMINAL, two_axis
 
 from kbs_process.plant.attach import attach
 from kbs_process.plant.compiled.simulation import Simulation
-from kbs_process.plant.effects import select
-from kbs_process.plant.effects.bungee import BUNGEE
 from kbs_process.plant.external import external_wrench
+from kbs_process.plant.laws import select
+from kbs_process.plant.laws.environment.bungee import BUNGEE
 from kbs_process.plant.schedule import Schedule
 from kbs_process.rig.model import Rig, substitute
 from kbs_process.signals.records import Array

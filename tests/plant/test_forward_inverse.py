@@ -7,7 +7,7 @@ import numpy as np
 from plant_rigs import NOMINAL, two_axis
 
 from kbs_process.plant.compiled.simulation import Simulation
-from kbs_process.plant.effects import select
+from kbs_process.plant.laws import select
 from kbs_process.plant.rigid import inverse_dynamics
 from kbs_process.plant.schedule import Schedule
 

@@ -11,7 +11,7 @@ from plant_rigs import NOMINAL, one_axis, two_axis
 from kbs_process.errors import ConfigError
 from kbs_process.plant.attach import attach
 from kbs_process.plant.compiled.simulation import Simulation
-from kbs_process.plant.effects import select
+from kbs_process.plant.laws import select
 from kbs_process.plant.predict import LANES, predict, predict_together, simulation_of
 from kbs_process.plant.schedule import Schedule
 from kbs_process.rig.model import Rig, substitute

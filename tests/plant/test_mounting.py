@@ -13,9 +13,9 @@ from kbs_process.errors import ConfigError
 from kbs_process.plant.attach import attach
 from kbs_process.plant.compiled.simulation import Simulation
 from kbs_process.plant.effect import Effect, Normal, Parameter, Port, State
-from kbs_process.plant.effects import select
-from kbs_process.plant.effects.base_hardening import BASE_HARDENING, moment
-from kbs_process.plant.effects.base_hysteresis import BASE_HYSTERESIS
+from kbs_process.plant.laws import select
+from kbs_process.plant.laws.environment.base_hardening import BASE_HARDENING, moment
+from kbs_process.plant.laws.hysteresis.base_hysteresis import BASE_HYSTERESIS
 from kbs_process.plant.linear.linearise import linearise
 from kbs_process.plant.linear.mounted import mounted_sag
 from kbs_process.plant.predict import DEFAULT_STEP, SLIPPING_STEP

@@ -13,8 +13,8 @@ from kbs_process.errors import ConfigError
 from kbs_process.plant.attach import attach
 from kbs_process.plant.compiled.simulation import Simulation
 from kbs_process.plant.effect import Effect, Normal, Parameter, Port
-from kbs_process.plant.effects import select
-from kbs_process.plant.effects.bungee import BUNGEE
+from kbs_process.plant.laws import select
+from kbs_process.plant.laws.environment.bungee import BUNGEE
 from kbs_process.plant.linear.linearise import linearise
 from kbs_process.plant.schedule import Schedule
 from kbs_process.rig.model import Rig, substitute

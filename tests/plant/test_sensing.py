@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from kbs_process.plant.effect import Normal, Parameter
-from kbs_process.plant.sensing import SENSING, Sensing, SensingPort
-from kbs_process.plant.sensing.sensing import READINGS
+from kbs_process.plant.laws import SENSING
+from kbs_process.plant.sensing import READINGS, Sensing, SensingPort
 from kbs_process.signals.records import Array
 
 T = np.arange(2000) * 0.05

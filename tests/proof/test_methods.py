@@ -11,8 +11,7 @@ import pytest
 from msgspec.structs import replace
 
 from kbs_process.diagnosis.proposing.families import FAMILIES, port_word
-from kbs_process.plant.effects import CATALOGUE
-from kbs_process.plant.sensing import SENSING
+from kbs_process.plant.laws import CATALOGUE, SENSING
 from kbs_process.results.records import Conclusion, Provenance, encode
 from kbs_process.studies.diagnose.results import DiagnosisResults, Find, Fitted, Moved, Place, Rival, Trial
 from proof import answer, methods

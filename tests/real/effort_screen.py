@@ -14,7 +14,7 @@ import numpy as np
 
 from kbs_process.plant.along import signals_of
 from kbs_process.plant.effect import Port
-from kbs_process.plant.effects import CATALOGUE
+from kbs_process.plant.laws import CATALOGUE
 from kbs_process.plant.moved import reading, unit_torques
 from kbs_process.plant.rigid import loads
 from kbs_process.reduction.analysis import bands_of

@@ -7,8 +7,8 @@ import re
 import pytest
 
 from kbs_process.plant.effect import Effect
-from kbs_process.plant.effects import CATALOGUE, MEASURED
-from kbs_process.plant.sensing import SENSING, Sensing
+from kbs_process.plant.laws import CATALOGUE, MEASURED, SENSING
+from kbs_process.plant.sensing import Sensing
 from kbs_process.report.formula import equation, formula
 from kbs_process.report.panel import Formula
 

@@ -5,13 +5,15 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
+from typing import Any
 
 import jsonschema
 import msgspec
 import pytest
 
 from kbs_process.errors import OutputError
-from kbs_process.results.records import decode, load, schema_of
+from kbs_process.results.records import decode, encode, load, schema_of
+from kbs_process.results.versions import VERSION
 from kbs_process.studies.correlate import results as r
 from kbs_process.studies.documents import DOCUMENTS
 from kbs_process.studies.documents import render as build
@@ -19,6 +21,7 @@ from report import sample
 
 SCHEMAS = Path(__file__).parents[2] / "schemas"
 SCHEMA = SCHEMAS / "results.schema.json"
+FORMER = Path(__file__).parent / "former"
 
 
 @pytest.mark.parametrize("kind", DOCUMENTS)
@@ -33,12 +36,42 @@ def test_results_say_of_what_kind_they_are(kind: str) -> None:
     assert {field.name: field.default for field in msgspec.structs.fields(DOCUMENTS[kind].record)}["kind"] == kind
 
 
+@pytest.mark.parametrize("kind", DOCUMENTS)
+def test_every_kind_says_the_same_version(kind: str) -> None:
+    assert {field.name: field.default for field in msgspec.structs.fields(DOCUMENTS[kind].record)}["schema"] == VERSION
+
+
+def holds(tree: Any, part: Any) -> bool:
+    """Whether all that `part` says is said by `tree`, which may say more."""
+    if isinstance(part, dict):
+        return part.keys() <= tree.keys() and all(holds(tree[key], value) for key, value in part.items())
+    if isinstance(part, list):
+        return len(tree) == len(part) and all(map(holds, tree, part))
+    return bool(tree == part)
+
+
+@pytest.mark.parametrize("kind", DOCUMENTS)
+def test_results_of_version_1_are_read_and_become_this_version(kind: str) -> None:
+    content = (FORMER / f"{kind}.json").read_bytes()
+    former = json.loads(content)
+    assert former.pop("schema") == 1
+    now = json.loads(encode(decode(content, DOCUMENTS[kind].record)))
+    assert now.pop("schema") == VERSION == 2
+    assert holds(now, former)
+
+
+@pytest.mark.parametrize("kind", DOCUMENTS)
+def test_results_of_version_1_are_rendered(kind: str, tmp_path: Path) -> None:
+    (tmp_path / "results.json").write_bytes((FORMER / f"{kind}.json").read_bytes())
+    assert "</html>" in build(tmp_path, pdf=False).read_text(encoding="utf-8")
+
+
 def test_the_sample_satisfies_the_schema_and_survives_a_round_trip() -> None:
     results = sample.command_results()
-    content = r.encode(results)
+    content = encode(results)
     jsonschema.Draft202012Validator(json.loads(SCHEMA.read_text())).validate(json.loads(content))
     assert decode(content, r.Results) == results
-    assert r.encode(decode(content, r.Results)) == content
+    assert encode(decode(content, r.Results)) == content
 
 
 def test_numbers_that_could_not_be_determined_become_null() -> None:
@@ -49,7 +82,7 @@ def test_numbers_that_could_not_be_determined_become_null() -> None:
         provenance=sample.PROVENANCE,
         resonances=(resonance,),
     )
-    assert decode(r.encode(minimal), r.Results).resonances[0].sigma_Hz is None
+    assert decode(encode(minimal), r.Results).resonances[0].sigma_Hz is None
 
 
 @pytest.mark.parametrize(
@@ -62,7 +95,7 @@ def test_numbers_that_could_not_be_determined_become_null() -> None:
     ],
 )
 def test_a_wrong_field_is_named(change, said, tmp_path) -> None:
-    content = json.loads(r.encode(sample.command_results()))
+    content = json.loads(encode(sample.command_results()))
     change(content)
     (tmp_path / "results.json").write_text(json.dumps(content))
     with pytest.raises(OutputError) as caught:
@@ -85,7 +118,7 @@ def test_an_empty_folder_is_refused_with_a_remedy(tmp_path) -> None:
 
 
 def test_an_unknown_kind_of_report_is_refused_with_a_remedy(tmp_path) -> None:
-    content = json.loads(r.encode(sample.command_results()))
+    content = json.loads(encode(sample.command_results()))
     content["kind"] = "correlatoin"
     (tmp_path / "results.json").write_text(json.dumps(content))
     with pytest.raises(OutputError, match="no report of kind 'correlatoin'") as caught:

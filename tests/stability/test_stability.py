@@ -11,8 +11,8 @@ from scipy.integrate import solve_ivp
 
 from kbs_process.plant.attach import attach
 from kbs_process.plant.effect import instance
-from kbs_process.plant.effects import CATALOGUE, select
-from kbs_process.plant.effects.measured_law import MEASURED
+from kbs_process.plant.laws import CATALOGUE, select
+from kbs_process.plant.laws.position.measured_law import MEASURED
 from kbs_process.plant.linear.linearise import Linear, linearise
 from kbs_process.rig.model import Controller, Quantity
 from kbs_process.studies.stability import loop as stability

@@ -11,7 +11,7 @@ from kbs_process.campaign.documents import Document, Key, Merged, shown
 from kbs_process.campaign.problems import Problems
 from kbs_process.errors import did_you_mean
 from kbs_process.plant.effect import Effect, Port
-from kbs_process.plant.effects import CATALOGUE, MEASURED, catalogue_with, find
+from kbs_process.plant.laws import CATALOGUE, MEASURED, catalogue_with, find
 from kbs_process.results.provenance import sha256
 from kbs_process.rig.model import LAB, Joint, Quantity
 

@@ -14,7 +14,7 @@ from kbs_process.campaign.problems import Problems
 from kbs_process.campaign.requirements import disturbance, pointing
 from kbs_process.campaign.rig_builder import RigBuilder
 from kbs_process.campaign.schema import violations
-from kbs_process.plant.effects import catalogue_with, select
+from kbs_process.plant.laws import catalogue_with, select
 from kbs_process.rig.model import Rig
 from kbs_process.signals.records import WRENCH_CHANNELS, WRENCH_UNITS
 

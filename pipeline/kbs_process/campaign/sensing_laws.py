@@ -9,9 +9,9 @@ from kbs_process.campaign.config import SensingLaw
 from kbs_process.campaign.documents import Document, Key, Tree
 from kbs_process.campaign.problems import Problems
 from kbs_process.campaign.quantities import Kind, read_quantity
-from kbs_process.diagnosis.screening.suspects import couplings, products
 from kbs_process.errors import ConfigError, did_you_mean
-from kbs_process.plant.sensing import SENSING, Sensing, SensingPort
+from kbs_process.plant.laws import SENSING
+from kbs_process.plant.sensing import Sensing, SensingPort, couplings, products
 from kbs_process.rig.model import Quantity, Rig
 
 STREAMS = ("wrench", "encoder")

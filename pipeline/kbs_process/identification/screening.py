@@ -16,7 +16,7 @@ import numpy as np
 
 from kbs_process.identification.output_error import Experiment, Measured, Output, Scalar, Spectra, simulate
 from kbs_process.plant.effect import Port, Uniform
-from kbs_process.plant.effects import select
+from kbs_process.plant.laws import select
 from kbs_process.plant.linear.modes import modes
 from kbs_process.rig.model import Rig
 from kbs_process.signals.records import WRENCH_CHANNELS, Array

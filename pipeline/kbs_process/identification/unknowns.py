@@ -16,7 +16,7 @@ from kbs_process.estimation.fit import Parameters
 from kbs_process.identification.output_error import Experiment, Scalar
 from kbs_process.identification.screening import LEAST, contacts, phases
 from kbs_process.plant.effect import Effect, Port, Uniform
-from kbs_process.plant.effects import select
+from kbs_process.plant.laws import select
 from kbs_process.rig.model import Rig
 
 _NOT_MOVING = ("spacecraft.", "controller.", "transducer.noise", "transducer.resolution", "transducer.bias")

@@ -32,6 +32,7 @@ SIGNALS = {
 }
 
 
+LAST = 10_000  # order of a law that declares none
 CROSSED = frozenset(("other_angle", "other_rate"))  # signals of another joint
 
 # Phases that a search tries, rad.
@@ -242,6 +243,8 @@ class Effect:
     of_set_points: bool = False  # a delay of where cycles begin, between which the field goes straight
     tag: str = ""  # what `instance` has added to the names of parameters and states
     wires: tuple[tuple[str, str], ...] = ()  # argument of the equation -> signal or parameter, where they differ
+    order: int = LAST  # of summation and of search, whatever order a campaign names them in; then by name
+    measured: bool = False  # a curve without a name: a model can contain it, and no search tries it
 
     def __post_init__(self) -> None:
         where = f"effect '{self.name}'"

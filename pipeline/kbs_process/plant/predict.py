@@ -12,7 +12,7 @@ from kbs_process.plant.compiled.lanes import LANES
 from kbs_process.plant.compiled.simulation import Simulation
 from kbs_process.plant.compiled.together import Together
 from kbs_process.plant.effect import Effect
-from kbs_process.plant.effects import select
+from kbs_process.plant.laws import select
 from kbs_process.plant.linear.linearise import linearise
 from kbs_process.plant.schedule import Schedule
 from kbs_process.plant.structure import parameters, structure_of

@@ -9,8 +9,8 @@ import numpy as np
 
 from kbs_process.campaign.config import Campaign, RecordingEntry
 from kbs_process.plant.effect import Effect
-from kbs_process.plant.effects import select
 from kbs_process.plant.external import external_efforts, external_wrench, pulls_at_rest
+from kbs_process.plant.laws import select
 from kbs_process.plant.moved import added_loads
 from kbs_process.rig.model import Rig, substitute
 from kbs_process.signals.records import Array, Run, Signal

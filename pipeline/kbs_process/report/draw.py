@@ -105,6 +105,17 @@ def canvas(height: float, *, width: float = WIDTH) -> tuple[Figure, Axes]:
     return figure, figure.subplots()
 
 
+def row(height: float, count: int, *, width: float = WIDTH, share_y: bool = False) -> tuple[Figure, list[Axes]]:
+    """Return a figure with so many pairs of axes side by side."""
+    figure = Figure(figsize=(width, height), layout="constrained")
+    return figure, list(figure.subplots(1, count, squeeze=False, sharey=share_y)[0])
+
+
+def legend_above(figure: Figure) -> None:
+    """Say above the axes what is what."""
+    figure.legend(loc="outside upper left", ncols=4, fontsize=7)
+
+
 def picture(figure: Figure, alt: str, title: str = "", form: Literal["svg", "png"] = "svg") -> Picture:
     """Return the figure as a data URI: SVG, or PNG where its curves are dense."""
     content = io.BytesIO()

@@ -12,6 +12,7 @@ from typing import Any, Literal, TypeVar
 import msgspec
 
 from kbs_process.errors import OutputError
+from kbs_process.results.versions import VERSION, upgraded
 
 FILE = "results.json"
 
@@ -77,10 +78,20 @@ class Provenance(Record, frozen=True, kw_only=True):
     inputs: tuple[InputFile, ...] = ()
 
 
-class _Kind(msgspec.Struct, frozen=True):
-    """The one key that says how to read the others."""
+class ResultsFile(Record, frozen=True, kw_only=True):
+    """What every kind of results.json has; each kind adds its `kind` and all else that it says."""
+
+    schema: Literal[2] = VERSION
+    verdict: Conclusion
+    provenance: Provenance
+    warnings: tuple[Notice, ...] = ()
+
+
+class _Form(msgspec.Struct, frozen=True):
+    """The keys that say how to read the others."""
 
     kind: str = "correlation"
+    schema: int = 1
 
 
 R = TypeVar("R", bound=msgspec.Struct)
@@ -93,9 +104,11 @@ def encode(results: Record) -> bytes:
 
 
 def decode(content: bytes, record: type[R], where: str = FILE) -> R:
-    """Return the results in `content`, or say which field is wrong."""
+    """Return the results in `content`, of this or a former version, or say which field is wrong."""
     try:
-        return msgspec.json.decode(content, type=record)
+        if msgspec.json.decode(content, type=_Form).schema == VERSION:
+            return msgspec.json.decode(content, type=record)
+        return msgspec.convert(upgraded(msgspec.json.decode(content)), record)
     except (msgspec.ValidationError, msgspec.DecodeError) as error:
         raise OutputError(
             f"not a results file of this version: {error}",
@@ -111,7 +124,7 @@ def load(folder: Path, record: type[R]) -> R:
 
 def kind_of(folder: Path) -> str:
     """Return what kind of results a folder holds."""
-    return decode(_content(folder), _Kind, str(folder / FILE)).kind
+    return decode(_content(folder), _Form, str(folder / FILE)).kind
 
 
 def schema_of(record: type[Record], title: str) -> dict[str, Any]:

@@ -25,7 +25,7 @@ from kbs_process.diagnosis.screening.suspects import weighed
 from kbs_process.diagnosis.selection.outcome import Alternative, Curve, Estimate, Find, Identity, Place
 from kbs_process.diagnosis.selection.tryout import identity, in_plant, port_label
 from kbs_process.plant.effect import ACTION, ACTIONS, Effect
-from kbs_process.plant.effects.measured_law import Measured
+from kbs_process.plant.laws.position.measured_law import Measured
 from kbs_process.plant.sensing import Sensing
 from kbs_process.rig.model import Rig
 from kbs_process.signals.records import Array

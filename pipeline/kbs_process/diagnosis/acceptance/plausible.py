@@ -16,7 +16,7 @@ import numpy as np
 from kbs_process.diagnosis.screening.screen import Catalogued, Suspect
 from kbs_process.diagnosis.screening.signature import port_inputs
 from kbs_process.plant.effect import Effect
-from kbs_process.plant.sensing.sensing import Sensing
+from kbs_process.plant.sensing import Sensing
 
 SPREADS = 100.0  # of a sensor's law, beyond which it is no sensor's
 SIGMAS = 3.0  # by which an amplitude has to be beyond

@@ -14,7 +14,7 @@ from kbs_process.diagnosis.experiments.experiment import Drive, Experiment
 from kbs_process.errors import ConfigError, DivergenceError
 from kbs_process.identification.output_error import Scalar
 from kbs_process.plant.compiled.simulation import Simulation
-from kbs_process.plant.effects import select
+from kbs_process.plant.laws import select
 from kbs_process.plant.moved import added_loads
 from kbs_process.plant.predict import predict as simulate_plant
 from kbs_process.plant.predict import predict_together as simulate_together

@@ -15,7 +15,7 @@ from scipy.linalg import expm
 from kbs_process.diagnosis.experiments.experiment import Experiment
 from kbs_process.diagnosis.experiments.hypothesis import Hypothesis, acting, coupled
 from kbs_process.plant.effect import Port
-from kbs_process.plant.effects import select
+from kbs_process.plant.laws import select
 from kbs_process.plant.linear.linearise import linearise
 from kbs_process.signals.records import Array
 

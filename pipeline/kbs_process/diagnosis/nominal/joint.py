@@ -19,7 +19,7 @@ from kbs_process.diagnosis.nominal.search import Search
 from kbs_process.estimation.fit import Parameters
 from kbs_process.identification.output_error import Scalar
 from kbs_process.plant.attach import detach, idle
-from kbs_process.plant.effects import select
+from kbs_process.plant.laws import select
 from kbs_process.signals.records import Array
 
 _STEPS = 12

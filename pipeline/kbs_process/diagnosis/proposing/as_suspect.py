@@ -12,12 +12,12 @@ from kbs_process.diagnosis.proposing.curves import CurveSuspect, basis
 from kbs_process.diagnosis.screening.places import POINT, Place
 from kbs_process.diagnosis.screening.scene import Scene
 from kbs_process.diagnosis.screening.screen import Catalogued, Suspect
-from kbs_process.diagnosis.screening.suspects import BY, Candidate
+from kbs_process.diagnosis.screening.suspects import Candidate
 from kbs_process.diagnosis.selection.outcome import Estimate, Find
 from kbs_process.plant.effect import ACTION, ACTIONS, Effect, Port, instance
-from kbs_process.plant.effects import CATALOGUE
-from kbs_process.plant.effects.measured_law import Measured
-from kbs_process.plant.sensing import SENSING, Sensing
+from kbs_process.plant.laws import CATALOGUE, SENSING
+from kbs_process.plant.laws.position.measured_law import Measured
+from kbs_process.plant.sensing import BY, Sensing
 from kbs_process.rig.model import TRANSDUCER
 from kbs_process.signals.records import Array
 

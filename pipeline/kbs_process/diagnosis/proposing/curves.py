@@ -1,8 +1,8 @@
 """Laws beyond the catalogue: any smooth function of one regressor at a port, or a friction of such a size.
 
-Cubic B-splines over what the regressor sweeps, those of `plant.effects.measured_law`, so that the plant can contain
-what was found. A curve has no name; where it passes and no law of the catalogue does, it is the measured law, which it
-shows with a band.
+Cubic B-splines over what the regressor sweeps, those of `plant.laws.position.measured_law`, so that the plant can
+contain what was found. A curve has no name; where it passes and no law of the catalogue does, it is the measured law,
+which it shows with a band.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from kbs_process.diagnosis.screening.inlets import Inlet
 from kbs_process.diagnosis.screening.scene import Scene
 from kbs_process.diagnosis.screening.suspects import felt_from_the_ground
 from kbs_process.plant.effect import CROSSED, Port
-from kbs_process.plant.effects.measured_law import COEFFICIENTS, DENSE, INTERVALS, MEASURED, SLIDES, Measured
+from kbs_process.plant.laws.position.measured_law import COEFFICIENTS, DENSE, INTERVALS, MEASURED, SLIDES, Measured
 from kbs_process.plant.structure import other_joint
 from kbs_process.signals.records import Array
 

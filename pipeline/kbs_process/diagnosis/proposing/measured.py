@@ -14,8 +14,8 @@ from kbs_process.diagnosis.screening.gls import Score
 from kbs_process.diagnosis.screening.suspects import next_action
 from kbs_process.identification.output_error import Scalar
 from kbs_process.plant.attach import attach
-from kbs_process.plant.effects import select
-from kbs_process.plant.effects.measured_law import COEFFICIENTS, SLIDES, Measured
+from kbs_process.plant.laws import select
+from kbs_process.plant.laws.position.measured_law import COEFFICIENTS, SLIDES, Measured
 from kbs_process.rig.model import Joint
 from kbs_process.signals.records import Array
 

@@ -21,7 +21,7 @@ from kbs_process.diagnosis.screening.screen import Bench, Catalogued, Found
 from kbs_process.diagnosis.screening.suspects import Candidate, free_actions
 from kbs_process.diagnosis.screening.view import View
 from kbs_process.plant.effect import Effect
-from kbs_process.plant.effects import find
+from kbs_process.plant.laws import find
 from kbs_process.signals.records import Array
 
 _PARTS = (1, 2, 3)  # of a series, which comes once a turn at least, that an order may be; or a tone

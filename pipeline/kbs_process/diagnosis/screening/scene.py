@@ -14,7 +14,7 @@ from kbs_process.diagnosis.screening.courses import Course, courses
 from kbs_process.diagnosis.screening.inlets import Inlet
 from kbs_process.diagnosis.screening.transfer import Path, follow
 from kbs_process.diagnosis.selection.side_by_side import side_by_side
-from kbs_process.plant.effects import select
+from kbs_process.plant.laws import select
 from kbs_process.signals.records import Array
 
 _STEPS_HZ = 100.0  # of the linear plant, at least: what passes below the working rate is right to 1 % there

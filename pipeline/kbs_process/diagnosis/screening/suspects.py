@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations_with_replacement, product
+from itertools import product
 
 import numpy as np
 
@@ -13,17 +13,16 @@ from kbs_process.diagnosis.screening.places import Place, points_of
 from kbs_process.diagnosis.screening.ranges import Ranges
 from kbs_process.plant.along import signals_of
 from kbs_process.plant.effect import ACTIONS, VELOCITIES, Effect, Parameter, Port, instance
-from kbs_process.plant.effects import CATALOGUE
-from kbs_process.plant.effects.joint_order import JOINT_ORDER
+from kbs_process.plant.laws import CATALOGUE, SENSING
+from kbs_process.plant.laws.position.joint_order import JOINT_ORDER
 from kbs_process.plant.rigid import links_beyond, poses
-from kbs_process.plant.sensing import SENSING, Sensing, SensingPort
+from kbs_process.plant.sensing import Sensing, SensingPort, couplings, products
 from kbs_process.plant.taps import plate_column
 from kbs_process.rig.model import LAB, TRANSDUCER, Joint, Rig
 from kbs_process.signals.records import WRENCH_CHANNELS
 
 FLOOR = "floor"
 _ALONG_GRAVITY = 0.95  # cosine
-BY = "<-"  # in the site of a coupling: channel that reads, channel that acts, or the two of which the product does
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,17 +186,6 @@ def _grid(
     choices = [ranges.choices(grid, site, own.get(entry.name)) for entry, grid in zip(shapes, grids, strict=True)]
     for point in product(*choices):
         yield tuple((entry.name, value) for entry, value in zip(shapes, point, strict=True))
-
-
-def couplings(channels: Sequence[str]) -> list[str]:
-    """Sites of what one channel does to another."""
-    return [f"{reads}{BY}{acts}" for reads in channels for acts in channels if reads != acts]
-
-
-def products(channels: Sequence[str]) -> list[str]:
-    """Sites of what the product of two channels does to one; its own square is its non-linearity's."""
-    pairs = list(combinations_with_replacement(channels, 2))
-    return [BY.join((reads, *pair)) for reads in channels for pair in pairs if pair != (reads, reads)]
 
 
 def _sensed_sites(law: Sensing, rig: Rig, channels: Sequence[str], ranges: Ranges) -> list[str]:

@@ -40,7 +40,6 @@ from kbs_process.diagnosis.proposing.orders import with_orders
 from kbs_process.diagnosis.proposing.sizes import springs
 from kbs_process.diagnosis.screening.screen import Catalogued, Found, Suspect
 from kbs_process.diagnosis.screening.shapes import bends, bettered, fitted, possible, standing_still, uncovered
-from kbs_process.diagnosis.screening.suspects import BY
 from kbs_process.diagnosis.screening.view import View
 from kbs_process.diagnosis.selection.each_recording import taken_off, taken_off_again
 from kbs_process.diagnosis.selection.effort import Effort
@@ -48,6 +47,7 @@ from kbs_process.diagnosis.selection.race import at_floor, own_of, raced
 from kbs_process.diagnosis.selection.side_by_side import side_by_side
 from kbs_process.diagnosis.selection.tryout import extra_of, identity, in_plant, of_every_clock
 from kbs_process.plant.effect import Effect, Port
+from kbs_process.plant.sensing.sensing import BY
 from kbs_process.signals.records import Array
 
 

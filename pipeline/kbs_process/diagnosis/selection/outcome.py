@@ -12,7 +12,7 @@ from kbs_process.diagnosis.nominal.joint import Standing
 from kbs_process.diagnosis.nominal.known import Known
 from kbs_process.diagnosis.screening.localise import PortName
 from kbs_process.diagnosis.screening.ports import Cells, PortTest
-from kbs_process.plant.effects.measured_law import Measured
+from kbs_process.plant.laws.position.measured_law import Measured
 from kbs_process.plant.sensing import Sensing
 from kbs_process.signals.records import Array
 

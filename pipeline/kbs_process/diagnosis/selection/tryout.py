@@ -18,14 +18,15 @@ from kbs_process.diagnosis.screening.places import point_of
 from kbs_process.diagnosis.screening.scene import Scene
 from kbs_process.diagnosis.screening.screen import Bench, Catalogued, Found, Suspect
 from kbs_process.diagnosis.screening.shapes import Bend, along, bends
-from kbs_process.diagnosis.screening.suspects import BY, Candidate
+from kbs_process.diagnosis.screening.suspects import Candidate
 from kbs_process.diagnosis.selection.outcome import Identity
 from kbs_process.identification.output_error import Scalar
 from kbs_process.plant.attach import attach
 from kbs_process.plant.effect import Effect, Port
-from kbs_process.plant.effects import select
-from kbs_process.plant.effects.motor_order import MOTOR_ORDER
+from kbs_process.plant.laws import select
+from kbs_process.plant.laws.motor.motor_order import MOTOR_ORDER
 from kbs_process.plant.sensing import SensingPort
+from kbs_process.plant.sensing.sensing import BY
 from kbs_process.rig.model import Rig
 from kbs_process.signals.records import Array
 

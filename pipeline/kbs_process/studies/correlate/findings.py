@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 
 from kbs_process.campaign.config import Campaign
-from kbs_process.plant.effects import select
+from kbs_process.plant.laws import select
 from kbs_process.plant.linear.modes import modes
 from kbs_process.reduction.analysis import Analysis, bands_of, passband
 from kbs_process.reduction.judging import judged

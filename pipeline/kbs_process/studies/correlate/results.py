@@ -24,11 +24,10 @@ from kbs_process.results.records import InputFile as InputFile
 from kbs_process.results.records import Notice as Notice
 from kbs_process.results.records import Provenance as Provenance
 from kbs_process.results.records import Record as Record
+from kbs_process.results.records import ResultsFile
 from kbs_process.results.records import encode as encode
 from kbs_process.signals.records import PUT_IN_ORDER
 from kbs_process.studies.correlate.on_transducer import OnTransducer
-
-SCHEMA_VERSION: Literal[1] = 1
 
 Role = Literal["calibration", "fit", "held-out"]
 
@@ -228,14 +227,13 @@ class Resonance(Record, frozen=True, kw_only=True):
     sigma_Hz: float | None = None
 
 
-class Results(Record, frozen=True, kw_only=True):
+class Results(ResultsFile, frozen=True, kw_only=True):
     """results.json."""
 
     campaign: CampaignSummary
     verdict: Conclusion
     provenance: Provenance
     kind: Literal["correlation"] = "correlation"
-    schema: Literal[1] = SCHEMA_VERSION
     requirements: tuple[Requirement, ...] = ()
     warnings: tuple[Notice, ...] = ()
     recordings: tuple[Recording, ...] = ()

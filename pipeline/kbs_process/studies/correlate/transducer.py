@@ -11,7 +11,7 @@ from scipy.signal import welch
 
 from kbs_process.campaign.config import Campaign
 from kbs_process.campaign.modal_file import read_modal
-from kbs_process.plant.effects import select
+from kbs_process.plant.laws import select
 from kbs_process.plant.linear.modal import ModalTable, derive
 from kbs_process.plant.rigid import static_wrench
 from kbs_process.reduction.analysis import Analysis, bands_of

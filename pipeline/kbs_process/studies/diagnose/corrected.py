@@ -13,11 +13,10 @@ from kbs_process.campaign.config import Campaign, SensingLaw
 from kbs_process.campaign.corrected_model import write_model
 from kbs_process.campaign.sensing_laws import belongs_to_model
 from kbs_process.diagnosis.experiments.hypothesis import Hypothesis
-from kbs_process.diagnosis.screening.suspects import BY
 from kbs_process.diagnosis.selection.outcome import Estimate, Find, Outcome
 from kbs_process.plant.effect import Uniform
-from kbs_process.plant.effects import CATALOGUE, select
-from kbs_process.plant.sensing import SENSING
+from kbs_process.plant.laws import CATALOGUE, SENSING, select
+from kbs_process.plant.sensing import BY
 from kbs_process.rig.model import Quantity, substitute
 from kbs_process.signals.records import Array
 

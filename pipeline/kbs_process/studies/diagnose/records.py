@@ -13,7 +13,7 @@ from kbs_process.diagnosis.nominal.joint import Standing
 from kbs_process.diagnosis.nominal.known import Known
 from kbs_process.diagnosis.selection.next_test import Proposal
 from kbs_process.diagnosis.selection.outcome import Curve, Find, Outcome
-from kbs_process.plant.effects.measured_law import Measured, unit_of
+from kbs_process.plant.laws.position.measured_law import Measured, unit_of
 from kbs_process.plant.structure import other_joint
 from kbs_process.results import provenance
 from kbs_process.results.records import Check, Conclusion

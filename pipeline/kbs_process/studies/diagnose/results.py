@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from kbs_process.results.records import Check, Conclusion, Notice, Provenance, Record
+from kbs_process.results.records import Check, Conclusion, Notice, Provenance, Record, ResultsFile
 
 Answer = Literal["none", "parameters off", "physics", "undecided"]
 
@@ -171,7 +171,7 @@ class NextTest(Record, frozen=True, kw_only=True):
     tried: tuple[Planned, ...]  # best first, known parameters as they stand
 
 
-class DiagnosisResults(Record, frozen=True, kw_only=True):
+class DiagnosisResults(ResultsFile, frozen=True, kw_only=True):
     """results.json of a diagnosis."""
 
     name: str
@@ -180,7 +180,6 @@ class DiagnosisResults(Record, frozen=True, kw_only=True):
     verdict: Conclusion
     provenance: Provenance
     kind: Literal["diagnosis"] = "diagnosis"
-    schema: Literal[1] = 1
     answer: Answer
     paragraph: str  # to be pasted into a test report
     floor: str  # where it comes from, and what it is worth

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from kbs_process.results.records import Conclusion, Constant, Notice, Provenance, Record
+from kbs_process.results.records import Conclusion, Constant, Notice, Provenance, Record, ResultsFile
 
 
 class Likelihood(Record, frozen=True, kw_only=True):
@@ -55,7 +55,7 @@ class Driver(Record, frozen=True, kw_only=True):
     share: float
 
 
-class FlightResults(Record, frozen=True, kw_only=True):
+class FlightResults(ResultsFile, frozen=True, kw_only=True):
     """results.json of a flight prediction."""
 
     name: str
@@ -64,7 +64,6 @@ class FlightResults(Record, frozen=True, kw_only=True):
     verdict: Conclusion
     provenance: Provenance
     kind: Literal["flight"] = "flight"
-    schema: Literal[1] = 1
     trajectory: str
     duration_s: float
     samples: int

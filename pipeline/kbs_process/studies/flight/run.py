@@ -10,7 +10,7 @@ import numpy as np
 
 from kbs_process.campaign.config import Campaign, PointingRequirement, Requirement
 from kbs_process.errors import ConfigError, SimulationError, did_you_mean
-from kbs_process.plant.effects import select
+from kbs_process.plant.laws import select
 from kbs_process.plant.predict import Schedule, predict
 from kbs_process.plant.sampling import Uncertain, draw, uncertain, values
 from kbs_process.progress import Progress

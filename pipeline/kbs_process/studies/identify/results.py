@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from kbs_process.results.records import Check, Conclusion, Notice, Provenance, Record
+from kbs_process.results.records import Check, Conclusion, Notice, Provenance, Record, ResultsFile
 
 
 class Interval(Record, frozen=True, kw_only=True):
@@ -57,7 +57,7 @@ class Correlations(Record, frozen=True, kw_only=True):
     matrix: tuple[tuple[float, ...], ...]
 
 
-class IdentifyResults(Record, frozen=True, kw_only=True):
+class IdentifyResults(ResultsFile, frozen=True, kw_only=True):
     """results.json of an identification."""
 
     name: str
@@ -66,7 +66,6 @@ class IdentifyResults(Record, frozen=True, kw_only=True):
     verdict: Conclusion
     provenance: Provenance
     kind: Literal["identify"] = "identify"
-    schema: Literal[1] = 1
     band_Hz: tuple[float, float]
     samples: int  # numbers in the whitened residual
     misfit_rms: float  # of it, with the sensors' noise: 1 if all is explained

@@ -10,8 +10,9 @@ from scipy.interpolate import CubicSpline
 from kbs_process.campaign.config import Campaign, SensingLaw
 from kbs_process.campaign.sensing_laws import LAWS
 from kbs_process.diagnosis.screening.signature import sensed, unit_values
-from kbs_process.diagnosis.screening.suspects import BY, Candidate
+from kbs_process.diagnosis.screening.suspects import Candidate
 from kbs_process.plant.sensing import SensingPort
+from kbs_process.plant.sensing.sensing import BY
 from kbs_process.rig.model import Rig
 from kbs_process.signals.records import WRENCH_CHANNELS, Array, Block, Signal
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from kbs_process.campaign.config import Campaign, RecordingEntry
 from kbs_process.errors import ConfigError, did_you_mean
-from kbs_process.plant.effects import select
+from kbs_process.plant.laws import select
 from kbs_process.plant.moved import added_loads
 from kbs_process.plant.predict import Schedule, predict
 from kbs_process.plant.rigid import loads

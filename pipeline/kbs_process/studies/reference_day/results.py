@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Literal
 
 from kbs_process.results.pointing import PointingEstimate
-from kbs_process.results.records import Conclusion, Constant, Notice, Provenance, Record, Status
+from kbs_process.results.records import Conclusion, Constant, Notice, Provenance, Record, ResultsFile, Status
 
 
 class PublishedSection(Record, frozen=True, kw_only=True):
@@ -82,7 +82,7 @@ class Geometry(Record, frozen=True, kw_only=True):
     elevation: tuple[float, float]
 
 
-class ReferenceDayResults(Record, frozen=True, kw_only=True):
+class ReferenceDayResults(ResultsFile, frozen=True, kw_only=True):
     """results.json of a simulated reference day."""
 
     name: str
@@ -91,7 +91,6 @@ class ReferenceDayResults(Record, frozen=True, kw_only=True):
     verdict: Conclusion
     provenance: Provenance
     kind: Literal["reference-day"] = "reference-day"
-    schema: Literal[1] = 1
     geometry: Geometry
     phases: tuple[Phase, ...]
     sections: tuple[Section, ...]

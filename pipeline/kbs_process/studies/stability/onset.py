@@ -16,8 +16,8 @@ from scipy.signal import detrend, periodogram
 
 from kbs_process.errors import SimulationError
 from kbs_process.plant.effect import ACTION
-from kbs_process.plant.effects import CATALOGUE
-from kbs_process.plant.effects.measured_law import MEASURED
+from kbs_process.plant.laws import CATALOGUE
+from kbs_process.plant.laws.position.measured_law import MEASURED
 from kbs_process.plant.predict import Schedule, predict
 from kbs_process.rig.model import Controller, Rig, substitute
 from kbs_process.signals.records import Array, Block

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from kbs_process.results.records import Conclusion, Constant, Notice, Provenance, Record
+from kbs_process.results.records import Conclusion, Constant, Notice, Provenance, Record, ResultsFile
 
 
 class LoopMargins(Record, frozen=True, kw_only=True):
@@ -65,7 +65,7 @@ class Sensitivity(Record, frozen=True, kw_only=True):
     sigma_of_factor: float
 
 
-class StabilityResults(Record, frozen=True, kw_only=True):
+class StabilityResults(ResultsFile, frozen=True, kw_only=True):
     """results.json of a stability analysis."""
 
     name: str
@@ -85,7 +85,6 @@ class StabilityResults(Record, frozen=True, kw_only=True):
     kick_rad: float
     encoder_step_rad: float
     kind: Literal["stability"] = "stability"
-    schema: Literal[1] = 1
     margins: tuple[LoopMargins, ...] = ()
     critical: tuple[CriticalAt, ...] = ()
     boundary: tuple[Boundary, ...] = ()

@@ -9,7 +9,7 @@ import numpy as np
 
 from kbs_process.campaign.config import Campaign
 from kbs_process.errors import ConfigError, did_you_mean
-from kbs_process.plant.effects import select
+from kbs_process.plant.laws import select
 from kbs_process.plant.linear.linearise import Linear, linearise
 from kbs_process.plant.structure import structure_of
 from kbs_process.progress import Progress

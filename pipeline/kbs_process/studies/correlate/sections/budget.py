@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-from kbs_process.report.panel import Block, Caption, Figure, Fold, Grid, Panel, Text
-from kbs_process.report.tables import Tables
-from kbs_process.report.text import frame_label, number, unit
-from kbs_process.studies.correlate.figures import bars
-from kbs_process.studies.correlate.results import Budget, Results
-from kbs_process.studies.correlate.sections.choose import band_label, main_band, main_frame
+from collections.abc import Sequence
 
-_CAPTION = Caption(
-    shown="Each stage's share of the variance of every channel in one recording; the total standard deviation stands "
-    "at the bar's end.",
-    good="A total well below the limit's margin, shared by several stages.",
-    bad="One stage that makes nearly all of a bar while the verdict is undecided.",
-    do="Improve that stage: encoder through gravity, a better angle or a smaller imbalance; "
-    "cross-coupling, a calibration; noise, more repeats; band edge, a longer recording.",
-)
+from kbs_process.report import draw
+from kbs_process.report.panel import Block, Figure, Fold, Grid, Panel, Picture, Text
+from kbs_process.report.prose import Prose
+from kbs_process.report.tables import Tables
+from kbs_process.report.text import frame_label, label, number, unit
+from kbs_process.studies.correlate.choose import band_label, main_band, main_frame
+from kbs_process.studies.correlate.results import Budget, Results
+
+_SAYS = Prose("kbs_process.studies.correlate", "budget")
 
 
 def panel(results: Results, tables: Tables) -> Panel:
@@ -30,7 +26,7 @@ def panel(results: Results, tables: Tables) -> Panel:
     first = tuple(row for row in here if row.recording == recording)
     title = f"Shares of the variance, {_label(results, first[0])}"
     alt = "Share of each stage in each channel's variance"
-    blocks: list[Block] = [Figure(title, (bars.variance_shares(first, alt),), _CAPTION)]
+    blocks: list[Block] = [Figure(title, (_shares(first, alt),), _SAYS.caption("shares"))]
     blocks.append(_table(results, first))
     elsewhere = tuple(row for row in results.budget if row.recording == recording and row not in first)
     others = tuple(row for row in here if row.recording != recording)
@@ -72,3 +68,30 @@ def _table(results: Results, rows: tuple[Budget, ...]) -> Grid:
 
 def _sigma(row: Budget, stage: str, source: str) -> float | None:
     return next((item.sigma for item in row.contributions if (item.stage, item.source) == (stage, source)), None)
+
+
+def _shares(budgets: Sequence[Budget], alt: str) -> Picture:
+    """Draw each stage's share of each channel's variance; the total stands beside the bar."""
+    stages = list(dict.fromkeys(item.stage for budget in budgets for item in budget.contributions))
+    with draw.style():
+        figure, axis = draw.canvas(0.95 + 0.34 * len(budgets))
+        for row, budget in enumerate(budgets):
+            variance = sum(item.sigma**2 for item in budget.contributions) or 1.0
+            left = 0.0
+            for item in budget.contributions:
+                share = 100.0 * item.sigma**2 / variance
+                color = draw.SERIES[stages.index(item.stage) % len(draw.SERIES)]
+                axis.barh(row, share, 0.62, left=left, color=color, edgecolor="white", linewidth=0.5)
+                left += share
+            axis.annotate(
+                f"{number(budget.total, 2)} {unit(budget.unit)}", (101.0, row), va="center", annotation_clip=False
+            )
+        axis.set_yticks(range(len(budgets)), [label(budget.channel) for budget in budgets])
+        axis.invert_yaxis()
+        axis.set_xlim(0.0, 100.0)
+        axis.grid(visible=False, axis="y")
+        axis.set_xlabel("share of the variance / %          total σ at the bar's end")
+        for index, stage in enumerate(stages):
+            axis.bar(0, 0, color=draw.SERIES[index % len(draw.SERIES)], label=label(stage))
+        draw.legend_above(figure)
+        return draw.picture(figure, alt)

@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-from kbs_process.report.panel import Block, Caption, Cell, Figure, Fold, Grid, Notices, Panel, Text
-from kbs_process.report.tables import Tables
-from kbs_process.report.text import MISSING, band_hz, count, exact, frame_label, measure, number, percent, unit
-from kbs_process.studies.correlate.figures import bars
-from kbs_process.studies.correlate.results import Notice, Requirement, Results
+from collections.abc import Sequence
 
-_CAPTION = Caption(
-    shown="Each channel's measured value in the recording that is nearest to failing, with the interval that holds the "
-    "true one at 95 %, the prediction's largest, and the limit. The interval of a peak reaches further down than up: "
-    "noise raises a peak and never lowers it.",
-    good="Every bar with its interval ends left of the limit, and the prediction is a little above the measurement.",
-    bad="An error bar that reaches the limit: the verdict is then undecided. A prediction well below the "
-    "measurement: it must not be used to extrapolate to flight.",
-    do="For the channel nearest to its limit, go to its time history, then to the uncertainty budget for "
-    "what would narrow the bar.",
-)
+import numpy as np
+
+from kbs_process.report import draw
+from kbs_process.report.panel import Block, Cell, Figure, Fold, Grid, Notices, Panel, Picture, Text
+from kbs_process.report.prose import Prose
+from kbs_process.report.tables import Tables
+from kbs_process.report.text import MISSING, band_hz, count, exact, frame_label, label, measure, number, percent, unit
+from kbs_process.studies.correlate.results import ChannelResult, Notice, Requirement, Results
+
+_SAYS = Prose("kbs_process.studies.correlate", "compliance")
 
 
 def panel(results: Results, tables: Tables) -> Panel:
@@ -69,13 +65,8 @@ def _table(results: Results) -> Grid:
         "Predicted",
         "Verdict",
     )
-    note = (
-        "Interval: two standard deviations above the measured value; below it two for an rms, for a peak as many as "
-        "noise alone may make of one. Elsewhere in this report ± is one standard deviation. Margin: limit less "
-        "measured value."
-    )
-    sources = "; ".join(dict.fromkeys(entry.source for entry in results.requirements if entry.source))
-    return Grid("Compliance", head, rows, "llrrrrlrc", f"{note} Source: {sources}." if sources else note)
+    sources = list(dict.fromkeys(entry.source for entry in results.requirements if entry.source))
+    return Grid("Compliance", head, rows, "llrrrrlrc", _SAYS("table_note", sources=sources))
 
 
 def _interval(entry: Requirement) -> str:
@@ -125,4 +116,44 @@ def _figure(requirement: Requirement) -> Figure:
     title = f"{requirement.name}: {requirement.statistic} by channel, frame {frame_label(requirement.frame)}"
     found = ", ".join(f"{row.channel} {number(row.value)}" for row in requirement.channels)
     alt = f"Measured {requirement.statistic} in {requirement.unit}: {found}; limit {exact(requirement.limit)}"
-    return Figure(title, (bars.against_limit(requirement, alt),), _CAPTION)
+    return Figure(title, (_against_limit(requirement, alt),), _SAYS.caption("channels"))
+
+
+def _against_limit(requirement: Requirement, alt: str) -> Picture:
+    """Draw each channel's measured value with its 95 % interval, the predicted one, and the limit."""
+    rows = requirement.channels
+    with draw.style():
+        figure, axis = draw.canvas(0.75 + 0.36 * len(rows))
+        place = np.arange(len(rows), dtype=float)
+        axis.barh(
+            place - 0.19,
+            [row.value or 0.0 for row in rows],
+            0.34,
+            xerr=_reach(rows),
+            color=draw.MEASURED,
+            error_kw={"elinewidth": 0.9, "capsize": 2, "ecolor": draw.INK},
+            label="measured, 95 % interval",
+        )
+        if any(row.predicted is not None for row in rows):
+            axis.barh(
+                place + 0.19, [row.predicted or 0.0 for row in rows], 0.34, color=draw.PREDICTED, label="predicted"
+            )
+        axis.axvline(requirement.limit, color=draw.LIMIT, linewidth=1.2, label="limit")
+        axis.set_yticks(place, [label(row.channel) for row in rows])
+        axis.invert_yaxis()
+        axis.set_xlim(left=0.0)
+        axis.grid(visible=False, axis="y")
+        axis.set_xlabel(f"{requirement.statistic} / {unit(requirement.unit)}")
+        draw.legend_above(figure)
+        return draw.picture(figure, alt)
+
+
+def _reach(rows: Sequence[ChannelResult]) -> list[list[float]]:
+    """How far each channel's interval reaches below and above its value; not at all where there is none."""
+    values = [row.value or 0.0 for row in rows]
+    lows = [value if row.low is None else row.low for value, row in zip(values, rows, strict=True)]
+    highs = [value if row.high is None else row.high for value, row in zip(values, rows, strict=True)]
+    return [
+        [value - low for value, low in zip(values, lows, strict=True)],
+        [high - value for value, high in zip(values, highs, strict=True)],
+    ]

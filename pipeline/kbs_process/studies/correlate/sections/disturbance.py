@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from kbs_process.report import histories, series
-from kbs_process.report.panel import Block, Caption, Figure, Live, Panel, Picture, Text
+from kbs_process.report.panel import Block, Figure, Live, Panel, Picture, Text
+from kbs_process.report.prose import Prose
 from kbs_process.report.tables import Table, Tables
 from kbs_process.report.text import frame_label
 from kbs_process.report.views import Scene, views
-from kbs_process.studies.correlate.results import Frame, Results
-from kbs_process.studies.correlate.sections.choose import (
+from kbs_process.studies.correlate.choose import (
+    PLATES,
     band_label,
     band_names,
     by_role,
@@ -18,20 +19,10 @@ from kbs_process.studies.correlate.sections.choose import (
     main_frame,
     peak_limit,
 )
-from kbs_process.studies.correlate.sections.static import PLATES
+from kbs_process.studies.correlate.results import Frame, Results
 
-_CAPTION = Caption(
-    shown="The disturbance of each channel after gravity and cross-coupling are taken away and the band "
-    "is cut out: measured, predicted by the plant's model through the same processing, and their "
-    "difference on the same scale. Dashed: the limit on the peak, where one applies. Shaded: lost "
-    "samples and filter edges, which count for nothing.",
-    good="The prediction has the bursts of the measurement at the same times and is a little larger; the "
-    "difference is no larger than the uncertainty budget's total.",
-    bad="A burst that only one of the two has, a difference in phase that grows with time, or a measured "
-    "peak above the predicted one: the prediction is then not pessimistic.",
-    do="Compare repeats first: what does not repeat is not the mechanism's. Then look where on the "
-    "trajectory (speed, tooth passing, resonance) the difference sits, and at the spectra.",
-)
+_SAYS = Prose("kbs_process.studies.correlate", "disturbance")
+
 
 Entry = tuple[str, str, Frame, Table]  # recording, band, frame, table
 
@@ -51,7 +42,7 @@ def panel(results: Results, tables: Tables) -> Panel:
     figure = Figure(
         "Disturbance, measured and predicted",
         tuple(_plate(results, *entry) for key in dict.fromkeys((main, bursts)) for entry in _plates(found, key)),
-        _CAPTION,
+        _SAYS.caption("histories"),
         Live(
             "disturbance",
             ("measured", "predicted", "residual"),

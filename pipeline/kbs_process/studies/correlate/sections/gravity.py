@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-from kbs_process.report.panel import Block, Caption, Cell, Figure, Grid, Panel, Text
-from kbs_process.report.tables import Tables
-from kbs_process.report.text import count, measure, number, unit
-from kbs_process.studies.correlate.figures import bars
-from kbs_process.studies.correlate.results import Gravity, Results, StaticChannel
+import math
+from collections.abc import Sequence
 
-_CAPTION = Caption(
-    shown="How far each fitted parameter moved from what the parameter files said, in standard "
-    "deviations of the latter. The bar is the fitted value's own standard deviation.",
-    good="Points within the shaded band, with bars much shorter than it: the recordings agree with the "
-    "drawing and know better.",
-    bad="A point outside the band: the prior, the calibration or the model is wrong. A bar as long as "
-    "the band: these recordings say nothing about that parameter.",
-    do="For a point outside, weigh or measure that quantity again before the value is used elsewhere. "
-    "For a long bar, record a pseudo-static run over a wider range of angles.",
-)
+import numpy as np
+
+from kbs_process.report import draw
+from kbs_process.report.panel import Block, Cell, Figure, Grid, Panel, Picture, Text
+from kbs_process.report.prose import Prose
+from kbs_process.report.tables import Tables
+from kbs_process.report.text import label, measure, number, unit
+from kbs_process.studies.correlate.results import FittedParameter, Gravity, Results, StaticChannel
+
+_SAYS = Prose("kbs_process.studies.correlate", "gravity")
+_ROWS = 24  # of parameters in one column  # of parameters in one column
 
 
 def panel(results: Results, tables: Tables) -> Panel:
@@ -39,8 +37,8 @@ def panel(results: Results, tables: Tables) -> Panel:
     blocks.append(_parameters(gravity))
     if any(entry.prior is not None and entry.prior_sigma for entry in gravity.parameters):
         alt = "Fitted parameters against their priors, in prior sigma"
-        picture = bars.shifts(gravity.parameters, alt)
-        blocks.append(Figure("Fitted parameters against their priors", (picture,), _CAPTION))
+        picture = _shifts(gravity.parameters, alt)
+        blocks.append(Figure("Fitted parameters against their priors", (picture,), _SAYS.caption("shifts")))
     if weighs:
         blocks.append(_channels(gravity))
     if any(channel.sigma for entry in gravity.recordings for channel in entry.channels):
@@ -61,12 +59,12 @@ def _parameters(gravity: Gravity) -> Grid:
         (entry.name, measure(entry.prior, entry.prior_sigma), measure(entry.value, entry.sigma), unit(entry.unit))
         for entry in gravity.parameters
     )
-    quality = ""
+    notes = []
     if gravity.samples:
-        quality = f"{count(gravity.samples, 'sample')}; reduced chi-square {number(gravity.reduced_chi_square)}."
+        notes.append(_SAYS("fit_note", samples=gravity.samples, chi_square=gravity.reduced_chi_square))
     if any(entry.name.startswith("transducer.cross_coupling") for entry in gravity.parameters):
-        quality += " Cross-coupling: dX in (I + X) = (I + X₀)(I + dX), X₀ as stated."
-    return Grid("Fitted parameters", ("Parameter", "Before (prior)", "Fitted", "Unit"), rows, "lrrl", quality)
+        notes.append(_SAYS("coupling_note"))
+    return Grid("Fitted parameters", ("Parameter", "Before (prior)", "Fitted", "Unit"), rows, "lrrl", " ".join(notes))
 
 
 def _channels(gravity: Gravity) -> Grid:
@@ -82,8 +80,7 @@ def _channels(gravity: Gravity) -> Grid:
         for entry in gravity.channels
     )
     head = ("Channel", "Static peak", "Residual rms", "σ from angles", "σ from the fit", "Unit")
-    note = "σ from angles: encoder noise and quantisation times the static wrench's slope over the angle."
-    return Grid("Static wrench and what is left of it", head, rows, "lrrrrl", note)
+    return Grid("Static wrench and what is left of it", head, rows, "lrrrrl", _SAYS("channels_note"))
 
 
 def _taring(gravity: Gravity) -> Grid:
@@ -96,23 +93,15 @@ def _taring(gravity: Gravity) -> Grid:
         for entry in gravity.recordings
     )
     head = ("Recording", "Tared by", *map(_named, gravity.recordings[0].channels))
-    note = (
-        "The constant that the transducer added to each recording, taken away with the static wrench. A recording that "
-        "was not fitted is tared by itself: these constants are all that was estimated from it."
-    )
-    return Grid("Taring", head, rows, "kk" + "r" * len(gravity.recordings[0].channels), note)
+    return Grid("Taring", head, rows, "kk" + "r" * len(gravity.recordings[0].channels), _SAYS("taring_note"))
 
 
 def _left(gravity: Gravity) -> Grid:
     rows = tuple((entry.recording, *map(_ratio, entry.channels)) for entry in gravity.recordings)
     head = ("Recording", *map(_named, gravity.recordings[0].channels))
     below = "" if gravity.low_pass_Hz is None else f" below {number(gravity.low_pass_Hz, 2)} Hz"
-    note = (
-        "Rms of what the model leaves, over what the model's and the angles' uncertainty and the fitted pseudo-static "
-        "recordings' own residual explain. Marked: a load that no parameter file describes."
-    )
     title = f"What is left of each recording{below}, over what may be left"
-    return Grid(title, head, rows, "k" + "r" * len(gravity.recordings[0].channels), note)
+    return Grid(title, head, rows, "k" + "r" * len(gravity.recordings[0].channels), _SAYS("left_note"))
 
 
 def _ratio(channel: StaticChannel) -> str | Cell:
@@ -122,3 +111,41 @@ def _ratio(channel: StaticChannel) -> str | Cell:
 
 def _named(channel: StaticChannel) -> str:
     return f"{channel.channel} / {unit(channel.unit)}"
+
+
+def _shifts(parameters: Sequence[FittedParameter], alt: str) -> Picture:
+    """Draw how far each fitted parameter moved from its prior, in the prior's sigma; many in two columns."""
+    moved = [entry for entry in parameters if entry.prior is not None and entry.prior_sigma]
+    columns = 1 if len(moved) <= _ROWS else 2
+    rows = math.ceil(len(moved) / columns)
+    prior = np.array([entry.prior for entry in moved], dtype=float)
+    width = np.array([entry.prior_sigma for entry in moved], dtype=float)
+    pull = (np.array([entry.value for entry in moved]) - prior) / width
+    error = np.array([entry.sigma for entry in moved]) / width
+    reach = max(3.0, 1.15 * float(np.max(np.abs(pull), initial=0.0)))
+    with draw.style():
+        figure, axes = draw.row(0.7 + (0.2 if columns == 1 else 0.155) * rows, columns)
+        for column, axis in enumerate(axes):
+            shown = slice(column * rows, min((column + 1) * rows, len(moved)))
+            place = np.arange(shown.stop - shown.start, dtype=float)
+            axis.axvspan(-2.0, 2.0, color=draw.SHADE, linewidth=0, label="prior, ± 2 σ")
+            axis.errorbar(
+                pull[shown],
+                place,
+                xerr=error[shown],
+                fmt="o",
+                markersize=3.5,
+                color=draw.MEASURED,
+                elinewidth=1.0,
+                capsize=2,
+                label="fitted, ± 1 σ",
+            )
+            axis.axvline(0.0, color=draw.RESIDUAL, linewidth=0.7)
+            axis.set_yticks(place, [label(entry.name) for entry in moved[shown]])
+            axis.set_ylim(rows - 0.5, -0.5)
+            axis.set_xlim(-reach, reach)
+            axis.grid(visible=False, axis="y")
+            axis.set_xlabel("(fitted − prior) / prior's σ")
+        handles, names = axes[0].get_legend_handles_labels()
+        figure.legend(handles, names, loc="outside upper left", ncols=4, fontsize=7)
+        return draw.picture(figure, alt, form="svg" if columns == 1 else "png")

@@ -2,32 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import groupby
 
-from kbs_process.report.panel import Block, Caption, Cell, Figure, Fold, Grid, Panel, Text
-from kbs_process.report.tables import Tables
-from kbs_process.report.text import frame_label, measure, number, percent, unit
-from kbs_process.studies.correlate.figures import merit
-from kbs_process.studies.correlate.results import Merit, Results
-from kbs_process.studies.correlate.sections.choose import ROLES, band_label, band_names, folded, main_band, main_frame
+import numpy as np
 
-_CAPTION = Caption(
-    shown="Predicted against measured peak, one mark a recording and channel. On the line they are "
-    "equal; above it the prediction is the larger, hence pessimistic. Hollow: at the noise, as the measured rms is "
-    "less than twice its uncertainty.",
-    good="Marks on the line or a little above it; repeats of a trajectory close together.",
-    bad="Marks below the line: the prediction promises less disturbance than there is. Marks far above "
-    "it: the margin is spent on the model.",
-    do="For a mark below the line, see that channel's time history. A hollow mark says nothing of the "
-    "prediction: record more repeats, or look at the unfiltered disturbance, where the signal is larger.",
-)
-_NOTE = (
-    "FVE: fraction of the measured variance that the prediction explains; 100 % is perfect, 0 no better "
-    "than no prediction, negative worse. Spectral ratio: predicted over measured power density, geometric mean "
-    "over the band's frequencies: a quiet frequency counts as much as a loud one. "
-    "Pessimism: predicted over measured peak. At the noise: the measured rms is less than twice its uncertainty, "
-    "so that the figures in grey describe the noise and not the prediction."
-)
+from kbs_process.report import draw
+from kbs_process.report.panel import Block, Cell, Figure, Fold, Grid, Panel, Picture, Text
+from kbs_process.report.prose import Prose
+from kbs_process.report.tables import Tables
+from kbs_process.report.text import frame_label, label, measure, number, percent, unit
+from kbs_process.studies.correlate.choose import ROLES, band_label, band_names, folded, main_band, main_frame
+from kbs_process.studies.correlate.results import Merit, Results
+
+_SAYS = Prose("kbs_process.studies.correlate", "merit")
+_MARKS = ("o", "s", "^", "D", "v", "P", "X", "*")
+
+
 _HEAD = (
     "Recording",
     "Role",
@@ -59,7 +50,7 @@ def panel(results: Results, tables: Tables) -> Panel:
     if drawn:
         title = f"Peaks, {band_label(results, key[0])}, {frame_label(key[1])}"
         alt = f"Predicted against measured peak of {len(drawn)} recordings and channels"
-        blocks.append(Figure(title, (merit.peaks(drawn, alt),), _CAPTION))
+        blocks.append(Figure(title, (_peaks(drawn, alt),), _SAYS.caption("peaks")))
     if others:
         tables_of_others = tuple(_table(results, *other, groups[other]) for other in others)
         blocks.append(Fold("Other bands and frames", tables_of_others))
@@ -75,7 +66,7 @@ def _rank(results: Results, row: Merit, main: tuple[str, str]) -> tuple[bool, in
 
 def _table(results: Results, band: str, frame: str, rows: tuple[Merit, ...]) -> Grid:
     title = f"Figures of merit, {band_label(results, band)}, {frame_label(frame)}"
-    return Grid(title, _HEAD, _rows(rows), "kkkrrrrrrrrrk", _NOTE)
+    return Grid(title, _HEAD, _rows(rows), "kkkrrrrrrrrrk", _SAYS("table_note"))
 
 
 def _rows(rows: tuple[Merit, ...]) -> tuple[tuple[str | Cell, ...], ...]:
@@ -108,3 +99,42 @@ def _figures(row: Merit) -> tuple[str | Cell, ...]:
         judged(number(row.pessimism, 2), doubtful=optimistic),
         Cell("at the noise" if noise else "", "muted"),
     )
+
+
+def _peaks(rows: Sequence[Merit], alt: str) -> Picture:
+    """Draw one mark a recording and channel, hollow where it is at the noise, axes for each unit."""
+    units = list(dict.fromkeys(row.unit for row in rows))
+    channels = list(dict.fromkeys(row.channel for row in rows))
+    with draw.style():
+        figure, axes = draw.row(3.1, len(units), width=draw.WIDTH if len(units) > 1 else 4.2)
+        for axis, name in zip(axes, units, strict=True):
+            shown = [row for row in rows if row.unit == name]
+            measured = np.array([row.measured_peak for row in shown], dtype=float)
+            predicted = np.array([row.predicted_peak for row in shown], dtype=float)
+            low = 0.6 * float(min(measured.min(), predicted.min()))
+            high = 1.6 * float(max(measured.max(), predicted.max()))
+            axis.fill_between([low, high], [low, high], [high, high], color="#f4efe6", linewidth=0)
+            axis.plot([low, high], [low, high], color=draw.RESIDUAL, linewidth=0.8)
+            axis.text(0.03, 0.96, "pessimistic", transform=axis.transAxes, va="top", color="#8a6d3b")
+            axis.text(0.97, 0.04, "optimistic", transform=axis.transAxes, ha="right", color=draw.LIMIT)
+            for channel, noise in dict.fromkeys((row.channel, row.at_the_noise) for row in shown):
+                mine = np.array([(row.channel, row.at_the_noise) == (channel, noise) for row in shown])
+                index = channels.index(channel)
+                color = draw.SERIES[index % len(draw.SERIES)]
+                axis.plot(
+                    measured[mine],
+                    predicted[mine],
+                    linestyle="none",
+                    marker=_MARKS[index % len(_MARKS)],
+                    markersize=4.5,
+                    markerfacecolor="white" if noise else color,
+                    markeredgecolor=draw.RESIDUAL if noise else color,
+                    markeredgewidth=0.7,
+                    label=f"{label(channel)}, at the noise" if noise else label(channel),
+                )
+            draw.logarithmic(axis, "x", low, high)
+            draw.logarithmic(axis, "y", low, high)
+            axis.set_xlabel(f"measured peak / {unit(name)}")
+            axis.set_ylabel(f"predicted peak / {unit(name)}")
+            axis.legend(loc="center left", bbox_to_anchor=(0.0, 0.62), fontsize=6.5)
+        return draw.picture(figure, alt)

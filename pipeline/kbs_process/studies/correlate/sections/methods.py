@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from kbs_process.report.panel import Block, Grid, Panel, Text
+from kbs_process.report.prose import Prose
 from kbs_process.report.provenance import constants
 from kbs_process.report.tables import Tables
 from kbs_process.report.text import MISSING, number, percent
+from kbs_process.studies.correlate.choose import band_range
 from kbs_process.studies.correlate.results import Results
-from kbs_process.studies.correlate.sections.choose import band_range
+
+_SAYS = Prose("kbs_process.studies.correlate", "methods")
 
 
 def panel(results: Results, tables: Tables) -> Panel:
@@ -33,9 +36,5 @@ def _bands(results: Results) -> Grid:
         )
         for band in results.bands
     )
-    note = (
-        "Within the edge, at both ends, the filter's transient exceeds 0.1 %. Its rms over the record, relative to "
-        "the signal's: for a flat spectrum, and for a signal that drifts. The budget takes each for what it applies to."
-    )
     head = ("Band", "Range", "Method", "Edge", "Edge error, flat", "Edge error, drift")
-    return Grid("Bands", head, rows, "lllrrr", note)
+    return Grid("Bands", head, rows, "lllrrr", _SAYS("bands_note"))

@@ -5,26 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from kbs_process.report import distributions as figures
-from kbs_process.report.panel import Block, Caption, Figure, Grid, Panel, Picture, Text
+from kbs_process.report.panel import Block, Figure, Grid, Panel, Picture, Text
+from kbs_process.report.prose import Prose
 from kbs_process.report.tables import Tables
 from kbs_process.report.text import measure, number
 from kbs_process.results.pointing import RecordedPointing
+from kbs_process.studies.correlate.choose import PLATES
 from kbs_process.studies.correlate.results import Results
-from kbs_process.studies.correlate.sections.static import PLATES
 
-_DENSITY = Caption(
-    shown="Density of each axis' error (encoder less command) about its bias, with the normal density of the same "
-    "standard deviation; between the dashed lines lie 95 %.",
-    good="One hump about zero.",
-    bad="Two humps or flat shoulders: a limit cycle over one encoder code. Long tails: rare events, which a standard "
-    "deviation does not tell. Spikes: the antenna stood still.",
-    do="Compare the width with one code of the encoder; for tails look at starts, stops and reversals.",
-)
-_NOTE = (
-    "± is one standard deviation, from the length of the recording and the correlation of its error. Variation: half "
-    "the range of the slow part within the recording. Errors are at the working rate; what the encoder rounds is in "
-    "them, and what it misreads is not: only an external instrument sees that."
-)
+_SAYS = Prose("kbs_process.studies.correlate", "pointing")
 
 
 def panel(results: Results, tables: Tables) -> Panel:
@@ -37,7 +26,7 @@ def panel(results: Results, tables: Tables) -> Panel:
     blocks: list[Block] = []
     pictures = _densities(rows, tables)
     if pictures:
-        blocks.append(Figure("Distribution of the pointing error", pictures, _DENSITY))
+        blocks.append(Figure("Distribution of the pointing error", pictures, _SAYS.caption("density")))
     blocks.append(_table(rows))
     return Panel("pointing", "Pointing", question, tuple(blocks))
 
@@ -78,7 +67,7 @@ def _table(rows: tuple[RecordedPointing, ...]) -> Grid:
         )
         for row in rows
     )
-    return Grid("Pointing error against the command", head, body, "kkkrrrrr", _NOTE)
+    return Grid("Pointing error against the command", head, body, "kkkrrrrr", _SAYS("table_note"))
 
 
 def _mdeg(value: float, sigma: float) -> str:

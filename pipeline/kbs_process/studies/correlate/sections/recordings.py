@@ -5,8 +5,8 @@ from __future__ import annotations
 from kbs_process.report.panel import Block, Cell, Fold, Grid, Panel
 from kbs_process.report.tables import Tables
 from kbs_process.report.text import MISSING, count, measure, number
+from kbs_process.studies.correlate.choose import folded
 from kbs_process.studies.correlate.results import Recording, Results
-from kbs_process.studies.correlate.sections.choose import folded
 
 
 def panel(results: Results, tables: Tables) -> Panel:

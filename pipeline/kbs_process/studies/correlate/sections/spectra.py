@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
-from kbs_process.report.panel import Block, Caption, Figure, Grid, Panel, Text
-from kbs_process.report.tables import Tables
-from kbs_process.report.text import frame_label, measure
-from kbs_process.studies.correlate.figures import spectra
-from kbs_process.studies.correlate.results import Results
-from kbs_process.studies.correlate.sections.choose import by_role
-from kbs_process.studies.correlate.sections.static import PLATES
+import math
 
-_CAPTION = Caption(
-    shown="One-sided power spectral density of each channel at its full rate: measured and predicted. "
-    "Dotted: edges of the bands. Dashed: resonances of the article on the transducer.",
-    good="Measured and predicted agree within the band, and the resonance lies well above the band's edge.",
-    bad="A resonance next to an edge: the filter then passes part of a response that belongs to the test "
-    "rig, not to the mechanism. A measured floor well above the prediction: the channel shows noise, not "
-    "disturbance.",
-    do="With a resonance near the edge, read the narrower band first and compare what both engines give "
-    "for the wider. A narrow line that only the measurement has is a candidate for physics that was left "
-    "out.",
-)
+import numpy as np
+
+from kbs_process.report import draw
+from kbs_process.report.panel import Block, Figure, Grid, Panel, Picture, Text
+from kbs_process.report.prose import Prose
+from kbs_process.report.sheet import Sheet
+from kbs_process.report.tables import Table, Tables
+from kbs_process.report.text import frame_label, label, measure, number, unit
+from kbs_process.signals.records import Array
+from kbs_process.studies.correlate.choose import PLATES, by_role
+from kbs_process.studies.correlate.results import Resonance, Results
+
+_SAYS = Prose("kbs_process.studies.correlate", "spectra")
+_BINS = 500
 
 
 def panel(results: Results, tables: Tables) -> Panel:
@@ -35,7 +32,7 @@ def panel(results: Results, tables: Tables) -> Panel:
         if (table := tables.spectrum(recording.name)) is not None and table.channels
     ]
     pictures = tuple(
-        spectra.spectra(
+        _densities(
             table,
             results.resonances,
             tuple(edges),
@@ -47,7 +44,7 @@ def panel(results: Results, tables: Tables) -> Panel:
     blocks: list[Block] = []
     if pictures:
         title = f"Power spectral densities, {frame_label(results.campaign.frame)}"
-        blocks.append(Figure(title, pictures, _CAPTION))
+        blocks.append(Figure(title, pictures, _SAYS.caption("densities")))
     else:
         blocks.append(Text("No recording has a spectrum table."))
     if results.resonances:
@@ -57,3 +54,86 @@ def panel(results: Results, tables: Tables) -> Panel:
         )
         blocks.append(Grid("Resonances on the transducer", ("Axis", "Frequency", "Source"), rows, "lrl"))
     return Panel("spectra", "Spectra", question, tuple(blocks))
+
+
+def _densities(
+    table: Table, resonances: tuple[Resonance, ...], edges: tuple[float, ...], *, alt: str, title: str
+) -> Picture:
+    """Draw measured and predicted density of every channel on logarithmic scales, down the columns."""
+    channels = table.channels
+    columns = 2 if len(channels) > 1 else 1
+    rows = math.ceil(len(channels) / columns)
+    with draw.style():
+        sheet = Sheet(rows, columns, 1.14 if rows > 1 else 2.2, gap=0.12)
+        names: set[str] = set()
+        for index, channel in enumerate(channels):
+            column, row = divmod(index, rows)
+            curves = _curves(table, channel)
+            frequencies, densities = (
+                _range(*(f for f, _ in curves.values())),
+                _range(*(density for _, density in curves.values())),
+            )
+            panel = sheet.panel(row, column, frequencies, (0.5 * densities[0], 2.0 * densities[1]), logarithmic=True)
+            for name, (frequency, density) in curves.items():
+                panel.curve(frequency, density, draw.LINES[name])
+            _marks(panel, resonances, edges, named=index == 0)
+            lowest = row == rows - 1 or index == len(channels) - 1
+            panel.frame(f"{channel} / {unit(table.unit(channel))}", below="frequency / Hz" if lowest else None)
+            names |= curves.keys()
+        sheet.key(0, sorted(names))
+        return draw.picture(sheet.figure, alt, title, "png")
+
+
+def _curves(table: Table, channel: str) -> dict[str, tuple[Array, Array]]:
+    """Return the channel's densities."""
+    return {
+        kind: _thinned(table.columns["f"], table.columns[f"{channel}.{kind}"])
+        for kind in ("measured", "predicted")
+        if f"{channel}.{kind}" in table.columns
+    }
+
+
+def _thinned(f: Array, density: Array) -> tuple[Array, Array]:
+    """Keep the greatest density of each of many equal steps of log frequency, so that no line is lost.
+
+    Noughts, which a logarithmic scale cannot show, are left out.
+    """
+    usable = (f > 0) & (density > 0)
+    f, density = f[usable], density[usable]
+    if len(f) <= _BINS:
+        return f, density
+    step = np.log(f[-1] / f[0]) / _BINS
+    bins = np.minimum((np.log(f / f[0]) / step).astype(np.intp), _BINS - 1)
+    order = np.lexsort((-density, bins))
+    keep = np.sort(order[np.unique(bins[order], return_index=True)[1]])
+    return f[keep], density[keep]
+
+
+def _range(*values: Array) -> tuple[float, float]:
+    """Return the least and the greatest of all positive values; a decade where there are none."""
+    found = np.concatenate(values)
+    return (float(found.min()), float(found.max())) if found.size else (0.1, 1.0)
+
+
+def _marks(panel: Panel, resonances: tuple[Resonance, ...], edges: tuple[float, ...], *, named: bool) -> None:
+    """Draw band edges and resonances within the panel's range, these with their names in the first panel."""
+    shown = [edge for edge in edges if panel.x.low <= edge <= panel.x.high]
+    panel.upright(shown, colors=draw.INK, linewidths=0.7, linestyles=[(0, (1, 1.5))], zorder=1)
+    ordered = sorted(resonances, key=lambda resonance: resonance.frequency_Hz)
+    ordered = [found for found in ordered if panel.x.low <= found.frequency_Hz <= panel.x.high]
+    frequencies = [resonance.frequency_Hz for resonance in ordered]
+    panel.upright(frequencies, colors=draw.LIMIT, linewidths=0.7, linestyles=[(0, (4, 2))], zorder=1)
+    for index, resonance in enumerate(ordered if named else ()):
+        # Neighbours stand on opposite sides of their lines, as the first two are often close.
+        side = -1 if index % 2 == 0 else 1
+        panel.sheet.axes.text(
+            float(panel.x.place(resonance.frequency_Hz)) + 0.02 * side,
+            panel.y.end - 0.015,
+            f"{label(resonance.axis, 12)} {number(resonance.frequency_Hz)} Hz",
+            rotation=90,
+            ha="right" if side < 0 else "left",
+            va="top",
+            fontsize=5.5,
+            color=draw.LIMIT,
+            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.4},
+        )

@@ -3,25 +3,15 @@
 from __future__ import annotations
 
 from kbs_process.report import histories, series
-from kbs_process.report.panel import Block, Caption, Figure, Live, Panel, Picture, Text
+from kbs_process.report.panel import Block, Figure, Live, Panel, Picture, Text
+from kbs_process.report.prose import Prose
 from kbs_process.report.tables import Table, Tables
 from kbs_process.report.text import count
 from kbs_process.report.views import Scene, views
+from kbs_process.studies.correlate.choose import PLATES, by_role
 from kbs_process.studies.correlate.results import Results
-from kbs_process.studies.correlate.sections.choose import by_role
 
-PLATES = 6
-_CAPTION = Caption(
-    shown="Every channel as measured at the transducer (cross-coupling undone), the static wrench that "
-    "the fitted masses and centres of gravity give at the measured angles, and their difference on a "
-    "scale of its own. Shaded: samples that were lost or lie within a filter's edge.",
-    good="The two curves cannot be told apart on the left; the difference is small against the static "
-    "wrench, without slope, and looks like the disturbance sought.",
-    bad="A difference that follows the joint angle (wrong CoG, tilt or misalignment), that jumps (an "
-    "encoder's converter switches, a loose harness), or that drifts (temperature).",
-    do="A slope over angle: see the gravity fit's parameters and checks. A jump: look at the encoder of "
-    "that instant. A drift: take the transducer's zero before and after the run.",
-)
+_SAYS = Prose("kbs_process.studies.correlate", "static")
 
 
 def panel(results: Results, tables: Tables) -> Panel:
@@ -39,7 +29,7 @@ def panel(results: Results, tables: Tables) -> Panel:
     figure = Figure(
         "Measured and static wrench at the transducer (frame T), unfiltered",
         pictures,
-        _CAPTION,
+        _SAYS.caption("histories"),
         Live("static", ("measured", "static", "residual"), views(scenes), two_scales=True),
     )
     blocks: list[Block] = [figure]

@@ -3,37 +3,30 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from kbs_process.report.panel import Block, Caption, Figure, Fold, Grid, Panel, Text
-from kbs_process.report.tables import Tables
+from kbs_process.report import draw
+from kbs_process.report.panel import Block, Figure, Fold, Grid, Panel, Picture, Text
+from kbs_process.report.prose import Prose
+from kbs_process.report.tables import Table, Tables
 from kbs_process.report.text import frame_label, measure, number, percent, unit
 from kbs_process.signals.records import Array
-from kbs_process.studies.correlate.figures import transducer as figures
-from kbs_process.studies.correlate.on_transducer import FilterErrorIn, OnTransducer
+from kbs_process.studies.correlate.choose import band_label, main_frame
+from kbs_process.studies.correlate.on_transducer import OnTransducer
 from kbs_process.studies.correlate.results import Results
-from kbs_process.studies.correlate.sections.choose import band_label, main_frame
+
+_SAYS = Prose("kbs_process.studies.correlate", "transducer")
+_KINDS = {
+    "rigid": {"color": draw.RESIDUAL, "linewidth": 1.0, "zorder": 2},
+    "modal": {"color": draw.PREDICTED, "linewidth": 2.2, "zorder": 2.5},
+    "coupled": {"color": draw.MEASURED, "linewidth": 0.7, "zorder": 3},
+}
+_LABELS = {"rigid": "on a rigid base", "modal": "through the modes", "coupled": "coupled plant"}
+
 
 QUESTION = "How much of a band's torque does the transducer's resonance make, and do both ways to compute it agree?"
-_GAINS = Caption(
-    shown="Torque that the transducer reads over the torque that the article would exert on a rigid base, over "
-    "frequency, at the first, middle and last pose; dotted: the bands' upper edges; coloured: the same behind each "
-    "band's low-pass.",
-    good="Close to 1 up to the edge, and the resonance's peak far below 1 behind the low-pass.",
-    bad="Well above 1 at the edge: torques there are read too large. A peak near 1 behind the low-pass: the resonance "
-    "leaks into the band, whatever excites it.",
-    do="State the requirement in the lower band, stiffen the set-up, or divide the prediction's gain out.",
-)
-_SPECTRA = Caption(
-    shown="The predicted disturbance of one recording: on a rigid base, the same through the modes, and by the plant "
-    "with the elastic transducer in it.",
-    good="All three agree below the resonance; the last two also at it.",
-    bad="Modes and coupled plant differ below the resonance: the modal model is not that of this set-up. At the "
-    "resonance alone they differ where friction answers the plate's motion, or a burst is shorter than the ring.",
-    do="Check the modal file's pose, axes and interface against the rig's parameters.",
-)
 
 
 def panel(results: Results, tables: Tables) -> Panel:
@@ -48,18 +41,16 @@ def panel(results: Results, tables: Tables) -> Panel:
     gain = tables.read("transducer", f"{found.recording}.gain")
     if gain is not None:
         alt = "Gain of the transducer's resonance over frequency for three torques"
-        picture = figures.gains(gain, edges, _low_passes(edges, gain.columns["f"]), alt)
-        blocks.append(Figure("Gain from a rigid base to the transducer", (picture,), _GAINS))
+        picture = _gain_curves(gain, edges, _low_passes(edges, gain.columns["f"]), alt)
+        blocks.append(Figure("Gain from a rigid base to the transducer", (picture,), _SAYS.caption("gains")))
     frame = main_frame(results)
     blocks += [_gain_table(found), _error_table(results, found, frame)]
     spectrum = tables.read("transducer", f"{found.recording}.spectrum")
     if spectrum is not None:
         alt = "Root densities of three torques on a rigid base, through the modes, coupled"
-        blocks.append(
-            Figure(
-                f"The disturbance of {found.recording}, both ways", (figures.spectra(spectrum, edges, alt),), _SPECTRA
-            )
-        )
+        picture = _density_curves(spectrum, edges, alt)
+        title = f"The disturbance of {found.recording}, both ways"
+        blocks.append(Figure(title, (picture,), _SAYS.caption("spectra")))
     others = [other for other in ("T", "S") if other != frame and any(e.frame == other for e in found.errors)]
     folded = [_error_table(results, found, other) for other in others]
     blocks += [_agreement_table(results, found), Fold("Modes, and other frames", (_mode_table(found), *folded))]
@@ -76,22 +67,11 @@ def _words(results: Results, found: OnTransducer) -> Text:
     items = []
     for band in dict.fromkeys(entry.band for entry in torques):
         worst = max((e for e in torques if e.band == band), key=lambda e: e.error_peak)
-        items.append(
-            f"{band_label(results, band)}: at most {measure(worst.error_peak, worst.error_peak_sigma)} N m peak "
-            f"({worst.channel}), where the torque on a rigid base peaks at {number(worst.rigid_peak)} N m; "
-            f"{percent(_share(worst))} of the error's power leaks through the low-pass's flank."
-        )
+        share = (worst.leak_rms / worst.error_rms) ** 2 if worst.error_rms > 0.0 else 0.0
+        items.append(_SAYS("band", band=band_label(results, band), worst=worst, share=min(share, 1.0)))
     lowest = min(found.modes, key=lambda mode: mode.frequency_Hz)
-    text = (
-        f"The lowest mode on the transducer lies at {measure(lowest.frequency_Hz, lowest.frequency_sigma_Hz)} Hz "
-        f"with a damping of {percent(lowest.damping, 2)}. What it adds to {found.recording}'s predicted torque, "
-        f"in frame {main_frame(results)}:"
-    )
+    text = _SAYS("lowest", mode=lowest, recording=found.recording, frame=main_frame(results))
     return Text(text, tuple(items))
-
-
-def _share(entry: FilterErrorIn) -> float:
-    return min(1.0, (entry.leak_rms / entry.error_rms) ** 2) if entry.error_rms > 0.0 else 0.0
 
 
 def _gain_table(found: OnTransducer) -> Grid:
@@ -111,8 +91,7 @@ def _gain_table(found: OnTransducer) -> Grid:
         for pose in poses
     )
     head = (f"Angle of {found.joint}", *(f"{channel} at {edge:g} Hz" for edge in edges for channel in channels))
-    note = "±: one standard deviation, from those of the modes' frequencies and dampings."
-    return Grid("Gain at the bands' edges", head, rows, "k" + "r" * (len(head) - 1), note)
+    return Grid("Gain at the bands' edges", head, rows, "k" + "r" * (len(head) - 1), _SAYS("gain_note"))
 
 
 def _error_table(results: Results, found: OnTransducer, frame: str) -> Grid:
@@ -131,11 +110,7 @@ def _error_table(results: Results, found: OnTransducer, frame: str) -> Grid:
         for e in found.errors
         if e.frame == frame
     )
-    note = (
-        "Error: reading on the transducer less torque on a rigid base, in the band. Leak: its part above the band's "
-        "upper edge. ±: one standard deviation from the modes; the disturbance itself counts as known."
-    )
-    return Grid(f"Filter error of {found.recording}, {frame_label(frame)}", head, rows, "kkrrrrrr", note)
+    return Grid(f"Filter error of {found.recording}, {frame_label(frame)}", head, rows, "kkrrrrrr", _SAYS("error_note"))
 
 
 def _agreement_table(results: Results, found: OnTransducer) -> Grid:
@@ -162,8 +137,7 @@ def _agreement_table(results: Results, found: OnTransducer) -> Grid:
         )
         for e in found.agreement
     )
-    note = f"Modes: {found.source}. Noise: the sensor's, in the band; a difference far below it cannot be measured."
-    return Grid(f"Both ways, {frame_label('T')}", head, rows, "kkrrrrrr", note)
+    return Grid(f"Both ways, {frame_label('T')}", head, rows, "kkrrrrrr", _SAYS("agreement_note", source=found.source))
 
 
 def _mode_table(found: OnTransducer) -> Grid:
@@ -178,3 +152,57 @@ def _mode_table(found: OnTransducer) -> Grid:
         for mode in found.modes
     )
     return Grid("Modes, with their effective moments of inertia", head, rows, "krrrrr")
+
+
+def _gain_curves(table: Table, edges: Sequence[float], filters: dict[str, Array], alt: str) -> Picture:
+    """Draw |H| of each torque at each pose, and behind the low-passes, `filters` by name, at the last pose."""
+    f = table.columns["f"]
+    channels = _channels(table)
+    with draw.style():
+        figure, axes = draw.row(2.5, len(channels), share_y=True)
+        for axis, channel in zip(axes, channels, strict=True):
+            names = [name for name in table.columns if name.startswith(f"{channel}.")]
+            for index, name in enumerate(names):
+                shade = 0.35 + 0.65 * (index + 1) / len(names)
+                look = {"color": draw.MEASURED, "alpha": shade, "linewidth": 0.9}
+                axis.plot(f, table.columns[name], label=name.split(".", 1)[1], **look)
+            for index, (name, gain) in enumerate(filters.items()):
+                color = draw.SERIES[(index + 1) % len(draw.SERIES)]
+                axis.plot(f, gain * table.columns[names[-1]], label=f"behind {name}", color=color, linewidth=0.9)
+            for edge in edges:
+                axis.axvline(edge, color=draw.INK, linewidth=0.7, linestyle=(0, (1, 1.5)))
+            draw.logarithmic(axis, "x", 0.2, float(f[-1]))
+            draw.logarithmic(axis, "y", 1e-4, 200.0)
+            axis.set_title(channel)
+            axis.set_xlabel("frequency / Hz")
+            axis.legend(fontsize=6, loc="lower left")
+        axes[0].set_ylabel("read / on a rigid base")
+        return draw.picture(figure, alt)
+
+
+def _density_curves(table: Table, edges: Sequence[float], alt: str) -> Picture:
+    """Draw the density of each torque on a rigid base, through the modes, and by the coupled plant."""
+    f = table.columns["f"]
+    channels = _channels(table)
+    with draw.style():
+        figure, axes = draw.row(2.5, len(channels))
+        for axis, channel in zip(axes, channels, strict=True):
+            top = 0.0
+            for kind, look in _KINDS.items():
+                density = table.columns.get(f"{channel}.{kind}")
+                if density is not None:
+                    axis.plot(f, np.sqrt(density), label=_LABELS[kind], **look)
+                    top = max(top, float(np.sqrt(density[f > 0.1]).max()))
+            for edge in edges:
+                axis.axvline(edge, color=draw.INK, linewidth=0.7, linestyle=(0, (1, 1.5)))
+            draw.logarithmic(axis, "x", max(0.1, float(f[1])), float(f[-1]))
+            draw.logarithmic(axis, "y", 1e-5 * top, 2.0 * top)
+            axis.set_title(channel)
+            axis.set_xlabel("frequency / Hz")
+        axes[0].set_ylabel("root density / N·m/√Hz")
+        axes[0].legend(fontsize=6, loc="upper left")
+        return draw.picture(figure, alt, form="png")
+
+
+def _channels(table: Table) -> list[str]:
+    return list(dict.fromkeys(name.split(".", 1)[0] for name in table.columns if name != "f"))

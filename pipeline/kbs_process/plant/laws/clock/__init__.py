@@ -1,0 +1,1 @@
+"""Errors of clocks: by how much the stamps of a stream are late."""

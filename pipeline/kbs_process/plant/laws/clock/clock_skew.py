@@ -1,0 +1,43 @@
+"""A clock that runs fast, or slow, since it was set."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kbs_process.plant.effect import Normal, Parameter
+from kbs_process.plant.sensing import Sensing, SensingPort
+from kbs_process.signals.records import Array
+
+
+def lateness(time: Array, skew: float, set_at: float) -> Array:
+    r"""By how much the stamps of a clock are late that gains on the others.
+
+    Equation: $y_\mathrm{read}(t) = y(t - s (t - t_0))$, $t_0$ being when it was right, after a recording's
+        start: before it, negative, of a clock that has gained since it was set.
+    Units: s, 1, s -> s.
+    Validity: one rate all along, and every recording begun as long after the clock was set: where that differs, the
+        offset is each recording's own.
+    Source: D. W. Allan, N. Ashby, C. C. Hodge, The science of timekeeping, Hewlett-Packard AN 1289 (1997).
+    """
+    return np.asarray(skew * (time - set_at), dtype=np.float64)
+
+
+CLOCK_SKEW = Sensing(
+    name="clock_skew",
+    order=220,
+    port=SensingPort.STREAM,
+    equation=lateness,
+    parameters=(
+        Parameter("skew", "1", Normal(0.0, 1e-4), "rate of the clock, less 1", (-0.1, 0.1), role="amplitude"),
+        Parameter(
+            "set_at",
+            "s",
+            Normal(0.0, 30.0),
+            "when it was right, after the recording's start",
+            (-1e5, 1e5),
+            grid=(-3.0, -1.0, -0.3, 0.0, 0.25, 0.5, 0.75, 1.0, 1.3, 2.0),
+            over="time.span",
+        ),
+    ),
+    reference="D. W. Allan, N. Ashby, C. C. Hodge, The science of timekeeping, Hewlett-Packard AN 1289 (1997)",
+)

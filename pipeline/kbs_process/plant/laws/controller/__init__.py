@@ -1,0 +1,1 @@
+"""Between the controller's command and the magnetic field: gain, delay, jitter."""

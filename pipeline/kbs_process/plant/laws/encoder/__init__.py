@@ -1,0 +1,1 @@
+"""Errors of encoders: of the disc, of its reading, of the converter."""

@@ -1,0 +1,1 @@
+"""What comes from outside: air, cords, cables that pull, what hangs on a link, the floor, the mounting."""

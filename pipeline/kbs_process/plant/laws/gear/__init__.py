@@ -1,0 +1,1 @@
+"""The gear between motor and output: stiffness, play, kinematic error."""

@@ -1,0 +1,1 @@
+"""What remembers: friction before it slides, wires that rub, joints that slip."""

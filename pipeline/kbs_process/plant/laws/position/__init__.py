@@ -1,0 +1,1 @@
+"""Torques that depend on where a joint or the motor stands."""

@@ -1,0 +1,1 @@
+"""Errors of the transducer: its calibration, its converter, its drift."""
