@@ -100,12 +100,12 @@ def sentence(rows: Sequence[Row], sets: int, trials: int) -> str:
         _row(rows, name) for name in ("place", "physics", "false find", "port, in no catalogue")
     )
     return (
-        f"The diagnosis is experimental. In {trials} sealed trials "
-        f"({sets} sets, with changes of the code between them) it\n"
-        f"named the right physics for {physics.right} of {physics.of} single effects of its catalogue "
-        f"({_interval(physics)}).\nThe place was right for {place.right}. "
-        f"Of effects outside the catalogue it found where they enter for {outside.right} of {outside.of}.\n"
-        f"It reported an effect in {false.right} of {false.of} trials that had none.\n"
+        f"The diagnosis is experimental. It was tried on {trials} simulated campaigns with concealed effects "
+        f"({sets} sealed\nsets, with changes of the code between them). "
+        f"Of {physics.of} single effects that its catalogue has, it named {physics.right}\n"
+        f"rightly ({_interval(physics)}), and placed {place.right}. "
+        f"Of {outside.of} effects outside the catalogue it found where {outside.right} enter.\n"
+        f"It reported an effect in {false.right} of {false.of} campaigns that had none.\n"
     )
 
 
