@@ -16,7 +16,7 @@ from kbs_process.campaign.corrected_model import write_model
 from kbs_process.campaign.load import load_campaign
 from kbs_process.campaign.mission import load_day
 from kbs_process.diagnosis.experiments.hypothesis import Hypothesis
-from kbs_process.diagnosis.selection.outcome import Estimate, Identity
+from kbs_process.diagnosis.facts import Estimate, Identity, Place
 from kbs_process.errors import ConfigError
 from kbs_process.identification.output_error import Scalar
 from kbs_process.plant.attach import attach
@@ -100,7 +100,7 @@ def test_a_diagnosis_that_went_round_a_phase_and_found_a_gain_leaves_a_model_tha
     )
     standing = SimpleNamespace(known=known, hypothesis=known.hypothesis, laws={name: {}})
     found = SimpleNamespace(
-        identity=Identity("transducer", "", ("Ty",), "gain", "channel_gain"),
+        identity=Identity(Place("transducer", "", ("Ty",)), "gain", "channel_gain"),
         actions=((Estimate("gain", "1", 0.03, 0.002),),),
     )
     outcome = SimpleNamespace(standing=standing, finds=(found,))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Iterator
 from math import pi
@@ -10,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from kbs_process.campaign.schema import load_schema
+from kbs_process.campaign.formats.schemas import schema_text
 from kbs_process.campaign.units import DIMENSIONS, UnitMismatchError, factor
 
 DOCUMENT = (Path(__file__).parents[2] / "docs" / "campaign.md").read_text(encoding="utf-8")
@@ -29,7 +30,7 @@ def keys(node: Any) -> Iterator[str]:
 def test_every_key_is_documented(schema: str) -> None:
     prose = re.sub(r"```.*?```", "", DOCUMENT, flags=re.DOTALL)
     words = set(re.findall(r"[A-Za-z_0-9]+", " ".join(re.findall(r"`([^`]+)`", prose))))
-    assert set(keys(load_schema(schema))) <= words
+    assert set(keys(json.loads(schema_text(schema)))) <= words
 
 
 def test_the_table_of_units_is_the_code_s() -> None:

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import hashlib
 import json
+import subprocess
+import sys
 from math import pi
 from pathlib import Path
 
-import jsonschema
 import numpy as np
 import pytest
 
 from campaign.campaign_folder import CampaignFolder
 from kbs_process.campaign.load import load_campaign
-from kbs_process.campaign.schema import load_schema, schema_folder
 from kbs_process.results import provenance
 
 
@@ -200,10 +200,20 @@ def test_provenance_names_every_input_and_stays_the_same(folder: CampaignFolder)
     assert one == two
 
 
-@pytest.mark.parametrize("name", ["campaign", "parameters"])
-def test_schemas_are_schemas(name: str) -> None:
-    jsonschema.Draft202012Validator.check_schema(load_schema(name))
-    assert (schema_folder() / f"{name}.schema.json").is_file()
+LOADING = """
+import sys
+from pathlib import Path
+from kbs_process.campaign.load import load_campaign
+load_campaign(Path(sys.argv[1]), checksums=False)
+print(*sys.modules)
+"""
+
+
+def test_loading_imports_nothing_that_it_has_no_use_for(folder: CampaignFolder) -> None:
+    command = [sys.executable, "-c", LOADING, str(folder.path)]
+    modules = subprocess.run(command, capture_output=True, text=True, check=True).stdout.split()
+    for name in ("kbs_process.diagnosis", "kbs_process.studies", "kbs_process.report", "matplotlib", "jsonschema"):
+        assert not any(module == name or module.startswith(f"{name}.") for module in modules), name
 
 
 def test_an_effect_may_act_twice(folder: CampaignFolder) -> None:

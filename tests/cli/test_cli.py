@@ -23,6 +23,7 @@ from kbs_process import cli
 from kbs_process.errors import RecordingError
 from kbs_process.recordings.mcap.messages.encoding import OutStream
 from kbs_process.recordings.mcap.writer import write_mcap
+from kbs_process.results.outcome import Outcome
 from kbs_process.studies.convert import preset_names
 
 VERBS = ("process", "validate", "inspect", "simulate", "predict", "import", "report", "prove")
@@ -73,15 +74,11 @@ def processed(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
     """Replaces the pipeline; `met` and `error` say how it ends, `called` what it was asked."""
     state = SimpleNamespace(met=True, error=None, called=None)
 
-    def process(campaign: Any, target: Path, *, progress: Any, pdf: bool | None) -> SimpleNamespace:
+    def process(campaign: Any, target: Path, *, progress: Any, pdf: bool | None) -> Outcome:
         state.called = (campaign.name, target, pdf)
         if state.error is not None:
             raise state.error
-        return SimpleNamespace(
-            verdict_lines=("torque 0.04 N m, limit 0.06 N m: met",),
-            requirement_met=state.met,
-            report=target / "index.html",
-        )
+        return Outcome(("torque 0.04 N m, limit 0.06 N m: met",), state.met, target / "index.html")
 
     importlib.import_module("kbs_process.studies.diagnose.run")  # which the real one is read by
     fake = ModuleType("kbs_process.studies.correlate.run")

@@ -10,10 +10,10 @@ import pytest
 from diagnosis import bench
 from diagnosis.test_floor import CHANNELS, N, made
 from kbs_process.diagnosis.experiments import floor
-from kbs_process.diagnosis.experiments.detection import Cell, Detection, detect
 from kbs_process.diagnosis.experiments.experiment import Experiment, Trial
 from kbs_process.diagnosis.experiments.hypothesis import Prediction
 from kbs_process.diagnosis.experiments.whiten import window_of
+from kbs_process.diagnosis.nominal.detection import Cell, Detection, detect
 from kbs_process.signals.records import Array, Mask
 
 NOTHING = {0: Prediction(np.zeros((N, CHANNELS)), np.zeros((N, 6)))}

@@ -14,44 +14,37 @@ from test_rounds import standing
 from kbs_process.campaign.load import load_campaign
 from kbs_process.diagnosis.acceptance.finding import _alike_likely, merged, trusted
 from kbs_process.diagnosis.acceptance.gate import Fold, Gate
-from kbs_process.diagnosis.experiments.detection import Detection
+from kbs_process.diagnosis.acceptance.outcome import Absorbed, Alternative, Curve, Find, Outcome, Refused
 from kbs_process.diagnosis.experiments.floor import declared
-from kbs_process.diagnosis.experiments.trajectories import family, limits_of
+from kbs_process.diagnosis.facts import Estimate, Identity, Moved, Place, Planned
+from kbs_process.diagnosis.nominal.detection import Detection
 from kbs_process.diagnosis.nominal.joint import standing_of
 from kbs_process.diagnosis.nominal.known import MOVED, NEAR
 from kbs_process.diagnosis.proposing.curves import basis
 from kbs_process.diagnosis.proposing.measured import inserted
-from kbs_process.diagnosis.selection.next_test import Proposal, Tried
-from kbs_process.diagnosis.selection.outcome import (
-    Absorbed,
-    Alternative,
-    Curve,
-    Estimate,
-    Find,
-    Identity,
-    Moved,
-    Outcome,
-    Refused,
-)
+from kbs_process.diagnosis.selection.next_test import Proposal
+from kbs_process.diagnosis.selection.trajectories import family, limits_of
 from kbs_process.plant.laws.position.measured_law import COEFFICIENTS, MEASURED
 from kbs_process.reduction.commands import read_commands
 from kbs_process.results.records import load
 from kbs_process.studies.diagnose.corrected import write_corrected
-from kbs_process.studies.diagnose.files import write_diagnosis
+from kbs_process.studies.diagnose.output import write_diagnosis
+from kbs_process.studies.diagnose.prose import answer, law_in_words
 from kbs_process.studies.diagnose.results import DiagnosisResults, Trial
-from kbs_process.studies.diagnose.sentences import _law_in_words, _shown, _stopped
 
 OVER_ANGLE = next(one for one in MEASURED if one.effect.name == "ground_angle_law")
-LAW = Identity("external wrench", "el", (), "unnamed", "curve over joint angle")
-CABLE = Identity("external wrench", "el", (), "cable", "ground_cable")
-DRAG = Identity("joint torque", "el", (), "friction", "joint_viscous")
+LAW = Identity(Place("external wrench", "el"), "unnamed", "curve over joint angle")
+CABLE = Identity(Place("external wrench", "el"), "cable", "ground_cable")
+DRAG = Identity(Place("joint torque", "el"), "friction", "joint_viscous")
+FLOOR = declared(bench.experiment(bench.rig(), ("fit",), 4))
 NOTHING = Detection((), -1.0, 1.0)
+OFF = Moved(name="joint.el.drive.Ka", unit="N m/rad", prior=0.5, prior_sigma=0.1, value=1.0, sigma=0.1, sigmas=5.0)
 NODES, SIGMA = np.full(COEFFICIENTS, 0.5), np.full(COEFFICIENTS, 0.01)
 
 
 def disc(like: Find, order: float, tag: str) -> Find:
     """An eccentric disc that was found with one order; of a second find the numbers are tagged."""
-    own = Identity("encoder", "el", (), "eccentricity", "encoder_eccentricity")
+    own = Identity(Place("encoder", "el"), "eccentricity", "encoder_eccentricity")
     values = {"eccentric_sin": 1e-4 * order, "eccentric_cos": 0.0, "eccentric_order": order}
     told = tuple(Estimate(f"{name}{tag}", "", value, 1e-6) for name, value in values.items())
     return replace(like, identity=own, estimates=told, curve=None)
@@ -115,12 +108,12 @@ def outcome() -> Outcome:
 def written(outcome: Outcome, tmp_path_factory: pytest.TempPathFactory) -> Path:
     (find,), experiment = outcome.finds, outcome.known.experiment
     trajectory = family(limits_of(experiment.drives, experiment.dt), ("az", "el"), 60.0, "el")[0]
-    proposal = Proposal(LAW, (CABLE,), trajectory, 3.0, 0.067, 3, float("nan"), (Tried(trajectory.words, 3.2),))
+    proposal = Proposal(LAW, (CABLE,), trajectory, 3.0, 0.067, 3, float("nan"), (Planned(trajectory.words, 3.2),))
     target = tmp_path_factory.mktemp("diagnosis") / "out"
     campaign = load_campaign(bench.CAMPAIGN, checksums=False)
     discs = merged([disc(find, 1.0, ""), disc(find, 2.0, "_2")])
     write_corrected(campaign, replace(outcome, finds=discs), target.parent / "discs")
-    off = replace(outcome, finds=(), moved=(Moved("joint.el.drive.Ka", 1.0, 0.1, 5.0),))
+    off = replace(outcome, finds=(), moved=(OFF,))
     told_off = write_diagnosis(campaign, declared(experiment), off, target, False, None, "")
     nothing = "Model with its known numbers refitted, to which nothing was added"
     assert told_off.verdict_lines[1] == f"{nothing}: {target / 'corrected'}"
@@ -285,29 +278,35 @@ def test_a_number_that_went_as_far_as_it_was_let_go_is_told(outcome: Outcome, si
     value[k] += sigmas * known.parameters.sigma[k]
     moved = replace(known, value=value)
     assert moved.stopped == ((name,) if told else ())
-    assert (f"{name} went as far as chance may have it" in _stopped(moved)) == told
+    nothing = replace(outcome, finds=(), standing=replace(outcome.standing, known=moved))
+    assert (f"{name} went as far as chance may have it" in answer(nothing, (), (), FLOOR)) == told
 
 
-def test_the_channel_that_shows_most_of_what_is_left_is_told() -> None:
+def test_the_channel_that_shows_most_of_what_is_left_is_told(outcome: Outcome) -> None:
     def trial(**channels: float) -> Trial:
         return Trial(
             recording="r", trajectory="0", role="fit", nominal=9.0, known=3.0, corrected=1.2, channels=channels
         )
 
-    assert _shown([trial(Fx=1.0, Fy=2.0), trial(Fx=2.0**0.5, Fy=0.9, el=1.0)]) == " Fy shows 75 % of its power."
-    assert _shown([trial(Fx=1.5, Fy=1.5)]) == _shown([trial(Fx=0.9)]) == _shown([]) == ""
+    def told(*trials: Trial) -> str:
+        return answer(replace(outcome, after=Detection((), -80.0, 1.44)), trials, (), FLOOR)
+
+    assert told(trial(Fx=1.0, Fy=2.0), trial(Fx=2.0**0.5, Fy=0.9, el=1.0)).endswith(" Fy shows 75 % of its power.")
+    assert told(trial(Fx=1.5, Fy=1.5)) == told(trial(Fx=0.9)) == told()
+    assert "of its power" not in told()
 
 
 def test_what_cannot_be_told_from_a_law_is_told_with_its_place(outcome: Outcome) -> None:
-    cord = replace(CABLE, law="cable", axis="az")
+    az = Place(CABLE.place.port, "az")
+    cord = replace(CABLE, law="cable", place=az)
     same, apart = (Alternative(cord, 0.1, rho, 0.2, True, True) for rho in (2.0, 9.0))
-    spline = Alternative(replace(LAW, axis="az", law="curve"), 0.1, 1.0, 0.2, True, True)
+    spline = Alternative(replace(LAW, place=az, law="curve"), 0.1, 1.0, 0.2, True, True)
     here = Alternative(replace(LAW, law="harness"), 0.1, 9.0, 0.2, True, True)
     (find,) = outcome.finds
-    own = f"{LAW.law} ({LAW.port}, {LAW.axis})".replace("_", " ")
-    assert _law_in_words(replace(find, alternatives=(apart, spline))) == own
-    told = _law_in_words(replace(find, alternatives=(same, here)))
-    assert told == own.replace(" (", " or harness (") + f", or cable ({CABLE.port}, az)"
+    own = f"{LAW.law} ({LAW.place.port}, {LAW.place.site})".replace("_", " ")
+    assert law_in_words(replace(find, alternatives=(apart, spline))) == own
+    told = law_in_words(replace(find, alternatives=(same, here)))
+    assert told == own.replace(" (", " or harness (") + f", or cable ({CABLE.place.port}, az)"
 
 
 @pytest.mark.parametrize("share", [0.4, 1.0])
@@ -340,7 +339,7 @@ def test_what_is_left_decides_what_is_said(
         finds=outcome.finds if found else (),
         after=Detection((), -80.0, fit),
         held_out=(NOTHING, Detection((), -80.0, unseen)),
-        moved=(Moved("joint.el.drive.Ka", 1.0, 0.1, 5.0),) if moved else (),
+        moved=(OFF,) if moved else (),
     )
     assert told.verdict == verdict
     quiet = replace(told, finds=(), after=NOTHING, held_out=None)

@@ -6,7 +6,7 @@ import bench
 import numpy as np
 import pytest
 
-from kbs_process.diagnosis.acceptance.dissipation import drives
+from kbs_process.diagnosis.acceptance.plausible import drives
 from kbs_process.diagnosis.experiments.hypothesis import Hypothesis, predict
 from kbs_process.diagnosis.screening.scene import Scene
 from kbs_process.diagnosis.screening.screen import Catalogued

@@ -10,9 +10,9 @@ import pytest
 from diagnosis import bench
 from kbs_process.diagnosis.experiments.floor import declared
 from kbs_process.diagnosis.experiments.hypothesis import Hypothesis
-from kbs_process.diagnosis.nominal import explain
-from kbs_process.diagnosis.nominal.explain import NEAR, eased
 from kbs_process.diagnosis.nominal.known import as_it_is, refit
+from kbs_process.diagnosis.selection import explain
+from kbs_process.diagnosis.selection.explain import NEAR, eased
 from kbs_process.rig.model import substitute
 
 OFF = {"body.antenna.cog": 2}  # elements; a short swing shows little of the others

@@ -14,15 +14,15 @@ from kbs_process.diagnosis.experiments.hypothesis import Hypothesis, predict
 from kbs_process.diagnosis.nominal.joint import Standing, with_extra
 from kbs_process.diagnosis.nominal.parameters import known_parameters, prior
 from kbs_process.diagnosis.proposing.families import port_word
+from kbs_process.diagnosis.proposing.tryout import extra_of, identity
+from kbs_process.diagnosis.proposing.view import View
 from kbs_process.diagnosis.screening.places import points_of
 from kbs_process.diagnosis.screening.ranges import Ranges
 from kbs_process.diagnosis.screening.scene import Scene
 from kbs_process.diagnosis.screening.screen import Bench, Catalogued, screen
 from kbs_process.diagnosis.screening.shapes import bettered
 from kbs_process.diagnosis.screening.suspects import Candidate, candidates
-from kbs_process.diagnosis.screening.view import View
 from kbs_process.diagnosis.selection.leaders import leaders
-from kbs_process.diagnosis.selection.tryout import extra_of, identity
 from kbs_process.identification.output_error import Scalar
 from kbs_process.plant.attach import attach
 from kbs_process.plant.effect import Effect
@@ -57,7 +57,7 @@ def test_the_point_of_a_drag_is_found_beside_its_size_and_power() -> None:
     ]
     best = bettered(tried, screen(tried, [Catalogued(one, scene) for one in every]).candidates[0])
     own = identity(best.suspect)
-    assert (own.port, own.axis, own.family) == ("external wrench", "el", "air drag")
+    assert (own.place.port, own.place.site, own.family) == ("external wrench", "el", "air drag")
     assert port_word(AIR_DRAG.name, AIR_DRAG.port) == "external wrench"
     after = with_extra(here, extra_of(best, here, tried, scene), bench.serial(made)).known
     found = {s.name.removeprefix("external.air_drag."): k for k, s in enumerate(after.free)}
@@ -80,7 +80,7 @@ def test_a_cord_that_nobody_stated_is_found_wherever_its_anchor_is() -> None:
     every = [one for one in candidates(made.rig, made.effects, none, (), made.channels) if one.name == BUNGEE.name]
     best = bettered(tried, screen(tried, [Catalogued(one, scene) for one in every]).candidates[0])
     own = identity(best.suspect)
-    assert (own.port, own.axis, own.family) == ("external wrench", "el", "bungee")
+    assert (own.place.port, own.place.site, own.family) == ("external wrench", "el", "bungee")
     after = with_extra(here, extra_of(best, here, tried, scene), bench.serial(made)).known
     for name, value, sigma in zip(after.names, after.value, after.sigma, strict=True):
         print(f"{name}: {value:.4f} +- {sigma:.4f}")

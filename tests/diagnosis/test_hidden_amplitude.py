@@ -12,10 +12,10 @@ from kbs_process.diagnosis.experiments.experiment import Experiment
 from kbs_process.diagnosis.experiments.hypothesis import Hypothesis, predict
 from kbs_process.diagnosis.nominal.joint import Extra, Standing, with_extra
 from kbs_process.diagnosis.nominal.known import Known
+from kbs_process.diagnosis.proposing.tryout import extra_of
 from kbs_process.diagnosis.screening.scene import Scene
 from kbs_process.diagnosis.screening.screen import Bench, Catalogued, screen
 from kbs_process.diagnosis.screening.suspects import Candidate
-from kbs_process.diagnosis.selection.tryout import extra_of
 from kbs_process.identification.output_error import Scalar
 from kbs_process.plant.attach import attach
 from kbs_process.plant.laws.hysteresis.ground_cable import GROUND_CABLE

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from kbs_process.diagnosis.acceptance.tails import log_tail
 from kbs_process.diagnosis.screening.gls import Background, Sums, absorbing, per_trial, score
+from kbs_process.estimation.tails import log_tail
 from kbs_process.signals.records import Array
 
 ROWS, KNOWN = 400, 6

@@ -16,13 +16,13 @@ from kbs_process.diagnosis.experiments.hypothesis import Hypothesis, predict
 from kbs_process.diagnosis.nominal.joint import Standing, with_extra
 from kbs_process.diagnosis.proposing import proposals
 from kbs_process.diagnosis.proposing.proposals import proposed
+from kbs_process.diagnosis.proposing.tryout import extra_of
 from kbs_process.diagnosis.screening.ranges import Ranges
 from kbs_process.diagnosis.screening.scene import Scene
 from kbs_process.diagnosis.screening.screen import Bench, Catalogued, screen
 from kbs_process.diagnosis.screening.shapes import bettered
 from kbs_process.diagnosis.screening.suspects import Candidate
 from kbs_process.diagnosis.selection import leaders
-from kbs_process.diagnosis.selection.tryout import extra_of
 from kbs_process.identification.output_error import Scalar
 from kbs_process.plant.attach import attach
 from kbs_process.plant.effect import Effect

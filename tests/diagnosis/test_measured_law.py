@@ -13,7 +13,8 @@ from test_rounds import standing
 
 from kbs_process.campaign.corrected_model import write_model
 from kbs_process.campaign.load import load_campaign
-from kbs_process.diagnosis.acceptance.dissipation import pushes
+from kbs_process.diagnosis.acceptance.plausible import pushes
+from kbs_process.diagnosis.acceptance.verdict import gated
 from kbs_process.diagnosis.experiments.hypothesis import Hypothesis, predict
 from kbs_process.diagnosis.nominal.joint import Own, with_extra
 from kbs_process.diagnosis.nominal.known import Known
@@ -23,7 +24,6 @@ from kbs_process.diagnosis.screening.gls import Score, Sums, score
 from kbs_process.diagnosis.screening.scene import Scene
 from kbs_process.diagnosis.screening.screen import Bench, Found
 from kbs_process.diagnosis.selection import leaders
-from kbs_process.diagnosis.selection.leaders import gated
 from kbs_process.plant.effect import Port
 from kbs_process.plant.laws.position.measured_law import COEFFICIENTS, MEASURED, Measured, torque, torque_over_rate
 

@@ -13,14 +13,14 @@ from kbs_process.diagnosis.acceptance import needed as needing
 from kbs_process.diagnosis.acceptance.finding import Tried
 from kbs_process.diagnosis.acceptance.gate import Gate
 from kbs_process.diagnosis.acceptance.needed import Accepted, in_the_shade, needed
+from kbs_process.diagnosis.acceptance.outcome import Find
 from kbs_process.diagnosis.experiments.experiment import Experiment
 from kbs_process.diagnosis.experiments.floor import declared
 from kbs_process.diagnosis.experiments.thresholds import CLEAR, GATE_SIGMA, STAYS_SIGMA
 from kbs_process.diagnosis.nominal.joint import Own, Standing, with_extra, without
 from kbs_process.diagnosis.nominal.known import Known
-from kbs_process.diagnosis.selection.outcome import Find
+from kbs_process.diagnosis.proposing.tryout import extra_of, identity
 from kbs_process.diagnosis.selection.race import own_of
-from kbs_process.diagnosis.selection.tryout import extra_of, identity
 from kbs_process.plant.laws import CATALOGUE
 
 LAG, CABLE, HARNESS = ("channel_lag", "Tx"), ("ground_cable", "el"), ("harness", "el")

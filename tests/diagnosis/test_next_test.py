@@ -11,18 +11,20 @@ import numpy as np
 import pytest
 
 from kbs_process.diagnosis.acceptance.gate import Gate
+from kbs_process.diagnosis.acceptance.outcome import Alternative, Find
 from kbs_process.diagnosis.experiments.floor import declared
-from kbs_process.diagnosis.experiments.trajectories import family, limits_of
+from kbs_process.diagnosis.facts import Estimate, Identity, Place
 from kbs_process.diagnosis.nominal.joint import Standing
 from kbs_process.diagnosis.selection.next_test import Proposal, propose
-from kbs_process.diagnosis.selection.outcome import Alternative, Estimate, Find, Identity
+from kbs_process.diagnosis.selection.trajectories import family, limits_of
 from kbs_process.identification.output_error import Scalar
 from kbs_process.reduction.commands import read_commands
-from kbs_process.studies.diagnose.next_test import commands_of, next_test
+from kbs_process.studies.diagnose.output import commands_of
+from kbs_process.studies.diagnose.records import next_test
 
 FREE = (Scalar("joint.el.drive.Ka"), Scalar("joint.el.drive.b_m"))
-VISCOUS = Identity("joint torque", "el", (), "viscous", "joint_viscous")
-COULOMB = Identity("joint torque", "el", (), "friction", "coulomb")
+VISCOUS = Identity(Place("joint torque", "el"), "viscous", "joint_viscous")
+COULOMB = Identity(Place("joint torque", "el"), "friction", "coulomb")
 
 
 @pytest.fixture(scope="module")
@@ -78,7 +80,7 @@ def test_viscous_and_coulomb_friction_are_told_apart_by_changes_of_the_rate(stan
     worth = [one.worth for one in proposal.tried]
     assert worth == sorted(worth, reverse=True)
     # At one slow rate the two are alike.
-    slowest = next(one.worth for one in proposal.tried if "scans of the whole range at 0.06" in one.words)
+    slowest = next(one.worth for one in proposal.tried if "scans of the whole range at 0.06" in one.trajectory)
     assert worth[0] > 3.0 * slowest
     # Known parameters that are refitted take some of it.
     assert 0.0 < proposal.distance <= worth[0] * 1.001
@@ -104,7 +106,7 @@ def test_a_number_that_is_weakly_known_is_measured_better(standing: Standing, pr
 
 def test_what_an_encoder_alone_shows_is_measured_with_it(standing: Standing) -> None:
     """Where a joint moves in a planned recording, its encoder is looked at."""
-    law = Identity("encoder", "el", (), "eccentricity", "encoder_eccentricity")
+    law = Identity(Place("encoder", "el"), "eccentricity", "encoder_eccentricity")
     numbers = {"eccentric_sin": 1e-4, "eccentric_cos": 5e-5}
     fitted = tuple(Estimate(name, "rad", value, 0.5 * value) for name, value in numbers.items())
     disc = replace(found(0.3), identity=law, estimates=(*fitted, Estimate("eccentric_order", "1", 300.0, 0.0)))
@@ -119,7 +121,7 @@ def test_its_commands_are_read_as_they_were_planned(standing: Standing, proposal
     read, planned = read_commands(file, ("az", "el")), proposal.trajectory.schedule
     np.testing.assert_allclose(read.position, planned.position, atol=1e-9)
     np.testing.assert_allclose(read.rate, planned.rate, atol=1e-9)
-    record = next_test(proposal, "next.csv")
+    record = next_test(proposal)
     assert record.sigma == proposal.sigma
     assert record.distance is None
 

@@ -31,10 +31,9 @@ from kbs_process.reduction.reading import read_run
 from kbs_process.rig.model import Rig
 from kbs_process.signals.records import Array, Block, Events, Loss, Mask, Run
 from kbs_process.stages.motion import Motion
-from kbs_process.studies.diagnose import stretch
+from kbs_process.studies.diagnose import reading
 from kbs_process.studies.diagnose.diagnosable import LEAST_S, check_copies, check_length, check_noise, check_signs
-from kbs_process.studies.diagnose.stretch import LONGEST_S, busiest, read_stretch
-from kbs_process.studies.diagnose.warnings import passed_over
+from kbs_process.studies.diagnose.reading import LONGEST_S, busiest, passed_over, read_stretch
 
 RIG = bench.rig()
 ENTRY = RecordingEntry("a", Path("recordings/a.mcap"), "SWING", "fit", 1, None, None, None)
@@ -304,7 +303,7 @@ def test_which_part_of_a_long_recording_is_looked_at_is_told(monkeypatch: pytest
         asked.append((entry.start, entry.end))
         return long_run()
 
-    monkeypatch.setattr(stretch, "read_alive", read)
+    monkeypatch.setattr(reading, "read_alive", read)
     part = read_stretch(campaign(), replace(ENTRY, start=100.0), SilentProgress())
     (start, _), (begin, end) = asked
     assert (start, end - begin) == (100.0, LONGEST_S)

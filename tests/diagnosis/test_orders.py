@@ -8,16 +8,17 @@ import bench
 import numpy as np
 import pytest
 
+from kbs_process.diagnosis.acceptance.outcome import Find
 from kbs_process.diagnosis.experiments.hypothesis import Hypothesis, predict
+from kbs_process.diagnosis.facts import Estimate, Identity
 from kbs_process.diagnosis.nominal.joint import with_extra
-from kbs_process.diagnosis.proposing.as_suspect import suspect_of
 from kbs_process.diagnosis.proposing.orders import _of_order, _others, with_orders
+from kbs_process.diagnosis.proposing.tryout import extra_of, identity
+from kbs_process.diagnosis.proposing.view import View
 from kbs_process.diagnosis.screening.scene import Scene
 from kbs_process.diagnosis.screening.screen import Bench, Catalogued, Found, screen
 from kbs_process.diagnosis.screening.suspects import Candidate
-from kbs_process.diagnosis.screening.view import View
-from kbs_process.diagnosis.selection.outcome import Estimate, Find, Identity
-from kbs_process.diagnosis.selection.tryout import extra_of, identity
+from kbs_process.diagnosis.selection.as_suspect import suspect_of
 from kbs_process.identification.output_error import Scalar
 from kbs_process.plant.attach import attach
 from kbs_process.plant.laws import find, select

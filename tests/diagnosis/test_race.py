@@ -11,20 +11,21 @@ from test_rounds import ROLES, standing, with_cable
 
 from kbs_process.diagnosis.acceptance.finding import Tried
 from kbs_process.diagnosis.acceptance.gate import Gate
+from kbs_process.diagnosis.acceptance.verdict import gated
 from kbs_process.diagnosis.experiments.floor import declared
 from kbs_process.diagnosis.experiments.hypothesis import Simulate
 from kbs_process.diagnosis.experiments.thresholds import FIRST, MOSTLY_DONE, TOLERATED, WAYS
 from kbs_process.diagnosis.nominal.joint import Own, Standing, with_extra
+from kbs_process.diagnosis.proposing.tryout import extra_of, identity
+from kbs_process.diagnosis.proposing.view import View
 from kbs_process.diagnosis.screening.screen import Found
-from kbs_process.diagnosis.screening.view import View
 from kbs_process.diagnosis.selection import believed as believing
 from kbs_process.diagnosis.selection import leaders as leading
 from kbs_process.diagnosis.selection import race
 from kbs_process.diagnosis.selection.believed import contested, continued, inherited, named_first, named_there
 from kbs_process.diagnosis.selection.effort import Effort
-from kbs_process.diagnosis.selection.leaders import gated, leaders, tried, various
+from kbs_process.diagnosis.selection.leaders import leaders, tried, various
 from kbs_process.diagnosis.selection.race import Runner, raced
-from kbs_process.diagnosis.selection.tryout import extra_of, identity
 
 RIGHT, WRONG, CURVE = ("ground_cable", "el"), ("harness", "el"), ("ground_angle_law", "el")
 KIN = ("tether", "el")  # of the right one's family and place

@@ -9,14 +9,15 @@ import numpy as np
 import pytest
 from test_rounds import ROLES, screened, standing, with_cable
 
-from kbs_process.diagnosis.acceptance.remains import detected, missed, promises_little, taken, too_little
+from kbs_process.diagnosis.acceptance.remains import missed, promises_little, taken, too_little
 from kbs_process.diagnosis.experiments.experiment import Experiment
 from kbs_process.diagnosis.experiments.floor import declared
 from kbs_process.diagnosis.experiments.thresholds import LEAST_RHO, TAKEN, TOLERATED
 from kbs_process.diagnosis.nominal.joint import Standing, with_extra
-from kbs_process.diagnosis.screening.view import View
+from kbs_process.diagnosis.nominal.settling import detected
+from kbs_process.diagnosis.proposing.tryout import extra_of
+from kbs_process.diagnosis.proposing.view import View
 from kbs_process.diagnosis.selection import rounds
-from kbs_process.diagnosis.selection.tryout import extra_of
 
 
 @pytest.fixture(scope="module")

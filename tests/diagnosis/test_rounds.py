@@ -15,26 +15,26 @@ from kbs_process.diagnosis.acceptance import supposed as supposed_laws
 from kbs_process.diagnosis.acceptance.finding import Tried, as_it_stands, find_of
 from kbs_process.diagnosis.acceptance.gate import Gate, gate
 from kbs_process.diagnosis.acceptance.needed import Accepted
-from kbs_process.diagnosis.acceptance.remains import detected
 from kbs_process.diagnosis.acceptance.rivals import probabilities, rivalry
 from kbs_process.diagnosis.acceptance.supposed import Noted
+from kbs_process.diagnosis.acceptance.verdict import gated
 from kbs_process.diagnosis.experiments.experiment import Experiment
 from kbs_process.diagnosis.experiments.floor import declared
 from kbs_process.diagnosis.experiments.hypothesis import Hypothesis, Simulate, predict
 from kbs_process.diagnosis.experiments.thresholds import told_apart
+from kbs_process.diagnosis.facts import Identity, Place
 from kbs_process.diagnosis.nominal.joint import Own, Standing, with_extra
 from kbs_process.diagnosis.nominal.scatter import scattered
-from kbs_process.diagnosis.proposing.as_suspect import sigma_of, suspect_of
+from kbs_process.diagnosis.nominal.settling import detected
+from kbs_process.diagnosis.proposing.tryout import extra_of, identity
 from kbs_process.diagnosis.screening.gls import Sums, score
 from kbs_process.diagnosis.screening.scene import Scene
 from kbs_process.diagnosis.screening.screen import Bench, Catalogued, Found, Screening, screen
 from kbs_process.diagnosis.screening.suspects import Candidate
 from kbs_process.diagnosis.selection import believed, effort, rounds
+from kbs_process.diagnosis.selection.as_suspect import sigma_of, suspect_of
 from kbs_process.diagnosis.selection.effort import Effort
-from kbs_process.diagnosis.selection.leaders import gated
-from kbs_process.diagnosis.selection.outcome import Identity
 from kbs_process.diagnosis.selection.race import own_of
-from kbs_process.diagnosis.selection.tryout import extra_of, identity
 from kbs_process.identification.output_error import Scalar
 from kbs_process.plant.attach import attach
 from kbs_process.plant.laws import CATALOGUE, SENSING, select
@@ -257,7 +257,7 @@ def test_an_error_of_an_encoder_that_no_law_has_is_measured_with_a_band(made: Ex
     told = passed(here, tried, scene, found, "encoder_profile")
     assert told.gate.passed, told.gate.reasons
     find = find_of([told], 0, np.ones(1), here, None)
-    assert not find.named and (find.identity.port, find.identity.axis) == ("encoder", "el")
+    assert not find.named and (find.identity.place.port, find.identity.place.site) == ("encoder", "el")
     assert find.held_out_variance is not None and find.held_out_variance > 0.9
     assert {one.unit for one in find.estimates} == {"rad"}
     assert find.curve is not None
@@ -281,7 +281,7 @@ def test_an_error_of_an_encoder_that_no_law_has_is_measured_with_a_band(made: Ex
 def test_a_law_that_fell_in_the_plant_is_none_that_the_find_cannot_be_told_from(cable: Standing) -> None:
     tried, scene, found = screened(cable)
     told = passed(cable, tried, scene, found, "ground_cable")
-    fell = Identity("joint torque", "el", (), "harness", "harness")
+    fell = Identity(Place("joint torque", "el"), "harness", "harness")
     with_it, without_it = (
         find_of([told], 0, np.ones(1), cable, None, refused).alternatives for refused in ((), (fell,))
     )

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from diagnosis import bench
-from kbs_process.diagnosis.experiments.detection import Detection
 from kbs_process.diagnosis.experiments.experiment import Experiment
 from kbs_process.diagnosis.experiments.floor import declared
 from kbs_process.diagnosis.experiments.hypothesis import Hypothesis
 from kbs_process.diagnosis.experiments.metric import metrics
 from kbs_process.diagnosis.experiments.thresholds import DETECTED, TOLERATED
 from kbs_process.diagnosis.nominal.costs import GEARS, Found
+from kbs_process.diagnosis.nominal.detection import Detection
 from kbs_process.diagnosis.nominal.ground import Ground
 from kbs_process.diagnosis.nominal.known import refit
 from kbs_process.diagnosis.nominal.parameters import known_parameters, prior

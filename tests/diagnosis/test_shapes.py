@@ -13,10 +13,10 @@ from test_suspects import rig, suspects
 from kbs_process.diagnosis.acceptance.finding import Tried, as_it_stands, find_of
 from kbs_process.diagnosis.acceptance.gate import gate
 from kbs_process.diagnosis.nominal.joint import Own, with_extra
+from kbs_process.diagnosis.proposing.tryout import extra_of
 from kbs_process.diagnosis.screening.scene import Scene
 from kbs_process.diagnosis.screening.screen import Bench, Catalogued, Screening, screen
 from kbs_process.diagnosis.screening.shapes import Bend, bends, bettered
-from kbs_process.diagnosis.selection.tryout import extra_of
 from kbs_process.plant.effect import LogNormal
 
 

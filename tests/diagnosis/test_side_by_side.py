@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from kbs_process.diagnosis.selection.side_by_side import MOST, side_by_side
+from kbs_process.diagnosis.side_by_side import MOST, side_by_side
 
 
 def test_results_come_in_the_order_of_the_items() -> None:

@@ -16,8 +16,8 @@ from kbs_process.diagnosis.experiments.thresholds import HIDDEN
 from kbs_process.diagnosis.nominal.joint import standing_of
 from kbs_process.diagnosis.nominal.known import Known, refit
 from kbs_process.diagnosis.proposing.sizes import in_the_way, of_mounting, sized
+from kbs_process.diagnosis.proposing.view import View
 from kbs_process.diagnosis.screening.screen import Catalogued, Found
-from kbs_process.diagnosis.screening.view import View
 from kbs_process.diagnosis.selection import race, rounds
 from kbs_process.diagnosis.selection.effort import Effort
 from kbs_process.diagnosis.selection.leaders import leaders

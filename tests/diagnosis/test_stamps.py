@@ -14,13 +14,12 @@ from kbs_process.diagnosis.experiments.experiment import Experiment
 from kbs_process.diagnosis.experiments.floor import declared
 from kbs_process.diagnosis.experiments.jumps import jump
 from kbs_process.diagnosis.experiments.stamps import late_by, set_right, slope
-from kbs_process.diagnosis.nominal import mistimed
 from kbs_process.diagnosis.nominal.joint import Standing
 from kbs_process.diagnosis.proposing.clocks import timed
+from kbs_process.diagnosis.proposing.view import View
 from kbs_process.diagnosis.screening.scene import Scene
 from kbs_process.diagnosis.screening.screen import Bench, Catalogued, screen
-from kbs_process.diagnosis.screening.view import View
-from kbs_process.diagnosis.selection import each_recording, rounds
+from kbs_process.diagnosis.selection import each_recording, mistimed, rounds
 from kbs_process.diagnosis.selection.each_recording import jump_gain, taken_off, taken_off_again
 from kbs_process.diagnosis.selection.effort import Effort
 from kbs_process.signals.records import Array

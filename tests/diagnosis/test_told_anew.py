@@ -10,13 +10,14 @@ import pytest
 from test_rounds import candidate, standing
 
 from kbs_process.diagnosis.acceptance.finding import Tried
+from kbs_process.diagnosis.acceptance.verdict import gated
 from kbs_process.diagnosis.experiments.floor import declared
 from kbs_process.diagnosis.nominal.joint import with_extra
+from kbs_process.diagnosis.proposing.tryout import extra_of
 from kbs_process.diagnosis.screening.scene import Scene
 from kbs_process.diagnosis.screening.screen import Bench, Catalogued, screen
-from kbs_process.diagnosis.selection.leaders import gated, reread
+from kbs_process.diagnosis.selection.leaders import reread
 from kbs_process.diagnosis.selection.race import own_of
-from kbs_process.diagnosis.selection.tryout import extra_of
 
 
 def test_a_step_told_at_the_wrong_load_is_found_where_it_is() -> None:

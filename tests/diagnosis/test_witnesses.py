@@ -10,10 +10,9 @@ from test_needed import CABLE, joined
 from test_rounds import ROLES, standing, with_cable
 
 from kbs_process.diagnosis.acceptance.gate import gate
-from kbs_process.diagnosis.acceptance.remains import missed
+from kbs_process.diagnosis.acceptance.remains import blind, missed
 from kbs_process.diagnosis.experiments.experiment import Experiment
 from kbs_process.diagnosis.experiments.thresholds import LEAST_RHO
-from kbs_process.diagnosis.experiments.witnesses import blind
 from kbs_process.diagnosis.nominal.joint import Own, Standing
 from kbs_process.diagnosis.nominal.known import Known
 

@@ -14,8 +14,8 @@ from typing import get_args
 import pytest
 
 from kbs_process.cli import cli
+from kbs_process.diagnosis.facts import Answer
 from kbs_process.studies.diagnose.report import _HEADLINES
-from kbs_process.studies.diagnose.results import Answer
 
 ROOT = Path(__file__).parents[2]
 NOT_OURS = {"build", "node_modules", "results"}

@@ -16,7 +16,7 @@ from end_to_end.archive_run import Processed
 from engine.campaigns import CAMPAIGNS_FOLDER
 from kbs_process.campaign.load import load_campaign
 from kbs_process.progress import SilentProgress
-from kbs_process.recordings import open_recording
+from kbs_process.recordings.mcap.source import open_recording
 from kbs_process.studies.correlate.run import process
 
 KEPT = 0.6  # share of the file that the recorder wrote

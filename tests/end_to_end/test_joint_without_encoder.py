@@ -30,7 +30,7 @@ from kbs_process.signals.records import Events, Signal
 from kbs_process.stages.motion import estimate
 from kbs_process.studies.correlate import run
 from kbs_process.studies.correlate.run import process
-from kbs_process.studies.diagnose.run import experiment_of
+from kbs_process.studies.diagnose.reading import experiment_of
 from kbs_process.studies.identify.run import identify
 
 TOPIC = 'encoder = "/encoder"'

@@ -52,7 +52,7 @@ def test_search_passes_through_amplitude_zero() -> None:
         at = POLAR.back(u)
         return POLAR.jacobian(difference_jacobian(residual, at, np.ones(3)), at)
 
-    fit = fit_map(whole, POLAR.flat_parameters, jacobian=slopes, start=POLAR.flat(start), gain=1e-6, iterations=20)
+    fit = fit_map(whole, POLAR.flat_parameters, jacobian=slopes, start=POLAR.flat(start), iterations=20)
     found = POLAR.back(fit.value)
     assert fit.checks[0].passed
     assert found[0] == pytest.approx(0.8, abs=1e-3)  # the prior holds it by (0.3/0.2)^2 against some thousands

@@ -9,7 +9,8 @@ import numpy as np
 import pandas as pd
 
 from kbs_process.campaign.load import load_campaign
-from kbs_process.recordings import Stream, open_recording
+from kbs_process.recordings.mcap.source import open_recording
+from kbs_process.recordings.mcap.streams import Stream
 from kbs_process.signals.records import Array, Stamps
 
 CAMPAIGN = """

@@ -24,12 +24,13 @@ from importer_files import (
 
 from kbs_process.campaign.load import load_campaign
 from kbs_process.errors import ConfigError, KbsError, OutputError, RecordingError
-from kbs_process.studies import convert as importers
-from kbs_process.studies.convert import isolated
+from kbs_process.recordings import isolated
+from kbs_process.studies.convert.describe import describe
+from kbs_process.studies.convert.run import import_recordings
 
 
 def _import(folder: Path, file: str, mapping: str = MAPPING, notices: list[str] | None = None) -> Path:
-    return importers.import_recordings(
+    return import_recordings(
         write_mapping(folder, file, mapping),
         folder,
         folder / "campaign",
@@ -45,6 +46,7 @@ def _import(folder: Path, file: str, mapping: str = MAPPING, notices: list[str] 
         ('unit = "rad"', 'unit = "degree"', "did you mean 'deg'?"),
         ('"Fx", unit = "N"', '"Fx", unit = "N m"', "unit of torque"),
         ('role = "fit"', 'role = "fitt"', "did you mean 'fit'?"),
+        ("[time]", 'format = "hdf"\n[time]', "'hdf' is not allowed\n  -> did you mean 'hdf5'?"),
         ('unit = "s"', 'unit = "s"\nrate_Hz = 100.0', "delete one of the two"),
         ("wheel =", "wheal =", "wheel"),
         ("description/campaign.toml", "campaign.toml", "does not exist"),
@@ -117,12 +119,12 @@ def test_a_folder_with_something_in_it_is_left_alone(tmp_path: Path) -> None:
 
 def test_unknown_preset_and_missing_source(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="did you mean 'smartwheel'"):
-        importers.import_recordings("smartweel", tmp_path, tmp_path / "campaign")
+        import_recordings("smartweel", tmp_path, tmp_path / "campaign")
     with pytest.raises(RecordingError, match=r"published: github\.com/csu-hmc"):
-        importers.import_recordings("treadmill_fast", tmp_path, tmp_path / "campaign")
+        import_recordings("treadmill_fast", tmp_path, tmp_path / "campaign")
     with pytest.raises(RecordingError, match="tells no format"):
         (tmp_path / "run.xyz").write_text("1")
-        importers.describe(tmp_path / "run.xyz")
+        describe(tmp_path / "run.xyz")
 
 
 WRITERS = {"parquet": write_parquet, "h5": write_hdf5, "tdms": write_tdms, "mf4": write_mdf}
@@ -143,7 +145,7 @@ def test_damaged_binary_files(tmp_path: Path, suffix: str, write: Writer) -> Non
         path = tmp_path / f"{name}.{suffix}"
         path.write_bytes(damaged)
         try:
-            listing = importers.describe(path)
+            listing = describe(path)
         except RecordingError as error:
             assert name in error.where
             assert "Traceback" not in str(error)
@@ -167,7 +169,7 @@ def test_a_reader_that_dies_or_hangs(tmp_path: Path, monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(isolated, "MODULE", "bad_reader")
     monkeypatch.setattr(isolated, "SILENCE_S", 1.0)
     with pytest.raises(RecordingError, match=said):
-        importers.describe(tmp_path / "run.tdms")
+        describe(tmp_path / "run.tdms")
 
 
 def test_a_small_file_that_declares_endless_data(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -178,7 +180,7 @@ def test_a_small_file_that_declares_endless_data(tmp_path: Path, monkeypatch: py
     assert (tmp_path / "bomb.h5").stat().st_size < 10_000
     monkeypatch.setattr(isolated, "DATA_FLOOR", 1 << 22)
     with pytest.raises(RecordingError, match="far more samples"):
-        importers.describe(tmp_path / "bomb.h5")
+        describe(tmp_path / "bomb.h5")
 
 
 def test_missing_library_names_the_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -188,12 +190,12 @@ def test_missing_library_names_the_extra(tmp_path: Path, monkeypatch: pytest.Mon
     (tmp_path / "run.mf4").write_bytes(b"MDF")
     monkeypatch.setattr(isolated, "find_spec", absent)
     with pytest.raises(KbsError, match=r"pip install 'kbs-process\[formats\]'"):
-        importers.describe(tmp_path / "run.mf4")
+        describe(tmp_path / "run.mf4")
 
 
 def test_description_is_a_mapping_to_start_from(tmp_path: Path) -> None:
     write_hdf5(tmp_path / "run.h5", signals(100) | {"t": np.arange(100) * 0.5})
-    described = importers.describe(tmp_path / "run.h5")
+    described = describe(tmp_path / "run.h5")
     assert tomllib.loads(described)["recording"][0]["source"] == "run.h5"
     row = next(line for line in described.splitlines() if line.endswith("  t"))
     assert row.split()[2:6] == ["100", "0", "0", "49.5"]
@@ -207,14 +209,14 @@ def test_the_description_is_taken_whole_and_from_its_folder_only(tmp_path: Path)
 
     rig.write_text(coupled)
     with pytest.raises(ConfigError, match=r"'x\.csv' does not exist"):
-        importers.import_recordings(plan, tmp_path, tmp_path / "campaign")
+        import_recordings(plan, tmp_path, tmp_path / "campaign")
     np.savetxt(tmp_path / "description" / "x.csv", np.eye(6) * 0.01, delimiter=",")
-    folder = importers.import_recordings(plan, tmp_path, tmp_path / "campaign")
+    folder = import_recordings(plan, tmp_path, tmp_path / "campaign")
     assert load_campaign(folder).rig.transducer.cross_coupling.value[2, 2] == 0.01
 
     rig.rename(tmp_path / "rig.toml")
     for name, said in {"parameters/rig.toml": "does not exist", "../rig.toml": "outside the campaign"}.items():
         campaign.write_text(CAMPAIGN.replace("parameters/rig.toml", name))
         with pytest.raises(ConfigError, match=said):
-            importers.import_recordings(plan, tmp_path, tmp_path / "other")
+            import_recordings(plan, tmp_path, tmp_path / "other")
     assert not (tmp_path / "other").exists()

@@ -25,10 +25,9 @@ from importer_files import (
     write_tsv,
 )
 
-from kbs_process.studies import convert as importers
-from kbs_process.studies.convert import text
+from kbs_process.recordings.formats import Text, text
 from kbs_process.studies.convert.clock import numbers
-from kbs_process.studies.convert.mapping import Text
+from kbs_process.studies.convert.run import import_recordings
 
 NO_TIME = MAPPING.replace('[time]\ncolumn = "t"\nunit = "s"\n', "")
 
@@ -77,7 +76,7 @@ NO_TIME = MAPPING.replace('[time]\ncolumn = "t"\nunit = "s"\n', "")
 def test_reads_back_bit_for_bit(tmp_path: Path, file: str, write: Writer, mapping: str) -> None:
     columns = signals(2500)
     write(tmp_path / file, columns)
-    folder = importers.import_recordings(write_mapping(tmp_path, file, mapping), tmp_path / file, tmp_path / "campaign")
+    folder = import_recordings(write_mapping(tmp_path, file, mapping), tmp_path / file, tmp_path / "campaign")
     blocks = read_back(folder, "turn_1")
     stamps = np.rint(columns["t"] * 1e9).astype(np.int64)
     for key, names in {"wrench": ("Fx", "Fy", "Fz"), "encoder": ("angle",)}.items():
@@ -100,7 +99,7 @@ def test_waveforms_bring_their_own_clocks(tmp_path: Path) -> None:
     mapping = NO_TIME
     for name in ("Fx", "Fy", "Fz", "angle"):
         mapping = mapping.replace(f'"{name}"', f'"run/{name}"')
-    folder = importers.import_recordings(write_mapping(tmp_path, "run.tdms", mapping), tmp_path, tmp_path / "c")
+    folder = import_recordings(write_mapping(tmp_path, "run.tdms", mapping), tmp_path, tmp_path / "c")
     blocks = read_back(folder, "turn_1")
     zero = start.astype("datetime64[ns]").astype(np.int64)
     np.testing.assert_array_equal(blocks["wrench"][0], zero + np.arange(200) * 1_000_000)
@@ -116,7 +115,7 @@ def test_streams_of_different_rates(tmp_path: Path) -> None:
             file[name] = columns[name]
         file["angle"], file["ticks"] = columns["angle"][:30], np.arange(30) * 10
     mapping = MAPPING.replace("[wrench]", '[time.encoder]\ncolumn = "ticks"\nrate_Hz = 1000.0\n\n[wrench]')
-    folder = importers.import_recordings(write_mapping(tmp_path, "run.h5", mapping), tmp_path, tmp_path / "c")
+    folder = import_recordings(write_mapping(tmp_path, "run.h5", mapping), tmp_path, tmp_path / "c")
     blocks = read_back(folder, "turn_1")
     assert len(blocks["wrench"][0]) == 300
     np.testing.assert_array_equal(blocks["encoder"][0], np.arange(30) * 10_000_000)
@@ -129,8 +128,8 @@ def test_dates_and_absolute_start(tmp_path: Path) -> None:
     pd.DataFrame({**columns, "t": np.arange(50) * 10}).to_parquet(tmp_path / "counts.parquet")
     dated = MAPPING.replace('unit = "s"', 'unit = "datetime"')
     counted = MAPPING.replace('unit = "s"', 'unit = "ms"\nstart = 2026-01-31T13:00:00+01:00')
-    first = importers.import_recordings(write_mapping(tmp_path, "dates.csv", dated), tmp_path, tmp_path / "a")
-    second = importers.import_recordings(write_mapping(tmp_path, "counts.parquet", counted), tmp_path, tmp_path / "b")
+    first = import_recordings(write_mapping(tmp_path, "dates.csv", dated), tmp_path, tmp_path / "a")
+    second = import_recordings(write_mapping(tmp_path, "counts.parquet", counted), tmp_path, tmp_path / "b")
     expected = dates.as_unit("ns").asi8
     np.testing.assert_array_equal(read_back(first, "turn_1")["wrench"][0], expected)
     np.testing.assert_array_equal(read_back(second, "turn_1")["wrench"][0], expected - 123)
@@ -147,7 +146,7 @@ def test_units_signs_and_wrapped_angles_across_pieces(tmp_path: Path, monkeypatc
         .replace('"Fy", unit = "N"', '"Fy", unit = "N", scale = -2.0')
         .replace('unit = "rad"', 'unit = "deg", unwrap = true')
     )
-    folder = importers.import_recordings(write_mapping(tmp_path, "run.csv", mapping), tmp_path, tmp_path / "c")
+    folder = import_recordings(write_mapping(tmp_path, "run.csv", mapping), tmp_path, tmp_path / "c")
     blocks = read_back(folder, "turn_1")
     expected = np.column_stack([1000.0 * force, -2.0 * force, force])
     np.testing.assert_allclose(blocks["wrench"][1], expected, rtol=1e-15)
@@ -160,7 +159,7 @@ def test_a_motor_s_angle_is_unwrapped_before_it_is_geared_down(tmp_path: Path) -
     zero = 0.0 * t
     write_csv(tmp_path / "run.csv", {"t": t, "Fx": zero, "Fy": zero, "Fz": zero, "angle": degrees % 360.0})
     mapping = MAPPING.replace('unit = "rad"', 'unit = "deg", scale = 0.01, unwrap = 360')
-    folder = importers.import_recordings(write_mapping(tmp_path, "run.csv", mapping), tmp_path, tmp_path / "c")
+    folder = import_recordings(write_mapping(tmp_path, "run.csv", mapping), tmp_path, tmp_path / "c")
     found = read_back(folder, "turn_1")["encoder"][1][:, 0]
     np.testing.assert_allclose(found, 0.01 * np.radians(degrees), atol=1e-12)
 
@@ -194,7 +193,7 @@ def test_force_resolved_in_fixed_axes_is_turned_into_the_transducer(tmp_path: Pa
     down = {"t": t, "Fx": 0 * t, "Fy": 0 * t - 5.0, "Fz": 0 * t + 1.0, "angle": q}
     write_csv(tmp_path / "run.csv", down)
     mapping = MAPPING + '\n[turn]\njoint = "wheel"\naxis = [0, 0, 1]\nfactor = -1.0\n'
-    folder = importers.import_recordings(write_mapping(tmp_path, "run.csv", mapping), tmp_path, tmp_path / "c")
+    folder = import_recordings(write_mapping(tmp_path, "run.csv", mapping), tmp_path, tmp_path / "c")
     expected = np.column_stack([-5.0 * np.sin(q), -5.0 * np.cos(q), np.ones(100)])
     np.testing.assert_allclose(read_back(folder, "turn_1")["wrench"][1], expected, atol=1e-14)
 
@@ -204,7 +203,7 @@ def test_parts_of_one_file_share_no_sample(tmp_path: Path) -> None:
     write_csv(tmp_path / "run.csv", columns)
     second = MAPPING[MAPPING.index("[[recording]]") :].replace('"fit"\nrepeat = 1', '"held-out"\nrepeat = 2')
     mapping = MAPPING + "end_s = 4.0\n\n" + second + "start_s = 4.0\n"
-    folder = importers.import_recordings(write_mapping(tmp_path, "run.csv", mapping), tmp_path, tmp_path / "c")
+    folder = import_recordings(write_mapping(tmp_path, "run.csv", mapping), tmp_path, tmp_path / "c")
     parts = [read_back(folder, name)["wrench"][1] for name in ("turn_1", "turn_2")]
     assert [len(part) for part in parts] == [400, 600]
     np.testing.assert_array_equal(np.concatenate([part[:, 0] for part in parts]), columns["Fx"])
@@ -214,8 +213,8 @@ def test_campaign_keeps_the_template_and_says_where_it_comes_from(tmp_path: Path
     write_csv(tmp_path / "run.csv", signals(50))
     mapping = MAPPING + '\n[source]\norigin = "a \\"quoted\\" bench"\n'
     plan = write_mapping(tmp_path, "run.csv", mapping)
-    one = importers.import_recordings(plan, tmp_path, tmp_path / "one")
-    two = importers.import_recordings(plan, tmp_path, tmp_path / "two")
+    one = import_recordings(plan, tmp_path, tmp_path / "one")
+    two = import_recordings(plan, tmp_path, tmp_path / "two")
     written = (one / "campaign.toml").read_text()
     assert "# kept, comment and all" in written
     assert "old.mcap" not in written

@@ -11,10 +11,11 @@ from importer_files import read_streams
 from scipy.io import loadmat
 
 from kbs_process.campaign.load import load_campaign
-from kbs_process.recordings import Stream
+from kbs_process.recordings.mcap.streams import Stream
 from kbs_process.signals.records import Array, Stamps
-from kbs_process.studies import convert as importers
+from kbs_process.studies.convert import preset_names
 from kbs_process.studies.convert.mapping import find_mapping, load_mapping
+from kbs_process.studies.convert.run import import_recordings
 
 DATA = Path(__file__).parents[3] / "shared" / "data"
 
@@ -33,7 +34,7 @@ def _read(campaign: Path, recording: str, key: str) -> tuple[Stamps, Array]:
     return read_streams(loaded.recording(recording).path, [stream])[key]
 
 
-@pytest.mark.parametrize("name", importers.preset_names())
+@pytest.mark.parametrize("name", preset_names())
 def test_presets_are_sound(name: str) -> None:
     preset = load_mapping(find_mapping(name))
     assert preset.template.is_file()
@@ -43,7 +44,7 @@ def test_presets_are_sound(name: str) -> None:
 
 def test_smartwheel(tmp_path: Path) -> None:
     source = _source("smartwheel")
-    folder = importers.import_recordings("smartwheel", source, tmp_path / "smartwheel")
+    folder = import_recordings("smartwheel", source, tmp_path / "smartwheel")
     raw = pd.read_csv(source / "pushrimkinetics_offsets_baseline.csv", header=None).to_numpy()
     parts = ("baseline_1", "baseline_2")
     stamp, wrench = map(np.concatenate, zip(*(_read(folder, part, "wrench") for part in parts), strict=True))
@@ -64,7 +65,7 @@ def test_smartwheel(tmp_path: Path) -> None:
 def test_treadmill(tmp_path: Path, speed: str) -> None:
     source = _source("treadmill_pitch")
     notices: list[str] = []
-    folder = importers.import_recordings(f"treadmill_{speed}", source, tmp_path / "treadmill", notice=notices.append)
+    folder = import_recordings(f"treadmill_{speed}", source, tmp_path / "treadmill", notice=notices.append)
     for trial in (1, 2):
         raw = pd.read_csv(source / f"Random{speed.title()}Speed{trial}.txt", sep="\t").to_numpy()
         stamp, moment = _read(folder, f"random_{speed}_{trial}", "wrench")
@@ -82,13 +83,13 @@ def test_documented_mapping_is_one(tmp_path: Path) -> None:
     (tmp_path / "mapping.toml").write_text(example)
     mapping = load_mapping(tmp_path / "mapping.toml")
     assert [stream.key for stream in mapping.streams] == ["wrench", "encoder", "command", "temperature"]
-    for name in importers.preset_names():
+    for name in preset_names():
         assert f"`{name}`" in page
 
 
 def test_emps(tmp_path: Path) -> None:
     source = _source("emps")
-    folder = importers.import_recordings("emps", source, tmp_path / "emps")
+    folder = import_recordings("emps", source, tmp_path / "emps")
     raw = loadmat(source / "DATA_EMPS_PULSES.mat")
     stamp, effort = _read(folder, "sweeps_with_pulses_1", "effort")
     _, way = _read(folder, "sweeps_with_pulses_1", "angle")
@@ -101,7 +102,7 @@ def test_emps(tmp_path: Path) -> None:
 
 def test_odrive(tmp_path: Path) -> None:
     source = _source("odrive_cogging")
-    folder = importers.import_recordings("odrive", source, tmp_path / "odrive")
+    folder = import_recordings("odrive", source, tmp_path / "odrive")
     t, counts, current = np.load(source / "slow2_nocomp_1.npy")
     begun = t - t[0] >= 0.5 - 1e-9
     stamp, effort = _read(folder, "slow_2", "effort")

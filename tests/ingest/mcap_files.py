@@ -13,7 +13,8 @@ from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 from numpy.typing import NDArray
 
-from kbs_process.recordings import Stream, open_recording
+from kbs_process.recordings.mcap.source import open_recording
+from kbs_process.recordings.mcap.streams import Stream
 from kbs_process.signals.records import Block, Loss
 
 MAGIC = b"\x89MCAP0\r\n"

@@ -17,7 +17,11 @@ from mcap.writer import CompressionType, IndexType
 from mcap_files import FORCE, MAGIC, read, rewrite, top_records
 
 from kbs_process.errors import RecordingError
-from kbs_process.recordings import OutStream, Stream, inspect_recording, open_recording, write_mcap
+from kbs_process.recordings.inspection import inspect_recording
+from kbs_process.recordings.mcap.messages.encoding import OutStream
+from kbs_process.recordings.mcap.source import open_recording
+from kbs_process.recordings.mcap.streams import Stream
+from kbs_process.recordings.mcap.writer import write_mcap
 from kbs_process.signals.records import Block, Loss
 
 WRENCH = Stream("w", "/wrench", FORCE)

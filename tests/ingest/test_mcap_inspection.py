@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from mcap_files import build
 
-from kbs_process.recordings import OutStream, inspect_recording, write_mcap
-from kbs_process.recordings.mcap.messages.encoding import Encoding
+from kbs_process.recordings.inspection import inspect_recording
+from kbs_process.recordings.mcap.messages.encoding import Encoding, OutStream
+from kbs_process.recordings.mcap.writer import write_mcap
 
 
 @pytest.mark.parametrize("encoding", ["ros2", "json", "protobuf"])

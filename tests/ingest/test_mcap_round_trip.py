@@ -14,8 +14,10 @@ from mcap_files import FORCE, read, rewrite, same_bits
 from mcap_ros2.decoder import DecoderFactory
 
 from kbs_process.errors import OutputError, RecordingError
-from kbs_process.recordings import OutStream, Stream, open_recording, write_mcap
-from kbs_process.recordings.mcap.messages.encoding import Encoding
+from kbs_process.recordings.mcap.messages.encoding import Encoding, OutStream
+from kbs_process.recordings.mcap.source import open_recording
+from kbs_process.recordings.mcap.streams import Stream
+from kbs_process.recordings.mcap.writer import write_mcap
 
 ENCODINGS: tuple[Encoding, ...] = ("ros2", "json", "protobuf")
 ANGLE = ("position[az]", "position[el]", "velocity[az]", "velocity[el]")

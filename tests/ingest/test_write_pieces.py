@@ -12,9 +12,11 @@ from mcap.reader import make_reader
 from mcap.records import Message
 
 from kbs_process.errors import RecordingError
-from kbs_process.recordings import OutStream, Stream, open_recording, write_mcap, write_pieces
 from kbs_process.recordings.mcap import writer
-from kbs_process.recordings.mcap.messages.encoding import Encoding
+from kbs_process.recordings.mcap.messages.encoding import Encoding, OutStream
+from kbs_process.recordings.mcap.source import open_recording
+from kbs_process.recordings.mcap.streams import Stream
+from kbs_process.recordings.mcap.writer import write_mcap, write_pieces
 
 START = 1_700_000_000_000_000_000
 

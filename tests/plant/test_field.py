@@ -9,7 +9,9 @@ import pytest
 from plant_rigs import NOMINAL, two_axis
 
 from kbs_process.plant.attach import attach
-from kbs_process.plant.laws import cogging, select, tooth_stiction
+from kbs_process.plant.laws import select
+from kbs_process.plant.laws.friction import tooth_stiction
+from kbs_process.plant.laws.motor import cogging
 from kbs_process.plant.predict import predict, tap_columns
 from kbs_process.plant.schedule import Schedule
 from kbs_process.rig.model import Rig, substitute

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import re
 import shutil
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
+from typing import Any
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -16,17 +18,16 @@ from kbs_process.campaign.mission import load_day
 from kbs_process.errors import ConfigError
 from kbs_process.mission.planner import Phase, Plan, plan
 from kbs_process.progress import SilentProgress
+from kbs_process.results.pointing import PointingEstimate
 from kbs_process.results.records import load
 from kbs_process.rig.model import substitute
 from kbs_process.signals.records import Array
 from kbs_process.stages import pointing
-from kbs_process.stages.bandpass import Band
-from kbs_process.stages.pointing import PointingStatistics
 from kbs_process.studies.documents import render as build
-from kbs_process.studies.reference_day.day import Extreme, Section
 from kbs_process.studies.reference_day.discussion import discussion
-from kbs_process.studies.reference_day.results import ReferenceDayResults
-from kbs_process.studies.reference_day.run import commands, fly, simulate_day
+from kbs_process.studies.reference_day.flying import commands, fly
+from kbs_process.studies.reference_day.results import PublishedSection, ReferenceDayResults, Section, Torque
+from kbs_process.studies.reference_day.run import simulate_day
 from mission.reference import FOLDER
 
 
@@ -111,33 +112,40 @@ def test_a_section_without_its_event_is_refused(tmp_path: Path) -> None:
     assert not (tmp_path / "out").exists()
 
 
-def made_up(section: Section, errors: tuple[float, float], torque: float) -> Section:
+def made_up(section: dict[str, Any], errors: tuple[float, float], torque: float) -> Section:
     """Return a section with 95 % errors, rad, and a torque in both bands, N m."""
 
-    def one(axis: str, value: float) -> PointingStatistics:
-        return PointingStatistics(axis, 1000, 0.0, 0.0, value, 0.0, value, 0.0, 0.0, 0.0, value)
+    def one(axis: str, value: float) -> PointingEstimate:
+        return PointingEstimate(
+            axis=axis, bias=0.0, bias_sigma=0.0, random=value, random_sigma=0.0,
+            percentile=value, percentile_sigma=0.0, orbit=0.0, greatest=value,
+        )  # fmt: skip
 
-    band = Band("lt1Hz", None, 1.0)
-    return replace(
-        section,
-        statistics=(one("az", errors[0]), one("el", errors[1])),
-        torques=(Extreme(band, "up to 1 Hz", torque, "Tx", 0.0), Extreme(band, "up to 8 Hz", torque, "Tx", 0.0)),
+    def greatest(label: str) -> Torque:
+        return Torque(band="lt1Hz", label=label, value=torque, axis="Tx", time_s=0.0)
+
+    return Section(
+        **section,
+        azimuth=one("az", errors[0]),
+        elevation=one("el", errors[1]),
+        torques=(greatest("up to 1 Hz"), greatest("up to 8 Hz")),
     )
 
 
 def test_the_discussion_says_what_the_numbers_say() -> None:
     campaign = load_campaign(FOLDER, recordings=False)
-    entries = load_day(campaign).sections[:2]
+    spans = ((0.0, 1500.0, ("tracking DRS59",), 1e-3), (1500.0, 1650.0, ("hand-over DRS44",), 2e-2))
     bare = [
-        Section(entries[0], 0.0, 1500.0, ("tracking DRS59",), 1e-3, (), ()),
-        Section(entries[1], 1500.0, 1650.0, ("hand-over DRS44",), 2e-2, (), ()),
-    ]
+        {"name": entry.name, "start_s": start, "end_s": end, "ends_with": entry.until, "modes": modes,
+         "greatest_rate": rate, "published": PublishedSection(**asdict(entry.published), end_s=entry.near)}
+        for entry, (start, end, modes, rate) in zip(load_day(campaign).sections, spans, strict=False)
+        if entry.published is not None
+    ]  # fmt: skip
     quiet = [made_up(one, (1e-4, 1e-4 / (1 + place)), 0.002) for place, one in enumerate(bare)]
-    text = " ".join(discussion(campaign, quiet))
+    text = " ".join(discussion(campaign.rig, quiet))
     assert "They end -150 to +0 s" in text
     assert "takes 150 s where the table allots 300 s" in text
     assert "ours reach 0.002 N m" in text and "ours are no bound for a flexible mast" in text
     loud = [made_up(one, (1e-4, 1e-4), 0.08) for one in bare]
-    assert "no bound" not in " ".join(discussion(campaign, loud))
-    steady = [replace(one, entry=replace(one.entry, published=None)) for one in quiet]
-    assert discussion(campaign, steady) == ()
+    assert "no bound" not in " ".join(discussion(campaign.rig, loud))
+    assert [*discussion(campaign.rig, [msgspec.structs.replace(one, published=None) for one in quiet])] == []

@@ -10,10 +10,11 @@ import msgspec
 import pytest
 from msgspec.structs import replace
 
+from kbs_process.diagnosis.facts import Moved, Place
 from kbs_process.diagnosis.proposing.families import FAMILIES, port_word
 from kbs_process.plant.laws import CATALOGUE, SENSING
 from kbs_process.results.records import Conclusion, Provenance, encode
-from kbs_process.studies.diagnose.results import DiagnosisResults, Find, Fitted, Moved, Place, Rival, Trial
+from kbs_process.studies.diagnose.results import DiagnosisResults, Find, Fitted, Rival, Trial
 from proof import answer, methods
 from proof.bundle import pack
 from proof.diagnosis import answer_of

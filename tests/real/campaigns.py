@@ -11,8 +11,8 @@ import pyarrow.parquet as pq
 from kbs_process.campaign.load import load_campaign
 from kbs_process.progress import SilentProgress
 from kbs_process.results.records import load
-from kbs_process.studies import convert as importers
 from kbs_process.studies.convert import PRESETS
+from kbs_process.studies.convert.run import import_recordings
 from kbs_process.studies.correlate.results import Results
 from kbs_process.studies.correlate.run import process
 
@@ -57,7 +57,7 @@ class Processed:
 
 def processed(mapping, source, folder):
     """Import files by a mapping into a folder, and process the campaign."""
-    campaign = importers.import_recordings(mapping, source, folder / "campaign")
+    campaign = import_recordings(mapping, source, folder / "campaign")
     process(load_campaign(campaign), folder / "results", progress=SilentProgress(), pdf=False)
     return Processed(campaign, folder / "results")
 

@@ -13,13 +13,13 @@ from scipy.signal import butter, sosfiltfilt
 
 from gravity.real_sets import DATA
 from kbs_process.campaign.load import load_campaign
-from kbs_process.diagnosis.nominal.explain import explain
-from kbs_process.diagnosis.selection.outcome import Outcome
+from kbs_process.diagnosis.acceptance.outcome import Outcome
+from kbs_process.diagnosis.selection.explain import explain
 from kbs_process.diagnosis.selection.rounds import diagnose
 from kbs_process.progress import SilentProgress
 from kbs_process.signals.records import Array
-from kbs_process.studies import convert as importers
-from kbs_process.studies.diagnose.run import experiment_of
+from kbs_process.studies.convert.run import import_recordings
+from kbs_process.studies.diagnose.reading import experiment_of
 from kbs_process.studies.diagnose.simulators import Simulators
 from real.campaigns import sampling_error
 from real.test_real_efforts import EMPS, EMPS_S, ODRIVE
@@ -34,7 +34,7 @@ BAND_HZ = 20.0  # in which a residual is scored
 def diagnosed(preset: str, source: Path, folder: Path) -> Outcome:
     """The campaign of a preset through import, refit and search."""
     progress = SilentProgress()
-    campaign = load_campaign(importers.import_recordings(preset, source, folder))
+    campaign = load_campaign(import_recordings(preset, source, folder))
     experiment = experiment_of(campaign, progress)
     with Simulators(experiment) as simulate:
         found = explain(experiment, simulate, progress.task)

@@ -9,6 +9,7 @@ from typing import get_args
 import msgspec
 import numpy as np
 
+from kbs_process.diagnosis.facts import Answer, Moved, Place
 from kbs_process.results.records import Check, Conclusion, encode
 from kbs_process.results.tables import write_table
 from kbs_process.studies.diagnose import results as d
@@ -33,7 +34,7 @@ def trial(name: str, role: str, corrected: float) -> d.Trial:
 
 def find() -> d.Find:
     x = np.linspace(1.2, 1.5, 40)
-    place = d.Place(port="joint torque", site="el", channels=("el", "Ty"))
+    place = Place(port="joint torque", site="el", channels=("el", "Ty"))
     return d.Find(
         name="harness",
         family="harness",
@@ -71,7 +72,7 @@ def results(*finds: d.Find) -> d.DiagnosisResults:
         floor="from 3 repeats",
         log10_p=-220.0,
         moved=(
-            d.Moved(
+            Moved(
                 name="joint.el.drive.Ka",
                 unit="N m/rad",
                 prior=1e4,
@@ -88,7 +89,7 @@ def results(*finds: d.Find) -> d.DiagnosisResults:
             d.Suspect(
                 name="harness",
                 family="harness",
-                place=d.Place(port="joint torque", site="el"),
+                place=Place(port="joint torque", site="el"),
                 distance=310.0,
                 absorbed=0.2,
                 outcome="accepted",
@@ -133,7 +134,7 @@ def test_it_is_headed_by_its_answer(tmp_path: Path) -> None:
         "physics": "Physics left out",
         "undecided": "Undecided",
     }
-    assert set(headings) == set(get_args(d.Answer))
+    assert set(headings) == set(get_args(Answer))
     for answer, heading in headings.items():
         text = page(tmp_path / heading, msgspec.structs.replace(results(), answer=answer))
         assert re.findall("<strong>(.*?)</strong>", text)[:1] == [heading]

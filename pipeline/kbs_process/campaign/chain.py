@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from kbs_process.campaign.documents import Key, Merged, Tree
+from kbs_process.campaign.documents import Key, Merged
 from kbs_process.campaign.problems import Problems
 from kbs_process.errors import did_you_mean
 from kbs_process.rig.model import LAB, TRANSDUCER
 
 
-def order(joints: Mapping[str, Tree], transducer_on: str | None, tables: Merged, problems: Problems) -> tuple[str, ...]:
-    """Return the names of the joints from the laboratory outwards; a rig without a transducer is a chain of joints.
+def order(joints: Mapping[str, str], transducer_on: str | None, tables: Merged, problems: Problems) -> tuple[str, ...]:
+    """Return the joints, given with their parents, from the laboratory outwards; there may be no transducer.
 
     Notes a parent that does not exist, two links on one parent, and links that do not lead to the laboratory.
     """
-    parents = {name: table["parent"] for name, table in joints.items()}
+    parents = dict(joints)
     if transducer_on is not None:
         parents[TRANSDUCER] = transducer_on
     places: dict[str, Key] = {name: ("joint", name, "parent") for name in joints}

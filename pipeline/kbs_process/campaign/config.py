@@ -9,22 +9,26 @@ from typing import Literal
 
 from kbs_process.rig.model import Quantity, Rig
 
+DrivenBy = Literal["command", "motion"]
+Load = Literal["torque", "force"]
+Frame = Literal["S", "T"]  # at the spacecraft's centre of mass, or at the transducer
+Statistic = Literal["peak", "rms"]
+PointingStatistic = Literal["random", "bias", "orbit", "percentile"]
+Role = Literal["calibration", "fit", "held-out"]
+
 
 @dataclass(frozen=True, slots=True)
 class Requirement:
     """A limit on the disturbance; every axis must meet it alone."""
 
     name: str
-    quantity: Literal["torque", "force"]
-    frame: Literal["S", "T"]  # at the spacecraft's centre of mass, or at the transducer
-    statistic: Literal["peak", "rms"]
+    quantity: Load
+    frame: Frame
+    statistic: Statistic
     limit: float  # in `unit`
     unit: str  # "N m" or "N"
     band: tuple[float, float]  # Hz
     source: str
-
-
-PointingStatistic = Literal["random", "bias", "orbit", "percentile"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +104,7 @@ class RecordingEntry:
     name: str  # the file's stem; names the tables of this run
     path: Path
     trajectory: str
-    role: Literal["calibration", "fit", "held-out"]
+    role: Role
     repeat: int
     sha256: str | None  # as the campaign states it, already found right
     start: float | None  # s from the recording's start; what is before is left out
@@ -127,7 +131,7 @@ class Campaign:
     title: str
     article: str
     configuration: str
-    drive: Literal["command", "motion"]
+    drive: DrivenBy
     requirements: tuple[Requirement, ...]
     bands: Bands
     topics: Topics

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import math
+import json
 import re
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
@@ -17,6 +17,7 @@ Tree = dict[str, Any]
 Key = tuple[str | int, ...]  # ("recording", 2, "file")
 
 _HEADER = re.compile(r"^\s*(\[\[?)\s*([^\[\]]+?)\s*\]\]?\s*(?:#.*)?$")
+_BARE = re.compile(r"[A-Za-z0-9_-]+")
 _ASSIGNMENT = re.compile(r"^\s*([A-Za-z0-9_.\-\"' ]+?)\s*=")
 
 
@@ -45,7 +46,10 @@ def dotted(key: Key) -> str:
     """Return the key in the notation of the error messages: "recording[2].file", counted from 1."""
     text = ""
     for part in key:
-        text += f"[{part + 1}]" if isinstance(part, int) else f".{part}" if text else part
+        if isinstance(part, int):
+            text += f"[{part + 1}]"
+        else:
+            text += ("." if text else "") + (part if _BARE.fullmatch(part) else json.dumps(part, ensure_ascii=False))
     return text
 
 
@@ -59,9 +63,10 @@ def read(path: Path, *, role: str, remedy: str) -> Document:
         raise ConfigError(
             f"is not UTF-8 text (byte {error.start})", where=shown(path), remedy="save the file as UTF-8"
         ) from error
-    except OSError as error:
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else error  # a name with a NUL in it
         raise ConfigError(
-            f"cannot be read: {error.strerror}", where=shown(path), remedy="check the file and its permissions"
+            f"cannot be read: {reason}", where=shown(path), remedy="check the file and its permissions"
         ) from error
     try:
         return Document(path, text, tomllib.loads(text))
@@ -70,6 +75,10 @@ def read(path: Path, *, role: str, remedy: str) -> Document:
         raise ConfigError(
             f"is not valid TOML: {message}", where=f"{shown(path)}:{line}", remedy="correct this line"
         ) from error
+    except (ValueError, RecursionError) as error:  # an integer of more than 4300 digits; brackets upon brackets
+        deep = isinstance(error, RecursionError)
+        what = "holds arrays in arrays, hundreds deep" if deep else "holds a number of thousands of digits"
+        raise ConfigError(what, where=shown(path), remedy="write what the format asks for") from error
 
 
 def _decode_error(message: str, text: str) -> tuple[str, int]:
@@ -81,24 +90,6 @@ def _decode_error(message: str, text: str) -> tuple[str, int]:
     if match.group(1) is None:
         return f"{bare} at the end of the file", text.count("\n") + 1
     return f"{bare} (column {match.group(2)})", int(match.group(1))
-
-
-def check_finite(document: Document, problems: Problems) -> None:
-    """Refuse the NaN and infinities that TOML allows: no number of a campaign may be either."""
-    for key, value in _leaves(document.tree):
-        if isinstance(value, float) and not math.isfinite(value):
-            problems.add(document.place(key), f"{value} is not a finite number", "give the number, or ask its source")
-
-
-def _leaves(node: Any, key: Key = ()) -> Iterator[tuple[Key, Any]]:
-    if isinstance(node, dict):
-        for name, value in node.items():
-            yield from _leaves(value, (*key, name))
-    elif isinstance(node, list):
-        for index, value in enumerate(node):
-            yield from _leaves(value, (*key, index))
-    else:
-        yield key, node
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from pathlib import Path
 
 import numpy as np
 
-from kbs_process.campaign.documents import Document, Tree, check_finite, read
+from kbs_process.campaign.documents import Document, read
+from kbs_process.campaign.formats.faults import checked
+from kbs_process.campaign.formats.modal_file import ModalFile, PoseTable
 from kbs_process.campaign.problems import Problems
-from kbs_process.campaign.schema import violations
 from kbs_process.campaign.units import factor
 from kbs_process.errors import did_you_mean
 from kbs_process.plant.linear.modal import ModalModel, ModalTable, tracked
@@ -25,30 +26,23 @@ def read_modal(path: Path, joints: Collection[str]) -> ModalTable:
     """
     problems = Problems(subject=str(path))
     document = read(path, role="the modal file", remedy="correct [model] modal in campaign.toml, or add the file")
-    check_finite(document, problems)
-    for violation in violations(document.tree, "modal"):
-        problems.add(document.place(violation.key), violation.what, violation.remedy)
+    file = checked(document, ModalFile, problems)
+    if file.joint not in joints:
+        problems.add(document.place(("joint",)), f"there is no joint '{file.joint}'", did_you_mean(file.joint, joints))
+    _check_poses(file.pose, document, problems)
     problems.raise_any()
-    tree = document.tree
-    if tree["joint"] not in joints:
-        problems.add(
-            document.place(("joint",)), f"there is no joint '{tree['joint']}'", did_you_mean(tree["joint"], joints)
-        )
-    _check_poses(document, problems)
-    problems.raise_any()
-    models = sorted((_model(pose) for pose in tree["pose"]), key=lambda model: model.angle)
-    return ModalTable(tree["joint"], tracked(models), tree["source"])
+    models = sorted((_model(pose) for pose in file.pose), key=lambda model: model.angle)
+    return ModalTable(file.joint, tracked(models), file.source)
 
 
-def _check_poses(document: Document, problems: Problems) -> None:
-    poses = document.tree["pose"]
-    count = len(poses[0]["mode"])
+def _check_poses(poses: Sequence[PoseTable], document: Document, problems: Problems) -> None:
+    count = len(poses[0].mode)
     angles: set[float] = set()
     for index, pose in enumerate(poses):
-        if len(pose["mode"]) != count:
+        if len(pose.mode) != count:
             problems.add(
                 document.place(("pose", index, "mode")),
-                f"has {len(pose['mode'])} modes, the first pose {count}",
+                f"has {len(pose.mode)} modes, the first pose {count}",
                 "give the same modes at every pose: they are followed from one to the next",
             )
         angle = _angle(pose)
@@ -57,16 +51,16 @@ def _check_poses(document: Document, problems: Problems) -> None:
         angles.add(angle)
 
 
-def _angle(pose: Tree) -> float:
-    return float(pose["angle"]["value"]) * factor(pose["angle"]["unit"], "rad")
+def _angle(pose: PoseTable) -> float:
+    return pose.angle.value * factor(pose.angle.unit, "rad")
 
 
-def _model(pose: Tree) -> ModalModel:
+def _model(pose: PoseTable) -> ModalModel:
     def column(name: str) -> Array:
-        return np.array([float(mode.get(name, 0.0)) for mode in pose["mode"]])
+        return np.array([getattr(mode, name) for mode in pose.mode])
 
     def six(name: str) -> Array:
-        return np.array([mode.get(name, [0.0] * 6) for mode in pose["mode"]], dtype=float).T
+        return np.array([getattr(mode, name) for mode in pose.mode]).T
 
     return ModalModel(
         angle=_angle(pose),

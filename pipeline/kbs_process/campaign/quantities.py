@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,6 +12,9 @@ from kbs_process.campaign.units import UnitMismatchError, factor
 from kbs_process.errors import ConfigError
 from kbs_process.rig.model import Quantity
 from kbs_process.signals.records import WRENCH_CHANNELS, WRENCH_UNITS, Array
+
+if TYPE_CHECKING:
+    from kbs_process.campaign.formats.tables import PlainQuantity, QuantityTable
 
 CHANNELWISE = "SI by channel"  # N for forces, N m for torques
 PAIRWISE = "SI by channel pair"  # N/N, N/(N m), (N m)/N, (N m)/(N m)
@@ -22,28 +25,56 @@ class Kind:
     """What a key expects: SI unit, shape, bound; for a number a wrench channel, the channels recorded."""
 
     unit: str
-    shape: tuple[int, ...]
+    shape: tuple[int, ...] = ()
     low: float | None = None
     strict: bool = False  # `low` itself is refused
     channels: tuple[str, ...] = ()
+    each_joint: bool = False  # one element for each joint, whatever `shape` says
+    of_joint: bool = False  # the unit at a joint that turns: one that slides has m for rad, and N for N m
+
+    @property
+    def bound(self) -> str:
+        """The bound in words."""
+        return "" if self.low is None else f"{'more than' if self.strict else 'at least'} {self.low:g}"
+
+    def in_words(self) -> str:
+        """Say it in a few words: "(3) m, more than 0"."""
+        shape = (
+            f"({', '.join(map(str, self.shape))})" if self.shape else "one for each joint" if self.each_joint else ""
+        )
+        return ", ".join(filter(None, (f"{shape} {self.unit}".strip(), self.bound)))
 
 
-def read_quantity(name: str, table: dict[str, Any], kind: Kind, folder: Path) -> Quantity:
-    """Return the quantity in SI.
+def read_quantity(name: str, table: QuantityTable | PlainQuantity, kind: Kind, folder: Path) -> Quantity:
+    """Return the quantity in SI; CSV files are looked for in `folder`.
 
     Raises ConfigError, its `where` being the key inside the table at fault.
     """
-    given = _array(table["value"], "value", folder)
+    given = _array(table.value, "value", folder)
     value = _shaped(given, kind, "value", scalar_fills=not given.any())
-    sigma = _shaped(_array(table["sigma"], "sigma", folder), kind, "sigma", scalar_fills=True)
-    scale = _scale(table["unit"], kind)
-    value, sigma = value * scale, sigma * scale
+    sigma = _shaped(_array(table.sigma, "sigma", folder), kind, "sigma", scalar_fills=True)
+    scale = _scale(table.unit, kind)
+    with np.errstate(over="ignore"):
+        value, sigma = value * scale, sigma * scale
+    for key, array in (("value", value), ("sigma", sigma)):
+        if not np.isfinite(array).all():
+            raise ConfigError("is beyond all numbers in SI", where=key, remedy="check number and unit")
     if (sigma < 0.0).any():
         raise ConfigError("a standard deviation is negative", where="sigma", remedy="give 0 or more")
     if kind.low is not None and ((value <= kind.low) if kind.strict else (value < kind.low)).any():
-        least = f"{'more than' if kind.strict else 'at least'} {kind.low:g}"
-        raise ConfigError(f"{table['value']} is out of bounds", where="value", remedy=f"give {least}")
-    return Quantity(name, value, kind.unit, sigma, table["source"])
+        raise ConfigError(f"{table.value} is out of bounds", where="value", remedy=f"give {kind.bound}")
+    return Quantity(name, value, kind.unit, sigma, table.source)
+
+
+def quantity_or_fault(
+    name: str, table: QuantityTable | PlainQuantity, kind: Kind, folder: Path
+) -> tuple[Quantity, ConfigError | None]:
+    """Return the quantity in SI; where it cannot be read, zeros in its place and the fault."""
+    try:
+        return read_quantity(name, table, kind, folder), None
+    except ConfigError as error:
+        zero = np.zeros(kind.shape)
+        return Quantity(name, zero, kind.unit, zero, ""), error
 
 
 def _array(given: Any, key: str, folder: Path) -> Array:
@@ -62,6 +93,9 @@ def from_csv(path: Path, key: str) -> Array:
         array = np.loadtxt(path, delimiter=",", ndmin=2)
     except FileNotFoundError as error:
         raise ConfigError(f"the CSV file '{path}' does not exist", where=key, remedy="check its name") from error
+    except OSError as error:
+        what = f"the CSV file '{path}' cannot be read: {error.strerror}"
+        raise ConfigError(what, where=key, remedy="check its name and its permissions") from error
     except (ValueError, UnicodeDecodeError) as error:
         remedy = "one row a line, numbers separated by commas, '#' before comments"
         raise ConfigError(f"the CSV file '{path}' is no matrix: {error}", where=key, remedy=remedy) from error

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from collections.abc import Sequence
 from typing import Any
 
 from kbs_process.campaign.config import SensingLaw
-from kbs_process.campaign.documents import Document, Key, Tree
+from kbs_process.campaign.documents import Document, Key
+from kbs_process.campaign.formats.campaign_file import SensingTable
 from kbs_process.campaign.problems import Problems
 from kbs_process.campaign.quantities import Kind, read_quantity
 from kbs_process.errors import ConfigError, did_you_mean
@@ -26,36 +27,37 @@ def belongs_to_model(law: Sensing) -> bool:
 LAWS = {law.name: law for law in SENSING if belongs_to_model(law)}
 
 
-def read_sensing(document: Document, rig: Rig, problems: Problems) -> tuple[SensingLaw, ...]:
+def read_sensing(
+    tables: Sequence[SensingTable], document: Document, rig: Rig, problems: Problems
+) -> tuple[SensingLaw, ...]:
     """Return the laws under [model] sensing; what is wrong with them is noted."""
-    tables = document.tree.get("model", {}).get("sensing", [])
     found = (_law(table, (*KEY, index), document, rig, problems) for index, table in enumerate(tables))
     return tuple(law for law in found if law is not None)
 
 
-def _law(table: Tree, key: Key, document: Document, rig: Rig, problems: Problems) -> SensingLaw | None:
-    law = LAWS.get(table["law"])
+def _law(table: SensingTable, key: Key, document: Document, rig: Rig, problems: Problems) -> SensingLaw | None:
+    law = LAWS.get(table.law)
     if law is None:
-        what = f"'{table['law']}' is no law of a sensor that a model can contain"
-        problems.add(document.place((*key, "law")), what, did_you_mean(table["law"], LAWS))
+        what = f"'{table.law}' is no law of a sensor that a model can contain"
+        problems.add(document.place((*key, "law")), what, did_you_mean(table.law, LAWS))
         return None
     sites = _sites(law, rig)
-    if table["site"] not in sites:
-        what = f"'{table['site']}' is no site of '{law.name}'"
-        problems.add(document.place((*key, "site")), what, did_you_mean(table["site"], sites))
+    if table.site not in sites:
+        what = f"'{table.site}' is no site of '{law.name}'"
+        problems.add(document.place((*key, "site")), what, did_you_mean(table.site, sites))
     units = {entry.name: entry.unit for entry in law.parameters}
-    given = table["parameters"]
+    given = table.parameters
     for name in sorted(set(units) ^ set(given)):
         what = f"has no '{name}'" if name in units else f"'{name}' is no parameter of '{law.name}'"
         problems.add(document.place((*key, "parameters")), what, did_you_mean(name, units))
     quantities: dict[str, Quantity] = {}
     for name in [name for name in given if name in units]:
         try:
-            path = f"sensing.{table['site']}.{law.name}.{name}"
-            quantities[name] = read_quantity(path, given[name], Kind(units[name], ()), Path())
+            path = f"sensing.{table.site}.{law.name}.{name}"
+            quantities[name] = read_quantity(path, given[name], Kind(units[name]), document.path.parent)
         except ConfigError as error:
             problems.add(document.place((*key, "parameters", name)), error.what, error.remedy)
-    return SensingLaw(law.name, table["site"], quantities)
+    return SensingLaw(law.name, table.site, quantities)
 
 
 def _sites(law: Sensing, rig: Rig) -> tuple[str, ...]:

@@ -4,82 +4,60 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from kbs_process.cli.shared import (
-    FOLDER,
-    campaign_argument,
-    examples,
-    output_option,
-    pdf_option,
-    progress,
-    quiet_option,
-)
+from kbs_process.cli.shared import FOLDER, examples, verb
+
+if TYPE_CHECKING:
+    from kbs_process.campaign.config import Campaign
+    from kbs_process.results.outcome import Outcome
 
 
-@click.command(epilog=examples("identify campaign/DUMMY1", "identify campaign/DUMMY1 --starts 3 --run-to-run 0.01"))
-@campaign_argument
-@click.option(
-    "--starts", type=click.IntRange(min=1), default=2, show_default=True, help="Starting points that are followed."
+@verb(
+    click.option(
+        "--starts", type=click.IntRange(min=1), default=2, show_default=True, help="Starting points that are followed."
+    ),
+    click.option(
+        "--run-to-run",
+        type=click.FloatRange(min=0.0, min_open=True),
+        default=0.02,
+        show_default=True,
+        metavar="SHARE",
+        help="By how much a friction torque differs from run to run, one sigma, of itself.",
+    ),
+    example=("identify campaign/DUMMY1", "identify campaign/DUMMY1 --starts 3 --run-to-run 0.01"),
+    output="results/NAME-identify",
+    pdf=True,
 )
-@click.option(
-    "--run-to-run",
-    type=click.FloatRange(min=0.0, min_open=True),
-    default=0.02,
-    show_default=True,
-    metavar="SHARE",
-    help="By how much a friction torque differs from run to run, one sigma, of itself.",
-)
-@output_option("results/NAME-identify")
-@pdf_option
-@quiet_option
-def identify(campaign: str, starts: int, run_to_run: float, output: Path | None, pdf: bool | None, quiet: bool) -> None:
+def identify(campaign: Campaign, starts: int, run_to_run: float, **options: Any) -> Outcome:
     """Identify the motor-gears of CAMPAIGN from its recordings with the role "fit".
 
     Writes corrected parameter files (identified/parameters), and a report with intervals, checks, correlations and the
     prediction of held-out recordings before and after. Takes ten minutes or more.
     """
-    from kbs_process.campaign.load import load_campaign
-    from kbs_process.campaign.locate import find_campaign, results_folder
-
-    folder = find_campaign(campaign)
-    target = results_folder(folder, output, suffix="-identify")
-    loaded = load_campaign(folder)
     from kbs_process.identification.estimate import Settings
     from kbs_process.studies.identify.run import identify as run
 
-    settings = Settings(starts=starts, run_to_run=run_to_run)
-    outcome = run(loaded, target, settings=settings, progress=progress(quiet), pdf=pdf)
-    for line in outcome.verdict_lines:
-        click.echo(line)
-    click.echo(f"Report: {outcome.report}")
+    return run(campaign, settings=Settings(starts=starts, run_to_run=run_to_run), **options)
 
 
-@click.command(epilog=examples("diagnose campaign/EL089", "diagnose campaign/EL089 -o /data/why --no-pdf"))
-@campaign_argument
-@output_option("results/NAME-diagnosis")
-@pdf_option
-@quiet_option
-def diagnose(campaign: str, output: Path | None, pdf: bool | None, quiet: bool) -> None:
+@verb(
+    example=("diagnose campaign/EL089", "diagnose campaign/EL089 -o /data/why --no-pdf"),
+    output="results/NAME-diagnosis",
+    pdf=True,
+)
+def diagnose(campaign: Campaign, **options: Any) -> Outcome:
     """Find out why recordings of CAMPAIGN differ from their prediction.
 
     Detects what exceeds the repeatability floor, refits the known parameters within their uncertainties, locates what
     they leave, names its physics or measures its law, and tries it on recordings that were held out. Writes a
     corrected model (corrected/) beside the report. Experimental: docs/validations.md says how often it is right.
     """
-    from kbs_process.campaign.load import load_campaign
-    from kbs_process.campaign.locate import find_campaign, results_folder
-
-    folder = find_campaign(campaign)
-    target = results_folder(folder, output, suffix="-diagnosis")
-    loaded = load_campaign(folder)
     from kbs_process.studies.diagnose.run import diagnose as run
 
-    outcome = run(loaded, target, progress=progress(quiet), pdf=pdf)
-    for line in outcome.verdict_lines:
-        click.echo(line)
-    click.echo(f"Report: {outcome.report}")
+    return run(campaign, **options)
 
 
 @click.command(

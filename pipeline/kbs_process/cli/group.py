@@ -1,4 +1,4 @@
-"""The command itself, and all its verbs; a new one is a function in a file beside, and a name here."""
+"""The command itself; its verbs are all commands in the files beside."""
 
 from __future__ import annotations
 
@@ -7,31 +7,11 @@ from pathlib import Path
 import click
 
 from kbs_process import __version__
-from kbs_process.cli.correction import diagnose, identify, prove
-from kbs_process.cli.dynamics import modal, stability
-from kbs_process.cli.flight import flight, reference_day
-from kbs_process.cli.prediction import predict, simulate
-from kbs_process.cli.processing import process, report, validate
-from kbs_process.cli.recordings import import_, inspect
+from kbs_process.cli import correction, dynamics, flight, prediction, processing, recordings
 from kbs_process.cli.shared import examples
 from kbs_process.errors import did_you_mean
 
-VERBS = (
-    process,
-    validate,
-    inspect,
-    simulate,
-    predict,
-    flight,
-    reference_day,
-    stability,
-    modal,
-    identify,
-    diagnose,
-    report,
-    prove,
-    import_,
-)
+_FILES = (correction, dynamics, flight, prediction, processing, recordings)
 
 
 class CampaignGroup(click.Group):
@@ -54,7 +34,7 @@ class CampaignGroup(click.Group):
 
 @click.group(
     cls=CampaignGroup,
-    commands=VERBS,
+    commands=[verb for file in _FILES for verb in vars(file).values() if isinstance(verb, click.Command)],
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
     epilog=examples("campaign/EL089", "campaign/EL089 --check", "validate campaign/EL089", "VERB --help")
     + "\n\nExit status: 0 done; 1 a requirement is not met, or a recording has losses (only with --check); "

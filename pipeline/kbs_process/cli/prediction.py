@@ -3,58 +3,72 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from kbs_process.cli.shared import EXISTING_FILE, campaign_argument, examples, output_option, progress, quiet_option
+from kbs_process.cli.shared import EXISTING_FILE, conclude, examples, output_option, progress, quiet_option, verb
+
+if TYPE_CHECKING:
+    from kbs_process.campaign.config import Campaign
+    from kbs_process.progress import Progress
 
 
-@click.command(
-    epilog=examples(
-        "simulate campaign/EL089 --trajectory EL089P00", "simulate campaign/EL089 --command slew.csv --rate 200"
+def commanded_by(table: str) -> tuple[Any, ...]:
+    """Return the options of a verb that is driven by commands, those of a recording or those of a `table`."""
+
+    def alone(context: click.Context, parameter: click.Parameter, value: Any) -> Any:
+        (other,) = {"trajectory", "command"} - {parameter.name}
+        if value is not None and context.params.get(other) is not None:
+            raise click.UsageError("Give --trajectory or --command, not both.", context)
+        return value
+
+    return (
+        click.option(
+            "--trajectory",
+            metavar="NAME",
+            callback=alone,
+            help="Commands of the first recording of this trajectory [default, without --command: the last one "
+            "listed].",
+        ),
+        click.option("--command", type=EXISTING_FILE, callback=alone, help=table),
     )
+
+
+@verb(
+    *commanded_by(
+        "CSV or Parquet file with columns t (s), and for each joint its angle JOINT (rad) and, if known, its rate "
+        "JOINT.rate (rad/s)."
+    ),
+    click.option(
+        "--rate",
+        type=click.FloatRange(min=0, min_open=True),
+        metavar="HZ",
+        help="Sampling rate of the wrench [default: the recording's; 100 with --command].",
+    ),
+    example=("simulate campaign/EL089 --trajectory EL089P00", "simulate campaign/EL089 --command slew.csv --rate 200"),
+    output="results/NAME-simulated",
+    checksums=False,
 )
-@campaign_argument
-@click.option(
-    "--trajectory",
-    metavar="NAME",
-    help="Commands of the first recording of this trajectory [default, without --command: the last one listed].",
-)
-@click.option(
-    "--command",
-    type=EXISTING_FILE,
-    help="CSV or Parquet file with columns t (s), and for each joint its angle JOINT (rad) and, if known, "
-    "its rate JOINT.rate (rad/s).",
-)
-@click.option(
-    "--rate",
-    type=click.FloatRange(min=0, min_open=True),
-    metavar="HZ",
-    help="Sampling rate of the wrench [default: the recording's; 100 with --command].",
-)
-@output_option("results/NAME-simulated")
-@quiet_option
 def simulate(
-    campaign: str, trajectory: str | None, command: Path | None, rate: float | None, output: Path | None, quiet: bool
-) -> None:
+    campaign: Campaign,
+    trajectory: str | None,
+    command: Path | None,
+    rate: float | None,
+    target: Path,
+    progress: Progress,
+) -> tuple[str, ...]:
     """Run CAMPAIGN's plant on commands alone, through its controller.
 
     Writes wrench, angles and field as Parquet and as simulated.mcap. With --command no recording need be there.
     """
-    if trajectory is not None and command is not None:
-        raise click.UsageError("Give --trajectory or --command, not both.")
-    from kbs_process.campaign.load import load_campaign
-    from kbs_process.campaign.locate import find_campaign, results_folder
     from kbs_process.studies.predict.run import simulate_commands, simulate_trajectory
 
-    folder = find_campaign(campaign)
-    target = results_folder(folder, output, suffix="-simulated")
-    loaded = load_campaign(folder, checksums=False, recordings=command is None)
     if command is not None:
-        written = simulate_commands(loaded, command, target, rate_Hz=rate or 100.0, progress=progress(quiet))
+        written = simulate_commands(campaign, command, target, rate_Hz=rate or 100.0, progress=progress)
     else:
-        written = simulate_trajectory(loaded, trajectory, target, rate_Hz=rate, progress=progress(quiet))
-    click.echo(f"Simulated: {written}")
+        written = simulate_trajectory(campaign, trajectory, target, rate_Hz=rate, progress=progress)
+    return (f"Simulated: {written}",)
 
 
 @click.command(
@@ -90,10 +104,8 @@ def predict(words: tuple[str, ...], model: Path | None, output: Path | None, qui
     folder = find_campaign(words[0] if model is None else str(model))
     # The recordings that a model came from may be elsewhere by now.
     loaded = load_campaign(folder, checksums=False, recordings=model is None)
-    if model is None:
-        target = results_folder(folder, output, suffix="-predicted")
-        written = predict_recording(loaded, words[1], target, progress=progress(quiet))
-    else:
-        named = output or Path("results") / f"{loaded.name}-corrected-predicted"
-        written = predict_with(loaded, words[0], results_folder(folder, named), progress=progress(quiet))
-    click.echo(f"Predicted: {written}")
+    if model is not None:
+        output = output or Path("results") / f"{loaded.name}-corrected-predicted"
+    target = results_folder(folder, output, suffix="-predicted")
+    run = predict_recording if model is None else predict_with
+    conclude((f"Predicted: {run(loaded, words[-1], target, progress=progress(quiet))}",))

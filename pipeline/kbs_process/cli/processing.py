@@ -13,7 +13,9 @@ from kbs_process.cli.shared import (
     INTERRUPTED,
     NOT_MET,
     campaign_argument,
+    check_option,
     complain,
+    conclude,
     examples,
     output_option,
     pdf_option,
@@ -31,7 +33,7 @@ if TYPE_CHECKING:
 @campaign_argument
 @output_option("results/NAME")
 @pdf_option
-@click.option("--check", is_flag=True, help="Exit with 1 when a requirement is not met.")
+@check_option("a requirement is not met")
 @click.option(
     "--diagnose/--no-diagnose",
     "why",
@@ -61,9 +63,7 @@ def process(campaign: str, output: Path | None, pdf: bool | None, check: bool, w
 
     outcome = run(loaded, target, progress=progress(quiet), pdf=pdf)
     try:
-        for line in outcome.verdict_lines:
-            click.echo(line)
-        click.echo(f"Report: {outcome.report}")
+        conclude(outcome)
         if why is False and before is not None and not before.outdated:
             click.echo(f"Diagnosis, of the same inputs, kept from before: {before.folder}")
         if why is not False:
@@ -94,7 +94,7 @@ def _diagnose(campaign: Campaign, results: Path, *, progress: Progress, pdf: boo
 
 @click.command(epilog=examples("validate campaign/EL089", "validate campaign/EL089 --check"))
 @campaign_argument
-@click.option("--check", is_flag=True, help="Exit with 1 when a recording has losses.")
+@check_option("a recording has losses")
 @quiet_option
 def validate(campaign: str, check: bool, quiet: bool) -> None:
     """Check CAMPAIGN's description, read all its recordings through, and fit gravity to them.

@@ -8,13 +8,22 @@ from pathlib import Path
 
 import click
 
-from kbs_process.cli.shared import BAD_INPUT, EXISTING_FILE, FOLDER, NOT_MET, examples, progress, quiet_option
+from kbs_process.cli.shared import (
+    BAD_INPUT,
+    EXISTING_FILE,
+    FOLDER,
+    NOT_MET,
+    check_option,
+    examples,
+    progress,
+    quiet_option,
+)
 from kbs_process.studies.convert import preset_names
 
 
 @click.command(epilog=examples("inspect recording.mcap", "inspect --check campaigns/EL089/recordings/*.mcap"))
 @click.argument("files", nargs=-1, required=True, type=EXISTING_FILE, metavar="FILE...")
-@click.option("--check", is_flag=True, help="Exit with 1 when a recording has losses.")
+@check_option("a recording has losses")
 def inspect(files: tuple[Path, ...], check: bool) -> None:
     """Show what is in recordings: topics, rates, gaps, ranges, damage.
 
@@ -51,15 +60,17 @@ def import_(mapping: str | None, source: Path | None, campaign: Path | None, fil
 
     MAPPING is a TOML file that says which columns are which channels, or the name of a preset.
     """
-    from kbs_process.studies import convert as importers
-
     if file is not None:
-        click.echo(importers.describe(file), nl=False)
+        from kbs_process.studies.convert.describe import describe
+
+        click.echo(describe(file), nl=False)
         return
     if mapping is None or source is None or campaign is None:
         raise click.UsageError(
             f"Give MAPPING, SOURCE and CAMPAIGN, or --describe FILE. Presets: {', '.join(preset_names())}"
         )
+    from kbs_process.studies.convert.run import import_recordings
+
     notice = functools.partial(click.echo, err=True)
-    made = importers.import_recordings(mapping, source, campaign, progress=progress(quiet), notice=notice)
+    made = import_recordings(mapping, source, campaign, progress=progress(quiet), notice=notice)
     click.echo(f"Campaign: {made}")

@@ -1,8 +1,10 @@
-"""What the verbs share: exit statuses, arguments and options, examples, and how they speak."""
+"""What the verbs share: how they load, run, print and end, their arguments and options, and how they speak."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Iterable
+from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -10,8 +12,10 @@ import click
 
 if TYPE_CHECKING:
     from kbs_process.progress import Progress
+    from kbs_process.results.outcome import Outcome
 
 _Verb = TypeVar("_Verb", bound=Callable[..., Any])
+_Option = Callable[[Callable[..., Any]], Callable[..., Any]]
 
 NOT_MET, BAD_INPUT, INTERNAL, INTERRUPTED = 1, 2, 70, 130
 
@@ -36,6 +40,11 @@ def output_option(default: str) -> Callable[[_Verb], _Verb]:
     )
 
 
+def check_option(when: str) -> Callable[[_Verb], _Verb]:
+    """Return the option that makes an exit status of what was found."""
+    return click.option("--check", is_flag=True, help=f"Exit with 1 when {when}.")
+
+
 def examples(*lines: str) -> str:
     """Return an epilog that click prints as it is."""
     return "\b\nExamples:\n" + "\n".join(f"  kbs-process {line}" for line in lines)
@@ -51,3 +60,62 @@ def progress(quiet: bool) -> Progress:
 def complain(message: str) -> None:
     """Say what went wrong, beside the output."""
     click.echo(message, err=True)
+
+
+def verb(
+    *options: _Option,
+    example: Iterable[str],
+    campaign: str | None = None,
+    output: str | None = None,
+    pdf: bool = False,
+    check: str | None = None,
+    **loading: bool,
+) -> Callable[[Callable[..., Outcome | Iterable[str]]], click.Command]:
+    """Return what makes a command of a study: it finds and loads the campaign, runs, prints, and sets the exit status.
+
+    The function is given the campaign, and by name `progress`, the folder of its results (`target`) where there is an
+    `output` (its default, results/NAME...), and every option; it returns an outcome, or lines to be printed. Its
+    docstring is the help. `campaign` is that argument's default, `pdf` offers a report.pdf, `check` says when --check
+    makes a status of the outcome, `loading` is handed to `load_campaign`. The function imports what computes: bad input
+    is told before that.
+    """
+    given = campaign_argument if campaign is None else click.argument("campaign", default=campaign)
+    shared: list[_Option] = [
+        given,
+        *options,
+        *([] if output is None else [output_option(output)]),
+        *([pdf_option] if pdf else []),
+        *([] if check is None else [check_option(check)]),
+        quiet_option,
+    ]
+
+    def decorate(study: Callable[..., Outcome | Iterable[str]]) -> click.Command:
+        @wraps(study)
+        def run(campaign: str, quiet: bool, check: bool = False, **given: Any) -> None:
+            from kbs_process.campaign.load import load_campaign
+            from kbs_process.campaign.locate import find_campaign, results_folder
+
+            folder = find_campaign(campaign)
+            if output is not None:
+                suffix = output.removeprefix("results/NAME")
+                given["target"] = results_folder(folder, given.pop("output"), suffix=suffix)
+            # Where commands come from a table, no recording need be there.
+            loaded = load_campaign(folder, **{"recordings": given.get("command") is None, **loading})
+            conclude(study(loaded, progress=progress(quiet), **given), check=check)
+
+        command: Callable[..., Any] = run
+        for option in reversed(shared):
+            command = option(command)
+        return click.command(study.__name__.replace("_", "-"), epilog=examples(*example))(command)
+
+    return decorate
+
+
+def conclude(outcome: Outcome | Iterable[str], *, check: bool = False) -> None:
+    """Print what a study tells, and end with the status of a requirement that is not met if `check` asks for it."""
+    from kbs_process.results.outcome import Outcome
+
+    for line in outcome.lines if isinstance(outcome, Outcome) else outcome:
+        click.echo(line)
+    if check and isinstance(outcome, Outcome) and outcome.requirement_met is False:
+        sys.exit(NOT_MET)

@@ -31,16 +31,14 @@ class Descent:
 def descend(residual: Residual, J: Array, parameters: Parameters, start: Array, *, gain: float, steps: int) -> Descent:
     """Go down from `start` with slopes J (n, p) until a step promises less than `gain`, at most `steps` residuals."""
     scale, root = parameters.scale, 1.0 / parameters.sigma
-    unbounded = np.full(len(start), np.inf)
-    low = -unbounded if parameters.lower is None else parameters.lower
-    high = unbounded if parameters.upper is None else parameters.upper
+    low, high = parameters.lower, parameters.upper
     R = triangle(np.vstack([J, np.diag(root)]) * scale)
 
     def augmented(theta: Array) -> tuple[Array, Array, float]:
         misfit, excess = residual(theta), (theta - parameters.value) * root
         return misfit, excess, float(misfit @ misfit + excess @ excess)
 
-    theta = np.clip(start, low, high)
+    theta = parameters.clipped(start)
     misfit, excess, cost = augmented(theta)
     first, begin, damping = -1.0, cost, 0.0
     for _ in range(steps):
@@ -52,7 +50,7 @@ def descend(residual: Residual, J: Array, parameters: Parameters, start: Array, 
         first = promised if first < 0.0 else first
         if promised < gain:
             break
-        candidate = np.clip(theta + step * scale, low, high)
+        candidate = parameters.clipped(theta + step * scale)
         *new, new_cost = augmented(candidate)
         gained = cost - new_cost
         if not gained > 0.0:

@@ -8,7 +8,7 @@ with S the long-run covariance of the scores, which holds for residuals of any c
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.linalg import lstsq
@@ -35,8 +35,12 @@ class Parameters:
     names: tuple[str, ...]
     value: Array  # (p,)
     sigma: Array  # (p,) > 0
-    lower: Array | None = None  # (p,)
-    upper: Array | None = None  # (p,)
+    lower: Array = field(default_factory=lambda: np.array(-np.inf))  # (p,), or one for all
+    upper: Array = field(default_factory=lambda: np.array(np.inf))
+
+    def __post_init__(self) -> None:
+        for side in ("lower", "upper"):
+            object.__setattr__(self, side, np.broadcast_to(getattr(self, side), self.value.shape))
 
     @property
     def scale(self) -> Array:
@@ -44,6 +48,28 @@ class Parameters:
         size = np.where(self.value != 0.0, np.abs(self.value), 1.0)
         scale: Array = np.where(np.isfinite(self.sigma), self.sigma, size)
         return scale
+
+    def clipped(self, theta: Array) -> Array:
+        """The nearest numbers (p,) within bounds."""
+        return np.asarray(np.clip(theta, self.lower, self.upper), dtype=np.float64)
+
+    def stuck(self, theta: Array) -> list[str]:
+        """Names of those that are at a bound."""
+        entries = zip(self.names, theta, self.lower, self.upper, strict=True)
+        return [name for name, value, low, high in entries if value <= low or value >= high]
+
+    def extended(
+        self, names: Sequence[str], value: Array, sigma: Array, lower: Array | float, upper: Array | float
+    ) -> Parameters:
+        """These, and more of them."""
+        more = np.broadcast_to(lower, value.shape), np.broadcast_to(upper, value.shape)
+        return Parameters(
+            (*self.names, *names),
+            np.concatenate([self.value, value]),
+            np.concatenate([self.sigma, sigma]),
+            np.concatenate([self.lower, more[0]]),
+            np.concatenate([self.upper, more[1]]),
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +93,6 @@ class Fit:
     checks: tuple[Check, ...]
     residual_rms: float  # of the whitened residual: 1 where the weights are right
     dof: int  # samples less parameters
-    iterations: int
 
     @property
     def ok(self) -> bool:
@@ -85,7 +110,6 @@ def fit_map(
     series: Sequence[tuple[int, int]] | None = None,
     scores: Callable[[Array, Array], Array] | None = None,
     start: Array | None = None,
-    gain: float = 0.0,
     iterations: int = _MAX_ITERATIONS,
 ) -> Fit:
     """Fit `parameters` to a residual (n,) that is measured less modelled over its standard deviation.
@@ -93,13 +117,12 @@ def fit_map(
     `series` says how the residual is laid out: (samples, channels) of each independent stretch of uniformly
     sampled data, row-major, in order; without it residuals are taken as white. `scores` gives, from the residual and
     its Jacobian (n, p), the covariance (p, p) of J^T r by a model of the errors, for what residuals hide; the
-    parameters' is then no smaller. The search begins at `start`, or at the prior's mean, and ends where the next
-    step promises to lower the cost by less than `gain`, or after
-    `iterations`. Raises FitError where data and prior leave a combination of parameters undetermined, and names it.
+    parameters' is then no smaller. The search begins at `start`, or at the prior's mean, and ends after `iterations`
+    at the latest. Raises FitError where data and prior leave a combination of parameters undetermined, and names it.
     """
     gradient = jacobian or (lambda theta: difference_jacobian(residual, theta, parameters.scale))
     begin = parameters.value if start is None else start
-    theta, taken, converged = _minimise(residual, gradient, parameters, begin, gain, iterations)
+    theta, taken, converged = _minimise(residual, gradient, parameters, begin, iterations)
     r, J = residual(theta), gradient(theta)
     precision = parameters.sigma**-2.0
     H_inverse = _inverse(J, precision, parameters)
@@ -125,7 +148,6 @@ def fit_map(
         checks=checks,
         residual_rms=float(np.sqrt(np.mean(r**2))),
         dof=len(r) - len(theta),
-        iterations=taken,
     )
 
 
@@ -140,22 +162,15 @@ def difference_jacobian(residual: Residual, theta: Array, scale: Array) -> Array
 
 
 def _minimise(
-    residual: Residual,
-    gradient: Callable[[Array], Array],
-    parameters: Parameters,
-    start: Array,
-    least: float,
-    most: int,
+    residual: Residual, gradient: Callable[[Array], Array], parameters: Parameters, start: Array, most: int
 ) -> tuple[Array, int, bool]:
     root = 1.0 / parameters.sigma
-    unbounded = np.full(len(parameters.value), np.inf)
-    low = -unbounded if parameters.lower is None else parameters.lower
-    high = unbounded if parameters.upper is None else parameters.upper
+    low, high = parameters.lower, parameters.upper
 
     def augmented(theta: Array) -> Array:
         return np.concatenate([residual(theta), (theta - parameters.value) * root])
 
-    theta = np.clip(start, low, high)
+    theta = parameters.clipped(start)
     scale = parameters.scale
     misfit = augmented(theta)
     cost, damping = _cost(misfit), 0.0
@@ -168,9 +183,7 @@ def _minimise(
             _refuse_singular(R, parameters.names)
         while True:
             whole = damped_step(R, rhs, damping, (low - theta) / scale, (high - theta) / scale)
-            if least > 0.0 and _promised(R, rhs, whole) < least:
-                return theta, iteration, True
-            candidate = np.clip(theta + whole * scale, low, high)
+            candidate = parameters.clipped(theta + whole * scale)
             candidate_misfit = augmented(candidate)
             new = _cost(candidate_misfit)
             if new <= cost or damping > _LARGEST_DAMPING:
@@ -199,12 +212,6 @@ def damped_step(R: Array, rhs: Array, damping: float, lowest: Array, highest: Ar
             break
         step[~held] = lstsq(damped[:, ~held], wanted - damped[:, held] @ step[held])[0]
     return step
-
-
-def _promised(R: Array, rhs: Array, step: Array) -> float:
-    """What the linear model says a step lowers the cost by."""
-    left = rhs - R @ step
-    return float(rhs @ rhs - left @ left)
 
 
 def _cost(r: Array) -> float:
@@ -257,17 +264,7 @@ def _at_least(sandwich: Array, model: Array) -> Array:
 
 
 def _bounds_check(theta: Array, parameters: Parameters) -> Check:
-    stuck = [
-        name
-        for name, value, low, high in zip(
-            parameters.names,
-            theta,
-            np.full_like(theta, -np.inf) if parameters.lower is None else parameters.lower,
-            np.full_like(theta, np.inf) if parameters.upper is None else parameters.upper,
-            strict=True,
-        )
-        if value <= low or value >= high
-    ]
+    stuck = parameters.stuck(theta)
     return Check("within bounds", not stuck, f"at a bound: {', '.join(stuck)}" if stuck else "none at a bound")
 
 

@@ -60,9 +60,7 @@ def draws(theta: Array, C: Array, parameters: Parameters, count: int, rng: np.ra
     root = np.linalg.cholesky(C)
     half = [root @ rng.standard_normal(len(theta)) for _ in range(count // 2)]
     points = [theta + side * one for one in half for side in (1.0, -1.0)]
-    if parameters.lower is None or parameters.upper is None:
-        return points
-    return [np.clip(point, parameters.lower, parameters.upper) for point in points]
+    return [parameters.clipped(point) for point in points]
 
 
 def linearised(

@@ -48,12 +48,12 @@ def profiles(
     points: list[list[tuple[float, float]]] = [[(0.0, 0.0)] for _ in sides]
     for _ in range(2):
         at = [
-            _clipped(fit.value + C[:, i] / C[i, i] * side * r, parameters)
+            parameters.clipped(fit.value + C[:, i] / C[i, i] * side * r)
             for (i, side), r in zip(sides, reach, strict=True)
         ]
         first = residuals(at)
         corrected = [
-            _clipped(theta + _others_step(C, J, r, theta, parameters, i), parameters)
+            parameters.clipped(theta + _others_step(C, J, r, theta, parameters, i))
             for theta, r, (i, _) in zip(at, first, sides, strict=True)
         ]
         before, after = _costs(at, first, parameters), _costs(corrected, residuals(corrected), parameters)
@@ -70,13 +70,6 @@ def profiles(
         ends = [fit.value[i] + side * _end(points[k + (side > 0)]) for side in (-1, 1)]
         found.append(Profile(fit.names[i], x, np.array([D for _, D in known]), float(ends[0]), float(ends[1])))
     return tuple(found)
-
-
-def _clipped(theta: Array, parameters: Parameters) -> Array:
-    if parameters.lower is None or parameters.upper is None:
-        return theta
-    clipped: Array = np.clip(theta, parameters.lower, parameters.upper)
-    return clipped
 
 
 def _costs(thetas: Sequence[Array], residuals: Sequence[Array], parameters: Parameters) -> list[float]:

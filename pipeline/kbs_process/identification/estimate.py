@@ -185,7 +185,7 @@ def _refine(
         mean, C = model.posterior(parameters)
         step = mean - theta
         moved, rounds = float(np.sqrt(step @ np.linalg.solve(C, step) / len(step))), rounds + 1
-        theta = np.clip(mean, parameters.lower, parameters.upper)
+        theta = parameters.clipped(mean)
     objective.unpredicted = model.unpredicted
     fit = fit_map(objective.residual, parameters, jacobian=lambda at: model.slopes, start=theta, iterations=0)
     tests = {
@@ -196,7 +196,7 @@ def _refine(
     checks = (Check("converged", moved <= _STILL, told), *fit.checks[1:], _contact_check(tests))
     return Identification(
         final,
-        replace(fit, checks=checks, iterations=rounds),
+        replace(fit, checks=checks),
         model.slopes,
         tuple(spectra),
         tuple(objective.correction),

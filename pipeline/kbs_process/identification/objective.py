@@ -13,9 +13,10 @@ from kbs_process.identification.screening import Evaluate, Task
 from kbs_process.identification.unknowns import frictions
 from kbs_process.signals.records import Array
 
-_DIFFERENCE = 0.05  # prior sigmas (phases: rad), first difference
-_SEEN = 5.0  # what a difference should move the whitened residual by: above its jumps where friction sticks
-_LEAST_DIFFERENCE, _MOST_DIFFERENCE = 5e-3, 0.4  # prior sigmas
+DIFFERENCE = 0.05  # prior sigmas (phases: rad), first difference
+SEEN = 5.0  # what a difference should move the whitened residual by: above its jumps where friction sticks
+MOST_DIFFERENCE = 0.4  # prior sigmas
+_LEAST_DIFFERENCE = 5e-3  # likewise
 _FAR = 1.5  # prior sigmas, along a principal direction
 
 
@@ -136,7 +137,7 @@ class Objective:
         """
         p = len(self.experiment.free)
         _, length, V = np.linalg.svd(R * scale)
-        h = np.clip(_SEEN / np.maximum(length, 1e-30), _LEAST_DIFFERENCE, _FAR)
+        h = np.clip(SEEN / np.maximum(length, 1e-30), _LEAST_DIFFERENCE, _FAR)
         base = self.in_recordings(theta)
         tasks = [
             (r, values + side * h[k] * scale * V[k], self.spectra[r])
@@ -171,15 +172,15 @@ class Objective:
 
 
 def first_differences(parameters: Parameters) -> Array:
-    differences: Array = np.where(np.isfinite(parameters.sigma), parameters.sigma, 1.0) * _DIFFERENCE
+    differences: Array = np.where(np.isfinite(parameters.sigma), parameters.sigma, 1.0) * DIFFERENCE
     return differences
 
 
 def settled(columns: Mapping[int, list[Array]], parameters: Parameters) -> Array:
-    """Differences that move the whitened residual by about `_SEEN`."""
+    """Differences that move the whitened residual by about `SEEN`."""
     size = np.where(np.isfinite(parameters.sigma), parameters.sigma, 1.0)
     length = lengths(columns, range(len(size)))
-    settled: Array = np.clip(_SEEN / np.maximum(length, 1e-30), _LEAST_DIFFERENCE * size, _MOST_DIFFERENCE * size)
+    settled: Array = np.clip(SEEN / np.maximum(length, 1e-30), _LEAST_DIFFERENCE * size, MOST_DIFFERENCE * size)
     return settled
 
 

@@ -37,6 +37,23 @@ class Scalar:
         return self.quantity + "".join(f"[{index}]" for index in self.element)
 
 
+def values_of(rig: Rig, free: Sequence[Scalar]) -> Array:
+    """(p,) some numbers of a rig as they are."""
+    quantities = rig.quantities()
+    return np.array([float(quantities[one.quantity].value[one.element]) for one in free])
+
+
+def rig_at(rig: Rig, free: Sequence[Scalar], values: Array) -> Rig:
+    """The rig with some numbers set to `values` (p,)."""
+    quantities = rig.quantities()
+    new: dict[str, Array | float] = {}
+    for scalar, value in zip(free, values, strict=True):
+        whole = np.array(new.get(scalar.quantity, quantities[scalar.quantity].value))
+        whole[scalar.element] = value
+        new[scalar.quantity] = whole
+    return substitute(rig, new)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Measured:
     """A recording for the fit, on one grid that begins at its time zero."""
@@ -74,17 +91,11 @@ class Experiment:
     @property
     def nominal(self) -> Array:
         """(p,) free numbers as in the parameter files."""
-        return np.array([_element(self.rig, scalar) for scalar in self.free])
+        return values_of(self.rig, self.free)
 
     def rig_at(self, values: Array) -> Rig:
         """The rig with the free numbers set to `values` (p,)."""
-        quantities = self.rig.quantities()
-        new: dict[str, Array | float] = {}
-        for scalar, value in zip(self.free, values, strict=True):
-            whole = np.array(new.get(scalar.quantity, quantities[scalar.quantity].value))
-            whole[scalar.element] = value
-            new[scalar.quantity] = whole
-        return substitute(self.rig, new)
+        return rig_at(self.rig, self.free, values)
 
     def bands(self, recording: Measured) -> tuple[tuple[float, float], ...]:
         """Hz, of each channel."""
@@ -92,10 +103,6 @@ class Experiment:
         wrench = (self.lowest_Hz, highest[0])
         angle = (self.lowest_Hz, highest[1])
         return (wrench,) * len(self.rig.transducer.channels) + (angle,) * len(self.rig.joints)
-
-
-def _element(rig: Rig, scalar: Scalar) -> float:
-    return float(rig.quantities()[scalar.quantity].value[scalar.element])
 
 
 def sensor_spectra(experiment: Experiment, recording: Measured) -> Spectra:

@@ -34,7 +34,6 @@ class Polar:
         """Priors and bounds in the chart: the pairs have neither."""
         places = [*self.amplitude, *self.phase]
         given = self.parameters
-        assert given.lower is not None and given.upper is not None
         value, sigma, lower, upper = (array.copy() for array in (given.value, given.sigma, given.lower, given.upper))
         value[list(self.phase)] = value[list(self.amplitude)]  # their scale
         sigma[places], lower[places], upper[places] = np.inf, -np.inf, np.inf

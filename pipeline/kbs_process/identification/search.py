@@ -17,13 +17,13 @@ from kbs_process.identification.screening import Evaluate, Start, contacts, phas
 from kbs_process.identification.unknowns import prior, with_factors
 from kbs_process.signals.records import Array
 
-_BETTER = 10.0  # of -2 log likelihood: a phase or an edge is moved for more
+BETTER = 10.0  # of -2 log likelihood: a phase or an edge is moved for more
 _CALM = 0.9  # weight from which a search is near its end
 _STEPS = 6  # with the same slopes
 _TRUSTED = 1.0  # prior sigmas: how far numbers go with the same slopes
 _LEAPS = 2  # every how many rounds other phases and edges are looked at
 _TURNS = 4  # phases that are tried of an effect that is smooth in it
-_EDGES = 4  # pairs of edges that are tried of a contact
+EDGES = 4  # pairs of edges that are tried of a contact
 _FOLLOWED = 2  # Gauss-Newton steps of each in its own numbers, before it is judged
 
 
@@ -94,7 +94,6 @@ def _near(parameters: Parameters, u: Array) -> Parameters:
 
     Farther out friction may turn abrupt, and a mechanism whose friction chatters has no slopes to lead back.
     """
-    assert parameters.lower is not None and parameters.upper is not None
     reach = _TRUSTED * np.where(np.isfinite(parameters.sigma) | (parameters.value != 0.0), parameters.scale, 0.5)
     return replace(
         parameters,
@@ -123,11 +122,11 @@ def leap(objective: Objective, theta: Array, parameters: Parameters) -> Array:
             trials.append(trial)
         best += _gained(objective, theta, trials, [pair.phase, pair.amplitude], J, parameters)
     for contact in contacts(experiment.rig, experiment.effects, experiment.free):
-        trials = edge_minima(objective.residuals, theta, J, parameters, contact, _EDGES)
+        trials = edge_minima(objective.residuals, theta, J, parameters, contact, EDGES)
         own = [contact.torque, contact.width, contact.phase]
         trials = _followed(objective, trials, own, J, parameters)
         best += _gained(objective, theta, trials, own, J, parameters)
-    return _within(best, parameters)
+    return parameters.clipped(best)
 
 
 def _followed(
@@ -158,14 +157,8 @@ def _followed(
             gradient = slopes.T @ r + (at - parameters.value) * weights**2
             step = -np.linalg.solve(slopes.T @ slopes + np.diag(weights**2), gradient)[own]
             moved[k][own] += np.clip(step, -_TRUSTED * scale, _TRUSTED * scale)
-        points = [_within(at, parameters) for at in moved]
+        points = [parameters.clipped(at) for at in moved]
     return points
-
-
-def _within(theta: Array, parameters: Parameters) -> Array:
-    assert parameters.lower is not None and parameters.upper is not None
-    clipped: Array = np.clip(theta, parameters.lower, parameters.upper)
-    return clipped
 
 
 def _gained(
@@ -185,7 +178,7 @@ def _gained(
         costs.append(float(left @ left + along @ moves[-1]))
     chosen = int(np.argmin(costs))
     move = np.zeros_like(theta)
-    if costs[chosen] < costs[0] - _BETTER:
+    if costs[chosen] < costs[0] - BETTER:
         move[own] = (points[chosen] - theta)[own]
         reach = _TRUSTED * parameters.scale[rest]
         move[rest] = np.clip(moves[chosen] - moves[0], -reach, reach)

@@ -109,11 +109,4 @@ def with_factors(parameters: Parameters, experiment: Experiment, run_to_run: flo
         f"{recording.name}: {experiment.free[index].name}" for recording in experiment.recordings for index in scaled
     )
     count = len(names)
-    assert parameters.lower is not None and parameters.upper is not None
-    return Parameters(
-        (*parameters.names, *names),
-        np.concatenate([parameters.value, np.zeros(count)]),
-        np.concatenate([parameters.sigma, np.full(count, run_to_run)]),
-        np.concatenate([parameters.lower, np.full(count, -1.0)]),
-        np.concatenate([parameters.upper, np.full(count, np.inf)]),
-    )
+    return parameters.extended(names, np.zeros(count), np.full(count, run_to_run), -1.0, np.inf)

@@ -1,21 +1,6 @@
-"""Recordings in and out: MCAP, decoded a chunk at a time, verified, and never trusted."""
+"""Recordings in and out, read a piece at a time, verified, and never trusted.
 
-from kbs_process.recordings.inspection import FieldRange, Inspection, TopicInspection, inspect_recording
-from kbs_process.recordings.mcap.messages.encoding import OutStream
-from kbs_process.recordings.mcap.source import Source, TopicSummary, open_recording
-from kbs_process.recordings.mcap.streams import Stream
-from kbs_process.recordings.mcap.writer import write_mcap, write_pieces
-
-__all__ = [
-    "FieldRange",
-    "Inspection",
-    "OutStream",
-    "Source",
-    "Stream",
-    "TopicInspection",
-    "TopicSummary",
-    "inspect_recording",
-    "open_recording",
-    "write_mcap",
-    "write_pieces",
-]
+To read one of the project's own, an MCAP file, begin with `mcap/source`; to write one, with `mcap/writer`; `inspection`
+says what is in it. A file in a foreign format (CSV, Parquet, HDF5, ...) is opened by `open_table` as named columns;
+each format is one file in `formats/`. What the columns mean to a campaign is none of this folder's business.
+"""

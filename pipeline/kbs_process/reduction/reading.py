@@ -6,7 +6,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 from kbs_process.campaign.config import Campaign, RecordingEntry
-from kbs_process.recordings import Stream, open_recording
+from kbs_process.recordings.mcap.source import open_recording
+from kbs_process.recordings.mcap.streams import Stream
 from kbs_process.signals.records import Block, Loss, Run
 from kbs_process.stages.align.condense import CondenseSettings, condense
 

@@ -8,6 +8,8 @@ from typing import Any
 from kbs_process.errors import OutputError
 from kbs_process.report import pdf as paper
 from kbs_process.report.document import Document
+from kbs_process.results.outcome import Outcome
+from kbs_process.results.records import FILE, ResultsFile, encode
 
 
 def build(results: Path, document: Document[Any], pdf: bool | None = None) -> Path:
@@ -30,6 +32,16 @@ def build(results: Path, document: Document[Any], pdf: bool | None = None) -> Pa
             remedy="free space on the disk, or check the folder's permissions",
         ) from None
     return target
+
+
+def publish(
+    folder: Path, target: Path, results: ResultsFile, document: Document[Any], pdf: bool | None, *more: str
+) -> Outcome:
+    """Write results.json and the report into `folder`, which becomes `target`; return what is told, and `more`."""
+    (folder / FILE).write_bytes(encode(results))
+    page = build(folder, document, pdf)
+    met = {"pass": True, "fail": False}.get(results.verdict.status)
+    return Outcome((results.verdict.sentence, *more), met, target / page.name)
 
 
 def _replace(target: Path, content: bytes) -> None:

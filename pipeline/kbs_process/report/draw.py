@@ -111,6 +111,12 @@ def row(height: float, count: int, *, width: float = WIDTH, share_y: bool = Fals
     return figure, list(figure.subplots(1, count, squeeze=False, sharey=share_y)[0])
 
 
+def grid(height: float, rows: int, columns: int = 1, *, share_x: bool = False) -> tuple[Figure, list[Axes]]:
+    """Return a figure with rows and columns of axes, row by row."""
+    figure = Figure(figsize=(WIDTH, height), layout="constrained")
+    return figure, list(figure.subplots(rows, columns, squeeze=False, sharex=share_x).ravel())
+
+
 def legend_above(figure: Figure) -> None:
     """Say above the axes what is what."""
     figure.legend(loc="outside upper left", ncols=4, fontsize=7)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from kbs_process.results.records import Conclusion
+from kbs_process.results.records import Conclusion, Notice
 
 Tone = Literal["", "pass", "fail", "undecided", "muted"]
 
@@ -131,6 +132,11 @@ class Notices:
 
     entries: tuple[tuple[str, str, str, str], ...]  # severity, what, where, remedy
     kind: Literal["notices"] = "notices"
+
+
+def notices(found: Sequence[Notice]) -> tuple[Notices, ...]:
+    """Return the block of what a reader has to know; none where there is nothing."""
+    return (Notices(tuple((n.severity, n.what, n.where, n.remedy) for n in found)),) if found else ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from kbs_process.report.panel import Block, Fold, Grid, Panel, Text
+from kbs_process.report.tables import Tables
 from kbs_process.report.text import count, measure, unit
-from kbs_process.results.records import Constant, Provenance
+from kbs_process.results.records import Constant, Provenance, ResultsFile
 
 
 def panel(made: Provenance, recorded: Mapping[str, str] | None = None) -> Panel:
@@ -26,6 +27,11 @@ def panel(made: Provenance, recorded: Mapping[str, str] | None = None) -> Panel:
         Grid("Inputs", ("File", "SHA-256"), tuple(inputs.items()), "lk"),
     ]
     return Panel("provenance", "Provenance", "What made these results, and from what?", tuple(blocks))
+
+
+def section(results: ResultsFile, tables: Tables) -> Panel:
+    """The section, as the last one of a document."""
+    return panel(results.provenance)
 
 
 def constants(entries: Sequence[Constant]) -> Fold:

@@ -13,3 +13,8 @@ class Outcome:
     verdict_lines: tuple[str, ...]
     requirement_met: bool | None  # None: there is no requirement, or it is undecided
     report: Path
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """The verdict, and where the report is."""
+        return (*self.verdict_lines, f"Report: {self.report}")

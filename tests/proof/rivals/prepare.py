@@ -11,11 +11,11 @@ import numpy as np
 from kbs_process.campaign.load import load_campaign
 from kbs_process.diagnosis.experiments.experiment import Experiment, Trial
 from kbs_process.diagnosis.experiments.hypothesis import Hypothesis, Tapped, tapped
-from kbs_process.diagnosis.nominal.explain import explain
 from kbs_process.diagnosis.nominal.known import Known
+from kbs_process.diagnosis.selection.explain import explain
 from kbs_process.progress import SilentProgress
 from kbs_process.signals.records import WRENCH_CHANNELS
-from kbs_process.studies.diagnose.run import experiment_of
+from kbs_process.studies.diagnose.reading import experiment_of
 from kbs_process.studies.diagnose.simulators import Simulators
 from proof.answer import Moved
 from proof.rivals.case import Array, Case, Recording

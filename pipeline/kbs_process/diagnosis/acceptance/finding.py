@@ -10,20 +10,21 @@ import numpy as np
 from scipy.stats import chi2
 
 from kbs_process.diagnosis.acceptance.gate import Gate
+from kbs_process.diagnosis.acceptance.outcome import Alternative, Curve, Find, Location
 from kbs_process.diagnosis.acceptance.rivals import rivalry
 from kbs_process.diagnosis.experiments.jumps import jump
 from kbs_process.diagnosis.experiments.thresholds import RIVALS, told_apart
+from kbs_process.diagnosis.facts import Estimate, Identity, Place
 from kbs_process.diagnosis.nominal.joint import Own, Standing
 from kbs_process.diagnosis.nominal.known import Known
 from kbs_process.diagnosis.proposing.curves import CurveSuspect, along, basis
 from kbs_process.diagnosis.proposing.families import UNNAMED, family
+from kbs_process.diagnosis.proposing.tryout import identity, in_plant, port_label
 from kbs_process.diagnosis.screening.places import POINT
 from kbs_process.diagnosis.screening.ranges import swept
 from kbs_process.diagnosis.screening.screen import Catalogued, Found, Screening, Suspect
 from kbs_process.diagnosis.screening.signature import per_unit
 from kbs_process.diagnosis.screening.suspects import weighed
-from kbs_process.diagnosis.selection.outcome import Alternative, Curve, Estimate, Find, Identity, Place
-from kbs_process.diagnosis.selection.tryout import identity, in_plant, port_label
 from kbs_process.plant.effect import ACTION, ACTIONS, Effect
 from kbs_process.plant.laws.position.measured_law import Measured
 from kbs_process.plant.sensing import Sensing
@@ -50,7 +51,7 @@ def find_of(
     best: int,
     chances: Array,
     before: Standing,
-    place: Place | None,
+    place: Location | None,
     refused: Sequence[Identity] = (),
 ) -> Find:
     """The find of the `best` of some laws that passed, each right with a chance; `before` stood without it.
@@ -128,7 +129,7 @@ def _equivalents(suspect: Suspect, rig: Rig) -> tuple[Alternative, ...]:
     if not weighed(rig, rig.joint(suspect.joint)):
         return ()
     law = "weight over joint angle"
-    same = Identity("mass properties", suspect.joint, (), family("mass_shift"), law)
+    same = Identity(Place("mass properties", suspect.joint), family("mass_shift"), law)
     return (Alternative(same, 0.0, 0.0, 0.5, indistinguishable=True, refitted=False),)
 
 

@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from scipy.stats import norm
 
 from kbs_process.diagnosis.acceptance.evenness import evenly, parts
-from kbs_process.diagnosis.acceptance.tails import log_tail
 from kbs_process.diagnosis.experiments.thresholds import (
     GATE_FEW,
     GATE_FORETOLD,
@@ -31,6 +30,7 @@ from kbs_process.diagnosis.experiments.thresholds import (
 )
 from kbs_process.diagnosis.nominal.known import Known
 from kbs_process.diagnosis.screening.gls import Background
+from kbs_process.estimation.tails import log_tail
 from kbs_process.signals.records import Array
 
 _ROUNDING = 1e-12  # of a variance, which a difference of two may lose

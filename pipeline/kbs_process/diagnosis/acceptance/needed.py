@@ -9,19 +9,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from kbs_process.diagnosis.acceptance.finding import Tried, explained_share
-from kbs_process.diagnosis.acceptance.remains import detected, missed, searched, too_little
+from kbs_process.diagnosis.acceptance.outcome import Find, Refused
+from kbs_process.diagnosis.acceptance.remains import blind, missed, too_little
+from kbs_process.diagnosis.acceptance.verdict import gated
 from kbs_process.diagnosis.experiments.floor import Floor
 from kbs_process.diagnosis.experiments.hypothesis import Simulate
 from kbs_process.diagnosis.experiments.thresholds import CLEAR, SHADE, STAYS_SIGMA
-from kbs_process.diagnosis.experiments.witnesses import blind
+from kbs_process.diagnosis.facts import Place
 from kbs_process.diagnosis.nominal.costs import GROSS
 from kbs_process.diagnosis.nominal.joint import Own, Standing, without
 from kbs_process.diagnosis.nominal.known import Known
-from kbs_process.diagnosis.nominal.settling import bent
+from kbs_process.diagnosis.nominal.settling import bent, detected, searched
+from kbs_process.diagnosis.proposing.tryout import identity
 from kbs_process.diagnosis.screening.screen import Found
-from kbs_process.diagnosis.selection.leaders import gated
-from kbs_process.diagnosis.selection.outcome import Find, Identity, Refused
-from kbs_process.diagnosis.selection.tryout import identity
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,15 +38,15 @@ def in_the_shade(found: Found, accepted: Sequence[Accepted]) -> tuple[str, ...]:
     for other in accepted:
         there = other.find.identity
         share = found.score.rho_eff / other.find.rho_eff
-        if _where(identity(found.suspect)) == _where(there) and not share >= SHADE:
+        if _where(identity(found.suspect).place) == _where(there.place) and not share >= SHADE:
             return (f"is {100.0 * share:.1f} % of {there.law} there: its formula may be as far from nature's",)
     return ()
 
 
-def _where(one: Identity) -> tuple[str, ...]:
+def _where(one: Place) -> tuple[str, ...]:
     """Mechanics of a joint, its encoder, its field, or a channel."""
     sensed = one.port in ("transducer", "encoder", "clock", "controller")
-    return (one.port if sensed else "mechanics", one.axis, *one.channels[:1])
+    return (one.port if sensed else "mechanics", one.site, *one.channels[:1])
 
 
 def needed(

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
-from dataclasses import replace
+from collections.abc import Collection
 
-from kbs_process.diagnosis.experiments.detection import Detection, detect
-from kbs_process.diagnosis.experiments.experiment import Experiment
 from kbs_process.diagnosis.experiments.floor import Floor
+from kbs_process.diagnosis.experiments.hypothesis import Simulate
 from kbs_process.diagnosis.experiments.thresholds import (
     EVERYWHERE,
     LEAD,
@@ -17,26 +15,11 @@ from kbs_process.diagnosis.experiments.thresholds import (
     TOLERATED,
     UNFORESEEN,
 )
-from kbs_process.diagnosis.nominal.joint import Standing
+from kbs_process.diagnosis.nominal.detection import Detection
+from kbs_process.diagnosis.nominal.joint import Own, Standing, bare
 from kbs_process.diagnosis.nominal.known import Known
-from kbs_process.diagnosis.screening.view import View
-
-
-def detected(standing: Standing, floor: Floor, trials: Sequence[int]) -> Detection:
-    """Detection on readings from which laws that are columns of the prediction are taken off."""
-    known = standing.known
-    experiment = known.experiment
-    if standing.laws:
-        corrected = tuple(
-            replace(
-                trial,
-                measured=trial.measured
-                - (standing.shown(k) - standing.predicted[trial.drive].values) * trial.valid[:, None],
-            )
-            for k, trial in enumerate(experiment.trials)
-        )
-        experiment = replace(experiment, trials=corrected)
-    return detect(experiment, floor, standing.predicted, trials, known=known)
+from kbs_process.diagnosis.nominal.settling import detected, searched
+from kbs_process.diagnosis.proposing.view import View
 
 
 def taken(there: Detection, here: Detection) -> float:
@@ -98,9 +81,18 @@ def promises_little(view: View, there: Detection) -> str:
     return f"would take {100.0 * most:.1f} % of the floor's power at most: {_DIFFER}"
 
 
-def searched(experiment: Experiment) -> bool:
-    """Whether phases and tooth contact are searched for: along a measured motion there are none."""
-    return experiment.drives[0].schedule is not None
-
-
 _DIFFER = "minima of the known parameters differ by as much"
+
+
+def blind(standing: Standing, own: Own, simulate: Simulate) -> frozenset[int]:
+    r"""Held-out trials in which a law does too little to be seen, all other numbers being what they are.
+
+    Equation: $|W (y - y_0)|^2 < \rho^2$, $y_0$ being what the plant without the law predicts there, and $\rho$ the
+        distance from which on a suspect is looked at.
+    Validity: what changes in such a recording when all numbers are refitted is the others' doing. A motion of one axis,
+        with phases of its own that no other recording shows, had been predicted worse beside a friction of the other
+        axis that was right (development), and refused it.
+    """
+    known, out = standing.known, bare(standing, own, simulate).known
+    does = {k: known.residual[k] - out.residual[k] for k in known.experiment.held_out}
+    return frozenset(k for k, change in does.items() if float(change @ change) < LEAST_RHO**2)

@@ -10,11 +10,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from kbs_process.diagnosis.acceptance.finding import Tried
+from kbs_process.diagnosis.acceptance.outcome import Refused
 from kbs_process.diagnosis.experiments.thresholds import MOSTLY_DONE, TAKEN, WAYS
+from kbs_process.diagnosis.facts import Identity
 from kbs_process.diagnosis.nominal.known import Known
+from kbs_process.diagnosis.proposing.tryout import identity
 from kbs_process.diagnosis.screening.screen import Found
-from kbs_process.diagnosis.selection.outcome import Identity, Refused
-from kbs_process.diagnosis.selection.tryout import identity
 
 
 @dataclass(slots=True)
@@ -56,8 +57,8 @@ def supposed(fallen: Sequence[Tried], before: Known) -> list[Tried]:
     much = [one for one in fallen if one.own.names and taken(before, one.standing.known) >= TAKEN]
     best: dict[tuple[str, ...], Tried] = {}
     for one in sorted(much, key=lambda one: one.standing.known.cost):
-        own = identity(one.found.suspect)
-        best.setdefault((own.port, own.axis, *own.channels[:1]), one)
+        own = identity(one.found.suspect).place
+        best.setdefault((own.port, own.site, *own.channels[:1]), one)
     return list(best.values())[:WAYS]
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from kbs_process.diagnosis.experiments.experiment import Drive, Experiment
 from kbs_process.errors import ConfigError, DivergenceError
-from kbs_process.identification.output_error import Scalar
+from kbs_process.identification.output_error import Scalar, rig_at, values_of
 from kbs_process.plant.compiled.simulation import Simulation
 from kbs_process.plant.laws import select
 from kbs_process.plant.moved import added_loads
@@ -21,7 +21,7 @@ from kbs_process.plant.predict import predict_together as simulate_together
 from kbs_process.plant.predict import simulation_of, step_for, tap_columns
 from kbs_process.plant.rigid import loads as rigid_loads
 from kbs_process.plant.structure import Structure
-from kbs_process.rig.model import Rig, substitute
+from kbs_process.rig.model import Rig
 from kbs_process.signals.records import WRENCH_CHANNELS, Array
 from kbs_process.stages.align.resample import resample
 from kbs_process.stages.motion import Motion
@@ -42,18 +42,11 @@ class Hypothesis:
 
     def at(self, free: Sequence[Scalar], values: Array) -> Hypothesis:
         """The same with some numbers at `values` (p,)."""
-        quantities = self.rig.quantities()
-        new: dict[str, Array | float] = {}
-        for scalar, value in zip(free, values, strict=True):
-            whole = np.array(new.get(scalar.quantity, quantities[scalar.quantity].value))
-            whole[scalar.element] = value
-            new[scalar.quantity] = whole
-        return replace(self, rig=substitute(self.rig, new))
+        return replace(self, rig=rig_at(self.rig, free, values))
 
     def values(self, free: Sequence[Scalar]) -> Array:
         """(p,) numbers as they are."""
-        quantities = self.rig.quantities()
-        return np.array([float(quantities[s.quantity].value[s.element]) for s in free])
+        return values_of(self.rig, free)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

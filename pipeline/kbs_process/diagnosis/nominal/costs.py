@@ -11,15 +11,15 @@ from kbs_process.diagnosis.experiments.experiment import Experiment
 from kbs_process.diagnosis.experiments.hypothesis import Hypothesis, Prediction, Simulate
 from kbs_process.diagnosis.experiments.metric import Metric
 from kbs_process.diagnosis.nominal.parameters import Slopes, known_parameters
-from kbs_process.diagnosis.selection.side_by_side import side_by_side
+from kbs_process.diagnosis.side_by_side import side_by_side
 from kbs_process.estimation.fit import Parameters
 from kbs_process.identification.estimate import gearbox
+from kbs_process.identification.objective import DIFFERENCE
 from kbs_process.identification.output_error import Scalar
 from kbs_process.identification.polar import Polar
 from kbs_process.identification.screening import phases
 from kbs_process.signals.records import Array
 
-_DIFFERENCE = 0.05  # prior sigmas (phases: rad), first difference
 GROSS = 1.0  # of the noise: wrong phases alone have left 0.8
 # Which slopes are taken where the search stands: none, those of suspects alone, of drives too, all.
 OLD, OWN, GEARS, ALL = range(4)
@@ -83,7 +83,7 @@ class Costs:
         # A law's number has a prior that is wider by far than it is large.
         self.stated = np.array([one in files for one in free], dtype=np.bool_) & np.isfinite(parameters.sigma)
         self.spread = np.where(self.stated, parameters.sigma, self.scale)
-        self.differences = _DIFFERENCE * self.spread
+        self.differences = DIFFERENCE * self.spread
         self.slow = [i for i, scalar in enumerate(free) if scalar in files - gears]
         self.geared = [i for i, scalar in enumerate(free) if scalar in gears]
         self.calibrations = {trial.drive for trial in trials if trial.role == "calibration"}
@@ -154,14 +154,12 @@ class Costs:
     def room(self, theta: Array) -> tuple[Array, Array]:
         """How far each number may go down and up, in the chart of cosines and sines: these have no bounds."""
         limits = self.polar.flat_parameters
-        assert limits.lower is not None and limits.upper is not None
         u = self.polar.flat(theta)
         return np.minimum(limits.lower - u, 0.0), np.maximum(limits.upper - u, 0.0)
 
     def clipped(self, theta: Array) -> Array:
         """The nearest numbers within bounds."""
-        assert self.parameters.lower is not None and self.parameters.upper is not None
-        return np.asarray(np.clip(theta, self.parameters.lower, self.parameters.upper), dtype=np.float64)
+        return self.parameters.clipped(theta)
 
 
 def added(laws: Laws, free: Sequence[Scalar], values: Array, reference: int) -> Array | float:

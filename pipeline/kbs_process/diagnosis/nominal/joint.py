@@ -105,7 +105,8 @@ def entered(standing: Standing, extra: Extra, simulate: Simulate) -> Entered:
     laws = dict(standing.laws)
     for index, scalar in enumerate(extra.linear):
         laws[scalar.name] = {drive: columns[index] for drive, columns in (extra.columns or {}).items()}
-    parameters = _extended(known.parameters, extra)
+    names = [scalar.name for scalar in (*extra.plant, *extra.linear)]
+    parameters = known.parameters.extended(names, extra.prior, extra.sigma, extra.lower, extra.upper)
     search = Search(
         experiment,
         known.metric,
@@ -206,21 +207,7 @@ def standing_of(known: Known, laws: Laws) -> Standing:
     return Standing(known, own, laws)
 
 
-def _extended(parameters: Parameters, extra: Extra) -> Parameters:
-    assert parameters.lower is not None and parameters.upper is not None
-    names = tuple(scalar.name for scalar in (*extra.plant, *extra.linear))
-    return replace(
-        parameters,
-        names=(*parameters.names, *names),
-        value=np.concatenate([parameters.value, extra.prior]),
-        sigma=np.concatenate([parameters.sigma, extra.sigma]),
-        lower=np.concatenate([parameters.lower, extra.lower]),
-        upper=np.concatenate([parameters.upper, extra.upper]),
-    )
-
-
 def _chosen(parameters: Parameters, index: Sequence[int]) -> Parameters:
-    assert parameters.lower is not None and parameters.upper is not None
     return Parameters(
         tuple(parameters.names[i] for i in index),
         parameters.value[index],

@@ -18,6 +18,7 @@ from kbs_process.diagnosis.experiments.floor import Floor
 from kbs_process.diagnosis.experiments.hypothesis import Hypothesis, Prediction, Simulate
 from kbs_process.diagnosis.experiments.metric import Metric, metrics
 from kbs_process.diagnosis.experiments.softened import softened
+from kbs_process.diagnosis.facts import Moved
 from kbs_process.diagnosis.nominal.costs import ALL, GROSS, Found, Laws
 from kbs_process.diagnosis.nominal.ground import information
 from kbs_process.diagnosis.nominal.parameters import Slopes, known_parameters, prior, within
@@ -82,7 +83,6 @@ class Known:
     def room(self) -> tuple[Array, Array]:
         """How far numbers may go down and up, (p,) each."""
         limits = self.parameters
-        assert limits.lower is not None and limits.upper is not None
         return np.minimum(limits.lower - self.value, 0.0), np.maximum(limits.upper - self.value, 0.0)
 
     @property
@@ -160,6 +160,25 @@ class Known:
         """Whether these numbers are together farther from their priors than chance has them."""
         strain = self.strain
         return strain.count > 0 and bool(chi2.sf(strain.squares, strain.count) < STRAINED)
+
+    @property
+    def numbers(self) -> tuple[Moved, ...]:
+        """Each of the rig's own, before and after; those of laws at a sensor are left out."""
+        units = {name: quantity.unit for name, quantity in self.hypothesis.rig.quantities().items()}
+        entries = zip(self.free, self.value, self.sigma, self.parameters.value, self.parameters.sigma, strict=True)
+        return tuple(
+            Moved(
+                name=scalar.name,
+                unit=units[scalar.quantity],
+                prior=float(prior),
+                prior_sigma=float(spread) if (bounded := bool(np.isfinite(spread) and spread > 0.0)) else None,
+                value=float(value),
+                sigma=float(sigma),
+                sigmas=float((value - prior) / spread) if bounded else None,
+            )
+            for scalar, value, sigma, prior, spread in entries
+            if scalar.quantity in units
+        )
 
     @property
     def stopped(self) -> tuple[str, ...]:
@@ -312,13 +331,7 @@ def known_of(search: Search, found: Found, before: Array) -> Known:
 
 def _checks(known: Known, found: Found) -> tuple[Check, ...]:
     far = [f"{name} ({moved:+.1f})" for name, moved in zip(known.names, known.moved, strict=True) if abs(moved) > MOVED]
-    limits = known.parameters
-    assert limits.lower is not None and limits.upper is not None
-    stuck = [
-        name
-        for name, value, low, high in zip(known.names, known.value, limits.lower, limits.upper, strict=True)
-        if value <= low or value >= high
-    ]
+    stuck = known.parameters.stuck(known.value)
     within, strain = f"all within {MOVED:g} sigma", known.strain
     return (
         Check(CONVERGED, found.converged, f"{found.rounds} rounds"),

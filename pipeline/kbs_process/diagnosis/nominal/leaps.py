@@ -16,9 +16,10 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from kbs_process.diagnosis.nominal.phasing import stages
-from kbs_process.diagnosis.selection.side_by_side import side_by_side
+from kbs_process.diagnosis.side_by_side import side_by_side
 from kbs_process.identification.contact import edge_minima
 from kbs_process.identification.screening import Contact, contacts
+from kbs_process.identification.search import BETTER, EDGES
 from kbs_process.signals.records import Array
 
 if TYPE_CHECKING:
@@ -26,13 +27,11 @@ if TYPE_CHECKING:
     from kbs_process.diagnosis.nominal.search import Search
 
 _SMOOTH = 8  # phases tried all round
-_EDGES = 4  # pairs of edges tried of a contact
 _DIFFERENCE = 0.01  # rad, of an edge, and 5 % of a torque, for a candidate's own step
 _STRIDES = 2  # pairs of edges tried of a contact by steps of all numbers
 _REACH = 0.06  # rad: an edge's own step goes no farther than half the grid that proposed it
 _WALK = (-0.3, -0.16, -0.08, -0.03, 0.03, 0.08, 0.16, 0.3)  # rad, outwards: an edge's places that are tried
 _NARROWEST = 0.02  # rad, half a contact
-_BETTER = 10.0  # of -2 log likelihood, for which something is moved
 _RIDGE = 1e-10  # of each number's own information
 _FOLLOWED = (1.0, 0.3, 0.0)  # shares of how the others follow
 _RISE = 1.5  # times the cost, that a leap may bring before the others have settled
@@ -86,7 +85,7 @@ def stride(search: Search, found: Found, steps: int, most: int) -> Found | None:
                 reached.append(search.descend(gone, steps, most=most))
             costs = [sum(search.cost(one.theta, one.predicted)) for one in reached]
             best = int(np.argmin(costs))
-            found = reached[best] if costs[best] < costs[0] - _BETTER else found
+            found = reached[best] if costs[best] < costs[0] - BETTER else found
     return None if found is begun else found
 
 
@@ -157,10 +156,10 @@ class Moving:
         )
 
     def best(self, theta: Array, points: Sequence[Array]) -> Array:
-        """The best of some points, the rest having followed; `theta` itself where none is better by `_BETTER`."""
+        """The best of some points, the rest having followed; `theta` itself where none is better by `BETTER`."""
         here, *others = self.followed([theta, *points])
         chosen = min(others, key=lambda one: one.cost, default=here)
-        return theta if chosen.cost > here.cost - _BETTER else self.with_rest(theta, chosen, here)
+        return theta if chosen.cost > here.cost - BETTER else self.with_rest(theta, chosen, here)
 
     def with_rest(self, theta: Array, chosen: Followed, here: Followed) -> Array:
         """`theta` moved to a point that was judged, the rest following."""
@@ -185,7 +184,7 @@ class Moving:
 
     def edges(self, theta: Array, contact: Contact) -> list[Array]:
         """Points with the contact's edges where they might be, each after a step of its own."""
-        points = self.minima(theta, contact, _EDGES)
+        points = self.minima(theta, contact, EDGES)
         return [*points, *self.stepped(points)]
 
     def minima(self, theta: Array, contact: Contact, most: int) -> list[Array]:

@@ -42,7 +42,6 @@ def prior(rig: Rig, nominal: Rig, effects: Sequence[str], free: Sequence[Scalar]
 
 def within(parameters: Parameters, reach: float, among: Mask | None = None) -> Parameters:
     """Bounds no farther than `reach` sigmas from the means, of all that have a sigma or of those `among` them."""
-    assert parameters.lower is not None and parameters.upper is not None
     chosen = np.isfinite(parameters.sigma) & (True if among is None else among)
     apart = np.where(chosen, reach * parameters.sigma, np.inf)
     return replace(

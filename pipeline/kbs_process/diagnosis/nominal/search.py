@@ -16,7 +16,7 @@ from kbs_process.diagnosis.nominal.costs import ALL, GEARS, OLD, Found, Predicti
 from kbs_process.diagnosis.nominal.ground import Ground
 from kbs_process.diagnosis.nominal.leaps import leap, stride
 from kbs_process.diagnosis.nominal.tangents import Step, Tangents
-from kbs_process.diagnosis.selection.side_by_side import side_by_side
+from kbs_process.diagnosis.side_by_side import side_by_side
 from kbs_process.signals.records import Array
 
 # Tried side by side, as many as a processor's vector has lanes: valleys are as narrow as 1e-8 of what is across them,

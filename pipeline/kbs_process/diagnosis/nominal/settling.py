@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
-from kbs_process.diagnosis.acceptance.remains import detected, searched
+from collections.abc import Sequence
+from dataclasses import replace
+
+from kbs_process.diagnosis.experiments.experiment import Experiment
 from kbs_process.diagnosis.experiments.floor import Floor
 from kbs_process.diagnosis.experiments.hypothesis import Simulate
 from kbs_process.diagnosis.experiments.thresholds import CLOSE, MOST, NOMINAL
+from kbs_process.diagnosis.nominal.detection import Detection, detect
 from kbs_process.diagnosis.nominal.joint import Standing, standing_of
 from kbs_process.diagnosis.nominal.known import confined, settled
 
@@ -57,3 +61,25 @@ def released(standing: Standing, floor: Floor, simulate: Simulate) -> Standing:
     left = detected(held, floor, known.experiment.fit).left
     again = resettled(held, floor, simulate, leaps=1 if left else 0)
     return again if again.known.cost < known.cost else standing
+
+
+def detected(standing: Standing, floor: Floor, trials: Sequence[int]) -> Detection:
+    """Detection on readings from which laws that are columns of the prediction are taken off."""
+    known = standing.known
+    experiment = known.experiment
+    if standing.laws:
+        corrected = tuple(
+            replace(
+                trial,
+                measured=trial.measured
+                - (standing.shown(k) - standing.predicted[trial.drive].values) * trial.valid[:, None],
+            )
+            for k, trial in enumerate(experiment.trials)
+        )
+        experiment = replace(experiment, trials=corrected)
+    return detect(experiment, floor, standing.predicted, trials, known=known)
+
+
+def searched(experiment: Experiment) -> bool:
+    """Whether phases and tooth contact are searched for: along a measured motion there are none."""
+    return experiment.drives[0].schedule is not None

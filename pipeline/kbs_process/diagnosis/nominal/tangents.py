@@ -13,11 +13,11 @@ from kbs_process.diagnosis.experiments.hypothesis import Prediction
 from kbs_process.diagnosis.nominal.costs import ALL, GEARS, OLD, OWN, Costs, Found, Gradients, Predictions
 from kbs_process.diagnosis.nominal.parameters import Slopes, slopes
 from kbs_process.diagnosis.nominal.secants import along_valleys
+from kbs_process.identification.objective import MOST_DIFFERENCE, SEEN
 from kbs_process.signals.records import Array
 
-_SEEN = 5.0  # what a difference should move the whitened residual by
 _SPAN = 1.0  # of a step
-_LEAST_DIFFERENCE, _MOST_DIFFERENCE = 2e-3, 0.4  # prior sigmas
+_LEAST_DIFFERENCE = 2e-3  # prior sigmas
 _MUCH = 0.5  # prior sigmas of a body's number, within which its slopes and others' stay what they are
 # Of the whitened residual's length: what a number moves by one sigma and is not looked at again.
 _NEGLIGIBLE = 1.0
@@ -122,13 +122,13 @@ class Tangents(Costs):
         return new
 
     def settle(self, H: Array, moved: Array) -> None:
-        """Differences that move the whitened residual by about `_SEEN`, and span some of what a step has moved.
+        """Differences that move the whitened residual by about `SEEN`, and span some of what a step has moved.
 
         Where friction sticks or slips by a hair, slopes over less than the next step say nothing of it.
         """
         length = np.sqrt(np.maximum(np.diag(H), 1e-300))
         self.differences = np.clip(
-            np.maximum(_SEEN / length, _SPAN * moved), _LEAST_DIFFERENCE * self.spread, _MOST_DIFFERENCE * self.spread
+            np.maximum(SEEN / length, _SPAN * moved), _LEAST_DIFFERENCE * self.spread, MOST_DIFFERENCE * self.spread
         )
 
 

@@ -12,14 +12,14 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from kbs_process.diagnosis.acceptance.tails import log_tail
 from kbs_process.diagnosis.experiments.thresholds import FALSE_ALARM, ITS_OWN, LEAST_RHO, ORDERS_SHARE
 from kbs_process.diagnosis.proposing.proposals import LONGEST_BEAT
+from kbs_process.diagnosis.proposing.view import View
 from kbs_process.diagnosis.screening.gls import Score, Sums, score
 from kbs_process.diagnosis.screening.ranges import SPECTRUM
 from kbs_process.diagnosis.screening.screen import Bench, Catalogued, Found
 from kbs_process.diagnosis.screening.suspects import Candidate, free_actions
-from kbs_process.diagnosis.screening.view import View
+from kbs_process.estimation.tails import log_tail
 from kbs_process.plant.effect import Effect
 from kbs_process.plant.laws import find
 from kbs_process.signals.records import Array

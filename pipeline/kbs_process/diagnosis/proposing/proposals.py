@@ -12,7 +12,7 @@ from kbs_process.diagnosis.nominal.known import Known
 from kbs_process.diagnosis.proposing.folding import periods
 from kbs_process.diagnosis.proposing.sweeps import sweeping
 from kbs_process.diagnosis.screening.scene import Scene
-from kbs_process.diagnosis.selection.side_by_side import side_by_side
+from kbs_process.diagnosis.side_by_side import side_by_side
 from kbs_process.signals.records import Array
 
 _HIGHEST_ORDER = 420.0  # of a motor: twice the teeth's passing and what lies around it

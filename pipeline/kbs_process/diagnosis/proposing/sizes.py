@@ -14,9 +14,9 @@ import numpy as np
 
 from kbs_process.diagnosis.experiments.hypothesis import Hypothesis, Simulate
 from kbs_process.diagnosis.proposing.clocks import height_of
+from kbs_process.diagnosis.proposing.tryout import inserted
+from kbs_process.diagnosis.proposing.view import View
 from kbs_process.diagnosis.screening.screen import Bench, Catalogued, Found, Suspect, evidence
-from kbs_process.diagnosis.screening.view import View
-from kbs_process.diagnosis.selection.tryout import inserted
 from kbs_process.plant.effect import Effect, Port
 from kbs_process.signals.records import Array
 

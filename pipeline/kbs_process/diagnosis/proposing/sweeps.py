@@ -6,8 +6,8 @@ import numpy as np
 from scipy.fft import fft, next_fast_len
 from scipy.optimize import minimize
 
-from kbs_process.diagnosis.acceptance.tails import log_tail
 from kbs_process.diagnosis.experiments.thresholds import LINE_ALPHA
+from kbs_process.estimation.tails import log_tail
 from kbs_process.signals.records import Array
 
 _PADDED = 2  # times, for frequencies between those that a recording resolves

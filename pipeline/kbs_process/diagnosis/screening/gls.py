@@ -25,9 +25,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, eigh
 
-from kbs_process.diagnosis.acceptance.tails import log_tail
 from kbs_process.diagnosis.experiments.thresholds import ABSORBED, DEPENDENT
 from kbs_process.estimation.bounded import bounded_minimum
+from kbs_process.estimation.tails import log_tail
 from kbs_process.signals.records import Array
 
 _RIDGE = 1e-12  # of unit columns

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from kbs_process.diagnosis.experiments.floor import Floor, channel_windows
 from kbs_process.diagnosis.experiments.hypothesis import coupled
 from kbs_process.diagnosis.experiments.thresholds import WINDOW_S
+from kbs_process.diagnosis.facts import Place
 from kbs_process.diagnosis.nominal.joint import Standing
 from kbs_process.diagnosis.nominal.known import Known
 from kbs_process.diagnosis.screening.inlets import (
@@ -28,19 +29,6 @@ from kbs_process.rig.model import TRANSDUCER, Rig
 from kbs_process.signals.records import WRENCH_CHANNELS, Array, Mask
 
 _VARIES = 3  # inputs from which on the eight channels have no room for all of their first-order changes
-
-
-@dataclass(frozen=True, slots=True)
-class PortName:
-    """A port in the field's words: what, on which joint, link or stream, and which channels it touches."""
-
-    port: str
-    axis: str = ""
-    channels: tuple[str, ...] = ()
-
-    @property
-    def label(self) -> str:
-        return " ".join(part for part in (self.port, self.axis, " ".join(self.channels)) if part)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,7 +55,7 @@ class _Window:
 
 def cells_and_ports(
     standing: Standing, floor: Floor, paths: Mapping[int, Path]
-) -> tuple[Cells, tuple[PortModel, ...], dict[str, PortName]]:
+) -> tuple[Cells, tuple[PortModel, ...], dict[str, Place]]:
     """Residuals and ports over all trajectories that may be fitted; `paths` (by drive) of each one's reference.
 
     Recordings that have no window without a gap have no cells, and nothing is said of ports.
@@ -127,35 +115,35 @@ def _no_cells(c: int, p: int) -> Cells:
     return Cells(z, np.zeros((0, c, p), dtype=np.complex128), index, np.zeros(p), none, none, none, index)
 
 
-def _ports(rig: Rig, channels: Sequence[str], wrench: int) -> tuple[PortName, ...]:
+def _ports(rig: Rig, channels: Sequence[str], wrench: int) -> tuple[Place, ...]:
     driven = [joint.name for joint in rig.joints if joint.drive is not None]
-    internal = [PortName(port, name) for name in driven for port in ("motor torque", "transmission", "joint torque")]
-    grounds = [PortName("ground torque", name) for name in driven]
+    internal = [Place(port, name) for name in driven for port in ("motor torque", "transmission", "joint torque")]
+    grounds = [Place("ground torque", name) for name in driven]
     links = [name for name in (TRANSDUCER, *rig.joint_names) if name in links_beyond(rig)]
-    outside = [PortName("external wrench", link) for link in links] + [PortName("base")] * bool(links)
-    outside += [PortName("base torque")] * plate_turns(rig)
-    sensors = [PortName("transducer", "", (name,)) for name in channels[:wrench]]
-    encoders = [PortName("encoder", name) for name in channels[wrench:]]
-    clocks = [PortName("clock", "wrench")] + [PortName("clock", "encoder")] * bool(encoders)
+    outside = [Place("external wrench", link) for link in links] + [Place("base", "")] * bool(links)
+    outside += [Place("base torque", "")] * plate_turns(rig)
+    sensors = [Place("transducer", "", (name,)) for name in channels[:wrench]]
+    encoders = [Place("encoder", name) for name in channels[wrench:]]
+    clocks = [Place("clock", "wrench")] + [Place("clock", "encoder")] * bool(encoders)
     return (*internal, *grounds, *outside, *sensors, *encoders, *clocks)
 
 
-def _inlets(name: PortName) -> tuple[Inlet, ...]:
+def _inlets(name: Place) -> tuple[Inlet, ...]:
     match name.port:
         case "external wrench":
-            return tuple(Inlet(WRENCH_PORT, name.axis, axis) for axis in WRENCH_CHANNELS)
+            return tuple(Inlet(WRENCH_PORT, name.site, axis) for axis in WRENCH_CHANNELS)
         case "base":
             return tuple(Inlet(BASE_PORT, "", axis) for axis in "xyz")
         case "base torque":
             return tuple(Inlet(MOUNTING_PORT, "", axis) for axis in "xyz")
         case "ground torque":
-            return (Inlet(GROUND_PORT, name.axis),)
+            return (Inlet(GROUND_PORT, name.site),)
         case _:
-            return (Inlet(name.port.replace(" ", "_"), name.axis),)
+            return (Inlet(name.port.replace(" ", "_"), name.site),)
 
 
 def _all_shown(
-    names: Sequence[PortName], known: Known, window: _Window, path: Path, late: Array
+    names: Sequence[Place], known: Known, window: _Window, path: Path, late: Array
 ) -> dict[str, tuple[Complex, Complex]]:
     """By label: transfer vectors (b, c, d) in a window and their first-order changes (b, c, e), whitened."""
     experiment = known.experiment
@@ -183,9 +171,9 @@ def _all_shown(
     for name in names:
         if name.port == "clock":
             part = np.arange(c) < experiment.loads
-            shown[name.label] = window(late * (part if name.axis == "wrench" else ~part))[:, :, None], nothing
+            shown[name.label] = window(late * (part if name.site == "wrench" else ~part))[:, :, None], nothing
         elif name not in plant:
-            touched = name.channels[0] if name.channels else name.axis
+            touched = name.channels[0] if name.channels else name.site
             unit = np.zeros((b, c, 1), dtype=complex)
             unit[:, experiment.channels.index(touched), 0] = 1.0
             shown[name.label] = window.whiten(unit), nothing

@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 from scipy.stats import f as fisher_f
 
-from kbs_process.diagnosis.acceptance.tails import log_tail
 from kbs_process.diagnosis.experiments.thresholds import CELL_ALPHA, PORT_ALPHA, PORT_ERROR, RIVALS
+from kbs_process.estimation.tails import log_tail
 from kbs_process.signals.records import Array
 
 Complex = NDArray[np.complex128]

@@ -15,7 +15,6 @@ from typing import Protocol
 import numpy as np
 from scipy.special import logsumexp
 
-from kbs_process.diagnosis.acceptance.tails import log_tail
 from kbs_process.diagnosis.experiments.hypothesis import coupled
 from kbs_process.diagnosis.experiments.jumps import PLACES, jump
 from kbs_process.diagnosis.experiments.stamps import late_by
@@ -28,7 +27,8 @@ from kbs_process.diagnosis.screening.scene import Scene
 from kbs_process.diagnosis.screening.signature import inputs, reduced, sensed, stamped, unit_values
 from kbs_process.diagnosis.screening.suspects import Candidate
 from kbs_process.diagnosis.screening.transfer import BATCH, respond
-from kbs_process.diagnosis.selection.side_by_side import side_by_side
+from kbs_process.diagnosis.side_by_side import side_by_side
+from kbs_process.estimation.tails import log_tail
 from kbs_process.plant.sensing import Sensing, SensingPort
 from kbs_process.signals.records import WRENCH_CHANNELS, Array
 

@@ -14,16 +14,15 @@ from scipy.interpolate import CubicSpline
 
 from kbs_process.diagnosis.experiments.hypothesis import Tapped
 from kbs_process.diagnosis.experiments.stamps import slope
-from kbs_process.diagnosis.screening.courses import Course, courses
 from kbs_process.diagnosis.screening.inlets import BASE_PORT, MOUNTING_PORT, WRENCH_PORT, Inlet
 from kbs_process.diagnosis.screening.places import point_of
+from kbs_process.diagnosis.screening.scene import Course, courses
 from kbs_process.diagnosis.screening.suspects import Candidate, own_values
 from kbs_process.plant.along import along, signals_of
 from kbs_process.plant.effect import Effect, Port
 from kbs_process.plant.laws import select
 from kbs_process.plant.linear.linearise import drive_slopes
-from kbs_process.plant.sensing import Sensing, SensingPort
-from kbs_process.plant.sensing.sensing import BY
+from kbs_process.plant.sensing import BY, Sensing, SensingPort
 from kbs_process.plant.taps import plate_column
 from kbs_process.rig.model import Rig
 from kbs_process.signals.records import WRENCH_CHANNELS, Array

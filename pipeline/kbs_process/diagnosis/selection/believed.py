@@ -11,22 +11,24 @@ from scipy.special import softmax
 from kbs_process.diagnosis.acceptance.finding import Tried, find_of
 from kbs_process.diagnosis.acceptance.moments import only_while
 from kbs_process.diagnosis.acceptance.needed import Accepted
+from kbs_process.diagnosis.acceptance.outcome import Location
 from kbs_process.diagnosis.acceptance.remains import too_little
 from kbs_process.diagnosis.acceptance.rivals import evidences
 from kbs_process.diagnosis.acceptance.supposed import Noted
+from kbs_process.diagnosis.acceptance.verdict import gated
 from kbs_process.diagnosis.experiments.floor import Floor
 from kbs_process.diagnosis.experiments.hypothesis import Simulate
 from kbs_process.diagnosis.experiments.thresholds import CONTESTED, GATE_SIGMA, MOST, SECOND, SETTLED, TOLERATED
+from kbs_process.diagnosis.facts import Identity, Place
 from kbs_process.diagnosis.nominal.joint import Standing
 from kbs_process.diagnosis.nominal.settling import released, resettled
 from kbs_process.diagnosis.proposing.families import UNNAMED
+from kbs_process.diagnosis.proposing.tryout import identity
+from kbs_process.diagnosis.proposing.view import View
 from kbs_process.diagnosis.screening.screen import Found
 from kbs_process.diagnosis.screening.shapes import bettered
-from kbs_process.diagnosis.screening.view import View
 from kbs_process.diagnosis.selection.effort import Effort
-from kbs_process.diagnosis.selection.leaders import gated, reread, tried
-from kbs_process.diagnosis.selection.outcome import Identity, Place
-from kbs_process.diagnosis.selection.tryout import identity
+from kbs_process.diagnosis.selection.leaders import reread, tried
 from kbs_process.signals.records import Array
 
 
@@ -34,7 +36,7 @@ def believed(
     passed: Sequence[Tried],
     view: View,
     standing: Standing,
-    place: Place | None,
+    place: Location | None,
     floor: Floor,
     simulate: Effort,
     accepted: Sequence[Accepted],
@@ -88,7 +90,7 @@ def contested(passed: Sequence[Tried], floor: Floor, simulate: Simulate) -> list
     What their numbers are strained by then decides between them: it was done before any law was in the plant.
     """
     best = min(passed, key=lambda one: one.standing.known.cost)
-    first: dict[tuple[str, ...], Tried] = {}
+    first: dict[Place, Tried] = {}
     for one in sorted(passed, key=lambda one: one.standing.known.cost):
         if one.own.names and _as_good(one, best):
             first.setdefault(_law(one).place, one)
@@ -134,7 +136,7 @@ def _as_well_elsewhere(told: Tried, passed: Sequence[Tried], before: Standing) -
     if before.known.gross or not told.own.names or told.gate.sigmas >= GATE_SIGMA:
         return ()
     elsewhere = [_law(one) for one in passed if _as_good(one, told) and _law(one).place != _law(told).place]
-    return tuple(f"{one.law} ({one.port}) does as well, and parts of recordings differ" for one in elsewhere)
+    return tuple(f"{one.law} ({one.place.port}) does as well, and parts of recordings differ" for one in elsewhere)
 
 
 def _stands_in(
@@ -173,10 +175,13 @@ def named_first(passed: Sequence[Tried]) -> list[Tried]:
     named = [one for one in passed if _law(one).family != UNNAMED]
 
     def told(curve: Tried) -> bool:
-        where = _law(curve).port, _law(curve).axis
-        return any((_law(one).port, _law(one).axis) == where and _as_good(one, curve) for one in named)
+        return any(_same_axis(_law(one), _law(curve)) and _as_good(one, curve) for one in named)
 
     return [one for one in passed if one in named or not told(one)]
+
+
+def _same_axis(one: Identity, other: Identity) -> bool:
+    return (one.place.port, one.place.site) == (other.place.port, other.place.site)
 
 
 def named_there(passed: Sequence[Tried], refused: Sequence[Identity], view: View) -> list[Found]:
@@ -191,7 +196,7 @@ def named_there(passed: Sequence[Tried], refused: Sequence[Identity], view: View
     best: dict[Identity, Found] = {}
     for found in view.able:
         own = identity(found.suspect)
-        if own.family != UNNAMED and (own.port, own.axis) == (where.port, where.axis):
+        if own.family != UNNAMED and _same_axis(own, where):
             best.setdefault(own, found)
     return [bettered(view.bench, found) for own, found in best.items() if own not in done][:SECOND]
 

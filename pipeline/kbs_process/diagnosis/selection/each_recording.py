@@ -22,9 +22,9 @@ from kbs_process.diagnosis.experiments.thresholds import FALSE_ALARM, MOSTLY_DON
 from kbs_process.diagnosis.nominal.joint import Own, Standing
 from kbs_process.diagnosis.nominal.known import Known
 from kbs_process.diagnosis.proposing.clocks import by_a_right_clock, unread
+from kbs_process.diagnosis.proposing.view import View
 from kbs_process.diagnosis.screening.gls import Background, Sums, score
 from kbs_process.diagnosis.screening.screen import Catalogued, Found, Suspect
-from kbs_process.diagnosis.screening.view import View
 from kbs_process.signals.records import Array
 
 _PASSES = 8  # of a clock's correction, at most

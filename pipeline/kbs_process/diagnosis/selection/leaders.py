@@ -7,19 +7,13 @@ from dataclasses import replace
 from functools import partial
 from typing import TypeGuard
 
-import numpy as np
-
-from kbs_process.diagnosis.acceptance.dissipation import drives, pushes
-from kbs_process.diagnosis.acceptance.finding import Tried, explained_share
-from kbs_process.diagnosis.acceptance.gate import Gate, foretold, gate
-from kbs_process.diagnosis.acceptance.plausible import oversized, undone
+from kbs_process.diagnosis.acceptance.finding import Tried
 from kbs_process.diagnosis.acceptance.rivals import probabilities
+from kbs_process.diagnosis.acceptance.verdict import gated
 from kbs_process.diagnosis.experiments.floor import Floor
 from kbs_process.diagnosis.experiments.hypothesis import Simulate
 from kbs_process.diagnosis.experiments.thresholds import (
     BENT,
-    GATE_SIGMA,
-    LAW_VARIANCE,
     LEAD,
     LEADERS,
     MISTIMED,
@@ -30,25 +24,22 @@ from kbs_process.diagnosis.experiments.thresholds import (
     SHAPED,
     TOLERATED,
 )
-from kbs_process.diagnosis.experiments.witnesses import blind
-from kbs_process.diagnosis.nominal.joint import Own, Standing, bare, moved_on, with_extra
+from kbs_process.diagnosis.nominal.joint import Standing, bare, moved_on, with_extra
 from kbs_process.diagnosis.nominal.settling import resettled
 from kbs_process.diagnosis.proposing.clocks import timed
-from kbs_process.diagnosis.proposing.curves import CurveSuspect
 from kbs_process.diagnosis.proposing.families import UNNAMED
 from kbs_process.diagnosis.proposing.orders import with_orders
 from kbs_process.diagnosis.proposing.sizes import springs
+from kbs_process.diagnosis.proposing.tryout import extra_of, identity, in_plant, of_every_clock
+from kbs_process.diagnosis.proposing.view import View
 from kbs_process.diagnosis.screening.screen import Catalogued, Found, Suspect
-from kbs_process.diagnosis.screening.shapes import bends, bettered, fitted, possible, standing_still, uncovered
-from kbs_process.diagnosis.screening.view import View
+from kbs_process.diagnosis.screening.shapes import bettered, possible, uncovered
 from kbs_process.diagnosis.selection.each_recording import taken_off, taken_off_again
 from kbs_process.diagnosis.selection.effort import Effort
 from kbs_process.diagnosis.selection.race import at_floor, own_of, raced
-from kbs_process.diagnosis.selection.side_by_side import side_by_side
-from kbs_process.diagnosis.selection.tryout import extra_of, identity, in_plant, of_every_clock
+from kbs_process.diagnosis.side_by_side import side_by_side
 from kbs_process.plant.effect import Effect, Port
-from kbs_process.plant.sensing.sensing import BY
-from kbs_process.signals.records import Array
+from kbs_process.plant.sensing import BY
 
 
 def leaders(
@@ -142,7 +133,7 @@ def various(chosen: Sequence[Found]) -> list[Found]:
     families: dict[tuple[str, ...], Found] = {}
     for found in chosen:
         own = identity(found.suspect)
-        place = own.port, own.axis, *own.channels
+        place = own.place.port, own.place.site, *own.place.channels
         several = isinstance(found.suspect, Catalogued) and bool(found.suspect.candidate.again)
         kind = own.law if _delays(found.suspect) else own.family
         places.setdefault(place, found)
@@ -157,7 +148,7 @@ def _delays(suspect: Suspect) -> bool:
 
 def _way(found: Found) -> tuple[str, ...]:
     own = identity(found.suspect)
-    return own.port, own.axis, own.law, *own.channels[:1]
+    return own.place.port, own.place.site, own.law, *own.place.channels[:1]
 
 
 def tried(
@@ -177,48 +168,6 @@ def tried(
             verdict = gated(runner.found, before, runner.standing, own, simulate)
         judged.append(Tried(runner.found, runner.standing, verdict, view.screening, own, runner.leapt))
     return [one for one in judged if one.gate.passed], [one for one in judged if not one.gate.passed]
-
-
-def gated(
-    found: Found, before: Standing, after: Standing, own: Own, simulate: Simulate, *, least: float = GATE_SIGMA
-) -> Gate:
-    """The gate's verdict on a law that `after` has and `before` is without; sizes have to be such as it may have."""
-    known = after.known
-    places = [known.names.index(name) for name in own.amplitudes]
-    shapes = [known.names.index(name) for name in own.names if name not in own.amplitudes]
-    nothing = partial(blind, after, own, simulate)
-    verdict = gate(before.known, known, places, shapes, least=least, blind=nothing)
-    # What minima of the known parameters leave differs, and is no law's.
-    share = explained_share(before.known, known, beyond=TOLERATED)
-    index = np.array(places)
-    a, C = known.value[index], known.covariance[np.ix_(index, index)]
-    if identity(found.suspect).family == UNNAMED:
-        if share is None and known.experiment.held_out and not foretold(before.known, known, nothing()):
-            verdict = verdict.but("recordings that were held out leave nothing that would show a curve")
-        if share is not None and not share >= LAW_VARIANCE:
-            verdict = verdict.but(f"a curve that explains {100.0 * share:.0f} % of the held-out excess is no law")
-    if isinstance(found.suspect, CurveSuspect):
-        return verdict.but(*pushes(found.suspect, a, C))
-    if not isinstance(found.suspect, Catalogued):
-        return verdict
-    free = _undone(found.suspect, a, known.value[shapes])
-    return verdict.but(
-        *oversized(found.suspect, a, np.sqrt(np.diag(C)), free),
-        *drives(found.suspect, a, C),
-        *(standing_still(found.suspect, known.value[shapes].tolist()) if in_plant(found.suspect) else ()),
-    )
-
-
-def _undone(suspect: Catalogued, values: Array, shapes: Array) -> frozenset[str]:
-    """Amplitudes of a law of some shape in the plant that others of it undo.
-
-    Of finds that are one law together, the first one's come first.
-    """
-    if not in_plant(suspect):
-        return frozenset()
-    amplitudes = dict(zip(suspect.amplitudes, map(float, values), strict=False))
-    own = len(bends(suspect.candidate, suspect.scene.hypothesis.rig))
-    return undone(fitted(suspect, shapes[:own].tolist()), amplitudes)
 
 
 def reread(chosen: Tried, before: Standing, floor: Floor, simulate: Simulate) -> Tried:

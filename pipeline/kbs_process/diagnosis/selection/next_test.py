@@ -20,21 +20,22 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import norm
 
+from kbs_process.diagnosis.acceptance.outcome import Find
 from kbs_process.diagnosis.experiments.experiment import Drive, Experiment, Trial
 from kbs_process.diagnosis.experiments.floor import Floor
 from kbs_process.diagnosis.experiments.hypothesis import Prediction, Simulate
 from kbs_process.diagnosis.experiments.metric import metrics
 from kbs_process.diagnosis.experiments.thresholds import RIVALS
-from kbs_process.diagnosis.experiments.trajectories import Trajectory, family, limits_of
+from kbs_process.diagnosis.facts import Identity, Planned
 from kbs_process.diagnosis.nominal.joint import Standing
 from kbs_process.diagnosis.nominal.parameters import slopes
-from kbs_process.diagnosis.proposing.as_suspect import sigma_of, suspect_of
+from kbs_process.diagnosis.proposing.tryout import identity
+from kbs_process.diagnosis.proposing.view import suspects_of
 from kbs_process.diagnosis.screening.gls import Background
 from kbs_process.diagnosis.screening.scene import Scene
 from kbs_process.diagnosis.screening.screen import Bench, Suspect
-from kbs_process.diagnosis.screening.view import suspects_of
-from kbs_process.diagnosis.selection.outcome import Find, Identity
-from kbs_process.diagnosis.selection.tryout import identity
+from kbs_process.diagnosis.selection.as_suspect import sigma_of, suspect_of
+from kbs_process.diagnosis.selection.trajectories import Trajectory, family, limits_of
 from kbs_process.signals.records import Array
 
 _SECONDS = 200.0  # of a proposed test, or as long as the longest recording
@@ -49,14 +50,6 @@ _DEPENDENT = 1e-10
 Simulating = Callable[[Experiment], AbstractContextManager[Simulate]]
 
 
-@dataclass(frozen=True, slots=True)
-class Tried:
-    """A trajectory of the family and what it is worth: rho_delta, or the root of the information's eigenvalue."""
-
-    words: str
-    worth: float
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Proposal:
     """The next test, with what it will show."""
@@ -68,7 +61,7 @@ class Proposal:
     p_wrong: float  # with one recording
     recordings: int  # that are needed for P(wrong) < 1 %, or 1
     sigma: float  # of the least known combination of numbers over that of now, with one recording; nan with rivals
-    tried: tuple[Tried, ...]  # best first
+    tried: tuple[Planned, ...]  # best first
 
 
 def propose(standing: Standing, finds: Sequence[Find], floor: Floor, simulating: Simulating) -> Proposal | None:
@@ -79,7 +72,7 @@ def propose(standing: Standing, finds: Sequence[Find], floor: Floor, simulating:
     find, rivals = asked
     experiment = standing.known.experiment
     limits = limits_of(experiment.drives, experiment.dt)
-    trajectories = family(limits, experiment.rig.joint_names, min(_SECONDS, limits.seconds), find.identity.axis)
+    trajectories = family(limits, experiment.rig.joint_names, min(_SECONDS, limits.seconds), find.identity.place.site)
     if not trajectories:
         return None
     planned = _planned(experiment, trajectories)
@@ -94,7 +87,7 @@ def propose(standing: Standing, finds: Sequence[Find], floor: Floor, simulating:
         judged = {int(k): stage.judged(int(k), rivals, simulate) for k in order[:_JUDGED]}
         best = min(judged, key=lambda k: -judged[k][0] if rivals else judged[k][1])
         least, sigma = judged[best]
-    tried = tuple(Tried(trajectories[k].words, float(worth[k])) for k in order)
+    tried = tuple(Planned(trajectories[k].words, float(worth[k])) for k in order)
     needed = int(np.ceil((RIVALS / least) ** 2)) if rivals and least > 0.0 else 1
     return Proposal(
         law=find.identity,

@@ -15,17 +15,16 @@ from functools import partial
 
 import numpy as np
 
-from kbs_process.diagnosis.acceptance.remains import detected
 from kbs_process.diagnosis.experiments.floor import Floor
 from kbs_process.diagnosis.experiments.thresholds import FAR_BEHIND, FIRST, MOST, SETTLED_TIMES, TOLERATED, WAYS
 from kbs_process.diagnosis.nominal.joint import Entered, Own, Standing, bare, entered, moved_on, with_extra
-from kbs_process.diagnosis.nominal.settling import released
+from kbs_process.diagnosis.nominal.settling import detected, released
 from kbs_process.diagnosis.proposing.sizes import of_mounting, sized
+from kbs_process.diagnosis.proposing.tryout import extra_of
+from kbs_process.diagnosis.proposing.view import View
 from kbs_process.diagnosis.screening.screen import Found
-from kbs_process.diagnosis.screening.view import View
 from kbs_process.diagnosis.selection.effort import Effort
-from kbs_process.diagnosis.selection.side_by_side import side_by_side
-from kbs_process.diagnosis.selection.tryout import extra_of
+from kbs_process.diagnosis.side_by_side import side_by_side
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -9,9 +9,9 @@ import numpy as np
 
 from kbs_process.diagnosis.acceptance.finding import Tried, as_it_stands, find_of, merged, trusted
 from kbs_process.diagnosis.acceptance.needed import Accepted, in_the_shade, needed
-from kbs_process.diagnosis.acceptance.remains import detected, promises_little, searched
+from kbs_process.diagnosis.acceptance.outcome import Absorbed, Location, Outcome
+from kbs_process.diagnosis.acceptance.remains import promises_little
 from kbs_process.diagnosis.acceptance.supposed import Noted, enough, supposed, wanting
-from kbs_process.diagnosis.experiments.detection import Detection
 from kbs_process.diagnosis.experiments.floor import Floor
 from kbs_process.diagnosis.experiments.hypothesis import Simulate
 from kbs_process.diagnosis.experiments.thresholds import (
@@ -24,25 +24,26 @@ from kbs_process.diagnosis.experiments.thresholds import (
     TRUST,
     TRUST_PART,
 )
+from kbs_process.diagnosis.facts import Moved
+from kbs_process.diagnosis.nominal.detection import Detection
 from kbs_process.diagnosis.nominal.joint import Standing, bare, standing_of, without
 from kbs_process.diagnosis.nominal.known import MOVED, Known, refit
 from kbs_process.diagnosis.nominal.scatter import scattered
-from kbs_process.diagnosis.nominal.settling import bent, drawn_back, nominal, resettled
+from kbs_process.diagnosis.nominal.settling import bent, detected, drawn_back, nominal, resettled, searched
 from kbs_process.diagnosis.proposing.clocks import timed
 from kbs_process.diagnosis.proposing.sizes import in_the_way, of_mounting, springs
+from kbs_process.diagnosis.proposing.tryout import identity, of_every_clock
+from kbs_process.diagnosis.proposing.view import View
 from kbs_process.diagnosis.screening.localise import cells_and_ports
 from kbs_process.diagnosis.screening.ports import port_test
 from kbs_process.diagnosis.screening.scene import Scene
 from kbs_process.diagnosis.screening.screen import Catalogued, Found, Screening
 from kbs_process.diagnosis.screening.shapes import possible
-from kbs_process.diagnosis.screening.view import View
 from kbs_process.diagnosis.selection.believed import believed
 from kbs_process.diagnosis.selection.each_recording import jump_gain
 from kbs_process.diagnosis.selection.effort import Effort
 from kbs_process.diagnosis.selection.leaders import leaders, tried
-from kbs_process.diagnosis.selection.outcome import Absorbed, Moved, Outcome, Place
-from kbs_process.diagnosis.selection.side_by_side import side_by_side
-from kbs_process.diagnosis.selection.tryout import identity, of_every_clock
+from kbs_process.diagnosis.side_by_side import side_by_side
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,7 +53,7 @@ class _Round:
     seen: Standing  # from where laws were looked for, and `place` is
     screening: Screening
     noted: Noted
-    place: Place | None
+    place: Location | None
 
 
 def diagnose(
@@ -335,23 +336,20 @@ def _hopeless(first: Sequence[Found], least: float) -> bool:
     return PROMISED * most < least and not any(of_mounting(found) for found in first)
 
 
-def _place(standing: Standing, floor: Floor, scene: Scene) -> Place | None:
+def _place(standing: Standing, floor: Floor, scene: Scene) -> Location | None:
     if not scene.paths:
         return None
     cells, models, names = cells_and_ports(standing, floor, scene.paths)
     if not len(cells.z):
         return None
     test = port_test(cells, models)
-    return Place(test, cells, tuple(names[port] for port in test.only))
+    return Location(test, cells, tuple(names[port] for port in test.only))
 
 
 def _moved(known: Known) -> tuple[Moved, ...]:
+    stated = {name for name, own in zip(known.names, known.stated, strict=True) if own}
     return tuple(
-        Moved(name, float(value), float(sigma), float(sigmas))
-        for name, value, sigma, sigmas, stated in zip(
-            known.names, known.value, known.sigma, known.moved, known.stated, strict=True
-        )
-        if stated and abs(sigmas) > MOVED
+        one for one in known.numbers if one.name in stated and one.sigmas is not None and abs(one.sigmas) > MOVED
     )
 
 

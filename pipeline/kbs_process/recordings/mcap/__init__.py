@@ -1,1 +1,5 @@
-"""MCAP files: read a chunk at a time, verified, never trusted; and written."""
+"""MCAP files, from the bytes up.
+
+`framing` and `container` find verified chunks, `streams` decodes the numbers wanted from their messages, `source` is a
+whole file as all others see it; `writer` writes one, and reads it back.
+"""

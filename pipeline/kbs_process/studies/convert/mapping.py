@@ -15,25 +15,13 @@ from kbs_process.campaign.problems import Problems
 from kbs_process.campaign.schema import violations
 from kbs_process.campaign.units import UnitMismatchError, alike, factor
 from kbs_process.errors import ConfigError, did_you_mean
+from kbs_process.recordings.formats import Text, formats
 from kbs_process.signals.records import WRENCH_CHANNELS, WRENCH_UNITS
 from kbs_process.studies.convert import PRESETS, preset_names
 
 KELVIN = 273.15  # 0 degC, K
 
-Format = Literal["text", "parquet", "hdf5", "tdms", "mdf", "matlab", "numpy"]
 TimeUnit = Literal["s", "ms", "us", "ns", "min", "datetime"]
-
-
-class Text(msgspec.Struct, frozen=True):
-    """How delimited text is written; None is found from the first lines."""
-
-    delimiter: str | None = None
-    header: bool | None = None
-    units_row: bool = False
-    skip_rows: int = 0
-    decimal: Literal[".", ","] = "."
-    comment: str | None = None
-    encoding: str = "utf-8-sig"
 
 
 class Time(msgspec.Struct, frozen=True):
@@ -102,7 +90,7 @@ class Mapping(msgspec.Struct, frozen=True):
 
     path: Path
     template: Path  # campaign.toml
-    format: Format | None
+    format: str | None  # of all source files; None: each by its suffix
     text: Text
     streams: tuple[StreamMap, ...]
     turn: Turn | None
@@ -141,6 +129,9 @@ def load_mapping(path: Path) -> Mapping:
         problems.add(document.place(violation.key), violation.what, violation.remedy)
     problems.raise_any()
     tree = document.tree
+    if "format" in tree and tree["format"] not in formats():
+        remedy = did_you_mean(tree["format"], formats())
+        problems.add(document.place(("format",)), f"'{tree['format']}' is not allowed", remedy)
     streams = tuple(_stream(document, key, problems) for key in STREAMS if key in tree)
     parts = tuple(msgspec.convert(part, Part) for part in tree["recording"])
     _check_parts(document, parts, problems)

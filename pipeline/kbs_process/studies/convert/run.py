@@ -14,23 +14,36 @@ from kbs_process.campaign.load import load_campaign
 from kbs_process.campaign.locate import CAMPAIGN_FILE
 from kbs_process.errors import OutputError, RecordingError, did_you_mean
 from kbs_process.progress import Progress, SilentProgress
-from kbs_process.recordings import OutStream, write_pieces
-from kbs_process.recordings.mcap.messages.encoding import JOINT_PARTS
+from kbs_process.recordings.mcap.messages.encoding import JOINT_PARTS, OutStream
+from kbs_process.recordings.mcap.writer import write_pieces
+from kbs_process.recordings.open_table import open_table
 from kbs_process.results.provenance import sha256
 from kbs_process.results.store import writing
 from kbs_process.signals.records import Array, Block
 from kbs_process.studies.convert.description import Origin, prepare, recording_file, write_campaign
-from kbs_process.studies.convert.formats import open_table
 from kbs_process.studies.convert.mapping import WRENCH_FIELDS, Mapping, Part, StreamMap, find_mapping, load_mapping
 from kbs_process.studies.convert.streams import Findings, read_part
 
 LATEST_NS = (1 << 31) * 1_000_000_000  # the seconds of a ROS 2 time stamp are a signed 32-bit number
 
 
-def convert(
-    mapping: Path | str, source: Path, target: Path, *, progress: Progress | None, notice: Callable[[str], None] | None
+def import_recordings(
+    mapping: Path | str,
+    source: Path,
+    target: Path,
+    *,
+    progress: Progress | None = None,
+    notice: Callable[[str], None] | None = None,
 ) -> Path:
-    """Do what `importers.import_recordings` promises."""
+    """Convert source files into a new campaign folder and return it.
+
+    `mapping` is the path of a mapping or the name of a preset; `source` the folder of the files that it names,
+    or, where it names one, that file; `target` the folder to make, which must not exist, or be empty. It
+    appears whole or not at all. `notice` is given one line for each thing that is wrong with the files but
+    not fatal: cells that are no number, time stamps that repeat or go back.
+
+    Raises ConfigError (mapping or campaign), RecordingError (source files), OutputError (target).
+    """
     progress = progress or SilentProgress()
     plan = load_mapping(find_mapping(mapping))
     files = _source_files(plan, source)

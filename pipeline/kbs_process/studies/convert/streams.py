@@ -10,10 +10,10 @@ from itertools import chain
 import numpy as np
 
 from kbs_process.errors import RecordingError
+from kbs_process.recordings.tables import Cells, Table, find_column
 from kbs_process.signals.records import Array, Block, Mask, Stamps
 from kbs_process.studies.convert.clock import nanoseconds, numbers
 from kbs_process.studies.convert.mapping import Channel, Mapping, Part, StreamMap, Time, Turn
-from kbs_process.studies.convert.tables import Cells, Table, find_column
 
 _NO_STAMPS = np.empty(0, dtype=np.int64)
 _TIMELESS = "rows have no time, left out"

@@ -9,7 +9,8 @@ import msgspec
 import numpy as np
 
 from kbs_process.campaign.config import Campaign
-from kbs_process.recordings import OutStream, write_mcap
+from kbs_process.recordings.mcap.messages.encoding import OutStream
+from kbs_process.recordings.mcap.writer import write_mcap
 from kbs_process.reduction.analysis import Analysis
 from kbs_process.results.tables import TableWriter, write_table
 from kbs_process.signals.records import WRENCH_CHANNELS, Signal

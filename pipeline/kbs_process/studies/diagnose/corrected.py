@@ -12,14 +12,16 @@ import numpy as np
 from kbs_process.campaign.config import Campaign, SensingLaw
 from kbs_process.campaign.corrected_model import write_model
 from kbs_process.campaign.sensing_laws import belongs_to_model
+from kbs_process.diagnosis.acceptance.outcome import Find, Outcome
 from kbs_process.diagnosis.experiments.hypothesis import Hypothesis
-from kbs_process.diagnosis.selection.outcome import Estimate, Find, Outcome
+from kbs_process.diagnosis.facts import Estimate
 from kbs_process.plant.effect import Uniform
 from kbs_process.plant.laws import CATALOGUE, SENSING, select
 from kbs_process.plant.sensing import BY
 from kbs_process.rig.model import Quantity, substitute
 from kbs_process.signals.records import Array
 
+CORRECTED = "corrected"  # folder of the model, in that of the results
 _SENSORS = {law.name: law for law in SENSING}
 _EACH_TIME = {
     *(effect.name for effect in CATALOGUE if effect.each_trial),
@@ -74,7 +76,7 @@ def _reads(find: Find) -> bool:
 def _sensing(find: Find, estimates: Sequence[Estimate], source: str) -> SensingLaw:
     """A find, or one of its actions, as the model's sensors have it."""
     law, own = _SENSORS[find.identity.law], find.identity
-    site = BY.join(own.channels) or own.axis
+    site = BY.join(own.place.channels) or own.place.site
     numbers = {}
     for one in estimates:
         # A second action of the same law has numbered amplitudes.

@@ -9,15 +9,16 @@ import numpy as np
 
 from kbs_process.campaign.config import Campaign
 from kbs_process.diagnosis.experiments import floor
-from kbs_process.diagnosis.experiments.detection import Detection, detect
 from kbs_process.diagnosis.experiments.experiment import Experiment
 from kbs_process.diagnosis.experiments.floor import Floor
 from kbs_process.diagnosis.experiments.hypothesis import Hypothesis
 from kbs_process.diagnosis.experiments.thresholds import DETECTED
+from kbs_process.diagnosis.nominal.detection import Detection, detect
 from kbs_process.progress import Progress
 from kbs_process.results.diagnosed import FOLDER
 from kbs_process.results.store import revising
-from kbs_process.studies.diagnose.run import diagnose, experiment_of
+from kbs_process.studies.diagnose.reading import experiment_of
+from kbs_process.studies.diagnose.run import diagnose
 from kbs_process.studies.diagnose.simulators import Simulators
 
 

@@ -2,38 +2,30 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 
+import msgspec
 import numpy as np
 
 from kbs_process.campaign.config import Campaign
+from kbs_process.diagnosis.acceptance.outcome import Curve, Find, Outcome
 from kbs_process.diagnosis.experiments.experiment import Experiment
 from kbs_process.diagnosis.experiments.floor import Floor
 from kbs_process.diagnosis.nominal.joint import Standing
 from kbs_process.diagnosis.nominal.known import Known
 from kbs_process.diagnosis.selection.next_test import Proposal
-from kbs_process.diagnosis.selection.outcome import Curve, Find, Outcome
 from kbs_process.plant.laws.position.measured_law import Measured, unit_of
 from kbs_process.plant.structure import other_joint
 from kbs_process.results import provenance
 from kbs_process.results.records import Check, Conclusion
 from kbs_process.rig.model import Joint, Rig
 from kbs_process.studies.diagnose import results as records
-from kbs_process.studies.diagnose.next_test import next_test
-from kbs_process.studies.diagnose.sentences import paragraph, sentence
-from kbs_process.studies.diagnose.terms import COMMANDS, place_of, rms
+from kbs_process.studies.diagnose.prose import answer, notes, notices, paragraph, rms
 from kbs_process.studies.diagnose.unexplained import unexplained
-from kbs_process.studies.diagnose.warnings import warnings
 
+COMMANDS = "next-test.csv"  # file of the next test's commands, in the results' folder
 _SHOWN = 25  # suspects in the table
-_NOTES = (
-    "The floor is what repeats of one trajectory differ by. Constants and slopes of the transducer's channels and "
-    "errors of the clocks, each recording's own, are taken out of every comparison.",
-    "Known parameters are refitted within their priors before anything is looked for, and again beside each suspect.",
-    "A find has passed the gate: inside the non-linear plant, with all known parameters refitted, it improves the "
-    "prediction of recordings that it was not fitted to, all together, and makes none of them markedly worse.",
-    "Channels are whitened in their order: each is judged given those before it.",
-)
 _PORTS = {"ground torque": "external wrench"}  # of the port test, in the words of finds
 
 
@@ -56,22 +48,19 @@ def results_of(
         article=campaign.article,
         verdict=Conclusion(
             status="undecided" if outcome.verdict == "undecided" else "none",
-            sentence=sentence(outcome, trials, requirements, floor),
+            sentence=answer(outcome, trials, requirements, floor),
         ),
         provenance=provenance.made(verb, campaign.folder, campaign.files),
         answer=outcome.verdict,
         paragraph=paragraph(outcome, finds, trials, requirements, floor),
         floor=floor.statement,
         log10_p=outcome.log_p / float(np.log(10.0)),
-        moved=tuple(_moved(outcome.standing.known)),
+        moved=outcome.standing.known.numbers,
         finds=finds,
         trials=trials,
         requirements=requirements,
         ports=tuple(_ports(outcome)),
-        located=tuple(
-            records.Place(port=_PORTS.get(one.port, one.port), site=one.axis, channels=one.channels)
-            for one in outcome.located
-        ),
+        located=tuple(msgspec.structs.replace(one, port=_PORTS.get(one.port, one.port)) for one in outcome.located),
         suspects=tuple(_suspects(outcome))[:_SHOWN],
         # Without a law, the search may have gone on to a better place.
         checks=tuple(
@@ -79,9 +68,9 @@ def results_of(
             for c in (known if outcome.finds else outcome.standing.known).checks
         ),
         files=tuple(files),
-        next_test=None if proposal is None else next_test(proposal, COMMANDS),
-        warnings=tuple(warnings(campaign, floor, outcome)),
-        notes=_NOTES,
+        next_test=None if proposal is None else next_test(proposal),
+        warnings=tuple(notices(campaign, floor, outcome)),
+        notes=notes(),
     )
 
 
@@ -92,7 +81,7 @@ def _find(find: Find, experiment: Experiment) -> records.Find:
         name=find.identity.law,
         family=find.identity.family,
         named=find.named,
-        place=place_of(find.identity),
+        place=find.identity.place,
         equation=find.equation,
         reference=find.reference,
         parameters=tuple(
@@ -113,7 +102,7 @@ def _find(find: Find, experiment: Experiment) -> records.Find:
             records.Rival(
                 name=other.identity.law,
                 family=other.identity.family,
-                place=place_of(other.identity),
+                place=other.identity.place,
                 distance=other.rho_delta,
                 probability=other.probability,
                 simulated=other.refitted,
@@ -143,7 +132,7 @@ def _unit_of_nodes(curve: Curve | None) -> str:
 
 def _joint(find: Find, rig: Rig) -> Joint | None:
     """The joint whose numbers a find has: units are those of one that turns, or slides."""
-    return next((joint for joint in rig.joints if joint.name == find.identity.axis), None)
+    return next((joint for joint in rig.joints if joint.name == find.identity.place.site), None)
 
 
 def _unit(turning: str, joint: Joint | None) -> str:
@@ -183,24 +172,6 @@ def _trials(known: Known, corrected: Known) -> Iterator[records.Trial]:
         )
 
 
-def _moved(known: Known) -> Iterator[records.Moved]:
-    units = {name: quantity.unit for name, quantity in known.hypothesis.rig.quantities().items()}
-    entries = zip(known.free, known.value, known.sigma, known.parameters.value, known.parameters.sigma, strict=True)
-    for scalar, value, sigma, prior, spread in entries:
-        if scalar.quantity not in units:
-            continue
-        bounded = bool(np.isfinite(spread) and spread > 0.0)
-        yield records.Moved(
-            name=scalar.name,
-            unit=units[scalar.quantity],
-            prior=float(prior),
-            prior_sigma=float(spread) if bounded else None,
-            value=float(value),
-            sigma=float(sigma),
-            sigmas=float((value - prior) / spread) if bounded else None,
-        )
-
-
 def _ports(outcome: Outcome) -> Iterator[records.PortTest]:
     if outcome.place is None:
         return
@@ -224,11 +195,28 @@ def _suspects(outcome: Outcome) -> Iterator[records.Suspect]:
         yield records.Suspect(
             name=identity.law,
             family=identity.family,
-            place=place_of(identity),
+            place=identity.place,
             distance=distance,
             absorbed=absorbed,
             outcome=said,
         )
+
+
+def next_test(proposal: Proposal) -> records.NextTest:
+    """Return the record of a proposal."""
+    apart = bool(proposal.rivals)
+    return records.NextTest(
+        law=proposal.law.words,
+        rivals=tuple(one.words for one in proposal.rivals),
+        trajectory=proposal.trajectory.words,
+        seconds=proposal.trajectory.seconds,
+        file=COMMANDS,
+        distance=proposal.distance if apart else None,
+        p_wrong=proposal.p_wrong if apart else None,
+        recordings=proposal.recordings,
+        sigma=None if math.isnan(proposal.sigma) else proposal.sigma,
+        tried=proposal.tried,
+    )
 
 
 def seen_channels(known: Known, k: int) -> list[int]:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from kbs_process.diagnosis.facts import Answer
 from kbs_process.report import provenance
 from kbs_process.report.document import Document
 from kbs_process.report.panel import Head, Panel
 from kbs_process.report.tables import Tables
-from kbs_process.studies.diagnose.results import Answer, DiagnosisResults
+from kbs_process.studies.diagnose.results import DiagnosisResults
 from kbs_process.studies.diagnose.sections import answer, finds, next_test, remaining, search
 
 _HEADLINES: Mapping[Answer, str] = {

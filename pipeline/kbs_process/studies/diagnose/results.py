@@ -8,17 +8,8 @@ from __future__ import annotations
 
 from typing import Literal
 
+from kbs_process.diagnosis.facts import Answer, Moved, Place, Planned
 from kbs_process.results.records import Check, Conclusion, Notice, Provenance, Record, ResultsFile
-
-Answer = Literal["none", "parameters off", "physics", "undecided"]
-
-
-class Place(Record, frozen=True, kw_only=True):
-    """Where physics enters: a port, the joint, link, stream or channel it belongs to, and the channels that show it."""
-
-    port: str
-    site: str
-    channels: tuple[str, ...] = ()  # strongest first
 
 
 class Fitted(Record, frozen=True, kw_only=True):
@@ -85,18 +76,6 @@ class Find(Record, frozen=True, kw_only=True):
     same_ports: tuple[str, ...] = ()  # that these channels cannot tell from its own
 
 
-class Moved(Record, frozen=True, kw_only=True):
-    """A known parameter, before and after."""
-
-    name: str
-    unit: str
-    prior: float
-    prior_sigma: float | None  # None: nothing was known, as of a phase
-    value: float
-    sigma: float
-    sigmas: float | None  # from the prior, in its sigma
-
-
 class Trial(Record, frozen=True, kw_only=True):
     """A recording's residual over the floor at each step."""
 
@@ -147,13 +126,6 @@ class Suspect(Record, frozen=True, kw_only=True):
     distance: float  # of its signature, known parameters refitted; of one that they absorb, without
     absorbed: float | None = None
     outcome: str  # "accepted", "refused: ...", "absorbed by ..."
-
-
-class Planned(Record, frozen=True, kw_only=True):
-    """A trajectory that could be run next."""
-
-    trajectory: str
-    worth: float  # distance of the nearest rival; without rivals, root of the information's smallest eigenvalue
 
 
 class NextTest(Record, frozen=True, kw_only=True):

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from kbs_process.report import provenance
 from kbs_process.report.document import Document
-from kbs_process.report.panel import Head, Panel
-from kbs_process.report.tables import Tables
+from kbs_process.report.panel import Head
 from kbs_process.studies.flight.results import FlightResults
 from kbs_process.studies.flight.sections import compliance, drivers, histories
 
@@ -16,13 +15,9 @@ def head(results: FlightResults) -> Head:
     return Head("Flight prediction", results.name, results.title, about, results.verdict, results.provenance.version)
 
 
-def _provenance(results: FlightResults, tables: Tables) -> Panel:
-    return provenance.panel(results.provenance)
-
-
 DOCUMENT = Document(
     title="Results of a flight prediction",
     record=FlightResults,
     head=head,
-    panels=(compliance.panel, histories.panel, drivers.panel, _provenance),
+    panels=(compliance.panel, histories.panel, drivers.panel, provenance.section),
 )

@@ -136,7 +136,6 @@ def _identified(outcomes: Outcomes) -> Iterator[records.Identified]:
     units = found.experiment.rig.quantities()
     turns = {found.experiment.free[phase.phase].name for phase in _phases(outcomes)}
     correlation = fit.covariance / np.outer(fit.sigma, fit.sigma) - np.eye(len(fit.sigma))
-    assert found.parameters.lower is not None and found.parameters.upper is not None
     for index, scalar in enumerate(found.experiment.free):
         partner = int(np.argmax(np.abs(correlation[index])))
         value = float(fit.value[index])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from kbs_process.report import provenance
 from kbs_process.report.document import Document
-from kbs_process.report.panel import Block, Head, Notices, Panel, Text
+from kbs_process.report.panel import Head, Panel, Text, notices
 from kbs_process.report.tables import Tables
 from kbs_process.studies.identify.results import IdentifyResults
 from kbs_process.studies.identify.sections import parameters, residuals
@@ -18,26 +18,17 @@ def head(results: IdentifyResults) -> Head:
 
 
 def _methods(results: IdentifyResults, tables: Tables) -> Panel:
-    blocks: list[Block] = [Text(note) for note in results.notes]
-    blocks.append(
-        Text(
-            f"Friction torques may differ from run to run by {100 * results.run_to_run:.3g} % (one sigma): an estimate "
-            "is of the gear, not of one run."
-        )
+    spread = (
+        f"Friction torques may differ from run to run by {100 * results.run_to_run:.3g} % (one sigma): an estimate "
+        "is of the gear, not of one run."
     )
-    if results.warnings:
-        entries = tuple((entry.severity, entry.what, entry.where, entry.remedy) for entry in results.warnings)
-        blocks.insert(0, Notices(entries))
-    return Panel("methods", "Methods", "How were these numbers obtained?", tuple(blocks))
-
-
-def _provenance(results: IdentifyResults, tables: Tables) -> Panel:
-    return provenance.panel(results.provenance)
+    blocks = (*notices(results.warnings), *(Text(note) for note in (*results.notes, spread)))
+    return Panel("methods", "Methods", "How were these numbers obtained?", blocks)
 
 
 DOCUMENT = Document(
     title="Results of an identification",
     record=IdentifyResults,
     head=head,
-    panels=(parameters.panel, residuals.panel, _methods, _provenance),
+    panels=(parameters.panel, residuals.panel, _methods, provenance.section),
 )

@@ -11,8 +11,7 @@ from kbs_process.campaign.config import Campaign, SensingLaw
 from kbs_process.campaign.sensing_laws import LAWS
 from kbs_process.diagnosis.screening.signature import sensed, unit_values
 from kbs_process.diagnosis.screening.suspects import Candidate
-from kbs_process.plant.sensing import SensingPort
-from kbs_process.plant.sensing.sensing import BY
+from kbs_process.plant.sensing import BY, SensingPort
 from kbs_process.rig.model import Rig
 from kbs_process.signals.records import WRENCH_CHANNELS, Array, Block, Signal
 

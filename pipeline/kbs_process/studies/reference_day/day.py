@@ -1,62 +1,31 @@
-"""The sections of a reference day: where they end, and how well the antenna points and how quietly it turns in each."""
+"""The day judged: where its sections end, and how well the antenna points and how quietly it turns in each."""
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
 
 import numpy as np
 
 from kbs_process.campaign.config import Campaign, PointingRequirement
-from kbs_process.campaign.mission import Day, SectionEntry
+from kbs_process.campaign.formats.mission_file import SectionEntry
+from kbs_process.campaign.mission import Day
 from kbs_process.errors import ConfigError
 from kbs_process.mission.planner import Plan
 from kbs_process.reduction.analysis import bands_of, passband
+from kbs_process.reduction.pointing import estimate
+from kbs_process.results.pointing import PointingEstimate
 from kbs_process.signals.grid import overlap
 from kbs_process.signals.records import Mask, Signal
 from kbs_process.stages import bandpass, pointing
 from kbs_process.stages.bandpass import Band
 from kbs_process.stages.pointing import PointingStatistics
 from kbs_process.stages.to_cog import to_spacecraft
-from kbs_process.stages.verdict import Judgement, judge
+from kbs_process.stages.verdict import judge
+from kbs_process.studies.reference_day.results import Judged, PublishedSection, Section, Torque
 
 TORQUES = ("Tx", "Ty", "Tz")
-
-
-@dataclass(frozen=True, slots=True)
-class Extreme:
-    """Greatest torque of a section in one band."""
-
-    band: Band
-    label: str
-    value: float
-    axis: str
-    time: float
-
-
-@dataclass(frozen=True, slots=True)
-class Section:
-    """A section, from `start` to `end` s, and what was found in it."""
-
-    entry: SectionEntry
-    start: float
-    end: float
-    modes: tuple[str, ...]
-    greatest_rate: float  # rad/s
-    statistics: tuple[PointingStatistics, ...]  # azimuth, elevation
-    torques: tuple[Extreme, ...]  # narrowest band first
-
-
-@dataclass(frozen=True, slots=True)
-class Verdict:
-    """The worst value of a statistic over sections and axes, against its limit."""
-
-    requirement: PointingRequirement
-    value: float  # rad
-    sigma: float
-    verdict: Judgement
-    where: str
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,15 +34,14 @@ class Assessed:
 
     error: Signal  # joint angles less desired ones
     boresight: Signal  # cross-elevation, elevation, line of sight
-    torques: tuple[Signal, ...]  # at the spacecraft's centre of mass, a band each, narrowest first
+    torques: dict[str, Signal]  # at the spacecraft's centre of mass, by the band's name, narrowest first
     sections: tuple[Section, ...]
-    verdicts: tuple[Verdict, ...]
-    whole: tuple[PointingStatistics, ...]  # of the boresight, over the day
-    joints: tuple[PointingStatistics, ...]  # of the joints, over the day
+    requirements: tuple[Judged, ...]
+    whole: tuple[PointingEstimate, ...]  # of the boresight, over the day
 
 
 def assess(campaign: Campaign, day: Day, planned: Plan, angle: Signal, wrench: Signal) -> Assessed:
-    """Cut the day into its sections and take the statistics of each."""
+    """Cut the day into its sections, take the statistics of each, and hold them against the limits."""
     angle, wrench = overlap(angle, wrench)
     error = pointing.error(angle, planned.t, planned.q)
     boresight = pointing.line_of_sight(error, angle.values[:, 1])
@@ -82,15 +50,19 @@ def assess(campaign: Campaign, day: Day, planned: Plan, angle: Signal, wrench: S
     sections = []
     for entry, start, end in boundaries(day, planned):
         inside = (error.t >= start) & (error.t < end)
+        azimuth, elevation = map(estimate, pointing.statistics(error, period, day.smoothing, inside))
         sections.append(
             Section(
-                entry=entry,
-                start=start,
-                end=end,
+                name=entry.name,
+                start_s=start,
+                end_s=end,
+                ends_with=entry.until,
                 modes=_modes(planned, start, end),
                 greatest_rate=_rate(planned, start, end),
-                statistics=pointing.statistics(error, period, day.smoothing, inside),
-                torques=tuple(_extreme(band, signal, inside) for band, signal in torques.items()),
+                azimuth=azimuth,
+                elevation=elevation,
+                torques=tuple(_greatest(band, signal, inside) for band, signal in torques.items()),
+                published=PublishedSection(**asdict(entry.published), end_s=entry.near) if entry.published else None,
             )
         )
     joints = pointing.statistics(error, period, day.smoothing)
@@ -98,11 +70,13 @@ def assess(campaign: Campaign, day: Day, planned: Plan, angle: Signal, wrench: S
     return Assessed(
         error=error,
         boresight=boresight,
-        torques=tuple(torques.values()),
+        torques={band.name: signal for band, signal in torques.items()},
         sections=tuple(sections),
-        verdicts=tuple(_verdict(one, sections, joints, offsets) for one in day.requirements),
-        whole=pointing.statistics(boresight, period, day.smoothing),
-        joints=joints,
+        requirements=(
+            *(_pointing_judged(one, sections, joints, offsets) for one in day.requirements),
+            *_torque_judged(campaign, sections),
+        ),
+        whole=tuple(map(estimate, pointing.statistics(boresight, period, day.smoothing))),
     )
 
 
@@ -158,20 +132,25 @@ def _torques(campaign: Campaign, wrench: Signal) -> dict[Band, Signal]:
     return {band: to_spacecraft(bandpass.apply(wrench, band), spacecraft) for band in (*bands, unfiltered)}
 
 
-def _extreme(band: Band, signal: Signal, inside: Mask) -> Extreme:
+def _greatest(band: Band, signal: Signal, inside: Mask) -> Torque:
     columns = [signal.channels.index(channel) for channel in TORQUES]
     x = np.where((signal.valid & inside)[:, None], np.abs(signal.values[:, columns]), 0.0)
     row, column = np.unravel_index(int(np.argmax(x)), x.shape)
-    label = f"up to {passband(band, signal.rate)[1]:g} Hz"
-    return Extreme(band, label, float(x[row, column]), TORQUES[int(column)], float(signal.t[row]))
+    return Torque(
+        band=band.name,
+        label=f"up to {passband(band, signal.rate)[1]:g} Hz",
+        value=float(x[row, column]),
+        axis=TORQUES[int(column)],
+        time_s=float(signal.t[row]),
+    )
 
 
-def _verdict(
+def _pointing_judged(
     requirement: PointingRequirement,
     sections: Sequence[Section],
     joints: Sequence[PointingStatistics],
     offsets: Sequence[float],
-) -> Verdict:
+) -> Judged:
     """Judge the worst section and axis; slow variation over an orbit needs the whole day.
 
     What the encoder's alignment leaves unknown counts as uncertainty of the bias.
@@ -181,12 +160,42 @@ def _verdict(
         candidates = [(one.orbit, one.orbit_sigma, f"{one.axis}, whole day") for one in joints]
     else:
         for section in sections:
-            for one, offset in zip(section.statistics, offsets, strict=True):
+            for one, offset in zip((section.azimuth, section.elevation), offsets, strict=True):
                 value, sigma = {
                     "bias": (abs(one.bias), float(np.hypot(one.bias_sigma, offset))),
                     "random": (one.random, one.random_sigma),
                     "percentile": (one.percentile, one.percentile_sigma),
                 }[requirement.statistic]
-                candidates.append((value, sigma, f"{one.axis}, section {section.entry.name}"))
+                candidates.append((value, sigma, f"{one.axis}, section {section.name}"))
     value, sigma, where = max(candidates)
-    return Verdict(requirement, value, sigma, judge(value, sigma, requirement.limit), where)
+    return Judged(
+        name=requirement.name,
+        statistic=requirement.statistic,
+        limit=requirement.limit,
+        unit="rad",
+        value=value,
+        sigma=sigma,
+        verdict=judge(value, sigma, requirement.limit),
+        where=where,
+        source=requirement.source,
+    )
+
+
+def _torque_judged(campaign: Campaign, sections: Sequence[Section]) -> Iterator[Judged]:
+    """Judge peaks of torque in the narrowest band; the campaign's other requirements are not about a day's peaks."""
+    for requirement in campaign.requirements:
+        if (requirement.quantity, requirement.frame, requirement.statistic) != ("torque", "S", "peak"):
+            continue
+        section = max(sections, key=lambda one: one.torques[0].value)
+        worst = section.torques[0]
+        yield Judged(
+            name=requirement.name,
+            statistic=f"peak, {worst.label}",
+            limit=requirement.limit,
+            unit=requirement.unit,
+            value=worst.value,
+            sigma=0.0,
+            verdict=judge(worst.value, 0.0, requirement.limit),
+            where=f"{worst.axis}, section {section.name}, {worst.time_s:.1f} s",
+            source=requirement.source,
+        )

@@ -21,15 +21,11 @@ def _constants(results: ReferenceDayResults, tables: Tables) -> Panel:
     return Panel("constants", "Constants", "With which numbers was this computed?", (block,))
 
 
-def _provenance(results: ReferenceDayResults, tables: Tables) -> Panel:
-    return provenance.panel(results.provenance)
-
-
 DOCUMENT = Document(
     title="Results of a simulated reference day",
     record=ReferenceDayResults,
     head=head,
     panels=(
-        compliance.panel, sections.panel, trajectory.panel, errors.panel, torque.panel, _constants, _provenance,
+        compliance.panel, sections.panel, trajectory.panel, errors.panel, torque.panel, _constants, provenance.section,
     ),
 )  # fmt: skip

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Literal
 
 from kbs_process.results.pointing import PointingEstimate
-from kbs_process.results.records import Conclusion, Constant, Notice, Provenance, Record, ResultsFile, Status
+from kbs_process.results.records import Constant, Record, ResultsFile, Status
 
 
 class PublishedSection(Record, frozen=True, kw_only=True):
@@ -88,8 +88,6 @@ class ReferenceDayResults(ResultsFile, frozen=True, kw_only=True):
     name: str
     title: str
     article: str
-    verdict: Conclusion
-    provenance: Provenance
     kind: Literal["reference-day"] = "reference-day"
     geometry: Geometry
     phases: tuple[Phase, ...]
@@ -97,6 +95,5 @@ class ReferenceDayResults(ResultsFile, frozen=True, kw_only=True):
     requirements: tuple[Judged, ...]
     boresight: tuple[PointingEstimate, ...]  # over the whole day
     discussion: tuple[str, ...] = ()
-    warnings: tuple[Notice, ...] = ()
     parameters: tuple[Constant, ...] = ()
     notes: tuple[str, ...] = ()

@@ -2,35 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from kbs_process.campaign.config import Campaign
-from kbs_process.campaign.mission import load_day
+from kbs_process.campaign.mission import Day, load_day
+from kbs_process.mission import orbit
 from kbs_process.mission.planner import Plan, plan
-from kbs_process.plant.predict import Schedule, predict
 from kbs_process.progress import Progress
-from kbs_process.report.build import build
+from kbs_process.report.build import publish
+from kbs_process.report.prose import Prose
+from kbs_process.results import provenance
 from kbs_process.results.outcome import Outcome
+from kbs_process.results.records import Conclusion, Constant
 from kbs_process.results.store import writing
-from kbs_process.rig.model import Rig
-from kbs_process.signals.records import WRENCH_CHANNELS, Array, Block, Signal
-from kbs_process.stages.align.condense import CondenseSettings, condense
-from kbs_process.studies.reference_day.day import assess
-from kbs_process.studies.reference_day.files import write_results, write_tables
+from kbs_process.stages.to_cog import ASSUMPTION
+from kbs_process.stages.verdict import COVERAGE
+from kbs_process.studies.reference_day.day import Assessed, assess
+from kbs_process.studies.reference_day.discussion import discussion
+from kbs_process.studies.reference_day.files import write_tables
+from kbs_process.studies.reference_day.flying import fly
+from kbs_process.studies.reference_day.report import DOCUMENT
+from kbs_process.studies.reference_day.results import Geometry, Judged, Phase, ReferenceDayResults
 
-WRENCH_RATE = 100.0  # Hz: the low-pass before the samples lets nothing alias into the bands
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Flown:
-    """What the plant did on the planned commands, on the day's own time axis."""
-
-    angle: Signal  # true joint angles, rad
-    wrench: Signal  # on the spacecraft at the interface, in T
+_SAYS = Prose("kbs_process.studies.reference_day", "notes")
 
 
 def simulate_day(campaign: Campaign, target: Path, *, progress: Progress, pdf: bool | None = None) -> Outcome:
@@ -46,60 +44,79 @@ def simulate_day(campaign: Campaign, target: Path, *, progress: Progress, pdf: b
             assessed = assess(campaign, day, planned, flown.angle, flown.wrench)
         with progress.task("Writing the report"):
             write_tables(folder, planned, assessed)
-            results = write_results(folder, campaign, day, planned, assessed)
-            from kbs_process.studies.reference_day.report import DOCUMENT  # draws: takes its time to import
-
-            page = build(folder, DOCUMENT, pdf)
-    met = {"pass": True, "fail": False}.get(results.verdict.status)
-    return Outcome((results.verdict.sentence,), met, target / page.name)
+            return publish(folder, target, _results(campaign, day, planned, assessed), DOCUMENT, pdf)
 
 
-def commands(planned: Plan, rig: Rig) -> Schedule:
-    """Return what the controller is told at the start of every cycle, for the plan's angles.
-
-    The desired rate is the plan's motion over the coming cycle, which the controller feeds forward. Its closed loop
-    compares the desired angle with an encoder reading that is `latency` cycles old, so that it is given the
-    angle desired then: with the present one the antenna would lead its plan by rate x latency x cycle.
-    """
-    controller = rig.controller
-    assert controller is not None  # by load_day
-    delay = controller.latency if controller.loop == "closed" else 0
-    ahead = np.diff(planned.q, axis=0)
-    rate = np.concatenate([ahead, ahead[-1:]]) / float(controller.cycle)
-    position = planned.q[np.maximum(np.arange(len(planned.q)) - delay, 0)]
-    return Schedule(planned.t, position, rate)
-
-
-def fly(campaign: Campaign, planned: Plan, duration: float, update: Callable[[float], None] | None = None) -> Flown:
-    """Simulate the day in one piece, a block at a time; only the working rate is kept."""
-    rig, rate = campaign.rig, campaign.bands.working_rate
-    angles: list[Array] = []
-    blocks = predict(
-        rig,
-        campaign.effects,
-        commands(planned, rig),
-        rate_Hz=WRENCH_RATE,
-        angle_rate_Hz=rate,
-        duration_s=duration,
-        quantise=False,
-        progress=update,
+def _results(campaign: Campaign, day: Day, planned: Plan, found: Assessed) -> ReferenceDayResults:
+    return ReferenceDayResults(
+        name=campaign.name,
+        title=campaign.title,
+        article=campaign.article,
+        verdict=_conclusion(found.requirements),
+        provenance=provenance.made("reference-day", campaign.folder, (*campaign.files, day.path)),
+        geometry=_geometry(day, planned),
+        phases=tuple(
+            Phase(
+                mode=phase.mode,
+                relay=phase.relay,
+                start_s=float(planned.t[phase.start]),
+                end_s=float(planned.t[phase.end - 1]),
+            )
+            for phase in planned.phases
+        ),
+        sections=found.sections,
+        requirements=found.requirements,
+        boresight=found.whole,
+        discussion=tuple(discussion(campaign.rig, found.sections)),
+        parameters=(*_constants(day), *provenance.constants(campaign.rig)),
+        notes=(*map(_SAYS, ("orbit", "error", "uncertainty", "peaks")), ASSUMPTION),
     )
-    run = condense(
-        campaign.name, _aside(blocks, angles), {"wrench": WRENCH_CHANNELS}, CondenseSettings(working_rate_Hz=rate)
+
+
+def _conclusion(judged: Sequence[Judged]) -> Conclusion:
+    if not judged:
+        return Conclusion(status="none", sentence="The mission states no requirement.")
+    words = {"pass": "All requirements are met", "undecided": "Undecided", "fail": "A requirement is not met"}
+    worst = max(judged, key=lambda one: ([*words].index(one.verdict), one.value / one.limit))
+    value, sigma, limit, unit = _shown(worst)
+    sentence = (
+        f"{words[worst.verdict]}. Nearest to its limit: {worst.name}, {value:.4g} +- {COVERAGE * sigma:.2g} {unit} "
+        f"(k = {COVERAGE:g}; {worst.where}); limit {limit:g} {unit}."
     )
-    assert run.wrench is not None  # the plant gives one
-    offsets = [float(joint.encoder.offset) if joint.encoder else 0.0 for joint in rig.joints]
-    q = np.concatenate(angles) - np.array(offsets)
-    names = rig.joint_names
-    valid = np.ones(len(q), dtype=np.bool_)
-    angle = Signal(0.0, 1.0 / rate, q, names, ("rad",) * len(names), "joint", valid, ("true angle of the plant",))
-    return Flown(angle, run.wrench)
+    return Conclusion(status=worst.verdict, sentence=sentence)
 
 
-def _aside(blocks: Iterator[tuple[str, Block]], angles: list[Array]) -> Iterator[tuple[str, Block]]:
-    """Pass the wrench on, and put the angles aside: they are instants, not to be filtered."""
-    for key, block in blocks:
-        if key == "angle":
-            angles.append(block.values)
-        elif key == "wrench":
-            yield key, block
+def _shown(one: Judged) -> tuple[float, float, float, str]:
+    """Value, sigma and limit in the unit that requirements on pointing are written in."""
+    if one.unit != "rad":
+        return one.value, one.sigma, one.limit, one.unit
+    return (float(np.degrees(one.value)), float(np.degrees(one.sigma)), round(float(np.degrees(one.limit)), 9), "deg")
+
+
+def _geometry(day: Day, planned: Plan) -> Geometry:
+    rate, acceleration = planned.extremes(day.mission.cycle)
+    satellite = orbit.satellite(day.mission.orbit)
+    azimuth, elevation = ((float(q.min()), float(q.max())) for q in planned.q.T)
+    return Geometry(
+        epoch=day.mission.orbit.epoch.isoformat(),
+        nodal_period_s=day.mission.orbit.nodal_period,
+        semi_major_axis_m=float(satellite.a) * orbit.EARTH_RADIUS,
+        node_rate=float(satellite.nodedot) / 60.0,
+        greatest_rate=float(rate.max()),
+        greatest_acceleration=float(acceleration.max()),
+        rate_limit=day.mission.limits.rate,
+        acceleration_limit=day.mission.limits.acceleration,
+        azimuth=azimuth,
+        elevation=elevation,
+    )
+
+
+def _constants(day: Day) -> Iterator[Constant]:
+    for one in day.quantities:
+        yield Constant(
+            name=f"mission.{one.name}",
+            value=", ".join(f"{x:.9g}" for x in np.ravel(one.value)),
+            unit=one.unit,
+            sigma=", ".join(f"{x:.3g}" for x in np.ravel(one.sigma)),
+            source=one.source,
+        )

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from kbs_process.report import provenance
 from kbs_process.report.document import Document
-from kbs_process.report.panel import Head, Panel
-from kbs_process.report.tables import Tables
+from kbs_process.report.panel import Head
 from kbs_process.studies.stability.results import StabilityResults
 from kbs_process.studies.stability.sections import margins, onset, poles
 
@@ -18,13 +17,9 @@ def head(results: StabilityResults) -> Head:
     return Head("Stability", results.name, title, about, results.verdict, results.provenance.version)
 
 
-def _provenance(results: StabilityResults, tables: Tables) -> Panel:
-    return provenance.panel(results.provenance)
-
-
 DOCUMENT = Document(
     title="Results of a stability analysis",
     record=StabilityResults,
     head=head,
-    panels=(margins.panel, poles.panel, onset.panel, _provenance),
+    panels=(margins.panel, poles.panel, onset.panel, provenance.section),
 )

@@ -1,1 +1,4 @@
-"""Messages of MCAP files, in each encoding: decoded and encoded."""
+"""Messages of each encoding: `decoders` says which type reads which, one file each; `encoding` writes them.
+
+`fields` names the numbers within a message, `layout` finds them in many messages at once.
+"""

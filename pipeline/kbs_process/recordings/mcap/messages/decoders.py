@@ -8,9 +8,9 @@ from typing import Protocol
 from kbs_process.errors import RecordingError
 from kbs_process.recordings.mcap.framing import Channel, MalformedError, Schema
 from kbs_process.recordings.mcap.kernels import Bytes, Words
-from kbs_process.recordings.mcap.layout import Decoded
 from kbs_process.recordings.mcap.messages.fields import Elements, Field, Step
 from kbs_process.recordings.mcap.messages.jsontext import JsonMessage
+from kbs_process.recordings.mcap.messages.layout import Decoded
 from kbs_process.recordings.mcap.messages.protobuf import ProtobufMessage
 from kbs_process.recordings.mcap.messages.ros2 import Ros2Message
 from kbs_process.signals.records import Stamps

@@ -15,8 +15,8 @@ import msgspec
 import numpy as np
 
 from kbs_process.recordings.mcap.kernels import Bytes, Words
-from kbs_process.recordings.mcap.layout import Decoded
 from kbs_process.recordings.mcap.messages.fields import Elements, Field, Key, Step, find_stamp, sibling
+from kbs_process.recordings.mcap.messages.layout import Decoded
 from kbs_process.signals.records import Array, Mask, Stamps
 
 DEPTH = 16  # of objects within objects

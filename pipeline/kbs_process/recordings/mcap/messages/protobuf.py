@@ -12,8 +12,8 @@ from itertools import count
 
 from kbs_process.recordings.mcap.framing import MalformedError
 from kbs_process.recordings.mcap.kernels import FLOAT32, FLOAT64, LITTLE, SIGNED, UNSIGNED, VARINT, ZIGZAG
-from kbs_process.recordings.mcap.layout import LACKING, LEFT_OUT, Cell, Guards, Layout, LayoutDecoder, layout
 from kbs_process.recordings.mcap.messages.fields import Elements, Field, Step, find_stamp, sibling
+from kbs_process.recordings.mcap.messages.layout import LACKING, LEFT_OUT, Cell, Guards, Layout, LayoutDecoder, layout
 
 WIRE_VARINT, WIRE_64, WIRE_BYTES, WIRE_32 = 0, 1, 2, 5
 FIXED_SIZE = {WIRE_64: 8, WIRE_32: 4}

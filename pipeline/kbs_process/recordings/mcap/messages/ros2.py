@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 from kbs_process.recordings.mcap.framing import MalformedError
 from kbs_process.recordings.mcap.kernels import BIG, FLOAT32, FLOAT64, LITTLE, SIGNED, UNSIGNED
-from kbs_process.recordings.mcap.layout import LACKING, Cell, Guards, Layout, LayoutDecoder, layout
 from kbs_process.recordings.mcap.messages.fields import Elements, Field, Key, Step, find_stamp, sibling
+from kbs_process.recordings.mcap.messages.layout import LACKING, Cell, Guards, Layout, LayoutDecoder, layout
 
 PRIMITIVES = {  # type -> kind of cell, bytes
     "bool": (UNSIGNED, 1),

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from kbs_process.report.panel import Block, Caption, Cell, Figure, Grid, Notices, Panel, Text
+import numpy as np
+
+from kbs_process.diagnosis.facts import Answer
+from kbs_process.report import draw
+from kbs_process.report.panel import Block, Caption, Cell, Figure, Grid, Notices, Panel, Picture, Text
 from kbs_process.report.tables import Tables
-from kbs_process.report.text import MISSING, chance, number, percent
-from kbs_process.studies.diagnose import figures
-from kbs_process.studies.diagnose.results import Answer, DiagnosisResults, Find, Place, Trial, Unexplained
+from kbs_process.report.text import MISSING, chance, label, number, percent
+from kbs_process.studies.diagnose.results import DiagnosisResults, Find, Trial, Unexplained
 
 _TRIALS = Caption(
     shown="Whitened residual over the floor, rms, of every recording: with the parameter files' numbers (phases, of "
@@ -17,11 +20,8 @@ _TRIALS = Caption(
     do="See what remains, and record the trajectory where it is strongest.",
 )
 AT_FLOOR = 1.1
-
-
-def where(place: Place) -> str:
-    """A place in words."""
-    return f"{place.port}, {place.site}" if place.site else place.port
+_STEPS = {"nominal": draw.SERIES[4], "known": draw.PREDICTED, "corrected": draw.MEASURED}
+_WIDTH = 0.26
 
 
 def panel(results: DiagnosisResults, tables: Tables) -> Panel:
@@ -33,7 +33,7 @@ def panel(results: DiagnosisResults, tables: Tables) -> Panel:
         )
     if results.finds:
         blocks.append(_finds(results.finds, results.answer))
-    blocks.append(Figure("Residual over the floor", (figures.trials(results.trials),), _TRIALS))
+    blocks.append(Figure("Residual over the floor", (_bars(results.trials),), _TRIALS))
     blocks.append(_trials(results.trials))
     if results.requirements:
         blocks.append(_requirements(results.requirements))
@@ -55,7 +55,7 @@ def _finds(finds: tuple[Find, ...], answer: Answer) -> Grid:
         (
             find.name,
             find.family,
-            where(find.place),
+            find.place.words,
             ", ".join(find.place.channels[:3]) or MISSING,
             number(find.probability, 3),
             number(find.distance, 3),
@@ -98,3 +98,23 @@ def _requirements(requirements: tuple[Unexplained, ...]) -> Grid:
     )
     head = ("Requirement", "As", "Limit", "Known refitted", "Corrected", "Of the limit", "Where")
     return Grid("What is left, noise included, as requirements count it", head, rows, "klrrrrl")
+
+
+def _bars(entries: tuple[Trial, ...]) -> Picture:
+    """Draw residual over floor of each recording: nominal, known parameters refitted, corrected."""
+    with draw.style():
+        figure, axis = draw.canvas(0.9 + 0.34 * len(entries))
+        places = np.arange(len(entries))[::-1]
+        for index, (step, color) in enumerate(_STEPS.items()):
+            values = [getattr(entry, step) for entry in entries]
+            axis.barh(places + (1 - index) * _WIDTH, values, _WIDTH, color=color, label=step, left=0.0)
+        axis.axvline(1.0, color=draw.LIMIT, linewidth=0.8, linestyle="--", label="floor")
+        most = max(max(entry.nominal, entry.known, entry.corrected) for entry in entries)
+        draw.logarithmic(axis, "x", 0.5, 1.3 * max(most, 2.0))
+        axis.set_yticks(places, [f"{label(entry.recording, 24)} ({entry.role})" for entry in entries])
+        axis.grid(visible=False, axis="y")
+        axis.set_xlabel("residual over floor, rms")
+        axis.legend(ncols=4, loc="lower right", bbox_to_anchor=(1.0, 1.0))
+        worst = max(entries, key=lambda entry: entry.corrected)
+        alt = f"Residual over floor of {len(entries)} recordings; corrected, at most {number(worst.corrected)}"
+        return draw.picture(figure, alt)

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
+
 from kbs_process.diagnosis.experiments.thresholds import RIVALS, SHADE, told_apart
+from kbs_process.report import draw
 from kbs_process.report.formula import equation
-from kbs_process.report.panel import Block, Caption, Cell, Figure, Grid, Panel, Text
+from kbs_process.report.panel import Block, Caption, Cell, Figure, Grid, Panel, Picture, Text
 from kbs_process.report.tables import Tables
 from kbs_process.report.text import number, percent, unit
-from kbs_process.studies.diagnose import figures
-from kbs_process.studies.diagnose.results import DiagnosisResults, Find, Rival
-from kbs_process.studies.diagnose.sections.answer import where
+from kbs_process.studies.diagnose.results import Curve, DiagnosisResults, Find, Rival
 
 _LAW = Caption(
     shown="What enters at the port, estimated from the residual without presuming a law, against what orders it, and "
@@ -34,7 +35,7 @@ def _find(find: Find) -> Iterator[Block]:
     alike = f" These channels cannot tell that port from {', '.join(find.same_ports)}." if find.same_ports else ""
     digits = 2 if find.absorbed < 0.99 else 4  # what a weight leaves of a cord is not nothing
     yield Text(
-        f"{find.name}, {where(find.place)}.{known} Known parameters could have taken up "
+        f"{find.name}, {find.place.words}.{known} Known parameters could have taken up "
         f"{percent(find.absorbed, digits)} of its signature.{alike}"
     )
     if find.equation:
@@ -54,7 +55,7 @@ def _find(find: Find) -> Iterator[Block]:
     if rows:
         yield Grid(f"{find.name}: parameters", ("Parameter", "Unit", "Value", "Sigma", "95 %"), rows, "klrrr")
     if find.curve is not None:
-        yield Figure(f"{find.name}: the law", (figures.law(find, find.curve),), _LAW)
+        yield Figure(f"{find.name}: the law", (_band(find, find.curve),), _LAW)
     gate = tuple(
         (
             entry.recording,
@@ -76,7 +77,7 @@ def _find(find: Find) -> Iterator[Block]:
                 (
                     rival.name,
                     rival.family,
-                    where(rival.place),
+                    rival.place.words,
                     "yes" if rival.simulated else "no",
                     Cell(number(rival.distance), "undecided" if _alike(find, rival) else ""),
                     number(rival.probability, 2),
@@ -92,3 +93,18 @@ def _find(find: Find) -> Iterator[Block]:
 def _alike(find: Find, rival: Rival) -> bool:
     """Whether a law cannot be told from a find."""
     return rival.distance < (told_apart(find.distance) if rival.simulated else RIVALS)
+
+
+def _band(find: Find, curve: Curve) -> Picture:
+    """Draw what enters at the port, with its band of two sigmas, and the accepted law through it."""
+    x, y, sigma = (np.asarray(values) for values in (curve.x, curve.y, curve.sigma))
+    with draw.style():
+        figure, axis = draw.canvas(2.3)
+        axis.fill_between(x, y - 2.0 * sigma, y + 2.0 * sigma, color=draw.SHADE, linewidth=0.0, label="2 sigma")
+        axis.plot(x, y, color=draw.MEASURED, linewidth=0.9, label="measured")
+        if curve.fitted:
+            axis.plot(x, curve.fitted, color=draw.PREDICTED, linewidth=1.6, zorder=1, label=find.name)
+        axis.set_xlabel(f"{curve.regressor} / {unit(curve.x_unit)}")
+        axis.set_ylabel(f"{find.place.port} / {unit(curve.y_unit)}")
+        axis.legend()
+        return draw.picture(figure, f"{find.name} at {find.place.site}: measured law over {curve.regressor}")

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from kbs_process.report import curves
-from kbs_process.report.panel import Block, Caption, Figure, Panel, Text
+import numpy as np
+from matplotlib.figure import Figure as Canvas
+
+from kbs_process.report import curves, draw
+from kbs_process.report.panel import Block, Caption, Figure, Panel, Picture, Text
 from kbs_process.report.tables import Tables
-from kbs_process.studies.diagnose import figures
-from kbs_process.studies.diagnose.results import DiagnosisResults
+from kbs_process.report.text import label, number
+from kbs_process.studies.diagnose.results import DiagnosisResults, Trial
 
 _CHANNELS = Caption(
     shown="What is left of each channel over the floor, with everything that was found in the plant.",
@@ -32,7 +35,7 @@ _HISTORIES = Caption(
 
 def panel(results: DiagnosisResults, tables: Tables) -> Panel:
     """Channels of all recordings, spectra and histories of those held out."""
-    blocks: list[Block] = [Figure("What is left, channel by channel", (figures.channels(results.trials),), _CHANNELS)]
+    blocks: list[Block] = [Figure("What is left, channel by channel", (_levels(results.trials),), _CHANNELS)]
     shown = [entry for entry in results.trials if entry.role == "held-out"] or list(results.trials)
     spectra, histories = [], []
     for entry in shown:
@@ -47,3 +50,23 @@ def panel(results: DiagnosisResults, tables: Tables) -> Panel:
         blocks.append(Figure("Histories of the residual", tuple(histories), _HISTORIES))
     blocks += [Text(note) for note in results.notes]
     return Panel("remaining", "What remains", "What is left, and where does it live?", tuple(blocks))
+
+
+def _levels(entries: tuple[Trial, ...]) -> Picture:
+    """Draw what is left over the floor, channel by channel."""
+    names = tuple(dict.fromkeys(name for entry in entries for name in entry.channels))
+    values = np.array([[entry.channels.get(name, np.nan) for name in names] for entry in entries])
+    with draw.style():
+        figure = Canvas(figsize=(draw.WIDTH, 0.7 + 0.26 * len(entries)), layout="constrained")
+        axis = figure.subplots()
+        top = max(2.0, float(np.nanmax(values)))
+        image = axis.imshow(values, cmap="Blues", vmin=1.0, vmax=top, aspect="auto")
+        axis.set_xticks(range(len(names)), names)
+        axis.set_yticks(range(len(entries)), [label(entry.recording, 24) for entry in entries])
+        axis.grid(visible=False)
+        for row, column in np.argwhere(np.isfinite(values)):
+            value = values[row, column]
+            color = "white" if value > 0.5 * (1.0 + top) else draw.INK
+            axis.text(column, row, number(value), ha="center", va="center", color=color, fontsize=6)
+        figure.colorbar(image, ax=axis, label="over floor")
+        return draw.picture(figure, f"Residual over floor by channel, at most {number(float(np.nanmax(values)))}")

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import numpy as np
+from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure as Canvas
+
+from kbs_process.diagnosis.facts import Moved
+from kbs_process.report import draw
 from kbs_process.report.panel import Block, Caption, Cell, Figure, Fold, Grid, Panel, Picture
-from kbs_process.report.tables import Tables
+from kbs_process.report.tables import Table, Tables
 from kbs_process.report.text import MISSING, chance, count, measure, number, percent, unit
-from kbs_process.studies.diagnose import figures
-from kbs_process.studies.diagnose.results import DiagnosisResults, Moved, PortTest, Suspect
-from kbs_process.studies.diagnose.sections.answer import where
+from kbs_process.signals.records import Array
+from kbs_process.studies.diagnose.results import DiagnosisResults, PortTest, Suspect
 
 _FAR = 3.0  # sigma
 _MAPS = Caption(
@@ -51,7 +56,7 @@ def _maps(results: DiagnosisResults, tables: Tables) -> tuple[Picture, ...]:
         if trial.role != "held-out":
             members.setdefault(trial.trajectory, []).append(trial.recording)
     found = ((tables.read("residual_map", number), names) for number, names in members.items())
-    return tuple(figures.where(table, ", ".join(names)) for table, names in found if table is not None)
+    return tuple(_map(table, ", ".join(names)) for table, names in found if table is not None)
 
 
 def _ports(entries: tuple[PortTest, ...]) -> Grid:
@@ -75,7 +80,7 @@ def _suspects(entries: tuple[Suspect, ...]) -> Grid:
         (
             entry.name,
             entry.family,
-            where(entry.place),
+            entry.place.words,
             number(entry.distance),
             MISSING if entry.absorbed is None else percent(entry.absorbed, 2),
             entry.outcome,
@@ -101,3 +106,51 @@ def _moved(title: str, entries: tuple[Moved, ...]) -> Grid:
         for entry in entries
     )
     return Grid(title, ("Number", "Unit", "Prior", "Refitted", "Moved / sigma"), rows, "klrrr")
+
+
+def _map(table: Table, title: str) -> Picture:
+    """Draw rms over the floor in windows of time by frequencies, before and after; dots: more than chance."""
+    t, f, found = (table.columns[name] for name in ("t", "f", "significant"))
+    times, tones = _windows(t, f), np.unique(f)
+    grids = {side: np.full((len(tones), len(times)), np.nan) for side in ("before", "after")}
+    for row, tone in enumerate(tones):
+        own = np.flatnonzero(f == tone)
+        # A window that holds the slowest changes is as long as several others.
+        nearest = own[np.abs(t[own][:, None] - times).argmin(axis=0)]
+        for side, grid in grids.items():
+            grid[row] = table.columns[side][nearest]
+    most = max(3.0, float(np.nanquantile(grids["before"], 0.99)))
+    with draw.style():
+        figure = Canvas(figsize=(draw.WIDTH, 2.4), layout="constrained")
+        axes = figure.subplots(1, 2, sharey=True)
+        for axis, (side, grid) in zip(axes, grids.items(), strict=True):
+            image = axis.pcolormesh(
+                _edges(times), _edges(tones), grid, cmap="Blues", norm=LogNorm(1.0, most), rasterized=True
+            )
+            axis.set_title(side)
+            axis.set_xlabel("time / s")
+            axis.grid(visible=False)
+        seen = found > 0.5
+        axes[0].plot(t[seen], f[seen], ".", color=draw.LIMIT, markersize=1.5)
+        draw.logarithmic(axes[0], "y", float(tones[0]) * 0.8, float(tones[-1]) * 1.1)
+        axes[0].set_ylabel("frequency / Hz")
+        scale = figure.colorbar(image, ax=axes, label="over floor")
+        draw.logarithmic(scale.ax, "y", 1.0, most)
+        worst = number(float(np.nanmax(grids["before"])))
+        alt = f"{title}: residual over floor by time and frequency, before at most {worst}"
+        return draw.picture(figure, alt, title)
+
+
+def _windows(t: Array, f: Array) -> Array:
+    """Middles of the shortest windows: those of the frequency that is looked at most often."""
+    tones, counts = np.unique(f, return_counts=True)
+    return np.unique(t[f == tones[counts.argmax()]])
+
+
+def _edges(middles: Array) -> Array:
+    """Borders between neighbours, and as far beyond the first and the last one."""
+    if len(middles) < 2:
+        return np.asarray(np.concatenate([middles - 0.5, middles + 0.5]))
+    between = 0.5 * (middles[1:] + middles[:-1])
+    first, last = 2.0 * middles[0] - between[0], 2.0 * middles[-1] - between[-1]
+    return np.asarray(np.concatenate([[max(first, 0.5 * middles[0])], between, [last]]))

@@ -2,33 +2,27 @@
 
 from __future__ import annotations
 
-from kbs_process.report.panel import Block, Caption, Cell, Figure, Grid, Notices, Panel, Text
-from kbs_process.report.tables import Tables
+import numpy as np
+
+from kbs_process.report import draw
+from kbs_process.report.panel import Block, Cell, Figure, Grid, Panel, Picture, Text, notices
+from kbs_process.report.prose import Prose
+from kbs_process.report.tables import Table, Tables
 from kbs_process.report.text import MISSING, band_hz, count, frame_label, number, percent, unit
-from kbs_process.studies.flight import figures
 from kbs_process.studies.flight.results import Distribution, FlightRequirement, FlightResults
 
-_SPREAD = Caption(
-    shown="The share of the units that stay below each value, on every channel and for the greatest of them; the "
-    "nominal unit (dots) and the limit.",
-    good="All curves end left of the limit.",
-    bad="A curve that crosses the limit: the share above it fails. Nominal units far from the middle of their curve: "
-    "the statistic is not linear in the parameters, and the nominal unit must not be used alone.",
-    do="Look below for the numbers that drive the spread, and have those measured on the flight motor-gear.",
-)
+_SAYS = Prose("kbs_process.studies.flight", "compliance")
 
 
 def panel(results: FlightResults, tables: Tables) -> Panel:
     """Probabilities, the statistics behind them, and their distributions."""
-    blocks: list[Block] = [_probabilities(results)]
-    if results.warnings:
-        blocks.append(Notices(tuple((n.severity, n.what, n.where, n.remedy) for n in results.warnings)))
-    blocks.append(Text("Assumptions behind these figures:", results.notes))
+    assumptions = Text("Assumptions behind these figures:", results.notes)
+    blocks: list[Block] = [_probabilities(results), *notices(results.warnings), assumptions]
     units = tables.read("flight", "units")
     for index, requirement in enumerate(results.requirements):
         title = f"{requirement.name}: {requirement.statistic} over {count(results.samples, 'unit')}"
         if units is not None:
-            blocks.append(Figure(title, (figures.distribution(requirement, index, units),), _SPREAD))
+            blocks.append(Figure(title, (_distribution(requirement, index, units),), _SAYS.caption("spread")))
         blocks.append(_statistics(requirement, title))
     return Panel(
         "compliance", "Compliance", "With which probability does a flight unit meet its requirements?", tuple(blocks)
@@ -72,3 +66,30 @@ def _statistics(requirement: FlightRequirement, title: str) -> Grid:
     rows = (*(row(entry.channel, entry) for entry in requirement.channels), row("worst of them", requirement.worst))
     head = ("Channel", "Nominal", "Mean", "5 %", "Median", "95 %", "Greatest", "95 %/95 % bound")
     return Grid(f"{title}, {unit(requirement.unit)}", head, rows, "krrrrrrr")
+
+
+def _distribution(requirement: FlightRequirement, index: int, units: Table) -> Picture:
+    """Draw the empirical distribution of each channel's statistic, the nominal unit, and the limit."""
+    names = [channel.channel for channel in requirement.channels]
+    columns = [units.columns[f"{index}.{name}.{requirement.statistic}"] for name in names]
+    curves = [*zip(names, columns, requirement.channels, strict=True)]
+    curves.append(("worst of them", np.max(columns, axis=0), requirement.worst))
+    with draw.style():
+        figure, axis = draw.canvas(2.6)
+        for place, (name, outcomes, found) in enumerate(curves):
+            color = draw.INK if place == len(curves) - 1 else draw.SERIES[place]
+            ordered = np.sort(outcomes)
+            share = np.arange(1, len(ordered) + 1) / len(ordered)
+            axis.step(ordered, 100.0 * share, where="post", color=color, linewidth=1.1, label=name)
+            at = 100.0 * float(np.mean(outcomes <= found.nominal))
+            axis.plot([found.nominal], [at], marker="o", markersize=3.5, color=color)
+        greatest = requirement.worst.greatest
+        if greatest > 0.25 * requirement.limit:
+            axis.axvline(requirement.limit, color=draw.LIMIT, linewidth=1.2, label="limit")
+        axis.set_xlim(left=0.0)
+        axis.set_ylim(0.0, 101.0)
+        axis.set_xlabel(f"{requirement.statistic} / {unit(requirement.unit)}")
+        axis.set_ylabel("units below / %")
+        axis.legend(loc="lower right")
+        alt = ", ".join(f"{entry.channel} {number(entry.q95)}" for entry in requirement.channels)
+        return draw.picture(figure, f"Distributions over the units; 95 % stay below: {alt} {requirement.unit}")

@@ -2,21 +2,14 @@
 
 from __future__ import annotations
 
-from kbs_process.report.panel import Block, Caption, Figure, Panel, Text
-from kbs_process.report.tables import Tables
-from kbs_process.report.text import band_hz, frame_label
-from kbs_process.studies.flight import figures
-from kbs_process.studies.flight.results import FlightResults
+from kbs_process.report import draw
+from kbs_process.report.panel import Block, Figure, Panel, Picture, Text
+from kbs_process.report.prose import Prose
+from kbs_process.report.tables import Table, Tables
+from kbs_process.report.text import band_hz, frame_label, unit
+from kbs_process.studies.flight.results import FlightRequirement, FlightResults
 
-_CAPTION = Caption(
-    shown="Least and greatest value in each stretch of time: of the nominal unit (dark), and the range that 90 % of "
-    "the units stay in at that time (pale), in the requirement's band.",
-    good="Bursts at the same times in all units, and all within the limits.",
-    bad="A pale band much wider than the nominal unit's: where the burst falls depends on the unit, and one "
-    "prediction says little.",
-    do="If bursts come where a tooth-passing or cogging line crosses a resonance, choose rates that do not dwell "
-    "there.",
-)
+_SAYS = Prose("kbs_process.studies.flight", "histories")
 
 
 def panel(results: FlightResults, tables: Tables) -> Panel:
@@ -27,10 +20,30 @@ def panel(results: FlightResults, tables: Tables) -> Panel:
         if table is not None:
             where = (band_hz(*requirement.band_Hz), frame_label(requirement.frame))
             title = ", ".join((requirement.name, *(() if requirement.quantity == "pointing" else where)))
-            blocks.append(Figure(title, (figures.histories(requirement, table),), _CAPTION))
+            blocks.append(Figure(title, (_histories(requirement, table),), _SAYS.caption("histories")))
     return Panel(
         "histories",
         "Time histories",
         "When does the disturbance come, and in how many units?",
         tuple(blocks) or (Text("The tables of the histories are not in this folder."),),
     )
+
+
+def _histories(requirement: FlightRequirement, table: Table) -> Picture:
+    """Draw one row a channel: the nominal unit's envelope over the range of 90 % of the units."""
+    t = table.columns["t"]
+    rows = requirement.channels
+    with draw.style():
+        figure, axes = draw.grid(0.5 + 1.15 * len(rows), len(rows), share_x=True)
+        for axis, row in zip(axes, rows, strict=True):
+            low, high, q05, q95 = (table.columns[f"{row.channel}.{name}"] for name in ("low", "high", "q05", "q95"))
+            axis.fill_between(t, q05, q95, color=draw.PREDICTED, alpha=0.5, linewidth=0.0, label="90 % of units")
+            axis.fill_between(t, low, high, color=draw.MEASURED, linewidth=0.4, label="nominal unit")
+            if row.greatest > 0.5 * requirement.limit:
+                for level in (-requirement.limit, requirement.limit):
+                    axis.axhline(level, color=draw.LIMIT, linewidth=0.8, linestyle=(0, (4, 2)))
+            axis.set_ylabel(f"{row.channel} / {unit(requirement.unit)}")
+        axes[0].legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
+        axes[-1].set_xlabel("time / s")
+        alt = f"{requirement.name}: range of 90 % of the units over time, and the nominal unit"
+        return draw.picture(figure, alt, form="png")

@@ -2,25 +2,21 @@
 
 from __future__ import annotations
 
-from kbs_process.report.panel import Block, Caption, Cell, Figure, Fold, Grid, Panel, Text
+import math
+
+import numpy as np
+
+from kbs_process.report import draw
+from kbs_process.report.panel import Block, Cell, Figure, Fold, Grid, Panel, Picture, Text
+from kbs_process.report.prose import Prose
 from kbs_process.report.tables import Tables
 from kbs_process.report.text import MISSING, count, measure, number, unit
-from kbs_process.studies.identify import figures
-from kbs_process.studies.identify.results import Identified, IdentifyResults
+from kbs_process.studies.identify.results import Correlations, Identified, IdentifyResults
 
-_PROFILE = Caption(
-    shown="What the cost (-2 log likelihood) rises by when a parameter is held and all others follow (points), the "
-    "parabola of its sigma (grey), the level of 95 % (dashed) and the interval (dotted).",
-    good="Points on the parabola: sigma says it all.",
-    bad="A flat or lopsided profile: the interval is not +-1.96 sigma. A point below zero: the search ended too early.",
-    do="Use the interval where it differs from the parabola's; record motions that separate the pair where it is flat.",
-)
-_CORRELATION = Caption(
-    shown="Correlation of the estimates of drives and transducer.",
-    good="Little colour off the diagonal.",
-    bad="A pair near +-1: the recordings know a combination of the two alone.",
-    do="Measure one of the pair otherwise, or record both directions and other rates.",
-)
+_SAYS = Prose("kbs_process.studies.identify", "parameters")
+_LEVEL = 3.84
+_COLUMNS = 3
+
 _TITLES = {
     "critical": "The paper's five: tooth-passing stick-slip, flexspline stiffness and damping, cogging, twice-a-turn",
     "gearbox": "The rest of drives and transducer",
@@ -43,12 +39,11 @@ def panel(results: IdentifyResults, tables: Tables) -> Panel:
     profiled = tuple(entry for entry in results.parameters if entry.interval is not None)
     joints = dict.fromkeys(entry.name.split(".drive.")[0] for entry in profiled)
     pictures = tuple(
-        figures.profiles(tuple(entry for entry in profiled if entry.name.startswith(f"{joint}.")), joint)
-        for joint in joints
+        _profiles(tuple(entry for entry in profiled if entry.name.startswith(f"{joint}.")), joint) for joint in joints
     )
     if pictures:
-        blocks.append(Figure("Profile likelihood", pictures, _PROFILE))
-    blocks.append(Figure("Correlations", (figures.correlations(results.correlations),), _CORRELATION))
+        blocks.append(Figure("Profile likelihood", pictures, _SAYS.caption("profile")))
+    blocks.append(Figure("Correlations", (_correlations(results.correlations),), _SAYS.caption("correlation")))
     rows = tuple(
         (
             str(index),
@@ -96,3 +91,42 @@ def _grid(title: str, entries: tuple[Identified, ...]) -> Grid:
         "Most correlated with",
     )
     return Grid(title, head, rows, "klrrrrl")
+
+
+def _profiles(entries: tuple[Identified, ...], title: str) -> Picture:
+    """Draw each profile over the parabola of the estimate's sigma."""
+    rows = math.ceil(len(entries) / _COLUMNS)
+    with draw.style():
+        figure, axes = draw.grid(0.3 + 1.5 * rows, rows, _COLUMNS)
+        for axis, entry in zip(axes, entries, strict=False):
+            assert entry.interval is not None
+            x = np.linspace(-3.0, 3.0, 61)
+            axis.plot(entry.value + entry.sigma * x, x**2, color=draw.RESIDUAL, linewidth=0.8)
+            axis.plot(entry.interval.x, entry.interval.D, marker="o", markersize=3, color=draw.MEASURED)
+            axis.axhline(_LEVEL, color=draw.LIMIT, linewidth=0.8, linestyle="--")
+            for end in (entry.interval.low, entry.interval.high):
+                axis.axvline(end, color=draw.MEASURED, linewidth=0.6, linestyle=":")
+            axis.set_ylim(-0.3, 9.0)
+            axis.set_title(entry.name.rpartition(".")[2])
+            axis.set_xlabel(unit(entry.unit))
+            axis.tick_params(axis="x", labelsize=6)
+            axis.locator_params(axis="x", nbins=4)
+        for axis in axes[len(entries) :]:
+            axis.set_axis_off()
+        return draw.picture(figure, f"{title}: profile likelihood of {len(entries)} parameters", title)
+
+
+def _correlations(found: Correlations) -> Picture:
+    """Draw the correlation matrix."""
+    names = [name.removeprefix("joint.").replace(".drive.", " ").replace("transducer.", "") for name in found.names]
+    with draw.style():
+        figure, axis = draw.canvas(0.9 * draw.WIDTH)
+        image = axis.imshow(np.array(found.matrix), cmap="RdBu_r", vmin=-1.0, vmax=1.0)
+        axis.set_xticks(range(len(names)), names, rotation=90, fontsize=5.5)
+        axis.set_yticks(range(len(names)), names, fontsize=5.5)
+        axis.grid(visible=False)
+        figure.colorbar(image, ax=axis, shrink=0.7, label="correlation")
+        worst = max(
+            (abs(value) for i, row in enumerate(found.matrix) for j, value in enumerate(row) if i != j), default=0.0
+        )
+        return draw.picture(figure, f"Correlations of {len(names)} estimates, at most {number(worst, 2)}")

@@ -3,24 +3,13 @@
 from __future__ import annotations
 
 from kbs_process.report import curves
-from kbs_process.report.panel import Block, Caption, Cell, Figure, Grid, Panel
+from kbs_process.report.panel import Block, Cell, Figure, Grid, Panel
+from kbs_process.report.prose import Prose
 from kbs_process.report.tables import Tables
 from kbs_process.report.text import exact, number
 from kbs_process.studies.identify.results import IdentifyResults
 
-_SPECTRA = Caption(
-    shown="Power spectral density of what the plant leaves unexplained: with the parameter files' numbers (before), "
-    "with the identified ones (after), and the sensor's own noise (dashed).",
-    good="After lies on the sensor's noise at all frequencies.",
-    bad="A hump above the noise: physics that the model lacks, or a number that is not free.",
-    do="Find the motor order or the resonance at the hump, and add the effect.",
-)
-_HISTORIES = Caption(
-    shown="The same in time.",
-    good="After looks like noise, whatever the drives do.",
-    bad="Bursts that come again with position or rate.",
-    do="Compare their instants with the motor's angle and rate.",
-)
+_SAYS = Prose("kbs_process.studies.identify", "residuals")
 
 
 def panel(results: IdentifyResults, tables: Tables) -> Panel:
@@ -51,9 +40,9 @@ def panel(results: IdentifyResults, tables: Tables) -> Panel:
         if (table := tables.read("residual", name)) is not None:
             histories.append(curves.histories(table, channels, name))
     if spectra:
-        blocks.append(Figure("Spectra of the residual", tuple(spectra), _SPECTRA))
+        blocks.append(Figure("Spectra of the residual", tuple(spectra), _SAYS.caption("spectra")))
     if histories:
-        blocks.append(Figure("Histories of the residual", tuple(histories), _HISTORIES))
+        blocks.append(Figure("Histories of the residual", tuple(histories), _SAYS.caption("histories")))
     return Panel(
         "residuals", "Held-out predictions", "Does it predict recordings that the fit has not seen?", tuple(blocks)
     )

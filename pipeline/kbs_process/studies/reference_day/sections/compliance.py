@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kbs_process.report.panel import Block, Cell, Grid, Notices, Panel, Text
+from kbs_process.report.panel import Cell, Grid, Panel, Text, notices
 from kbs_process.report.tables import Tables
 from kbs_process.report.text import exact, measure, number, percent, unit
 from kbs_process.studies.reference_day.results import Judged, ReferenceDayResults
@@ -15,16 +15,14 @@ def panel(results: ReferenceDayResults, tables: Tables) -> Panel:
     head = ("Requirement", "Found", "Limit", "Margin", "Worst case", "Verdict")
     note = "± is one standard deviation. Each axis has to meet each pointing requirement in every section."
     sources = "; ".join(dict.fromkeys(one.source for one in results.requirements))
-    blocks: list[Block] = [
-        Grid(
-            "Compliance", head, tuple(_row(one) for one in results.requirements), "lrrrlc", f"{note} Source: {sources}."
-        )
-    ]
-    if results.warnings:
-        blocks.append(Notices(tuple((n.severity, n.what, n.where, n.remedy) for n in results.warnings)))
-    blocks.append(Text("Assumptions behind these figures:", results.notes))
+    rows = tuple(_row(one) for one in results.requirements)
+    blocks = (
+        Grid("Compliance", head, rows, "lrrrlc", f"{note} Source: {sources}."),
+        *notices(results.warnings),
+        Text("Assumptions behind these figures:", results.notes),
+    )
     question = "Does the unit point well enough, and turn quietly enough, over the day?"
-    return Panel("compliance", "Compliance", question, tuple(blocks))
+    return Panel("compliance", "Compliance", question, blocks)
 
 
 def _row(one: Judged) -> tuple[str | Cell, ...]:

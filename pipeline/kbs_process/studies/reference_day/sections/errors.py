@@ -5,25 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from kbs_process.report import distributions as pointing
-from kbs_process.report.panel import Block, Caption, Figure, Fold, Panel, Picture
+from kbs_process.report import draw, series
+from kbs_process.report.panel import Block, Figure, Fold, Panel, Picture
+from kbs_process.report.prose import Prose
 from kbs_process.report.tables import Table, Tables
-from kbs_process.studies.reference_day import figures
 from kbs_process.studies.reference_day.results import ReferenceDayResults, Section
 
-_DENSITY = Caption(
-    shown="Density of the error about its bias in the first section, with the normal density of the same standard "
-    "deviation; between the dashed lines lie 95 %.",
-    good="One hump about zero, narrower than the limit.",
-    bad="Two humps or flat shoulders: a limit cycle over one encoder code. Long tails: rare events, which a standard "
-    "deviation does not tell.",
-    do="Compare the width with one code of the encoder; look for the events in the history below.",
-)
-_HISTORY = Caption(
-    shown="Pointing error of either axis over the day: the range within each stretch of time, with the limit on 95 %.",
-    good="A band of even width about zero.",
-    bad="A drift or a step: slow variation, which counts against the limit over one orbit.",
-    do="Match it with the trajectory: errors that come with rate are the loop's, those at rest the encoder's.",
-)
+_SAYS = Prose("kbs_process.studies.reference_day", "errors")
+AXES = (("az", "azimuth", draw.MEASURED), ("el", "elevation", draw.PREDICTED))
+_POINTS = 3000  # of a curve over the day
 
 
 def panel(results: ReferenceDayResults, tables: Tables) -> Panel:
@@ -33,12 +23,16 @@ def panel(results: ReferenceDayResults, tables: Tables) -> Panel:
     if table is not None:
         first, *rest = results.sections
         title = f"Distribution of the pointing error, section {first.name}"
-        blocks.append(Figure(title, _densities(table, first), _DENSITY))
+        blocks.append(Figure(title, _densities(table, first), _SAYS.caption("density")))
         limits = [one.limit for one in results.requirements if one.statistic == "percentile"]
-        history = figures.errors(table, min(limits, default=0.0))
-        blocks.append(Figure("Pointing error over the day", (history,), _HISTORY))
+        history = _errors(table, min(limits, default=0.0))
+        blocks.append(Figure("Pointing error over the day", (history,), _SAYS.caption("history")))
         others = tuple(
-            Figure(f"Distribution of the pointing error, section {one.name}", _densities(table, one), _DENSITY)
+            Figure(
+                f"Distribution of the pointing error, section {one.name}",
+                _densities(table, one),
+                _SAYS.caption("density"),
+            )
             for one in rest
         )
         if others:
@@ -51,3 +45,21 @@ def _densities(table: Table, section: Section) -> tuple[Picture, ...]:
     inside = np.logical_and(table.valid, (t >= section.start_s) & (t < section.end_s))
     found = (("azimuth", "az", section.azimuth), ("elevation", "el", section.elevation))
     return (pointing.distributions([(name, table.columns[column][inside], one) for name, column, one in found]),)
+
+
+def _errors(table: Table, limit: float) -> Picture:
+    """Draw both axes' pointing error over the day: the range within each stretch of time."""
+    t = table.columns["t"]
+    size = series.stride(len(t), _POINTS)
+    t0, step = series.times(t, size)
+    with draw.style():
+        figure, axes = draw.grid(3.0, 2, share_x=True)
+        for axis, (column, name, color) in zip(axes, AXES, strict=True):
+            mdeg = 1e3 * np.degrees(series.envelope(table.columns[column], size))
+            axis.plot(t0 + step * np.arange(len(mdeg)), mdeg, color=color, linewidth=0.4)
+            for level in (-limit, limit):
+                axis.axhline(1e3 * np.degrees(level), color=draw.LIMIT, linewidth=0.8, linestyle=(0, (4, 2)))
+            axis.set_ylabel(f"{name} error / mdeg")
+        axes[-1].set_xlim(0.0, float(t[-1]))
+        axes[-1].set_xlabel("time / s")
+        return draw.picture(figure, "Pointing error of either axis over the reference day", form="png")

@@ -2,30 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from kbs_process.report.panel import Block, Caption, Figure, Grid, Panel, Text
+from kbs_process.report import draw
+from kbs_process.report.panel import Block, Figure, Grid, Panel, Picture, Text
+from kbs_process.report.prose import Prose
 from kbs_process.report.tables import Tables
 from kbs_process.report.text import MISSING, measure, number
 from kbs_process.results.pointing import PointingEstimate
-from kbs_process.studies.reference_day import figures
 from kbs_process.studies.reference_day.results import ReferenceDayResults, Section
 
-_COMPARED = Caption(
-    shown="95 % of the magnitude of each axis' error in each section, with two standard deviations, beside the "
-    "published figures.",
-    good="Both well below 44 mdeg, and of like size.",
-    bad="A section that stands out in one and not in the other: a cause that one of the models lacks.",
-    do="Read the discussion under the table; look at that section's error over time.",
-)
+_SAYS = Prose("kbs_process.studies.reference_day", "sections")
 
 
 def panel(results: ReferenceDayResults, tables: Tables) -> Panel:
     """Table of the sections with the published figures, and the discussion."""
     blocks: list[Block] = [_compared(results)]
     if any(section.published for section in results.sections):
-        figure = figures.against_published(results.sections)
-        blocks.append(Figure("95 % of the pointing error, simulated and published", (figure,), _COMPARED))
+        figure = _against_published(results.sections)
+        blocks.append(
+            Figure("95 % of the pointing error, simulated and published", (figure,), _SAYS.caption("compared"))
+        )
     if results.discussion:
         blocks.append(Text("Where they differ, and why:", results.discussion))
     blocks.append(_statistics(results))
@@ -89,3 +88,25 @@ def _line(where: str, name: str, one: PointingEstimate) -> tuple[str, ...]:
         _mdeg(one.percentile, one.percentile_sigma),
         number(1e3 * float(np.degrees(one.greatest))),
     )
+
+
+def _against_published(sections: Sequence[Section]) -> Picture:
+    """Draw 95 % of either axis' error, ours with two sigma beside the published one."""
+    place = np.arange(len(sections), dtype=float)
+    with draw.style():
+        figure, axes = draw.row(2.3, 2, share_y=True)
+        for axis, which in zip(axes, ("azimuth", "elevation"), strict=True):
+            ours = [1e3 * np.degrees(getattr(section, which).percentile) for section in sections]
+            sigma = [1e3 * np.degrees(getattr(section, which).percentile_sigma) for section in sections]
+            theirs = [getattr(section.published, f"{which}_mdeg", np.nan) for section in sections]
+            axis.bar(place - 0.2, ours, 0.38, yerr=2.0 * np.array(sigma), color=draw.MEASURED, label="simulated, ± 2 σ",
+                     error_kw={"elinewidth": 0.8, "capsize": 1.5, "ecolor": draw.INK})  # fmt: skip
+            axis.bar(place + 0.2, theirs, 0.38, color=draw.PREDICTED, label="published")
+            axis.set_xticks(place, [section.name for section in sections])
+            axis.grid(visible=False, axis="x")
+            axis.set_title(which)
+            axis.set_xlabel("section")
+        axes[0].set_ylim(bottom=0.0)  # shared; an error of a statistic may be greater than the statistic
+        axes[0].set_ylabel("95 % error / mdeg")
+        axes[0].legend(loc="upper left", fontsize=6.5)
+        return draw.picture(figure, "95 % of the pointing error of each section, simulated and published")

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from kbs_process.report.panel import Block, Caption, Figure, Panel
+from collections.abc import Sequence
+
+import numpy as np
+
+from kbs_process.report import draw, series
+from kbs_process.report.panel import Block, Figure, Panel, Picture
+from kbs_process.report.prose import Prose
 from kbs_process.report.tables import Table, Tables
-from kbs_process.studies.reference_day import figures
 from kbs_process.studies.reference_day.results import ReferenceDayResults
 
-_TORQUE = Caption(
-    shown="Torque at the spacecraft's centre of mass, every axis and band, as the range within each stretch of time.",
-    good="Well within the limit (dashed) in the requirement's band.",
-    bad="Bursts where the antenna crosses a rate at which cogging or tooth passing meets a resonance.",
-    do="For a burst, find its rate in the trajectory: motor turns a second times 200 is the frequency.",
-)
+_SAYS = Prose("kbs_process.studies.reference_day", "torque")
+TORQUES = (("Tx", draw.MEASURED), ("Ty", draw.PREDICTED), ("Tz", draw.RESIDUAL))
+_POINTS = 3000  # of a curve over the day
 
 
 def panel(results: ReferenceDayResults, tables: Tables) -> Panel:
@@ -25,6 +27,27 @@ def panel(results: ReferenceDayResults, tables: Tables) -> Panel:
     limits = [one.limit for one in results.requirements if one.unit == "N m"]
     blocks: list[Block] = []
     if found:
-        picture = figures.torques(found, min(limits, default=None))
-        blocks.append(Figure("Disturbance torque over the day", (picture,), _TORQUE))
+        picture = _torques(found, min(limits, default=None))
+        blocks.append(Figure("Disturbance torque over the day", (picture,), _SAYS.caption("torque")))
     return Panel("torque", "Torque", "Which torque does the unit exert on the spacecraft?", tuple(blocks))
+
+
+def _torques(tables: Sequence[tuple[str, Table]], limit: float | None) -> Picture:
+    """Draw every axis' torque over the day, a row a band: the range within each stretch of time."""
+    with draw.style():
+        figure, axes = draw.grid(0.4 + 1.6 * len(tables), len(tables), share_x=True)
+        for axis, (name, table) in zip(axes, tables, strict=True):
+            t = table.columns["t"]
+            size = series.stride(len(t), _POINTS)
+            t0, step = series.times(t, size)
+            for column, color in TORQUES:
+                x = series.envelope(np.where(table.valid, table.columns[column], np.nan), size)
+                axis.plot(t0 + step * np.arange(len(x)), x, color=color, linewidth=0.4, label=column)
+            if limit is not None and name == tables[0][0]:
+                for level in (-limit, limit):
+                    axis.axhline(level, color=draw.LIMIT, linewidth=0.8, linestyle=(0, (4, 2)))
+            axis.set_ylabel(f"{name}\ntorque / N·m")
+        axes[0].legend(loc="upper right", ncols=3)
+        axes[-1].set_xlim(0.0, float(t[-1]))
+        axes[-1].set_xlabel("time / s")
+        return draw.picture(figure, "Disturbance torque at the spacecraft's centre of mass", form="png")

@@ -4,20 +4,18 @@ from __future__ import annotations
 
 import math
 
-from kbs_process.report.panel import Block, Caption, Figure, Grid, Panel, Text
+import numpy as np
+
+from kbs_process.report import draw
+from kbs_process.report.panel import Block, Figure, Grid, Panel, Picture, Text
+from kbs_process.report.prose import Prose
 from kbs_process.report.tables import Tables
 from kbs_process.report.text import number
-from kbs_process.studies.stability import figures
 from kbs_process.studies.stability.results import StabilityResults
 
+_SAYS = Prose("kbs_process.studies.stability", "margins")
+
 _ROWS = 9
-_CAPTION = Caption(
-    shown="Gain margin, phase margin and peak of the sensitivity |1 / (1 + L)| of each joint's loop over the swept "
-    "joint's angle, the other loops closed. Dashed: the customary 6 dB and 30°, and a sensitivity of 2.",
-    good="All curves on the safe side of the dashed lines, and nearly level: the pose does not matter to the loop.",
-    bad="A dip: at these poses a resonance of the article comes close to the loop.",
-    do="Where a margin is short, lower Kp or the latency, or see the map of poles for the mode that comes near.",
-)
 
 
 def panel(results: StabilityResults, tables: Tables) -> Panel:
@@ -35,7 +33,7 @@ def panel(results: StabilityResults, tables: Tables) -> Panel:
     alt = "Gain margin, phase margin and sensitivity peak over the angle of the swept joint"
     blocks: list[Block] = [
         Text(words),
-        Figure("Margins over the range", (figures.margins(results, alt),), _CAPTION),
+        Figure("Margins over the range", (_margins(results, alt),), _SAYS.caption("margins")),
         _table(results),
         _sensitivities(results),
     ]
@@ -82,3 +80,26 @@ def _sensitivities(results: StabilityResults) -> Grid:
 
 def _decibel(value: float | None) -> str:
     return number(None if value is None else 20.0 * math.log10(value))
+
+
+def _margins(results: StabilityResults, alt: str) -> Picture:
+    """Draw the three margins of each joint's loop over the swept angle."""
+    with draw.style():
+        figure, (gain, phase, peak) = draw.row(2.3, 3)
+        for index, joint in enumerate(results.joints):
+            mine = [entry for entry in results.margins if entry.joint == joint]
+            angle = np.degrees([entry.angle_rad for entry in mine])
+            color = draw.SERIES[index % len(draw.SERIES)]
+            decibel = 20.0 * np.log10(np.array([entry.gain or np.nan for entry in mine]))
+            degrees = np.degrees(np.array([entry.phase_rad or np.nan for entry in mine]))
+            gain.plot(angle, decibel, color=color, label=joint)
+            phase.plot(angle, degrees, color=color)
+            peak.plot(angle, [entry.sensitivity_peak for entry in mine], color=color)
+        limits = ((gain, 6.0, "gain margin / dB"), (phase, 30.0, "phase margin / °"), (peak, 2.0, "sensitivity peak"))
+        for axis, limit, label in limits:
+            axis.axhline(limit, color=draw.LIMIT, linewidth=0.8, linestyle=(0, (4, 2)))
+            axis.set_ylim(bottom=0.0)
+            axis.set_xlabel(f"{results.joint} / °")
+            axis.set_ylabel(label)
+        gain.legend(loc="lower right")
+        return draw.picture(figure, alt)

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from kbs_process.report.panel import Block, Caption, Figure, Panel, Text
-from kbs_process.report.tables import Tables
+import numpy as np
+
+from kbs_process.report import draw
+from kbs_process.report.panel import Block, Figure, Panel, Picture, Text
+from kbs_process.report.prose import Prose
+from kbs_process.report.tables import Table, Tables
 from kbs_process.report.text import number
-from kbs_process.studies.stability import figures
 from kbs_process.studies.stability.results import StabilityResults
 
-_CAPTION = Caption(
-    shown="Frequency (left) and damping (right) of every pole over the swept joint's angle: hollow, of the plant with "
-    "its field held; full, of the closed loop. Dotted: half the cycle's rate.",
-    good="The plant's modes keep their damping when the loop is closed, and the loop's own poles are well damped.",
-    bad="A closed-loop pole whose damping falls towards nought at some poses.",
-    do="Compare its frequency with the plant's modes, folded at the dotted line, to see which one the loop excites.",
-)
+_SAYS = Prose("kbs_process.studies.stability", "poles")
 
 
 def panel(results: StabilityResults, tables: Tables) -> Panel:
@@ -31,6 +28,31 @@ def panel(results: StabilityResults, tables: Tables) -> Panel:
             "closed loop's poles, folded at that frequency."
         )
         alt = "Frequency and damping of poles over the angle of the swept joint"
-        picture = figures.poles(table, results.joint, nyquist, alt)
-        blocks += [Text(words), Figure("Poles over the range", (picture,), _CAPTION)]
+        picture = _poles(table, results.joint, nyquist, alt)
+        blocks += [Text(words), Figure("Poles over the range", (picture,), _SAYS.caption("poles"))]
     return Panel("poles", "Poles", question, tuple(blocks))
+
+
+def _poles(table: Table, joint: str, nyquist: float, alt: str) -> Picture:
+    """Draw frequency and damping of the plant's and the closed loop's poles."""
+    angle, frequency, damping = (table.columns[name] for name in ("angle", "frequency", "damping"))
+    closed = table.columns["closed"] > 0.5
+    with draw.style():
+        figure, (left, right) = draw.row(3.0, 2)
+        for axis, values in ((left, frequency), (right, damping)):
+            axis.plot(
+                np.degrees(angle[~closed]), values[~closed], linestyle="none", marker="o", markersize=4.5,
+                markerfacecolor="none", markeredgecolor=draw.PREDICTED, label="plant, field held",
+            )  # fmt: skip
+            axis.plot(
+                np.degrees(angle[closed]), values[closed], linestyle="none", marker=".", markersize=4.0,
+                color=draw.MEASURED, label="closed loop",
+            )  # fmt: skip
+            axis.set_xlabel(f"{joint} / °")
+        left.axhline(nyquist, color=draw.INK, linewidth=0.7, linestyle=(0, (1, 1.5)))
+        draw.logarithmic(left, "y", 0.7 * float(frequency.min()), 1.4 * float(frequency.max()))
+        draw.logarithmic(right, "y", 0.5 * max(1e-4, float(np.abs(damping).min())), 1.5)
+        left.set_ylabel("frequency / Hz")
+        right.set_ylabel("damping of critical")
+        left.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, fontsize=6.5)
+        return draw.picture(figure, alt)

@@ -1,0 +1,154 @@
+"""Reading in a child process: a damaged or hostile file may kill, hang or bloat the child, not the command.
+
+Protocol, on the child's standard output: the columns, one line of JSON; or, where columns were asked for, their
+cells, each array one line of JSON (dtype, count) and its bytes. Nothing that is received is executed or unpickled.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from importlib.util import find_spec
+from pathlib import Path
+from threading import Timer
+from typing import IO
+
+import numpy as np
+
+from kbs_process.errors import KbsError, RecordingError
+from kbs_process.recordings.formats import Format, Text, format_named
+from kbs_process.recordings.tables import Cells, Column
+
+MODULE = "kbs_process.recordings.isolated"
+SILENCE_S = 300.0  # a child that sends nothing for so long hangs
+DATA_FLOOR = 1 << 30  # bytes that a file of any size may expand to
+DATA_BY_SIZE = 1000  # and so many times its size: the best that compression makes of constants
+MEMORY_FLOOR = 4 << 30  # bytes of address space; the libraries themselves take less than one quarter of it
+MEMORY_BY_SIZE = 8  # and so many times the file's size
+
+
+class IsolatedTable:
+    """A binary file, read by a child process."""
+
+    def __init__(self, path: Path, name: str, declared: Format) -> None:
+        if declared.library and find_spec(declared.library) is None:
+            raise KbsError(
+                f"reading {name} needs the package '{declared.library}'",
+                where=str(path),
+                remedy="pip install 'kbs-process[formats]'",
+            )
+        self.path = path
+        self._format = name
+        with self._child(()) as child, _watched(child) as stream:
+            line = stream.readline()
+            entries = json.loads(line) if line.endswith(b"\n") else []
+        self.columns = tuple(Column(*entry) for entry in entries)
+        if not self.columns:
+            raise RecordingError("holds no column of numbers", where=str(path))
+
+    def chunks(self, names: Sequence[str]) -> Iterator[tuple[Cells, ...]]:
+        left = DATA_FLOOR + DATA_BY_SIZE * self.path.stat().st_size
+        with self._child(names) as child:
+            while True:
+                received = [_receive(child) for _ in names]
+                cells = tuple(one for one in received if one is not None)
+                if len(cells) < len(names):
+                    return  # the end; if it came too soon, leaving the context raises
+                left -= sum(one.nbytes for one in cells)
+                if left < 0:
+                    raise RecordingError(
+                        "declares far more samples than a file of its size can hold",
+                        where=str(self.path),
+                        remedy="export it again; what it declares was not recorded",
+                    )
+                yield cells
+
+    @contextmanager
+    def _child(self, names: Sequence[str]) -> Iterator[subprocess.Popen[bytes]]:
+        """Run a child; raise RecordingError with its last words where it fails."""
+        command = [sys.executable, "-P", "-m", MODULE, self._format, str(self.path), json.dumps(list(names))]
+        with (
+            tempfile.TemporaryFile() as complaints,
+            subprocess.Popen(command, stdout=subprocess.PIPE, stderr=complaints) as child,
+        ):
+            try:
+                yield child
+            except BaseException:
+                child.kill()
+                raise
+            status = child.wait()
+            if status:
+                complaints.seek(0)
+                words = complaints.read().decode("utf-8", "replace").strip().rpartition("\n")[2]
+                raise RecordingError(
+                    f"cannot be read as {self._format}: {_cause(status, words)}",
+                    where=str(self.path),
+                    remedy="check that the file is whole, and its format (format = ... in the mapping)",
+                )
+
+
+def _cause(status: int, words: str) -> str:
+    if status < 0:
+        return f"its reader was killed by {signal.Signals(-status).name}, as damaged files do"
+    return words or f"its reader ended with status {status}"
+
+
+@contextmanager
+def _watched(child: subprocess.Popen[bytes]) -> Iterator[IO[bytes]]:
+    """Give the child's output; kill the child where it stays silent."""
+    timer = Timer(SILENCE_S, child.kill)
+    timer.daemon = True
+    timer.start()
+    try:
+        assert child.stdout is not None
+        yield child.stdout
+    finally:
+        timer.cancel()
+
+
+def _receive(child: subprocess.Popen[bytes]) -> Cells | None:
+    """Return the next array, or None where there is no more."""
+    with _watched(child) as stream:
+        header = stream.readline()
+        if not header.endswith(b"\n"):
+            return None
+        kind, count = json.loads(header)
+        dtype = np.dtype(kind)
+        data = stream.read(count * dtype.itemsize)
+    return np.frombuffer(data, dtype) if len(data) == count * dtype.itemsize else None
+
+
+def _limit_memory(path: Path) -> None:
+    if sys.platform != "win32":
+        import resource
+
+        limit = MEMORY_FLOOR + MEMORY_BY_SIZE * path.stat().st_size
+        resource.setrlimit(resource.RLIMIT_AS, (limit, resource.getrlimit(resource.RLIMIT_AS)[1]))
+
+
+def main(name: str, path: Path, names: Sequence[str]) -> None:
+    """Be the child: send the columns, or, where `names` are given, the cells."""
+    # Whatever a library prints must not get between the arrays.
+    with os.fdopen(os.dup(1), "wb") as out:
+        os.dup2(2, 1)
+        _limit_memory(path)
+        table = format_named(name).read(path, Text())
+        if not names:
+            entries = [(column.name, column.unit, column.clock) for column in table.columns]
+            out.write(json.dumps(entries).encode() + b"\n")
+            return
+        for cells in table.chunks(names):
+            for one in cells:
+                plain = np.ascontiguousarray(one)
+                out.write(json.dumps([plain.dtype.str, len(plain)]).encode() + b"\n")
+                out.write(plain.tobytes())
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], Path(sys.argv[2]), json.loads(sys.argv[3]))
