@@ -58,6 +58,11 @@ _EACH = {
     "port, in no catalogue": "port, outside the catalogue",
     "all of several": "all of several",
 }
+_NULL = {
+    "nothing": "no effect",
+    "within": "no effect; parameters within their uncertainties",
+    "beyond": "no effect; beyond their uncertainty: ",
+}
 _LIMITS = """- The code and the test bench changed between sets. The table says how often the answers were right.
   It measures no single version.
 - A right family can still be wrong in fact. One of the right ones is the curve of another channel.
@@ -148,7 +153,8 @@ def document(sets: Sequence[Sealed], whole: Bench, line: str, rivals: Bench) -> 
             "",
             "## Trial by trial",
             "",
-            "The number in brackets is the strength. At the transducer the place includes the strongest channel.",
+            "The number in brackets is the strength. At the transducer the place includes the strongest channel. *Unnamed*",
+            "are an effect outside the catalogue, and a measured curve.",
             *(line for one in sets for line in _trials(one)),
             "",
             *_cases(),
@@ -183,7 +189,9 @@ def _trials(one: Sealed) -> Iterable[str]:
 
 
 def _strength(truth: Truth) -> str:
-    return concealed(truth) + (f" ({truth.level:g})" if truth.effects else "")
+    if truth.effects:
+        return f"{concealed(truth)} ({truth.level:g})"
+    return f"{_NULL[truth.kind]}{', '.join(f'{one.name} by {one.sigmas:.1f} sigma' for one in truth.beyond)}"
 
 
 def _judged(truth: Truth, answer: Answer) -> str:
@@ -192,7 +200,9 @@ def _judged(truth: Truth, answer: Answer) -> str:
         return "no answer"
     if truth.kind in NULLS:
         right = answer.verdict == ("parameters off" if truth.kind == "beyond" else "none")
-        return "no" if answer.finds else "yes" if right else "no effect claimed"
+        return (
+            "no" if answer.finds else "yes" if right else "missed" if answer.verdict == "none" else "no effect claimed"
+        )
     judged = match(answer, truth.effects)
     if len(judged) > 1:
         return f"{sum(one.place for one in judged)} of {len(judged)} places"
