@@ -32,6 +32,8 @@ from kbs_process.studies.diagnose.output import write_diagnosis
 from kbs_process.studies.diagnose.prose import answer, law_in_words
 from kbs_process.studies.diagnose.results import DiagnosisResults, Trial
 
+pytestmark = pytest.mark.slow
+
 OVER_ANGLE = next(one for one in MEASURED if one.effect.name == "ground_angle_law")
 LAW = Identity(Place("external wrench", "el"), "unnamed", "curve over joint angle")
 CABLE = Identity(Place("external wrench", "el"), "cable", "ground_cable")

@@ -22,6 +22,8 @@ from kbs_process.reduction.commands import read_commands
 from kbs_process.studies.diagnose.output import commands_of
 from kbs_process.studies.diagnose.records import next_test
 
+pytestmark = pytest.mark.slow
+
 FREE = (Scalar("joint.el.drive.Ka"), Scalar("joint.el.drive.b_m"))
 VISCOUS = Identity(Place("joint torque", "el"), "viscous", "joint_viscous")
 COULOMB = Identity(Place("joint torque", "el"), "friction", "coulomb")

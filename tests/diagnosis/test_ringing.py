@@ -16,6 +16,8 @@ from kbs_process.plant.linear.modes import modes
 from kbs_process.rig.model import substitute
 from kbs_process.signals.records import Array
 
+pytestmark = pytest.mark.slow
+
 BEGIN = 10
 
 

@@ -40,6 +40,8 @@ from kbs_process.plant.attach import attach
 from kbs_process.plant.laws import CATALOGUE, SENSING, select
 from kbs_process.signals.records import Array
 
+pytestmark = pytest.mark.slow
+
 FREE = (
     Scalar("body.antenna.cog", (0,)),
     Scalar("joint.el.drive.Ka"),

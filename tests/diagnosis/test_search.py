@@ -22,6 +22,8 @@ from kbs_process.diagnosis.nominal.search import Search
 from kbs_process.diagnosis.nominal.tangents import Step
 from kbs_process.rig.model import substitute
 
+pytestmark = pytest.mark.slow
+
 
 def searching(made: Experiment) -> Search:
     begin, simulate = Hypothesis(made.rig, made.effects), bench.serial(made)

@@ -19,6 +19,8 @@ from kbs_process.diagnosis.screening.screen import Bench, Catalogued, Screening,
 from kbs_process.diagnosis.screening.shapes import Bend, bends, bettered
 from kbs_process.plant.effect import LogNormal
 
+pytestmark = pytest.mark.slow
+
 
 def test_steps_of_a_shape_stay_between_its_bounds_and_are_undone() -> None:
     for suspect in suspects(temperature=True, field_recorded=False):

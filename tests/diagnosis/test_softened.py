@@ -18,6 +18,8 @@ from kbs_process.diagnosis.nominal.settling import bent, detected, drawn_back
 from kbs_process.diagnosis.selection.explain import NEAR
 from kbs_process.signals.records import Array
 
+pytestmark = pytest.mark.slow
+
 CHANNEL, HZ = 4, 3.0
 
 

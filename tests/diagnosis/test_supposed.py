@@ -22,6 +22,8 @@ from kbs_process.diagnosis.nominal.known import Known
 from kbs_process.diagnosis.selection import rounds
 from kbs_process.diagnosis.selection.effort import Effort
 
+pytestmark = pytest.mark.slow
+
 
 def leaving(known: Known, share: float) -> Known:
     """The same with residuals that leave a share of what it leaves beyond the noise."""

@@ -23,6 +23,8 @@ from kbs_process.plant.linear.linearise import drive_damping
 from kbs_process.rig.model import Amplifier, Drive, Quantity, Rig, substitute
 from kbs_process.signals.records import WRENCH_CHANNELS, Array
 
+pytestmark = pytest.mark.slow
+
 NOISE = np.array([0.02] * 3 + [0.002] * 3 + [1.1e-4] * 2)  # of EL089's sensors
 # Effect, site, shape, the amplitude that is tried and its size: some ten times what a floor shows; bound of the error.
 CASES = [

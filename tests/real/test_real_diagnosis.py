@@ -24,10 +24,13 @@ from kbs_process.studies.diagnose.simulators import Simulators
 from real.campaigns import sampling_error
 from real.test_real_efforts import EMPS, EMPS_S, ODRIVE
 
-pytestmark = pytest.mark.skipif(
-    not (DATA / "emps").is_dir() or not (DATA / "odrive_cogging").is_dir(),
-    reason="real recordings (../shared/data) are not here",
-)
+pytestmark = [
+    pytest.mark.validation,
+    pytest.mark.skipif(
+        not (DATA / "emps").is_dir() or not (DATA / "odrive_cogging").is_dir(),
+        reason="real recordings (../shared/data) are not here",
+    ),
+]
 BAND_HZ = 20.0  # in which a residual is scored
 
 

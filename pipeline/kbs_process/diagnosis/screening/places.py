@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kbs_process.plant.effect import Effect, Port
+from kbs_process.plant.effect import Effect
 from kbs_process.plant.rigid import inertia_matrix
 from kbs_process.rig.model import Rig
 from kbs_process.signals.records import Array
@@ -18,7 +18,7 @@ def points_of(effect: Effect, rig: Rig, link: str) -> tuple[Place | None, ...]:
 
     None, of an effect that acts at no point.
     """
-    if effect.port is not Port.EXTERNAL_FORCE:
+    if effect.port.site != "link":
         return (None,)
     centre = point_of(rig, link)
     points = [centre]
