@@ -143,6 +143,7 @@ def test_every_dependency_is_used() -> None:
         assert evidence in README + PYPROJECT, name
 
 
+@pytest.mark.slow
 def test_what_is_imported_is_declared_or_comes_with_what_is() -> None:
     runtime, _ = dependencies()
     extra = imported("pipeline") - {"kbs-process"} - runtime

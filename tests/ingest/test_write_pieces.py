@@ -56,6 +56,7 @@ def test_pieces_of_any_size_give_the_bytes_of_the_whole(
         assert (tmp_path / "pieces.mcap").read_bytes() == (tmp_path / "whole.mcap").read_bytes()
 
 
+@pytest.mark.slow
 def test_memory_does_not_grow_with_the_recording(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(writer, "BATCH", 2000)
     monkeypatch.setattr(writer, "CHUNK", 1 << 16)
