@@ -15,9 +15,8 @@ from scipy.interpolate import CubicSpline
 from kbs_process.diagnosis.experiments.hypothesis import Tapped
 from kbs_process.diagnosis.experiments.stamps import slope
 from kbs_process.diagnosis.screening.inlets import WRENCH_PORT, Inlet
-from kbs_process.diagnosis.screening.places import point_of
 from kbs_process.diagnosis.screening.scene import Course, courses
-from kbs_process.diagnosis.screening.suspects import Candidate, own_values
+from kbs_process.diagnosis.screening.suspects import Candidate, own_values, point_of
 from kbs_process.plant.along import along, signals_of
 from kbs_process.plant.compiled.taps import plate_column
 from kbs_process.plant.effect import Effect, Port

@@ -11,10 +11,9 @@ import numpy as np
 from kbs_process.diagnosis.acceptance.outcome import Find
 from kbs_process.diagnosis.facts import Estimate
 from kbs_process.diagnosis.proposing.curves import CurveSuspect, basis
-from kbs_process.diagnosis.screening.places import POINT, Place
 from kbs_process.diagnosis.screening.scene import Scene
 from kbs_process.diagnosis.screening.screen import Catalogued, Suspect
-from kbs_process.diagnosis.screening.suspects import Candidate
+from kbs_process.diagnosis.screening.suspects import POINT, Candidate, Point
 from kbs_process.plant.effect import ACTION, ACTIONS, Effect, Port, instance
 from kbs_process.plant.laws import LAWS
 from kbs_process.plant.laws.position.measured_law import Measured
@@ -73,7 +72,7 @@ def _numbers(estimates: Sequence[Estimate]) -> dict[str, Estimate]:
     return {re.sub(f"{ACTION}$", "", name): own[name] for name in reversed(own)} | own
 
 
-def _point(numbers: Mapping[str, Estimate]) -> Place | None:
+def _point(numbers: Mapping[str, Estimate]) -> Point | None:
     """Where a force acts, if that was fitted."""
     if not all(name in numbers for name in POINT):
         return None
