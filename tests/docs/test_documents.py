@@ -75,6 +75,16 @@ def test_paths_that_developers_read_exist(name: str) -> None:
     assert paths
 
 
+def test_the_folders_of_the_architecture_stand_in_the_order_of_the_layers() -> None:
+    layers = tomllib.loads(PYPROJECT)["tool"]["importlinter"]["contracts"][0]["layers"]
+    level = {name.removeprefix("kbs_process."): depth for depth, one in enumerate(layers) for name in one.split(" | ")}
+    table = (ROOT / "docs" / "dev" / "architecture.md").read_text(encoding="utf-8").partition("## Folders")[2]
+    cells = re.findall(r"^\| (`[^|]+) \|", table.partition("\nStudies know")[0], flags=re.MULTILINE)
+    named = [name for cell in cells for name in re.findall(r"`(\w+)(?:/|\.py)`", cell)]
+    assert [level[name] for name in named] == sorted(level[name] for name in named)
+    assert level.keys() - set(named) == {"progress", "interruption"}
+
+
 def test_the_readme_s_verbs_are_the_command_line_s() -> None:
     table = README[README.index("| command |") :]
     verbs = re.findall(r"^\| `kbs-process ([a-z-]+)", table, flags=re.MULTILINE)
