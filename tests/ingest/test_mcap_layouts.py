@@ -14,9 +14,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from mcap_files import FORCE, build, read, same_bits
 from mcap_ros2._dynamic import serialize_dynamic
+from message_encodings import json_schema, protobuf_name, protobuf_schema
 
 from kbs_process.errors import RecordingError
-from kbs_process.recordings.mcap.messages.schemas import json_schema, protobuf_name, protobuf_schema, ros2_schema
+from kbs_process.recordings.mcap.messages.encoding import ros2_schema
 from kbs_process.recordings.mcap.streams import Stream
 
 WRENCH = ("geometry_msgs/msg/WrenchStamped", "ros2msg", ros2_schema("wrench"))
