@@ -25,12 +25,14 @@ from mcap.writer import CompressionType
 from mcap_ros2.decoder import DecoderFactory
 from pytest_benchmark.fixture import BenchmarkFixture
 
-from ingest.mcap_files import rewrite
-from ingest.message_encodings import write_encoded
 from kbs_process.recordings.mcap.messages.encoding import OutStream
 from kbs_process.recordings.mcap.source import open_recording
 from kbs_process.recordings.mcap.streams import Stream
 from kbs_process.recordings.mcap.writer import write_mcap
+from recordings.mcap.mcap_files import rewrite
+from recordings.mcap.message_encodings import write_encoded
+
+pytestmark = pytest.mark.slow
 
 MESSAGES = 1_000_000  # of each topic
 PEER_MESSAGES = 20_000

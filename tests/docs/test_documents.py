@@ -120,6 +120,7 @@ def test_every_dependency_is_justified_and_nothing_else() -> None:
     assert all(row[-1] for row in rows)
 
 
+@pytest.mark.slow
 def test_every_dependency_is_used() -> None:
     runtime, test = dependencies()
     # A package without a wheel for this machine is not installed here; its marker says so.
@@ -130,6 +131,7 @@ def test_every_dependency_is_used() -> None:
         assert evidence in README + PYPROJECT, name
 
 
+@pytest.mark.slow
 def test_what_is_imported_is_declared_or_comes_with_what_is() -> None:
     runtime, _ = dependencies()
     extra = imported("pipeline") - {"kbs-process"} - runtime

@@ -16,7 +16,7 @@ from kbs_process.errors import OutputError
 from kbs_process.signals.grid import overlap
 from kbs_process.signals.records import Array, Envelope, Mask, Signal, Spectrum
 
-if TYPE_CHECKING:
+if TYPE_CHECKING:  # takes its time to import
     from pandas import DataFrame
 
 
