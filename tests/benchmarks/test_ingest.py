@@ -25,11 +25,12 @@ from mcap.writer import CompressionType
 from mcap_ros2.decoder import DecoderFactory
 from pytest_benchmark.fixture import BenchmarkFixture
 
-from kbs_process.recordings.mcap.messages.encoding import Encoding, OutStream
+from kbs_process.recordings.mcap.messages.encoding import OutStream
 from kbs_process.recordings.mcap.source import open_recording
 from kbs_process.recordings.mcap.streams import Stream
 from kbs_process.recordings.mcap.writer import write_mcap
 from recordings.mcap.mcap_files import rewrite
+from recordings.mcap.message_encodings import write_encoded
 
 pytestmark = pytest.mark.slow
 
@@ -42,7 +43,7 @@ STREAMS = (
 )
 
 
-def campaign(encoding: Encoding, n: int) -> list[OutStream]:
+def campaign(n: int) -> list[OutStream]:
     """A wrench at 1 kHz with all bits of noise, as a calibration matrix leaves it, and two encoders."""
     rng = np.random.default_rng(89)
     stamp = 1_700_000_000_000_000_000 + 1_000_000 * np.arange(n) + rng.integers(0, 20_000, n)
@@ -52,8 +53,8 @@ def campaign(encoding: Encoding, n: int) -> list[OutStream]:
     joints = np.hstack([angle, -np.sin(t * [0.01, 0.02]) * [0.01, 0.02]])
     log = stamp + 20_000
     return [
-        OutStream("/wrench", "wrench", stamp, log, wrench, encoding=encoding, frame="transducer"),
-        OutStream("/joints", "joints", stamp, log + 100_000, joints, ("az", "el"), encoding),
+        OutStream("/wrench", "wrench", stamp, log, wrench, frame="transducer"),
+        OutStream("/joints", "joints", stamp, log + 100_000, joints, ("az", "el")),
     ]
 
 
@@ -113,7 +114,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     folder = tmp_path_factory.mktemp("recordings")
     paths = {name: folder / f"{name}.mcap" for name in ("ros2", "json", "protobuf", "lz4", "unindexed")}
     for name in ("ros2", "json", "protobuf"):
-        write_mcap(paths[name], campaign(name, MESSAGES))
+        write_encoded(paths[name], campaign(MESSAGES), name)
     rewrite(paths["ros2"], paths["lz4"], compression=CompressionType.LZ4)
     with paths["ros2"].open("rb") as file:  # cut off its summary, as by loss of power
         data = file.read()
@@ -155,7 +156,7 @@ def test_reading_costs_little_more_than_decompressing(
 def test_peer(benchmark: BenchmarkFixture, files: dict[str, Path], tmp_path: Path) -> None:
     """mcap + mcap-ros2-support on fewer messages, extrapolated by their number."""
     path = tmp_path / "slice.mcap"
-    write_mcap(path, campaign("ros2", PEER_MESSAGES // 2))
+    write_mcap(path, campaign(PEER_MESSAGES // 2))
 
     def peer() -> None:
         with path.open("rb") as file:

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from extending.scratch import copy_package, run_copy
-from importers.importer_files import write_csv, write_mapping
 from kbs_process.results.tables import read_table
 from kbs_process.studies.convert.run import import_recordings
+from studies.convert.importer_files import write_csv, write_mapping
 
 CLIPPED = '''"""Clipping: what exceeds the transducer's range is brought back to it."""
 

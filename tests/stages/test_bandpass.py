@@ -9,7 +9,7 @@ from scipy.signal import butter, sosfiltfilt
 
 from kbs_process.signals.records import Signal
 from kbs_process.stages.align.resample import resample
-from kbs_process.stages.bandpass import UNFILTERED, Band, apply, edge_seconds, gain, statement
+from kbs_process.stages.bandpass import UNFILTERED, Band, apply, gain, statement
 from kbs_process.stages.lowfrequency import high_pass
 
 DT = 0.05
@@ -132,7 +132,7 @@ def test_the_statement_holds_on_200_s_cut_out_of_long_records(band: Band) -> Non
 
 
 def test_beyond_the_stated_edge_the_error_is_below_a_thousandth() -> None:
-    edge = edge_seconds(BELOW_1, DT)
+    edge = statement(BELOW_1, DT, 16_001).edge_s
     assert 100.0 < edge < 230.0
     drift = np.random.default_rng(5).normal(size=(60_000, 40)).cumsum(axis=0)
     error = np.sqrt(np.mean(cut(drift, 20_000, BELOW_1)[1] ** 2, axis=1))
@@ -143,7 +143,7 @@ def test_beyond_the_stated_edge_the_error_is_below_a_thousandth() -> None:
 def test_a_low_pass_alone_is_over_in_seconds() -> None:
     said = statement(Band("lp", None, 1.0), DT, 4000)
     assert said.edge_error < 1e-3 and 1.0 < said.flagged_s < 4.0
-    assert edge_seconds(UNFILTERED, DT) == 0.0
+    assert statement(UNFILTERED, DT, 4000).edge_s == 0.0
 
 
 def test_what_was_invented_in_a_gap_leaks_nowhere():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from kbs_process.rig.model import substitute
@@ -27,7 +29,7 @@ def test_mixed_channels_come_out_unmixed():
     true = _run(rig)
     raw = true.wrench.values @ (np.eye(6) + X).T + np.arange(6.0)
     S = np.cov(raw.T)[None].astype(complex)
-    run = true.with_wrench(true.wrench.derive(raw, "raw"))
+    run = replace(true, wrench=true.wrench.derive(raw, "raw"))
     object.__setattr__(run, "spectrum", Spectrum(np.zeros(1), S, true.wrench.channels, 1))
     object.__setattr__(run, "envelope", Envelope(np.zeros(1), raw.min(0)[None], raw.max(0)[None]))
     out = decouple.apply(run, decouple.fit(rig))

@@ -37,27 +37,6 @@ def from_rotation_vector(phi: Array) -> Array:
     return R
 
 
-def to_rotation_vector(R: Array) -> Array:
-    """Rotation vector of R, (..., 3, 3) -> (..., 3), rad; angles up to pi (excluded), by the quaternion."""
-    R = np.asarray(R, dtype=float)
-    # Each candidate is the quaternion (w, x, y, z) times one of its own elements; the largest is the soundest.
-    trace = np.trace(R, axis1=-2, axis2=-1)
-    K = np.empty((*R.shape[:-2], 4, 4))
-    K[..., 0, 0] = 1.0 + trace
-    off = np.stack([R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]], -1)
-    K[..., 0, 1:] = K[..., 1:, 0] = off
-    K[..., 1:, 1:] = R + np.swapaxes(R, -1, -2) + (1.0 - trace)[..., None, None] * np.eye(3)
-    best = np.argmax(np.diagonal(K, axis1=-2, axis2=-1), axis=-1)
-    quaternion = np.take_along_axis(K, best[..., None, None], axis=-2)[..., 0, :]
-    quaternion /= np.linalg.norm(quaternion, axis=-1, keepdims=True)
-    quaternion = np.where(quaternion[..., :1] < 0.0, -quaternion, quaternion)
-    sine = np.linalg.norm(quaternion[..., 1:], axis=-1)
-    half = np.arctan2(sine, quaternion[..., 0])
-    # 2 half / sin(half), which tends to 2 at zero.
-    phi: Array = 2.0 / np.sinc(half / np.pi)[..., None] * quaternion[..., 1:]
-    return phi
-
-
 def from_tilt(tilt: Array) -> Array:
     """R_LT of a transducer inclined by tilt = (tx about x, ty about y), rad: R_y(ty) R_x(tx).
 

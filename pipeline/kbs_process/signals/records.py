@@ -195,7 +195,3 @@ class Run:
             [self.rates[key] for key, signal in measured.items() if signal is not None for _ in signal.channels],
             dtype=np.float64,
         )
-
-    def with_wrench(self, wrench: Signal) -> Run:
-        """Return the same run with another wrench."""
-        return replace(self, wrench=wrench)

@@ -1,7 +1,7 @@
-"""Wrenches [F, M] and twists [v, omega] carried from one frame to another.
+"""Wrenches [F, M] carried from one frame to another.
 
 A frame T is placed in a frame G by `R_GT` (maps T's components into G's) and `r_GT` (T's origin from G's
-origin, in G's axes, m). A wrench's moment and a twist's velocity belong to the origin of their frame.
+origin, in G's axes, m). A wrench's moment belongs to the origin of its frame.
 """
 
 from __future__ import annotations
@@ -17,16 +17,6 @@ def transform_wrench(wrench: Array, R_GT: Array, r_GT: Array) -> Array:
     force = rotate(R_GT, wrench[..., :3])
     moment = rotate(R_GT, wrench[..., 3:]) + cross(r_GT, force)
     return np.concatenate([force, moment], axis=-1)
-
-
-def transform_twist(twist: Array, R_GT: Array, r_GT: Array) -> Array:
-    """The same motion at G's origin in G's axes: omega' = R omega, v' = R v + r x omega'; (..., 6).
-
-    Power is invariant: transform_wrench(w) . transform_twist(v) = w . v.
-    """
-    omega = rotate(R_GT, twist[..., 3:])
-    velocity = rotate(R_GT, twist[..., :3]) + cross(r_GT, omega)
-    return np.concatenate([velocity, omega], axis=-1)
 
 
 def wrench_matrix(R_GT: Array, r_GT: Array) -> Array:

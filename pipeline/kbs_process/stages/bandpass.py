@@ -154,15 +154,6 @@ def _known(valid: Mask, f1: float, dt: float) -> Mask:
     return known
 
 
-def edge_seconds(band: Band, dt: float) -> float:
-    """Time from an end until the filter errs by less than 0.1 % there, however long the record, s."""
-    slowest = _slowest(band, dt)
-    if slowest is None:
-        return 0.0
-    n = 2 * int(np.ceil(4.0 / (slowest * dt))) + 1
-    return statement(band, dt, n).edge_s
-
-
 def _slowest(band: Band, dt: float) -> float | None:
     limits = [f for f in (band.high_pass_Hz, band.low_pass_Hz) if f is not None]
     return min(limits) if limits else None

@@ -147,7 +147,7 @@ def test_what_is_read_with_the_other_sign_is_told() -> None:
     run, moved = swinging()
     assert run.wrench is not None and run.angle is not None
     check_signs(run, moved, campaign(), ENTRY)
-    reaction = run.with_wrench(run.wrench.derive(-run.wrench.values, "reaction"))
+    reaction = replace(run, wrench=run.wrench.derive(-run.wrench.values, "reaction"))
     with pytest.raises(RecordingError, match=r"slope of measured T. against computed gravity is -1\.000, expected \+1"):
         check_signs(reaction, moved, campaign(), ENTRY)
     dead = replace(run, angle=run.angle.derive(np.ones((N, 2)), "dead"))
@@ -169,7 +169,7 @@ def slower(one: Recorded) -> Recorded:
 def gappy(one: Recorded, gone: Mask) -> Recorded:
     assert one.run.wrench is not None
     wrench = one.run.wrench
-    return replace(one, run=one.run.with_wrench(wrench.derive(wrench.values, "gap", valid=wrench.valid & ~gone)))
+    return replace(one, run=replace(one.run, wrench=wrench.derive(wrench.values, "gap", valid=wrench.valid & ~gone)))
 
 
 def test_recordings_at_other_rates_are_no_repeats_for_their_noise_is_another() -> None:

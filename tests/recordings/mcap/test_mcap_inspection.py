@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from kbs_process.recordings.inspection import inspect_recording
-from kbs_process.recordings.mcap.messages.encoding import Encoding, OutStream
+from kbs_process.recordings.mcap.messages.encoding import OutStream
 from kbs_process.recordings.mcap.writer import write_mcap
 from recordings.mcap.mcap_files import build
+from recordings.mcap.message_encodings import Encoding, write_encoded
 
 
 @pytest.mark.parametrize("encoding", ["ros2", "json", "protobuf"])
@@ -26,10 +27,10 @@ def test_rates_gaps_repeats_and_ranges(tmp_path: Path, encoding: Encoding) -> No
     wrench[17, 1] = np.nan
     joints = np.column_stack([np.linspace(0, 1, 100), np.linspace(2, 3, 100)])
     streams = [
-        OutStream("/wrench", "wrench", stamp, log, wrench, encoding=encoding),
-        OutStream("/encoder", "joints", log[:100], log[:100], joints, ("az", "el"), encoding),
+        OutStream("/wrench", "wrench", stamp, log, wrench),
+        OutStream("/encoder", "joints", log[:100], log[:100], joints, ("az", "el")),
     ]
-    write_mcap(tmp_path / "a.mcap", streams)
+    write_encoded(tmp_path / "a.mcap", streams, encoding)
     found = inspect_recording(tmp_path / "a.mcap")
     assert found.state == "lossy"  # the NaN
     encoder, topic = found.topics

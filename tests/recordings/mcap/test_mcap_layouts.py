@@ -15,9 +15,10 @@ from hypothesis import strategies as st
 from mcap_ros2._dynamic import serialize_dynamic
 
 from kbs_process.errors import RecordingError
-from kbs_process.recordings.mcap.messages.schemas import json_schema, protobuf_name, protobuf_schema, ros2_schema
+from kbs_process.recordings.mcap.messages.encoding import ros2_schema
 from kbs_process.recordings.mcap.streams import Stream
 from recordings.mcap.mcap_files import FORCE, build, read, same_bits
+from recordings.mcap.message_encodings import json_schema, protobuf_name, protobuf_schema
 
 WRENCH = ("geometry_msgs/msg/WrenchStamped", "ros2msg", ros2_schema("wrench"))
 JOINTS = ("sensor_msgs/msg/JointState", "ros2msg", ros2_schema("joints"))

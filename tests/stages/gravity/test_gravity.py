@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -138,7 +140,7 @@ def test_what_the_calibration_left_of_the_cross_coupling_is_found():
     spread[0, 4] = 0.05
     loose = substitute(nominal, {"transducer.cross_coupling": np.zeros((6, 6))}, {"transducer.cross_coupling": spread})
     run = record(nominal, "calibration", calibration_angles(), np.random.default_rng(0))
-    mixed = run.with_wrench(run.wrench.derive(run.wrench.values @ (np.eye(6) + X).T, "mixed"))
+    mixed = replace(run, wrench=run.wrench.derive(run.wrench.values @ (np.eye(6) + X).T, "mixed"))
     model = gravity.fit([sample(mixed, loose, True)], loose, include_inertia=False)
     found = model.rig.transducer.cross_coupling
     assert found.value[0, 4] == pytest.approx(0.03, abs=4 * found.sigma[0, 4])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -53,7 +55,7 @@ def _loaded(run, start, stop, wrench):
     values = run.wrench.values.copy()
     rows = slice(int(start * RATE), int(stop * RATE))
     values[rows] += wrench
-    return run.with_wrench(run.wrench.derive(values, "loaded"))
+    return replace(run, wrench=run.wrench.derive(values, "loaded"))
 
 
 def test_a_held_out_recordings_constant_is_found_within_its_stated_error(fitted):

@@ -13,8 +13,7 @@ import numpy as np
 from mcap.writer import CompressionType, Writer
 
 from kbs_process.errors import OutputError
-from kbs_process.recordings.mcap.messages.encoding import OutStream, payloads
-from kbs_process.recordings.mcap.messages.schemas import TYPES, json_schema, protobuf_name, protobuf_schema, ros2_schema
+from kbs_process.recordings.mcap.messages.encoding import TYPES, OutStream, payloads, ros2_schema
 from kbs_process.recordings.mcap.source import open_recording
 from kbs_process.recordings.mcap.streams import Stream
 from kbs_process.signals.records import Block
@@ -88,7 +87,7 @@ class _Topic:
 
     def add(self, piece: OutStream) -> None:
         like = replace(self.head, stamp=piece.stamp, log=piece.log, values=piece.values)
-        if like.fields != self.head.fields or piece.encoding != self.head.encoding:
+        if like.fields != self.head.fields:
             raise ValueError(f"{piece.topic}: pieces of different kinds")
         if len(piece.log):
             self._pieces.append(like)
@@ -120,7 +119,7 @@ def _write(file: BinaryIO, pieces: Iterable[OutStream], hold: int) -> list[_Topi
     waiting, due = 0, BATCH
     for piece in pieces:
         if not topics:
-            writer.start(profile="ros2" if piece.encoding == "ros2" else "", library="kbs-process")
+            writer.start(profile="ros2", library="kbs-process")
         if piece.topic not in topics:
             topics[piece.topic] = _Topic(piece, _register(writer, piece))
         elif waiting >= due:  # only now: before a topic comes again, others may still be unknown
@@ -161,14 +160,8 @@ def _messages(stream: OutStream, first: int) -> Iterator[tuple[int, int, int, by
 
 
 def _register(writer: Writer, stream: OutStream) -> int:
-    kind = stream.kind
-    if stream.encoding == "ros2":
-        schema = writer.register_schema(TYPES[kind], "ros2msg", ros2_schema(kind))
-    elif stream.encoding == "json":
-        schema = writer.register_schema(TYPES[kind], "jsonschema", json_schema(kind))
-    else:
-        schema = writer.register_schema(protobuf_name(kind), "protobuf", protobuf_schema())
-    return writer.register_channel(stream.topic, "cdr" if stream.encoding == "ros2" else stream.encoding, schema)
+    schema = writer.register_schema(TYPES[stream.kind], "ros2msg", ros2_schema(stream.kind))
+    return writer.register_channel(stream.topic, "cdr", schema)
 
 
 def _verify(path: Path, topics: Sequence[_Topic]) -> None:

@@ -1,20 +1,41 @@
-"""Payloads of the messages that are written, in each encoding."""
+"""The messages that are written: their schemas and their payloads, in ROS 2's encoding, CDR."""
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Literal
 
-import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from kbs_process.recordings.mcap.messages.schemas import Kind, delimited, number_field
 from kbs_process.signals.records import Array, Stamps
 
-Encoding = Literal["ros2", "json", "protobuf"]
+Kind = Literal["wrench", "joints", "temperature"]
+
+TYPES: dict[Kind, str] = {
+    "wrench": "geometry_msgs/msg/WrenchStamped",
+    "joints": "sensor_msgs/msg/JointState",
+    "temperature": "sensor_msgs/msg/Temperature",
+}
+
+_HEADER = {
+    "std_msgs/Header": "builtin_interfaces/Time stamp\nstring frame_id",
+    "builtin_interfaces/Time": "int32 sec\nuint32 nanosec",
+}
+_ROS2: dict[Kind, dict[str, str]] = {
+    "wrench": {
+        "": "std_msgs/Header header\ngeometry_msgs/Wrench wrench",
+        **_HEADER,
+        "geometry_msgs/Wrench": "geometry_msgs/Vector3 force\ngeometry_msgs/Vector3 torque",
+        "geometry_msgs/Vector3": "float64 x\nfloat64 y\nfloat64 z",
+    },
+    "joints": {
+        "": "std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort",
+        **_HEADER,
+    },
+    "temperature": {"": "std_msgs/Header header\nfloat64 temperature\nfloat64 variance", **_HEADER},
+}
 LITTLE_ENDIAN_CDR = b"\x00\x01\x00\x00"
 WIDTHS = {"wrench": 6, "temperature": 1}
 JOINT_PARTS = ("position", "velocity", "effort")
@@ -35,7 +56,6 @@ class OutStream:
     log: Stamps  # (n,) recorder clock, ns
     values: Array  # (n, c)
     names: tuple[str, ...] = ()  # joints
-    encoding: Encoding = "ros2"
     frame: str = ""  # frame_id
 
     def __post_init__(self) -> None:
@@ -59,10 +79,11 @@ class OutStream:
         return tuple(f"{part}[{name}]" for part in parts for name in self.names)
 
 
-def payloads(stream: OutStream) -> Iterator[bytes]:
-    """Yield the payload of every message."""
-    encoders = {"ros2": _ros2, "json": _json, "protobuf": _protobuf}
-    return encoders[stream.encoding](stream)
+def ros2_schema(kind: Kind) -> bytes:
+    """Return the definition with all those it depends on, as rosbag2 writes it."""
+    main, *others = _ROS2[kind].items()
+    text = main[1] + "\n" + "".join(f"{'=' * 80}\nMSG: {name}\n{body}\n" for name, body in others)
+    return text.encode()
 
 
 class _CdrLayout:
@@ -99,7 +120,8 @@ class _CdrLayout:
         return table.view(np.uint8).reshape(n, self.size)
 
 
-def _ros2(stream: OutStream) -> Iterator[bytes]:
+def payloads(stream: OutStream) -> Iterator[bytes]:
+    """Yield the payload of every message."""
     layout = _CdrLayout()
     seconds, nanoseconds = np.divmod(stream.stamp, 1_000_000_000)
     layout.number("<i4", seconds)
@@ -118,53 +140,3 @@ def _ros2(stream: OutStream) -> Iterator[bytes]:
         if stream.kind == "temperature":
             layout.number("<f8", 0.0)  # variance: unknown
     return map(bytes, layout.rows(len(stream.stamp)))
-
-
-def _json(stream: OutStream) -> Iterator[bytes]:
-    encode = msgspec.json.Encoder().encode
-    joints = len(stream.names)
-    for stamp, row in zip(stream.stamp.tolist(), stream.values.tolist(), strict=True):
-        seconds, nanoseconds = divmod(stamp, 1_000_000_000)
-        message: dict[str, Any] = {
-            "header": {"stamp": {"sec": seconds, "nanosec": nanoseconds}, "frame_id": stream.frame}
-        }
-        if stream.kind == "wrench":
-            force, torque = (dict(zip("xyz", part, strict=True)) for part in (row[:3], row[3:]))
-            message["wrench"] = {"force": force, "torque": torque}
-        elif stream.kind == "joints":
-            message |= {"name": stream.names, "position": row[:joints], "velocity": row[joints : 2 * joints]}
-            if len(row) > 2 * joints:
-                message["effort"] = row[2 * joints :]
-        else:
-            message["temperature"] = row[0]
-        yield encode(message)
-
-
-def _protobuf(stream: OutStream) -> Iterator[bytes]:
-    joints = len(stream.names)
-    names = b"".join(delimited(2, name.encode()) for name in stream.names)
-    frame = delimited(2, stream.frame.encode()) if stream.frame else b""
-    for stamp, row in zip(stream.stamp.tolist(), stream.values.tolist(), strict=True):
-        seconds, nanoseconds = divmod(stamp, 1_000_000_000)
-        time = number_field(1, seconds) + number_field(2, nanoseconds)
-        header = delimited(1, delimited(1, time) + frame)
-        if stream.kind == "wrench":
-            yield header + delimited(2, delimited(1, _doubles(1, row[:3])) + delimited(2, _doubles(1, row[3:])))
-        elif stream.kind == "joints":
-            parts = (row[:joints], row[joints : 2 * joints], row[2 * joints :])
-            yield (header + names + b"".join(_packed(number, part) for number, part in enumerate(parts, start=3)))
-        else:
-            yield header + _doubles(2, row)
-
-
-def _doubles(first: int, values: list[float]) -> bytes:
-    """Encode numbered doubles; proto3 leaves out a zero, though not a negative one."""
-    return b"".join(
-        bytes((number << 3 | 1,)) + data
-        for number, value in enumerate(values, start=first)
-        if any(data := struct.pack("<d", value))
-    )
-
-
-def _packed(number: int, values: list[float]) -> bytes:
-    return delimited(number, struct.pack(f"<{len(values)}d", *values)) if values else b""
