@@ -19,7 +19,7 @@ from kbs_process.progress import SilentProgress
 from kbs_process.signals.records import Array
 from kbs_process.studies.convert.run import import_recordings
 from kbs_process.studies.diagnose.reading import experiment_of
-from kbs_process.studies.diagnose.simulators import Simulators
+from kbs_process.studies.diagnose.simulators import simulating
 from real.campaigns import sampling_error
 from real.test_real_efforts import EMPS, EMPS_S, ODRIVE
 from stages.gravity.real_sets import DATA
@@ -39,7 +39,7 @@ def diagnosed(preset: str, source: Path, folder: Path) -> Outcome:
     progress = SilentProgress()
     campaign = load_campaign(import_recordings(preset, source, folder))
     experiment = experiment_of(campaign, progress)
-    with Simulators(experiment) as simulate:
+    with simulating(experiment) as simulate:
         found = explain(experiment, simulate, progress.task)
         return diagnose(found.known, found.floor, simulate, found.after, found.near)
 

@@ -9,7 +9,7 @@ import pytest
 
 from diagnosis import bench
 from diagnosis.proposing.test_local_law import ANGLE, TORQUE, WIDTH, with_bump
-from kbs_process.diagnosis.acceptance.moments import most_of, only_while
+from kbs_process.diagnosis.acceptance.remains import most_of, only_while
 from kbs_process.diagnosis.experiments.thresholds import MOSTLY
 from kbs_process.diagnosis.nominal.joint import Own, Standing, bare, with_extra
 from kbs_process.diagnosis.proposing.tryout import extra_of

@@ -41,7 +41,6 @@ def joined(made: Experiment, before: Standing, family: tuple[str, str]) -> tuple
         reference="",
         estimates=(),
         probability=1.0,
-        rho=0.0,
         rho_eff=0.0,
         kappa=0.0,
         gate=passed,

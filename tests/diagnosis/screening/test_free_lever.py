@@ -15,12 +15,11 @@ from kbs_process.diagnosis.nominal.joint import Standing, with_extra
 from kbs_process.diagnosis.nominal.parameters import known_parameters, prior
 from kbs_process.diagnosis.proposing.tryout import extra_of, identity
 from kbs_process.diagnosis.proposing.view import View
-from kbs_process.diagnosis.screening.places import points_of
 from kbs_process.diagnosis.screening.ranges import Ranges
 from kbs_process.diagnosis.screening.scene import Scene
 from kbs_process.diagnosis.screening.screen import Bench, Catalogued, screen
 from kbs_process.diagnosis.screening.shapes import bettered
-from kbs_process.diagnosis.screening.suspects import Candidate, candidates
+from kbs_process.diagnosis.screening.suspects import Candidate, candidates, points_of
 from kbs_process.diagnosis.selection.leaders import leaders
 from kbs_process.identification.output_error import Scalar
 from kbs_process.plant.attach import attach

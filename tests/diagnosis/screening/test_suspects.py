@@ -11,10 +11,9 @@ import pytest
 import archived
 from kbs_process.diagnosis.experiments.hypothesis import Tapped
 from kbs_process.diagnosis.screening.inlets import Inlet
-from kbs_process.diagnosis.screening.places import half_lengths, point_of
 from kbs_process.diagnosis.screening.ranges import Ranges, ranges_of
 from kbs_process.diagnosis.screening.signature import inputs, port_inputs, reduced, sensed
-from kbs_process.diagnosis.screening.suspects import Candidate, candidates
+from kbs_process.diagnosis.screening.suspects import Candidate, candidates, half_lengths, point_of
 from kbs_process.diagnosis.screening.transfer import follow, respond
 from kbs_process.plant.attach import attach
 from kbs_process.plant.effect import Effect

@@ -11,10 +11,9 @@ import pytest
 from diagnosis import bench
 from kbs_process.diagnosis.experiments.hypothesis import Hypothesis, predict
 from kbs_process.diagnosis.screening.inlets import Inlet
-from kbs_process.diagnosis.screening.places import points_of
 from kbs_process.diagnosis.screening.scene import Scene, rebinned
 from kbs_process.diagnosis.screening.signature import inputs
-from kbs_process.diagnosis.screening.suspects import Candidate
+from kbs_process.diagnosis.screening.suspects import Candidate, points_of
 from kbs_process.diagnosis.screening.transfer import amplified, respond
 from kbs_process.plant.attach import attach
 from kbs_process.plant.effect import SIGNALS, Effect, Port

@@ -36,7 +36,7 @@ def standing() -> Standing:
 
 def found(sigma: float, *rivals: Identity) -> Find:
     """Friction whose number is known to a standard deviation."""
-    others = tuple(Alternative(rival, 0.4, 1.0, 0.3, True, True) for rival in rivals)
+    others = tuple(Alternative(rival, 0.4, 1.0, True, True) for rival in rivals)
     return Find(
         identity=VISCOUS,
         named=True,
@@ -44,7 +44,6 @@ def found(sigma: float, *rivals: Identity) -> Find:
         reference="",
         estimates=(Estimate("joint_viscous", "N m s/rad", 1.0, sigma),),
         probability=0.6,
-        rho=1.0 / sigma,
         rho_eff=1.0 / sigma,
         kappa=0.0,
         gate=Gate(True, (), True, 20.0, (1.0, 1.0), ()),
