@@ -17,6 +17,8 @@ from __future__ import annotations
 
 from kbs_process.plant.effect import Effect, Normal, Port, amplitude
 
+import pytest
+
 
 def torque(rotor_rate: float, fan: float) -> float:
     r"""Torque on the rotor by a fan.
@@ -73,6 +75,7 @@ print(json.dumps({
 """
 
 
+@pytest.mark.slow
 def test_a_new_law_is_one_file(tmp_path: Path) -> None:
     package = Path(kbs_process.__file__).parent
     copy = copytree(package, tmp_path / "kbs_process", ignore=ignore_patterns("__pycache__"))

@@ -53,7 +53,7 @@ Version = Annotated[int, AfterValidator(_first_version), Field(json_schema_extra
 
 # Alternatives are told apart by what TOML has; their tags are in a fault's place, where no key can begin like that.
 TAGS = "\0"
-TABLE, ARRAY, TEXT, TRUTH, NUMBER = (Tag(f"{TAGS}{kind}") for kind in ("table", "array", "text", "truth", "number"))
+TABLE, ARRAY, TEXT, TRUTH, NUMBER = (Tag(f"{TAGS}{kind}") for kind in ("table", "array", "text", "boolean", "number"))
 
 
 def _kind(value: Any) -> str:
