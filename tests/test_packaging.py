@@ -1,4 +1,4 @@
-"""What is installed holds everything that the package reads: schemas, templates, presets."""
+"""What is installed holds everything that the package reads: templates, presets, assets."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import shutil
 import subprocess
 import sys
 import tarfile
-import tomllib
 import zipfile
 from pathlib import Path
 
@@ -41,8 +40,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     for name in ("pyproject.toml", "README.md", "LICENSE"):
         shutil.copy(ROOT / name, tree)
     ignored = shutil.ignore_patterns("*.egg-info", "__pycache__")
-    for name in ("pipeline", "schemas"):
-        shutil.copytree(ROOT / name, tree / name, ignore=ignored)
+    shutil.copytree(ROOT / "pipeline", tree / "pipeline", ignore=ignored)
     source = build(tree, "sdist", place / "sdist")
     with tarfile.open(source) as archive:
         archive.extraction_filter = getattr(tarfile, "data_filter", None)  # early releases of 3.11 have none
@@ -51,31 +49,25 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     return tree, build(unpacked, "wheel", place / "wheel")
 
 
-def test_every_package_is_listed_once() -> None:
-    listed = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]["packages"]
-    folders = (path.parent.relative_to(ROOT / "pipeline") for path in (ROOT / "pipeline").rglob("__init__.py"))
-    packages = {".".join(folder.parts) for folder in folders} | {"kbs_process.schemas"}
-    assert sorted(listed) == sorted(packages), "pyproject.toml: [tool.setuptools] packages"
-
-
 def test_the_wheel_holds_every_file_of_the_package(built: tuple[Path, Path]) -> None:
     with zipfile.ZipFile(built[1]) as wheel:
         packed = set(wheel.namelist())
     package = built[0] / "pipeline" / "kbs_process"
     files = {path.relative_to(package.parent).as_posix() for path in package.rglob("*") if path.is_file()}
-    schemas = {f"kbs_process/schemas/{path.name}" for path in (built[0] / "schemas").glob("*.json")}
-    assert files | schemas <= packed
-    assert {f"kbs_process/schemas/{name}.schema.json" for name in ("campaign", "parameters")} <= packed
+    assert files <= packed
 
 
-def test_the_installed_package_finds_its_schemas(built: tuple[Path, Path], tmp_path: Path) -> None:
+def test_the_installed_package_reads_campaigns_and_presets(built: tuple[Path, Path], tmp_path: Path) -> None:
     with zipfile.ZipFile(built[1]) as wheel:
         wheel.extractall(tmp_path)
-    code = "from kbs_process.campaign.schema import *; load_schema('campaign'); print(schema_folder())"
-    done = subprocess.run(
-        [sys.executable, "-c", f"import sys; sys.path.insert(0, {str(tmp_path)!r}); {code}"],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.stdout.strip() == str(tmp_path / "kbs_process" / "schemas"), done.stderr
+    code = f"""
+import sys; sys.path.insert(0, {str(tmp_path)!r})
+from pathlib import Path
+import kbs_process
+from kbs_process.campaign.load import load_campaign
+from kbs_process.studies.convert.mapping import find_mapping, load_mapping
+load_mapping(find_mapping("emps"))
+print(load_campaign(Path({str(ROOT / "campaigns" / "EL089")!r}), checksums=False).name, kbs_process.__file__)
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.stdout.split() == ["EL089", str(tmp_path / "kbs_process" / "__init__.py")], done.stderr

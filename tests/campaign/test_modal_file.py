@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from kbs_process.campaign.modal_file import modal_text, read_modal
+from kbs_process.campaign.modal_file import read_modal
+from kbs_process.campaign.writing.modal_file import modal_text
 from kbs_process.errors import ConfigError
 from kbs_process.plant.laws import select
 from kbs_process.plant.linear.modal import ModalTable, derive

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from kbs_process.campaign.load import load_campaign
-from kbs_process.campaign.parameter_files import corrected, write_parameters
+from kbs_process.campaign.writing.parameter_files import corrected, write_parameters
 
 DUMMY1 = Path(__file__).parents[2] / "campaigns" / "DUMMY1"
 

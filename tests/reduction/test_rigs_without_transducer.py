@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from campaign.campaign_folder import CampaignFolder, make_folder
-from kbs_process.campaign.corrected_model import write_model
 from kbs_process.campaign.load import load_campaign
+from kbs_process.campaign.writing.corrected_model import write_model
 from kbs_process.errors import ConfigError
 from kbs_process.plant.attach import attach
 from kbs_process.plant.laws import select

@@ -11,8 +11,8 @@ import pytest
 
 from diagnosis import bench
 from diagnosis.selection.test_rounds import standing
-from kbs_process.campaign.corrected_model import write_model
 from kbs_process.campaign.load import load_campaign
+from kbs_process.campaign.writing.corrected_model import write_model
 from kbs_process.diagnosis.acceptance.plausible import pushes
 from kbs_process.diagnosis.acceptance.verdict import gated
 from kbs_process.diagnosis.experiments.hypothesis import Hypothesis, predict

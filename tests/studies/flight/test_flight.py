@@ -13,7 +13,7 @@ from kbs_process.cli import cli
 from kbs_process.errors import ConfigError
 from kbs_process.results.parallel import ordered_map
 from kbs_process.rig.model import substitute
-from kbs_process.studies.flight.run import Job, fly, in_orbit
+from kbs_process.studies.flight.unit import Job, Judged, fly, in_orbit
 
 pytestmark = pytest.mark.slow
 
@@ -67,7 +67,6 @@ def test_a_slow_slew_in_orbit_costs_what_the_inertia_does():
     from kbs_process.campaign.config import Requirement
     from kbs_process.plant.predict import Schedule
     from kbs_process.reduction.analysis import bands_of
-    from kbs_process.studies.flight.run import Judged
 
     campaign = load_campaign(ROOT / "campaigns" / "EL089", checksums=False, flight=True)
     balanced = {"body.antenna.cog": np.zeros(3), "body.antenna.inertia": np.array([0.7, 0.9, 0.8, 0, 0, 0])}

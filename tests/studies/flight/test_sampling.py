@@ -12,7 +12,7 @@ from kbs_process.plant.laws import select
 from kbs_process.plant.sampling import draw, uncertain, values
 from kbs_process.rig.model import substitute
 from kbs_process.studies.flight.propagation import by_chance, importance, probability, upper_bound
-from kbs_process.studies.flight.run import in_orbit
+from kbs_process.studies.flight.unit import in_orbit
 
 pytestmark = pytest.mark.slow
 

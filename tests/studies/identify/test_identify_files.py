@@ -19,9 +19,9 @@ from kbs_process.identification.unknowns import frictions, gearbox, prior, with_
 from kbs_process.reduction.reading import read_run
 from kbs_process.results.records import load
 from kbs_process.studies.identify.files import PARAMETERS, write_identification
+from kbs_process.studies.identify.findings import Outcomes, Prediction
 from kbs_process.studies.identify.measured import measured
 from kbs_process.studies.identify.results import IdentifyResults
-from kbs_process.studies.identify.run import Outcomes, Prediction
 
 pytestmark = pytest.mark.slow
 

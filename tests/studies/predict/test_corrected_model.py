@@ -12,9 +12,9 @@ import pytest
 
 from campaign.campaign_folder import make_folder
 from kbs_process.campaign.config import SensingLaw
-from kbs_process.campaign.corrected_model import write_model
 from kbs_process.campaign.load import load_campaign
 from kbs_process.campaign.mission import load_day
+from kbs_process.campaign.writing.corrected_model import write_model
 from kbs_process.diagnosis.experiments.hypothesis import Hypothesis
 from kbs_process.diagnosis.facts import Estimate, Identity, Place
 from kbs_process.errors import ConfigError

@@ -97,7 +97,7 @@ def test_the_cycle_is_discretised_exactly(arriving: tuple[tuple[float, float], .
 def test_margins_of_python_control_agree_with_the_eigenvalues() -> None:
     system, given = flexible()
     for joint in system.joints:
-        found = stability.margins(stability.loop(system, given), joint)
+        found = stability.margins(stability.loop(system, given), joint, 0.0)
         alone = np.array([found.gain if name == joint else 1.0 for name in system.joints])
         scaled = replace(
             given,

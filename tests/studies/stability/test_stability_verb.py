@@ -11,20 +11,18 @@ import pytest
 from kbs_process.campaign.load import load_campaign
 from kbs_process.errors import ConfigError
 from kbs_process.progress import SilentProgress
-from kbs_process.studies.stability import run as stability
+from kbs_process.studies.stability.run import Simulations, analyse_stability
 
 pytestmark = pytest.mark.slow
 
 ROOT = Path(__file__).parents[3]
 
 
-def test_a_campaign_is_analysed_and_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(stability, "WEIGHTS", (1.0,))
-    monkeypatch.setattr(stability, "_SHARES", (0.5,))
-    monkeypatch.setattr(stability, "_SIMULATED", 1)
+def test_a_campaign_is_analysed_and_reported(tmp_path: Path) -> None:
+    few = Simulations(poses=1, weights=(1.0,), shares=(0.5,))
     campaign = load_campaign(ROOT / "campaigns" / "EL089", checksums=False)
-    settings = {"joint": None, "low_deg": 0.0, "high_deg": 80.0, "points": 2}
-    outcome = stability.analyse_stability(campaign, tmp_path / "out", **settings, progress=SilentProgress(), pdf=False)
+    settings = {"joint": None, "low_deg": 0.0, "high_deg": 80.0, "points": 2, "pdf": False}
+    outcome = analyse_stability(campaign, tmp_path / "out", **settings, progress=SilentProgress(), simulations=few)
     assert outcome.requirement_met
     assert "keeps the customary margins" in outcome.verdict_lines[0]
     results = json.loads((tmp_path / "out" / "results.json").read_text())
@@ -44,7 +42,7 @@ def test_a_campaign_is_analysed_and_reported(tmp_path: Path, monkeypatch: pytest
 def test_a_joint_that_is_not_there_is_told(tmp_path: Path) -> None:
     campaign = load_campaign(ROOT / "campaigns" / "EL089", checksums=False)
     with pytest.raises(ConfigError, match="there is no joint 'elevation'"):
-        stability.analyse_stability(
+        analyse_stability(
             campaign,
             tmp_path / "out",
             joint="elevation",

@@ -16,8 +16,7 @@ import numpy as np
 from kbs_process.campaign.config import Campaign, SensingLaw
 from kbs_process.campaign.documents import Tree, read
 from kbs_process.campaign.locate import CAMPAIGN_FILE
-from kbs_process.campaign.parameter_files import corrected, entry, text_of, whole, write_parameters
-from kbs_process.campaign.sensing_laws import table_of
+from kbs_process.campaign.writing.parameter_files import corrected, entry, text_of, whole, write_parameters
 from kbs_process.rig.model import Quantity, Rig
 
 FOUND = "found.toml"  # numbers that the campaign's parameter files do not have
@@ -128,7 +127,16 @@ def _description(
     model = {key: value for key, value in tree.get("model", {}).items() if key != "modal"}
     tree["model"] = model | {"effects": list(effects)}
     if sensing:
-        tree["model"]["sensing"] = [table_of(law) for law in sensing]
+        tree["model"]["sensing"] = [_law(law) for law in sensing]
     tree["recording"] = [recording | {"file": from_here(recording["file"])} for recording in tree.get("recording", [])]
     tree["parameters"] = {"files": [f"parameters/{path.name}" for path in files]}
     return tree
+
+
+def _law(law: SensingLaw) -> Tree:
+    """A law as [model] sensing has it, in SI."""
+    return {
+        "law": law.law,
+        "site": law.site,
+        "parameters": {name: entry(quantity) for name, quantity in law.parameters.items()},
+    }
