@@ -9,6 +9,8 @@ import sys
 from pathlib import Path
 from shutil import copytree, ignore_patterns
 
+import pytest
+
 import kbs_process
 
 LAW = '''"""Friction of the rotor that grows with the square of its rate: a fan on the motor."""
@@ -16,8 +18,6 @@ LAW = '''"""Friction of the rotor that grows with the square of its rate: a fan 
 from __future__ import annotations
 
 from kbs_process.plant.effect import Effect, Normal, Port, amplitude
-
-import pytest
 
 
 def torque(rotor_rate: float, fan: float) -> float:
