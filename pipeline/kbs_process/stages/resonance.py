@@ -38,8 +38,8 @@ class FilterError:
     band: str
     rigid_rms: Array
     rigid_peak: Array
-    transmitted_rms: Array
-    transmitted_peak: Array
+    read_rms: Array
+    read_peak: Array
     error_rms: Array  # of transmitted less rigid
     error_rms_sigma: Array
     error_peak: Array
@@ -126,8 +126,8 @@ def _error(load: Signal, transmitted: Signal, varied: Sequence[Signal], band: Ba
         band=band.name,
         rigid_rms=_rms(rigid.values[valid]),
         rigid_peak=_peak(rigid.values[valid]),
-        transmitted_rms=_rms(read.values[valid]),
-        transmitted_peak=_peak(read.values[valid]),
+        read_rms=_rms(read.values[valid]),
+        read_peak=_peak(read.values[valid]),
         error_rms=rms,
         error_rms_sigma=sigma[0],
         error_peak=peak,

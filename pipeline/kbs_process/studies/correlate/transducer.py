@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -25,13 +26,14 @@ from kbs_process.stages.align.condense import CondenseSettings
 from kbs_process.stages.bandpass import UNFILTERED
 from kbs_process.stages.budget import sensor_noise
 from kbs_process.stages.motion import estimate
-from kbs_process.stages.resonance import Transmitted, amplification, filter_errors, transmit
+from kbs_process.stages.resonance import FilterError, Transmitted, amplification, filter_errors, transmit
 from kbs_process.stages.to_cog import to_spacecraft
 from kbs_process.studies.correlate.results import BothWays, FilterErrorIn, GainAt, ModeAt, OnTransducer
 
 SPACING = np.radians(2.5)  # of the poses at which modes are derived
 STILL = np.radians(5.0)  # a joint that turns by no more leaves the modes as they are
 TORQUES = ("Tx", "Ty", "Tz")
+SIZES = tuple(field.name for field in dataclasses.fields(FilterError) if field.name != "band")
 SEGMENT_S = 51.2  # of the spectra: lines 0.04 Hz wide
 
 
@@ -142,22 +144,9 @@ def _errors(campaign: Campaign, found: Transmitted) -> Iterable[FilterErrorIn]:
     bands = [band for band in bands_of(campaign.bands) if band.low_pass_Hz is not None]
     for frame, moved in frames:
         for error in filter_errors(moved, bands):
-            for index, channel in enumerate(WRENCH_CHANNELS):
-                yield FilterErrorIn(
-                    band=error.band,
-                    frame=frame,
-                    channel=channel,
-                    unit=WRENCH_UNITS[index],
-                    rigid_rms=float(error.rigid_rms[index]),
-                    rigid_peak=float(error.rigid_peak[index]),
-                    read_rms=float(error.transmitted_rms[index]),
-                    read_peak=float(error.transmitted_peak[index]),
-                    error_rms=float(error.error_rms[index]),
-                    error_rms_sigma=float(error.error_rms_sigma[index]),
-                    error_peak=float(error.error_peak[index]),
-                    error_peak_sigma=float(error.error_peak_sigma[index]),
-                    leak_rms=float(error.leak_rms[index]),
-                )
+            for index, (channel, unit) in enumerate(zip(WRENCH_CHANNELS, WRENCH_UNITS, strict=True)):
+                sizes = {name: float(getattr(error, name)[index]) for name in SIZES}
+                yield FilterErrorIn(band=error.band, frame=frame, channel=channel, unit=unit, **sizes)
 
 
 def _agreement(campaign: Campaign, analysis: Analysis, found: Transmitted) -> Iterable[BothWays]:
