@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from extending.scratch import copy_package, run_copy
 from studies.convert.importer_files import MAPPING, read_back, signals, write_mapping
@@ -32,6 +33,7 @@ FORMAT = Format(suffixes=(".blk",), read=read_blocks)
 '''
 
 
+@pytest.mark.slow
 def test_a_format_is_one_file(tmp_path: Path) -> None:
     package = copy_package(tmp_path)
     (package / "recordings" / "formats" / "blocks.py").write_text(BLOCKS)

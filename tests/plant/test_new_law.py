@@ -9,6 +9,8 @@ import sys
 from pathlib import Path
 from shutil import copytree, ignore_patterns
 
+import pytest
+
 import kbs_process
 
 LAW = '''"""Friction of the rotor that grows with the square of its rate: a fan on the motor."""
@@ -73,6 +75,7 @@ print(json.dumps({
 """
 
 
+@pytest.mark.slow
 def test_a_new_law_is_one_file(tmp_path: Path) -> None:
     package = Path(kbs_process.__file__).parent
     copy = copytree(package, tmp_path / "kbs_process", ignore=ignore_patterns("__pycache__"))

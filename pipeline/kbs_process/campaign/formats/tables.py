@@ -52,7 +52,7 @@ SomeDistinct = Annotated[
 Version = Annotated[int, AfterValidator(_first_version), Field(json_schema_extra={"const": 1})]
 
 # Alternatives are told apart by what TOML has; their tags stand in a fault's place, and are no keys.
-TABLE, ARRAY, TEXT, TRUTH, NUMBER = (Tag(f"\0{kind}") for kind in ("table", "array", "text", "truth", "number"))
+TABLE, ARRAY, TEXT, TRUTH, NUMBER = (Tag(f"\0{kind}") for kind in ("table", "array", "text", "boolean", "number"))
 _TAGS = {dict: TABLE, list: ARRAY, str: TEXT, bool: TRUTH, int: NUMBER, float: NUMBER}
 TAGS = {tag.tag for tag in _TAGS.values()}
 
