@@ -4,28 +4,27 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from kbs_process.campaign.load import load_campaign
+import archived
 from kbs_process.diagnosis.experiments.hypothesis import Tapped
-from kbs_process.diagnosis.proposing.families import FAMILIES, PORTS, family, port_word
 from kbs_process.diagnosis.screening.inlets import Inlet
-from kbs_process.diagnosis.screening.places import half_lengths, point_of
 from kbs_process.diagnosis.screening.ranges import Ranges, ranges_of
 from kbs_process.diagnosis.screening.signature import inputs, port_inputs, reduced, sensed
-from kbs_process.diagnosis.screening.suspects import Candidate, candidates
+from kbs_process.diagnosis.screening.suspects import Candidate, candidates, half_lengths, point_of
 from kbs_process.diagnosis.screening.transfer import follow, respond
 from kbs_process.plant.attach import attach
 from kbs_process.plant.effect import Effect
 from kbs_process.plant.laws import CATALOGUE, SENSING, select
-from kbs_process.plant.laws.position.joint_order import JOINT_ORDER
+from kbs_process.plant.laws.position.order import JOINT_ORDER
 from kbs_process.plant.predict import Schedule, predict, tap_columns
 from kbs_process.rig.model import Rig
 from kbs_process.signals.records import Array
 from kbs_process.stages.align.resample import resample
+
+pytestmark = pytest.mark.slow
 
 CHANNELS = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz", "az", "el")
 NOMINAL = tuple(effect.name for effect in CATALOGUE[:6])
@@ -35,7 +34,7 @@ TONES = {"floor_frequency": (2.3,), "mains_frequency": (0.7, 1.1), "jitter_frequ
 
 @cache
 def rig() -> Rig:
-    return load_campaign(Path(__file__).parents[2] / "campaigns" / "EL089", recordings=False).rig
+    return archived.rig()
 
 
 @cache
@@ -301,12 +300,10 @@ def test_a_clock_that_wanders_with_any_period_is_near_one_that_is_tried() -> Non
 
 
 def test_every_law_has_a_family_and_a_port_in_words() -> None:
-    assert set(FAMILIES) == {e.name for e in CATALOGUE} - {"synchronous_motor", "flexspline"} | {
-        e.name for e in SENSING
-    }
+    assert {law.name for law in (*CATALOGUE, *SENSING) if not law.family} == {"synchronous_motor", "flexspline"}
     for suspect in suspects(temperature=True, field_recorded=False):
-        assert family(suspect.name) and suspect.port in PORTS
-    assert port_word("appendage", one("appendage", "el").port) == "appendage"
+        assert suspect.effect.family and suspect.port.word
+    assert one("appendage", "el").effect.port_word == "appendage"
 
 
 # name, amplitude, value, channels that show it, and how well: correlation of both, and their ratio

@@ -19,6 +19,8 @@ from kbs_process.plant.laws import CATALOGUE, select
 from kbs_process.plant.schedule import Schedule
 from kbs_process.plant.structure import Structure
 
+pytestmark = pytest.mark.slow
+
 TWO = Structure((-1, 0), True, tuple(effect for effect in CATALOGUE if effect.port.of_drive))
 MODULES = [compiling.inspect.getmodule(effect.equation) for effect in TWO.effects]
 
@@ -36,7 +38,6 @@ MEMORY = Effect(
         Parameter("strength", "N m/rad", LogNormal(2.0, 0.1), "stiffness", (0.0, 100.0)),
         Parameter("decay", "1/s", LogNormal(5.0, 0.1), "inverse of the time it remembers", (0.0, 100.0)),
     ),
-    "test",
     states=(State("z", "N m", 0.0, "torque remembered"),),
 )
 

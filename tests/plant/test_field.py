@@ -10,12 +10,14 @@ from plant_rigs import NOMINAL, two_axis
 
 from kbs_process.plant.attach import attach
 from kbs_process.plant.laws import select
-from kbs_process.plant.laws.friction import tooth_stiction
+from kbs_process.plant.laws.friction import stiction as tooth_stiction
 from kbs_process.plant.laws.motor import cogging
 from kbs_process.plant.predict import predict, tap_columns
 from kbs_process.plant.schedule import Schedule
 from kbs_process.rig.model import Rig, substitute
 from kbs_process.signals.records import Array
+
+pytestmark = pytest.mark.slow
 
 SECONDS, CYCLE, LATE, SCALE = 8.0, 0.05, 5e-3, 2e-3
 START, REACH = np.array([0.4, -0.3]), np.array([0.12, 0.08])

@@ -30,6 +30,8 @@ from kbs_process.studies.reference_day.results import PublishedSection, Referenc
 from kbs_process.studies.reference_day.run import simulate_day
 from mission.reference import FOLDER
 
+pytestmark = pytest.mark.slow
+
 
 def short_campaign(folder: Path, duration: float, sections: str) -> Campaign:
     """Return a copy of the reference day that ends early."""

@@ -13,6 +13,8 @@ from kbs_process.errors import ConfigError
 from kbs_process.progress import SilentProgress
 from kbs_process.studies.stability import run as stability
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parents[2]
 
 

@@ -1,4 +1,4 @@
-"""The tables of a results folder, written: Parquet with units, frame and history in the file's metadata."""
+"""The tables of a results folder: Parquet with units, frame and history in the file's metadata."""
 
 from __future__ import annotations
 
@@ -6,13 +6,18 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from kbs_process.errors import OutputError
 from kbs_process.signals.grid import overlap
 from kbs_process.signals.records import Array, Envelope, Mask, Signal, Spectrum
+
+if TYPE_CHECKING:  # takes its time to import
+    from pandas import DataFrame
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,3 +114,17 @@ def write_table(
     table = table.replace_schema_metadata({"kbs": json.dumps(about, sort_keys=True)})
     path.parent.mkdir(parents=True, exist_ok=True)
     pq.write_table(table, path, compression="zstd")
+
+
+def read_table(path: Path) -> DataFrame:
+    """Return a table of a results folder; its `attrs` hold `units` by column, `frame`, `history` and `recording`."""
+    try:
+        content = pq.read_table(path)
+        about = json.loads((content.schema.metadata or {}).get(b"kbs", b"{}"))
+        frame: DataFrame = content.to_pandas()
+    except (OSError, ValueError, pa.lib.ArrowException) as error:
+        raise OutputError(
+            f"not a readable table: {error}", where=str(path), remedy="process the campaign again: kbs-process CAMPAIGN"
+        ) from None
+    frame.attrs = {"units": {}, "frame": "", "history": [], "recording": ""} | about
+    return frame
