@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from kbs_process.results.tables import read_table
+from kbs_process.results.tables import read_columns
 from kbs_process.signals.records import WRENCH_CHANNELS, Array, Mask
 
 
@@ -67,6 +67,9 @@ class Tables:
         # Looked up among the files that are there, so that no name can lead out of the folder.
         if not directory.is_dir() or name not in {entry.name for entry in directory.iterdir()}:
             return None
-        frame = read_table(directory / name)
-        columns = {str(name): frame[name].to_numpy(np.float64) for name in frame}
-        return Table(columns, frame.attrs["units"])
+        content, about = read_columns(directory / name)
+        columns = {
+            name: np.asarray(column.to_numpy(), dtype=np.float64)
+            for name, column in zip(content.column_names, content.columns, strict=True)
+        }
+        return Table(columns, about.get("units", {}))

@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyarrow as pa
@@ -116,15 +116,25 @@ def write_table(
     pq.write_table(table, path, compression="zstd")
 
 
-def read_table(path: Path) -> DataFrame:
-    """Return a table of a results folder; its `attrs` hold `units` by column, `frame`, `history` and `recording`."""
+def read_table(path: Path | str) -> DataFrame:
+    """Return a table as a DataFrame, whose rows are times (s) or frequencies (Hz).
+
+    Its `attrs` hold the "units" of the columns, and the "frame", "history" and "recording" of the signals. Raises
+    OutputError where the file cannot be read.
+    """
+    content, about = read_columns(Path(path))
+    frame: DataFrame = content.to_pandas()
+    frame = frame.set_index(content.column_names[0])
+    frame.attrs.update(about)
+    return frame
+
+
+def read_columns(path: Path) -> tuple[pa.Table, dict[str, Any]]:
+    """Read one table as it is stored, and what its metadata say of it."""
     try:
         content = pq.read_table(path)
-        about = json.loads((content.schema.metadata or {}).get(b"kbs", b"{}"))
-        frame: DataFrame = content.to_pandas()
-    except (OSError, ValueError, pa.lib.ArrowException) as error:
+        return content, json.loads((content.schema.metadata or {}).get(b"kbs", b"{}"))
+    except (OSError, ValueError, pa.ArrowException) as error:
         raise OutputError(
             f"not a readable table: {error}", where=str(path), remedy="process the campaign again: kbs-process CAMPAIGN"
         ) from None
-    frame.attrs = {"units": {}, "frame": "", "history": [], "recording": ""} | about
-    return frame
