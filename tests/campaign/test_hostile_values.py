@@ -132,6 +132,7 @@ FILES = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("make", "name", "model"), FILES, ids=[name for _, name, _ in FILES])
 def test_every_key_takes_any_value_or_tells_its_fault(
     make: Callable[[Path, str], tuple[Path, Load]], name: str, model: type[Table], tmp_path: Path
