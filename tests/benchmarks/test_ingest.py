@@ -31,6 +31,8 @@ from kbs_process.recordings.mcap.source import open_recording
 from kbs_process.recordings.mcap.streams import Stream
 from kbs_process.recordings.mcap.writer import write_mcap
 
+pytestmark = pytest.mark.slow
+
 MESSAGES = 1_000_000  # of each topic
 PEER_MESSAGES = 20_000
 FORCE = tuple(f"wrench.{part}.{axis}" for part in ("force", "torque") for axis in "xyz")

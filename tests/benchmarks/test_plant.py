@@ -29,6 +29,8 @@ from kbs_process.plant.structure import link_inertia
 from kbs_process.rig.model import Rig
 from kbs_process.signals.records import Array
 
+pytestmark = pytest.mark.slow
+
 CAMPAIGN = Path(__file__).parents[2] / "campaigns" / "EL089"
 SECONDS = 90.0
 RK4_STEP = 1e-4

@@ -6,7 +6,6 @@ import json
 import shutil
 import subprocess
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
@@ -60,8 +59,11 @@ def test_an_installer_that_fetched_a_commit_says_which(tmp_path: Path, monkeypat
     package.mkdir(parents=True)
     (package / "__init__.py").write_text("")
     url = json.dumps({"url": "https://example.org/x.git", "vcs_info": {"vcs": "git", "commit_id": COMMIT}})
-    installed = SimpleNamespace(locate_file=lambda name: tmp_path / "site" / name, read_text=lambda _: url)
-    monkeypatch.setattr(code, "distribution", lambda _: installed)
+    record = tmp_path / "site" / "kbs_process-0.1.0.dist-info"
+    record.mkdir()
+    (record / "METADATA").write_text("Metadata-Version: 2.1\nName: kbs-process\nVersion: 0.1.0\n")
+    (record / "direct_url.json").write_text(url)
+    monkeypatch.syspath_prepend(tmp_path / "site")
     assert (code.commit(package), code.source(package)) == (COMMIT, "")
     elsewhere = copy_of(package, tmp_path / "elsewhere" / "kbs_process")
     assert code.commit(elsewhere) == ""

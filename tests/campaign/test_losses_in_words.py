@@ -34,7 +34,7 @@ def test_what_was_put_in_order_alone_is_no_warning(also: tuple[str, ...], severi
     (notice,) = lost(entry, losses)
     assert notice.severity == severity
     assert "put in order: 3" in notice.what
-    listed = tuple(results.LossEntry(kind=one.kind, where=one.where, count=one.count) for one in losses)
+    listed = tuple(Loss(kind=one.kind, where=one.where, count=one.count) for one in losses)
     recording = results.Recording(
         name="a", file="a.mcap", trajectory="A", role="fit", repeat=1, sha256="0" * 64, duration_s=1.0,
         losses=listed,

@@ -146,6 +146,7 @@ def test_results_that_cannot_be_written_are_an_error(finished: Path, monkeypatch
     assert run(finished) == cli.BAD_INPUT
 
 
+@pytest.mark.slow
 def test_a_wrench_that_no_plant_makes_exceeds_the_floor(tmp_path: Path) -> None:
     """Recordings whose wrench is noise about a constant whatever the arm does."""
     folder = make_folder(tmp_path / "campaigns" / "EL089")

@@ -16,6 +16,8 @@ from kbs_process.results.records import encode
 from kbs_process.studies.correlate.earlier_diagnosis import earlier_diagnosis
 from report.test_report_diagnosis import results
 
+pytestmark = pytest.mark.slow
+
 LINK = 'href="diagnosis/index.html"'
 
 

@@ -24,6 +24,8 @@ from kbs_process.recordings.inspection import inspect_recording
 from kbs_process.rig.model import Quantity
 from kbs_process.signals.records import Array
 
+pytestmark = pytest.mark.slow
+
 PULL = 0.5  # N m about elevation, from the laboratory
 GAIN = 0.02  # of Fz
 

@@ -16,6 +16,8 @@ from kbs_process.diagnosis.experiments.whiten import window_of
 from kbs_process.diagnosis.nominal.detection import Cell, Detection, detect
 from kbs_process.signals.records import Array, Mask
 
+pytestmark = pytest.mark.slow
+
 NOTHING = {0: Prediction(np.zeros((N, CHANNELS)), np.zeros((N, 6)))}
 
 

@@ -32,6 +32,8 @@ from kbs_process.studies.diagnose.output import write_diagnosis
 from kbs_process.studies.diagnose.prose import answer, law_in_words
 from kbs_process.studies.diagnose.results import DiagnosisResults, Trial
 
+pytestmark = pytest.mark.slow
+
 OVER_ANGLE = next(one for one in MEASURED if one.effect.name == "ground_angle_law")
 LAW = Identity(Place("external wrench", "el"), "unnamed", "curve over joint angle")
 CABLE = Identity(Place("external wrench", "el"), "cable", "ground_cable")
@@ -64,11 +66,8 @@ def outcome() -> Outcome:
         free=(*known.free, *scalars),
         value=np.concatenate([known.value, NODES]),
         covariance=spread,
-        parameters=replace(
-            known.parameters,
-            names=(*known.parameters.names, *(one.name for one in scalars)),
-            value=np.concatenate([known.parameters.value, np.zeros(COEFFICIENTS)]),
-            sigma=np.concatenate([known.parameters.sigma, np.full(COEFFICIENTS, np.inf)]),
+        parameters=known.parameters.extended(
+            [one.name for one in scalars], np.zeros(COEFFICIENTS), np.full(COEFFICIENTS, np.inf), -np.inf, np.inf
         ),
     )
     x = np.linspace(*ends, 101)
@@ -79,11 +78,10 @@ def outcome() -> Outcome:
         reference="measured",
         estimates=tuple(Estimate(one.name.rpartition(".")[2], "", 0.5, 0.01) for one in scalars),
         probability=0.9,
-        rho=40.0,
         rho_eff=30.0,
         kappa=0.1,
         gate=Gate(True, (Fold("r1", 9.0, 1.0, 100.0),), True, 30.0, (2.0, 1.0), ()),
-        alternatives=(Alternative(CABLE, 0.1, 2.0, 0.16, True, True),),
+        alternatives=(Alternative(CABLE, 0.1, 2.0, True, True),),
         ports_alike=(),
         held_out_variance=0.95,
         curve=Curve(OVER_ANGLE, x, basis(OVER_ANGLE, x, *ends), np.linspace(0.6, 0.4, 101), np.full(101, 0.01)),
@@ -151,7 +149,7 @@ def written(outcome: Outcome, tmp_path_factory: pytest.TempPathFactory) -> Path:
     stated = np.where(there.stated, there.parameters.sigma, 0.0)
     pulled = replace(there, value=there.value + 8.0 * stated, covariance=0.01 * there.covariance)
     near, far = (
-        replace(find, alternatives=(Alternative(DRAG, 0.1, share * find.rho_eff, 0.0, False, True),))
+        replace(find, alternatives=(Alternative(DRAG, 0.1, share * find.rho_eff, False, True),))
         for find in outcome.finds
         for share in (0.1, 0.5)
     )
@@ -260,10 +258,10 @@ def test_the_next_test_can_be_simulated(written: Path) -> None:
 
 def test_laws_of_the_catalogue_that_do_the_same_are_alike_likely() -> None:
     """By odds of formulas that nature need not have; curves, and laws that are told apart, keep theirs."""
-    same = Alternative(DRAG, 0.02, 2.0, 0.16, True, True)
-    apart = Alternative(CABLE, 0.3, 9.0, 1e-6, False, True)
-    curve = Alternative(LAW, 0.08, 1.0, 0.3, True, True)
-    linear = Alternative(CABLE, 0.0, 1.0, 0.3, True, False)  # was not simulated
+    same = Alternative(DRAG, 0.02, 2.0, True, True)
+    apart = Alternative(CABLE, 0.3, 9.0, False, True)
+    curve = Alternative(LAW, 0.08, 1.0, True, True)
+    linear = Alternative(CABLE, 0.0, 1.0, True, False)  # was not simulated
     chance, others = _alike_likely(0.6, [same, apart, curve, linear])
     assert chance == pytest.approx(0.31)
     assert [one.probability for one in others] == pytest.approx([0.31, 0.3, 0.08, 0.0])
@@ -299,9 +297,9 @@ def test_the_channel_that_shows_most_of_what_is_left_is_told(outcome: Outcome) -
 def test_what_cannot_be_told_from_a_law_is_told_with_its_place(outcome: Outcome) -> None:
     az = Place(CABLE.place.port, "az")
     cord = replace(CABLE, law="cable", place=az)
-    same, apart = (Alternative(cord, 0.1, rho, 0.2, True, True) for rho in (2.0, 9.0))
-    spline = Alternative(replace(LAW, place=az, law="curve"), 0.1, 1.0, 0.2, True, True)
-    here = Alternative(replace(LAW, law="harness"), 0.1, 9.0, 0.2, True, True)
+    same, apart = (Alternative(cord, 0.1, rho, True, True) for rho in (2.0, 9.0))
+    spline = Alternative(replace(LAW, place=az, law="curve"), 0.1, 1.0, True, True)
+    here = Alternative(replace(LAW, law="harness"), 0.1, 9.0, True, True)
     (find,) = outcome.finds
     own = f"{LAW.law} ({LAW.place.port}, {LAW.place.site})".replace("_", " ")
     assert law_in_words(replace(find, alternatives=(apart, spline))) == own

@@ -30,6 +30,8 @@ from kbs_process.signals.records import Array, Signal
 from plant.plant_rigs import body, joint, quantity
 from plant.plant_rigs import rig as plain_rig
 
+pytestmark = pytest.mark.slow
+
 RATE = 100.0
 _TAPPED = ("rotor_angle", "rotor_rate", "joint_angle", "joint_rate")
 COEFFICIENTS = np.array([0.3, 0.5, -0.2, 0.1, 0.4, 0.2, -0.3, 0.1, 0.6, 0.2])

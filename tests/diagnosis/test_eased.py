@@ -15,6 +15,8 @@ from kbs_process.diagnosis.selection import explain
 from kbs_process.diagnosis.selection.explain import NEAR, eased
 from kbs_process.rig.model import substitute
 
+pytestmark = pytest.mark.slow
+
 OFF = {"body.antenna.cog": 2}  # elements; a short swing shows little of the others
 SIGMAS = 8.0
 

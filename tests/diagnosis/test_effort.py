@@ -11,6 +11,8 @@ from kbs_process.diagnosis.selection import effort
 from kbs_process.diagnosis.selection.effort import Effort
 from kbs_process.identification.output_error import Scalar
 
+pytestmark = pytest.mark.slow
+
 
 def test_a_pass_is_every_motion_with_every_number_moved(monkeypatch: pytest.MonkeyPatch) -> None:
     made = bench.experiment(bench.rig(), ("fit", "held-out"), 3, seconds=20.0)

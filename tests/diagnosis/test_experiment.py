@@ -11,7 +11,6 @@ from kbs_process.plant.predict import Schedule
 from kbs_process.signals.records import Events, Run, Signal
 
 N = 900
-RIG = bench.rig()
 
 
 def recording(name: str, late: float, trajectory: str = "SWING", n: int = N, turn: float = 0.02) -> Recorded:
@@ -21,7 +20,7 @@ def recording(name: str, late: float, trajectory: str = "SWING", n: int = N, tur
     swing = 1.2 + 10.0 * turn * np.sin(0.3 * (cycles - late))
     position = np.stack([0.0 * swing, swing], axis=1)
     rate = np.gradient(position, 0.1, axis=0)
-    channels = RIG.transducer.channels
+    channels = bench.rig().transducer.channels
     wrench = np.stack([np.sin(2.0 * np.pi * (0.5 + k) * (t - late)) for k in range(6)], axis=1)
     valid = np.ones(n, dtype=np.bool_)
     run = Run(
@@ -42,7 +41,7 @@ def recording(name: str, late: float, trajectory: str = "SWING", n: int = N, tur
 
 
 def made(*recorded: Recorded) -> Experiment:
-    return assemble(recorded, RIG, bench.effects())
+    return assemble(recorded, bench.rig(), bench.effects())
 
 
 def test_repeats_started_by_hand_lie_on_one_grid_and_share_their_drive() -> None:
@@ -75,4 +74,4 @@ def test_roles_say_what_may_be_fitted() -> None:
     experiment = made(recording("a", 0.0), recording("b", 0.1))
     assert experiment.fit == (0, 1)
     assert experiment.held_out == ()
-    assert experiment.channels == (*RIG.transducer.channels, "az", "el")
+    assert experiment.channels == (*bench.rig().transducer.channels, "az", "el")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import bench
@@ -15,12 +15,11 @@ from kbs_process.diagnosis.nominal.joint import Standing, with_extra
 from kbs_process.diagnosis.nominal.parameters import known_parameters, prior
 from kbs_process.diagnosis.proposing.tryout import extra_of, identity
 from kbs_process.diagnosis.proposing.view import View
-from kbs_process.diagnosis.screening.places import points_of
 from kbs_process.diagnosis.screening.ranges import Ranges
 from kbs_process.diagnosis.screening.scene import Scene
 from kbs_process.diagnosis.screening.screen import Bench, Catalogued, screen
 from kbs_process.diagnosis.screening.shapes import bettered
-from kbs_process.diagnosis.screening.suspects import Candidate, candidates
+from kbs_process.diagnosis.screening.suspects import Candidate, candidates, points_of
 from kbs_process.diagnosis.selection.leaders import leaders
 from kbs_process.identification.output_error import Scalar
 from kbs_process.plant.attach import attach
@@ -30,13 +29,17 @@ from kbs_process.plant.laws.environment.air_drag import AIR_DRAG
 from kbs_process.plant.laws.environment.bungee import BUNGEE
 from kbs_process.plant.predict import Schedule
 
+pytestmark = pytest.mark.slow
+
 DRAG, POWER, POINT = 0.8, 1.75, np.array([0.3, -0.1, 0.12])  # N at 0.01 m/s, 1, m
 FREE = (Scalar("body.antenna.cog", (0,)), Scalar("joint.el.drive.Ka"))
 
 
-def pulled(effect: Effect, values: Mapping[str, float]) -> tuple[Experiment, Standing]:
+def pulled(
+    effect: Effect, values: Mapping[str, float], path: Callable[[float], Schedule] = bench.schedule
+) -> tuple[Experiment, Standing]:
     """EL089's rig, and what is believed where a force that nobody stated acts on its antenna, at `POINT`."""
-    made = bench.experiment(bench.rig(), ("fit", "fit"), 5)
+    made = bench.experiment(bench.rig(), ("fit", "fit"), 5, path=path)
     names = tuple(one.name for one in select([*made.effects, effect.name]))
     truth = attach(made.rig, effect, values, on="el", point=POINT)
     bare = predict(Hypothesis(made.rig, made.effects), made, 0).values
@@ -94,11 +97,10 @@ def wide(seconds: float) -> Schedule:
     return Schedule(t, position, rate, field=100.0 * position)
 
 
-def test_a_cord_whose_pull_is_a_weight_to_known_numbers_is_a_lead(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_cord_whose_pull_is_a_weight_to_known_numbers_is_a_lead() -> None:
     """Wherever its grid has it, more than 99 % of what it does is masses' and levers'; what is left is its way's."""
-    monkeypatch.setattr(bench, "schedule", wide)
     cord = {"stiffness": 6.0, "free_length": 0.4, "anchor_x": 0.3, "anchor_y": -0.2, "anchor_z": 1.2}
-    made, here = pulled(BUNGEE, cord)
+    made, here = pulled(BUNGEE, cord, wide)
     known = known_parameters(made.rig, made.effects)
     stated = np.isfinite(prior(made.rig, made.rig, made.effects, known).sigma)
     free = tuple(one for one, told in zip(known, stated, strict=True) if told)  # all but phases

@@ -12,6 +12,8 @@ from kbs_process.diagnosis.acceptance.evenness import evenly, parts
 from kbs_process.diagnosis.acceptance.gate import _beside, _evenly, _sigmas
 from kbs_process.identification.output_error import Scalar
 
+pytestmark = pytest.mark.slow
+
 
 def test_numbers_that_are_held_leave_the_inverse_of_what_is_left_of_the_information() -> None:
     rng = np.random.default_rng(2)

@@ -21,6 +21,8 @@ from kbs_process.plant.attach import attach
 from kbs_process.plant.laws.hysteresis.cable import GROUND_CABLE
 from kbs_process.plant.laws.transducer.step import CHANNEL_STEP
 
+pytestmark = pytest.mark.slow
+
 SHAPE = (("cable_middle", 0.0), ("cable_reach", 0.05), ("cable_memory", 0.02))
 
 

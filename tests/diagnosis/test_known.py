@@ -15,6 +15,8 @@ from kbs_process.diagnosis.nominal.parameters import COUPLING, known_parameters,
 from kbs_process.rig.model import substitute
 from kbs_process.signals.records import Array
 
+pytestmark = pytest.mark.slow
+
 MOVED: dict[str, Array | float] = {
     "body.antenna.mass": 14.06,
     "joint.el.drive.Ka": 1.08e4,

@@ -19,6 +19,8 @@ from kbs_process.diagnosis.nominal.search import Search
 from kbs_process.rig.model import substitute
 from kbs_process.signals.records import Array
 
+pytestmark = pytest.mark.slow
+
 PHASE, WIDTH, TORQUE = "joint.az.drive.phi_stat", "joint.az.drive.delta", "joint.az.drive.Ts0"
 
 

@@ -15,6 +15,8 @@ from kbs_process.diagnosis.screening.scene import Scene
 from kbs_process.identification.output_error import Scalar
 from kbs_process.signals.records import Array
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.parametrize("orders", [np.arange(0.25, 60.0, 0.25), np.arange(7.3, 90.0, 0.61), np.arange(1.0, 3.0)])
 def test_power_along_orders_is_that_of_the_sum(orders: np.ndarray) -> None:

@@ -11,6 +11,7 @@ import bench
 import numpy as np
 import pytest
 
+from kbs_process.diagnosis.acceptance import verdict
 from kbs_process.diagnosis.acceptance.plausible import implausible, undone
 from kbs_process.diagnosis.experiments.hypothesis import Hypothesis, predict
 from kbs_process.diagnosis.nominal.joint import Standing, with_extra
@@ -22,7 +23,6 @@ from kbs_process.diagnosis.screening.scene import Scene
 from kbs_process.diagnosis.screening.screen import Bench, Catalogued, screen
 from kbs_process.diagnosis.screening.shapes import bettered
 from kbs_process.diagnosis.screening.suspects import Candidate
-from kbs_process.diagnosis.selection import leaders
 from kbs_process.identification.output_error import Scalar
 from kbs_process.plant.attach import attach
 from kbs_process.plant.effect import Effect
@@ -31,6 +31,8 @@ from kbs_process.plant.laws.hysteresis.cable import HARNESS
 from kbs_process.plant.laws.position.bell import LOCAL_TORQUE
 from kbs_process.plant.laws.position.detent import DETENT
 from kbs_process.plant.laws.position.order import JOINT_ORDER
+
+pytestmark = pytest.mark.slow
 
 FREE = (Scalar("body.antenna.cog", (0,)), Scalar("joint.el.drive.Ka"))
 TORQUE, ANGLE, WIDTH = 0.6, 1.27941, 1e-3  # N m, rad, rad: a fortieth of the swing
@@ -160,7 +162,7 @@ def test_amplitudes_that_undo_each_other_are_judged_by_what_they_do_together() -
     assert "harness_offset" not in undone(suspect, alone)
     # Two finds that are one law together: the second's numbers follow.
     values, shapes = (np.array([*own.values()] * 2, dtype=float) for own in (tail, shape))
-    assert leaders._undone(suspect, values, shapes) == free
+    assert verdict._undone(suspect, values, shapes) == free
 
 
 def test_place_and_width_of_a_bump_are_found_in_the_plant() -> None:

@@ -27,6 +27,8 @@ from kbs_process.diagnosis.selection import leaders
 from kbs_process.plant.effect import Port
 from kbs_process.plant.laws.position.measured_law import COEFFICIENTS, MEASURED, Measured, torque, torque_over_rate
 
+pytestmark = pytest.mark.slow
+
 # Of a bump in the middle of the range, N m.
 BUMP = np.array([0.0, 0.0, 0.02, 0.1, 0.3, 0.3, 0.1, 0.02, 0.0, 0.0])
 SLOPE = np.linspace(-1.0, 1.0, COEFFICIENTS)

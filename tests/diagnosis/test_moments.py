@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from test_local_law import ANGLE, TORQUE, WIDTH, with_bump
 
-from kbs_process.diagnosis.acceptance.moments import most_of, only_while
+from kbs_process.diagnosis.acceptance.remains import most_of, only_while
 from kbs_process.diagnosis.experiments.thresholds import MOSTLY
 from kbs_process.diagnosis.nominal.joint import Own, Standing, bare, with_extra
 from kbs_process.diagnosis.proposing.tryout import extra_of
@@ -18,6 +18,8 @@ from kbs_process.diagnosis.screening.screen import Bench, Catalogued, screen
 from kbs_process.diagnosis.screening.suspects import Candidate
 from kbs_process.plant.laws.position.bell import LOCAL_TORQUE
 from kbs_process.signals.records import Array
+
+pytestmark = pytest.mark.slow
 
 Changes = tuple[Array, ...]
 

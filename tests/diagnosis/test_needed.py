@@ -23,6 +23,8 @@ from kbs_process.diagnosis.proposing.tryout import extra_of, identity
 from kbs_process.diagnosis.selection.race import own_of
 from kbs_process.plant.laws import CATALOGUE
 
+pytestmark = pytest.mark.slow
+
 LAG, CABLE, HARNESS = ("channel_lag", "Tx"), ("ground_cable", "el"), ("harness", "el")
 HARNESS_EFFECT = next(one for one in CATALOGUE if one.name == "harness")
 
@@ -39,7 +41,6 @@ def joined(made: Experiment, before: Standing, family: tuple[str, str]) -> tuple
         reference="",
         estimates=(),
         probability=1.0,
-        rho=0.0,
         rho_eff=0.0,
         kappa=0.0,
         gate=passed,

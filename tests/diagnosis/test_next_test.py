@@ -22,6 +22,8 @@ from kbs_process.reduction.commands import read_commands
 from kbs_process.studies.diagnose.output import commands_of
 from kbs_process.studies.diagnose.records import next_test
 
+pytestmark = pytest.mark.slow
+
 FREE = (Scalar("joint.el.drive.Ka"), Scalar("joint.el.drive.b_m"))
 VISCOUS = Identity(Place("joint torque", "el"), "viscous", "joint_viscous")
 COULOMB = Identity(Place("joint torque", "el"), "friction", "coulomb")
@@ -34,7 +36,7 @@ def standing() -> Standing:
 
 def found(sigma: float, *rivals: Identity) -> Find:
     """Friction whose number is known to a standard deviation."""
-    others = tuple(Alternative(rival, 0.4, 1.0, 0.3, True, True) for rival in rivals)
+    others = tuple(Alternative(rival, 0.4, 1.0, True, True) for rival in rivals)
     return Find(
         identity=VISCOUS,
         named=True,
@@ -42,7 +44,6 @@ def found(sigma: float, *rivals: Identity) -> Find:
         reference="",
         estimates=(Estimate("joint_viscous", "N m s/rad", 1.0, sigma),),
         probability=0.6,
-        rho=1.0 / sigma,
         rho_eff=1.0 / sigma,
         kappa=0.0,
         gate=Gate(True, (), True, 20.0, (1.0, 1.0), ()),

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from test_experiment import N, made, recording
 
+import archived
 from kbs_process.campaign.config import Campaign, RecordingEntry
-from kbs_process.campaign.load import load_campaign
 from kbs_process.diagnosis.acceptance.gate import gate
 from kbs_process.diagnosis.acceptance.plausible import implausible
 from kbs_process.diagnosis.experiments import floor
@@ -35,12 +35,13 @@ from kbs_process.studies.diagnose import reading
 from kbs_process.studies.diagnose.diagnosable import LEAST_S, check_copies, check_length, check_noise, check_signs
 from kbs_process.studies.diagnose.reading import LONGEST_S, busiest, passed_over, read_stretch
 
-RIG = bench.rig()
+pytestmark = pytest.mark.slow
+
 ENTRY = RecordingEntry("a", Path("recordings/a.mcap"), "SWING", "fit", 1, None, None, None)
 
 
 def campaign() -> Campaign:
-    return load_campaign(bench.CAMPAIGN, recordings=False)
+    return archived.campaign("EL089", recordings=False)
 
 
 def wrench() -> Array:
@@ -51,10 +52,10 @@ def wrench() -> Array:
 
 
 def passed(
-    values: Array, rig: Rig = RIG, chunk: int = 37, *, keep: bool = False, apart: int = 10_000_000
+    values: Array, rig: Rig | None = None, chunk: int = 37, *, keep: bool = False, apart: int = 10_000_000
 ) -> tuple[Array, tuple[Loss, ...]]:
     """What is left of readings that come in small pieces, and what is told of them."""
-    alive, stamp = Alive(rig, ENTRY, keep=keep), np.arange(len(values)) * 10_000_000 // apart * apart
+    alive, stamp = Alive(rig or bench.rig(), ENTRY, keep=keep), np.arange(len(values)) * 10_000_000 // apart * apart
     pieces = (slice(start, start + chunk) for start in range(0, len(values), chunk))
     blocks = alive(("wrench", Block(stamp[own], stamp[own], values[own])) for own in pieces)
     return np.concatenate([block.stamp for _, block in blocks]), alive.losses
@@ -113,21 +114,22 @@ def test_what_is_judged_keeps_what_was_cut_off_and_tells_of_it(apart: int) -> No
 
 
 def test_a_channel_whose_resolution_hides_its_noise_may_stand_still() -> None:
-    coarse = replace(RIG.transducer, resolution=replace(RIG.transducer.resolution, value=np.full(6, 1.0)))
+    fine = bench.rig().transducer
+    coarse = replace(fine, resolution=replace(fine.resolution, value=np.full(6, 1.0)))
     values = wrench()
     values[:, 2] = 12.0
-    assert len(passed(values, replace(RIG, transducer=coarse))[0]) == 2000
+    assert len(passed(values, replace(bench.rig(), transducer=coarse))[0]) == 2000
 
 
 def test_sensors_without_stated_noise_are_told() -> None:
     silent = replace(
-        RIG.transducer,
-        noise=replace(RIG.transducer.noise, value=np.zeros(6)),
-        resolution=replace(RIG.transducer.resolution, value=np.zeros(6)),
+        bench.rig().transducer,
+        noise=replace(bench.rig().transducer.noise, value=np.zeros(6)),
+        resolution=replace(bench.rig().transducer.resolution, value=np.zeros(6)),
     )
-    check_noise(RIG, "EL089")
+    check_noise(bench.rig(), "EL089")
     with pytest.raises(ConfigError, match="noise nor resolution of Fx, Fy, Fz, Tx, Ty, Tz"):
-        check_noise(replace(RIG, transducer=silent), "EL089")
+        check_noise(replace(bench.rig(), transducer=silent), "EL089")
 
 
 def swinging() -> tuple[Run, Motion]:
@@ -136,7 +138,7 @@ def swinging() -> tuple[Run, Motion]:
     assert run.wrench is not None and run.angle is not None
     q = np.stack([np.zeros(N), 1.2 + 0.2 * np.sin(0.3 * (run.wrench.t - 0.013))], axis=1)
     rest = np.zeros_like(q)
-    wrench = run.wrench.derive(loads(RIG, q, rest, rest)[:, :6], "weight")
+    wrench = run.wrench.derive(loads(bench.rig(), q, rest, rest)[:, :6], "weight")
     moved = Motion(0.0, bench.DT, q, rest, rest, rest, rest[None], np.zeros(2), np.zeros(2), wrench.valid)
     return replace(run, wrench=wrench, angle=run.angle.derive(q, "angle")), moved
 
@@ -206,7 +208,7 @@ def test_nothing_is_compared_after_the_last_command_of_a_motion() -> None:
 
 def alike() -> Experiment:
     """Two repeats without noise, as nothing but a simulation makes them."""
-    experiment = bench.experiment(RIG, ("fit", "fit"), 1)
+    experiment = bench.experiment(bench.rig(), ("fit", "fit"), 1)
     first, second = experiment.trials
     return replace(experiment, trials=(first, replace(second, measured=first.measured)))
 
@@ -225,10 +227,10 @@ def test_repeats_that_are_the_same_have_what_the_plant_is_exact_to_for_a_floor()
 
 def test_a_recording_without_a_window_has_no_cells_and_one_with_a_gap_has_those_around_it() -> None:
     free = (Scalar("joint.el.drive.Ka"),)
-    short = bench.standing(bench.experiment(RIG, ("fit", "fit"), 2), free)
+    short = bench.standing(bench.experiment(bench.rig(), ("fit", "fit"), 2), free)
     cells, ports, _ = cells_and_ports(short, floor.declared(short.known.experiment), _paths(short))
     assert len(cells.z) == 0 and cells.J.shape == (0, 8, 1) and ports == ()
-    experiment = bench.experiment(RIG, ("fit",), 2, seconds=36.0)
+    experiment = bench.experiment(bench.rig(), ("fit",), 2, seconds=36.0)
     valid = experiment.trials[0].valid.copy()
     valid[350] = False
     broken = replace(experiment, trials=(replace(experiment.trials[0], valid=valid),))
@@ -323,7 +325,7 @@ def test_a_copy_is_no_repeat() -> None:
 
 
 def test_a_law_whose_coefficients_have_no_covariance_does_not_pass() -> None:
-    known = bench.standing(bench.experiment(RIG, ("fit", "held-out"), 4), (Scalar("joint.el.drive.Ka"),)).known
+    known = bench.standing(bench.experiment(bench.rig(), ("fit", "held-out"), 4), (Scalar("joint.el.drive.Ka"),)).known
     for covariance in (np.zeros((1, 1)), np.full((1, 1), np.nan)):
         verdict = gate(known, replace(known, covariance=covariance), [0])
         assert not verdict.passed

@@ -23,6 +23,8 @@ from kbs_process.identification.output_error import Scalar
 from kbs_process.plant.attach import attach
 from kbs_process.plant.laws import find, select
 
+pytestmark = pytest.mark.slow
+
 GRID = (150.0, 250.0, 350.0, 500.0, 620.0, 750.0, 900.0)
 RIPPLE = {250.0: 0.3, 500.0: -0.2, 750.0: 0.15}  # N m, sines
 

@@ -7,6 +7,8 @@ import pytest
 
 from kbs_process.diagnosis.screening.ports import Cells, PortModel, benjamini_yekutieli, fisher, port_test, sine_window
 
+pytestmark = pytest.mark.slow
+
 C, D, CELLS, NU = 6, 1, 20, 24
 
 

@@ -27,6 +27,8 @@ from kbs_process.diagnosis.selection.effort import Effort
 from kbs_process.diagnosis.selection.leaders import leaders, tried, various
 from kbs_process.diagnosis.selection.race import Runner, raced
 
+pytestmark = pytest.mark.slow
+
 RIGHT, WRONG, CURVE = ("ground_cable", "el"), ("harness", "el"), ("ground_angle_law", "el")
 KIN = ("tether", "el")  # of the right one's family and place
 

@@ -19,6 +19,8 @@ from kbs_process.diagnosis.proposing.tryout import extra_of
 from kbs_process.diagnosis.proposing.view import View
 from kbs_process.diagnosis.selection import rounds
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def made() -> Experiment:

@@ -10,11 +10,13 @@ from kbs_process.diagnosis.experiments.experiment import Experiment
 from kbs_process.diagnosis.experiments.floor import declared
 from kbs_process.diagnosis.experiments.hypothesis import Hypothesis, predict
 from kbs_process.diagnosis.experiments.metric import metrics
-from kbs_process.diagnosis.experiments.ringing import decays
+from kbs_process.diagnosis.experiments.nuisance import decays
 from kbs_process.plant.laws import select
 from kbs_process.plant.linear.modes import modes
 from kbs_process.rig.model import substitute
 from kbs_process.signals.records import Array
+
+pytestmark = pytest.mark.slow
 
 BEGIN = 10
 

@@ -9,13 +9,14 @@ from types import SimpleNamespace
 import bench
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 from kbs_process.diagnosis.acceptance import gate as gate_of
 from kbs_process.diagnosis.acceptance import supposed as supposed_laws
 from kbs_process.diagnosis.acceptance.finding import Tried, as_it_stands, find_of
 from kbs_process.diagnosis.acceptance.gate import Gate, gate
 from kbs_process.diagnosis.acceptance.needed import Accepted
-from kbs_process.diagnosis.acceptance.rivals import probabilities, rivalry
+from kbs_process.diagnosis.acceptance.rivals import distance, probabilities
 from kbs_process.diagnosis.acceptance.supposed import Noted
 from kbs_process.diagnosis.acceptance.verdict import gated
 from kbs_process.diagnosis.experiments.experiment import Experiment
@@ -39,6 +40,8 @@ from kbs_process.identification.output_error import Scalar
 from kbs_process.plant.attach import attach
 from kbs_process.plant.laws import CATALOGUE, SENSING, select
 from kbs_process.signals.records import Array
+
+pytestmark = pytest.mark.slow
 
 FREE = (
     Scalar("body.antenna.cog", (0,)),
@@ -222,9 +225,9 @@ def test_a_law_of_the_readings_needs_no_plant_and_its_rival_is_told_apart(made: 
     alone = np.linalg.inv(np.linalg.inv(linear) + prior)
     assert right.known.sigma[-2:] == pytest.approx(np.sqrt(np.diag(alone)), rel=0.15)
     assert np.allclose(right.shown(0) - right.predicted[0].values, share * moves + time * slower)
-    apart = rivalry(right.known, wrong.known)
-    assert apart.rho_delta > 20.0 and apart.rho_delta > told_apart(300.0) and apart.p_wrong < 1e-20
-    assert rivalry(right.known, right.known).rho_delta < told_apart(0.0)
+    apart = distance(right.known, wrong.known)
+    assert apart > 20.0 and apart > told_apart(300.0) and norm.sf(0.5 * apart) < 1e-20
+    assert distance(right.known, right.known) < told_apart(0.0)
 
 
 def passed(here: Standing, tried: Bench, scene: Scene, found: Screening, law: str) -> Tried:
@@ -256,7 +259,7 @@ def test_an_error_of_an_encoder_that_no_law_has_is_measured_with_a_band(made: Ex
     found = screen(tried, [Catalogued(one, scene) for one in some])
     told = passed(here, tried, scene, found, "encoder_profile")
     assert told.gate.passed, told.gate.reasons
-    find = find_of([told], 0, np.ones(1), here, None)
+    find = find_of([told], np.ones(1), here, None)
     assert not find.named and (find.identity.place.port, find.identity.place.site) == ("encoder", "el")
     assert find.held_out_variance is not None and find.held_out_variance > 0.9
     assert {one.unit for one in find.estimates} == {"rad"}
@@ -282,9 +285,7 @@ def test_a_law_that_fell_in_the_plant_is_none_that_the_find_cannot_be_told_from(
     tried, scene, found = screened(cable)
     told = passed(cable, tried, scene, found, "ground_cable")
     fell = Identity(Place("joint torque", "el"), "harness", "harness")
-    with_it, without_it = (
-        find_of([told], 0, np.ones(1), cable, None, refused).alternatives for refused in ((), (fell,))
-    )
+    with_it, without_it = (find_of([told], np.ones(1), cable, None, refused).alternatives for refused in ((), (fell,)))
     assert fell in {one.identity for one in with_it}
     assert {one.identity for one in with_it} - {one.identity for one in without_it} >= {fell}
 
@@ -358,7 +359,7 @@ def test_a_search_that_has_cost_too_much_ends_with_what_it_has_found(
 ) -> None:
     tried, scene, found = screened(cable)
     first = passed(cable, tried, scene, found, "ground_cable")
-    told = find_of([first], 0, np.ones(1), cable, None)
+    told = find_of([first], np.ones(1), cable, None)
     asked: list[int] = []
 
     def look(here: Standing, seen: Standing, _: object, __: object, accepted: list[Accepted]) -> rounds._Round:
@@ -409,7 +410,7 @@ def test_what_each_recording_has_of_its_own_is_not_looked_for_where_a_law_leaves
     """`some` law was found before; it would take up what that one's formula lacks."""
     tried, scene, found = screened(cable)
     first = passed(cable, tried, scene, found, "ground_cable")
-    told = find_of([first], 0, np.ones(1), cable, None)
+    told = find_of([first], np.ones(1), cable, None)
     accepted = [Accepted(first, told, cable)] if some else []
     own, repeating = (
         SimpleNamespace(suspect=SimpleNamespace(each_trial=each, family=("drift", str(each)))) for each in (True, False)

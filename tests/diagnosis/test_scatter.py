@@ -14,6 +14,8 @@ from kbs_process.diagnosis.nominal.scatter import ENDED, scattered
 from kbs_process.identification.output_error import Scalar
 from kbs_process.signals.records import Array
 
+pytestmark = pytest.mark.slow
+
 DAMPING = FREE.index(Scalar("joint.el.drive.b_m"))
 
 

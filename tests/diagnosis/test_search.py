@@ -13,14 +13,15 @@ from kbs_process.diagnosis.experiments.floor import declared
 from kbs_process.diagnosis.experiments.hypothesis import Hypothesis
 from kbs_process.diagnosis.experiments.metric import metrics
 from kbs_process.diagnosis.experiments.thresholds import DETECTED, TOLERATED
-from kbs_process.diagnosis.nominal.costs import GEARS, Found
+from kbs_process.diagnosis.nominal.costs import GEARS, Found, Ground
 from kbs_process.diagnosis.nominal.detection import Detection
-from kbs_process.diagnosis.nominal.ground import Ground
 from kbs_process.diagnosis.nominal.known import refit
 from kbs_process.diagnosis.nominal.parameters import known_parameters, prior
 from kbs_process.diagnosis.nominal.search import Search
 from kbs_process.diagnosis.nominal.tangents import Step
 from kbs_process.rig.model import substitute
+
+pytestmark = pytest.mark.slow
 
 
 def searching(made: Experiment) -> Search:

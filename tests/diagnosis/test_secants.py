@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from kbs_process.diagnosis.nominal.secants import along_valleys
+from kbs_process.diagnosis.nominal.tangents import along_valleys
 from kbs_process.estimation.fit import Parameters
 from kbs_process.identification.polar import Polar
 from kbs_process.signals.records import Array

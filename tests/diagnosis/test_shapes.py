@@ -19,6 +19,8 @@ from kbs_process.diagnosis.screening.screen import Bench, Catalogued, Screening,
 from kbs_process.diagnosis.screening.shapes import Bend, bends, bettered
 from kbs_process.plant.effect import LogNormal
 
+pytestmark = pytest.mark.slow
+
 
 def test_steps_of_a_shape_stay_between_its_bounds_and_are_undone() -> None:
     for suspect in suspects(temperature=True, field_recorded=False):
@@ -82,11 +84,7 @@ def test_the_time_of_a_lag_is_found_between_the_grid_s_with_its_interval() -> No
         after = with_extra(here, extra_of(one, here, tried, scene), bench.serial(made))
         own = Own(after.known.names[-2:], after.known.names[-2:-1])
         told = find_of(
-            [Tried(one, after, gate(here.known, after.known, [-2]), Screening((one,), 3), own)],
-            0,
-            np.ones(1),
-            here,
-            None,
+            [Tried(one, after, gate(here.known, after.known, [-2]), Screening((one,)), own)], np.ones(1), here, None
         )
         lag, time = told.estimates
         print(lag, time)

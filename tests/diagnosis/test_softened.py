@@ -10,13 +10,14 @@ import pytest
 from diagnosis import bench
 from kbs_process.diagnosis.experiments.floor import declared
 from kbs_process.diagnosis.experiments.hypothesis import Hypothesis, predict
-from kbs_process.diagnosis.experiments.metric import metrics
-from kbs_process.diagnosis.experiments.softened import excess_density, softened
+from kbs_process.diagnosis.experiments.metric import excess_density, metrics, softened
 from kbs_process.diagnosis.nominal.joint import Standing, standing_of
 from kbs_process.diagnosis.nominal.known import Known, as_it_is, refit
 from kbs_process.diagnosis.nominal.settling import bent, detected, drawn_back
 from kbs_process.diagnosis.selection.explain import NEAR
 from kbs_process.signals.records import Array
+
+pytestmark = pytest.mark.slow
 
 CHANNEL, HZ = 4, 3.0
 

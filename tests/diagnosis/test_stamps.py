@@ -24,6 +24,8 @@ from kbs_process.diagnosis.selection.each_recording import jump_gain, taken_off,
 from kbs_process.diagnosis.selection.effort import Effort
 from kbs_process.signals.records import Array
 
+pytestmark = pytest.mark.slow
+
 DT = 0.05
 T = np.arange(1200) * DT
 INSIDE = slice(60, -60)
@@ -89,7 +91,7 @@ def test_a_clock_is_taken_off_exactly() -> None:
     sizes = told.found.score.amplitude.reshape(2, 2)
     np.testing.assert_allclose(sizes, [[0.02, 0.0], [0.03, 0.0]], atol=3e-4)
     # A find is told as the first recording has it that is no calibration.
-    sin, cos, period = find_of([told], 0, np.ones(1), here, None).estimates
+    sin, cos, period = find_of([told], np.ones(1), here, None).estimates
     assert (sin.value, cos.value, period.value) == (*sizes[1], 25.0)
     unit, rows = known.metric[0](tried.signatures([suspect], 0)), np.asarray(known.rows)
     first_order = known.residual[0] - unit @ screening.candidates[0].score.amplitude[:2]

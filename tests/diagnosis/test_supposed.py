@@ -22,6 +22,8 @@ from kbs_process.diagnosis.nominal.known import Known
 from kbs_process.diagnosis.selection import rounds
 from kbs_process.diagnosis.selection.effort import Effort
 
+pytestmark = pytest.mark.slow
+
 
 def leaving(known: Known, share: float) -> Known:
     """The same with residuals that leave a share of what it leaves beyond the noise."""
@@ -99,7 +101,7 @@ def test_each_of_a_pair_has_to_be_found_beside_the_other(
         share = left[len(asked) - 1]
         one = second if len(asked) == 1 else first
         there = replace(here, known=leaving(known, share))
-        told = rounds.find_of([one], 0, np.ones(1), cable, None)
+        told = rounds.find_of([one], np.ones(1), cable, None)
         found = None if alone and len(asked) == 2 else Accepted(replace(one, standing=there), told, here)
         return rounds._Round(found, there, seen, one.screening, Noted(), None)
 

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from kbs_process.campaign.load import load_campaign
+import archived
 from kbs_process.diagnosis.experiments.hypothesis import Tapped
 from kbs_process.diagnosis.screening.inlets import Inlet
-from kbs_process.diagnosis.screening.places import half_lengths, point_of
 from kbs_process.diagnosis.screening.ranges import Ranges, ranges_of
 from kbs_process.diagnosis.screening.signature import inputs, port_inputs, reduced, sensed
-from kbs_process.diagnosis.screening.suspects import Candidate, candidates
+from kbs_process.diagnosis.screening.suspects import Candidate, candidates, half_lengths, point_of
 from kbs_process.diagnosis.screening.transfer import follow, respond
 from kbs_process.plant.attach import attach
 from kbs_process.plant.effect import Effect
@@ -26,6 +24,8 @@ from kbs_process.rig.model import Rig
 from kbs_process.signals.records import Array
 from kbs_process.stages.align.resample import resample
 
+pytestmark = pytest.mark.slow
+
 CHANNELS = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz", "az", "el")
 NOMINAL = tuple(effect.name for effect in CATALOGUE[:6])
 RATE, DT = 100.0, 0.05
@@ -34,7 +34,7 @@ TONES = {"floor_frequency": (2.3,), "mains_frequency": (0.7, 1.1), "jitter_frequ
 
 @cache
 def rig() -> Rig:
-    return load_campaign(Path(__file__).parents[2] / "campaigns" / "EL089", recordings=False).rig
+    return archived.rig()
 
 
 @cache

@@ -19,6 +19,8 @@ from kbs_process.diagnosis.screening.screen import Bench, Catalogued, screen
 from kbs_process.diagnosis.selection.leaders import reread
 from kbs_process.diagnosis.selection.race import own_of
 
+pytestmark = pytest.mark.slow
+
 
 def test_a_step_told_at_the_wrong_load_is_found_where_it_is() -> None:
     made = bench.experiment(bench.rig(), ("fit", "fit", "held-out"), 8)

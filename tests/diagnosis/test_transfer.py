@@ -11,10 +11,9 @@ import pytest
 
 from kbs_process.diagnosis.experiments.hypothesis import Hypothesis, predict
 from kbs_process.diagnosis.screening.inlets import Inlet
-from kbs_process.diagnosis.screening.places import points_of
 from kbs_process.diagnosis.screening.scene import Scene, rebinned
 from kbs_process.diagnosis.screening.signature import inputs
-from kbs_process.diagnosis.screening.suspects import Candidate
+from kbs_process.diagnosis.screening.suspects import Candidate, points_of
 from kbs_process.diagnosis.screening.transfer import amplified, respond
 from kbs_process.plant.attach import attach
 from kbs_process.plant.effect import SIGNALS, Effect, Port
@@ -22,6 +21,8 @@ from kbs_process.plant.laws import CATALOGUE, select
 from kbs_process.plant.linear.linearise import drive_damping
 from kbs_process.rig.model import Amplifier, Drive, Quantity, Rig, substitute
 from kbs_process.signals.records import WRENCH_CHANNELS, Array
+
+pytestmark = pytest.mark.slow
 
 NOISE = np.array([0.02] * 3 + [0.002] * 3 + [1.1e-4] * 2)  # of EL089's sensors
 # Effect, site, shape, the amplitude that is tried and its size: some ten times what a floor shows; bound of the error.

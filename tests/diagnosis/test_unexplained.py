@@ -8,13 +8,15 @@ import bench
 import numpy as np
 import pytest
 
+import archived
 from kbs_process.campaign.config import Requirement
-from kbs_process.campaign.load import load_campaign
 from kbs_process.diagnosis.experiments.experiment import Experiment
 from kbs_process.diagnosis.nominal.joint import Standing
 from kbs_process.identification.output_error import Scalar
 from kbs_process.signals.records import Array
 from kbs_process.studies.diagnose.unexplained import unexplained
+
+pytestmark = pytest.mark.slow
 
 SECONDS = 120.0
 FREE = (Scalar("joint.el.drive.b_m", ()),)
@@ -47,7 +49,7 @@ def wave(f: float, amplitude: float, channel: int, made: Experiment) -> Array:
 
 
 def test_a_wave_in_the_band_counts_by_its_peak_and_its_rms(made: Experiment) -> None:
-    campaign = load_campaign(bench.CAMPAIGN, recordings=False)
+    campaign = archived.campaign("EL089", recordings=False)
     both = [PEAK, replace(PEAK, name="rms at T", statistic="rms")]
     campaign = replace(campaign, requirements=tuple(both))
     nothing = left_behind(made, *[wave(0.2, 0.0, 4, made)] * 2)
@@ -60,7 +62,7 @@ def test_a_wave_in_the_band_counts_by_its_peak_and_its_rms(made: Experiment) -> 
 
 
 def test_the_worst_recording_counts_and_what_is_out_of_the_band_does_not(made: Experiment) -> None:
-    campaign = replace(load_campaign(bench.CAMPAIGN, recordings=False), requirements=(PEAK,))
+    campaign = replace(archived.campaign("EL089", recordings=False), requirements=(PEAK,))
     nothing = left_behind(made, *[wave(0.2, 0.0, 4, made)] * 2)
     (one,) = unexplained(campaign, nothing, left_behind(made, *[wave(6.0, 0.02, 4, made)] * 2))
     assert one.corrected < 1e-4
@@ -70,7 +72,7 @@ def test_the_worst_recording_counts_and_what_is_out_of_the_band_does_not(made: E
 
 
 def test_calibrations_and_what_was_not_recorded_are_judged_by_none(made: Experiment) -> None:
-    campaign = load_campaign(bench.CAMPAIGN, recordings=False)
+    campaign = archived.campaign("EL089", recordings=False)
     strange = replace(PEAK, name="forces of a joint", frame="nowhere")
     campaign = replace(campaign, requirements=(strange, PEAK))
     nothing = left_behind(made, *[wave(0.2, 0.0, 4, made)] * 2)
@@ -83,7 +85,7 @@ def test_calibrations_and_what_was_not_recorded_are_judged_by_none(made: Experim
 
 
 def test_a_force_is_a_torque_at_the_spacecraft(made: Experiment) -> None:
-    campaign = load_campaign(bench.CAMPAIGN, recordings=False)
+    campaign = archived.campaign("EL089", recordings=False)
     spacecraft = campaign.rig.spacecraft
     assert spacecraft is not None
     campaign = replace(campaign, requirements=(PEAK, replace(PEAK, frame="S")))

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from kbs_process.diagnosis.nominal import search as module
-from kbs_process.diagnosis.nominal.costs import Found
-from kbs_process.diagnosis.nominal.ground import Ground
+from kbs_process.diagnosis.nominal.costs import Found, Ground
 from kbs_process.diagnosis.nominal.search import Search
 from kbs_process.estimation.fit import Parameters
 from kbs_process.identification.polar import Polar

@@ -16,6 +16,8 @@ from kbs_process.diagnosis.experiments.thresholds import LEAST_RHO
 from kbs_process.diagnosis.nominal.joint import Own, Standing
 from kbs_process.diagnosis.nominal.known import Known
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def made() -> Experiment:

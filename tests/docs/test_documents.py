@@ -120,6 +120,7 @@ def test_every_dependency_is_justified_and_nothing_else() -> None:
     assert all(row[-1] for row in rows)
 
 
+@pytest.mark.slow
 def test_every_dependency_is_used() -> None:
     runtime, test = dependencies()
     # A package without a wheel for this machine is not installed here; its marker says so.

@@ -18,6 +18,8 @@ from kbs_process.signals.records import WRENCH_CHANNELS, WRENCH_UNITS, Signal
 from kbs_process.stages import bandpass
 from kbs_process.stages.bandpass import Band
 
+pytestmark = pytest.mark.slow
+
 # Four of those with an antenna and without a cord, for time.
 NAMES = ("EL089", "AZPS_ATA", "AESTPP00", "ACQ600")
 INFORMED = 1.5  # prior sigma over sigma, from which the recordings have a say

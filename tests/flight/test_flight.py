@@ -15,6 +15,8 @@ from kbs_process.results.parallel import ordered_map
 from kbs_process.rig.model import substitute
 from kbs_process.studies.flight.unit import Job, Judged, fly, in_orbit
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parents[2]
 SLEW = "t,az,el\n" + "\n".join(
     f"{t:.1f},0.0,{1.2 + 0.1 * (1 - np.cos(np.pi * min(t, 30.0) / 30.0)):.9f}" for t in np.arange(0.0, 130.0, 0.1)

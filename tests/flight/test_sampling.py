@@ -14,6 +14,8 @@ from kbs_process.rig.model import substitute
 from kbs_process.studies.flight.propagation import by_chance, importance, probability, upper_bound
 from kbs_process.studies.flight.unit import in_orbit
 
+pytestmark = pytest.mark.slow
+
 EL089 = Path(__file__).parents[2] / "campaigns" / "EL089"
 
 

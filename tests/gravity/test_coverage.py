@@ -21,6 +21,7 @@ def scores():
     return found
 
 
+@pytest.mark.validation
 def test_fitted_parameters_lie_within_their_sigmas_as_often_as_they_should(scores):
     z, gain = (np.concatenate([getattr(one, key) for one in scores]) for key in ("z", "gain"))
     informed = z[gain > INFORMED]
@@ -31,6 +32,7 @@ def test_fitted_parameters_lie_within_their_sigmas_as_often_as_they_should(score
     assert np.mean(np.abs(informed) < 2.0) > 0.83
 
 
+@pytest.mark.validation
 def test_torques_of_a_held_out_recording_are_as_wrong_in_the_band_as_stated(scores):
     wrong, stated = (
         np.sqrt(np.mean([getattr(one, key)[3:5] ** 2 for one in scores], axis=0)) for key in ("wrong", "stated")
@@ -46,6 +48,7 @@ def pink(rng, n, dt, knee):
     return np.fft.irfft(np.fft.rfft(rng.standard_normal(4 * n)) * shape, 4 * n)[:n]
 
 
+@pytest.mark.slow
 def test_one_over_f_noise_is_told_from_white():
     rng = np.random.default_rng(1)
     found = [fit_flicker(pink(rng, 1600, 0.25, 0.05), 0.25, 1.0) for _ in range(20)]
@@ -53,6 +56,7 @@ def test_one_over_f_noise_is_told_from_white():
     assert np.mean([noise.pink for noise in found]) == pytest.approx(0.05, rel=0.25)
 
 
+@pytest.mark.slow
 def test_scores_variance_of_a_slow_signal_in_one_over_f_noise_is_that_of_many_records():
     rng = np.random.default_rng(2)
     n, dt = 1600, 0.25

@@ -16,6 +16,8 @@ from kbs_process.stages.gravity.model import GravitySettings, Sample
 from kbs_process.stages.motion import MotionSettings
 from rigid.rigs import body, joint, quantity, smooth_motion
 
+pytestmark = pytest.mark.slow
+
 DT = 0.01
 TRUE = {"body.car.mass": 95.0, "joint.axis.viscous": 240.0}
 NOISE = 0.5

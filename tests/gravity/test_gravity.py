@@ -15,6 +15,8 @@ from kbs_process.stages.gravity import model as gravity
 from kbs_process.stages.gravity.quality import feasibility
 from rigid.rigs import pointing_rig, smooth_motion, wheel_rig
 
+pytestmark = pytest.mark.slow
+
 
 def calibration_angles(seconds=120.0):
     azimuth = staircase(seconds, np.linspace(-2.5, 2.5, 9))

@@ -16,6 +16,8 @@ from kbs_process.signals.smoothing import smooth
 from kbs_process.stages.motion import MotionSettings, estimate
 from rigid.rigs import pointing_rig, quantity
 
+pytestmark = pytest.mark.slow
+
 
 def slow_ramp(seconds=120.0, rate=2e-4):
     """A joint that crosses a code every two seconds: the worst case of an encoder."""

@@ -16,7 +16,10 @@ from kbs_process.signals.grid import crop
 from kbs_process.stages import motion
 from kbs_process.stages.gravity import model as gravity
 
-pytestmark = pytest.mark.skipif(not DATA.is_dir(), reason="real recordings (../shared/data) are not here")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not DATA.is_dir(), reason="real recordings (../shared/data) are not here"),
+]
 
 ROUNDING = {"Fx": 0.005, "Fy": 0.005, "Tx": 0.0005, "Ty": 0.0005}  # half a digit of the known figures
 EDGE_S = 1.0  # of the scoring filter, at either end

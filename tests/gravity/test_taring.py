@@ -14,6 +14,8 @@ from kbs_process.stages.gravity.quality import misfits
 from kbs_process.stages.gravity.taring import locate
 from rigid.rigs import pointing_rig
 
+pytestmark = pytest.mark.slow
+
 BIAS = np.array([3.0, -4.0, 6.0, 0.4, -0.6, 0.5])
 
 

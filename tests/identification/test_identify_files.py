@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from kbs_process.campaign.load import load_campaign
 from kbs_process.estimation.fit import Check, Fit
@@ -21,6 +22,8 @@ from kbs_process.studies.identify.files import PARAMETERS, write_identification
 from kbs_process.studies.identify.findings import Outcomes, Prediction
 from kbs_process.studies.identify.measured import measured
 from kbs_process.studies.identify.results import IdentifyResults
+
+pytestmark = pytest.mark.slow
 
 DUMMY1 = Path(__file__).parents[2] / "campaigns" / "DUMMY1"
 

@@ -5,11 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from kbs_process.results.records import Check, Conclusion, Provenance, encode
 from kbs_process.results.tables import write_table
 from kbs_process.studies.documents import render as build
 from kbs_process.studies.identify.results import Correlations, Followed, Identified, IdentifyResults, Interval, Misfit
+
+pytestmark = pytest.mark.slow
 
 
 def number(name: str, group: str, value: float, sigma: float) -> Identified:

@@ -10,6 +10,8 @@ import pytest
 from kbs_process.estimation.fit import Parameters
 from kbs_process.estimation.linearise import Unpredicted, draws, linearised
 
+pytestmark = pytest.mark.slow
+
 N, P = 60, 3
 PARAMETERS = Parameters(("a", "b", "c"), np.zeros(P), np.full(P, 5.0))
 

@@ -10,6 +10,8 @@ import pytest
 from kbs_process.estimation.fit import Parameters, difference_jacobian, fit_map
 from kbs_process.estimation.profile import profiles
 
+pytestmark = pytest.mark.slow
+
 T = np.linspace(0.0, 1.0, 200)
 
 

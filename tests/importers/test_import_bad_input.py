@@ -130,6 +130,7 @@ def test_unknown_preset_and_missing_source(tmp_path: Path) -> None:
 WRITERS = {"parquet": write_parquet, "h5": write_hdf5, "tdms": write_tdms, "mf4": write_mdf}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("suffix", "write"), WRITERS.items())
 def test_damaged_binary_files(tmp_path: Path, suffix: str, write: Writer) -> None:
     """Garbage and truncation end in an error, or in the samples that are left; never in a dead interpreter."""

@@ -17,6 +17,8 @@ from kbs_process.studies.convert import preset_names
 from kbs_process.studies.convert.mapping import find_mapping, load_mapping
 from kbs_process.studies.convert.run import import_recordings
 
+pytestmark = pytest.mark.slow
+
 DATA = Path(__file__).parents[3] / "shared" / "data"
 
 

@@ -81,6 +81,7 @@ def flips(data: bytes) -> Iterator[tuple[int, int]]:
         yield place, int(rng.integers(8))
 
 
+@pytest.mark.slow
 def test_a_flipped_bit_is_never_a_wrong_number(whole: Path, tmp_path: Path) -> None:
     data = whole.read_bytes()
     truth = rows(read(whole, WRENCH)[0]["w"])

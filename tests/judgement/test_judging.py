@@ -8,15 +8,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from campaign.campaign_folder import EXAMPLE
-from kbs_process.campaign.load import load_campaign
+import archived
 from kbs_process.reduction.analysis import Pair
 from kbs_process.reduction.judging import coverage_below, judged
+from kbs_process.results.judged import Budget, Requirement
 from kbs_process.signals.records import WRENCH_CHANNELS, WRENCH_UNITS, Signal
 from kbs_process.stages.bandpass import Band
-from kbs_process.studies.correlate import results
 
-CAMPAIGN = load_campaign(EXAMPLE, checksums=False)
 BAND = Band("lt1Hz", 0.01, 1.0)
 
 
@@ -28,20 +26,19 @@ def recorded(name: str, peak: float) -> SimpleNamespace:
     return SimpleNamespace(entry=SimpleNamespace(name=name), pairs={("S", "lt1Hz"): Pair(signal, None)})
 
 
-def stated(name: str, sigma: float) -> list[results.Budget]:
+def stated(name: str, sigma: float) -> list[Budget]:
     return [
-        results.Budget(
-            channel=channel, unit=unit, frame="S", band="lt1Hz", contributions=(), total=sigma, recording=name
-        )
+        Budget(channel=channel, unit=unit, frame="S", band="lt1Hz", contributions=(), total=sigma, recording=name)
         for channel, unit in zip(WRENCH_CHANNELS, WRENCH_UNITS, strict=True)
     ]
 
 
-def verdict(quiet: tuple[float, float], noisy: tuple[float, float]) -> results.Requirement:
+def verdict(quiet: tuple[float, float], noisy: tuple[float, float]) -> Requirement:
     """Judge two recordings, each with a peak and a sigma in N m, against 0.06 N m."""
-    requirement = replace(CAMPAIGN.requirements[0], limit=0.06)
+    campaign = archived.campaign("EL089")
+    requirement = replace(campaign.requirements[0], limit=0.06)
     runs = [recorded("quiet", quiet[0]), recorded("noisy", noisy[0])]
-    return judged(CAMPAIGN, requirement, runs, [*stated("quiet", quiet[1]), *stated("noisy", noisy[1])])
+    return judged(campaign, requirement, runs, [*stated("quiet", quiet[1]), *stated("noisy", noisy[1])])
 
 
 def test_a_lower_peak_that_is_less_well_known_decides() -> None:

@@ -15,7 +15,7 @@ import pytest
 from kbs_process.campaign.load import load_campaign
 from kbs_process.campaign.mission import Day, load_day
 from kbs_process.errors import ConfigError
-from mission.reference import DAY, FOLDER, MISSION
+from mission import reference
 
 ROOT = Path(__file__).parents[2]
 
@@ -26,7 +26,7 @@ def changed(tmp_path: Path) -> Callable[[str, str], Day]:
 
     def load(old: str, new: str) -> Day:
         folder = tmp_path / "REFDAY"
-        shutil.copytree(FOLDER, folder)
+        shutil.copytree(reference.FOLDER, folder)
         path = folder / "mission.toml"
         text = path.read_text()
         assert old in text
@@ -37,10 +37,10 @@ def changed(tmp_path: Path) -> Callable[[str, str], Day]:
 
 
 def test_units_are_converted() -> None:
-    assert np.degrees(MISSION.limits.low) == pytest.approx([-165.0, -30.0])
-    assert np.degrees(MISSION.limits.acceleration) == pytest.approx(0.015)
-    assert MISSION.orbit.ascending_node_time == pytest.approx(22 * 3600.0)
-    assert np.degrees(DAY.requirements[0].limit) == pytest.approx(0.054)
+    assert np.degrees(reference.mission().limits.low) == pytest.approx([-165.0, -30.0])
+    assert np.degrees(reference.mission().limits.acceleration) == pytest.approx(0.015)
+    assert reference.mission().orbit.ascending_node_time == pytest.approx(22 * 3600.0)
+    assert np.degrees(reference.day().requirements[0].limit) == pytest.approx(0.054)
 
 
 @pytest.mark.parametrize(
@@ -70,7 +70,7 @@ def test_a_campaign_without_a_mission_says_how_to_give_one() -> None:
 
 def test_a_campaign_without_recordings_is_for_its_mission_only() -> None:
     with pytest.raises(ConfigError, match="there is nothing to read"):
-        load_campaign(FOLDER)
+        load_campaign(reference.FOLDER)
 
 
 def keys(node: Any) -> Iterator[str]:

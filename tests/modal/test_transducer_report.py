@@ -11,6 +11,8 @@ import pytest
 if TYPE_CHECKING:
     from end_to_end.archive_run import Processed
 
+pytestmark = pytest.mark.slow
+
 Archived = Callable[[str], "Processed"]
 
 

@@ -13,6 +13,8 @@ from engine import TRAJECTORIES, Hardware, simulate
 from kbs_process.plant.schedule import Schedule
 from kbs_process.signals.records import Array
 
+pytestmark = pytest.mark.slow
+
 CAMPAIGN = Path(__file__).parents[2] / "campaigns" / "EL089"
 NOISE = np.array([0.02] * 3 + [0.002] * 3)  # rms a sample at 100 Hz
 CODE = 2.0 * np.pi / 2**14

@@ -19,6 +19,8 @@ from kbs_process.plant.laws import CATALOGUE, select
 from kbs_process.plant.schedule import Schedule
 from kbs_process.plant.structure import Structure
 
+pytestmark = pytest.mark.slow
+
 TWO = Structure((-1, 0), True, tuple(effect for effect in CATALOGUE if effect.port.of_drive))
 MODULES = [compiling.inspect.getmodule(effect.equation) for effect in TWO.effects]
 

@@ -17,6 +17,8 @@ from kbs_process.plant.predict import DEFAULT_STEP
 from kbs_process.plant.schedule import Schedule
 from kbs_process.signals.records import Array
 
+pytestmark = pytest.mark.slow
+
 NOISE = np.array([0.02] * 3 + [0.002] * 3)  # rms a sample
 
 

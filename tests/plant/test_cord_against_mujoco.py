@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from plant_rigs import CODE, streams
 
 from engine import TRAJECTORIES, simulate
@@ -12,6 +13,8 @@ from kbs_process.plant.attach import attach
 from kbs_process.plant.laws.environment.bungee import BUNGEE
 from kbs_process.plant.schedule import Schedule
 from kbs_process.rig.model import substitute
+
+pytestmark = pytest.mark.slow
 
 UNTIL = 30.0
 NOISE = np.array([0.02] * 3 + [0.002] * 3)  # rms a sample at 100 Hz

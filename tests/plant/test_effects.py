@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from kbs_process.campaign.units import DIMENSIONS
 from kbs_process.errors import ConfigError
-from kbs_process.plant.effect import Effect, LogNormal, Parameter, Port, State
-from kbs_process.plant.laws import CATALOGUE, MEASURED, select
+from kbs_process.plant.effect import Effect, Law, LogNormal, Parameter, Port, State
+from kbs_process.plant.laws import CATALOGUE, MEASURED, SENSING, select
 from kbs_process.plant.laws.friction.stiction import limit as tooth_stiction
 from kbs_process.plant.laws.position.detent import torque as detent
 
@@ -61,6 +61,12 @@ def test_names_are_unique_and_ordered_as_summed() -> None:
     names = [effect.name for effect in (*CATALOGUE, *MEASURED)]
     assert len(set(names)) == len(names)
     assert [effect.name for effect in select(names[::-1])] == names
+
+
+@pytest.mark.parametrize("laws", [CATALOGUE, MEASURED, SENSING], ids=["effects", "measured", "sensing"])
+def test_no_two_laws_declare_the_same_order(laws: tuple[Law, ...]) -> None:
+    orders = [law.order for law in laws]
+    assert len(set(orders)) == len(orders)
 
 
 def test_unknown_effect_is_answered_with_the_closest() -> None:

@@ -17,6 +17,8 @@ from kbs_process.plant.schedule import Schedule
 from kbs_process.rig.model import Rig, substitute
 from kbs_process.signals.records import Array
 
+pytestmark = pytest.mark.slow
+
 SECONDS, CYCLE, LATE, SCALE = 8.0, 0.05, 5e-3, 2e-3
 START, REACH = np.array([0.4, -0.3]), np.array([0.12, 0.08])
 OMEGA = 2.0 * np.pi / 8.0  # from rest to rest

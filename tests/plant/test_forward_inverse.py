@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import energetics as lab
 import numpy as np
+import pytest
 from plant_rigs import NOMINAL, two_axis
 
 from kbs_process.plant.compiled.simulation import Simulation
 from kbs_process.plant.laws import select
 from kbs_process.plant.rigid import inverse_dynamics
 from kbs_process.plant.schedule import Schedule
+
+pytestmark = pytest.mark.slow
 
 
 def test_inverse_dynamics_of_a_step_give_its_wrench() -> None:

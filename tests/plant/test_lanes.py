@@ -17,6 +17,8 @@ from kbs_process.plant.schedule import Schedule
 from kbs_process.rig.model import Rig, substitute
 from kbs_process.signals.records import Array
 
+pytestmark = pytest.mark.slow
+
 SECONDS = 6.0
 RATES: dict[str, Any] = {"rate_Hz": 100.0, "angle_rate_Hz": 40.0, "duration_s": SECONDS}
 BEFORE = 0.73  # s, that commands begin before the recording

@@ -23,6 +23,8 @@ from kbs_process.plant.schedule import Schedule
 from kbs_process.rig.model import Rig, substitute
 from kbs_process.signals.records import Array
 
+pytestmark = pytest.mark.slow
+
 FREE = {"d0": 0.0, "d1": 0.0, "Ts0": 0.0, "b_m": 0.0, "fsv": 0.0, "tcog": 0.0}
 HARD = {"base_hardening_x": 1.0, "base_hardening_y": 0.7, "base_hardening_z": 2.0, "base_hardening_power": 3.0}
 LOOP = {"base_loop_x": 0.3, "base_loop_y": 0.2, "base_loop_z": 0.3, "base_slip_angle": 2e-5}

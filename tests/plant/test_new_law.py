@@ -51,7 +51,7 @@ from kbs_process.plant.attach import attach
 from kbs_process.plant.laws import CATALOGUE, find
 from kbs_process.plant.laws.document import catalogue
 from kbs_process.plant.schedule import Schedule
-from kbs_process.plant.taps import tap_columns
+from kbs_process.plant.compiled.taps import tap_columns
 
 law = find("fan")
 rig = one_axis()

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import energetics as lab
 import numpy as np
+import pytest
 from plant_rigs import NOMINAL, streams, three_axis
 
 from kbs_process.plant.compiled.simulation import Simulation
 from kbs_process.plant.laws import select
 from kbs_process.plant.predict import tap_columns
 from kbs_process.plant.schedule import Schedule
+
+pytestmark = pytest.mark.slow
 
 RATE = 500.0
 START, SPEED = np.array([0.3, 0.5, -0.4]), np.radians([2.0, -3.0, 4.0])

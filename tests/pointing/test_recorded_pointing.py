@@ -17,6 +17,8 @@ from kbs_process.reduction.pointing import recorded_pointing
 from kbs_process.signals.records import WRENCH_CHANNELS, Array, Block, Run
 from kbs_process.stages.align.condense import CondenseSettings, condense
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parents[2]
 DURATION, OFFSET, MISREAD = 120.0, 2e-4, 5e-4
 

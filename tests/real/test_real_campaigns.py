@@ -16,7 +16,10 @@ from kbs_process.reduction.reading import read_run
 from kbs_process.signals.records import WRENCH_CHANNELS
 from real.campaigns import EDGE_S, exchanged, processed, sampling_error
 
-pytestmark = pytest.mark.skipif(not DATA.is_dir(), reason="real recordings (../shared/data) are not here")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not DATA.is_dir(), reason="real recordings (../shared/data) are not here"),
+]
 
 TREADMILL = {  # known change of the moment's rms by the compensation, %: trained on one trial, tested on the other
     ("treadmill_fast", 1): (-83.4, -82.0),

@@ -20,14 +20,17 @@ from kbs_process.progress import SilentProgress
 from kbs_process.signals.records import Array
 from kbs_process.studies.convert.run import import_recordings
 from kbs_process.studies.diagnose.reading import experiment_of
-from kbs_process.studies.diagnose.simulators import Simulators
+from kbs_process.studies.diagnose.simulators import simulating
 from real.campaigns import sampling_error
 from real.test_real_efforts import EMPS, EMPS_S, ODRIVE
 
-pytestmark = pytest.mark.skipif(
-    not (DATA / "emps").is_dir() or not (DATA / "odrive_cogging").is_dir(),
-    reason="real recordings (../shared/data) are not here",
-)
+pytestmark = [
+    pytest.mark.validation,
+    pytest.mark.skipif(
+        not (DATA / "emps").is_dir() or not (DATA / "odrive_cogging").is_dir(),
+        reason="real recordings (../shared/data) are not here",
+    ),
+]
 BAND_HZ = 20.0  # in which a residual is scored
 
 
@@ -36,7 +39,7 @@ def diagnosed(preset: str, source: Path, folder: Path) -> Outcome:
     progress = SilentProgress()
     campaign = load_campaign(import_recordings(preset, source, folder))
     experiment = experiment_of(campaign, progress)
-    with Simulators(experiment) as simulate:
+    with simulating(experiment) as simulate:
         found = explain(experiment, simulate, progress.task)
         return diagnose(found.known, found.floor, simulate, found.after, found.near)
 

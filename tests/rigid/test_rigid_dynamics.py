@@ -11,6 +11,8 @@ from kbs_process.rig.model import TRANSDUCER, substitute
 from kbs_process.signals.frames import from_rotation_vector, from_tilt, from_xyz, rotate
 from rigid.rigs import pointing_rig, smooth_motion, wheel_rig
 
+pytestmark = pytest.mark.slow
+
 G = 9.80665
 
 

@@ -19,6 +19,8 @@ from kbs_process.studies.stability import loop as stability
 from kbs_process.studies.stability import onset
 from plant.plant_rigs import NOMINAL, two_axis
 
+pytestmark = pytest.mark.slow
+
 POSE = np.radians([0.0, 30.0])
 
 

@@ -13,6 +13,8 @@ from kbs_process.errors import ConfigError
 from kbs_process.progress import SilentProgress
 from kbs_process.studies.stability.run import Simulations, analyse_stability
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parents[2]
 
 

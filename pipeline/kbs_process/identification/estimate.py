@@ -18,22 +18,9 @@ from kbs_process.identification.objective import Objective, first_differences, l
 from kbs_process.identification.output_error import Experiment, Spectra, estimated_spectra, sensor_spectra, unexplained
 from kbs_process.identification.screening import Evaluate, contacts, match_resonances, starts
 from kbs_process.identification.search import Mode, follow
-from kbs_process.identification.unknowns import CRITICAL, frictions, gearbox, others, prior, with_factors
+from kbs_process.identification.unknowns import CRITICAL, others, prior, with_factors
 from kbs_process.rig.model import Rig
 from kbs_process.signals.records import Array
-
-__all__ = [
-    "Identification",
-    "Mode",
-    "Settings",
-    "frictions",
-    "gearbox",
-    "identify",
-    "intervals",
-    "others",
-    "prior",
-    "with_factors",
-]
 
 _ROUGH = 10.0  # what ends a search, over what ends a refinement
 _STEPS = 6  # with the same slopes

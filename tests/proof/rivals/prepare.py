@@ -16,7 +16,7 @@ from kbs_process.diagnosis.selection.explain import explain
 from kbs_process.progress import SilentProgress
 from kbs_process.signals.records import WRENCH_CHANNELS
 from kbs_process.studies.diagnose.reading import experiment_of
-from kbs_process.studies.diagnose.simulators import Simulators
+from kbs_process.studies.diagnose.simulators import simulating
 from proof.answer import Moved
 from proof.rivals.case import Array, Case, Recording
 
@@ -28,7 +28,7 @@ def prepare(folder: Path) -> Case:
     """Do for a campaign what the diagnosis does before it looks for physics."""
     begin = monotonic()
     experiment = experiment_of(load_campaign(folder, checksums=False), SilentProgress())
-    with Simulators(experiment) as simulate:
+    with simulating(experiment) as simulate:
         explained = explain(experiment, simulate, SilentProgress().task)
     found, predicted = explained.known, explained.known.shown
     signals = {drive: _signals(experiment, found.hypothesis, drive, seen.wrench) for drive, seen in predicted.items()}

@@ -7,11 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2
 
 from kbs_process.diagnosis.acceptance.gate import Gate
 from kbs_process.diagnosis.acceptance.outcome import Alternative, Curve, Find, Location
-from kbs_process.diagnosis.acceptance.rivals import rivalry
+from kbs_process.diagnosis.acceptance.rivals import distance
 from kbs_process.diagnosis.experiments.jumps import jump
 from kbs_process.diagnosis.experiments.thresholds import RIVALS, told_apart
 from kbs_process.diagnosis.facts import Estimate, Identity, Place
@@ -19,11 +18,10 @@ from kbs_process.diagnosis.nominal.joint import Own, Standing
 from kbs_process.diagnosis.nominal.known import Known
 from kbs_process.diagnosis.proposing.curves import CurveSuspect, along, basis
 from kbs_process.diagnosis.proposing.tryout import identity, in_plant, port_label
-from kbs_process.diagnosis.screening.places import POINT
 from kbs_process.diagnosis.screening.ranges import swept
 from kbs_process.diagnosis.screening.screen import Catalogued, Found, Screening, Suspect
 from kbs_process.diagnosis.screening.signature import per_unit
-from kbs_process.diagnosis.screening.suspects import Candidate, weighed
+from kbs_process.diagnosis.screening.suspects import POINT, Candidate, weighed
 from kbs_process.plant.effect import ACTION, ACTIONS, UNNAMED, Effect
 from kbs_process.plant.laws import CATALOGUE
 from kbs_process.plant.laws.position.measured_law import Measured
@@ -47,31 +45,22 @@ class Tried:
 
 
 def find_of(
-    tried: Sequence[Tried],
-    best: int,
-    chances: Array,
-    before: Standing,
-    place: Location | None,
-    refused: Sequence[Identity] = (),
+    tried: Sequence[Tried], chances: Array, before: Standing, place: Location | None, refused: Sequence[Identity] = ()
 ) -> Find:
-    """The find of the `best` of some laws that passed, each right with a chance; `before` stood without it.
+    """The find of the first of some laws that passed, each right with a chance; `before` stood without it.
 
     Those that were `refused` in the plant are none that it cannot be told from, whatever the linear plant says of them.
     """
-    taken = tried[best]
+    taken = tried[0]
     suspect, own = taken.found.suspect, identity(taken.found.suspect)
     equivalent = _equivalents(suspect, taken.standing.known.experiment.rig)
-    chance = float(chances[best]) / (1 + len(equivalent))
+    chance = float(chances[0]) / (1 + len(equivalent))
     alternatives = [replace(one, probability=chance) for one in equivalent]
     for index, other in enumerate(tried):
-        if index != best and not other.found.suspect.each_trial and not suspect.each_trial:
-            apart = rivalry(taken.standing.known, other.standing.known)
-            alternatives.append(
-                Alternative(
-                    identity(other.found.suspect), float(chances[index]), apart.rho_delta, apart.p_wrong,
-                    apart.rho_delta < told_apart(taken.found.score.rho_eff), True,
-                )
-            )  # fmt: skip
+        if index and not other.found.suspect.each_trial and not suspect.each_trial:
+            apart = distance(taken.standing.known, other.standing.known)
+            near = apart < told_apart(taken.found.score.rho_eff)
+            alternatives.append(Alternative(identity(other.found.suspect), float(chances[index]), apart, near, True))
     simulated = {one.found.suspect.family for one in tried}
     for found in taken.screening.candidates:
         if found.suspect.family in simulated or found.absorbed or len(alternatives) >= 5:
@@ -80,9 +69,7 @@ def find_of(
             continue  # what a clock does to first order is nothing to compare with what one does at its size
         # Along the linear plant the distance is what the best leaves of the other's lack of gain.
         rho = float(np.sqrt(max(taken.found.score.gain - found.score.gain, 0.0)))
-        alternatives.append(
-            Alternative(identity(found.suspect), 0.0, rho, float(chi2.sf(0.25 * rho**2, 1) / 2.0), rho < RIVALS, False)
-        )
+        alternatives.append(Alternative(identity(found.suspect), 0.0, rho, rho < RIVALS, False))
     if own.family != UNNAMED:
         chance, alternatives = _alike_likely(chance, alternatives)
     alternatives.sort(key=lambda other: (-other.probability, other.rho_delta))
@@ -97,7 +84,6 @@ def find_of(
         reference=_law(suspect).reference,
         estimates=_estimates(taken, before),
         probability=chance,
-        rho=taken.found.score.rho,
         rho_eff=taken.found.score.rho_eff,
         kappa=taken.found.score.kappa,
         gate=taken.gate,
@@ -129,18 +115,9 @@ def _equivalents(suspect: Suspect, rig: Rig) -> tuple[Alternative, ...]:
     if not weighed(rig, rig.joint(suspect.joint)):
         return ()
     law = "weight over joint angle"
-    return tuple(
-        Alternative(
-            Identity(Place(weight.port_word, suspect.joint), weight.family, law),
-            0.0,
-            0.0,
-            0.5,
-            indistinguishable=True,
-            refitted=False,
-        )
-        for weight in CATALOGUE
-        if weight.of_weight
-    )
+    weights = (one for one in CATALOGUE if one.of_weight)
+    same = (Identity(Place(weight.port_word, suspect.joint), weight.family, law) for weight in weights)
+    return tuple(Alternative(one, 0.0, 0.0, indistinguishable=True, refitted=False) for one in same)
 
 
 def _law(suspect: Suspect) -> Effect | Sensing:
@@ -277,7 +254,6 @@ def merged(finds: Sequence[Find]) -> tuple[Find, ...]:
             estimates=(*first.estimates, *find.estimates),
             parts=(*first.actions, find.estimates),
             gate=replace(first.gate, folds=folds, whiteness=white),
-            rho=float(np.hypot(first.rho, find.rho)),
             rho_eff=float(np.hypot(first.rho_eff, find.rho_eff)),
         )
     return tuple(merged)

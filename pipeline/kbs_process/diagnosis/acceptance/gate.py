@@ -275,14 +275,12 @@ def _left_out(before: Known, after: Known) -> tuple[Fold, ...]:
     parts = []
     for known in (before, after):
         J = {k: known.jacobian(k) for k in experiment.fit}
-        precision = np.where(np.isfinite(known.parameters.sigma), known.parameters.sigma, np.inf) ** -2.0
-        offset = np.where(precision > 0.0, known.parameters.value - known.value, 0.0)
-        parts.append({k: _without(known, J, precision, offset, k) for k in chosen})
+        parts.append({k: _without(known, J, k) for k in chosen})
     return tuple(_fold(after, k, parts[0][k], parts[1][k]) for k in chosen)
 
 
-def _without(known: Known, J: dict[int, Array], precision: Array, offset: Array, out: int) -> float:
-    others = [k for k in J if k != out]
-    rest = Background.of({k: known.residual[k] for k in others}, {k: J[k] for k in others}, precision, offset)
+def _without(known: Known, J: dict[int, Array], out: int) -> float:
+    others = {k: j for k, j in J.items() if k != out}
+    rest = Background.of({k: known.residual[k] for k in others}, others, known.precision, known.offset)
     left = known.residual[out] - J[out] @ (rest.scale * rest.shift)
     return float(left @ left)

@@ -23,7 +23,6 @@ class Alternative:
     identity: Identity
     probability: float
     rho_delta: float  # whitened distance from the law taken, the rival refitted
-    p_wrong: float
     indistinguishable: bool
     refitted: bool  # in the non-linear plant; else along the linear one
 
@@ -49,8 +48,7 @@ class Find:
     reference: str
     estimates: tuple[Estimate, ...]
     probability: float
-    rho: float  # whitened size, and
-    rho_eff: float  # behind the known parameters
+    rho_eff: float  # whitened size behind the known parameters
     kappa: float
     gate: Gate
     alternatives: tuple[Alternative, ...]  # most probable first

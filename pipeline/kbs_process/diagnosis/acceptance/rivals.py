@@ -3,31 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 from scipy.special import softmax
-from scipy.stats import norm
 
 from kbs_process.diagnosis.nominal.known import Known
 from kbs_process.signals.records import Array
 
 
-@dataclass(frozen=True, slots=True)
-class Rivalry:
-    """Two laws on the same recordings."""
+def distance(accepted: Known, rival: Known) -> float:
+    """Whitened distance of two refitted models' predictions over the fit trials, rho_delta.
 
-    rho_delta: float  # whitened distance of the predictions after the rival is refitted
-    p_wrong: float  # that the likelier is the wrong one, Q(rho_delta / 2)
-
-
-def rivalry(accepted: Known, rival: Known) -> Rivalry:
-    """Distance of two refitted models' predictions over the fit trials, less what the rival's numbers could still take.
-
+    It is less what the rival's numbers could still take. The likelier is the wrong one with Q(rho_delta / 2).
     Both residuals are of the same recordings in the same metric: they differ by the predictions.
     """
-    H = np.diag(_precision(rival))
+    H = np.diag(rival.precision)
     h = np.zeros(len(H))
     total = 0.0
     for k in rival.experiment.fit:
@@ -37,8 +28,7 @@ def rivalry(accepted: Known, rival: Known) -> Rivalry:
     size = 1.0 / np.sqrt(np.maximum(np.diag(H), 1e-300))
     factor = cho_factor(H * np.outer(size, size) + 1e-12 * np.eye(len(H)))
     taken = float((size * h) @ cho_solve(factor, size * h))
-    rho = float(np.sqrt(max(total - taken, 0.0)))
-    return Rivalry(rho, float(norm.sf(0.5 * rho)))
+    return float(np.sqrt(max(total - taken, 0.0)))
 
 
 def evidences(models: Sequence[Known], rows: int, fitted: Sequence[int] = ()) -> Array:
@@ -53,8 +43,3 @@ def evidences(models: Sequence[Known], rows: int, fitted: Sequence[int] = ()) ->
 def probabilities(models: Sequence[Known], rows: int, fitted: Sequence[int] = ()) -> Array:
     """(models,) that each is right, one of them being so."""
     return softmax(evidences(models, rows, fitted))
-
-
-def _precision(known: Known) -> Array:
-    spread = np.where(np.isfinite(known.parameters.sigma), known.parameters.sigma, np.inf)
-    return np.asarray(spread**-2.0, dtype=np.float64)

@@ -1,4 +1,4 @@
-"""What points of the search for the known parameters cost: -2 log likelihood, and that of the prior."""
+"""What points of the search for the known parameters cost, and the minimum between bounds as slopes at one have it."""
 
 from __future__ import annotations
 
@@ -12,14 +12,16 @@ from kbs_process.diagnosis.experiments.hypothesis import Hypothesis, Prediction,
 from kbs_process.diagnosis.experiments.metric import Metric
 from kbs_process.diagnosis.nominal.parameters import Slopes, known_parameters
 from kbs_process.diagnosis.side_by_side import side_by_side
+from kbs_process.estimation.bounded import bounded_minimum
 from kbs_process.estimation.fit import Parameters
-from kbs_process.identification.estimate import gearbox
 from kbs_process.identification.objective import DIFFERENCE
 from kbs_process.identification.output_error import Scalar
 from kbs_process.identification.polar import Polar
 from kbs_process.identification.screening import phases
-from kbs_process.signals.records import Array
+from kbs_process.identification.unknowns import gearbox
+from kbs_process.signals.records import Array, Mask
 
+_RIDGE = 1e-10  # of unit columns: numbers that nothing shows would leave the equations singular
 GROSS = 1.0  # of the noise: wrong phases alone have left 0.8
 # Which slopes are taken where the search stands: none, those of suspects alone, of drives too, all.
 OLD, OWN, GEARS, ALL = range(4)
@@ -160,6 +162,70 @@ class Costs:
     def clipped(self, theta: Array) -> Array:
         """The nearest numbers within bounds."""
         return self.parameters.clipped(theta)
+
+
+class Ground:
+    """Normal equations of data that count `weight` times, and of the prior, in the chart of cosines and sines.
+
+    With slopes J (rows, p) of each trial, whitened, and the chart's T (p, u) at the place, A = T' (w J'J + P) T, scaled
+    to a unit diagonal. They hold for other points, too, as far as slopes are the same there.
+    """
+
+    def __init__(self, costs: Costs, theta: Array, J: Mapping[int, Array], weight: float) -> None:
+        self.costs, self.theta, self.J, self.weight = costs, theta, J, weight
+        self.T = costs.polar.jacobian(np.eye(len(theta)), theta)[: len(theta)]
+        self.information = information(J)
+        A = self.T.T @ (weight * self.information + np.diag(costs.precision + costs.ridge)) @ self.T
+        self.scale = 1.0 / np.sqrt(np.maximum(np.diag(A), 1e-300))
+        self.A = A * np.outer(self.scale, self.scale)
+
+    def pull(self, theta: Array, predicted: Predictions) -> Array:
+        """(u,) minus half the slope of the cost at a point (p,), at which `predicted` holds."""
+        costs = self.costs
+        data = sum(j.T @ costs.residual(k, predicted) for k, j in self.J.items())
+        prior = costs.precision * (theta - costs.parameters.value)
+        return np.asarray(self.scale * (self.T.T @ (self.weight * data - prior)), dtype=np.float64)
+
+    def minimum(self, theta: Array, pull: Array, damping: float = 0.0) -> tuple[Array, float]:
+        """The point (p,) where the cost is least from `theta` on, which is pulled so, and what it promises.
+
+        `damping` is Levenberg's and Marquardt's: 0 for the step of Gauss and Newton.
+        """
+        costs = self.costs
+        low, high = costs.room(theta)
+        du = bounded_minimum(self.A + (_RIDGE + damping) * np.eye(len(pull)), pull, low / self.scale, high / self.scale)
+        point = costs.clipped(costs.polar.back(costs.polar.flat(theta) + self.scale * du))
+        return point, float(2.0 * pull @ du - du @ self.A @ du) / self.weight
+
+    def valleys(self, among: Mask, share: float, length: float) -> list[Array]:
+        """Points (p,), some standard deviations off along principal directions with an eigenvalue below `share`.
+
+        Of the numbers `among` (p,), while the others stay. Of one that nothing shows, no standard deviation is known.
+        """
+        costs = self.costs
+        here = costs.polar.flat(self.theta)
+        low, high = costs.room(self.theta)
+        points = list[Array]()
+        if not (among.any() and np.isfinite(self.A).all()):
+            return points
+        for value, direction in zip(*_principal(self.A[np.ix_(among, among)]), strict=True):
+            if _RIDGE < value < share:
+                du = np.zeros(len(here))
+                du[among] = self.scale[among] * direction * (length / np.sqrt(value))
+                points.append(costs.clipped(costs.polar.back(here + np.clip(du, low, high))))
+        return points
+
+
+def information(J: Mapping[int, Array]) -> Array:
+    """(p, p) of all trials' slopes together."""
+    return np.asarray(sum(j.T @ j for j in J.values()), dtype=np.float64)
+
+
+def _principal(A: Array) -> tuple[Array, Array]:
+    """Eigenvalues (u,) from the least on, and eigenvectors, one in each row, with their largest element positive."""
+    values, vectors = np.linalg.eigh(A)
+    largest = np.argmax(np.abs(vectors), axis=0)
+    return values, (vectors * np.sign(vectors[largest, np.arange(len(values))])).T
 
 
 def added(laws: Laws, free: Sequence[Scalar], values: Array, reference: int) -> Array | float:

@@ -16,11 +16,9 @@ from scipy.stats import chi2
 from kbs_process.diagnosis.experiments.experiment import Experiment
 from kbs_process.diagnosis.experiments.floor import Floor
 from kbs_process.diagnosis.experiments.hypothesis import Hypothesis, Prediction, Simulate
-from kbs_process.diagnosis.experiments.metric import Metric, metrics
-from kbs_process.diagnosis.experiments.softened import softened
+from kbs_process.diagnosis.experiments.metric import Metric, metrics, softened
 from kbs_process.diagnosis.facts import Moved
-from kbs_process.diagnosis.nominal.costs import ALL, GROSS, Found, Laws
-from kbs_process.diagnosis.nominal.ground import information
+from kbs_process.diagnosis.nominal.costs import ALL, GROSS, Found, Laws, information
 from kbs_process.diagnosis.nominal.parameters import Slopes, known_parameters, prior, within
 from kbs_process.diagnosis.nominal.search import EARLY, Search
 from kbs_process.estimation.fit import Check, Parameters
@@ -78,6 +76,16 @@ class Known:
         spread = self.parameters.sigma
         finite = np.isfinite(spread)
         return np.where(finite, (self.value - self.parameters.value) / np.where(finite, spread, 1.0), np.nan)
+
+    @property
+    def precision(self) -> Array:
+        """(p,) that of the priors; 0 for phases, which have none."""
+        return np.asarray(self.parameters.sigma**-2.0, dtype=np.float64)
+
+    @property
+    def offset(self) -> Array:
+        """(p,) how far the priors' means are from where numbers are; 0 for phases."""
+        return np.where(self.precision > 0.0, self.parameters.value - self.value, 0.0)
 
     @property
     def room(self) -> tuple[Array, Array]:

@@ -10,8 +10,7 @@ import numpy as np
 from kbs_process.diagnosis.experiments.experiment import Experiment
 from kbs_process.diagnosis.experiments.hypothesis import Hypothesis, Prediction, Simulate, Task, decoupling
 from kbs_process.estimation.fit import Parameters
-from kbs_process.identification import estimate as identification
-from kbs_process.identification import output_error
+from kbs_process.identification import output_error, unknowns
 from kbs_process.identification.output_error import Scalar
 from kbs_process.rig.model import Rig, substitute
 from kbs_process.signals.records import WRENCH_CHANNELS, Array, Mask
@@ -21,8 +20,8 @@ COUPLING = "transducer.cross_coupling"
 
 def known_parameters(rig: Rig, effects: Sequence[str]) -> tuple[Scalar, ...]:
     """Every number with an uncertainty: of drives, transducer, bodies, then the cross-coupling's rows that are read."""
-    gears = identification.gearbox(rig, effects) if any(joint.drive for joint in rig.joints) else ()
-    others = identification.others(rig, gears)
+    gears = unknowns.gearbox(rig, effects) if any(joint.drive for joint in rig.joints) else ()
+    others = unknowns.others(rig, gears)
     quantity = rig.transducer.cross_coupling
     rows = [WRENCH_CHANNELS.index(channel) for channel in rig.transducer.channels]
     coupling = [Scalar(COUPLING, (i, j)) for i in rows for j in range(6) if quantity.sigma[i, j] > 0.0]
@@ -37,7 +36,7 @@ def prior(rig: Rig, nominal: Rig, effects: Sequence[str], free: Sequence[Scalar]
     known = nominal.quantities()
     own = {name: quantity for name, quantity in rig.quantities().items() if name in known}
     mixed = substitute(rig, {name: known[name].value for name in own}, {name: known[name].sigma for name in own})
-    return identification.prior(output_error.Experiment(mixed, tuple(effects), tuple(free), (), 0.0))
+    return unknowns.prior(output_error.Experiment(mixed, tuple(effects), tuple(free), (), 0.0))
 
 
 def within(parameters: Parameters, reach: float, among: Mask | None = None) -> Parameters:

@@ -13,10 +13,10 @@ import numpy as np
 from kbs_process.diagnosis.experiments.experiment import Experiment
 from kbs_process.diagnosis.experiments.floor import Floor
 from kbs_process.diagnosis.experiments.hypothesis import Hypothesis, Simulate
-from kbs_process.identification import estimate as identification
 from kbs_process.identification import output_error
 from kbs_process.identification.output_error import Measured, Output, sensor_spectra
 from kbs_process.identification.screening import Task, match_resonances, phases, starts
+from kbs_process.identification.unknowns import gearbox
 from kbs_process.signals.records import Array, Mask
 
 LOWEST_HZ = 0.5
@@ -77,7 +77,7 @@ class _Stage:
 
     def search(self, hypothesis: Hypothesis) -> Hypothesis:
         experiment = self.experiment
-        gears = identification.gearbox(hypothesis.rig, hypothesis.effects)
+        gears = gearbox(hypothesis.rig, hypothesis.effects)
         own = self.prefixes if self.calibrations else (*self.prefixes, "transducer.")
         free = tuple(scalar for scalar in gears if scalar.name.startswith(own))
         coarse = output_error.Experiment(hypothesis.rig, hypothesis.effects, free, self.recordings, LOWEST_HZ)

@@ -12,8 +12,7 @@ from functools import partial
 
 import numpy as np
 
-from kbs_process.diagnosis.nominal.costs import ALL, GEARS, OLD, Found, Predictions
-from kbs_process.diagnosis.nominal.ground import Ground
+from kbs_process.diagnosis.nominal.costs import ALL, GEARS, OLD, Found, Ground, Predictions
 from kbs_process.diagnosis.nominal.leaps import leap, stride
 from kbs_process.diagnosis.nominal.tangents import Step, Tangents
 from kbs_process.diagnosis.side_by_side import side_by_side

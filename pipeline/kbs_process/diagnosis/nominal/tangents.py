@@ -1,6 +1,6 @@
 """Slopes of the search for the known parameters: differences of the plant, taken anew or updated by what steps gave.
 
-Updates are Broyden's (Math. Comp. 19:577, 1965); along valleys see `secants`.
+Updates are Broyden's (Math. Comp. 19:577, 1965); along valleys see `along_valleys`.
 """
 
 from __future__ import annotations
@@ -10,14 +10,27 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kbs_process.diagnosis.experiments.hypothesis import Prediction
-from kbs_process.diagnosis.nominal.costs import ALL, GEARS, OLD, OWN, Costs, Found, Gradients, Predictions
+from kbs_process.diagnosis.nominal.costs import (
+    ALL,
+    GEARS,
+    GROSS,
+    OLD,
+    OWN,
+    Costs,
+    Found,
+    Gradients,
+    Ground,
+    Predictions,
+)
 from kbs_process.diagnosis.nominal.parameters import Slopes, slopes
-from kbs_process.diagnosis.nominal.secants import along_valleys
 from kbs_process.identification.objective import MOST_DIFFERENCE, SEEN
 from kbs_process.signals.records import Array
 
 _SPAN = 1.0  # of a step
 _LEAST_DIFFERENCE = 2e-3  # prior sigmas
+_ALIKE = 1e-4  # of what recordings would tell of each number alone: a direction of which they tell less is a valley
+_LENGTH = 3.0  # standard deviations of a direction, that it is gone along
+_APART = 1e-3  # of the longest: directions that differ by less are one
 _MUCH = 0.5  # prior sigmas of a body's number, within which its slopes and others' stay what they are
 # Of the whitened residual's length: what a number moves by one sigma and is not looked at again.
 _NEGLIGIBLE = 1.0
@@ -136,3 +149,38 @@ def _widened(slope: Slopes, base: Prediction, missing: int) -> Slopes:
     """Slopes with room for `missing` more numbers."""
     more = (0, missing), (0, 0), (0, 0)
     return Slopes(base, np.pad(slope.columns, more), np.pad(slope.taken, more))
+
+
+def along_valleys(search: Tangents, theta: Array, gradients: Gradients) -> Gradients:
+    """`gradients` taken at theta (p,), so corrected that they give what the plant does along valleys.
+
+    Where numbers make up for each other (a stiffness, inertias, the coupling's gain), a step moves each by hundreds of
+    the differences that its column is taken over, and what the columns say of it nearly cancels: the rest is their
+    errors, as friction sticks or slips by a hair. So the plant is asked again, over a step that is as long as the
+    valley is.
+
+    The least correction that does, lengths in prior sigmas: Broyden's, of several steps at once. What laws add is exact
+    and stays. Source: R. B. Schnabel, Quasi-Newton methods using multiple secant equations (1983).
+    """
+    bases = {drive: slope.base for drive, slope in gradients.items()}
+    trials = [k for k in search.experiment.fit if search.experiment.trials[k].drive in bases]
+    data = sum(float(z @ z) for z in (search.residual(k, bases) for k in trials))
+    rows = sum(search.metric[k].rows for k in trials)
+    # Where much is left, standard deviations are as wide, and the plant is not linear over them.
+    if not data <= (1.0 + GROSS) * rows:
+        return gradients
+    weight = 1.0 / max(1.0, data / rows)
+    ground = Ground(search, theta, search.jacobians(gradients), weight)
+    points = ground.valleys(search.stated, _ALIKE, _LENGTH)
+    gone = list(zip(points, search.predict(points, search.references), strict=True))
+    gone = [(p, there) for p, there in gone if all(np.isfinite(one.values).all() for one in there.values())]
+    if not gone:
+        return gradients
+    steps = np.array([point - theta for point, _ in gone])
+    back = np.linalg.pinv(steps / search.spread, rcond=_APART) / search.spread[:, None]
+    new = {}
+    for drive, slope in gradients.items():
+        seen = np.array([there[drive].values for _, there in gone]) - slope.base.values
+        missed = seen - np.tensordot(steps, slope.columns, axes=1)
+        new[drive] = replace(slope, columns=slope.columns + np.tensordot(back, missed, axes=1))
+    return new

@@ -16,7 +16,7 @@ from scipy.optimize import minimize_scalar
 
 from kbs_process.diagnosis.experiments.stamps import SIZES, late_by, set_right
 from kbs_process.diagnosis.nominal.known import Known
-from kbs_process.diagnosis.screening.screen import Bench, Catalogued, Found, Suspect, evidence
+from kbs_process.diagnosis.screening.screen import Bench, Catalogued, Found, Suspect
 from kbs_process.diagnosis.screening.shapes import bends, moved
 from kbs_process.diagnosis.screening.signature import stamped
 from kbs_process.estimation.bounded import bounded_minimum
@@ -80,8 +80,7 @@ def timed(bench: Bench, found: Found, among: Sequence[Suspect]) -> Found:
     if not gain > found.score.gain:
         return found
     score = replace(found.score, gain=gain, amplitude=np.array([size]), rank=1)
-    more = evidence(score, bench.background.rows) - evidence(found.score, bench.background.rows)
-    return replace(found, suspect=replace(suspect, size=size), score=score, log_evidence=found.log_evidence + more)
+    return found.told_as(replace(suspect, size=size), score, bench.background.rows)
 
 
 def _latest(bench: Bench, suspect: Catalogued, about: float | None = None) -> tuple[Catalogued, float, float]:
@@ -129,9 +128,7 @@ def _greatest(units: Mapping[int, Array]) -> float:
 def height_of(bench: Bench, left: Mapping[int, Array]) -> float:
     """-2 log likelihood of residuals, all known numbers refitted to first order, beyond a constant."""
     background = bench.background
-    parameters = bench.known.parameters
-    prior = np.where(np.isfinite(parameters.sigma), parameters.sigma, np.inf) ** -2.0
-    pull = np.where(prior > 0.0, prior * (parameters.value - bench.known.value), 0.0)
+    pull = bench.known.precision * bench.known.offset
     for k, z in left.items():
         pull = pull + background.J[k].T @ z
     pull = background.scale * pull

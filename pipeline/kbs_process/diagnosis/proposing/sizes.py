@@ -16,7 +16,7 @@ from kbs_process.diagnosis.experiments.hypothesis import Hypothesis, Simulate
 from kbs_process.diagnosis.proposing.clocks import height_of
 from kbs_process.diagnosis.proposing.tryout import inserted
 from kbs_process.diagnosis.proposing.view import View
-from kbs_process.diagnosis.screening.screen import Bench, Catalogued, Found, Suspect, evidence
+from kbs_process.diagnosis.screening.screen import Bench, Catalogued, Found, Suspect
 from kbs_process.plant.effect import Effect, Port
 from kbs_process.signals.records import Array
 
@@ -70,8 +70,7 @@ def sized(bench: Bench, found: Found, among: Sequence[Suspect], simulate: Simula
         return found
     suspect, amplitude = tried[best]
     score = replace(found.score, gain=gain, amplitude=amplitude, rank=1)
-    more = evidence(score, bench.background.rows) - evidence(found.score, bench.background.rows)
-    return replace(found, suspect=suspect, score=score, log_evidence=found.log_evidence + more)
+    return found.told_as(suspect, score, bench.background.rows)
 
 
 def _heights(bench: Bench, models: list[Hypothesis], simulate: Simulate) -> list[float]:

@@ -13,11 +13,10 @@ from kbs_process.diagnosis.facts import Identity, Place
 from kbs_process.diagnosis.nominal.joint import Extra, Standing
 from kbs_process.diagnosis.proposing import measured
 from kbs_process.diagnosis.proposing.curves import CurveSuspect
-from kbs_process.diagnosis.screening.places import point_of
 from kbs_process.diagnosis.screening.scene import Scene
 from kbs_process.diagnosis.screening.screen import Bench, Catalogued, Found, Suspect
 from kbs_process.diagnosis.screening.shapes import Bend, along, bends
-from kbs_process.diagnosis.screening.suspects import Candidate
+from kbs_process.diagnosis.screening.suspects import Candidate, point_of
 from kbs_process.identification.output_error import Scalar
 from kbs_process.plant.attach import attach
 from kbs_process.plant.effect import UNNAMED, Effect

@@ -75,7 +75,6 @@ class PortTest:
     """Verdict on every port, best first, and where there is anything at all."""
 
     ports: tuple[PortVerdict, ...]
-    anything: Array  # (cells,) p-value of no input anywhere
     significant: NDArray[np.bool_]  # (cells,) after Benjamini and Yekutieli
     log_p: float  # of no input anywhere
 
@@ -124,7 +123,7 @@ def port_test(cells: Cells, ports: Sequence[PortModel], transfer_error: float = 
         for i, (port, p, left, share) in enumerate(verdicts)
     ]
     found.sort(key=lambda v: (not v.sufficient, v.inputs if v.sufficient else 0, v.left))
-    return PortTest(tuple(found), none, benjamini_yekutieli(none, CELL_ALPHA), fisher(none))
+    return PortTest(tuple(found), benjamini_yekutieli(none, CELL_ALPHA), fisher(none))
 
 
 def _left_over(cells: Cells, port: PortModel | None, error: float) -> tuple[Array, float]:

@@ -8,7 +8,7 @@ linear. Recordings that are whitened alike share one pass.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Protocol
 
@@ -29,7 +29,6 @@ from kbs_process.diagnosis.screening.suspects import Candidate
 from kbs_process.diagnosis.screening.transfer import BATCH, respond
 from kbs_process.diagnosis.side_by_side import side_by_side
 from kbs_process.estimation.tails import log_tail
-from kbs_process.plant.sensing import Sensing, SensingPort
 from kbs_process.signals.records import WRENCH_CHANNELS, Array
 
 _RUNAWAY = 1e30  # of a unit amplitude's signature
@@ -85,7 +84,7 @@ class Catalogued:
         return PLACES if self.jumps else 1
 
     def inputs(self, drive: int) -> Sequence[Mapping[Inlet, Array]] | None:
-        if isinstance(self.candidate.effect, Sensing):
+        if not self.candidate.effect.in_plant:
             return None
         scene, hypothesis = self.scene, self.scene.hypothesis
         tapped, ways = scene.signals[drive], scene.courses[drive]
@@ -99,7 +98,7 @@ class Catalogued:
         experiment, rig = self.scene.experiment, self.scene.hypothesis.rig
         prediction = self.scene.predicted[drive].values
         law, tapped = self.candidate.effect, self.scene.signals[drive]
-        if isinstance(law, Sensing) and law.whole_band and tapped.readings is not None:
+        if law.whole_band and tapped.readings is not None:
             return reduced(self.candidate, tapped, experiment.channels, rig, experiment.dt, len(prediction))
         if self.size:
             late = self.size * self.late(drive)[:, 0]
@@ -113,11 +112,11 @@ class Catalogued:
     @property
     def jumps(self) -> bool:
         """Whether it is the jump of a clock, at a time that each trajectory has."""
-        return isinstance(self.candidate.effect, Sensing) and self.candidate.effect.jumps
+        return self.candidate.effect.jumps
 
     @property
     def of_clock(self) -> bool:
-        return self.candidate.port is SensingPort.STREAM
+        return self.candidate.port.site == "stream"
 
     @property
     def of_every_clock(self) -> bool:
@@ -166,13 +165,17 @@ class Found:
     def significant(self) -> bool:
         return bool(self.log_p < np.log(FALSE_ALARM) and self.score.rho_eff > LEAST_RHO)
 
+    def told_as(self, suspect: Suspect, score: Score, rows: int) -> Found:
+        """The same as another suspect of its family, which does what `score` says."""
+        more = evidence(score, rows) - evidence(self.score, rows)
+        return replace(self, suspect=suspect, score=score, log_evidence=self.log_evidence + more)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Screening:
     """Suspects at their best shapes, most probable first."""
 
     candidates: tuple[Found, ...]
-    looked_at: int  # points of all grids
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -188,10 +191,9 @@ class Bench:
     def of(cls, known: Known, scene: Scene, trials: Sequence[int] | None = None) -> Bench:
         """Over `trials`, else all that may be fitted."""
         members = tuple(known.experiment.fit if trials is None else trials)
-        precision = np.where(np.isfinite(known.parameters.sigma), known.parameters.sigma, np.inf) ** -2.0
         J = dict(zip(members, side_by_side(known.jacobian, members), strict=True))
-        offset = np.where(precision > 0.0, known.parameters.value - known.value, 0.0)
-        background = Background.of({k: known.residual[k] for k in members}, J, precision, offset, known.room)
+        residual = {k: known.residual[k] for k in members}
+        background = Background.of(residual, J, known.precision, known.offset, known.room)
         groups: dict[tuple[object, ...], list[int]] = {}
         for k in members:
             trial = known.experiment.trials[k]
@@ -270,7 +272,7 @@ def screen(bench: Bench, suspects: Sequence[Suspect]) -> Screening:
         log_p = min(0.0, lowest + np.log(looked_at) + places)
         candidates.append(Found(best[0], best[1], mean - places, log_p, len(grid), best[2]))
     candidates.sort(key=lambda candidate: -candidate.log_evidence)
-    return Screening(tuple(candidates), looked_at)
+    return Screening(tuple(candidates))
 
 
 def _scored(bench: Bench, batch: Sequence[Suspect]) -> list[_Scored]:

@@ -9,10 +9,9 @@ import numpy as np
 from scipy.optimize import minimize
 
 from kbs_process.diagnosis.screening.gls import Score, Sums, per_trial, score
-from kbs_process.diagnosis.screening.places import half_lengths
 from kbs_process.diagnosis.screening.ranges import SPECTRUM, WHILE_RECORDED, is_place, swept
-from kbs_process.diagnosis.screening.screen import Bench, Catalogued, Found, evidence
-from kbs_process.diagnosis.screening.suspects import Candidate
+from kbs_process.diagnosis.screening.screen import Bench, Catalogued, Found
+from kbs_process.diagnosis.screening.suspects import Candidate, half_lengths
 from kbs_process.identification.output_error import Scalar
 from kbs_process.plant.effect import LogNormal, Parameter, Uniform
 from kbs_process.rig.model import Rig
@@ -158,8 +157,7 @@ def uncovered(bench: Bench, found: Found, grid: Sequence[Catalogued]) -> Found:
     starts = sorted(scored, key=lambda end: -_whole(*end))[:_STARTS]
     best, own = max((_descended(bench, start, _whole) for start, _ in starts), key=lambda end: _whole(*end))
     all_of_it = replace(own, gain=own.whole_gain, rank=own.whole_rank, amplitude=own.whole)
-    more = evidence(all_of_it, bench.background.rows) - evidence(found.score, bench.background.rows)
-    return replace(found, suspect=best, score=all_of_it, log_evidence=found.log_evidence + more, absorbed_by=())
+    return replace(found.told_as(best, all_of_it, bench.background.rows), absorbed_by=())
 
 
 def _everywhere(suspect: Catalogued) -> list[Catalogued]:

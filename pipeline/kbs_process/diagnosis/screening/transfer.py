@@ -61,7 +61,7 @@ class Path:
 
 
 def follow(rig: Rig, effects: Sequence[Effect], taps: Mapping[str, Array], rate: float) -> Path:
-    """Linearise along `taps` (n,) of each SIGNAL.JOINT (`plant.taps.tap_columns`), sampled at `rate` Hz.
+    """Linearise along `taps` (n,) of each SIGNAL.JOINT (`plant.compiled.taps.tap_columns`), sampled at `rate` Hz.
 
     Validity: small inputs. A rotor that sticks moves here; a controller that reads the encoders does not react, which
     is how a plant behaves that is driven by its recorded field.

@@ -9,10 +9,9 @@ import numpy as np
 from scipy.special import softmax
 
 from kbs_process.diagnosis.acceptance.finding import Tried, find_of
-from kbs_process.diagnosis.acceptance.moments import only_while
 from kbs_process.diagnosis.acceptance.needed import Accepted
 from kbs_process.diagnosis.acceptance.outcome import Location
-from kbs_process.diagnosis.acceptance.remains import too_little
+from kbs_process.diagnosis.acceptance.remains import only_while, too_little
 from kbs_process.diagnosis.acceptance.rivals import evidences
 from kbs_process.diagnosis.acceptance.supposed import Noted
 from kbs_process.diagnosis.acceptance.verdict import gated
@@ -77,7 +76,7 @@ def believed(
         others = [k for k in order[number + 1 :] if _law(passed[k]) != _law(told)]
         chance = chances[others] / max(float(chances[order[number:]].sum()), np.finfo(np.float64).tiny)
         find = find_of(
-            [told, *(passed[k] for k in others)], 0, np.array([1.0 - float(chance.sum()), *chance]), standing,
+            [told, *(passed[k] for k in others)], np.array([1.0 - float(chance.sum()), *chance]), standing,
             place, noted.identities,
         )  # fmt: skip
         return Accepted(told, find, standing)

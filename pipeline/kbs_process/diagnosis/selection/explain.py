@@ -53,8 +53,8 @@ def explain(experiment: Experiment, simulate: Simulate, task: Task) -> Explained
     """Floor, refit of the known parameters, detection of what they leave."""
     nominal = Hypothesis(experiment.rig, experiment.effects)
     with task("Repeatability floor"):
-        begun = _predicted(experiment, nominal, simulate)
-        floor = _floor(experiment, begun)
+        begun = predicted_by(experiment, nominal, simulate)
+        floor = floor_of(experiment, begun)
     with task("Phases of cogging, friction and tooth contact"):
         start = phasing.begin(experiment, nominal, floor, simulate)
     slopes, leaps = None, 1
@@ -63,7 +63,7 @@ def explain(experiment: Experiment, simulate: Simulate, task: Task) -> Explained
             rough = refit(experiment, start, floor, simulate, reach=NEAR, leaps=1)
             rough = _moved_on(_stood(rough, floor), floor, simulate, LEAPS // 2).known
             start, slopes, leaps = rough.hypothesis, rough.slopes, 0
-            floor = smaller(floor, _floor(experiment, _predicted(experiment, start, simulate)))
+            floor = smaller(floor, floor_of(experiment, predicted_by(experiment, start, simulate)))
     with task("Refitting the known parameters, near what is known of them"):
         held = refit(experiment, start, floor, simulate, reach=NEAR, slopes=slopes, leaps=leaps)
         stood = _moved_on(_stood(held, floor), floor, simulate, LEAPS)
@@ -101,7 +101,7 @@ def explain(experiment: Experiment, simulate: Simulate, task: Task) -> Explained
     beside: Known | None = None
     if near is None and stood.after.left and stood.known.gross and searched(experiment):
         with task("Refitting the known parameters beside a clock that may be wrong"):
-            beside = by_another_clock(stood.known, floor, simulate, NEAR)
+            beside = by_another_clock(stood.known, floor, simulate)
         if beside is not None:
             near = replace(beside, chi2_before=_squares(beside, begun))
     known = replace(stood.known, chi2_before=_squares(stood.known, begun))
@@ -196,10 +196,12 @@ def _driven_alike(experiment: Experiment) -> bool:
     return all(len({experiment.trials[k].drive for k in members}) == 1 for members in experiment.repeats)
 
 
-def _predicted(experiment: Experiment, hypothesis: Hypothesis, simulate: Simulate) -> dict[int, Prediction]:
+def predicted_by(experiment: Experiment, hypothesis: Hypothesis, simulate: Simulate) -> dict[int, Prediction]:
+    """Predictions of all drives."""
     return dict(enumerate(simulate([(drive, hypothesis) for drive in range(len(experiment.drives))])))
 
 
-def _floor(experiment: Experiment, predicted: dict[int, Prediction]) -> Floor:
+def floor_of(experiment: Experiment, predicted: dict[int, Prediction]) -> Floor:
+    """The floor by what predictions leave."""
     left = {k: t.measured - predicted[t.drive].values for k, t in enumerate(experiment.trials)}
     return estimate(experiment, left)

@@ -16,7 +16,7 @@ from kbs_process.diagnosis.experiments.hypothesis import Hypothesis, Simulate
 from kbs_process.diagnosis.experiments.thresholds import CLOSE, MOST, TOLERATED
 from kbs_process.diagnosis.nominal import phasing
 from kbs_process.diagnosis.nominal.joint import Standing
-from kbs_process.diagnosis.nominal.known import Known, as_it_is, confined, refit
+from kbs_process.diagnosis.nominal.known import NEAR, Known, as_it_is, confined, refit
 from kbs_process.diagnosis.proposing.clocks import by_a_right_clock, height_of, timed
 from kbs_process.diagnosis.proposing.view import View
 from kbs_process.diagnosis.screening.screen import Catalogued, Found, Suspect
@@ -26,10 +26,10 @@ from kbs_process.diagnosis.side_by_side import side_by_side
 _TIMES = 3  # that recordings are stamped anew, each time by what the numbers of before leave
 
 
-def by_another_clock(known: Known, floor: Floor, simulate: Simulate, reach: float) -> Known | None:
+def by_another_clock(known: Known, floor: Floor, simulate: Simulate) -> Known | None:
     """Known numbers as they are beside the error of a clock that does most of what is to be done; None without one.
 
-    They go no farther than `reach` sigmas; what they leave is that of the recordings as they are.
+    They go no farther than `NEAR` sigmas; what they leave is that of the recordings as they are.
     """
     here, right = confined(known, simulate, CLOSE), None
     most = MOST * known.excess
@@ -39,7 +39,7 @@ def by_another_clock(known: Known, floor: Floor, simulate: Simulate, reach: floa
             break
         nominal = Hypothesis(experiment.rig, experiment.effects)
         start = phasing.begin(experiment, nominal, floor, simulate)
-        again = refit(experiment, start, floor, simulate, reach=reach, leaps=1)
+        again = refit(experiment, start, floor, simulate, reach=NEAR, leaps=1)
         if not again.excess < most:
             break
         most = again.excess

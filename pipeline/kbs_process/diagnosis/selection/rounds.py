@@ -200,7 +200,7 @@ def _pair(last: _Round, floor: Floor, simulate: Effort, accepted: Sequence[Accep
     for one in supposed(last.noted.fallen, last.standing.known):
         if not simulate.goes_on():
             break
-        told = find_of([one], 0, np.ones(1), last.standing, None)
+        told = find_of([one], np.ones(1), last.standing, None)
         there = one.standing if one.leapt else resettled(one.standing, floor, simulate, leaps=1)
         beside = [*accepted, Accepted(one, told, last.standing)]
         least = wanting(last.standing.known, there.known)

@@ -8,18 +8,18 @@ from pathlib import Path
 import numpy as np
 
 from kbs_process.campaign.config import Campaign
-from kbs_process.diagnosis.experiments import floor
 from kbs_process.diagnosis.experiments.experiment import Experiment
 from kbs_process.diagnosis.experiments.floor import Floor
 from kbs_process.diagnosis.experiments.hypothesis import Hypothesis
 from kbs_process.diagnosis.experiments.thresholds import DETECTED
 from kbs_process.diagnosis.nominal.detection import Detection, detect
+from kbs_process.diagnosis.selection.explain import floor_of, predicted_by
 from kbs_process.progress import Progress
 from kbs_process.results.diagnosed import FOLDER
 from kbs_process.results.store import revising
 from kbs_process.studies.diagnose.reading import experiment_of
 from kbs_process.studies.diagnose.run import diagnose
-from kbs_process.studies.diagnose.simulators import Simulators
+from kbs_process.studies.diagnose.simulators import simulating
 
 
 def diagnose_results(
@@ -57,10 +57,7 @@ def diagnose_results(
 
 def _detected(experiment: Experiment) -> tuple[Floor, Detection]:
     """The floor, and what the parameter files' numbers leave beyond it."""
-    drives = range(len(experiment.drives))
-    nominal = Hypothesis(experiment.rig, experiment.effects)
-    with Simulators(experiment) as simulate:
-        predicted = dict(zip(drives, simulate([(drive, nominal) for drive in drives]), strict=True))
-    left = {k: t.measured - predicted[t.drive].values for k, t in enumerate(experiment.trials)}
-    noise = floor.estimate(experiment, left)
+    with simulating(experiment) as simulate:
+        predicted = predicted_by(experiment, Hypothesis(experiment.rig, experiment.effects), simulate)
+    noise = floor_of(experiment, predicted)
     return noise, detect(experiment, noise, predicted, range(len(experiment.trials)))

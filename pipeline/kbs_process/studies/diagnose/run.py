@@ -13,7 +13,7 @@ from kbs_process.progress import Progress
 from kbs_process.results.outcome import Outcome
 from kbs_process.studies.diagnose.output import write_diagnosis
 from kbs_process.studies.diagnose.reading import experiment_of
-from kbs_process.studies.diagnose.simulators import Simulators
+from kbs_process.studies.diagnose.simulators import simulating
 
 
 def diagnose(
@@ -30,13 +30,13 @@ def diagnose(
     `verb` is that of the command that was given, none of processing: the results name the command.
     """
     experiment = experiment or experiment_of(campaign, progress)
-    with Simulators(experiment) as simulate:
+    with simulating(experiment) as simulate:
         explained = explain(experiment, simulate, progress.task)
         with progress.task("Suspects: what the known parameters leave"):
             outcome = rounds.diagnose(
                 explained.known, explained.floor, simulate, explained.after, explained.near, beside=explained.beside
             )
     with progress.task("Next test"):
-        proposal = propose(outcome.standing, outcome.finds, explained.floor, Simulators)
+        proposal = propose(outcome.standing, outcome.finds, explained.floor, simulating)
     with progress.task("Writing the report"):
         return write_diagnosis(campaign, explained.floor, outcome, target, pdf, proposal, verb)
