@@ -13,6 +13,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import pytest
+from hypothesis import settings
 
 if TYPE_CHECKING:
     from campaign.campaign_folder import CampaignFolder
@@ -25,6 +26,9 @@ FAST_S = 3.0  # a test that takes longer should be marked slow
 # collecting alone rewrites all assertions, for half a minute.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
+# What a step takes by the clock of a machine that others use, too, is no property of the code.
+settings.register_profile("shared machine", deadline=None)
+settings.load_profile("shared machine")
 
 
 @pytest.hookimpl(tryfirst=True)

@@ -16,9 +16,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from plant_rk4 import compiled_rk4
 from pytest_benchmark.fixture import BenchmarkFixture
 
+from benchmarks.plant_rk4 import compiled_rk4
 from engine import TRAJECTORIES, Hardware, simulate
 from kbs_process.campaign.load import load_campaign
 from kbs_process.plant.compiled.simulation import Simulation

@@ -20,7 +20,7 @@ from kbs_process.results.records import encode
 from kbs_process.studies.correlate.run import Outcome
 from kbs_process.studies.diagnose import diagnosing
 from report import sample
-from report.test_report_diagnosis import results
+from studies.diagnose.test_report_diagnosis import results
 
 NOISE = SimpleNamespace(source="declared", statement="what the data sheets say")
 LINK = 'href="diagnosis/index.html"'

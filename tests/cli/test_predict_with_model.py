@@ -15,8 +15,8 @@ from campaign.campaign_folder import make_folder
 from end_to_end.short_campaign import record
 from kbs_process import cli
 from kbs_process.campaign.config import SensingLaw
-from kbs_process.campaign.corrected_model import write_model
 from kbs_process.campaign.load import load_campaign
+from kbs_process.campaign.writing.corrected_model import write_model
 from kbs_process.diagnosis.experiments.hypothesis import Hypothesis
 from kbs_process.diagnosis.proposing.measured import inserted
 from kbs_process.plant.laws.position.measured_law import MEASURED

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from plant_rigs import NOMINAL, streams, two_axis
 
 from engine import TRAJECTORIES, Hardware, simulate
 from kbs_process.plant.schedule import Schedule
 from kbs_process.signals.records import Array
+from plant.plant_rigs import NOMINAL, streams, two_axis
 
 pytestmark = pytest.mark.slow
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from plant_rigs import CODE, streams
 
 from engine import TRAJECTORIES, simulate
 from engine.campaigns import ABOVE_ANTENNA, CAMPAIGNS
@@ -13,6 +12,7 @@ from kbs_process.plant.attach import attach
 from kbs_process.plant.laws.environment.bungee import BUNGEE
 from kbs_process.plant.schedule import Schedule
 from kbs_process.rig.model import substitute
+from plant.plant_rigs import CODE, streams
 
 pytestmark = pytest.mark.slow
 

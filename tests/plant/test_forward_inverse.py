@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import energetics as lab
 import numpy as np
 import pytest
-from plant_rigs import NOMINAL, two_axis
 
 from kbs_process.plant.compiled.simulation import Simulation
 from kbs_process.plant.laws import select
 from kbs_process.plant.rigid import inverse_dynamics
 from kbs_process.plant.schedule import Schedule
+from plant import energetics as lab
+from plant.plant_rigs import NOMINAL, two_axis
 
 pytestmark = pytest.mark.slow
 

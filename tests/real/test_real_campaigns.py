@@ -11,10 +11,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gravity.real_sets import DATA, hand_free, hub_axes, low_pass
 from kbs_process.reduction.reading import read_run
 from kbs_process.signals.records import WRENCH_CHANNELS
 from real.campaigns import EDGE_S, exchanged, processed, sampling_error
+from stages.gravity.real_sets import DATA, hand_free, hub_axes, low_pass
 
 pytestmark = [
     pytest.mark.slow,

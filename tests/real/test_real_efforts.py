@@ -11,9 +11,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from gravity.real_sets import DATA
 from real.campaigns import processed, sampling_error
 from real.effort_screen import Screen, suspects
+from stages.gravity.real_sets import DATA
 
 pytestmark = [
     pytest.mark.slow,

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from kbs_process.campaign.config import Campaign, SensingLaw
-from kbs_process.campaign.corrected_model import write_model
 from kbs_process.campaign.sensing_laws import belongs_to_model
+from kbs_process.campaign.writing.corrected_model import write_model
 from kbs_process.diagnosis.acceptance.outcome import Find, Outcome
 from kbs_process.diagnosis.experiments.hypothesis import Hypothesis
 from kbs_process.diagnosis.facts import Estimate

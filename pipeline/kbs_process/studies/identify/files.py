@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from kbs_process.campaign.config import Campaign
-from kbs_process.campaign.parameter_files import corrected, write_parameters
+from kbs_process.campaign.writing.parameter_files import corrected, write_parameters
 from kbs_process.estimation.whittle import periodogram
 from kbs_process.identification.output_error import Measured
 from kbs_process.report.build import publish
