@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import shutil
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -139,7 +139,7 @@ def test_the_discussion_says_what_the_numbers_say() -> None:
     spans = ((0.0, 1500.0, ("tracking DRS59",), 1e-3), (1500.0, 1650.0, ("hand-over DRS44",), 2e-2))
     bare = [
         {"name": entry.name, "start_s": start, "end_s": end, "ends_with": entry.until, "modes": modes,
-         "greatest_rate": rate, "published": PublishedSection(**asdict(entry.published), end_s=entry.near)}
+         "greatest_rate": rate, "published": PublishedSection(**entry.published.model_dump(), end_s=entry.near)}
         for entry, (start, end, modes, rate) in zip(load_day(campaign).sections, spans, strict=False)
         if entry.published is not None
     ]  # fmt: skip

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -62,7 +62,9 @@ def assess(campaign: Campaign, day: Day, planned: Plan, angle: Signal, wrench: S
                 azimuth=azimuth,
                 elevation=elevation,
                 torques=tuple(_greatest(band, signal, inside) for band, signal in torques.items()),
-                published=PublishedSection(**asdict(entry.published), end_s=entry.near) if entry.published else None,
+                published=PublishedSection(**entry.published.model_dump(), end_s=entry.near)
+                if entry.published
+                else None,
             )
         )
     joints = pointing.statistics(error, period, day.smoothing)
