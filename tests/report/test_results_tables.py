@@ -17,9 +17,9 @@ def test_a_table_is_a_data_frame_with_units(tmp_path: Path) -> None:
     units = {"t": "s", "Tx.measured": "N m"}
     write_table(path, columns, units, frame="T", history=("raw", "cut"), recording="run")
     table = read_table(path)
-    assert list(table) == ["t", "valid", "Tx.measured"]
-    for name, values in columns.items():
-        np.testing.assert_array_equal(table[name], values)
+    assert (table.index.name, *table) == ("t", "valid", "Tx.measured")
+    for name, values in table.reset_index().items():
+        np.testing.assert_array_equal(values, columns[str(name)])
     assert table.attrs == {"units": units, "frame": "T", "history": ["raw", "cut"], "recording": "run"}
 
 
