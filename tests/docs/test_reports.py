@@ -42,6 +42,7 @@ def test_the_script_makes_every_page() -> None:
     assert made == shown
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("folder", PAGES, ids=lambda folder: folder.name)
 def test_a_page_is_rendered_again_and_says_of_which_version_it_is(folder: Path, tmp_path: Path) -> None:
     shutil.copyfile(folder / FILE, tmp_path / FILE)  # without its tables: figures that need them are left out
@@ -52,6 +53,7 @@ def test_a_page_is_rendered_again_and_says_of_which_version_it_is(folder: Path, 
         assert text and f">{text}<" in again and f">{text}<" in archived
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("folder", "methods"), [("pooled", (OURS,)), ("pooled-rivals", METHODS)])
 def test_the_pooled_pages_are_those_of_the_stored_sets(folder: str, methods: tuple[str, ...]) -> None:
     stored = msgspec.json.decode((REPORTS / "proof" / folder / "rows.json").read_bytes(), type=tuple[Row, ...])

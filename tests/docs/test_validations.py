@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import pytest
+
 from proof.validations import BLOCK, MARKED, documents
 
 
+@pytest.mark.slow
 def test_the_documents_say_what_the_stored_sets_say() -> None:
     for path, text in documents().items():
         assert path.read_text(encoding="utf-8") == text, f"{path.name}: cd tests && python -m proof.validations"
