@@ -13,7 +13,6 @@ from kbs_process.diagnosis.experiments.experiment import Experiment
 from kbs_process.diagnosis.experiments.hypothesis import Hypothesis, predict
 from kbs_process.diagnosis.nominal.joint import Standing, with_extra
 from kbs_process.diagnosis.nominal.parameters import known_parameters, prior
-from kbs_process.diagnosis.proposing.families import port_word
 from kbs_process.diagnosis.proposing.tryout import extra_of, identity
 from kbs_process.diagnosis.proposing.view import View
 from kbs_process.diagnosis.screening.ranges import Ranges
@@ -57,7 +56,7 @@ def test_the_point_of_a_drag_is_found_beside_its_size_and_power() -> None:
     best = bettered(tried, screen(tried, [Catalogued(one, scene) for one in every]).candidates[0])
     own = identity(best.suspect)
     assert (own.place.port, own.place.site, own.family) == ("external wrench", "el", "air drag")
-    assert port_word(AIR_DRAG.name, AIR_DRAG.port) == "external wrench"
+    assert AIR_DRAG.port_word == "external wrench"
     after = with_extra(here, extra_of(best, here, tried, scene), bench.serial(made)).known
     found = {s.name.removeprefix("external.air_drag."): k for k, s in enumerate(after.free)}
     # A short swing tells size from distance by a few percent: the search ends where little more is to be gained.

@@ -18,8 +18,8 @@ from kbs_process.diagnosis.screening.screen import Bench, Catalogued, screen
 from kbs_process.diagnosis.screening.suspects import Candidate
 from kbs_process.identification.output_error import Scalar
 from kbs_process.plant.attach import attach
-from kbs_process.plant.laws.hysteresis.ground_cable import GROUND_CABLE
-from kbs_process.plant.laws.transducer.channel_step import CHANNEL_STEP
+from kbs_process.plant.laws.hysteresis.cable import GROUND_CABLE
+from kbs_process.plant.laws.transducer.step import CHANNEL_STEP
 
 SHAPE = (("cable_middle", 0.0), ("cable_reach", 0.05), ("cable_memory", 0.02))
 

@@ -27,10 +27,10 @@ from kbs_process.identification.output_error import Scalar
 from kbs_process.plant.attach import attach
 from kbs_process.plant.effect import Effect
 from kbs_process.plant.laws import select
-from kbs_process.plant.laws.hysteresis.harness import HARNESS
+from kbs_process.plant.laws.hysteresis.cable import HARNESS
+from kbs_process.plant.laws.position.bell import LOCAL_TORQUE
 from kbs_process.plant.laws.position.detent import DETENT
-from kbs_process.plant.laws.position.joint_order import JOINT_ORDER
-from kbs_process.plant.laws.position.local_torque import LOCAL_TORQUE
+from kbs_process.plant.laws.position.order import JOINT_ORDER
 
 FREE = (Scalar("body.antenna.cog", (0,)), Scalar("joint.el.drive.Ka"))
 TORQUE, ANGLE, WIDTH = 0.6, 1.27941, 1e-3  # N m, rad, rad: a fortieth of the swing

@@ -16,7 +16,7 @@ from kbs_process.diagnosis.proposing.tryout import extra_of
 from kbs_process.diagnosis.screening.scene import Scene
 from kbs_process.diagnosis.screening.screen import Bench, Catalogued, screen
 from kbs_process.diagnosis.screening.suspects import Candidate
-from kbs_process.plant.laws.position.local_torque import LOCAL_TORQUE
+from kbs_process.plant.laws.position.bell import LOCAL_TORQUE
 from kbs_process.signals.records import Array
 
 Changes = tuple[Array, ...]

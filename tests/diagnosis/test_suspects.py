@@ -11,7 +11,6 @@ import pytest
 
 from kbs_process.campaign.load import load_campaign
 from kbs_process.diagnosis.experiments.hypothesis import Tapped
-from kbs_process.diagnosis.proposing.families import FAMILIES, PORTS, family, port_word
 from kbs_process.diagnosis.screening.inlets import Inlet
 from kbs_process.diagnosis.screening.ranges import Ranges, ranges_of
 from kbs_process.diagnosis.screening.signature import inputs, port_inputs, reduced, sensed
@@ -20,7 +19,7 @@ from kbs_process.diagnosis.screening.transfer import follow, respond
 from kbs_process.plant.attach import attach
 from kbs_process.plant.effect import Effect
 from kbs_process.plant.laws import CATALOGUE, SENSING, select
-from kbs_process.plant.laws.position.joint_order import JOINT_ORDER
+from kbs_process.plant.laws.position.order import JOINT_ORDER
 from kbs_process.plant.predict import Schedule, predict, tap_columns
 from kbs_process.rig.model import Rig
 from kbs_process.signals.records import Array
@@ -300,12 +299,10 @@ def test_a_clock_that_wanders_with_any_period_is_near_one_that_is_tried() -> Non
 
 
 def test_every_law_has_a_family_and_a_port_in_words() -> None:
-    assert set(FAMILIES) == {e.name for e in CATALOGUE} - {"synchronous_motor", "flexspline"} | {
-        e.name for e in SENSING
-    }
+    assert {law.name for law in (*CATALOGUE, *SENSING) if not law.family} == {"synchronous_motor", "flexspline"}
     for suspect in suspects(temperature=True, field_recorded=False):
-        assert family(suspect.name) and suspect.port in PORTS
-    assert port_word("appendage", one("appendage", "el").port) == "appendage"
+        assert suspect.effect.family and suspect.port.word
+    assert one("appendage", "el").effect.port_word == "appendage"
 
 
 # name, amplitude, value, channels that show it, and how well: correlation of both, and their ratio

@@ -1,22 +1,26 @@
-"""The document of the catalogue names every law, at its port, and no other."""
+"""The page of the catalogue is what the laws declare, and names every law at its port."""
 
 from __future__ import annotations
 
 import re
 from pathlib import Path
 
-from kbs_process.plant.effect import Port
 from kbs_process.plant.laws import CATALOGUE, MEASURED, SENSING
-from kbs_process.plant.sensing import SensingPort
+from kbs_process.plant.laws.document import catalogue
 
 TEXT = (Path(__file__).parents[2] / "docs" / "catalogue.md").read_text(encoding="utf-8")
-WORDS: dict[Port | SensingPort, str] = {
-    **{port: port.name.lower().replace("_", " ") for port in (*Port, *SensingPort)},
-    Port.EXTERNAL_FORCE: "force on a link",
-}
+
+
+def test_the_page_is_written_from_the_laws() -> None:
+    assert catalogue() == TEXT, "python -m kbs_process.plant.laws > docs/catalogue.md"
 
 
 def test_every_law_is_listed_at_its_port() -> None:
-    rows = [line.split("|")[1:3] for line in TEXT.splitlines() if line.startswith("| `")]
-    listed = {name: port.strip() for names, port in rows for name in re.findall(r"`(\w+)`", names)}
-    assert listed == {law.name: WORDS[law.port] for law in (*CATALOGUE, *MEASURED, *SENSING)}
+    listed = dict(re.findall(r"^#### `(\w+)`\n\nAt: ([\w ]+)", TEXT, re.MULTILINE))
+    assert listed == {law.name: law.port.name.lower().replace("_", " ") for law in (*CATALOGUE, *MEASURED, *SENSING)}
+
+
+def test_every_parameter_has_a_row_with_its_unit() -> None:
+    rows = re.findall(r"^\| `(\w+)` \| ([^|]+) \|", TEXT, re.MULTILINE)
+    declared = [(entry.name, entry.unit) for law in (*CATALOGUE, *MEASURED, *SENSING) for entry in law.parameters]
+    assert sorted(rows) == sorted(declared)

@@ -36,7 +36,6 @@ MEMORY = Effect(
         Parameter("strength", "N m/rad", LogNormal(2.0, 0.1), "stiffness", (0.0, 100.0)),
         Parameter("decay", "1/s", LogNormal(5.0, 0.1), "inverse of the time it remembers", (0.0, 100.0)),
     ),
-    "test",
     states=(State("z", "N m", 0.0, "torque remembered"),),
 )
 

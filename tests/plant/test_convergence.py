@@ -11,8 +11,8 @@ from plant_rigs import CODE, NOMINAL, streams, two_axis
 from engine import TRAJECTORIES
 from kbs_process.plant.attach import attach
 from kbs_process.plant.effect import Effect
+from kbs_process.plant.laws.hysteresis.dahl import TRANSMISSION_HYSTERESIS
 from kbs_process.plant.laws.hysteresis.lugre import LUGRE
-from kbs_process.plant.laws.hysteresis.transmission_hysteresis import TRANSMISSION_HYSTERESIS
 from kbs_process.plant.predict import DEFAULT_STEP
 from kbs_process.plant.schedule import Schedule
 from kbs_process.signals.records import Array

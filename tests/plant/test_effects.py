@@ -13,7 +13,7 @@ from kbs_process.campaign.units import DIMENSIONS
 from kbs_process.errors import ConfigError
 from kbs_process.plant.effect import Effect, LogNormal, Parameter, Port, State
 from kbs_process.plant.laws import CATALOGUE, MEASURED, select
-from kbs_process.plant.laws.friction.tooth_stiction import limit as tooth_stiction
+from kbs_process.plant.laws.friction.stiction import limit as tooth_stiction
 from kbs_process.plant.laws.position.detent import torque as detent
 
 UNITS = {unit for units in DIMENSIONS.values() for unit in units}
@@ -102,7 +102,7 @@ Z = State("z", "N m", 0.0, "memory")
 )
 def test_wrong_wiring_is_an_error_at_import(equation, parameters, states, message) -> None:  # type: ignore[no-untyped-def]
     with pytest.raises(TypeError, match=message):
-        Effect("trial", Port.MOTOR_TORQUE, equation, parameters, "test", states=states)
+        Effect("trial", Port.MOTOR_TORQUE, equation, parameters, states=states)
 
 
 def test_tooth_stiction_over_a_travel_is_the_mean_of_that_at_instants() -> None:

@@ -10,7 +10,7 @@ from plant_rigs import NOMINAL, two_axis
 
 from kbs_process.plant.attach import attach
 from kbs_process.plant.laws import select
-from kbs_process.plant.laws.friction import tooth_stiction
+from kbs_process.plant.laws.friction import stiction as tooth_stiction
 from kbs_process.plant.laws.motor import cogging
 from kbs_process.plant.predict import predict, tap_columns
 from kbs_process.plant.schedule import Schedule

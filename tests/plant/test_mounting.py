@@ -15,7 +15,7 @@ from kbs_process.plant.compiled.simulation import Simulation
 from kbs_process.plant.effect import Effect, Normal, Parameter, Port, State
 from kbs_process.plant.laws import select
 from kbs_process.plant.laws.environment.base_hardening import BASE_HARDENING, moment
-from kbs_process.plant.laws.hysteresis.base_hysteresis import BASE_HYSTERESIS
+from kbs_process.plant.laws.hysteresis.bouc_wen import BASE_HYSTERESIS
 from kbs_process.plant.linear.linearise import linearise
 from kbs_process.plant.linear.mounted import mounted_sag
 from kbs_process.plant.predict import DEFAULT_STEP, SLIPPING_STEP
@@ -118,7 +118,6 @@ def test_slopes_of_the_mounting_are_those_of_the_plant() -> None:
         Port.BASE_TORQUE,
         holding,
         (Parameter("hold", "N m", Normal(0.0, 1.0), "of the test", (-1.0, 1.0), role="amplitude"),),
-        "test",
     )
     here, there = (
         simulation(attach(of, held, {"hold": push}), (BASE_HARDENING, held), standing([0.3, 0.2])).part("alpha")
@@ -181,7 +180,6 @@ def test_a_state_settles_within_a_step_or_never() -> None:
             Parameter("creep", "N m/rad", Normal(0.0, 1e3), "spring", (0.0, 1e6), role="amplitude"),
             Parameter("creep_time", "s", Normal(1.0, 1.0), "in which it yields", (1e-9, 1e9)),
         ),
-        "test",
         states=(State("strain", "rad", 0.0, "of the spring"),),
     )
 
@@ -225,7 +223,7 @@ def towing(vx: float, slack: float) -> tuple[float, float, float, float]:
 
 def test_a_state_that_a_port_cannot_integrate_is_an_error_at_import() -> None:
     with pytest.raises(TypeError, match="no states of its own"):
-        Effect("trial", Port.EXTERNAL_FORCE, towing, (), "test", states=(State("slack", "m", 0.0, ""),))
+        Effect("trial", Port.EXTERNAL_FORCE, towing, (), states=(State("slack", "m", 0.0, ""),))
 
 
 def test_the_mounting_stays_in_the_laboratory() -> None:

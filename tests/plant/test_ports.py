@@ -50,17 +50,15 @@ GROUND = Effect(
     Port.GROUND_TORQUE,
     twisting,
     (amplitude("hold", "N m"), amplitude("stiff", "N m/rad"), amplitude("damp", "N m s/rad")),
-    "test",
 )
-INSIDE = Effect("inside", Port.JOINT_TORQUE, pushing, (amplitude("push", "N m"),), "test")
+INSIDE = Effect("inside", Port.JOINT_TORQUE, pushing, (amplitude("push", "N m"),))
 PULL = Effect(
     "pull",
     Port.EXTERNAL_FORCE,
     pulling,
     (amplitude("pull", "N"), amplitude("spring", "N/m"), amplitude("drag", "N s/m")),
-    "test",
 )
-SHAKE = Effect("shake", Port.BASE_ACCELERATION, shaking, (amplitude("shake", "m/s^2"),), "test")
+SHAKE = Effect("shake", Port.BASE_ACCELERATION, shaking, (amplitude("shake", "m/s^2"),))
 POINT = np.array([0.1, -0.05, 0.2])
 LOADS = (INSIDE, GROUND, BUNGEE)
 COG = np.array([0.07, 0.06, -0.02])

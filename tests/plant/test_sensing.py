@@ -203,7 +203,7 @@ SPARE = Parameter("h", "1", Normal(0.0, 1.0), "unused", (-1.0, 1.0))
 )
 def test_wrong_wiring_is_an_error_at_import(equation, parameters, message) -> None:  # type: ignore[no-untyped-def]
     with pytest.raises(TypeError, match=message):
-        Sensing("trial", SensingPort.CHANNEL, equation, parameters, "test")
+        Sensing("trial", SensingPort.CHANNEL, equation, parameters)
 
 
 def test_a_power_of_any_reading_is_in_the_span_of_the_curved_characteristic() -> None:

@@ -11,7 +11,6 @@ import pytest
 from msgspec.structs import replace
 
 from kbs_process.diagnosis.facts import Moved, Place
-from kbs_process.diagnosis.proposing.families import FAMILIES, port_word
 from kbs_process.plant.laws import CATALOGUE, SENSING
 from kbs_process.results.records import Conclusion, Provenance, encode
 from kbs_process.studies.diagnose.results import DiagnosisResults, Find, Fitted, Rival, Trial
@@ -107,6 +106,6 @@ def test_a_method_that_fails_has_answered_with_its_failure(tmp_path: Path, monke
 
 
 def test_whatever_a_diagnosis_may_name_the_score_has_a_word_for() -> None:
-    assert {*FAMILIES.values()} <= {*get_args(Family)}
-    laws = [law for law in (*CATALOGUE, *SENSING) if law.name in FAMILIES]
-    assert {port_word(law.name, law.port) for law in laws} <= {*get_args(Port)}
+    laws = [law for law in (*CATALOGUE, *SENSING) if law.family]
+    assert {law.family for law in laws} <= {*get_args(Family)}
+    assert {law.port_word for law in laws} <= {*get_args(Port)}

@@ -9,7 +9,7 @@ import pytest
 
 from kbs_process.plant.attach import attach
 from kbs_process.plant.laws.friction.coulomb import COULOMB
-from kbs_process.plant.laws.position.joint_order import JOINT_ORDER
+from kbs_process.plant.laws.position.order import JOINT_ORDER
 from kbs_process.plant.moved import added_loads
 from kbs_process.plant.rigid import inertia_matrix, inverse_dynamics, joint_efforts, kinematics, loads
 from kbs_process.rig.model import Effort, Rig, no_transducer

@@ -12,10 +12,9 @@ from kbs_process.campaign.problems import Problems
 from kbs_process.campaign.quantities import Kind, read_quantity
 from kbs_process.errors import ConfigError, did_you_mean
 from kbs_process.plant.laws import SENSING
-from kbs_process.plant.sensing import Sensing, SensingPort, couplings, products
+from kbs_process.plant.sensing import Sensing
 from kbs_process.rig.model import Quantity, Rig
 
-STREAMS = ("wrench", "encoder")
 KEY = ("model", "sensing")
 
 
@@ -41,7 +40,7 @@ def _law(table: SensingTable, key: Key, document: Document, rig: Rig, problems: 
         what = f"'{table.law}' is no law of a sensor that a model can contain"
         problems.add(document.place((*key, "law")), what, did_you_mean(table.law, LAWS))
         return None
-    sites = _sites(law, rig)
+    sites = law.port.sites(rig.channels, rig.transducer.channels, rig.joint_names)
     if table.site not in sites:
         what = f"'{table.site}' is no site of '{law.name}'"
         problems.add(document.place((*key, "site")), what, did_you_mean(table.site, sites))
@@ -58,21 +57,6 @@ def _law(table: SensingTable, key: Key, document: Document, rig: Rig, problems: 
         except ConfigError as error:
             problems.add(document.place((*key, "parameters", name)), error.what, error.remedy)
     return SensingLaw(law.name, table.site, quantities)
-
-
-def _sites(law: Sensing, rig: Rig) -> tuple[str, ...]:
-    channels = rig.transducer.channels
-    match law.port:
-        case SensingPort.CHANNEL:
-            return rig.channels
-        case SensingPort.COUPLING:
-            return tuple(couplings(channels))
-        case SensingPort.PRODUCT:
-            return tuple(products(channels))
-        case SensingPort.STREAM:
-            return STREAMS
-        case _:
-            return rig.joint_names
 
 
 def table_of(law: SensingLaw) -> dict[str, Any]:

@@ -15,15 +15,15 @@ import numpy as np
 from kbs_process.estimation.fit import Parameters
 from kbs_process.identification.output_error import Experiment, Scalar
 from kbs_process.identification.screening import LEAST, contacts, phases
-from kbs_process.plant.effect import Effect, Port, Uniform
-from kbs_process.plant.laws import select
+from kbs_process.plant.effect import Effect, Uniform
+from kbs_process.plant.laws import CATALOGUE, select
 from kbs_process.rig.model import Rig
 
 _NOT_MOVING = ("spacecraft.", "controller.", "transducer.noise", "transducer.resolution", "transducer.bias")
 _PROJECTED = ("transducer.cross_coupling",)
 _NO_EFFECT = ("steps_per_turn", "encoder.offset", "gravity.magnitude")
 # The paper's five, by the parameters that describe them.
-CRITICAL = ("Ts0", "delta", "phi_stat", "Ka", "fsv", "tcog", "phi_cog", "d1", "phi_dyn")
+CRITICAL = frozenset(entry.name for effect in CATALOGUE for entry in effect.parameters if entry.critical)
 
 
 def of_drives(effects: Sequence[str]) -> tuple[Effect, ...]:
@@ -95,7 +95,7 @@ def frictions(experiment: Experiment) -> tuple[int, ...]:
         f"joint.{joint.name}.drive.{parameter.name}"
         for joint in experiment.rig.joints
         for effect in select(experiment.effects)
-        if effect.passive and effect.port in (Port.MOTOR_TORQUE, Port.MOTOR_FRICTION)
+        if effect.passive and effect.port.of_rotor
         for parameter in effect.parameters
         if parameter.unit.startswith("N m")
     }

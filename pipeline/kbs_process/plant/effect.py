@@ -1,17 +1,18 @@
-"""One piece of physics: an equation, where it acts, and its parameters.
+"""One piece of physics: an equation, where it acts, its parameters, and all that a search and a diagnosis ask of it.
 
 An effect is a plain typed function whose argument names are its wiring: signals of the plant at its port
 (`Port.signals`), the effect's own states, and its parameters. The declaration beneath it is checked
 when it is made, so a wrong name is an error at import, not in the middle of a run. The plant compiles the
-function; it has to use floats and `math` alone.
+function; it has to use floats and `math` alone, and to call functions of its own file alone.
 """
 
 from __future__ import annotations
 
 import inspect
 import math
+import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import cache
 from typing import Any, Literal, get_type_hints
@@ -32,6 +33,8 @@ SIGNALS = {
 }
 
 
+UNNAMED = "unnamed"  # family of laws that are measured
+_BRAKING = ("friction", "viscous")  # families
 LAST = 10_000  # order of a law that declares none
 CROSSED = frozenset(("other_angle", "other_rate"))  # signals of another joint
 
@@ -71,6 +74,22 @@ FIELD_SIGNALS = {
 }
 
 
+@dataclass(frozen=True, slots=True)
+class Acts:
+    """What a port is: what an equation's value does there, and what it can ask for."""
+
+    what: str  # with unit and signs
+    word: str  # for it in a diagnosis
+    shows: str  # what is seen of it
+    signals: Mapping[str, str]  # that an equation can ask for by name, with unit and meaning
+    site: Literal["joint", "link", "floor", "mounting"] = "joint"  # what it is a port of
+    rate: str = ""  # signal that the value, a torque, does its work with
+    tested: str = ""  # its name in a test of ports, if that tells more than the word
+
+
+_INSIDE = "windup at the encoder; of the wrench only what the motion's change makes"
+
+
 class Port(Enum):
     """Where an equation's value acts.
 
@@ -81,23 +100,117 @@ class Port(Enum):
     Ports of a drive have their parameters at every joint, the others once in the rig (`rig.model.External`).
     """
 
-    FIELD = "change of the magnetic field's position, as an angle of the motor, rad"
-    MOTOR_TORQUE = "torque on the rotor, N m"
-    MOTOR_FRICTION = "greatest Coulomb friction torque on the rotor, N m, >= 0: opposes motion, holds at rest"
-    TRANSMISSION = "torque of the gear on the output, N m; the rotor gets -1/ratio of it"
-    JOINT_TORQUE = "torque on the output, N m, reacted by the body that carries the motor"
-    GROUND_TORQUE = "torque on the output about the joint's axis, N m, reacted by the laboratory"
-    EXTERNAL_FORCE = "force (x, y, z) of the laboratory on a point of a link, N, along the undeflected T's axes"
-    BASE_ACCELERATION = "acceleration (x, y, z) of the laboratory's floor, m/s^2, along the undeflected T's axes"
-    BASE_TORQUE = (
-        "moment (x, y, z) of the mounting on the plate about the axes of the base's angles, N m, beyond the "
-        "transducer's stiffness and damping"
+    FIELD = Acts(
+        "change of the magnetic field's position, as an angle of the motor, rad",
+        "controller",
+        "what the motor makes of it; where the field was recorded, what the driver does after that",
+        FIELD_SIGNALS,
     )
+    MOTOR_TORQUE = Acts("torque on the rotor, N m", "motor torque", _INSIDE, SIGNALS, rate="rotor_rate")
+    MOTOR_FRICTION = Acts(
+        "greatest Coulomb friction torque on the rotor, N m, >= 0: opposes motion, holds at rest",
+        "motor torque",
+        _INSIDE,
+        SIGNALS,
+    )
+    TRANSMISSION = Acts(
+        "torque of the gear on the output, N m; the rotor gets -1/ratio of it", "transmission", _INSIDE, SIGNALS
+    )
+    JOINT_TORQUE = Acts(
+        "torque on the output, N m, reacted by the body that carries the motor",
+        "joint torque",
+        _INSIDE,
+        SIGNALS,
+        rate="joint_rate",
+    )
+    GROUND_TORQUE = Acts(
+        "torque on the output about the joint's axis, N m, reacted by the laboratory",
+        "external wrench",
+        "windup, and the wrench itself",
+        SIGNALS,
+        rate="joint_rate",
+        tested="ground torque",
+    )
+    EXTERNAL_FORCE = Acts(
+        "force (x, y, z) of the laboratory on a point of a link, N, along the undeflected T's axes",
+        "external wrench",
+        "windup, and the wrench itself",
+        POINT_SIGNALS,
+        "link",
+    )
+    BASE_ACCELERATION = Acts(
+        "acceleration (x, y, z) of the laboratory's floor, m/s^2, along the undeflected T's axes",
+        "base",
+        "the wrench, as of all masses the other way",
+        FLOOR_SIGNALS,
+        "floor",
+        tested="base",
+    )
+    BASE_TORQUE = Acts(
+        "moment (x, y, z) of the mounting on the plate about the axes of the base's angles, N m, beyond the "
+        "transducer's stiffness and damping",
+        "base",
+        "of the wrench what the change of the plate's motion makes: sag that turns weight, resonances; little at the "
+        "encoder; nothing where the transducer is rigid",
+        MOUNTING_SIGNALS,
+        "mounting",
+        tested="base torque",
+    )
+
+    @property
+    def what(self) -> str:
+        """What an equation's value does there, with its unit."""
+        return self.value.what
+
+    @property
+    def word(self) -> str:
+        """The word for it in a diagnosis."""
+        return self.value.word
+
+    @property
+    def shows(self) -> str:
+        """What is seen of what acts there."""
+        return self.value.shows
+
+    @property
+    def tested(self) -> str:
+        """Its name in a test of ports, if that tells more than the word."""
+        return self.value.tested
+
+    @property
+    def site(self) -> str:
+        """What it is a port of: a joint, a link, the floor or the mounting."""
+        return self.value.site
+
+    @property
+    def rate(self) -> str:
+        """Signal of the rate that a torque there does its work with, if it has one."""
+        return self.value.rate
+
+    @property
+    def signals(self) -> Mapping[str, str]:
+        """What an equation at this port can ask for by name, with its unit and meaning."""
+        return self.value.signals
 
     @property
     def of_drive(self) -> bool:
         """Whether it is a port of every driven joint, and not one of the rig."""
-        return self not in (Port.EXTERNAL_FORCE, Port.BASE_ACCELERATION, Port.BASE_TORQUE)
+        return self.site == "joint"
+
+    @property
+    def of_rotor(self) -> bool:
+        """Whether it is a torque on the rotor alone."""
+        return self in (Port.MOTOR_TORQUE, Port.MOTOR_FRICTION)
+
+    @property
+    def beneath(self) -> bool:
+        """Whether it is under the transducer's plate, which is one place."""
+        return self.site in ("floor", "mounting")
+
+    @property
+    def internal(self) -> bool:
+        """Whether what it does stays between a joint's output, its rotor and the body that carries the motor."""
+        return self.of_drive and self not in (Port.FIELD, Port.GROUND_TORQUE)
 
     @property
     def components(self) -> int:
@@ -110,19 +223,9 @@ class Port(Enum):
         return self is Port.BASE_TORQUE or (self.of_drive and self is not Port.FIELD)
 
     @property
-    def signals(self) -> dict[str, str]:
-        """What an equation at this port can ask for by name, with its unit and meaning."""
-        match self:
-            case Port.FIELD:
-                return FIELD_SIGNALS
-            case Port.EXTERNAL_FORCE:
-                return POINT_SIGNALS
-            case Port.BASE_ACCELERATION:
-                return FLOOR_SIGNALS
-            case Port.BASE_TORQUE:
-                return MOUNTING_SIGNALS
-            case _:
-                return SIGNALS
+    def of_channel(self) -> bool:
+        """Whether it is a port of a single channel."""
+        return False
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,6 +283,25 @@ class Uniform:
         return (self.high - self.low) / math.sqrt(12.0)
 
 
+Prior = Normal | LogNormal | Uniform
+
+Proposal = Literal[
+    "",
+    "tone",  # Hz of a line in the residual's spectrum
+    "swept tone",  # such a line, or where one begins that runs up or down
+    "sweep",  # Hz/s by which that one runs
+    "beat",  # Hz of a line, or of the beat of the controller's cycles next to it
+    "motor order",  # periods in a turn of the motor
+    "cycle order",  # whole periods in an electrical cycle of the motor
+    "joint order",  # periods in a turn of the joint
+    "disc order",  # periods in a turn of the encoder's disc, few
+    "disc bits",  # codes in a period, as a power of 2, where there are many
+    "period",  # rad after which an encoder's residual repeats
+    "place",  # rad of a joint, where the residual stands out
+    "width",  # rad of that stretch
+]
+
+
 @dataclass(frozen=True, slots=True)
 class Parameter:
     """A parameter that an equation asks for by name.
@@ -189,17 +311,26 @@ class Parameter:
     its `grid`, which are values, or, where `over` names a signal, shares (0 to 1) of the range that the signal sweeps:
     with "joint_angle" places in that range, with "joint_angle.span" widths; over "joint_angle.turns" the grid has
     orders, of which those count that come once at least in that range; over a "spectrum" it is a residual's tones.
+    Beside the grid a residual may propose values; `proposed` says of which kind.
     """
 
     name: str
     unit: str
-    prior: Normal | LogNormal | Uniform
+    prior: Prior
     description: str
     bounds: tuple[float, float]
     role: Literal["amplitude", "shape", "shared"] = "shape"
     grid: tuple[float, ...] = ()
     over: str = ""
     dry: bool = False  # an amplitude of friction or cogging: its slope at rest does not last
+    proposed: Proposal = ""
+    whole: bool = False  # a whole number, or a ratio of teeth: it stays where a line was found
+    critical: bool = False  # of the mechanism's nominal model: an identification has to find it
+
+    @property
+    def is_order(self) -> bool:
+        """Whether it counts periods in a turn."""
+        return self.proposed.endswith("order")
 
 
 @dataclass(frozen=True, slots=True)
@@ -212,46 +343,145 @@ class State:
     description: str
 
 
+def amplitude(
+    name: str, unit: str, prior: Prior, description: str, bounds: float | tuple[float, float], *, dry: bool = False
+) -> Parameter:
+    """Return a parameter that its equation is linear in, within `bounds`, of either sign within a single number."""
+    within = bounds if isinstance(bounds, tuple) else (-bounds, bounds)
+    return Parameter(name, unit, prior, description, within, "amplitude", dry=dry)
+
+
+def sine_and_cosine(
+    stem: str, unit: str, prior: Prior, what: str, bound: float, *, dry: bool = False
+) -> tuple[Parameter, Parameter]:
+    """Return the amplitudes `STEM_sin` and `STEM_cos` of `what` is periodic."""
+    sine, cosine = f"sine {what}", f"cosine {what}"
+    return (
+        amplitude(f"{stem}_sin", unit, prior, sine, bound, dry=dry),
+        amplitude(f"{stem}_cos", unit, prior, cosine, bound, dry=dry),
+    )
+
+
+def phase(name: str, description: str) -> Parameter:
+    """Return a phase, of which nothing is known and all round is tried."""
+    return Parameter(name, "rad", Uniform(-math.pi, math.pi), description, (-math.pi, math.pi), grid=EIGHTHS)
+
+
+def critical(entry: Parameter) -> Parameter:
+    """Return a parameter as one that an identification has to find."""
+    return replace(entry, critical=True)
+
+
+def wired(**arguments: str) -> tuple[tuple[str, str], ...]:
+    """Return what the arguments of an equation that several laws share are for one of them."""
+    return tuple(arguments.items())
+
+
 @dataclass(frozen=True, slots=True)
-class Effect:
+class Law:
+    """What laws of the plant and of its sensors have in common.
+
+    The docstring of the equation has its formula, units, validity and source. `order` is that of summation and of
+    search, whatever order a campaign names laws in; laws without one come last, by name. `family` is the physics in the
+    words of a diagnosis. What comes from outside, drifts or hums has amplitudes of its own in `each_trial`.
+    """
+
+    name: str
+    port: Any
+    equation: Callable[..., Any]
+    parameters: tuple[Parameter, ...]
+    order: int = field(default=LAST, kw_only=True)
+    family: str = field(default="", kw_only=True)
+    each_trial: bool = field(default=False, kw_only=True)
+    wires: tuple[tuple[str, str], ...] = field(default=(), kw_only=True)  # argument -> what it is, where they differ
+    tag: str = field(default="", kw_only=True)  # what `instance` has added to the names of parameters and states
+    anywhere: bool = field(default=False, kw_only=True)  # a force whose point on its link is not known
+    delay: str = field(default="", kw_only=True)  # the parameter by which the field comes late, s
+    of_cycles: str = field(default="", kw_only=True)  # family of orders that all come with whole electrical cycles
+
+    @property
+    def arguments(self) -> tuple[str, ...]:
+        """Names that the equation's arguments are wired to, in order."""
+        wires = dict(self.wires)
+        asked = tuple(wires.get(name, name) for name in _asked(self.equation))
+        if not self.tag:
+            return asked
+        own = {name.removesuffix(self.tag): name for name in self.own}
+        return tuple(own.get(name, name) for name in asked)
+
+    @property
+    def own(self) -> tuple[str, ...]:
+        """Names that it declares itself."""
+        return tuple(entry.name for entry in self.parameters)
+
+    @property
+    def amplitudes(self) -> tuple[Parameter, ...]:
+        """Parameters that it is linear in."""
+        return tuple(entry for entry in self.parameters if entry.role == "amplitude")
+
+    @property
+    def suspected(self) -> bool:
+        """Whether a search tries it: it can be absent, and has a name."""
+        return bool(self.amplitudes)
+
+    def section(self, heading: str) -> str:
+        """Return what the equation's docstring says under a heading, as "Validity", on one line."""
+        text = self.equation.__doc__ or ""
+        found = re.search(rf"^ *{heading}:(.*?)(?=^ *(?:Equation|Units|Validity|Source):|\Z)", text, re.M | re.S)
+        return "" if found is None else " ".join(found[1].split())
+
+    def plausible(self, entry: Parameter) -> tuple[float, float]:
+        """Between which values an amplitude is no sign of something else."""
+        return entry.bounds
+
+    @property
+    def reference(self) -> str:
+        """Where the equation is from."""
+        return self.section("Source").removesuffix(".")
+
+    @property
+    def port_word(self) -> str:
+        """The word in which a diagnosis says where it acts."""
+        return str(self.port.word)
+
+    @property
+    def in_plant(self) -> bool:
+        """Whether the plant can be simulated with it."""
+        return False
+
+
+@dataclass(frozen=True, slots=True)
+class Effect(Law):
     """An equation, the port at which its value acts, and what it is wired to.
 
     An effect with n states returns a tuple: its value, then the n time derivatives in their order. At a port of the
     rig, an equation returns three components. A state of the base's depends on itself and on the motion alone.
     What acts at the ground's port belongs to the test, unless it is part `of_article`.
-    `passive` claims that it never does positive work; the conformance test holds it to that. What comes from outside
-    has amplitudes of its own in `each_trial`. A force `anywhere` is tied to no place of its link that a drawing shows:
-    a search looks for its point, too. A moment `of_weight` acts about no axis that is along gravity. What is `recorded`
-    is in the record of the field, and leaves nothing to find where there is one. A `delay` of the field is exact in the
-    plant. An effect can act several times: see `instance`. Effects that share an equation say with `wires` what its
-    arguments are for each.
+    `passive` claims that it never does positive work; the conformance test holds it to that. A force `anywhere` is tied
+    to no place of its link that a drawing shows: a search looks for its point, too. A moment `of_weight` acts about no
+    axis that is along gravity. What is `recorded` is in the record of the field, and leaves nothing to find where there
+    is one. A `delay` of the field is exact in the plant. An effect can act several times: see `instance`. Effects that
+    share an equation say with `wires` what its arguments are for each.
     """
 
-    name: str
     port: Port
-    equation: Callable[..., Any]
-    parameters: tuple[Parameter, ...]
-    reference: str
     states: tuple[State, ...] = ()
     passive: bool = False
-    each_trial: bool = False
     of_article: bool = False  # although the wrench feels it at a port of the ground: an appendage
-    anywhere: bool = False  # a force whose point on its link is not known
     of_weight: bool = False  # a moment of weight about a joint's axis
+    of_gear: bool = False  # none of its own where a motor turns with its joint
+    either_sign: bool = False  # a friction that pushes in one sense what it brakes in the other
     recorded: bool = False  # a change of the field before that is recorded
-    delay: str = ""  # the parameter by which the field comes late, s: its equation is that to first order
     of_set_points: bool = False  # a delay of where cycles begin, between which the field goes straight
-    tag: str = ""  # what `instance` has added to the names of parameters and states
-    wires: tuple[tuple[str, str], ...] = ()  # argument of the equation -> signal or parameter, where they differ
-    order: int = LAST  # of summation and of search, whatever order a campaign names them in; then by name
     measured: bool = False  # a curve without a name: a model can contain it, and no search tries it
+    apart: str = ""  # word for where it acts, if that is not its port's
 
     def __post_init__(self) -> None:
         where = f"effect '{self.name}'"
         if not self.name.isidentifier():
             raise TypeError(f"{where}: the name is not an identifier")
         signals = self.port.signals
-        own = [state.name for state in self.states] + [parameter.name for parameter in self.parameters]
+        own = self.own
         if clash := (set(own) & set(signals)) | {name for name in own if own.count(name) > 1}:
             raise TypeError(f"{where}: {sorted(clash)} declared twice, or named like a signal of the plant")
         if unknown := set(self.arguments) - set(signals) - set(own):
@@ -268,13 +498,29 @@ class Effect:
             raise TypeError(f"{where}: arguments {untyped} are not float, or the result is not {returns}")
 
     @property
-    def arguments(self) -> tuple[str, ...]:
-        """Names that the equation's arguments are wired to, in order."""
-        names = [entry.name for entry in self.parameters] + [state.name for state in self.states]
-        own = {name.removesuffix(self.tag): name for name in names}
-        wires = dict(self.wires)
-        asked = (wires.get(name, name) for name in _asked(self.equation))
-        return tuple(own.get(name, name) for name in asked)
+    def own(self) -> tuple[str, ...]:
+        """Names that it declares itself."""
+        return (*(state.name for state in self.states), *(entry.name for entry in self.parameters))
+
+    @property
+    def port_word(self) -> str:
+        """The word in which a diagnosis says where it acts."""
+        return self.apart or self.port.word
+
+    @property
+    def in_plant(self) -> bool:
+        """Whether the plant can be simulated with it."""
+        return True
+
+    @property
+    def suspected(self) -> bool:
+        """Whether a search tries it: it can be absent, and has a name."""
+        return bool(self.amplitudes) and not self.measured
+
+    @property
+    def brakes(self) -> bool:
+        """Whether it takes work out of the mechanism: one that puts work in stands in for something else."""
+        return self.family in _BRAKING and bool(self.port.rate) and not self.either_sign
 
     @property
     def crossed(self) -> bool:
@@ -288,8 +534,8 @@ class Effect:
 
     def value(self, known: Mapping[str, float]) -> tuple[float, ...]:
         """Return the equation's components for numbers by name; its own states are at their initial values."""
-        wired = {state.name: state.initial for state in self.states} | dict(known)
-        result = self.equation(*(wired[name] for name in self.arguments))
+        numbers = {state.name: state.initial for state in self.states} | dict(known)
+        result = self.equation(*(numbers[name] for name in self.arguments))
         whole = result if isinstance(result, tuple) else (result,)
         return whole[: self.port.components]
 

@@ -10,13 +10,13 @@ from scipy.linalg import eigh
 from kbs_process.errors import SimulationError
 from kbs_process.plant.compiled.lanes import LANES
 from kbs_process.plant.compiled.simulation import Simulation
+from kbs_process.plant.compiled.taps import tap_columns
 from kbs_process.plant.compiled.together import Together
 from kbs_process.plant.effect import Effect
 from kbs_process.plant.laws import select
 from kbs_process.plant.linear.linearise import linearise
 from kbs_process.plant.schedule import Schedule
 from kbs_process.plant.structure import parameters, structure_of
-from kbs_process.plant.taps import tap_columns
 from kbs_process.rig.model import Rig
 from kbs_process.signals.records import Array, Block
 

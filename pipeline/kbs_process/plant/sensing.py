@@ -7,14 +7,14 @@ it is linear in its amplitudes.
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum
+from functools import cache, wraps
 from itertools import combinations_with_replacement
 from typing import get_type_hints
 
-from kbs_process.plant.effect import LAST, Parameter
+from kbs_process.plant.effect import Law, Parameter
 from kbs_process.signals.records import Array
 
 READINGS = {
@@ -28,9 +28,9 @@ SCALARS = {
     "code": "rad, one code of the encoder",
     "drop_time": "s, when the clock of this recording's stream seems to jump",
 }
-
-
 BY = "<-"  # in the site of a coupling: channel that reads, channel that acts, or the two of which the product does
+STREAMS = ("wrench", "encoder")
+SPREADS = 100.0  # of a prior, beyond which a size is no sensor's
 
 
 class SensingPort(Enum):
@@ -42,43 +42,57 @@ class SensingPort(Enum):
     ENCODER = "one encoder's angle, rad"
     STREAM = "all channels that one clock stamps"
 
-
-@dataclass(frozen=True, slots=True)
-class Sensing:
-    """An equation, the port at which its value acts, and its parameters.
-
-    `each_trial`: its amplitudes belong to a recording, as of what drifts or hums. `whole_band`: vibration beyond the
-    working band changes what it does within, as it is not linear in what it reads.
-    """
-
-    name: str
-    port: SensingPort
-    equation: Callable[..., Array]
-    parameters: tuple[Parameter, ...]
-    reference: str
-    each_trial: bool = False
-    whole_band: bool = False
-    order: int = LAST  # of search; then by name
-
-    def __post_init__(self) -> None:
-        where = f"sensing effect '{self.name}'"
-        own = {parameter.name for parameter in self.parameters}
-        known = {*READINGS, *SCALARS}
-        if not self.name.isidentifier():
-            raise TypeError(f"{where}: the name is not an identifier")
-        if unknown := set(self.arguments) - known - own:
-            raise TypeError(f"{where}: {sorted(unknown)} is neither a signal ({', '.join(known)}) nor declared")
-        if unused := own - set(self.arguments):
-            raise TypeError(f"{where}: {sorted(unused)} is declared, but not an argument of the equation")
-        hints = get_type_hints(self.equation)
-        wrong = [name for name in self.arguments if hints.get(name) != (Array if name in READINGS else float)]
-        if wrong or hints.get("return") != Array:
-            raise TypeError(f"{where}: {wrong} or the result have not the type that they are declared with")
+    @property
+    def what(self) -> str:
+        """Which signal an equation changes there."""
+        return self.value
 
     @property
-    def arguments(self) -> tuple[str, ...]:
-        """Names of the equation's arguments, in order."""
-        return tuple(inspect.signature(self.equation).parameters)
+    def word(self) -> str:
+        """The word for it in a diagnosis."""
+        return {SensingPort.ENCODER: "encoder", SensingPort.STREAM: "clock"}.get(self, "transducer")
+
+    @property
+    def shows(self) -> str:
+        """What is seen of what acts there."""
+        return {
+            SensingPort.ENCODER: "an angle; in a closed loop without a recorded field also the controller's answer",
+            SensingPort.STREAM: "all channels that a clock stamps",
+        }.get(self, "a channel of the transducer, whatever the mechanism does")
+
+    @property
+    def tested(self) -> str:
+        """Its name in a test of ports, if that tells more than the word."""
+        return ""
+
+    @property
+    def rate(self) -> str:
+        """No sensor does work."""
+        return ""
+
+    @property
+    def beneath(self) -> bool:
+        """No sensor is under the transducer's plate."""
+        return False
+
+    @property
+    def of_channel(self) -> bool:
+        """Whether it is a port of a single channel."""
+        return self.word == "transducer"
+
+    def sites(self, loads: Sequence[str], bridge: Sequence[str], encoders: Sequence[str]) -> list[str]:
+        """Return where a law can act: `loads` are all channels of loads, `bridge` those of the transducer."""
+        match self:
+            case SensingPort.CHANNEL:
+                return list(loads)
+            case SensingPort.COUPLING:
+                return couplings(bridge)
+            case SensingPort.PRODUCT:
+                return products(bridge)
+            case SensingPort.ENCODER:
+                return list(encoders)
+            case SensingPort.STREAM:
+                return [name for name, stamped in zip(STREAMS, (loads, encoders), strict=True) if stamped]
 
 
 def couplings(channels: Sequence[str]) -> list[str]:
@@ -90,3 +104,61 @@ def products(channels: Sequence[str]) -> list[str]:
     """Sites of what the product of two channels does to one; its own square is its non-linearity's."""
     pairs = list(combinations_with_replacement(channels, 2))
     return [BY.join((reads, *pair)) for reads in channels for pair in pairs if pair != (reads, reads)]
+
+
+def recursion(function: Callable[[Array, float], Array]) -> Callable[[Array, float], Array]:
+    """Compile a recursion over samples when it is first called: the compiler takes longer to import than all laws."""
+
+    @cache
+    def compiled() -> Callable[[Array, float], Array]:
+        from numba import njit
+
+        made: Callable[[Array, float], Array] = njit(cache=True, error_model="numpy")(function)
+        return made
+
+    @wraps(function)
+    def run(x: Array, displacement: float) -> Array:
+        return compiled()(x, displacement)
+
+    return run
+
+
+@dataclass(frozen=True, slots=True)
+class Sensing(Law):
+    """An equation, the port at which its value acts, and its parameters.
+
+    `whole_band`: vibration beyond the working band changes what it does within, as it is not linear in what it reads.
+    """
+
+    port: SensingPort
+    whole_band: bool = False
+
+    def __post_init__(self) -> None:
+        where = f"sensing effect '{self.name}'"
+        known = {*READINGS, *SCALARS}
+        if not self.name.isidentifier():
+            raise TypeError(f"{where}: the name is not an identifier")
+        if unknown := set(self.arguments) - known - set(self.own):
+            raise TypeError(f"{where}: {sorted(unknown)} is neither a signal ({', '.join(known)}) nor declared")
+        if unused := set(self.own) - set(self.arguments):
+            raise TypeError(f"{where}: {sorted(unused)} is declared, but not an argument of the equation")
+        hints = get_type_hints(self.equation)
+        types = [hint for name, hint in hints.items() if name != "return"]
+        wrong = [
+            name
+            for name, hint in zip(self.arguments, types, strict=True)
+            if hint != (Array if name in READINGS else float)
+        ]
+        if wrong or hints.get("return") != Array:
+            raise TypeError(f"{where}: {wrong} or the result have not the type that they are declared with")
+
+    def plausible(self, entry: Parameter) -> tuple[float, float]:
+        """Between which values an amplitude is no sign of something else: what is usual does not grow with the rig."""
+        low, high = entry.bounds
+        usual = SPREADS * entry.prior.spread
+        return max(low, -usual), min(high, usual)
+
+    @property
+    def jumps(self) -> bool:
+        """Whether it is the jump of a clock, at a time that each recording has."""
+        return "drop_time" in self.arguments

@@ -17,13 +17,13 @@ from kbs_process.diagnosis.facts import Estimate, Identity, Place
 from kbs_process.diagnosis.nominal.joint import Own, Standing
 from kbs_process.diagnosis.nominal.known import Known
 from kbs_process.diagnosis.proposing.curves import CurveSuspect, along, basis
-from kbs_process.diagnosis.proposing.families import UNNAMED, family
 from kbs_process.diagnosis.proposing.tryout import identity, in_plant, port_label
 from kbs_process.diagnosis.screening.ranges import swept
 from kbs_process.diagnosis.screening.screen import Catalogued, Found, Screening, Suspect
 from kbs_process.diagnosis.screening.signature import per_unit
-from kbs_process.diagnosis.screening.suspects import POINT, weighed
-from kbs_process.plant.effect import ACTION, ACTIONS, Effect
+from kbs_process.diagnosis.screening.suspects import POINT, Candidate, weighed
+from kbs_process.plant.effect import ACTION, ACTIONS, UNNAMED, Effect
+from kbs_process.plant.laws import CATALOGUE
 from kbs_process.plant.laws.position.measured_law import Measured
 from kbs_process.plant.sensing import Sensing
 from kbs_process.rig.model import Rig
@@ -80,7 +80,7 @@ def find_of(
     return Find(
         identity=own,
         named=own.family != UNNAMED,
-        equation=_equation(_law(suspect)),
+        equation=_law(suspect).section("Equation"),
         reference=_law(suspect).reference,
         estimates=_estimates(taken, before),
         probability=chance,
@@ -110,13 +110,14 @@ def _of_clock(suspect: Suspect) -> bool:
 
 def _equivalents(suspect: Suspect, rig: Rig) -> tuple[Alternative, ...]:
     """What looks the same whatever is recorded: a torque over the angle, the weight of a mass that moves with it."""
-    if not isinstance(suspect, CurveSuspect) or suspect.law.effect.name != "ground_angle_law":
+    if not (isinstance(suspect, CurveSuspect) and suspect.law.like_weight):
         return ()
     if not weighed(rig, rig.joint(suspect.joint)):
         return ()
     law = "weight over joint angle"
-    same = Identity(Place("mass properties", suspect.joint), family("mass_shift"), law)
-    return (Alternative(same, 0.0, 0.0, indistinguishable=True, refitted=False),)
+    weights = (one for one in CATALOGUE if one.of_weight)
+    same = (Identity(Place(weight.port_word, suspect.joint), weight.family, law) for weight in weights)
+    return tuple(Alternative(one, 0.0, 0.0, indistinguishable=True, refitted=False) for one in same)
 
 
 def _law(suspect: Suspect) -> Effect | Sensing:
@@ -126,16 +127,11 @@ def _law(suspect: Suspect) -> Effect | Sensing:
     return suspect.candidate.effect
 
 
-def _equation(law: Effect | Sensing) -> str:
-    text = law.equation.__doc__ or ""
-    lines = [line.strip() for line in text.splitlines()]
-    begin = next((k for k, line in enumerate(lines) if line.startswith("Equation:")), None)
-    if begin is None:
-        return lines[0] if lines else ""
-    end = next(
-        (k for k in range(begin + 1, len(lines)) if lines[k].startswith(("Units:", "Validity:", "Source:"))), len(lines)
-    )
-    return " ".join(lines[begin:end]).removeprefix("Equation:").strip()
+def _period(candidate: Candidate) -> float:
+    """After which what a law says repeats."""
+    shape = dict(candidate.shape)
+    (period,) = (shape[entry.name] for entry in candidate.effect.parameters if entry.proposed == "period")
+    return period
 
 
 def _estimates(taken: Tried, before: Standing) -> tuple[Estimate, ...]:
@@ -174,7 +170,7 @@ def _estimates(taken: Tried, before: Standing) -> tuple[Estimate, ...]:
 
 def _drops(suspect: Suspect) -> list[Estimate]:
     """When a clock seems to jump, along each trajectory that is fitted; nothing of another law."""
-    if not (isinstance(suspect, Catalogued) and "drop_time" in suspect.candidate.effect.arguments):
+    if not (isinstance(suspect, Catalogued) and suspect.jumps):
         return []
     experiment, shown, stream = suspect.scene.experiment, suspect.scene.predicted, suspect.candidate.site
     first = {experiment.trials[k].trajectory: experiment.trials[k].name for k in reversed(experiment.fit)}
@@ -213,7 +209,7 @@ def _curve(suspect: Suspect, taken: Tried, before: Standing) -> Curve:
         assert isinstance(suspect, Catalogued) and isinstance(suspect.candidate.effect, Sensing)
         law = suspect.candidate.effect
         low, high = swept(suspect.scene).spans[suspect.candidate.site, "reading"]
-        x = np.linspace(low, min(high, low + dict(suspect.candidate.shape)["profile_period"]), 101)
+        x = np.linspace(low, min(high, low + _period(suspect.candidate)), 101)
         columns = per_unit(suspect.candidate, np.arange(101.0), x, {})
         columns = columns - columns.mean(axis=0)  # an offset is the encoder's, and of another size
     known = taken.standing.known

@@ -15,20 +15,14 @@ from collections.abc import Collection, Iterable, Mapping
 import numpy as np
 
 from kbs_process.diagnosis.proposing.curves import CurveSuspect, along
-from kbs_process.diagnosis.proposing.families import family
 from kbs_process.diagnosis.screening.screen import Catalogued, Suspect
 from kbs_process.diagnosis.screening.signature import port_inputs
 from kbs_process.diagnosis.screening.suspects import Candidate
-from kbs_process.plant.effect import Effect, Port
-from kbs_process.plant.sensing import Sensing
+from kbs_process.plant.effect import Effect, Law
 from kbs_process.signals.records import Array
 
-_SPREADS = 100.0  # of a sensor's law, beyond which it is no sensor's
 _SIGMAS = 3.0  # by which an amplitude has to be beyond, or work be done by what is said to take it
-_TAKES = ("friction", "viscous")  # families
-_EVEN = ("motor_asymmetry",)  # laws that push in one sense what they brake in the other: either sign is right
 _SHARE = 0.1  # of the work that it does and takes, below which what it does is the motion's asymmetry
-_RATES = {Port.MOTOR_TORQUE: "rotor_rate", Port.JOINT_TORQUE: "joint_rate", Port.GROUND_TORQUE: "joint_rate"}
 
 
 def undone(suspect: Catalogued, amplitudes: Mapping[str, float]) -> frozenset[str]:
@@ -50,22 +44,17 @@ def undone(suspect: Catalogued, amplitudes: Mapping[str, float]) -> frozenset[st
     )
 
 
-def implausible(
-    law: Effect | Sensing, amplitudes: Mapping[str, tuple[float, float]], free: Collection[str] = ()
-) -> tuple[str, ...]:
+def implausible(law: Law, amplitudes: Mapping[str, tuple[float, float]], free: Collection[str] = ()) -> tuple[str, ...]:
     """Return why a law is refused that has amplitudes of such values and sigmas, by name; nothing, if it may have.
 
     Those that are `free` may have any.
     """
     reasons = []
-    for parameter in law.parameters:
-        if parameter.role != "amplitude" or parameter.name not in amplitudes or parameter.name in free:
+    for parameter in law.amplitudes:
+        if parameter.name not in amplitudes or parameter.name in free:
             continue
         value, sigma = amplitudes[parameter.name]
-        least, most = parameter.bounds
-        if isinstance(law, Sensing):
-            usual = _SPREADS * parameter.prior.spread
-            least, most = max(least, -usual), min(most, usual)
+        least, most = law.plausible(parameter)
         # Written so that what is no number is refused.
         if not least - _SIGMAS * sigma <= value <= most + _SIGMAS * sigma:
             unit = "" if parameter.unit == "1" else f" {parameter.unit}"
@@ -98,13 +87,11 @@ def drives(suspect: Catalogued, amplitudes: Array, covariance: Array) -> tuple[s
     Source: J. C. Willems, Dissipative dynamical systems I, Arch. Rational Mech. Anal. 45 (1972) 321.
     """
     candidate = suspect.candidate
-    if not (isinstance(candidate.effect, Effect) and candidate.port in _RATES):
-        return ()
-    if family(candidate.name) not in _TAKES or candidate.name in _EVEN:
+    if not (isinstance(candidate.effect, Effect) and candidate.effect.brakes):
         return ()
     # Several actions of one law have amplitudes one after the other.
     actions = len(amplitudes) // len(candidate.amplitudes)
-    power = np.tile(_power(suspect, candidate, _RATES[candidate.port]), actions)
+    power = np.tile(_power(suspect, candidate, candidate.port.rate), actions)
     work, all_of_it = power.sum(axis=0), float(np.abs(power @ amplitudes).sum())
     done, variance = float(work @ amplitudes), float(work @ (covariance @ work))
     if not done > max(_SIGMAS * float(np.sqrt(max(variance, 0.0))), _SHARE * all_of_it):

@@ -14,10 +14,10 @@ from kbs_process.diagnosis.experiments.hypothesis import Simulate
 from kbs_process.diagnosis.experiments.thresholds import GATE_SIGMA, LAW_VARIANCE, TOLERATED
 from kbs_process.diagnosis.nominal.joint import Own, Standing
 from kbs_process.diagnosis.proposing.curves import CurveSuspect
-from kbs_process.diagnosis.proposing.families import UNNAMED
 from kbs_process.diagnosis.proposing.tryout import identity, in_plant
 from kbs_process.diagnosis.screening.screen import Catalogued, Found
 from kbs_process.diagnosis.screening.shapes import bends, fitted, standing_still
+from kbs_process.plant.effect import UNNAMED
 from kbs_process.signals.records import Array
 
 

@@ -8,12 +8,10 @@ from scipy.linalg import expm
 from kbs_process.diagnosis.experiments.experiment import Experiment, Trial
 from kbs_process.diagnosis.experiments.hypothesis import Hypothesis, Prediction, acting, coupled
 from kbs_process.diagnosis.experiments.stamps import slope
-from kbs_process.plant.effect import Port
 from kbs_process.plant.laws import select
 from kbs_process.plant.linear.linearise import linearise
 from kbs_process.signals.records import Array
 
-_MOTOR = (Port.MOTOR_TORQUE, Port.MOTOR_FRICTION)
 _GROWS = 1e3  # times as much at a recording's end as at its beginning: no decay, where a gear pushes away from a pose
 
 
@@ -78,7 +76,7 @@ def decays(experiment: Experiment, hypothesis: Hypothesis, drive: int, begin: in
     held = [
         effect
         for effect in select(acting(hypothesis, experiment.drives[drive]))
-        if effect.port not in _MOTOR or "field" in effect.arguments
+        if not effect.port.of_rotor or "field" in effect.arguments
     ]
     system = linearise(hypothesis.rig, held, schedule.position[0])
     size = len(system.M)

@@ -37,7 +37,7 @@ def with_orders(view: View, found: Found) -> Found:
     a part of a turn some low ones together are any curve.
     """
     suspect = found.suspect
-    if not (isinstance(suspect, Catalogued) and isinstance(suspect.candidate.effect, Effect)):
+    if not (isinstance(suspect, Catalogued) and suspect.candidate.effect.in_plant):
         return found
     others = [_of_order(suspect, order) for order in _others(view, suspect)]
     actions = _free(suspect)
@@ -98,7 +98,7 @@ def _of_lines(candidate: Candidate) -> set[str]:
     return {
         entry.name
         for entry in effect.parameters
-        if "order" in entry.name or (entry.over == SPECTRUM and not effect.each_trial)
+        if entry.is_order or (entry.over == SPECTRUM and not effect.each_trial)
     }
 
 

@@ -13,6 +13,7 @@ from kbs_process.diagnosis.proposing.folding import periods
 from kbs_process.diagnosis.proposing.sweeps import sweeping
 from kbs_process.diagnosis.screening.scene import Scene
 from kbs_process.diagnosis.side_by_side import side_by_side
+from kbs_process.plant.laws import CATALOGUE, SENSING
 from kbs_process.signals.records import Array
 
 _HIGHEST_ORDER = 420.0  # of a motor: twice the teeth's passing and what lies around it
@@ -26,38 +27,42 @@ _TURNS = 10.0  # of a tone in a recording, fewer of which are drift, or the moti
 _CELLS = 20  # of an angle to a turn of the highest order
 _MOVING = 1e-3  # rad/s of a motor
 _PASSING = 1e-5  # rad/s of a joint
-_BY_ORDER = ("order", "ripple_order", "kinematic_order")
 _NEAR_WHOLE = 0.02  # of a number of periods in an electrical cycle
 _OF_ITS_SHAPE = 8.0  # periods in a disc's turn: more of them are lines of its grating, read between
 _BETWEEN = 33  # frequencies in two bins
 LONGEST_BEAT = 32  # cycles of a controller, after which what comes late comes late again
-_BY_PLACE = ("local", "detent", "touch", "shift")  # with _angle and _width
 _PLACES = 400  # that a joint's range is divided into
 _WIDEST = 0.1  # of the range, of what has a place
 _SEEN = 20.0  # samples at a place, fewer of which count as that many
-_BY_FREQUENCY = ("floor_frequency", "mains_frequency", "sway_frequency")
 
 
 def proposed(known: Known, scene: Scene) -> dict[str, tuple[float, ...]]:
     """Values to try beside the grids: parameter name, of one site "name.site" -> values that residuals propose."""
-    lines = _frequencies(known)
-    found = dict.fromkeys(_BY_FREQUENCY, lines) | {"jitter_frequency": _beats(known, lines)}
+    lines, tone = _frequencies(known), _sweep(known)
+    # Kind of proposal, and joint if it is one's -> values.
+    found: dict[tuple[str, str], tuple[float, ...]] = {("tone", ""): lines, ("beat", ""): _beats(known, lines)}
+    found["swept tone", ""] = lines
+    if tone is not None:
+        found |= {("swept tone", ""): (*lines, tone[0]), ("sweep", ""): (tone[1],)}
     of_joints = _of_joints(known, scene)
     for joint, orders in _orders(known, scene).items():
         beside = _in_turns_of_the_motor(known, joint, of_joints.get(joint, ()))
-        found |= {f"{name}.{joint}": (*orders, *beside) for name in _BY_ORDER}
-        found[f"microstep_order.{joint}"] = _of_cycles(known, joint, orders)
+        found["motor order", joint] = (*orders, *beside)
+        found["cycle order", joint] = _of_cycles(known, joint, orders)
     found |= _between_lines(known, _of_discs(known))
-    found |= {f"profile_period.{joint}": periods for joint, periods in periods(known, scene).items()}
-    found |= {f"joint_order.{joint}": lines for joint, lines in of_joints.items()}
+    found |= {("period", joint): values for joint, values in periods(known, scene).items()}
+    found |= {("joint order", joint): values for joint, values in of_joints.items()}
     for joint, (angle, width) in _local(known, scene).items():
-        for name in _BY_PLACE:
-            # What has been passed rings on for a while.
-            places = (angle - width, angle, angle + width)
-            found |= {f"{name}_angle.{joint}": places, f"{name}_width.{joint}": (width,)}
-    if (tone := _sweep(known)) is not None:
-        found |= {"floor_frequency": (*lines, tone[0]), "floor_sweep": (tone[1],)}
-    return {name: values for name, values in found.items() if values}
+        # What has been passed rings on for a while.
+        found |= {("place", joint): (angle - width, angle, angle + width), ("width", joint): (width,)}
+    return {
+        f"{entry.name}.{joint}" if joint else entry.name: values
+        for (kind, joint), values in found.items()
+        if values
+        for law in (*CATALOGUE, *SENSING)
+        for entry in law.parameters
+        if entry.proposed == kind
+    }
 
 
 def _sweep(known: Known) -> tuple[float, float] | None:
@@ -280,19 +285,17 @@ def _of_discs(known: Known) -> tuple[float, ...]:
     return _apart([value for _, value in sorted(found, reverse=True)], 0.5)
 
 
-def _between_lines(known: Known, orders: tuple[float, ...]) -> dict[str, tuple[float, ...]]:
+def _between_lines(known: Known, orders: tuple[float, ...]) -> dict[tuple[str, str], tuple[float, ...]]:
     """Orders of discs as what they are of: low ones of the disc's shape, high ones of its grating's interpolation.
 
     Without a known code it cannot be said how many of them a line of the grating is.
     """
-    found: dict[str, tuple[float, ...]] = {}
+    found: dict[tuple[str, str], tuple[float, ...]] = {}
     for joint in known.experiment.rig.joints:
         code = 0.0 if joint.encoder is None else float(joint.encoder.step)
         fine = [order for order in orders if code > 0.0 and order > _OF_ITS_SHAPE]
-        found[f"interpolation_bits.{joint.name}"] = tuple(
-            float(np.log2(2.0 * np.pi / (code * order))) for order in fine
-        )
-        found[f"eccentric_order.{joint.name}"] = tuple(order for order in orders if order not in fine)
+        found["disc bits", joint.name] = tuple(float(np.log2(2.0 * np.pi / (code * order))) for order in fine)
+        found["disc order", joint.name] = tuple(order for order in orders if order not in fine)
     return found
 
 

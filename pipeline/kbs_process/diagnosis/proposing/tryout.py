@@ -13,17 +13,15 @@ from kbs_process.diagnosis.facts import Identity, Place
 from kbs_process.diagnosis.nominal.joint import Extra, Standing
 from kbs_process.diagnosis.proposing import measured
 from kbs_process.diagnosis.proposing.curves import CurveSuspect
-from kbs_process.diagnosis.proposing.families import PORTS, UNNAMED, family, port_word
 from kbs_process.diagnosis.screening.scene import Scene
 from kbs_process.diagnosis.screening.screen import Bench, Catalogued, Found, Suspect
 from kbs_process.diagnosis.screening.shapes import Bend, along, bends
 from kbs_process.diagnosis.screening.suspects import Candidate, point_of
 from kbs_process.identification.output_error import Scalar
 from kbs_process.plant.attach import attach
-from kbs_process.plant.effect import Effect, Port
+from kbs_process.plant.effect import UNNAMED, Effect
 from kbs_process.plant.laws import select
-from kbs_process.plant.laws.motor.motor_order import MOTOR_ORDER
-from kbs_process.plant.sensing import BY, SensingPort
+from kbs_process.plant.sensing import BY
 from kbs_process.rig.model import Rig
 from kbs_process.signals.records import Array
 
@@ -33,21 +31,18 @@ _WHOLE_CYCLES = 1e-3  # from a whole number of them: less than lines of a residu
 def identity(suspect: Suspect) -> Identity:
     """In the field's words."""
     if isinstance(suspect, CurveSuspect):
-        port = PORTS[suspect.law.effect.port]
-        return Identity(Place(port, suspect.joint), UNNAMED, suspect.law.words)
+        return Identity(Place(suspect.law.effect.port_word, suspect.joint), UNNAMED, suspect.law.words)
     assert isinstance(suspect, Catalogued)
-    candidate = suspect.candidate
-    port = port_word(candidate.name, candidate.port)
-    of_channel = candidate.port in (SensingPort.CHANNEL, SensingPort.COUPLING, SensingPort.PRODUCT)
-    channels = tuple(candidate.site.split(BY)) if of_channel else ()
-    axis = "" if of_channel or port == PORTS[Port.BASE_ACCELERATION] else candidate.site
-    own = "cogging" if _with_cycles(candidate, suspect.scene.hypothesis.rig) else family(candidate.name)
-    return Identity(Place(port, axis, channels), own, candidate.name)
+    candidate, law = suspect.candidate, suspect.candidate.effect
+    channels = tuple(candidate.site.split(BY)) if law.port.of_channel else ()
+    axis = "" if law.port.of_channel or law.port.beneath else candidate.site
+    own = law.of_cycles if _with_cycles(candidate, suspect.scene.hypothesis.rig) else law.family
+    return Identity(Place(law.port_word, axis, channels), own, candidate.name)
 
 
 def _with_cycles(candidate: Candidate, rig: Rig) -> bool:
     """Whether orders of a motor all come with whole electrical cycles of it: then its own poles and teeth make them."""
-    if candidate.name != MOTOR_ORDER.name:
+    if not candidate.effect.of_cycles:
         return False
     drive = rig.joint(candidate.site).drive
     if drive is None or "Kangle" not in drive.parameters:
@@ -64,12 +59,8 @@ def port_label(suspect: Suspect) -> str:
         return Place(suspect.port.replace("_", " "), suspect.joint).label
     assert isinstance(suspect, Catalogued)
     candidate, own = suspect.candidate, identity(suspect).place
-    if candidate.port is Port.GROUND_TORQUE:
-        return Place("ground torque", candidate.site).label
-    if candidate.port is Port.BASE_ACCELERATION:
-        return Place("base", "").label
-    if candidate.port is Port.BASE_TORQUE:
-        return Place("base torque", "").label
+    if candidate.port.tested:
+        return Place(candidate.port.tested, own.site).label
     return Place(own.port, own.site, own.channels[:1]).label
 
 
@@ -77,7 +68,7 @@ def in_plant(suspect: Suspect) -> bool:
     """Whether it is simulated in the non-linear plant."""
     if isinstance(suspect, CurveSuspect):
         return True
-    return isinstance(suspect, Catalogued) and isinstance(suspect.candidate.effect, Effect) and not suspect.each_trial
+    return isinstance(suspect, Catalogued) and suspect.candidate.effect.in_plant and not suspect.each_trial
 
 
 def of_every_clock(found: Found) -> bool:

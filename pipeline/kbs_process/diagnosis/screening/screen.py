@@ -113,7 +113,7 @@ class Catalogued:
     @property
     def jumps(self) -> bool:
         """Whether it is the jump of a clock, at a time that each trajectory has."""
-        return "drop_time" in self.candidate.effect.arguments
+        return isinstance(self.candidate.effect, Sensing) and self.candidate.effect.jumps
 
     @property
     def of_clock(self) -> bool:
@@ -130,14 +130,14 @@ class Catalogued:
 
     def _recorded(self, drive: int) -> tuple[Array, dict[str, Array | float]]:
         """Time and what else is known of a drive's recordings that an equation may ask for."""
-        experiment, law = self.scene.experiment, self.candidate.effect
+        experiment = self.scene.experiment
         t = np.asarray(np.arange(experiment.drives[drive].n) * experiment.dt, dtype=np.float64)
         own = [one for one in experiment.trials if one.drive == drive]
         first = min(own, key=lambda one: one.role == "held-out")  # the first that is fitted
         known: dict[str, Array | float] = {}
         if first.temperature is not None:
             known["temperature"] = first.temperature
-        if "drop_time" in law.arguments:
+        if self.jumps:
             known["drop_time"] = jump(experiment, self.scene.predicted, first.trajectory, self.candidate.site)
         return t, known
 

@@ -13,14 +13,13 @@ from kbs_process.diagnosis.screening.ranges import SPECTRUM, WHILE_RECORDED, is_
 from kbs_process.diagnosis.screening.screen import Bench, Catalogued, Found
 from kbs_process.diagnosis.screening.suspects import Candidate, half_lengths
 from kbs_process.identification.output_error import Scalar
-from kbs_process.plant.effect import Effect, LogNormal, Parameter, Uniform
+from kbs_process.plant.effect import LogNormal, Parameter, Uniform
 from kbs_process.rig.model import Rig
 from kbs_process.signals.records import Array
 
 _FARTHEST = 30.0  # times, up or down, that a shape goes from where the grid had it; of what has a sign,
 _STEPS = 6.0  # as many of its steps
 _NEAR = 0.05  # m: steps of a search for a point are no less
-_WHOLE = ("order", "bit")  # in names of numbers that are whole, or ratios of teeth
 _DIFFERENCE = 0.02  # steps
 _PLACES = 24  # of a law that is somewhere, at most, for each width that it may have
 _NARROWER = (0.5, 0.25)  # shares of its width
@@ -83,7 +82,7 @@ def bends(candidate: Candidate, rig: Rig) -> tuple[Bend, ...]:
         for entry in candidate.effect.parameters
         if entry.role == "shape" and (step := _step(entry, candidate)) > 0.0
     ]
-    if candidate.point is None or not (isinstance(candidate.effect, Effect) and candidate.effect.anywhere):
+    if candidate.point is None or not candidate.effect.anywhere:
         return tuple(own)
     reach = np.maximum(half_lengths(rig, candidate.site), _NEAR)
     point = [
@@ -96,7 +95,7 @@ def bends(candidate: Candidate, rig: Rig) -> tuple[Bend, ...]:
 def _step(entry: Parameter, candidate: Candidate) -> float:
     """What a shape of the grid is known to: its prior's width, of a place the law's own; 0, where it stays."""
     put = entry.over == SPECTRUM or (entry.over and len(entry.grid) == 1)
-    if put or isinstance(entry.prior, Uniform) or any(word in entry.name for word in _WHOLE):
+    if put or isinstance(entry.prior, Uniform) or entry.whole:
         return 0.0
     if is_place(entry):
         wide = _width(entry, candidate)

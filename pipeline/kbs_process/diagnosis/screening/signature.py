@@ -18,11 +18,11 @@ from kbs_process.diagnosis.screening.inlets import BASE_PORT, MOUNTING_PORT, WRE
 from kbs_process.diagnosis.screening.scene import Course, courses
 from kbs_process.diagnosis.screening.suspects import Candidate, own_values, point_of
 from kbs_process.plant.along import along, signals_of
+from kbs_process.plant.compiled.taps import plate_column
 from kbs_process.plant.effect import Effect, Port
 from kbs_process.plant.laws import select
 from kbs_process.plant.linear.linearise import drive_slopes
 from kbs_process.plant.sensing import BY, Sensing, SensingPort
-from kbs_process.plant.taps import plate_column
 from kbs_process.rig.model import Rig
 from kbs_process.signals.records import WRENCH_CHANNELS, Array
 from kbs_process.stages.align.resample import resample

@@ -11,12 +11,11 @@ import numpy as np
 from kbs_process.diagnosis.screening.inlets import plate_turns
 from kbs_process.diagnosis.screening.ranges import Ranges
 from kbs_process.plant.along import signals_of
+from kbs_process.plant.compiled.taps import plate_column
 from kbs_process.plant.effect import ACTIONS, VELOCITIES, Effect, Parameter, Port, instance
 from kbs_process.plant.laws import CATALOGUE, SENSING
-from kbs_process.plant.laws.position.joint_order import JOINT_ORDER
 from kbs_process.plant.rigid import inertia_matrix, links_beyond, poses
-from kbs_process.plant.sensing import Sensing, SensingPort, couplings, products
-from kbs_process.plant.taps import plate_column
+from kbs_process.plant.sensing import Sensing, SensingPort
 from kbs_process.rig.model import LAB, TRANSDUCER, Joint, Rig
 from kbs_process.signals.records import WRENCH_CHANNELS, Array
 
@@ -44,7 +43,7 @@ class Candidate:
     @property
     def name(self) -> str:
         """The law's, whichever of its actions this is."""
-        return self.effect.name.removesuffix(self.effect.tag) if isinstance(self.effect, Effect) else self.effect.name
+        return self.effect.name.removesuffix(self.effect.tag)
 
     @property
     def port(self) -> Port | SensingPort:
@@ -53,8 +52,7 @@ class Candidate:
     @property
     def amplitudes(self) -> tuple[Parameter, ...]:
         """Parameters that it is linear in, action by action."""
-        own = tuple(entry for entry in self.effect.parameters if entry.role == "amplitude")
-        return own + tuple(entry for other in self.again for entry in other.amplitudes)
+        return self.effect.amplitudes + tuple(entry for other in self.again for entry in other.amplitudes)
 
     @property
     def actions(self) -> tuple[Candidate, ...]:
@@ -86,7 +84,7 @@ def candidates(
     plant = [
         Candidate(effect, site, shape, point, longest=longest)
         for law in left_out
-        if any(entry.role == "amplitude" for entry in law.parameters)
+        if law.suspected
         for site in _sites(law, rig, columns)
         for effect in [next_action(law, rig, site, accepted)]
         for point in points_of(effect, rig, site)
@@ -120,7 +118,7 @@ def _sites(effect: Effect, rig: Rig, columns: Sequence[str]) -> list[str]:
             return False
         if effect.of_weight and not weighed(rig, joint):
             return False
-        if effect is JOINT_ORDER and _direct(joint):
+        if effect.of_gear and _direct(joint):
             return False  # the motor's orders are the joint's
         own = {} if joint.drive is None else joint.drive.parameters
         turned = joint.drive is not None or "ratio" not in effect.arguments
@@ -157,7 +155,7 @@ def free_actions(effect: Effect, rig: Rig, site: str, accepted: Sequence[str]) -
     own = own_values(rig, site)
     for number in range(1, ACTIONS + 1):
         action = effect if number == 1 else instance(effect, number)
-        amplitudes = [entry.name for entry in action.parameters if entry.role == "amplitude"]
+        amplitudes = [entry.name for entry in action.amplitudes]
         # A drive's effect has numbers at every joint; one of the laboratory acts at a single place.
         here = not action.port.of_drive or any(own.get(name, 0.0) for name in amplitudes)
         if action.name not in accepted or not here:
@@ -182,8 +180,7 @@ def _grid(
     """Every choice of an effect's shape; a parameter without a grid is what the rig has, or its prior's middle."""
     shapes = [entry for entry in effect.parameters if entry.role == "shape"]
     # Whichever action of a law it is, its shape's grid has one name.
-    tag = effect.tag if isinstance(effect, Effect) else ""
-    grids = [replace(entry, name=entry.name.removesuffix(tag)) for entry in shapes]
+    grids = [replace(entry, name=entry.name.removesuffix(effect.tag)) for entry in shapes]
     choices = [ranges.choices(grid, site, own.get(entry.name)) for entry, grid in zip(shapes, grids, strict=True)]
     for point in product(*choices):
         yield tuple((entry.name, value) for entry, value in zip(shapes, point, strict=True))
@@ -194,17 +191,7 @@ def _sensed_sites(law: Sensing, rig: Rig, channels: Sequence[str], ranges: Range
     loads = [name for name in channels if name not in encoders]
     if "temperature" in law.arguments and not ranges.temperature:
         return []
-    match law.port:
-        case SensingPort.CHANNEL:
-            return loads
-        case SensingPort.COUPLING:
-            return couplings([name for name in loads if name in WRENCH_CHANNELS])
-        case SensingPort.PRODUCT:
-            return products([name for name in loads if name in WRENCH_CHANNELS])
-        case SensingPort.ENCODER:
-            return encoders
-        case SensingPort.STREAM:
-            return [*(["wrench"] if loads else []), *(["encoder"] if encoders else [])]
+    return law.port.sites(loads, [name for name in loads if name in WRENCH_CHANNELS], encoders)
 
 
 def points_of(effect: Effect, rig: Rig, link: str) -> tuple[Point | None, ...]:
@@ -212,7 +199,7 @@ def points_of(effect: Effect, rig: Rig, link: str) -> tuple[Point | None, ...]:
 
     None, of an effect that acts at no point.
     """
-    if effect.port is not Port.EXTERNAL_FORCE:
+    if effect.port.site != "link":
         return (None,)
     centre = point_of(rig, link)
     points = [centre]

@@ -34,7 +34,6 @@ _MIDDLES = (np.arange(PHASES) + 0.5) / PHASES - 0.5  # of knots' intervals
 _RATES = ("joint_rate", "rotor_rate")
 _STANDS = 1e-5  # rad of the motor in a step, below which it stands: a thousandth of a tooth's contact
 BATCH = 32  # columns that pass through the plant together: their states stay in the nearest cache
-_INTERNAL = (Port.MOTOR_TORQUE, Port.MOTOR_FRICTION, Port.TRANSMISSION, Port.JOINT_TORQUE)
 _PAD_S = 2.0  # s at either end, over which one end blends into the other
 
 Index = NDArray[np.intp]
@@ -62,7 +61,7 @@ class Path:
 
 
 def follow(rig: Rig, effects: Sequence[Effect], taps: Mapping[str, Array], rate: float) -> Path:
-    """Linearise along `taps` (n,) of each SIGNAL.JOINT (`plant.taps.tap_columns`), sampled at `rate` Hz.
+    """Linearise along `taps` (n,) of each SIGNAL.JOINT (`plant.compiled.taps.tap_columns`), sampled at `rate` Hz.
 
     Validity: small inputs. A rotor that sticks moves here; a controller that reads the encoders does not react, which
     is how a plant behaves that is driven by its recorded field.
@@ -73,7 +72,7 @@ def follow(rig: Rig, effects: Sequence[Effect], taps: Mapping[str, Array], rate:
     half = every // (2 * PHASES)
     knots = np.unique(np.append(np.arange(0, n, every), n - 1))
     angles = np.stack([taps[f"joint_angle.{joint.name}"] for joint in rig.joints], axis=1)
-    laboratory = [effect for effect in effects if effect.port not in _INTERNAL]
+    laboratory = [effect for effect in effects if not effect.port.internal]
     steady = [effect for effect in effects if not _passes(effect)]
     known: dict[tuple[int, ...], Linear] = {}
     systems = []
@@ -133,7 +132,7 @@ def _signals(taps: Mapping[str, Array], joint: str, other: str) -> dict[str, Arr
 def _passes(effect: Effect) -> bool:
     """Whether it acts on the rotor by its position alone: its slope comes and goes as teeth or turns pass."""
     position = "rotor_angle" in effect.arguments and not {"field", "joint_angle"} & set(effect.arguments)
-    return position and not effect.states and effect.port in (Port.MOTOR_TORQUE, Port.MOTOR_FRICTION)
+    return position and not effect.states and effect.port.of_rotor
 
 
 def _ripple(joint: Joint, effects: Sequence[Effect], signals: Mapping[str, Array], rate: float) -> Array:

@@ -34,12 +34,12 @@ def suspect_of(find: Find, scene: Scene) -> tuple[Suspect, Array] | None:
         coefficients = np.linalg.lstsq(basis(over, x, *ends), find.curve.value, rcond=None)[0]
         return CurveSuspect(scene, over, own.place.site, ends), np.asarray(coefficients)
     law = _LAWS.get(own.law)
-    mounting = isinstance(law, Effect) and law.port is Port.BASE_TORQUE
+    mounting = law is not None and law.port is Port.BASE_TORQUE
     site = TRANSDUCER if mounting else BY.join(own.place.channels) or own.place.site
     if law is None or law.each_trial or not site:
         return None
     # Of a sensor's law that was found more than once, the action that was found first.
-    numbers = _numbers(find.estimates if isinstance(law, Effect) else find.actions[0])
+    numbers = _numbers(find.estimates if law.in_plant else find.actions[0])
     if not _tells(numbers, law):
         return None
     if "temperature" in law.arguments and any(one.temperature is None for one in scene.experiment.trials):
@@ -88,5 +88,5 @@ def sigma_of(find: Find, suspect: Suspect, amplitude: Array) -> Array:
     if find.curve is not None and isinstance(find.curve.law, Measured):
         nodes = np.linspace(0.0, len(find.curve.x) - 1.0, len(amplitude)).round().astype(int)
         return np.asarray(find.curve.sigma[nodes])
-    numbers = _numbers(find.actions[0] if isinstance(_LAWS[find.identity.law], Sensing) else find.estimates)
+    numbers = _numbers(find.estimates if _LAWS[find.identity.law].in_plant else find.actions[0])
     return np.array([numbers[name].sigma for name in suspect.amplitudes])

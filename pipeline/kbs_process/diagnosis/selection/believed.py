@@ -21,13 +21,13 @@ from kbs_process.diagnosis.experiments.thresholds import CONTESTED, GATE_SIGMA, 
 from kbs_process.diagnosis.facts import Identity, Place
 from kbs_process.diagnosis.nominal.joint import Standing
 from kbs_process.diagnosis.nominal.settling import released, resettled
-from kbs_process.diagnosis.proposing.families import UNNAMED
 from kbs_process.diagnosis.proposing.tryout import identity
 from kbs_process.diagnosis.proposing.view import View
 from kbs_process.diagnosis.screening.screen import Found
 from kbs_process.diagnosis.screening.shapes import bettered
 from kbs_process.diagnosis.selection.effort import Effort
 from kbs_process.diagnosis.selection.leaders import reread, tried
+from kbs_process.plant.effect import UNNAMED
 from kbs_process.signals.records import Array
 
 

@@ -27,7 +27,6 @@ from kbs_process.diagnosis.experiments.thresholds import (
 from kbs_process.diagnosis.nominal.joint import Standing, bare, moved_on, with_extra
 from kbs_process.diagnosis.nominal.settling import resettled
 from kbs_process.diagnosis.proposing.clocks import timed
-from kbs_process.diagnosis.proposing.families import UNNAMED
 from kbs_process.diagnosis.proposing.orders import with_orders
 from kbs_process.diagnosis.proposing.sizes import springs
 from kbs_process.diagnosis.proposing.tryout import extra_of, identity, in_plant, of_every_clock
@@ -38,7 +37,7 @@ from kbs_process.diagnosis.selection.each_recording import taken_off, taken_off_
 from kbs_process.diagnosis.selection.effort import Effort
 from kbs_process.diagnosis.selection.race import at_floor, own_of, raced
 from kbs_process.diagnosis.side_by_side import side_by_side
-from kbs_process.plant.effect import Effect, Port
+from kbs_process.plant.effect import UNNAMED, Port
 from kbs_process.plant.sensing import BY
 
 
@@ -114,8 +113,7 @@ def _pulls(found: Found) -> bool:
 
 
 def _anywhere(found: Found) -> bool:
-    law = found.suspect.candidate.effect if isinstance(found.suspect, Catalogued) else None
-    return _pulls(found) and isinstance(law, Effect) and law.anywhere
+    return isinstance(found.suspect, Catalogued) and found.suspect.candidate.effect.anywhere
 
 
 def _same(one: Suspect, other: Suspect) -> TypeGuard[Catalogued]:
@@ -142,8 +140,7 @@ def various(chosen: Sequence[Found]) -> list[Found]:
 
 
 def _delays(suspect: Suspect) -> bool:
-    law = suspect.candidate.effect if isinstance(suspect, Catalogued) else None
-    return isinstance(law, Effect) and bool(law.delay)
+    return isinstance(suspect, Catalogued) and bool(suspect.candidate.effect.delay)
 
 
 def _way(found: Found) -> tuple[str, ...]:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from kbs_process.plant.compiled.loop import LOOP
+from kbs_process.plant.compiled.mounting import mounting_text, vector_of
 from kbs_process.plant.compiled.multibody import joint_offset, multibody_text, placing, unrolled
 from kbs_process.plant.compiled.stepping import accelerated, state_layout, stepping_text
+from kbs_process.plant.compiled.taps import taps_text
 from kbs_process.plant.effect import Effect, Port
-from kbs_process.plant.loop import LOOP
-from kbs_process.plant.mounting import mounting_text, vector_of
 from kbs_process.plant.structure import DRIVE, FIRST, JOINTS, MICROSTEP, RATIO, ROTOR, Structure
-from kbs_process.plant.taps import taps_text
 
 
 def module_text(structure: Structure) -> str:

@@ -8,6 +8,7 @@ lanes, without a branch.
 
 from __future__ import annotations
 
+from kbs_process.plant.compiled.mounting import vector_of
 from kbs_process.plant.compiled.stepping import (
     ROTOR_STEPS,
     InVector,
@@ -18,7 +19,6 @@ from kbs_process.plant.compiled.stepping import (
     state_layout,
     turned,
 )
-from kbs_process.plant.mounting import vector_of
 from kbs_process.plant.structure import Structure
 
 LANES = 8  # doubles in the widest vector

@@ -9,10 +9,10 @@ from kbs_process.plant.amplifier import discretised, steady
 from kbs_process.plant.compiled.compile import compiled_plant
 from kbs_process.plant.compiled.equilibrium import at_rest
 from kbs_process.plant.compiled.stepping import state_layout
+from kbs_process.plant.compiled.taps import OF_JOINTS
 from kbs_process.plant.effect import Effect
 from kbs_process.plant.schedule import Schedule, covering
 from kbs_process.plant.structure import FIRST, JOINTS, MICROSTEP, RATIO, parameters, structure_of
-from kbs_process.plant.taps import OF_JOINTS
 from kbs_process.rig.model import Rig
 from kbs_process.signals.records import Array
 

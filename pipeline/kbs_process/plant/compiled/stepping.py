@@ -16,8 +16,8 @@ States that follow an output's angle, as bristles do, are led along its parabola
 
 from __future__ import annotations
 
+from kbs_process.plant.compiled.mounting import vector_of
 from kbs_process.plant.compiled.multibody import carrier, given, joint_offset, placing, shaking, unrolled
-from kbs_process.plant.mounting import vector_of
 from kbs_process.plant.structure import DAMPING, DRIVE, MICROSTEP, RATIO, ROTOR, STIFFNESS, Structure
 
 ROTOR_STEPS = 10

@@ -3,7 +3,8 @@
 Begin with `friction/viscous.py`. A law is a plain function (equation, units, validity, source in its docstring) and the
 declaration beneath it, which says all that anybody asks of it: where it acts, its parameters, how they are searched, in
 which words a diagnosis speaks of it. A new law is a file in one of the folders, or a declaration in one of the files:
-nothing else names it. Any module-level `Effect` or `Sensing`, alone or in a tuple, is found.
+nothing else names it. Any `Effect` or `Sensing` at the level of a file, alone or in a tuple, is found. Laws act in the
+order that they declare, whatever order a campaign names them in.
 
 A campaign's nominal model names some of the effects; the others are suspects when a prediction fails. What the rig
 already describes is no effect: mass, CoG and inertia of bodies, inclination and compliance of the transducer,
@@ -28,22 +29,19 @@ def modules() -> Iterator[ModuleType]:
     """Yield every file of laws, folder by folder."""
     for folder in iter_modules(__path__, f"{__name__}."):
         if folder.ispkg:
-            yield from (
-                import_module(file.name)
-                for file in iter_modules(import_module(folder.name).__path__, f"{folder.name}.")
-            )
+            within = import_module(folder.name).__path__
+            yield from (import_module(file.name) for file in iter_modules(within, f"{folder.name}."))
 
 
-def _declared() -> Iterator[Effect | Sensing]:
-    for module in modules():
-        for value in vars(module).values():
-            yield from (
-                one for one in (value if isinstance(value, tuple) else (value,)) if isinstance(one, Effect | Sensing)
-            )
+def laws_of(module: ModuleType) -> list[Effect | Sensing]:
+    """Return the laws that a file declares: those with an equation of its own."""
+    named = (value if isinstance(value, tuple) else (value,) for value in vars(module).values())
+    laws = (one for values in named for one in values if isinstance(one, Effect | Sensing))
+    return [law for law in laws if law.equation.__module__ == module.__name__]
 
 
 # In the order that they declare.
-_FOUND = sorted({law.name: law for law in _declared()}.values(), key=lambda law: (law.order, law.name))
+_FOUND = sorted((law for module in modules() for law in laws_of(module)), key=lambda law: (law.order, law.name))
 
 CATALOGUE: tuple[Effect, ...] = tuple(law for law in _FOUND if isinstance(law, Effect) and not law.measured)
 MEASURED: tuple[Effect, ...] = tuple(law for law in _FOUND if isinstance(law, Effect) and law.measured)

@@ -14,7 +14,7 @@ from kbs_process.diagnosis.experiments.experiment import Experiment
 from kbs_process.diagnosis.experiments.floor import Floor
 from kbs_process.diagnosis.experiments.thresholds import RIVALS, told_apart
 from kbs_process.diagnosis.nominal.known import LEARNT, NEAR, Known
-from kbs_process.diagnosis.proposing.families import UNNAMED
+from kbs_process.plant.effect import UNNAMED
 from kbs_process.reduction.losses import lost
 from kbs_process.report.prose import Prose
 from kbs_process.results.records import Notice

@@ -15,6 +15,7 @@ from kbs_process.diagnosis.experiments.floor import Floor
 from kbs_process.diagnosis.nominal.joint import Standing
 from kbs_process.diagnosis.nominal.known import Known
 from kbs_process.diagnosis.selection.next_test import Proposal
+from kbs_process.plant.effect import Port
 from kbs_process.plant.laws.position.measured_law import Measured, unit_of
 from kbs_process.plant.structure import other_joint
 from kbs_process.results import provenance
@@ -26,7 +27,7 @@ from kbs_process.studies.diagnose.unexplained import unexplained
 
 COMMANDS = "next-test.csv"  # file of the next test's commands, in the results' folder
 _SHOWN = 25  # suspects in the table
-_PORTS = {"ground torque": "external wrench"}  # of the port test, in the words of finds
+_PORTS = {Port.GROUND_TORQUE.tested: Port.GROUND_TORQUE.word}  # of the port test, in the words of finds
 
 
 def results_of(

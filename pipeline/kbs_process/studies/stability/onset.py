@@ -16,8 +16,7 @@ from scipy.signal import detrend, periodogram
 
 from kbs_process.errors import SimulationError
 from kbs_process.plant.effect import ACTION
-from kbs_process.plant.laws import CATALOGUE
-from kbs_process.plant.laws.position.measured_law import MEASURED
+from kbs_process.plant.laws import CATALOGUE, MEASURED
 from kbs_process.plant.predict import Schedule, predict
 from kbs_process.rig.model import Controller, Rig, substitute
 from kbs_process.signals.records import Array, Block
@@ -60,8 +59,7 @@ def smooth_rig(rig: Rig) -> Rig:
     steps = [joint.encoder.step.name for joint in rig.joints if joint.encoder is not None]
     holders = [joint.drive.parameters for joint in rig.joints if joint.drive is not None]
     holders += [external.parameters for external in rig.external]
-    effects = (*CATALOGUE, *(law.effect for law in MEASURED))
-    dry = {entry.name for effect in effects for entry in effect.parameters if entry.dry}
+    dry = {entry.name for effect in (*CATALOGUE, *MEASURED) for entry in effect.parameters if entry.dry}
     amplitudes = [
         quantity.name
         for holder in holders

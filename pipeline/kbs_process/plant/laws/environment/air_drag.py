@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from kbs_process.plant.effect import Effect, LogNormal, Normal, Parameter, Port
+from kbs_process.plant.effect import Effect, LogNormal, Normal, Parameter, Port, amplitude
 
 SPEED = 0.01  # m/s of reference: 0.3 m from an axis at 2 deg/s
 _LEAST = 1e-6  # of it, below which the force is in proportion to the velocity
@@ -25,15 +25,15 @@ def force(vx: float, vy: float, vz: float, air_drag: float, air_drag_power: floa
 
 
 AIR_DRAG = Effect(
-    name="air_drag",
-    order=390,
-    port=Port.EXTERNAL_FORCE,
-    equation=force,
-    parameters=(
-        Parameter("air_drag", "N", Normal(0.0, 0.1), "drag at 0.01 m/s", (0.0, 100.0), role="amplitude"),
+    "air_drag",
+    Port.EXTERNAL_FORCE,
+    force,
+    (
+        amplitude("air_drag", "N", Normal(0.0, 0.1), "drag at 0.01 m/s", (0.0, 100.0)),
         Parameter("air_drag_power", "1", LogNormal(2.0, 0.15), "power of the speed", (1.0, 3.0)),
     ),
-    reference="S. F. Hoerner, Fluid-Dynamic Drag (1965), chapters 2 and 3",
     passive=True,
     anywhere=True,
+    family="air drag",
+    order=390,
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from kbs_process.plant.effect import Effect, LogNormal, Normal, Parameter, Port, State
+from kbs_process.plant.effect import Effect, LogNormal, Normal, Parameter, Port, State, amplitude
 
 
 def torque(
@@ -26,12 +26,11 @@ def torque(
 
 
 APPENDAGE = Effect(
-    name="appendage",
-    order=400,
-    port=Port.GROUND_TORQUE,
-    equation=torque,
-    parameters=(
-        Parameter("sway_inertia", "kg m^2", Normal(0.0, 0.1), "inertia of the mode", (0.0, 10.0), role="amplitude"),
+    "appendage",
+    Port.GROUND_TORQUE,
+    torque,
+    (
+        amplitude("sway_inertia", "kg m^2", Normal(0.0, 0.1), "inertia of the mode", (0.0, 10.0)),
         Parameter(
             "sway_frequency",
             "Hz",
@@ -39,10 +38,13 @@ APPENDAGE = Effect(
             "its frequency on a link at rest",
             (0.05, 50.0),
             grid=tuple(0.3 * 1.25**i for i in range(17)),
+            proposed="tone",
         ),
         Parameter("sway_damping", "1", LogNormal(0.01, 0.7), "its damping ratio", (0.0, 1.0), grid=(0.005, 0.03)),
     ),
-    reference="P. W. Likins, Dynamics and control of flexible space vehicles, JPL Technical Report 32-1329 (1970)",
     states=(State("sway", "rad", 0.0, "angle against the link"), State("sway_rate", "rad/s", 0.0, "rate")),
     of_article=True,
+    apart="appendage",
+    family="appendage",
+    order=400,
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from kbs_process.plant.effect import Effect, LogNormal, Normal, Parameter, Port
+from kbs_process.plant.effect import Effect, LogNormal, Normal, Parameter, Port, amplitude
 
 ANGLE = 1e-3  # rad of reference: what weight makes the plate sag by
 _LEAST = 1e-6  # of it, below which the moment is in proportion to the angle
@@ -40,20 +40,18 @@ def _power(angle: float, power: float) -> float:
     return share * math.exp((power - 1.0) * math.log(max(abs(share), _LEAST)))
 
 
-_PRIOR, _BOUNDS = Normal(0.0, 0.5), (-1e3, 1e3)
-
 BASE_HARDENING = Effect(
-    name="base_hardening",
-    order=450,
-    port=Port.BASE_TORQUE,
-    equation=moment,
-    parameters=(
-        Parameter("base_hardening_x", "N m", _PRIOR, "moment at 1 mrad about x", _BOUNDS, role="amplitude"),
-        Parameter("base_hardening_y", "N m", _PRIOR, "about y", _BOUNDS, role="amplitude"),
-        Parameter("base_hardening_z", "N m", _PRIOR, "about z", _BOUNDS, role="amplitude"),
+    "base_hardening",
+    Port.BASE_TORQUE,
+    moment,
+    (
+        amplitude("base_hardening_x", "N m", Normal(0.0, 0.5), "moment at 1 mrad about x", 1e3),
+        amplitude("base_hardening_y", "N m", Normal(0.0, 0.5), "about y", 1e3),
+        amplitude("base_hardening_z", "N m", Normal(0.0, 0.5), "about z", 1e3),
         Parameter(
             "base_hardening_power", "1", LogNormal(3.0, 0.3), "power of the angle", (1.2, 9.0), grid=(2.0, 3.0, 5.0)
         ),
     ),
-    reference="R. D. Mindlin, Dynamics of package cushioning, Bell System Technical J. 24 (1945) 353",
+    family="stiffness",
+    order=450,
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from kbs_process.plant.effect import Effect, LogNormal, Normal, Parameter, Port
+from kbs_process.plant.effect import Effect, LogNormal, Normal, Parameter, Port, amplitude
 
 GRAVITY = 9.80665  # m/s^2
 
@@ -23,13 +23,12 @@ def acceleration(time: float, tilt_x: float, tilt_y: float, tilt_time: float) ->
 
 
 FLOOR_TILT = Effect(
-    name="floor_tilt",
-    order=440,
-    port=Port.BASE_ACCELERATION,
-    equation=acceleration,
-    parameters=(
-        Parameter("tilt_x", "rad", Normal(0.0, 1e-4), "inclination towards x at last", (-0.1, 0.1), role="amplitude"),
-        Parameter("tilt_y", "rad", Normal(0.0, 1e-4), "towards y", (-0.1, 0.1), role="amplitude"),
+    "floor_tilt",
+    Port.BASE_ACCELERATION,
+    acceleration,
+    (
+        amplitude("tilt_x", "rad", Normal(0.0, 1e-4), "inclination towards x at last", 0.1),
+        amplitude("tilt_y", "rad", Normal(0.0, 1e-4), "towards y", 0.1),
         Parameter(
             "tilt_time",
             "s",
@@ -39,6 +38,7 @@ FLOOR_TILT = Effect(
             grid=(5.0, 10.0, 20.0, 50.0, 150.0),
         ),
     ),
-    reference="A. Einstein, Jahrbuch der Radioaktivitaet und Elektronik 4 (1907) 411, section 17",
     each_trial=True,
+    family="tilt",
+    order=440,
 )

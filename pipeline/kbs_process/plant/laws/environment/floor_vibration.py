@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from kbs_process.plant.effect import Effect, LogNormal, Normal, Parameter, Port
+from kbs_process.plant.effect import Effect, LogNormal, Normal, Parameter, Port, sine_and_cosine
 
 
 def acceleration(
@@ -35,21 +35,14 @@ def acceleration(
     )
 
 
-_AMPLITUDE = Normal(0.0, 1e-3)
-_BOUNDS = (-1.0, 1.0)
-
 FLOOR_VIBRATION = Effect(
-    name="floor_vibration",
-    order=430,
-    port=Port.BASE_ACCELERATION,
-    equation=acceleration,
-    parameters=(
-        Parameter("floor_x_sin", "m/s^2", _AMPLITUDE, "sine along x", _BOUNDS, role="amplitude"),
-        Parameter("floor_x_cos", "m/s^2", _AMPLITUDE, "cosine along x", _BOUNDS, role="amplitude"),
-        Parameter("floor_y_sin", "m/s^2", _AMPLITUDE, "sine along y", _BOUNDS, role="amplitude"),
-        Parameter("floor_y_cos", "m/s^2", _AMPLITUDE, "cosine along y", _BOUNDS, role="amplitude"),
-        Parameter("floor_z_sin", "m/s^2", _AMPLITUDE, "sine along z", _BOUNDS, role="amplitude"),
-        Parameter("floor_z_cos", "m/s^2", _AMPLITUDE, "cosine along z", _BOUNDS, role="amplitude"),
+    "floor_vibration",
+    Port.BASE_ACCELERATION,
+    acceleration,
+    (
+        *sine_and_cosine("floor_x", "m/s^2", Normal(0.0, 1e-3), "along x", 1.0),
+        *sine_and_cosine("floor_y", "m/s^2", Normal(0.0, 1e-3), "along y", 1.0),
+        *sine_and_cosine("floor_z", "m/s^2", Normal(0.0, 1e-3), "along z", 1.0),
         Parameter(
             "floor_frequency",
             "Hz",
@@ -57,11 +50,19 @@ FLOOR_VIBRATION = Effect(
             "frequency of the tone, at the recording's start",
             (0.01, 500.0),
             over="spectrum",
+            proposed="swept tone",
         ),
         Parameter(
-            "floor_sweep", "Hz/s", Normal(0.0, 1e-2), "change of the frequency with time", (-10.0, 10.0), grid=(0.0,)
+            "floor_sweep",
+            "Hz/s",
+            Normal(0.0, 1e-2),
+            "change of the frequency with time",
+            (-10.0, 10.0),
+            grid=(0.0,),
+            proposed="sweep",
         ),
     ),
-    reference="C. G. Gordon, Generic criteria for vibration-sensitive equipment, Proc. SPIE 1619 (1991) 71",
     each_trial=True,
+    family="vibration",
+    order=430,
 )

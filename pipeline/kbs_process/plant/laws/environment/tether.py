@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from kbs_process.plant.effect import Effect, Normal, Parameter, Port
+from kbs_process.plant.effect import Effect, Normal, Port, amplitude
 
 
 def force(
@@ -27,20 +27,18 @@ def force(
     return tether_x - tether_kx * x, tether_y - tether_ky * y, tether_z - tether_kz * z
 
 
-_PULL, _STIFFNESS = Normal(0.0, 5.0), Normal(0.0, 20.0)
-
 TETHER = Effect(
-    name="tether",
-    order=420,
-    port=Port.EXTERNAL_FORCE,
-    equation=force,
-    parameters=(
-        Parameter("tether_x", "N", _PULL, "pull along x, at T's origin", (-1e3, 1e3), role="amplitude"),
-        Parameter("tether_y", "N", _PULL, "pull along y", (-1e3, 1e3), role="amplitude"),
-        Parameter("tether_z", "N", _PULL, "pull along z", (-1e3, 1e3), role="amplitude"),
-        Parameter("tether_kx", "N/m", _STIFFNESS, "stiffness along x", (-1e4, 1e4), role="amplitude"),
-        Parameter("tether_ky", "N/m", _STIFFNESS, "stiffness along y", (-1e4, 1e4), role="amplitude"),
-        Parameter("tether_kz", "N/m", _STIFFNESS, "stiffness along z", (-1e4, 1e4), role="amplitude"),
+    "tether",
+    Port.EXTERNAL_FORCE,
+    force,
+    (
+        amplitude("tether_x", "N", Normal(0.0, 5.0), "pull along x, at T's origin", 1e3),
+        amplitude("tether_y", "N", Normal(0.0, 5.0), "pull along y", 1e3),
+        amplitude("tether_z", "N", Normal(0.0, 5.0), "pull along z", 1e3),
+        amplitude("tether_kx", "N/m", Normal(0.0, 20.0), "stiffness along x", 1e4),
+        amplitude("tether_ky", "N/m", Normal(0.0, 20.0), "stiffness along y", 1e4),
+        amplitude("tether_kz", "N/m", Normal(0.0, 20.0), "stiffness along z", 1e4),
     ),
-    reference="J. H. Ginsberg, Engineering Dynamics (2008), section 5.1",
+    family="cable",
+    order=420,
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from kbs_process.plant.effect import Effect, LogNormal, Normal, Parameter, Port, shared
+from kbs_process.plant.effect import Effect, LogNormal, Normal, Parameter, Port, amplitude, shared
 from kbs_process.plant.laws.gear.flexspline import FLEXSPLINE
 
 
@@ -22,12 +22,11 @@ def torque(
 
 
 BACKLASH = Effect(
-    name="backlash",
-    order=200,
-    port=Port.TRANSMISSION,
-    equation=torque,
-    parameters=(
-        Parameter("lost_motion", "rad", Normal(0.0, 1e-4), "half the play", (0.0, 0.01), role="amplitude"),
+    "backlash",
+    Port.TRANSMISSION,
+    torque,
+    (
+        amplitude("lost_motion", "rad", Normal(0.0, 1e-4), "half the play", (0.0, 0.01)),
         Parameter(
             "soft_zone",
             "rad",
@@ -38,5 +37,6 @@ BACKLASH = Effect(
         ),
         shared(FLEXSPLINE, "Ka"),
     ),
-    reference="M. Nordin, P.-O. Gutman, Controlling mechanical systems with backlash, Automatica 38 (2002) 1633",
+    family="backlash",
+    order=200,
 )

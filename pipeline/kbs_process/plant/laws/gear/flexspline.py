@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from kbs_process.plant.effect import Effect, LogNormal, Parameter, Port
+from kbs_process.plant.effect import Effect, LogNormal, Parameter, Port, critical
 
 
 def torque(
@@ -13,20 +13,20 @@ def torque(
     Equation: $T = f_{sv} (\omega_r/R - \omega_l) + K_a (\theta_r/R - \theta_l)$.
     Units: rad, rad/s, rad, rad/s, 1, N m s/rad, N m/rad -> N m.
     Validity: below the torque at which the stiffness of a Harmonic Drive rises; no hysteresis.
-    Source: ENVISAT Ka-band subsystem (1996), section 5, damping and stiffness of the gearbox.
+    Source: ENVISAT Ka-band subsystem: Measurement and prediction of the performance of a satellite based antenna
+        pointing mechanism and controller, Trans. Built Environment 19 (1996), section 5, damping and stiffness of the
+        gearbox.
     """
     return fsv * (rotor_rate / ratio - joint_rate) + Ka * (rotor_angle / ratio - joint_angle)
 
 
 FLEXSPLINE = Effect(
-    name="flexspline",
-    order=60,
-    port=Port.TRANSMISSION,
-    equation=torque,
-    parameters=(
-        Parameter("fsv", "N m s/rad", LogNormal(15.0, 0.2), "structural damping", bounds=(0.0, 1e4)),
-        Parameter("Ka", "N m/rad", LogNormal(1e4, 0.1), "torsional stiffness", bounds=(1.0, 1e7)),
+    "flexspline",
+    Port.TRANSMISSION,
+    torque,
+    (
+        critical(Parameter("fsv", "N m s/rad", LogNormal(15.0, 0.2), "structural damping", (0.0, 1e4))),
+        critical(Parameter("Ka", "N m/rad", LogNormal(1e4, 0.1), "torsional stiffness", (1.0, 1e7))),
     ),
-    reference="Measurement and prediction of the performance of a satellite based antenna pointing mechanism "
-    "and controller, Trans. Built Environment 19 (1996), section 5",
+    order=60,
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from kbs_process.plant.effect import Effect, Normal, Parameter, Port, shared
+from kbs_process.plant.effect import Effect, Normal, Parameter, Port, shared, sine_and_cosine
 from kbs_process.plant.laws.gear.flexspline import FLEXSPLINE
 
 
@@ -34,13 +34,11 @@ def torque(
 
 
 KINEMATIC_ERROR = Effect(
-    name="kinematic_error",
-    order=190,
-    port=Port.TRANSMISSION,
-    equation=torque,
-    parameters=(
-        Parameter("kinematic_sin", "rad", Normal(0.0, 5e-4), "sine of the error", (-0.01, 0.01), role="amplitude"),
-        Parameter("kinematic_cos", "rad", Normal(0.0, 5e-4), "cosine of the error", (-0.01, 0.01), role="amplitude"),
+    "kinematic_error",
+    Port.TRANSMISSION,
+    torque,
+    (
+        *sine_and_cosine("kinematic", "rad", Normal(0.0, 5e-4), "of the error", 0.01),
         Parameter(
             "kinematic_order",
             "1",
@@ -48,10 +46,12 @@ KINEMATIC_ERROR = Effect(
             "periods in a turn of the wave generator",
             (0.0, 1e3),
             grid=(1.0, 2.0, 3.0, 4.0, 6.0, 8.0),
+            proposed="motor order",
+            whole=True,
         ),
         shared(FLEXSPLINE, "fsv"),
         shared(FLEXSPLINE, "Ka"),
     ),
-    reference="F. H. Ghorbel, P. S. Gandhi, F. Alpeter, On the kinematic error in harmonic drive gears, J. Mechanical "
-    "Design 123 (2001) 90",
+    family="transmission error",
+    order=190,
 )

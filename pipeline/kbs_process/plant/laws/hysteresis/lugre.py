@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from kbs_process.plant.effect import Effect, LogNormal, Normal, Parameter, Port, State
+from kbs_process.plant.effect import Effect, LogNormal, Normal, Parameter, Port, State, amplitude
 
 
 def torque(
@@ -26,12 +26,11 @@ def torque(
 
 
 LUGRE = Effect(
-    name="lugre",
-    order=300,
-    port=Port.JOINT_TORQUE,
-    equation=torque,
-    parameters=(
-        Parameter("lugre", "N m", Normal(0.0, 0.5), "Coulomb torque", (-100.0, 100.0), role="amplitude", dry=True),
+    "lugre",
+    Port.JOINT_TORQUE,
+    torque,
+    (
+        amplitude("lugre", "N m", Normal(0.0, 0.5), "Coulomb torque", 100.0, dry=True),
         Parameter(
             "lugre_displacement",
             "rad",
@@ -57,7 +56,7 @@ LUGRE = Effect(
             grid=(1e-3, 5e-3),
         ),
     ),
-    reference="C. Canudas de Wit, H. Olsson, K. J. Astrom, P. Lischinsky, A new model for control of systems with "
-    "friction, IEEE Trans. Automatic Control 40 (1995) 419",
     states=(State("bristle", "1", 0.0, "bristles' deflection over that under the Coulomb torque"),),
+    family="friction",
+    order=300,
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from kbs_process.plant.effect import EIGHTHS, Effect, LogNormal, Parameter, Port, Uniform
+from kbs_process.plant.effect import Effect, LogNormal, Port, amplitude, critical, phase
 
 
 def torque(rotor_angle: float, tcog: float, phi_cog: float) -> float:
@@ -13,30 +13,22 @@ def torque(rotor_angle: float, tcog: float, phi_cog: float) -> float:
     Equation: $T = t_{cog} \sin(200 \theta_r + \phi_{cog})$, 200 being the full steps in a turn.
     Units: rad, N m, rad -> N m.
     Validity: first harmonic of the detent torque of a 200-step motor.
-    Source: ENVISAT Ka-band subsystem (1996), section 5, cogging torque.
+    Source: ENVISAT Ka-band subsystem: Measurement and prediction of the performance of a satellite based antenna
+        pointing mechanism and controller, Trans. Built Environment 19 (1996), section 5, cogging torque.
     """
     return tcog * math.sin(200.0 * rotor_angle + phi_cog)
 
 
 COGGING = Effect(
-    name="cogging",
-    order=20,
-    port=Port.MOTOR_TORQUE,
-    equation=torque,
-    parameters=(
-        Parameter(
-            "tcog",
-            "N m",
-            LogNormal(6e-3, 0.25),
-            "amplitude of the cogging torque",
-            bounds=(0.0, 1.0),
-            role="amplitude",
-            dry=True,
+    "cogging",
+    Port.MOTOR_TORQUE,
+    torque,
+    (
+        critical(
+            amplitude("tcog", "N m", LogNormal(6e-3, 0.25), "amplitude of the cogging torque", (0.0, 1.0), dry=True)
         ),
-        Parameter(
-            "phi_cog", "rad", Uniform(-math.pi, math.pi), "phase of cogging", bounds=(-math.pi, math.pi), grid=EIGHTHS
-        ),
+        critical(phase("phi_cog", "phase of cogging")),
     ),
-    reference="Measurement and prediction of the performance of a satellite based antenna pointing mechanism "
-    "and controller, Trans. Built Environment 19 (1996), section 5",
+    family="cogging",
+    order=20,
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from kbs_process.plant.effect import Effect, Normal, Parameter, Port, shared
+from kbs_process.plant.effect import Effect, Normal, Parameter, Port, shared, sine_and_cosine
 from kbs_process.plant.laws.motor.synchronous_motor import SYNCHRONOUS_MOTOR
 
 
@@ -32,13 +32,11 @@ def torque(
 
 
 MICROSTEP_ERROR = Effect(
-    name="microstep_error",
-    order=120,
-    port=Port.MOTOR_TORQUE,
-    equation=torque,
-    parameters=(
-        Parameter("microstep_sin", "rad", Normal(0.0, 5e-4), "sine of the error", (-0.01, 0.01), role="amplitude"),
-        Parameter("microstep_cos", "rad", Normal(0.0, 5e-4), "cosine of the error", (-0.01, 0.01), role="amplitude"),
+    "microstep_error",
+    Port.MOTOR_TORQUE,
+    torque,
+    (
+        *sine_and_cosine("microstep", "rad", Normal(0.0, 5e-4), "of the error", 0.01),
         Parameter(
             "microstep_order",
             "1",
@@ -46,9 +44,12 @@ MICROSTEP_ERROR = Effect(
             "periods in an electrical cycle",
             (0.5, 64.0),
             grid=(1.0, 2.0, 4.0),
+            proposed="cycle order",
+            whole=True,
         ),
         shared(SYNCHRONOUS_MOTOR, "Tmax"),
         shared(SYNCHRONOUS_MOTOR, "Kangle"),
     ),
-    reference="T. Kenjo, A. Sugawara, Stepping Motors and Their Microprocessor Controls (1994), chapter 5",
+    family="microstep",
+    order=120,
 )

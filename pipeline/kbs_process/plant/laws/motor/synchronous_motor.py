@@ -14,20 +14,19 @@ def torque(field: float, rotor_angle: float, Tmax: float, Kangle: float) -> floa
         $K_{angle} \theta_f$ is $\pi/64$ times the whole number of microsteps.
     Units: rad, rad, N m, 1 -> N m.
     Validity: current-controlled windings, no saturation, no step lost: load below Tmax.
-    Source: ENVISAT Ka-band subsystem (1996), section 5, synchronous torque.
+    Source: ENVISAT Ka-band subsystem: Measurement and prediction of the performance of a satellite based antenna
+        pointing mechanism and controller, Trans. Built Environment 19 (1996), section 5, synchronous torque.
     """
     return Tmax * math.sin(Kangle * (field - rotor_angle))
 
 
 SYNCHRONOUS_MOTOR = Effect(
-    name="synchronous_motor",
-    order=10,
-    port=Port.MOTOR_TORQUE,
-    equation=torque,
-    parameters=(
-        Parameter("Tmax", "N m", LogNormal(0.35, 0.06), "greatest synchronous torque", bounds=(1e-3, 10.0)),
-        Parameter("Kangle", "1", Normal(100.0, 0.0), "electrical cycles in a motor turn", bounds=(1.0, 1e4)),
+    "synchronous_motor",
+    Port.MOTOR_TORQUE,
+    torque,
+    (
+        Parameter("Tmax", "N m", LogNormal(0.35, 0.06), "greatest synchronous torque", (1e-3, 10.0)),
+        Parameter("Kangle", "1", Normal(100.0, 0.0), "electrical cycles in a motor turn", (1.0, 1e4)),
     ),
-    reference="Measurement and prediction of the performance of a satellite based antenna pointing mechanism "
-    "and controller, Trans. Built Environment 19 (1996), section 5",
+    order=10,
 )

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 
-from kbs_process.plant.effect import Effect, LogNormal, Normal, Parameter, Port
+from kbs_process.plant.effect import Effect, Normal, Port, amplitude
+from kbs_process.plant.laws.position.place import place, width
 
 
 def torque(joint_angle: float, detent: float, detent_angle: float, detent_width: float) -> float:
@@ -21,30 +22,14 @@ def torque(joint_angle: float, detent: float, detent_angle: float, detent_width:
 
 
 DETENT = Effect(
-    name="detent",
-    order=350,
-    port=Port.JOINT_TORQUE,
-    equation=torque,
-    parameters=(
-        Parameter("detent", "N m", Normal(0.0, 0.5), "greatest torque", (-100.0, 100.0), role="amplitude"),
-        Parameter(
-            "detent_angle",
-            "rad",
-            Normal(0.0, 3.0),
-            "angle without torque, in its middle",
-            (-100.0, 100.0),
-            grid=tuple((i + 0.5) / 12.0 for i in range(12)),
-            over="joint_angle",
-        ),
-        Parameter(
-            "detent_width",
-            "rad",
-            LogNormal(0.03, 1.0),
-            "from its middle to the greatest torque",
-            (1e-4, 3.0),
-            grid=(0.03, 0.08),
-            over="joint_angle.span",
-        ),
+    "detent",
+    Port.JOINT_TORQUE,
+    torque,
+    (
+        amplitude("detent", "N m", Normal(0.0, 0.5), "greatest torque", 100.0),
+        place("detent_angle", "angle without torque, in its middle", 12),
+        width("detent_width", "from its middle to the greatest torque", 0.03, (0.03, 0.08)),
     ),
-    reference="H. Goldstein, Classical Mechanics (1980), section 1.1: torque as the slope of a potential",
+    family="local torque",
+    order=350,
 )

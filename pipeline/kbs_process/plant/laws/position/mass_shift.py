@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 
-from kbs_process.plant.effect import Effect, LogNormal, Normal, Parameter, Port
+from kbs_process.plant.effect import Effect, Normal, Port, amplitude
+from kbs_process.plant.laws.position.place import place, width
 
 
 def torque(joint_angle: float, shift_sin: float, shift_cos: float, shift_angle: float, shift_width: float) -> float:
@@ -21,32 +22,17 @@ def torque(joint_angle: float, shift_sin: float, shift_cos: float, shift_angle: 
 
 
 MASS_SHIFT = Effect(
-    name="mass_shift",
-    order=380,
-    port=Port.GROUND_TORQUE,
-    equation=torque,
-    parameters=(
-        Parameter("shift_sin", "N m", Normal(0.0, 0.5), "with its sine", (-100.0, 100.0), role="amplitude"),
-        Parameter("shift_cos", "N m", Normal(0.0, 0.5), "with the angle's cosine", (-100.0, 100.0), role="amplitude"),
-        Parameter(
-            "shift_angle",
-            "rad",
-            Normal(0.0, 3.0),
-            "angle at which it moves",
-            (-100.0, 100.0),
-            grid=tuple((i + 0.5) / 10.0 for i in range(10)),
-            over="joint_angle",
-        ),
-        Parameter(
-            "shift_width",
-            "rad",
-            LogNormal(0.1, 1.0),
-            "over which it moves",
-            (1e-4, 3.0),
-            grid=(0.05, 0.15),
-            over="joint_angle.span",
-        ),
+    "mass_shift",
+    Port.GROUND_TORQUE,
+    torque,
+    (
+        amplitude("shift_sin", "N m", Normal(0.0, 0.5), "with its sine", 100.0),
+        amplitude("shift_cos", "N m", Normal(0.0, 0.5), "with the angle's cosine", 100.0),
+        place("shift_angle", "angle at which it moves", 10),
+        width("shift_width", "over which it moves", 0.1, (0.05, 0.15)),
     ),
-    reference="H. Goldstein, Classical Mechanics (1980), section 1.2",
     of_weight=True,
+    apart="mass properties",
+    family="mass",
+    order=380,
 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from kbs_process.plant.effect import Effect, LogNormal, Normal, Parameter, Port
+from kbs_process.plant.effect import UNNAMED, Effect, LogNormal, Normal, Parameter, Port, amplitude
 
 COEFFICIENTS = 10
 INTERVALS = COEFFICIENTS - 3
@@ -141,9 +141,6 @@ def friction_over_rate(
     return -math.tanh(rate / slide) * torque_over_rate(x, low, high, c0, c1, c2, c3, c4, c5, c6, c7, c8, c9)
 
 
-REFERENCE = "C. de Boor, A Practical Guide to Splines (2001), chapter IX"
-
-
 @dataclass(frozen=True, slots=True)
 class Measured:
     """A measured law: what it is over, and the rate that it opposes, if it is a friction."""
@@ -156,6 +153,11 @@ class Measured:
     def of_rate(self) -> bool:
         """Whether it is over a rate, and its nodes are dense about rest."""
         return self.regressor.endswith("rate")
+
+    @property
+    def like_weight(self) -> bool:
+        """Whether the weight of a mass that moves with the joint looks the same."""
+        return self.effect.port is Port.GROUND_TORQUE and self.regressor == "joint_angle" and not self.opposed
 
     @property
     def words(self) -> str:
@@ -176,13 +178,12 @@ def _over(order: int, regressor: str, port: Port, law: str, opposed: str = "") -
     """A law with parameters named after it."""
     unit = unit_of(regressor)
     coefficients = tuple(
-        Parameter(
+        amplitude(
             f"{law}_{k}",
             "N m",
             Normal(0.0, 1.0),
             "about the torque at that node of the table, the first and the last one outside it",
-            (-1e4, 1e4),
-            role="amplitude",
+            1e4,
             dry=bool(opposed),
         )
         for k in range(COEFFICIENTS)
@@ -200,8 +201,8 @@ def _over(order: int, regressor: str, port: Port, law: str, opposed: str = "") -
     equations = (friction, friction_over_rate) if opposed else (torque, torque_over_rate)
     effect = Effect(
         f"{port.name.lower().removesuffix('_torque')}_{law.removeprefix('ground_').removeprefix('motor_')}",
-        port, equations[unit == UNITS["rate"]], (*coefficients, *shape), REFERENCE, wires=tuple(wires), order=order,
-        measured=True,
+        port, equations[unit == UNITS["rate"]], (*coefficients, *shape),
+        wires=tuple(wires), order=order, family=UNNAMED, measured=True,
     )  # fmt: skip
     return Measured(effect, regressor, opposed)
 

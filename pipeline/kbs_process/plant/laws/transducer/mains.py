@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kbs_process.plant.effect import LogNormal, Normal, Parameter
+from kbs_process.plant.effect import LogNormal, Normal, Parameter, sine_and_cosine
 from kbs_process.plant.sensing import Sensing, SensingPort
 from kbs_process.signals.records import Array
 
@@ -22,17 +22,22 @@ def change(time: Array, mains_sin: float, mains_cos: float, mains_frequency: flo
 
 
 MAINS = Sensing(
-    name="mains",
-    order=130,
-    port=SensingPort.CHANNEL,
-    equation=change,
-    parameters=(
-        Parameter("mains_sin", "1", Normal(0.0, 0.05), "sine, in the channel's unit", (-1e3, 1e3), role="amplitude"),
-        Parameter("mains_cos", "1", Normal(0.0, 0.05), "cosine, in the channel's unit", (-1e3, 1e3), role="amplitude"),
+    "mains",
+    SensingPort.CHANNEL,
+    change,
+    (
+        *sine_and_cosine("mains", "1", Normal(0.0, 0.05), "in the channel's unit", 1e3),
         Parameter(
-            "mains_frequency", "Hz", LogNormal(1.0, 2.0), "of the tone in the band", (1e-3, 1e4), over="spectrum"
+            "mains_frequency",
+            "Hz",
+            LogNormal(1.0, 2.0),
+            "of the tone in the band",
+            (1e-3, 1e4),
+            over="spectrum",
+            proposed="tone",
         ),
     ),
-    reference="H. W. Ott, Electromagnetic Compatibility Engineering (2009), chapter 2",
     each_trial=True,
+    family="mains",
+    order=130,
 )
