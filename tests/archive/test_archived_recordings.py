@@ -48,6 +48,7 @@ def test_archive_is_small() -> None:
     assert total <= LARGEST_ARCHIVE
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "index"), [("EL089", 1), ("ACQ600", 1), ("ALSTPP00", 1)])
 def test_beginning_of_a_recording_comes_out_the_same(name: str, index: int, tmp_path) -> None:
     campaign = CAMPAIGNS[name]
@@ -72,6 +73,7 @@ def test_beginning_of_a_recording_comes_out_the_same(name: str, index: int, tmp_
     assert len(messages["/transducer/wrench"]) > 490
 
 
+@pytest.mark.slow
 def test_any_ros2_reader_decodes_the_messages() -> None:
     file = CAMPAIGNS["EL089"].folder / "recordings" / "EL089P00_1.mcap"
     first: dict[str, object] = {}

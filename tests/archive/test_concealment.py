@@ -43,8 +43,7 @@ sys.addaudithook(lambda event, args: opened.add(args[0]) if event in ("open", "o
 from kbs_process.studies.correlate import run
 from kbs_process.campaign.load import load_campaign
 from kbs_process.progress import SilentProgress
-run.build = lambda folder, document, pdf: folder / "index.html"
-run.process(load_campaign(campaign), target, progress=SilentProgress(), pdf=False)
+run.process(load_campaign(campaign), target, progress=SilentProgress(), page=False)
 for path in sorted({str(path) for path in opened if isinstance(path, (str, bytes, Path))}):
     print(path)
 """
@@ -73,6 +72,7 @@ def test_code_names_neither_campaigns_nor_truth(folder: str):
         assert not found, f"{module.relative_to(ROOT)}: {found}"
 
 
+@pytest.mark.slow
 def test_processing_opens_nothing_but_the_campaign(tmp_path: Path):
     campaign = ROOT / "campaigns" / "ALSTPP00"
     done = subprocess.run(

@@ -20,6 +20,8 @@ from kbs_process.stages.align.condense import CondenseSettings, condense
 from kbs_process.stages.align.resample import resample
 from kbs_process.stages.bandpass import Band, apply
 
+pytestmark = pytest.mark.slow
+
 RATE, WORKING, SECONDS = 1000.0, 20.0, 3600
 BAND = Band("lt1Hz", 0.01, 1.0)
 TIMES_A_COPY, TIMES_FASTER, MEMORY_SHARE = 5.0, 7.0, 0.5

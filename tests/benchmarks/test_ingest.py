@@ -25,11 +25,13 @@ from mcap.writer import CompressionType
 from mcap_ros2.decoder import DecoderFactory
 from pytest_benchmark.fixture import BenchmarkFixture
 
-from ingest.mcap_files import rewrite
 from kbs_process.recordings.mcap.messages.encoding import Encoding, OutStream
 from kbs_process.recordings.mcap.source import open_recording
 from kbs_process.recordings.mcap.streams import Stream
 from kbs_process.recordings.mcap.writer import write_mcap
+from recordings.mcap.mcap_files import rewrite
+
+pytestmark = pytest.mark.slow
 
 MESSAGES = 1_000_000  # of each topic
 PEER_MESSAGES = 20_000

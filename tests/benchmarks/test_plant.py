@@ -16,9 +16,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from plant_rk4 import compiled_rk4
 from pytest_benchmark.fixture import BenchmarkFixture
 
+from benchmarks.plant_rk4 import compiled_rk4
 from engine import TRAJECTORIES, Hardware, simulate
 from kbs_process.campaign.load import load_campaign
 from kbs_process.plant.compiled.simulation import Simulation
@@ -28,6 +28,8 @@ from kbs_process.plant.schedule import Schedule
 from kbs_process.plant.structure import link_inertia
 from kbs_process.rig.model import Rig
 from kbs_process.signals.records import Array
+
+pytestmark = pytest.mark.slow
 
 CAMPAIGN = Path(__file__).parents[2] / "campaigns" / "EL089"
 SECONDS = 90.0

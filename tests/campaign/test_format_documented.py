@@ -11,8 +11,8 @@ from typing import Any
 
 import pytest
 
-from kbs_process.campaign.formats.schemas import schema_text
 from kbs_process.campaign.units import DIMENSIONS, UnitMismatchError, factor
+from kbs_process.studies.schemas import schema_text
 
 DOCUMENT = (Path(__file__).parents[2] / "docs" / "campaign.md").read_text(encoding="utf-8")
 

@@ -10,7 +10,7 @@ from typing import Any
 import jsonschema
 import pytest
 
-from kbs_process.campaign.formats.schemas import FORMATS, schema_text
+from kbs_process.studies.schemas import FORMATS, schema_text
 
 ROOT = Path(__file__).parents[2]
 FILES = sorted((ROOT / "campaigns").rglob("*.toml"))
@@ -23,7 +23,7 @@ def stored(name: str) -> Path:
 @pytest.mark.parametrize("name", FORMATS)
 def test_the_committed_schema_is_the_one_of_the_format(name: str) -> None:
     text = schema_text(name)
-    assert stored(name).read_text(encoding="utf-8") == text, f"python -m kbs_process.campaign.formats {name}"
+    assert stored(name).read_text(encoding="utf-8") == text, f"python -m kbs_process.studies {name}"
     jsonschema.Draft202012Validator.check_schema(json.loads(text))
 
 

@@ -215,6 +215,7 @@ def processable(tmp_path: Path) -> CampaignFolder:
     return folder
 
 
+@pytest.mark.slow
 def test_validate_finds_sound_recordings_clean(processable: CampaignFolder, capsys: pytest.CaptureFixture[str]) -> None:
     assert run("validate", str(processable.path), "--check") == 0
     out = capsys.readouterr().out
@@ -223,6 +224,7 @@ def test_validate_finds_sound_recordings_clean(processable: CampaignFolder, caps
     assert "4 recordings: 0 unreadable, 0 with losses" in out
 
 
+@pytest.mark.slow
 def test_validate_tells_losses_and_fails_only_when_asked(
     processable: CampaignFolder, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -234,6 +236,7 @@ def test_validate_tells_losses_and_fails_only_when_asked(
     assert "EL089P00_3  held-out     clean" in out
 
 
+@pytest.mark.slow
 def test_validate_tells_what_was_put_in_order_and_counts_no_loss(
     processable: CampaignFolder, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -245,6 +248,7 @@ def test_validate_tells_what_was_put_in_order_and_counts_no_loss(
     assert "4 recordings: 0 unreadable, 0 with losses" in out
 
 
+@pytest.mark.slow
 def test_validate_tells_a_recording_of_which_nothing_is_whole_long_enough(
     processable: CampaignFolder, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -258,6 +262,7 @@ def test_validate_tells_a_recording_of_which_nothing_is_whole_long_enough(
     assert "wrench and angles are whole for 0 s of 20 s" in out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("trajectories", "hinted"),
     [
@@ -361,6 +366,7 @@ def test_simulate_a_command_file(folder: CampaignFolder, tmp_path: Path) -> None
     assert angle["el"].to_numpy()[-1] == pytest.approx(1.302, abs=2e-3)
 
 
+@pytest.mark.slow
 def test_an_interrupted_simulation_leaves_the_old_one(folder: CampaignFolder, tmp_path: Path) -> None:
     target = tmp_path / "simulated"
     target.mkdir()

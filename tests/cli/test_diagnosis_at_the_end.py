@@ -20,7 +20,7 @@ from kbs_process.results.records import encode
 from kbs_process.studies.correlate.run import Outcome
 from kbs_process.studies.diagnose import diagnosing
 from report import sample
-from report.test_report_diagnosis import results
+from studies.diagnose.test_report_diagnosis import results
 
 NOISE = SimpleNamespace(source="declared", statement="what the data sheets say")
 LINK = 'href="diagnosis/index.html"'
@@ -146,6 +146,7 @@ def test_results_that_cannot_be_written_are_an_error(finished: Path, monkeypatch
     assert run(finished) == cli.BAD_INPUT
 
 
+@pytest.mark.slow
 def test_a_wrench_that_no_plant_makes_exceeds_the_floor(tmp_path: Path) -> None:
     """Recordings whose wrench is noise about a constant whatever the arm does."""
     folder = make_folder(tmp_path / "campaigns" / "EL089")

@@ -14,7 +14,9 @@ from kbs_process.campaign.load import load_campaign
 from kbs_process.results import provenance
 from kbs_process.results.records import encode
 from kbs_process.studies.correlate.earlier_diagnosis import earlier_diagnosis
-from report.test_report_diagnosis import results
+from studies.diagnose.test_report_diagnosis import results
+
+pytestmark = pytest.mark.slow
 
 LINK = 'href="diagnosis/index.html"'
 

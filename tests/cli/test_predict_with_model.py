@@ -15,14 +15,16 @@ from campaign.campaign_folder import make_folder
 from end_to_end.short_campaign import record
 from kbs_process import cli
 from kbs_process.campaign.config import SensingLaw
-from kbs_process.campaign.corrected_model import write_model
 from kbs_process.campaign.load import load_campaign
+from kbs_process.campaign.writing.corrected_model import write_model
 from kbs_process.diagnosis.experiments.hypothesis import Hypothesis
 from kbs_process.diagnosis.proposing.measured import inserted
 from kbs_process.plant.laws.position.measured_law import MEASURED
 from kbs_process.recordings.inspection import inspect_recording
 from kbs_process.rig.model import Quantity
 from kbs_process.signals.records import Array
+
+pytestmark = pytest.mark.slow
 
 PULL = 0.5  # N m about elevation, from the laboratory
 GAIN = 0.02  # of Fz

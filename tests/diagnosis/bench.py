@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
-from kbs_process.campaign.load import load_campaign
+from archived import CAMPAIGNS, campaign
 from kbs_process.diagnosis.experiments.experiment import Drive, Experiment, Trial
 from kbs_process.diagnosis.experiments.floor import declared
 from kbs_process.diagnosis.experiments.hypothesis import Hypothesis, predict
@@ -20,14 +20,14 @@ from kbs_process.plant.predict import Schedule
 from kbs_process.rig.model import Rig
 from kbs_process.signals.records import Array
 
-CAMPAIGN = Path(__file__).parents[2] / "campaigns" / "EL089"
+CAMPAIGN = CAMPAIGNS / "EL089"
 DT = 0.05
 SECONDS = 12.0
 
 
 def rig() -> Rig:
     """EL089's."""
-    return load_campaign(CAMPAIGN, recordings=False).rig
+    return campaign("EL089", recordings=False).rig
 
 
 def unrounded(given: Rig) -> Rig:
@@ -36,7 +36,7 @@ def unrounded(given: Rig) -> Rig:
 
 
 def effects() -> tuple[str, ...]:
-    return load_campaign(CAMPAIGN, recordings=False).effects
+    return campaign("EL089", recordings=False).effects
 
 
 def schedule(seconds: float = SECONDS) -> Schedule:
@@ -54,14 +54,20 @@ def noise(rng: np.random.Generator, n: int, c: int) -> Array:
 
 
 def experiment(
-    truth: Rig, roles: tuple[str, ...], seed: int, seconds: float = SECONDS, *, bare_encoders: bool = False
+    truth: Rig,
+    roles: tuple[str, ...],
+    seed: int,
+    seconds: float = SECONDS,
+    *,
+    bare_encoders: bool = False,
+    path: Callable[[float], Schedule] = schedule,
 ) -> Experiment:
     """Trials of one trajectory with `truth` for hardware, biases and noise of their own; encoders do not round."""
     nominal = unrounded(rig()) if bare_encoders else rig()
     n = round(seconds / DT)
     channels = (*nominal.transducer.channels, *nominal.joint_names)
     units = ("N",) * 3 + ("N m",) * 3 + ("rad",) * 2
-    drive = Drive(0, n, schedule(seconds), None, 100.0, 100.0)
+    drive = Drive(0, n, path(seconds), None, 100.0, 100.0)
     bare = Experiment(nominal, effects(), DT, channels, units, (drive,), (), 8.0)
     exact = predict(Hypothesis(truth, effects()), bare, 0).values
     rng = np.random.default_rng(seed)

@@ -18,7 +18,8 @@ from kbs_process.diagnosis.facts import Answer
 from kbs_process.studies.diagnose.report import _HEADLINES
 
 ROOT = Path(__file__).parents[2]
-NOT_OURS = {"build", "node_modules", "reports"}
+RESULTS = {"tables/", "corrected/"}  # folders of results
+NOT_OURS = {"build", "node_modules", "results"}
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 PYPROJECT = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
 # Packages that are run, not imported, and where one sees it.
@@ -61,6 +62,27 @@ def test_links_lead_somewhere(document: Path) -> None:
         assert target.exists(), link
         assert target.is_relative_to(ROOT), link
         assert not anchor or anchor in anchors(target), link
+
+
+@pytest.mark.parametrize("name", ["architecture", "diagnosis", "identification", "proof"])
+def test_paths_that_developers_read_exist(name: str) -> None:
+    """Of the package, its tests or the repository; NAME and the like stand for any."""
+    text = re.sub(r"```.*?```", "", (ROOT / "docs" / "dev" / f"{name}.md").read_text(encoding="utf-8"), flags=re.DOTALL)
+    named = set(re.findall(r"`([\w./-]+/[\w.-]*(?:\.py)?)`", text))
+    paths = {path for path in named if (path.endswith((".py", "/"))) and not re.search(r"[A-Z]{4}", path)}
+    roots = (ROOT, ROOT / "pipeline" / "kbs_process", ROOT / "tests")
+    assert {path for path in paths if not any((root / path).exists() for root in roots)} <= RESULTS
+    assert paths
+
+
+def test_the_folders_of_the_architecture_stand_in_the_order_of_the_layers() -> None:
+    layers = tomllib.loads(PYPROJECT)["tool"]["importlinter"]["contracts"][0]["layers"]
+    level = {name.removeprefix("kbs_process."): depth for depth, one in enumerate(layers) for name in one.split(" | ")}
+    table = (ROOT / "docs" / "dev" / "architecture.md").read_text(encoding="utf-8").partition("## Folders")[2]
+    cells = re.findall(r"^\| (`[^|]+) \|", table.partition("\nStudies know")[0], flags=re.MULTILINE)
+    named = [name for cell in cells for name in re.findall(r"`(\w+)(?:/|\.py)`", cell)]
+    assert [level[name] for name in named] == sorted(level[name] for name in named)
+    assert level.keys() - set(named) == {"progress", "interruption"}
 
 
 def test_the_readme_s_verbs_are_the_command_line_s() -> None:
@@ -120,6 +142,7 @@ def test_every_dependency_is_justified_and_nothing_else() -> None:
     assert all(row[-1] for row in rows)
 
 
+@pytest.mark.slow
 def test_every_dependency_is_used() -> None:
     runtime, test = dependencies()
     # A package without a wheel for this machine is not installed here; its marker says so.
@@ -130,6 +153,7 @@ def test_every_dependency_is_used() -> None:
         assert evidence in README + PYPROJECT, name
 
 
+@pytest.mark.slow
 def test_what_is_imported_is_declared_or_comes_with_what_is() -> None:
     runtime, _ = dependencies()
     extra = imported("pipeline") - {"kbs-process"} - runtime

@@ -27,6 +27,7 @@ def clone(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_every_command_prints_what_is_shown(clone: Path) -> None:
     activated = "true"
     for step in steps(ROOT / "docs" / "tutorial.md"):

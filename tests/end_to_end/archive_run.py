@@ -15,7 +15,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
-from unittest.mock import patch
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -79,8 +78,7 @@ def main() -> None:
     from kbs_process.studies.correlate import run
 
     target, name = Path(sys.argv[1]), sys.argv[2]
-    with patch.object(run.build, "build", lambda folder, _: folder / "index.html"):
-        run.process(load_campaign(CAMPAIGNS_FOLDER / name), target, progress=SilentProgress(), pdf=False)
+    run.process(load_campaign(CAMPAIGNS_FOLDER / name), target, progress=SilentProgress(), page=False)
 
 
 if __name__ == "__main__":

@@ -10,7 +10,7 @@ from pathlib import Path
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 
-from ingest.mcap_files import top_records
+from recordings.mcap.mcap_files import top_records
 
 CHUNK = 6
 STAMP = struct.Struct("<iI")  # of a ROS 2 header, behind the encapsulation's four bytes

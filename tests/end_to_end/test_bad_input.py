@@ -17,6 +17,8 @@ from campaign.campaign_folder import CampaignFolder
 from end_to_end.command import kbs_process
 from end_to_end.short_campaign import record
 
+pytestmark = pytest.mark.slow
+
 CAMPAIGN, RIG = "campaign.toml", "parameters/rig.toml"
 FIRST = "AZPS_ATA.mcap"
 

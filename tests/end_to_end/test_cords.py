@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import pytest
+
 from end_to_end.archive_run import Processed
+
+pytestmark = pytest.mark.slow
 
 
 def torques(campaign: Processed, recording: str) -> dict[str, float]:

@@ -19,6 +19,8 @@ from kbs_process.progress import SilentProgress
 from kbs_process.recordings.mcap.source import open_recording
 from kbs_process.studies.correlate.run import process
 
+pytestmark = pytest.mark.slow
+
 KEPT = 0.6  # share of the file that the recorder wrote
 NOT_NUMBERS = (60.0, 60.5)  # s, in which Tz is NaN, then infinite
 BACK = (120.0, 120.3)  # s, in which the transducer's clock is 2 s back

@@ -10,6 +10,8 @@ import pytest
 
 from end_to_end.archive_run import Processed, process_apart
 
+pytestmark = pytest.mark.slow
+
 # What differs between two users of one machine, and must not matter.
 ELSEWHERE = {
     "PYTHONHASHSEED": "4242",

@@ -14,6 +14,8 @@ from end_to_end.archive_run import Processed
 from end_to_end.expected import EXPECTED_FOLDER, differences, expected, extract
 from engine.campaigns import CAMPAIGNS
 
+pytestmark = pytest.mark.slow
+
 
 def test_every_campaign_has_them() -> None:
     assert {path.stem for path in EXPECTED_FOLDER.glob("*.json")} == set(CAMPAIGNS)

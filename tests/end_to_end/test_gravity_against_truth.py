@@ -18,6 +18,8 @@ from kbs_process.signals.records import WRENCH_CHANNELS, WRENCH_UNITS, Signal
 from kbs_process.stages import bandpass
 from kbs_process.stages.bandpass import Band
 
+pytestmark = pytest.mark.slow
+
 # Four of those with an antenna and without a cord, for time.
 NAMES = ("EL089", "AZPS_ATA", "AESTPP00", "ACQ600")
 INFORMED = 1.5  # prior sigma over sigma, from which the recordings have a say
@@ -54,7 +56,7 @@ def _fitted(campaign: Processed) -> Fitted:
 
 
 def test_stated_sigmas_cover_the_truth(fitted: dict[str, Fitted]) -> None:
-    """On many campaigns, drawn for nothing else: `python -m gravity.coverage`."""
+    """On many campaigns, drawn for nothing else: `python -m stages.gravity.coverage`."""
     z = np.concatenate([one.z for one in fitted.values()])
     gain = np.concatenate([one.prior_sigma / one.sigma for one in fitted.values()])
     informed = z[gain > INFORMED]

@@ -14,6 +14,8 @@ import pytest
 from campaign.campaign_folder import CampaignFolder
 from end_to_end.command import kbs_process
 
+pytestmark = pytest.mark.slow
+
 OLD = {"results.json": "old", "index.html": "old page"}
 ROOM = "40"  # blocks of 512 bytes, less than a table needs
 PATIENCE = 120.0  # s

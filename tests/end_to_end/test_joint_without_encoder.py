@@ -28,10 +28,11 @@ from kbs_process.reduction.reading import read_run
 from kbs_process.reduction.settings import motion_settings
 from kbs_process.signals.records import Events, Signal
 from kbs_process.stages.motion import estimate
-from kbs_process.studies.correlate import run
 from kbs_process.studies.correlate.run import process
 from kbs_process.studies.diagnose.reading import experiment_of
 from kbs_process.studies.identify.run import identify
+
+pytestmark = pytest.mark.slow
 
 TOPIC = 'encoder = "/encoder"'
 READ = 'encoder = { topic = "/encoder", joints = ["el"] }'
@@ -46,14 +47,11 @@ def folder(folder: CampaignFolder) -> CampaignFolder:
     return folder
 
 
-def test_it_is_where_its_command_is_and_the_budget_says_how_well(
-    folder: CampaignFolder, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(run, "build", lambda target, document, pdf: target / "index.html")
+def test_it_is_where_its_command_is_and_the_budget_says_how_well(folder: CampaignFolder, tmp_path: Path) -> None:
     campaign = load_campaign(folder.path, checksums=False)
     assert campaign.topics.angle is not None
     assert (campaign.topics.angle.channels, campaign.topics.angle.fields) == (("el",), ("position[el]",))
-    process(campaign, tmp_path / "out", progress=SilentProgress(), pdf=False)
+    process(campaign, tmp_path / "out", progress=SilentProgress(), page=False)
     table = pq.read_table(tmp_path / "out" / "tables" / "aligned" / "EL089P00_1.parquet")
     assert [name for name in table.column_names if name.startswith("angle.")] == ["angle.el"]
     items = json.loads((tmp_path / "out" / "results.json").read_text())["budget"]

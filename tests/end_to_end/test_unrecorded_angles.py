@@ -14,13 +14,14 @@ from kbs_process.campaign.load import load_campaign
 from kbs_process.progress import SilentProgress
 from kbs_process.recordings.mcap.messages.encoding import OutStream
 from kbs_process.recordings.mcap.writer import write_mcap
-from kbs_process.studies.correlate import run
 from kbs_process.studies.correlate.run import process
+
+pytestmark = pytest.mark.slow
 
 STOPPED = 12.0  # s, of twenty
 
 
-def test_a_disturbance_is_not_judged_where_the_angles_are_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_a_disturbance_is_not_judged_where_the_angles_are_missing(tmp_path: Path):
     folder = short_campaign(tmp_path / "EL089")
     stamp = np.arange(2000) * 10_000_000
     angle = np.stack([np.zeros(2000), 1.3 + 0.1 * np.sin(0.5 * stamp * 1e-9)], axis=1)
@@ -35,9 +36,8 @@ def test_a_disturbance_is_not_judged_where_the_angles_are_missing(tmp_path: Path
             OutStream("/command", "joints", stamp[::10], stamp[::10], command, JOINTS),
         ],
     )
-    monkeypatch.setattr(run, "build", lambda target, document, pdf: target / "index.html")
     out = tmp_path / "out"
-    process(load_campaign(folder.path, checksums=False), out, progress=SilentProgress(), pdf=False)
+    process(load_campaign(folder.path, checksums=False), out, progress=SilentProgress(), page=False)
 
     for band in ("unfiltered", "lt1Hz", "lt2Hz"):
         table = pq.read_table(out / "tables" / "bands" / f"EL089P00_2.{band}.parquet")

@@ -11,6 +11,8 @@ from engine import Commands, Hardware, simulate
 from engine.simulation import TIME_STEP
 from engine.trajectories import Axis, commands
 
+pytestmark = pytest.mark.slow
+
 CAMPAIGN = Path(__file__).parents[2] / "campaigns" / "EL089"
 
 # Through tooth-passing resonances; close to the singularity, both axes; quick azimuth.

@@ -14,6 +14,8 @@ from engine.rigid import AZ, EL, PLATE, ROTOR_AZ, ROTOR_EL, build, rotation
 from engine.simulation import equilibrium, integrate
 from engine.trajectories import Axis, commands
 
+pytestmark = pytest.mark.slow
+
 CAMPAIGN = Path(__file__).parents[2] / "campaigns" / "EL089"
 NOMINAL = Hardware.from_campaign(CAMPAIGN)
 G = 9.80665

@@ -12,6 +12,8 @@ from engine import Hardware
 from engine.sensors import PINK_CORNER, Recording, coloured, read_transducer, record
 from engine.trajectories import Axis, commands
 
+pytestmark = pytest.mark.slow
+
 CAMPAIGN = Path(__file__).parents[2] / "campaigns" / "EL089"
 HARDWARE = Hardware.from_campaign(CAMPAIGN, seed=3)
 PATH = commands(Axis(0.0).rest(1.0).accelerate(0.5, 0.1), Axis(75.0), 6.0)

@@ -9,14 +9,12 @@ import sys
 from pathlib import Path
 
 import kbs_process
-from kbs_process.campaign.schema import schema_folder
 
 
 def copy_package(folder: Path) -> Path:
     """Copy the package into `folder`; return the copy."""
     package = folder / "kbs_process"
     shutil.copytree(Path(kbs_process.__file__).parent, package)  # with what is compiled: it is found by its file's date
-    shutil.copytree(schema_folder(), package / "schemas", dirs_exist_ok=True)
     return package
 
 

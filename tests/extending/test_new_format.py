@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from extending.scratch import copy_package, run_copy
-from importers.importer_files import MAPPING, read_back, signals, write_mapping
+from studies.convert.importer_files import MAPPING, read_back, signals, write_mapping
 
 BLOCKS = '''"""Blocks: a line of names, then doubles, a row after the other."""
 

@@ -11,6 +11,8 @@ from kbs_process.estimation.fit import Parameters, difference_jacobian
 from kbs_process.identification.contact import edge_minima, left_to_contact
 from kbs_process.identification.screening import Contact
 
+pytestmark = pytest.mark.slow
+
 FINE = 512  # places around a turn
 PSI = -np.pi + (np.arange(FINE) + 0.5) * 2.0 * np.pi / FINE
 PARAMETERS = Parameters(

@@ -18,6 +18,8 @@ from kbs_process.identification.screening import contacts
 from kbs_process.rig.model import substitute
 from kbs_process.signals.records import Array
 
+pytestmark = pytest.mark.slow
+
 FREE = ("tcog", "phi_cog", "d1", "phi_dyn", "Ts0", "delta", "phi_stat", "Ka")
 SEED = 1  # its contact has a minimum elsewhere that costs 120 more
 

@@ -17,6 +17,8 @@ from kbs_process.identification.unknowns import frictions, gearbox, others, prio
 from kbs_process.reduction.reading import read_run
 from kbs_process.studies.identify.measured import measured
 
+pytestmark = pytest.mark.slow
+
 TESTS = Path(__file__).parents[1]
 STEP = 5e-4  # s
 

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from kbs_process.estimation.fit import triangle
-from kbs_process.identification import objective
 from kbs_process.identification.objective import Objective
 from kbs_process.identification.output_error import Experiment, Spectra
 from kbs_process.identification.screening import Task
@@ -37,9 +36,10 @@ def length_of_sum(J: np.ndarray) -> float:
     return float(np.linalg.norm(J @ np.array([0.5, 0.5])))
 
 
-def test_jumps_make_no_information_of_the_sum(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(objective, "frictions", lambda _: ())
-    toy = cast(Experiment, SimpleNamespace(free=("a", "b"), recordings=("only",)))
+def test_jumps_make_no_information_of_the_sum() -> None:
+    toy = cast(
+        Experiment, SimpleNamespace(free=("a", "b"), recordings=("only",), rig=SimpleNamespace(joints=()), effects=())
+    )
     noise = cast(Spectra, ())
     slopes = Objective(toy, [noise], evaluate, np.array([0.05, 0.03]), 2, central=True)
     theta, scale = np.array([0.3, 0.2]), np.ones(2)

@@ -4,18 +4,31 @@ from __future__ import annotations
 
 from dataclasses import replace
 from datetime import timedelta
-from pathlib import Path
+from functools import cache
 
-from kbs_process.campaign.load import load_campaign
+from archived import CAMPAIGNS, campaign
 from kbs_process.campaign.mission import Day, load_day
 from kbs_process.mission.model import Mission, Orbit
 
-FOLDER = Path(__file__).parents[2] / "campaigns" / "REFDAY"
-DAY: Day = load_day(load_campaign(FOLDER, recordings=False))
-MISSION: Mission = DAY.mission
-ORBIT: Orbit = MISSION.orbit
+FOLDER = CAMPAIGNS / "REFDAY"
+
+
+@cache
+def day() -> Day:
+    """The archived day."""
+    return load_day(campaign("REFDAY", recordings=False))
+
+
+def mission() -> Mission:
+    """Its mission."""
+    return day().mission
+
+
+def orbit() -> Orbit:
+    """The orbit of its spacecraft."""
+    return mission().orbit
 
 
 def later(hours: float) -> Mission:
     """Return the mission begun `hours` later: another longitude of the node, other passes."""
-    return replace(MISSION, orbit=replace(ORBIT, epoch=ORBIT.epoch + timedelta(hours=hours)))
+    return replace(mission(), orbit=replace(orbit(), epoch=orbit().epoch + timedelta(hours=hours)))

@@ -11,18 +11,18 @@ from hypothesis import strategies as st
 from kbs_process.mission.geometry import azimuth_elevation, boresight, line_of_sight, local_frame, occulted, separation
 from kbs_process.mission.orbit import EARTH_RADIUS, EARTH_RATE, relay, spacecraft
 from kbs_process.signals.records import Array
-from mission.reference import MISSION, ORBIT
+from mission import reference
 
 T = np.arange(0.0, 14600.0, 20.0)
 
 
 def test_elevation_and_azimuth_by_triangles() -> None:
     """From the sides of the triangle Earth - spacecraft - relay, and from the orbit's normal: no frame is built."""
-    for one in MISSION.relays:
-        u, _ = line_of_sight(MISSION, one, T)
+    for one in reference.mission().relays:
+        u, _ = line_of_sight(reference.mission(), one, T)
         q = azimuth_elevation(u)
-        r, v = spacecraft(ORBIT, T)
-        target = relay(one, ORBIT, T)
+        r, v = spacecraft(reference.orbit(), T)
+        target = relay(one, reference.orbit(), T)
         distance = np.linalg.norm(target - r, axis=1)
         high = np.linalg.norm(r, axis=1)
         along = np.sum(r * target, axis=1) / high
@@ -36,10 +36,10 @@ def test_elevation_and_azimuth_by_triangles() -> None:
 
 
 def test_a_satellite_is_lost_at_the_earth_s_limb() -> None:
-    u, hidden = line_of_sight(MISSION, MISSION.relays[0], T)
+    u, hidden = line_of_sight(reference.mission(), reference.mission().relays[0], T)
     elevation = azimuth_elevation(u)[:, 1]
-    r, _ = spacecraft(ORBIT, T)
-    limb = -np.arccos((EARTH_RADIUS + MISSION.grazing_height) / np.linalg.norm(r, axis=1))
+    r, _ = spacecraft(reference.orbit(), T)
+    limb = -np.arccos((EARTH_RADIUS + reference.mission().grazing_height) / np.linalg.norm(r, axis=1))
     assert hidden.any() and not hidden.all()
     assert np.array_equal(hidden, elevation < limb)
 
@@ -67,7 +67,7 @@ def test_separation_is_exact_at_small_and_large_angles(angle: float) -> None:
 
 
 def test_the_local_frame_looks_up_forward_and_along_the_normal() -> None:
-    r, v = spacecraft(ORBIT, T)
+    r, v = spacecraft(reference.orbit(), T)
     R = local_frame(r, v)
     assert np.linalg.det(R) == pytest.approx(1.0)
     up = r / np.linalg.norm(r, axis=1, keepdims=True)
@@ -77,11 +77,11 @@ def test_the_local_frame_looks_up_forward_and_along_the_normal() -> None:
 
 
 def test_yaw_steering_follows_the_ground_track() -> None:
-    r, v = spacecraft(ORBIT, T)
+    r, v = spacecraft(reference.orbit(), T)
     plain, steered = local_frame(r, v), local_frame(r, v, yaw_steering=True)
     yaw = np.arccos(np.clip(np.sum(plain[:, :, 0] * steered[:, :, 0], axis=1), -1.0, 1.0))
     node = np.argmin(np.abs(r[:, 2]))
-    speed, i = np.linalg.norm(v[node]), ORBIT.inclination
+    speed, i = np.linalg.norm(v[node]), reference.orbit().inclination
     turned = np.array([speed * np.cos(i) - EARTH_RATE * np.linalg.norm(r[node]), speed * np.sin(i)])
     expected = np.arccos(turned @ [np.cos(i), np.sin(i)] / np.linalg.norm(turned))
     assert yaw[node] == pytest.approx(expected, rel=0.02)

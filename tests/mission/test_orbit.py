@@ -20,7 +20,7 @@ from kbs_process.mission.orbit import (
     spacecraft,
 )
 from kbs_process.signals.records import Array
-from mission.reference import ORBIT
+from mission import reference
 
 J2 = 1.082616e-3
 
@@ -33,19 +33,19 @@ def node_passages(t: Array, z: Array) -> Array:
 
 def longitude(t: Array) -> Array:
     """Longitude of the point below the spacecraft, rad."""
-    r, _ = spacecraft(ORBIT, t)
-    return np.arctan2(r[:, 1], r[:, 0]) - sidereal_angle(ORBIT, t)
+    r, _ = spacecraft(reference.orbit(), t)
+    return np.arctan2(r[:, 1], r[:, 0]) - sidereal_angle(reference.orbit(), t)
 
 
 def test_the_node_comes_round_501_times_in_35_days() -> None:
     t = np.arange(0.0, 86400.0 * 2, 10.0)
-    passages = node_passages(t, spacecraft(ORBIT, t)[0][:, 2])
+    passages = node_passages(t, spacecraft(reference.orbit(), t)[0][:, 2])
     assert np.mean(np.diff(passages)) == pytest.approx(35 * 86400 / 501, abs=0.05)
 
 
 def test_the_ground_track_repeats_after_35_days() -> None:
     period = 35 * 86400 / 501
-    start = node_passages(*(lambda t: (t, spacecraft(ORBIT, t)[0][:, 2]))(np.arange(0.0, 7000.0, 5.0)))[0]
+    start = node_passages(*(lambda t: (t, spacecraft(reference.orbit(), t)[0][:, 2]))(np.arange(0.0, 7000.0, 5.0)))[0]
     again = np.array([start, start + 501 * period])
     first, last = longitude(again)
     moved = np.degrees(np.angle(np.exp(1j * (last - first))))
@@ -54,15 +54,15 @@ def test_the_ground_track_repeats_after_35_days() -> None:
 
 def test_the_ascending_node_is_passed_at_22_h_local_time() -> None:
     t = np.arange(0.0, 86400.0, 5.0)
-    passages = node_passages(t, spacecraft(ORBIT, t)[0][:, 2])
-    epoch = ORBIT.epoch
+    passages = node_passages(t, spacecraft(reference.orbit(), t)[0][:, 2])
+    epoch = reference.orbit().epoch
     universal = epoch.hour + epoch.minute / 60.0 + passages / 3600.0
     local = (universal + np.degrees(longitude(passages)) / 15.0) % 24.0
     assert np.abs(local - 22.0).max() < 1.0 / 60.0
 
 
 def test_size_and_precession_are_those_of_a_sun_synchronous_orbit_of_800_km() -> None:
-    made = satellite(ORBIT)
+    made = satellite(reference.orbit())
     assert made.a * EARTH_RADIUS == pytest.approx(7159.5e3, abs=200.0)  # ENVISAT's published mean semi-major axis
     per_year = made.nodedot / 60.0 * 86400.0 * 365.2422
     assert per_year == pytest.approx(2.0 * np.pi, rel=2e-4)
@@ -70,7 +70,7 @@ def test_size_and_precession_are_those_of_a_sun_synchronous_orbit_of_800_km() ->
 
 def test_propagation_agrees_with_an_integration_of_gravity() -> None:
     t = np.linspace(0.0, 6000.0, 61)
-    r, v = spacecraft(ORBIT, t)
+    r, v = spacecraft(reference.orbit(), t)
 
     def gravity(_: float, y: Array) -> Array:
         x, n = y[:3], np.linalg.norm(y[:3])
@@ -83,14 +83,14 @@ def test_propagation_agrees_with_an_integration_of_gravity() -> None:
 
 def test_the_velocity_is_the_position_s_derivative() -> None:
     t = np.arange(0.0, 6000.0, 0.5)
-    r, v = spacecraft(ORBIT, t)
+    r, v = spacecraft(reference.orbit(), t)
     assert np.abs((r[2:] - r[:-2]) / 1.0 - v[1:-1]).max() < 0.5  # m/s
 
 
 def test_sidereal_angle_is_the_one_of_sgp4_and_advances_by_the_earth_s_rate() -> None:
-    day, fraction = julian_date(ORBIT)
+    day, fraction = julian_date(reference.orbit())
     t = np.array([0.0, 1000.0, 86400.0])
-    ours = sidereal_angle(ORBIT, t)
+    ours = sidereal_angle(reference.orbit(), t)
     theirs = [gstime(day + fraction + one / 86400.0) for one in t]
     assert np.abs(np.angle(np.exp(1j * (ours - theirs)))).max() < 1e-8
     assert (ours[1] - ours[0]) % (2.0 * np.pi) == pytest.approx(1000.0 * EARTH_RATE, rel=1e-8)
@@ -98,8 +98,8 @@ def test_sidereal_angle_is_the_one_of_sgp4_and_advances_by_the_earth_s_rate() ->
 
 def test_a_relay_stays_above_its_longitude_at_the_geostationary_radius() -> None:
     t = np.linspace(0.0, 86400.0, 25)
-    r = relay(Relay("X", np.radians(59.0)), ORBIT, t)
+    r = relay(Relay("X", np.radians(59.0)), reference.orbit(), t)
     assert np.linalg.norm(r, axis=1) == pytest.approx(42164e3, abs=2e3)
-    east = np.arctan2(r[:, 1], r[:, 0]) - sidereal_angle(ORBIT, t)
+    east = np.arctan2(r[:, 1], r[:, 0]) - sidereal_angle(reference.orbit(), t)
     assert np.abs(np.angle(np.exp(1j * (east - np.radians(59.0))))).max() < 1e-9
     assert pytest.approx(EARTH_MU) == GEOSTATIONARY_RADIUS**3 * EARTH_RATE**2

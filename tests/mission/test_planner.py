@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -13,9 +14,13 @@ from kbs_process.mission.geometry import azimuth_elevation, line_of_sight
 from kbs_process.mission.model import Mission
 from kbs_process.mission.planner import Plan, plan
 from kbs_process.studies.reference_day.day import boundaries
-from mission.reference import DAY, MISSION, later
+from mission import reference
 
-PLAN = plan(MISSION, DAY.lead)
+
+@cache
+def planned() -> Plan:
+    """The reference day."""
+    return plan(reference.mission(), reference.day().lead)
 
 
 def in_limits(made: Plan, mission: Mission) -> None:
@@ -28,46 +33,47 @@ def in_limits(made: Plan, mission: Mission) -> None:
 
 @pytest.mark.parametrize("hours", [0.0, 5.0, 11.0, -0.75, 1.0])
 def test_no_limit_is_broken_whatever_the_passes(hours: float) -> None:
-    mission = replace(later(hours), cycle=0.5)
+    mission = replace(reference.later(hours), cycle=0.5)
     in_limits(plan(mission), mission)
 
 
 def test_the_reference_day_is_within_its_limits_and_whole() -> None:
-    in_limits(PLAN, MISSION)
-    assert PLAN.t[0] == pytest.approx(-DAY.lead) and PLAN.t[-1] == pytest.approx(MISSION.duration)
-    assert PLAN.phases[0].start == 0 and PLAN.phases[-1].end == len(PLAN.t)
-    assert all(a.end == b.start for a, b in zip(PLAN.phases[:-1], PLAN.phases[1:], strict=True))
+    made, day = planned(), reference.day()
+    in_limits(made, day.mission)
+    assert made.t[0] == pytest.approx(-day.lead) and made.t[-1] == pytest.approx(day.mission.duration)
+    assert made.phases[0].start == 0 and made.phases[-1].end == len(made.t)
+    assert all(a.end == b.start for a, b in zip(made.phases[:-1], made.phases[1:], strict=True))
 
 
 def test_while_tracking_the_antenna_looks_at_the_satellite_in_view() -> None:
-    relays = {one.name: one for one in MISSION.relays}
-    for phase in PLAN.phases:
+    relays = {one.name: one for one in reference.mission().relays}
+    for phase in planned().phases:
         span = slice(phase.start, phase.end)
-        u, hidden = line_of_sight(MISSION, relays[phase.relay], PLAN.t[span])
+        u, hidden = line_of_sight(reference.mission(), relays[phase.relay], planned().t[span])
         if phase.mode == "tracking":
             assert not hidden.any()
-            assert PLAN.q[span] == pytest.approx(azimuth_elevation(u), abs=1e-12)
-            assert PLAN.offset[span].max() < 1e-12
+            assert planned().q[span] == pytest.approx(azimuth_elevation(u), abs=1e-12)
+            assert planned().offset[span].max() < 1e-12
         else:
-            assert PLAN.offset[span].max() > np.radians(10.0)
+            assert planned().offset[span].max() > np.radians(10.0)
 
 
 def test_the_losses_come_when_the_published_day_has_them() -> None:
-    losses = [event.t for event in PLAN.events if event.kind == "loss"]
+    losses = [event.t for event in planned().events if event.kind == "loss"]
     assert losses == pytest.approx([1500.0, 4400.0, 6500.0], abs=60.0)
 
 
 def test_the_first_two_satellites_set_and_the_third_pass_ends_at_the_stop() -> None:
-    lost = [phase.end - 1 for phase in PLAN.phases if phase.mode == "tracking"][:3]
-    azimuth, elevation = np.degrees(PLAN.q[lost]).T
+    lost = [phase.end - 1 for phase in planned().phases if phase.mode == "tracking"][:3]
+    azimuth, elevation = np.degrees(planned().q[lost]).T
     assert elevation[:2] == pytest.approx([-25.0, -25.0], abs=1.0)
     assert azimuth[2] == pytest.approx(165.0, abs=0.1) and elevation[2] > 0.0
 
 
 def test_sections_cover_the_day_without_a_gap() -> None:
-    found = boundaries(DAY, PLAN)
+    found = boundaries(reference.day(), planned())
     assert [entry.name for entry, _, _ in found] == ["1", "2", "3", "4", "5a", "5b", "6", "7", "8"]
-    assert found[0][1] == 0.0 and found[-1][2] == MISSION.duration == 14600.0
+    assert found[0][1] == 0.0 and found[-1][2] == reference.mission().duration == 14600.0
     assert all(a[2] == b[1] and b[2] > b[1] for a, b in itertools.pairwise(found))
 
 
@@ -75,7 +81,7 @@ def test_sections_cover_the_day_without_a_gap() -> None:
 def test_a_pass_close_to_the_zenith_is_bridged(hours: float, yaw: float) -> None:
     """DRS59 culminates at 87.0 and 88.6 deg, and azimuth would have to accelerate beyond the limit."""
     turned = np.array([0.0, 0.0, np.radians(yaw)])
-    mission = replace(later(hours), relays=MISSION.relays[:1], attitude=turned, cycle=0.5)
+    mission = replace(reference.later(hours), relays=reference.mission().relays[:1], attitude=turned, cycle=0.5)
     made = plan(mission)
     in_limits(made, mission)
     (bridge,) = [phase for phase in made.phases if phase.mode == "zenith"]
@@ -87,14 +93,16 @@ def test_a_pass_close_to_the_zenith_is_bridged(hours: float, yaw: float) -> None
 
 
 def test_a_hand_over_is_as_fast_as_the_limits_allow() -> None:
-    phase = next(phase for phase in PLAN.phases if phase.mode == "hand-over")
-    turned = abs(PLAN.q[phase.end, 0] - PLAN.q[phase.start, 0])
-    least = 2.0 * np.sqrt(turned / MISSION.limits.acceleration)  # from rest to rest
-    assert (phase.end - phase.start) * MISSION.cycle == pytest.approx(least, abs=8.0)
+    phase = next(phase for phase in planned().phases if phase.mode == "hand-over")
+    turned = abs(planned().q[phase.end, 0] - planned().q[phase.start, 0])
+    least = 2.0 * np.sqrt(turned / reference.mission().limits.acceleration)  # from rest to rest
+    assert (phase.end - phase.start) * reference.mission().cycle == pytest.approx(least, abs=8.0)
 
 
 def test_the_antenna_takes_its_time_to_a_satellite_that_has_yet_to_rise() -> None:
-    mission = replace(MISSION, relays=MISSION.relays[:1], cycle=0.5)  # DRS59 alone: it sets, and rises again
+
+    day = reference.mission()
+    mission = replace(day, relays=day.relays[:1], cycle=0.5)  # DRS59 alone: it sets, and rises again
     made = plan(mission)
     waits = [phase for phase in made.phases if phase.mode == "pre-pointing"]
     assert waits
@@ -105,6 +113,6 @@ def test_the_antenna_takes_its_time_to_a_satellite_that_has_yet_to_rise() -> Non
 
 
 def test_a_day_without_any_satellite_is_refused() -> None:
-    blind = replace(MISSION, grazing_height=30000e3, cycle=1.0)
+    blind = replace(reference.mission(), grazing_height=30000e3, cycle=1.0)
     with pytest.raises(MissionError, match="no relay satellite can be tracked at the beginning"):
         plan(blind)

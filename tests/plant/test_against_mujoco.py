@@ -7,11 +7,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from plant_rigs import NOMINAL, streams, two_axis
 
 from engine import TRAJECTORIES, Hardware, simulate
 from kbs_process.plant.schedule import Schedule
 from kbs_process.signals.records import Array
+from plant.plant_rigs import NOMINAL, streams, two_axis
+
+pytestmark = pytest.mark.slow
 
 CAMPAIGN = Path(__file__).parents[2] / "campaigns" / "EL089"
 NOISE = np.array([0.02] * 3 + [0.002] * 3)  # rms a sample at 100 Hz

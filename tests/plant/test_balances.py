@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-import energetics as lab
 import numpy as np
 import pytest
-from plant_rigs import NOMINAL, body, joint, one_axis, rig, three_axis, two_axis
 from scipy.linalg import eigh
 
 from kbs_process.plant.attach import attach
@@ -18,6 +16,10 @@ from kbs_process.plant.predict import predict
 from kbs_process.plant.schedule import Schedule
 from kbs_process.rig.model import Rig, substitute
 from kbs_process.signals.records import Array
+from plant import energetics as lab
+from plant.plant_rigs import NOMINAL, body, joint, one_axis, rig, three_axis, two_axis
+
+pytestmark = pytest.mark.slow
 
 FREE = {"d0": 0.0, "d1": 0.0, "Ts0": 0.0, "b_m": 0.0, "fsv": 0.0}
 

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from plant_rigs import CODE, NOMINAL, streams, two_axis
 
 from engine import TRAJECTORIES
 from kbs_process.plant.attach import attach
@@ -16,6 +15,9 @@ from kbs_process.plant.laws.hysteresis.lugre import LUGRE
 from kbs_process.plant.predict import DEFAULT_STEP
 from kbs_process.plant.schedule import Schedule
 from kbs_process.signals.records import Array
+from plant.plant_rigs import CODE, NOMINAL, streams, two_axis
+
+pytestmark = pytest.mark.slow
 
 NOISE = np.array([0.02] * 3 + [0.002] * 3)  # rms a sample
 

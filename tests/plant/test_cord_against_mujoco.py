@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from plant_rigs import CODE, streams
+import pytest
 
 from engine import TRAJECTORIES, simulate
 from engine.campaigns import ABOVE_ANTENNA, CAMPAIGNS
@@ -12,6 +12,9 @@ from kbs_process.plant.attach import attach
 from kbs_process.plant.laws.environment.bungee import BUNGEE
 from kbs_process.plant.schedule import Schedule
 from kbs_process.rig.model import substitute
+from plant.plant_rigs import CODE, streams
+
+pytestmark = pytest.mark.slow
 
 UNTIL = 30.0
 NOISE = np.array([0.02] * 3 + [0.002] * 3)  # rms a sample at 100 Hz

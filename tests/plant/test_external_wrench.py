@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from plant_rigs import NOMINAL, two_axis
 
 from kbs_process.plant.attach import attach
 from kbs_process.plant.compiled.simulation import Simulation
@@ -14,6 +13,7 @@ from kbs_process.plant.laws.environment.bungee import BUNGEE
 from kbs_process.plant.schedule import Schedule
 from kbs_process.rig.model import Rig, substitute
 from kbs_process.signals.records import Array
+from plant.plant_rigs import NOMINAL, two_axis
 
 COG = np.array([0.07, 0.06, -0.02])
 CORD = {"stiffness": 60.0, "free_length": 0.7117, "anchor_x": 0.07, "anchor_y": 0.06, "anchor_z": 3.2}

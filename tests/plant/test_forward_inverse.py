@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-import energetics as lab
 import numpy as np
-from plant_rigs import NOMINAL, two_axis
+import pytest
 
 from kbs_process.plant.compiled.simulation import Simulation
 from kbs_process.plant.laws import select
 from kbs_process.plant.rigid import inverse_dynamics
 from kbs_process.plant.schedule import Schedule
+from plant import energetics as lab
+from plant.plant_rigs import NOMINAL, two_axis
+
+pytestmark = pytest.mark.slow
 
 
 def test_inverse_dynamics_of_a_step_give_its_wrench() -> None:

@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from plant_rigs import joint, two_axis
 from scipy.spatial.transform import Rotation
 
 from kbs_process.plant.rigid import kinematics
 from kbs_process.plant.structure import turn
 from kbs_process.rig.model import Quantity
 from kbs_process.signals.frames import about_axis, from_rotation_vector
+from plant.plant_rigs import joint, two_axis
 
 
 def test_a_joint_turns_about_its_axis_behind_its_misalignment_numbers_read_only() -> None:

@@ -42,7 +42,7 @@ FAN = Effect(
 USE = """
 import json
 import numpy as np
-from plant_rigs import NOMINAL, one_axis, streams
+from plant.plant_rigs import NOMINAL, one_axis, streams
 
 import kbs_process
 from kbs_process.diagnosis.screening.ranges import Ranges

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-import energetics as lab
 import numpy as np
 import pytest
-from plant_rigs import NOMINAL, three_axis, two_axis
 
 from kbs_process.errors import ConfigError
 from kbs_process.plant.attach import attach
@@ -19,6 +17,8 @@ from kbs_process.plant.linear.linearise import linearise
 from kbs_process.plant.schedule import Schedule
 from kbs_process.rig.model import Rig, substitute
 from kbs_process.signals.records import Array
+from plant import energetics as lab
+from plant.plant_rigs import NOMINAL, three_axis, two_axis
 
 FREE = {"d0": 0.0, "d1": 0.0, "Ts0": 0.0, "b_m": 0.0, "fsv": 0.0}
 
@@ -93,6 +93,7 @@ def at_rest(of: Rig, position: Any) -> Simulation:
     return simulation(of, LOADS, standing(position))
 
 
+@pytest.mark.slow
 def test_reaction_of_the_ground_is_felt_and_that_inside_a_joint_is_not() -> None:
     of, position = two_axis(stiffness=None, amplifier=None), np.radians([30.0, 70.0])
     bare, inside, ground = (at_rest(each, position) for each in (hung(of), pushed(hung(of), 2.0), hung(of, hold=2.0)))
@@ -135,6 +136,7 @@ def loaded(shake: float, **settings: Any) -> tuple[Rig, tuple[Effect, ...]]:
     return attach(of, SHAKE, {"shake": shake}), (GROUND, PULL, SHAKE)
 
 
+@pytest.mark.slow
 def test_energy_gained_is_the_loads_work_less_what_is_dissipated() -> None:
     step = 5e-5
     of, effects = loaded(0.0, damping=(3.0, 2.0, 4.0))

@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from plant_rigs import NOMINAL, streams, two_axis
 
 from kbs_process.errors import SimulationError
 from kbs_process.plant.schedule import Schedule, covering
+from plant.plant_rigs import NOMINAL, streams, two_axis
 
 SETTINGS = {"rate_Hz": 100.0, "angle_rate_Hz": 10.0, "duration_s": 6.0}
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from plant_rigs import CODE, NOMINAL, one_axis, quantity, streams, two_axis
 from scipy.signal import butter, freqs
 
 from kbs_process.errors import ConfigError, SimulationError
@@ -12,6 +11,7 @@ from kbs_process.plant.amplifier import discretised, steady
 from kbs_process.plant.predict import predict
 from kbs_process.plant.schedule import Schedule
 from kbs_process.rig.model import Amplifier, substitute
+from plant.plant_rigs import CODE, NOMINAL, one_axis, quantity, streams, two_axis
 
 
 def climbing(duration: float) -> Schedule:
@@ -78,6 +78,7 @@ def test_recording_that_starts_after_its_commands() -> None:
     np.testing.assert_allclose(part["angle"], whole["angle"][150:], atol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_motor_too_weak_to_hold_is_refused() -> None:
     of = substitute(one_axis(stiffness=None), {"joint.tip.drive.parameters.Tmax": 1e-3})
     schedule = Schedule(np.array([0.0, 0.1]), np.zeros((2, 1)), np.zeros((2, 1)))
@@ -85,6 +86,7 @@ def test_a_motor_too_weak_to_hold_is_refused() -> None:
         predict(of, NOMINAL, schedule, rate_Hz=100.0, angle_rate_Hz=10.0, duration_s=1.0)
 
 
+@pytest.mark.slow
 def test_an_unstable_solution_is_reported() -> None:
     of = substitute(
         one_axis(stiffness=None), {"body.load.inertia": [1e-9, 1e-9, 1e-9, 0, 0, 0], "body.load.cog": [0, 0, 0]}

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from time import monotonic
 
-from proof.prove import finish, judge
+from proof.prove import finish, isolation, judge, workers
 from proof.score import Row
 from proof.seal import SealError
 from proof.words import METHODS, OURS
@@ -59,7 +59,8 @@ def main() -> int:
     try:
         work = Work(folder, split, count, asked.seed, command)
         if not asked.answered:
-            finish(work, methods, jobs=asked.jobs, dask=asked.dask, tell=tell)
+            with workers(asked.jobs, asked.dask) as pool:
+                finish(work, methods, pool, isolated=isolation(asked.dask), tell=tell)
         rows = judge(work, methods, target, command=command, tell=tell)
     except (BenchError, SealError) as error:
         print(f"error: {error}", file=sys.stderr)

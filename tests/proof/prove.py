@@ -7,6 +7,7 @@ import os
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
 from contextlib import contextmanager
+from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
 from typing import TypeVar
@@ -54,21 +55,31 @@ def workers(jobs: int, dask: str | None) -> Iterator[Executor]:
         yield pool
 
 
-def finish(work: Work, methods: tuple[str, ...], *, jobs: int, dask: str | None, tell: Tell) -> None:
-    """Make the trials of a bench that are missing, and let every method answer those that it has not."""
-    work.begin(isolation(dask))
+def finish(
+    work: Work,
+    methods: tuple[str, ...],
+    pool: Executor,
+    *,
+    isolated: str,
+    tell: Tell,
+    answered: Callable[[Job], dict[str, bytes]] = answer_trial,
+) -> None:
+    """Make the trials of a bench that are missing, and let every method answer those that it has not.
+
+    `isolated` says what methods run in, and `answered` runs them.
+    """
+    work.begin(isolated)
     tell(f"Each method runs in {work.isolation}")
-    with workers(jobs, dask) as pool:
-        orders = work.orders()
-        for done, (order, content) in enumerate(_each(pool, make_sealed, orders), start=1):
-            work.keep_trial(order.name, content)
-            tell(f"made {order.name}, {done} of {len(orders)}")
-        unanswered = work.unanswered(methods)
-        todo = (Job(name, work.trial(name), left, hidden=(work.folder,)) for name, left in unanswered)
-        for done, (job, given) in enumerate(_each(pool, answer_trial, todo), start=1):
-            for method, content in given.items():
-                work.keep_answer(job.trial, method, content)
-            tell(f"answered {job.trial}, {done} of {len(unanswered)}: {', '.join(given)}")
+    orders = work.orders()
+    for done, (order, content) in enumerate(_each(pool, partial(make_sealed, make=work.maker.make), orders), start=1):
+        work.keep_trial(order.name, content)
+        tell(f"made {order.name}, {done} of {len(orders)}")
+    unanswered = work.unanswered(methods)
+    todo = (Job(name, work.trial(name), left, hidden=(work.folder,)) for name, left in unanswered)
+    for done, (job, given) in enumerate(_each(pool, answered, todo), start=1):
+        for method, content in given.items():
+            work.keep_answer(job.trial, method, content)
+        tell(f"answered {job.trial}, {done} of {len(unanswered)}: {', '.join(given)}")
 
 
 def judge(work: Work, methods: tuple[str, ...], target: Path, *, command: str, tell: Tell) -> tuple[Row, ...]:

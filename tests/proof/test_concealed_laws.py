@@ -19,6 +19,8 @@ from proof.concealed.laws import COLUMNS, STATES, Law, act
 from proof.concealed.observed import Motion
 from proof.concealed.physics import Effect, Within
 
+pytestmark = pytest.mark.slow
+
 CAMPAIGN = Path(__file__).parents[2] / "campaigns" / "EL089"
 HARDWARE = Hardware.from_campaign(CAMPAIGN, seed=5)
 PATH = commands(Axis(10.0).accelerate(0.4, 0.4).accelerate(-0.4, 0.4), Axis(60.0).accelerate(0.5, 0.25), 4.0)

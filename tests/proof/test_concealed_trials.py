@@ -17,6 +17,8 @@ from proof.concealed.ranges import Phase, Range, share
 from proof.concealed.recording import record
 from proof.concealed.trials import Spec
 
+pytestmark = pytest.mark.slow
+
 
 def test_more_trials_begin_with_the_same_ones_and_every_physics_comes() -> None:
     many = trials.draw("development", 300, 4)

@@ -22,6 +22,8 @@ from proof.odd.__main__ import main
 from proof.odd.cases import BY_NUMBER, CASES, Case
 from proof.truth import Truth
 
+pytestmark = pytest.mark.slow
+
 
 def altered(number: str, **odd: Any) -> Case:
     """A case with some entries of its own."""

@@ -6,9 +6,7 @@ import json
 import operator
 import subprocess
 import sys
-from collections.abc import Iterator
-from concurrent.futures import Executor, ThreadPoolExecutor
-from contextlib import contextmanager
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -17,11 +15,13 @@ import pytest
 
 from kbs_process.errors import ConfigError
 from kbs_process.studies import prove as verb
-from proof import answer, prove, trials
+from proof import answer, prove
 from proof.answer import Answer, Claim
 from proof.methods import Job, failed
 from proof.words import OURS
 from proof.work import BenchError, Work
+
+pytestmark = pytest.mark.slow
 
 COGGING = {"port": "motor torque", "axis": "el", "family": "cogging"}
 
@@ -53,27 +53,14 @@ def guess(job: Job) -> dict[str, bytes]:
     return {method: answer.encode(given[method]) for method in job.methods}
 
 
-@pytest.fixture(autouse=True)
-def made_up(monkeypatch: pytest.MonkeyPatch) -> None:
-    maker = SimpleNamespace(draw=draw, make=make)
-    monkeypatch.setattr(trials, "maker", lambda: maker)
-    monkeypatch.setattr("proof.work.maker", lambda: maker)
-    monkeypatch.setattr(prove, "answer_trial", guess)
-
-    @contextmanager
-    def threads(jobs: int, dask: str | None) -> Iterator[Executor]:
-        with ThreadPoolExecutor(jobs) as pool:
-            yield pool
-
-    monkeypatch.setattr(prove, "workers", threads)
-
-
 def test_a_bench_ends_with_a_score_a_ledger_and_a_page(tmp_path: Path) -> None:
     said: list[str] = []
 
     def run(methods: tuple[str, ...]) -> dict[tuple[str, str], float | None]:
-        bench = Work(tmp_path / "work", "development", 4, 1, "kbs-process prove")
-        prove.finish(bench, methods, jobs=2, dask=None, tell=said.append)
+        maker = SimpleNamespace(draw=draw, make=make)
+        bench = Work(tmp_path / "work", "development", 4, 1, "kbs-process prove", maker)
+        with ThreadPoolExecutor(2) as pool:
+            prove.finish(bench, methods, pool, isolated="threads", tell=said.append, answered=guess)
         rows = prove.judge(bench, methods, tmp_path / "out", command="python -m proof", tell=said.append)
         return {(row.method, row.metric): row.value for row in rows if row.group == "all"}
 
@@ -91,8 +78,7 @@ def test_a_bench_ends_with_a_score_a_ledger_and_a_page(tmp_path: Path) -> None:
 
 
 @pytest.mark.filterwarnings("ignore")  # of a library that is not ours, on its way up and down
-def test_work_runs_on_a_dask_cluster(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.undo()
+def test_work_runs_on_a_dask_cluster() -> None:
     from distributed import LocalCluster
 
     with (
@@ -105,7 +91,6 @@ def test_work_runs_on_a_dask_cluster(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.filterwarnings("ignore")
 def test_a_cluster_that_is_not_there_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.undo()
     monkeypatch.setattr(prove, "_PATIENCE", 0.2)
     with pytest.raises(BenchError, match="dask scheduler"), prove.workers(1, "tcp://127.0.0.1:9"):
         pass

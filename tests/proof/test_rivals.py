@@ -13,6 +13,8 @@ from proof.rivals import boosting, gaussian, greybox, parameters, sparse
 from proof.rivals.case import Array, Case, Recording
 from proof.rivals.library import library, suspect
 
+pytestmark = pytest.mark.slow
+
 CHANNELS = ("Fz", "Tx", "Tz", "angle.az")
 DT, SAMPLES = 0.2, 300
 Law = Callable[[dict[str, Array]], Array]  # signals -> (n, channels), in units of the floor

@@ -23,8 +23,19 @@ def test_the_set_is_whole() -> None:
     assert len(TRIALS) == 2
 
 
-@pytest.mark.parametrize("name", TRIALS)
-def test_verdict_is_right(name: str) -> None:
+@pytest.mark.slow
+@pytest.mark.parametrize("name", TRIALS[1:])
+def test_what_is_concealed_is_told(name: str) -> None:
+    verdict_is_right(name)
+
+
+@pytest.mark.validation
+@pytest.mark.parametrize("name", TRIALS[:1])
+def test_nothing_is_told_where_nothing_is_concealed(name: str) -> None:
+    verdict_is_right(name)
+
+
+def verdict_is_right(name: str) -> None:
     content = (FOLDER / f"{name}.tar").read_bytes()
     given = answer.decode(answer_trial(Job(name, content, (OURS,), timeout_s=900.0))[OURS])
     assert given.failure == ""

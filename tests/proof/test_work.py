@@ -26,25 +26,18 @@ def make(specification: int, folder: Path) -> dict[str, Any]:
     return {"trial": folder.name, "kind": "nothing", "split": "development"}
 
 
-@pytest.fixture(autouse=True)
-def small_trials(monkeypatch: pytest.MonkeyPatch) -> None:
-    maker = SimpleNamespace(draw=draw, make=make)
-    monkeypatch.setattr(trials, "maker", lambda: maker)
-    monkeypatch.setattr("proof.work.maker", lambda: maker)
-
-
 def answered(trial: str, method: str, seconds: float = 1.0) -> bytes:
     return encode(Answer(method=method, trial=trial, detected=False, verdict="none", seconds=seconds))
 
 
 def work(folder: Path, count: int = 3, seed: int | None = 5) -> Work:
-    return Work(folder, "development", count, seed, "kbs-process prove")
+    return Work(folder, "development", count, seed, "kbs-process prove", SimpleNamespace(draw=draw, make=make))
 
 
 def finished(folder: Path) -> Work:
     bench = work(folder)
     for order in bench.orders():
-        bench.keep_trial(order.name, trials.make_sealed(order))
+        bench.keep_trial(order.name, trials.make_sealed(order, make))
     for name, methods in bench.unanswered(METHODS):
         for method in methods:
             bench.keep_answer(name, method, answered(name, method))
@@ -54,7 +47,7 @@ def finished(folder: Path) -> Work:
 def test_what_is_answered_before_the_first_gap_can_be_judged_and_the_rest_stays_sealed(tmp_path: Path) -> None:
     bench = work(tmp_path)
     for order in bench.orders():
-        bench.keep_trial(order.name, trials.make_sealed(order))
+        bench.keep_trial(order.name, trials.make_sealed(order, make))
     names = sorted(bench.plan.names)
     with pytest.raises(BenchError, match="first trial has no answer"):
         bench.close(METHODS)
@@ -76,7 +69,7 @@ def test_what_is_answered_before_the_first_gap_can_be_judged_and_the_rest_stays_
 def test_only_what_is_missing_is_done_again(tmp_path: Path) -> None:
     bench = work(tmp_path)
     first, *others = bench.orders()
-    bench.keep_trial(first.name, trials.make_sealed(first))
+    bench.keep_trial(first.name, trials.make_sealed(first, make))
     bench.keep_answer(first.name, "sparse", answered(first.name, "sparse"))
     again = work(tmp_path)
     assert [order.name for order in again.orders()] == [order.name for order in others]
@@ -114,7 +107,7 @@ def test_a_trial_that_is_exchanged_is_refused(tmp_path: Path) -> None:
     bench = finished(tmp_path)
     bench.close(METHODS)
     order = trials.Order(bench.plan.names[1], 99, seal.public(bench.key))
-    bench.keep_trial(order.name, trials.make_sealed(order))
+    bench.keep_trial(order.name, trials.make_sealed(order, make))
     with pytest.raises(BenchError, match="seals, changed"):
         bench.close(METHODS)
 
@@ -125,10 +118,9 @@ def test_another_bench_in_the_same_folder_is_refused(tmp_path: Path) -> None:
         work(tmp_path, count=4)
 
 
-def test_what_is_made_is_what_the_contract_asks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_made_is_what_the_contract_asks() -> None:
     def wrong(specification: int, folder: Path) -> dict[str, Any]:
         return make(specification, folder) | {"hint": 1}
 
-    monkeypatch.setattr(trials, "maker", lambda: SimpleNamespace(draw=draw, make=wrong))
     with pytest.raises(msgspec.ValidationError, match="hint"):
-        trials.make_sealed(trials.Order("T1", 1, seal.public(seal.new_key())))
+        trials.make_sealed(trials.Order("T1", 1, seal.public(seal.new_key())), wrong)

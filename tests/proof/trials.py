@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol, cast
@@ -34,19 +34,19 @@ class Order:
     public_key: bytes
 
 
-def maker() -> Maker:
+def generator() -> Maker:
     """Return the generator of this checkout."""
     from proof.concealed import trials
 
     return cast(Maker, trials)
 
 
-def make_sealed(order: Order) -> bytes:
+def make_sealed(order: Order, make: Callable[[Any, Path], dict[str, Any]]) -> bytes:
     """Make a trial and return its folder, packed, what is concealed sealed in it."""
     with tempfile.TemporaryDirectory(prefix="make-") as scratch:
         folder = Path(scratch) / order.name
         folder.mkdir()
-        told = maker().make(order.specification, folder) | {"trial": order.name}
+        told = make(order.specification, folder) | {"trial": order.name}
         add_seal(folder, msgspec.convert(told, truth.Truth), order.public_key)
         return pack(folder)
 

@@ -58,8 +58,13 @@ _EACH = {
     "port, in no catalogue": "port, outside the catalogue",
     "all of several": "all of several",
 }
-_LIMITS = """- The code and the test bench changed between sets. The table says how often the answers of that time were right. It
-  measures no single version.
+_NULL = {
+    "nothing": "no effect",
+    "within": "no effect; parameters within their uncertainties",
+    "beyond": "no effect; beyond their uncertainty: ",
+}
+_LIMITS = """- The code and the test bench changed between sets. The table says how often the answers were right.
+  It measures no single version.
 - A right family can still be wrong in fact. One of the right ones is the curve of another channel.
 - "Undecided" with the right effect as the nearest one counts as right.
 - The catalogue grew towards what the generator makes: 14 of its effects were outside at first, 6 are now.
@@ -100,16 +105,17 @@ def sentence(rows: Sequence[Row], sets: int, trials: int) -> str:
         _row(rows, name) for name in ("place", "physics", "false find", "port, in no catalogue")
     )
     return (
-        f"The diagnosis is experimental. In {trials} sealed trials ({sets} sets, with changes of the code between them) it\n"
-        f"named the right physics for {physics.right} of {physics.of} single effects of its catalogue "
-        f"({_interval(physics)}).\nThe place was right for {place.right}. "
-        f"Of effects outside the catalogue it found the port in {outside.right} of {outside.of}.\n"
-        f"It reported an effect in {false.right} of {false.of} trials that had none.\n"
+        f"The diagnosis is experimental. It was tried on {trials} simulated campaigns with concealed effects "
+        f"({sets} sealed\nsets, with changes of the code between them). "
+        f"Of {physics.of} single effects that its catalogue has, it named {physics.right}\n"
+        f"rightly ({_interval(physics)}), and placed {place.right}. "
+        f"Of {outside.of} effects outside the catalogue it found where {outside.right} enter.\n"
+        f"It reported an effect in {false.right} of {false.of} campaigns that had none.\n"
     )
 
 
 def document(sets: Sequence[Sealed], whole: Bench, line: str, rivals: Bench) -> str:
-    """The page on how often the diagnosis is right: `line`, all sets as one, rivals, each set, each trial, each case."""
+    """The page on how often the diagnosis is right: `line`, all sets as one, rivals, each set, trial and case."""
     made = sum(one.made for one in sets)
     return "\n".join(
         (
@@ -118,13 +124,13 @@ def document(sets: Sequence[Sealed], whole: Bench, line: str, rivals: Bench) -> 
             "<!-- Written by `cd tests && python -m proof.validations`; do not edit. -->",
             "",
             line,
-            "A sealed trial is a campaign with effects that its model lacks. What they are is encrypted until all answers",
-            "are written ([how](dev/proof.md)). Brackets hold exact binomial intervals of 95 %.",
+            "A sealed trial is a campaign with effects that its model lacks. What they are is encrypted until all",
+            "answers are written ([how](dev/proof.md)). Brackets hold exact binomial intervals of 95 %.",
             "",
             "## All sets together",
             "",
-            f"{made} trials were sealed. {len(whole.truths)} are scored. The others were not answered when the time was "
-            "up, and stayed sealed.",
+            f"{made} trials were sealed. {len(whole.truths)} are scored. The others were not answered when the time",
+            "was up, and stayed sealed.",
             "",
             *_table(("number", "all strengths", "strength 300 and more"), _together(whole.rows)),
             "",
@@ -134,8 +140,8 @@ def document(sets: Sequence[Sealed], whole: Bench, line: str, rivals: Bench) -> 
             "",
             "## Beside other methods",
             "",
-            f"{len(rivals.truths)} of the trials were answered by the rivals, too. All methods get the same recordings,",
-            "the same repeatability and the same refit of the nominal parameters.",
+            f"{len(rivals.truths)} of the trials were answered by the rivals, too. All methods get the same",
+            "recordings, the same repeatability and the same refit of the nominal parameters.",
             "",
             *(f"- *{name}*: {what}." for name, what in RIVALS.items()),
             "",
@@ -148,6 +154,7 @@ def document(sets: Sequence[Sealed], whole: Bench, line: str, rivals: Bench) -> 
             "## Trial by trial",
             "",
             "The number in brackets is the strength. At the transducer the place includes the strongest channel.",
+            "*Unnamed* are an effect outside the catalogue, and a measured curve.",
             *(line for one in sets for line in _trials(one)),
             "",
             *_cases(),
@@ -176,20 +183,15 @@ def _one(one: Sealed) -> Sequence[str]:
 def _trials(one: Sealed) -> Iterable[str]:
     answers = {answer.trial: answer for answer in one.bench.answers if answer.method == OURS}
     ordered = sorted(one.bench.truths, key=lambda truth: (-truth.level, truth.kind, truth.trial))
-    rows = (
-        (
-            _strength(truth),
-            said(answers[truth.trial]),
-            answers[truth.trial].verdict,
-            _judged(truth, answers[truth.trial]),
-        )
-        for truth in ordered
-    )
+    pairs = ((truth, answers[truth.trial]) for truth in ordered)
+    rows = ((_strength(truth), said(answer), answer.verdict, _judged(truth, answer)) for truth, answer in pairs)
     yield from ("", f"### Set {one.number}", "", *_table(("concealed", "said", "answer", "right"), rows))
 
 
 def _strength(truth: Truth) -> str:
-    return concealed(truth) + (f" ({truth.level:g})" if truth.effects else "")
+    if truth.effects:
+        return f"{concealed(truth)} ({truth.level:g})"
+    return f"{_NULL[truth.kind]}{', '.join(f'{one.name} by {one.sigmas:.1f} sigma' for one in truth.beyond)}"
 
 
 def _judged(truth: Truth, answer: Answer) -> str:
@@ -198,7 +200,9 @@ def _judged(truth: Truth, answer: Answer) -> str:
         return "no answer"
     if truth.kind in NULLS:
         right = answer.verdict == ("parameters off" if truth.kind == "beyond" else "none")
-        return "no" if answer.finds else "yes" if right else "no effect claimed"
+        return (
+            "no" if answer.finds else "yes" if right else "missed" if answer.verdict == "none" else "no effect claimed"
+        )
     judged = match(answer, truth.effects)
     if len(judged) > 1:
         return f"{sum(one.place for one in judged)} of {len(judged)} places"

@@ -19,7 +19,7 @@ import msgspec
 from proof import answer, seal
 from proof.answer import Answer, Part
 from proof.bundle import SEAL, SEAL_DIGEST, member
-from proof.trials import Order, break_seal, maker
+from proof.trials import Maker, Order, break_seal, generator
 from proof.truth import Truth
 from proof.words import Split
 
@@ -45,9 +45,12 @@ class Ledger(Part, frozen=True, kw_only=True):
 
 
 class Work:
-    """A working folder; `plan` is what it holds, or what a new one is made for."""
+    """A working folder; `plan` is what it holds, or what a new one is made for, and `maker` who makes its trials."""
 
-    def __init__(self, folder: Path, split: Split, count: int, seed: int | None, command: str) -> None:
+    def __init__(
+        self, folder: Path, split: Split, count: int, seed: int | None, command: str, maker: Maker | None = None
+    ) -> None:
+        self._maker = maker
         self.folder = folder.absolute()
         plan_file, key_file = self.folder / "plan.json", self.folder / "key"
         if plan_file.is_file():
@@ -72,6 +75,11 @@ class Work:
         self.key = key_file.read_bytes()
 
     @property
+    def maker(self) -> Maker:
+        """Who makes the trials: the generator of this checkout, unless another was given."""
+        return self._maker or generator()
+
+    @property
     def isolation(self) -> str:
         """What the methods ran in, as noted when they did."""
         return (self.folder / "isolation").read_text(encoding="utf-8")
@@ -88,7 +96,7 @@ class Work:
 
     def orders(self) -> list[Order]:
         """Trials that are still to be made."""
-        specifications = maker().draw(self.plan.split, len(self.plan.names), self.plan.seed)
+        specifications = self.maker.draw(self.plan.split, len(self.plan.names), self.plan.seed)
         public = seal.public(self.key)
         return [
             Order(name, specification, public)

@@ -55,10 +55,10 @@ class Processed:
         return table["t"].to_numpy(), np.column_stack([table[column].to_numpy() for column in columns])
 
 
-def processed(mapping, source, folder):
-    """Import files by a mapping into a folder, and process the campaign."""
+def processed(mapping, source, folder, *, page=False):
+    """Import files by a mapping into a folder, and process the campaign; pages take longest."""
     campaign = import_recordings(mapping, source, folder / "campaign")
-    process(load_campaign(campaign), folder / "results", progress=SilentProgress(), pdf=False)
+    process(load_campaign(campaign), folder / "results", progress=SilentProgress(), pdf=False, page=page)
     return Processed(campaign, folder / "results")
 
 

@@ -11,12 +11,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gravity.real_sets import DATA, hand_free, hub_axes, low_pass
 from kbs_process.reduction.reading import read_run
 from kbs_process.signals.records import WRENCH_CHANNELS
 from real.campaigns import EDGE_S, exchanged, processed, sampling_error
+from stages.gravity.real_sets import DATA, hand_free, hub_axes, low_pass
 
-pytestmark = pytest.mark.skipif(not DATA.is_dir(), reason="real recordings (../shared/data) are not here")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not DATA.is_dir(), reason="real recordings (../shared/data) are not here"),
+]
 
 TREADMILL = {  # known change of the moment's rms by the compensation, %: trained on one trial, tested on the other
     ("treadmill_fast", 1): (-83.4, -82.0),

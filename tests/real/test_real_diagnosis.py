@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfiltfilt
 
-from gravity.real_sets import DATA
 from kbs_process.campaign.load import load_campaign
 from kbs_process.diagnosis.acceptance.outcome import Outcome
 from kbs_process.diagnosis.selection.explain import explain
@@ -23,11 +22,15 @@ from kbs_process.studies.diagnose.reading import experiment_of
 from kbs_process.studies.diagnose.simulators import simulating
 from real.campaigns import sampling_error
 from real.test_real_efforts import EMPS, EMPS_S, ODRIVE
+from stages.gravity.real_sets import DATA
 
-pytestmark = pytest.mark.skipif(
-    not (DATA / "emps").is_dir() or not (DATA / "odrive_cogging").is_dir(),
-    reason="real recordings (../shared/data) are not here",
-)
+pytestmark = [
+    pytest.mark.validation,
+    pytest.mark.skipif(
+        not (DATA / "emps").is_dir() or not (DATA / "odrive_cogging").is_dir(),
+        reason="real recordings (../shared/data) are not here",
+    ),
+]
 BAND_HZ = 20.0  # in which a residual is scored
 
 

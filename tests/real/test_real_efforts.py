@@ -11,15 +11,17 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from gravity.real_sets import DATA
-from kbs_process.studies.correlate import run
 from real.campaigns import processed, sampling_error
 from real.effort_screen import Screen, suspects
+from stages.gravity.real_sets import DATA
 
-pytestmark = pytest.mark.skipif(
-    not (DATA / "emps").is_dir() or not (DATA / "odrive_cogging").is_dir(),
-    reason="real recordings (../shared/data) are not here",
-)
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(
+        not (DATA / "emps").is_dir() or not (DATA / "odrive_cogging").is_dir(),
+        reason="real recordings (../shared/data) are not here",
+    ),
+]
 
 EMPS_S, ODRIVE_S = 24.8, 9.5
 EMPS = {0: 10.12, 1: 3.06, 2: 2.66, 3: 2.51}  # N: viscous, + Coulomb and offset, + asymmetric viscous, + Stribeck
@@ -29,14 +31,12 @@ FRICTION = ("asymmetric_coulomb", "asymmetric_viscous", "stribeck")
 
 @pytest.fixture(scope="module")
 def axis(tmp_path_factory):
-    return processed("emps", DATA / "emps", tmp_path_factory.mktemp("emps"))
+    return processed("emps", DATA / "emps", tmp_path_factory.mktemp("emps"), page=True)
 
 
 @pytest.fixture(scope="module")
 def motor(tmp_path_factory):
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(run.build, "build", lambda results, pdf: results / "index.html")  # pages take longest
-        return processed("odrive", DATA / "odrive_cogging", tmp_path_factory.mktemp("odrive"))
+    return processed("odrive", DATA / "odrive_cogging", tmp_path_factory.mktemp("odrive"))
 
 
 def _held_out(done, band):

@@ -9,6 +9,10 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from kbs_process.results.judged import Budget, BudgetItem, ChannelResult, Frame, Requirement
+from kbs_process.results.records import Check, Conclusion, Constant, InputFile, Notice, Provenance, encode
+from kbs_process.signals.records import Loss
+from kbs_process.stages.conventions import SignCheck
 from kbs_process.studies.correlate import results as r
 
 CHANNELS = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
@@ -41,17 +45,14 @@ RUNS = (
     ("EL089P00_1", "EL089P00", "fit", 1, 200.0),
     ("EL089P00_2", "EL089P00", "held-out", 2, 200.0),
 )
-PROVENANCE = r.Provenance(
+PROVENANCE = Provenance(
     version="0.1.0",
     python="3.12.3",
     libraries={"numpy": "2.2.1", "scipy": "1.15.0"},
     platform="Linux x86_64",
     command="kbs-process campaign/EL089",
     commit="0123456789abcdef0123456789abcdef01234567",
-    inputs=(
-        r.InputFile(file="campaign.toml", sha256="a" * 64),
-        r.InputFile(file="parameters/rig.toml", sha256="b" * 64),
-    ),
+    inputs=(InputFile(file="campaign.toml", sha256="a" * 64), InputFile(file="parameters/rig.toml", sha256="b" * 64)),
 )
 
 
@@ -89,7 +90,7 @@ def one_channel(folder: Path) -> Path:
                 configuration="",
                 drive="motion",
             ),
-            verdict=r.Conclusion(status="none", sentence="No requirement is stated; three trials were compared."),
+            verdict=Conclusion(status="none", sentence="No requirement is stated; three trials were compared."),
             provenance=PROVENANCE,
             recordings=recordings,
             bands=BANDS[:1],
@@ -102,7 +103,7 @@ def one_channel(folder: Path) -> Path:
 
 def command_results() -> r.Results:
     """Return the contents of a complete results.json."""
-    loss = r.LossEntry(kind="gap", where="EL089P00_1.mcap /transducer/wrench", count=412, start_s=63.2, end_s=63.612)
+    loss = Loss(kind="gap", where="EL089P00_1.mcap /transducer/wrench", count=412, start_s=63.2, end_s=63.612)
     recordings = tuple(
         _recording(name, trajectory, role, repeat, duration, (loss,) if name == "EL089P00_1" else ())
         for name, trajectory, role, repeat, duration in RUNS
@@ -116,7 +117,7 @@ def command_results() -> r.Results:
             configuration="2: real antenna, high elevation, no gravity compensation",
             drive="command",
         ),
-        verdict=r.Conclusion(
+        verdict=Conclusion(
             status="pass",
             sentence="The disturbance torque at the spacecraft's centre of mass stays below 0.06 N m between 0.01 "
             "and 1 Hz: 0.0412 N m (0.0273 to 0.0474 at 95 %; Ty, EL089P00_2), a margin of 31 %.",
@@ -124,25 +125,25 @@ def command_results() -> r.Results:
         provenance=PROVENANCE,
         requirements=(_requirement(),),
         warnings=(
-            r.Notice(
+            Notice(
                 severity="warning",
                 what="412 samples of /transducer/wrench are missing between 63.2 s and 63.6 s",
                 where="EL089P00_1.mcap",
                 remedy="the stretch is left out of every figure; repeat the run if it matters",
             ),
-            r.Notice(
+            Notice(
                 severity="warning",
                 what="the first resonance (2.7 Hz, about y) lies next to the 2 Hz low-pass",
                 where="band lt2Hz",
                 remedy="judge by the 1 Hz band",
             ),
-            r.Notice(severity="info", what="temperature was not recorded", where="all recordings"),
+            Notice(severity="info", what="temperature was not recorded", where="all recordings"),
         ),
         recordings=recordings,
         conventions=(
-            r.Convention(check="sign of gravity", expected="Fz < 0 at rest", found="Fz = −274.6 N", ok=True),
-            r.Convention(check="Ty follows elevation", expected="slope > 0", found="slope +4.1 N m/rad", ok=True),
-            r.Convention(check="taring", expected="raw mean of Fz near the weight", found="0.4 N apart", ok=True),
+            SignCheck(check="sign of gravity", expected="Fz < 0 at rest", found="Fz = −274.6 N", ok=True),
+            SignCheck(check="Ty follows elevation", expected="slope > 0", found="slope +4.1 N m/rad", ok=True),
+            SignCheck(check="taring", expected="raw mean of Fz near the weight", found="0.4 N apart", ok=True),
         ),
         gravity=_gravity_result(),
         cross_coupling=_coupling(),
@@ -176,7 +177,7 @@ def command_results() -> r.Results:
             r.Resonance(axis="about z", frequency_Hz=10.4, source="plant at 78 deg"),
         ),
         budget=tuple(
-            r.Budget(
+            Budget(
                 channel=channel,
                 unit=UNITS[channel],
                 frame=frame,
@@ -200,15 +201,15 @@ def command_results() -> r.Results:
         methods="Recordings were condensed to 20 Hz by a linear-phase Kaiser FIR (gain error at most 1e-5).\n\n"
         "Gravity was fitted over three recordings and subtracted; the residual was band-passed.",
         parameters=(
-            r.Constant(name="body.antenna.mass", value=14.0, unit="kg", sigma=0.05, source="weighed, dummy data sheet"),
-            r.Constant(
+            Constant(name="body.antenna.mass", value=14.0, unit="kg", sigma=0.05, source="weighed, dummy data sheet"),
+            Constant(
                 name="transducer.cross_coupling",
                 value="6 x 6, see Cross-coupling",
                 unit="1",
                 sigma=None,
                 source="calibration",
             ),
-            r.Constant(name="joint.el.drive.Ka", value=1.0e4, unit="N m/rad", sigma=500.0, source="EM fit"),
+            Constant(name="joint.el.drive.Ka", value=1.0e4, unit="N m/rad", sigma=500.0, source="EM fit"),
         ),
         notes=(
             "Torque fluctuations are taken to arise in the motor gears and to reach the spacecraft as through "
@@ -217,9 +218,9 @@ def command_results() -> r.Results:
     )
 
 
-def _requirement() -> r.Requirement:
+def _requirement() -> Requirement:
     values = {"Tx": (0.0287, 0.0026), "Ty": (0.0412, 0.0031), "Tz": (0.0079, 0.0009)}
-    return r.Requirement(
+    return Requirement(
         name="Disturbance torque at the spacecraft's centre of mass",
         quantity="torque",
         frame="S",
@@ -239,7 +240,7 @@ def _requirement() -> r.Requirement:
         time_s=71.35,
         predicted_value=0.0467,
         channels=tuple(
-            r.ChannelResult(
+            ChannelResult(
                 channel=channel,
                 value=value,
                 sigma=sigma,
@@ -256,7 +257,7 @@ def _requirement() -> r.Requirement:
 
 
 def _recording(
-    name: str, trajectory: str, role: r.Role, repeat: int, duration: float, losses: tuple[r.LossEntry, ...]
+    name: str, trajectory: str, role: r.Role, repeat: int, duration: float, losses: tuple[Loss, ...]
 ) -> r.Recording:
     return r.Recording(
         name=name,
@@ -272,7 +273,7 @@ def _recording(
     )
 
 
-def _merit(name: str, role: r.Role, band: str, frame: r.Frame, channel: str, index: int) -> r.Merit:
+def _merit(name: str, role: r.Role, band: str, frame: Frame, channel: str, index: int) -> r.Merit:
     peak = SCALE[channel] * (1.0 if band == "lt1Hz" else 1.7) * (0.95 if role == "fit" else 1.0)
     ratio = 1.15 - 0.06 * index
     return r.Merit(
@@ -295,13 +296,13 @@ def _merit(name: str, role: r.Role, band: str, frame: r.Frame, channel: str, ind
     )
 
 
-def _contributions(scale: float, index: int) -> tuple[r.BudgetItem, ...]:
+def _contributions(scale: float, index: int) -> tuple[BudgetItem, ...]:
     return (
-        r.BudgetItem(stage="gravity", source="encoder quantisation and noise", sigma=scale),
-        r.BudgetItem(stage="gravity", source="covariance of the fit", sigma=0.4 * scale),
-        r.BudgetItem(stage="decouple", source="calibration of X", sigma=(0.2 + 0.1 * index) * scale),
-        r.BudgetItem(stage="bandpass", source="edges", sigma=0.15 * scale),
-        r.BudgetItem(stage="transducer", source="noise in band", sigma=0.6 * scale),
+        BudgetItem(stage="gravity", source="encoder quantisation and noise", sigma=scale),
+        BudgetItem(stage="gravity", source="covariance of the fit", sigma=0.4 * scale),
+        BudgetItem(stage="decouple", source="calibration of X", sigma=(0.2 + 0.1 * index) * scale),
+        BudgetItem(stage="bandpass", source="edges", sigma=0.15 * scale),
+        BudgetItem(stage="transducer", source="noise in band", sigma=0.6 * scale),
     )
 
 
@@ -342,11 +343,9 @@ def _gravity_result() -> r.Gravity:
             for channel in CHANNELS
         ),
         checks=(
-            r.Check(name="condition", ok=True, detail="condition number 41 of 1e6"),
-            r.Check(name="residual", ok=True, detail="reduced chi-square 1.04"),
-            r.Check(
-                name="priors", ok=False, detail="body.antenna.cog[z] moved 2.6 prior sigma; weigh the antenna again"
-            ),
+            Check(name="condition", ok=True, detail="condition number 41 of 1e6"),
+            Check(name="residual", ok=True, detail="reduced chi-square 1.04"),
+            Check(name="priors", ok=False, detail="body.antenna.cog[z] moved 2.6 prior sigma; weigh the antenna again"),
         ),
         samples=26000,
         reduced_chi_square=1.04,
@@ -444,4 +443,4 @@ def _table(path: Path, recording: str, frame: str, columns: dict[str, np.ndarray
 
 def _write(folder: Path, results: r.Results) -> None:
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / "results.json").write_bytes(r.encode(results))
+    (folder / "results.json").write_bytes(encode(results))

@@ -29,7 +29,7 @@ SWITCHES = (
 )
 PREPARED = "document.querySelectorAll('.uplot').length"
 
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no chromium on this machine")
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(CHROMIUM is None, reason="no chromium on this machine")]
 
 
 class Browser:

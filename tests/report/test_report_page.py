@@ -15,8 +15,8 @@ from pathlib import Path
 import pytest
 
 from kbs_process.errors import OutputError
-from kbs_process.report import pdf as paper
-from kbs_process.studies.correlate import results as r
+from kbs_process.report import build as paper
+from kbs_process.results.records import encode
 from kbs_process.studies.documents import render as build
 from report import sample
 
@@ -167,14 +167,14 @@ def test_a_motion_driven_rig_with_one_channel_is_reported_too(one_channel: Path)
 
 
 def test_results_without_tables_are_reported_too(tmp_path: Path) -> None:
-    (tmp_path / "results.json").write_bytes(r.encode(sample.command_results()))
+    (tmp_path / "results.json").write_bytes(encode(sample.command_results()))
     text = Page(build(tmp_path, pdf=False).read_text(encoding="utf-8")).text
     assert "No band table to show." in text
     assert "No recording has a spectrum table." in text
 
 
 def test_hostile_names_stay_text(tmp_path: Path) -> None:
-    content = r.encode(sample.command_results()).decode()
+    content = encode(sample.command_results()).decode()
     for name in ("EL089P00_2", "about y", "Ty", "body.antenna.mass", "drop", "below 1 Hz"):
         content = content.replace(json.dumps(name), json.dumps(HOSTILE + name))
     (tmp_path / "results.json").write_text(content.replace("engineering model", json.dumps(HOSTILE)[1:-1]))
@@ -195,6 +195,7 @@ def test_hostile_data_cannot_leave_its_script_element(tmp_path: Path) -> None:
     assert all(str(image["src"]).startswith("data:") for image in page.all("img"))
 
 
+@pytest.mark.slow
 def test_the_same_results_give_the_same_bytes_in_another_process(one_channel: Path, tmp_path: Path) -> None:
     folder = sample.one_channel(tmp_path)
     code = "import sys, pathlib; from kbs_process.studies.documents import render; render(pathlib.Path(sys.argv[1]))"
@@ -209,7 +210,7 @@ def test_the_same_results_give_the_same_bytes_in_another_process(one_channel: Pa
 
 
 def test_a_demanded_pdf_without_weasyprint_is_refused(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    (tmp_path / "results.json").write_bytes(r.encode(sample.command_results()))
+    (tmp_path / "results.json").write_bytes(encode(sample.command_results()))
     monkeypatch.setitem(sys.modules, "weasyprint", None)
     with pytest.raises(OutputError, match="no PDF without weasyprint") as caught:
         build(tmp_path, pdf=True)
@@ -225,7 +226,7 @@ def test_a_table_that_cannot_be_read_is_named(tmp_path: Path) -> None:
 
 
 def test_a_folder_that_cannot_be_written_is_named(tmp_path: Path) -> None:
-    (tmp_path / "results.json").write_bytes(r.encode(sample.command_results()))
+    (tmp_path / "results.json").write_bytes(encode(sample.command_results()))
     (tmp_path / "index.html").mkdir()
     with pytest.raises(OutputError, match=r"cannot write the report"):
         build(tmp_path, pdf=False)

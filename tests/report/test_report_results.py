@@ -12,7 +12,7 @@ import msgspec
 import pytest
 
 from kbs_process.errors import OutputError
-from kbs_process.results.records import decode, encode, load, schema_of
+from kbs_process.results.records import Conclusion, decode, encode, load, schema_of
 from kbs_process.results.versions import VERSION
 from kbs_process.studies.correlate import results as r
 from kbs_process.studies.documents import DOCUMENTS
@@ -78,7 +78,7 @@ def test_numbers_that_could_not_be_determined_become_null() -> None:
     resonance = r.Resonance(axis="x", frequency_Hz=2.0, source="", sigma_Hz=math.nan)
     minimal = r.Results(
         campaign=sample.command_results().campaign,
-        verdict=r.Conclusion(status="none", sentence=""),
+        verdict=Conclusion(status="none", sentence=""),
         provenance=sample.PROVENANCE,
         resonances=(resonance,),
     )

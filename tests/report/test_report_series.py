@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from kbs_process.report import series, text, views
+from kbs_process.report import series, text
 
 
 @settings(max_examples=60, deadline=None)
@@ -59,14 +59,14 @@ def test_stretches_are_closed_intervals() -> None:
     assert series.stretches(np.arange(5.0), mask) == ((0.0, 0.0), (3.0, 4.0))
 
 
-def _scene(n: int, curves: int) -> views.Scene:
+def _scene(n: int, curves: int) -> series.Scene:
     trace = series.Trace("Tx", "N m", np.zeros(n), None, None)
-    return views.Scene("run", "band", np.arange(float(n)), np.ones(n, dtype=bool), (trace,) * curves)
+    return series.Scene("run", "band", np.arange(float(n)), np.ones(n, dtype=bool), (trace,) * curves)
 
 
 def test_curves_share_the_pages_budget() -> None:
     scenes = [_scene(1000, 3), _scene(50_000, 6)]
-    short, long = views.views(scenes, budget=20_000)
+    short, long = series.views(scenes, budget=20_000)
     lengths = [len(base64.b64decode(str(c.curves[0]["codes"]))) // 2 for c in (*short.channels, *long.channels)]
     assert lengths[:3] == [1000] * 3, "a short recording is kept sample by sample"
     assert sum(lengths) <= 20_000 * 1.02
@@ -75,7 +75,7 @@ def test_curves_share_the_pages_budget() -> None:
 
 
 def test_what_the_page_cannot_carry_is_left_out() -> None:
-    assert len(views.views([_scene(10_000, 6)] * 40, budget=60 * views.FEWEST)) == 10
+    assert len(series.views([_scene(10_000, 6)] * 40, budget=60 * series.FEWEST)) == 10
 
 
 @pytest.mark.parametrize(

@@ -78,7 +78,10 @@ def read(path: Path, *, role: str, remedy: str) -> Document:
     except (ValueError, RecursionError) as error:  # an integer of more than 4300 digits; brackets upon brackets
         deep = isinstance(error, RecursionError)
         what = "holds arrays in arrays, hundreds deep" if deep else "holds a number of thousands of digits"
-        raise ConfigError(what, where=shown(path), remedy="write what the format asks for") from error
+        lines = text.splitlines()
+        line = max(range(len(lines)), key=lambda number: sum(map(lines[number].count, "[{0123456789")))
+        where = f"{shown(path)}:{line + 1}"
+        raise ConfigError(what, where=where, remedy="write what the format asks for") from error
 
 
 def _decode_error(message: str, text: str) -> tuple[str, int]:
@@ -176,7 +179,7 @@ def _line_of(text: str, key: Key) -> int | None:
             if header.group(1) == "[[":
                 index = counts[table] = counts.get(table, -1) + 1
                 table = (*table, index)
-            candidate = table
+            candidate = table[:-1] if table[-1:] == (0,) and key == table[:-1] else table
         elif assignment := _ASSIGNMENT.match(line):
             candidate = (*table, *_split(assignment.group(1)))
         else:

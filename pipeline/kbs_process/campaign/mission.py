@@ -115,7 +115,7 @@ def _limits(reader: _Reader, table: LimitsTable) -> Limits:
     read = reader.quantities(table, "limits")
     ranges = {axis: read[axis].value for axis in ("azimuth", "elevation")}
     for axis, (low, high) in ranges.items():
-        if not low < high:
+        if not low < high and read[axis].source:  # without one it could not be read, which is told already
             reader.problems.add(reader.document.place(("limits", axis)), "is empty", "give the lower limit first")
     return Limits(
         low=np.array([pair[0] for pair in ranges.values()]),

@@ -2,47 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from kbs_process.campaign.formats.kind import CHANNELWISE, PAIRWISE, Kind
+from kbs_process.campaign.formats.tables import PlainQuantity, QuantityTable
 from kbs_process.campaign.units import UnitMismatchError, factor
 from kbs_process.errors import ConfigError
 from kbs_process.rig.model import Quantity
 from kbs_process.signals.records import WRENCH_CHANNELS, WRENCH_UNITS, Array
-
-if TYPE_CHECKING:
-    from kbs_process.campaign.formats.tables import PlainQuantity, QuantityTable
-
-CHANNELWISE = "SI by channel"  # N for forces, N m for torques
-PAIRWISE = "SI by channel pair"  # N/N, N/(N m), (N m)/N, (N m)/(N m)
-
-
-@dataclass(frozen=True, slots=True)
-class Kind:
-    """What a key expects: SI unit, shape, bound; for a number a wrench channel, the channels recorded."""
-
-    unit: str
-    shape: tuple[int, ...] = ()
-    low: float | None = None
-    strict: bool = False  # `low` itself is refused
-    channels: tuple[str, ...] = ()
-    each_joint: bool = False  # one element for each joint, whatever `shape` says
-    of_joint: bool = False  # the unit at a joint that turns: one that slides has m for rad, and N for N m
-
-    @property
-    def bound(self) -> str:
-        """The bound in words."""
-        return "" if self.low is None else f"{'more than' if self.strict else 'at least'} {self.low:g}"
-
-    def in_words(self) -> str:
-        """Say it in a few words: "(3) m, more than 0"."""
-        shape = (
-            f"({', '.join(map(str, self.shape))})" if self.shape else "one for each joint" if self.each_joint else ""
-        )
-        return ", ".join(filter(None, (f"{shape} {self.unit}".strip(), self.bound)))
 
 
 def read_quantity(name: str, table: QuantityTable | PlainQuantity, kind: Kind, folder: Path) -> Quantity:

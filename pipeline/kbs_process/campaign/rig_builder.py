@@ -11,6 +11,7 @@ import numpy as np
 
 from kbs_process.campaign.chain import order
 from kbs_process.campaign.documents import Key, Merged
+from kbs_process.campaign.formats.kind import CHANNELWISE, Kind
 from kbs_process.campaign.formats.parameter_file import (
     BodyTable,
     ControllerTable,
@@ -23,7 +24,7 @@ from kbs_process.campaign.formats.parameter_file import (
 )
 from kbs_process.campaign.formats.tables import PlainQuantity, QuantityTable, Table, quantities
 from kbs_process.campaign.problems import Problems
-from kbs_process.campaign.quantities import CHANNELWISE, Kind, quantity_or_fault
+from kbs_process.campaign.quantities import quantity_or_fault
 from kbs_process.errors import did_you_mean
 from kbs_process.plant.effect import Effect
 from kbs_process.rig.model import (

@@ -1,15 +1,15 @@
-"""Laws of sensors and clocks that a campaign's model names: read, checked, written."""
+"""Laws of sensors and clocks that a campaign's model names: read and checked."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 from kbs_process.campaign.config import SensingLaw
 from kbs_process.campaign.documents import Document, Key
 from kbs_process.campaign.formats.campaign_file import SensingTable
+from kbs_process.campaign.formats.kind import Kind
 from kbs_process.campaign.problems import Problems
-from kbs_process.campaign.quantities import Kind, read_quantity
+from kbs_process.campaign.quantities import read_quantity
 from kbs_process.errors import ConfigError, did_you_mean
 from kbs_process.plant.laws import SENSING
 from kbs_process.plant.sensing import Sensing
@@ -57,20 +57,3 @@ def _law(table: SensingTable, key: Key, document: Document, rig: Rig, problems: 
         except ConfigError as error:
             problems.add(document.place((*key, "parameters", name)), error.what, error.remedy)
     return SensingLaw(law.name, table.site, quantities)
-
-
-def table_of(law: SensingLaw) -> dict[str, Any]:
-    """A law as [model] sensing has it, in SI."""
-    return {
-        "law": law.law,
-        "site": law.site,
-        "parameters": {
-            name: {
-                "value": float(quantity),
-                "unit": quantity.unit,
-                "sigma": float(quantity.sigma),
-                "source": quantity.source,
-            }
-            for name, quantity in law.parameters.items()
-        },
-    }

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from kbs_process.cli.prediction import commanded_by
-from kbs_process.cli.shared import verb
+from kbs_process.cli.shared import commanded_by, verb
 
 if TYPE_CHECKING:
     from kbs_process.campaign.config import Campaign

@@ -3,36 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
-from kbs_process.cli.shared import EXISTING_FILE, conclude, examples, output_option, progress, quiet_option, verb
+from kbs_process.cli.shared import commanded_by, conclude, examples, output_option, progress, quiet_option, verb
 
 if TYPE_CHECKING:
     from kbs_process.campaign.config import Campaign
     from kbs_process.progress import Progress
-
-
-def commanded_by(table: str) -> tuple[Any, ...]:
-    """Return the options of a verb that is driven by commands, those of a recording or those of a `table`."""
-
-    def alone(context: click.Context, parameter: click.Parameter, value: Any) -> Any:
-        (other,) = {"trajectory", "command"} - {parameter.name}
-        if value is not None and context.params.get(other) is not None:
-            raise click.UsageError("Give --trajectory or --command, not both.", context)
-        return value
-
-    return (
-        click.option(
-            "--trajectory",
-            metavar="NAME",
-            callback=alone,
-            help="Commands of the first recording of this trajectory [default, without --command: the last one "
-            "listed].",
-        ),
-        click.option("--command", type=EXISTING_FILE, callback=alone, help=table),
-    )
 
 
 @verb(

@@ -45,6 +45,27 @@ def check_option(when: str) -> Callable[[_Verb], _Verb]:
     return click.option("--check", is_flag=True, help=f"Exit with 1 when {when}.")
 
 
+def commanded_by(table: str) -> tuple[_Option, _Option]:
+    """Return the options of a verb that is driven by commands, those of a recording or those of a `table`."""
+
+    def alone(context: click.Context, parameter: click.Parameter, value: Any) -> Any:
+        (other,) = {"trajectory", "command"} - {parameter.name}
+        if value is not None and context.params.get(other) is not None:
+            raise click.UsageError("Give --trajectory or --command, not both.", context)
+        return value
+
+    return (
+        click.option(
+            "--trajectory",
+            metavar="NAME",
+            callback=alone,
+            help="Commands of the first recording of this trajectory [default, without --command: the last one "
+            "listed].",
+        ),
+        click.option("--command", type=EXISTING_FILE, callback=alone, help=table),
+    )
+
+
 def examples(*lines: str) -> str:
     """Return an epilog that click prints as it is."""
     return "\b\nExamples:\n" + "\n".join(f"  kbs-process {line}" for line in lines)

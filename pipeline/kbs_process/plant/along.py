@@ -85,7 +85,7 @@ def along(effect: Effect, signals: Mapping[str, Array], values: Mapping[str, flo
 
 
 def _amplitudes(effect: Effect) -> list[str]:
-    return [entry.name for entry in effect.parameters if entry.role == "amplitude"]
+    return [entry.name for entry in effect.amplitudes]
 
 
 def _given(effect: Effect) -> list[str]:

@@ -49,7 +49,7 @@ def idle(rig: Rig, effect: Effect) -> bool:
     holders = [joint.drive.parameters for joint in rig.joints if joint.drive is not None]
     if not effect.port.of_drive:
         holders = [entry.parameters for entry in rig.external if entry.name == effect.name]
-    names = [entry.name for entry in effect.parameters if entry.role == "amplitude"]
+    names = [entry.name for entry in effect.amplitudes]
     return not any(float(holder[name]) for holder in holders for name in names if name in holder)
 
 

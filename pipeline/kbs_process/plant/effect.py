@@ -74,23 +74,40 @@ FIELD_SIGNALS = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class Acts:
-    """What a port is: what an equation's value does there, and what it can ask for."""
+class Acts(Enum):
+    """What a port says of itself: what an equation's value does there, and what it can ask for."""
 
-    what: str  # with unit and signs
-    word: str  # for it in a diagnosis
-    shows: str  # what is seen of it
-    signals: Mapping[str, str]  # that an equation can ask for by name, with unit and meaning
-    site: Literal["joint", "link", "floor", "mounting"] = "joint"  # what it is a port of
-    rate: str = ""  # signal that the value, a torque, does its work with
-    tested: str = ""  # its name in a test of ports, if that tells more than the word
+    def __init__(
+        self, what: str, word: str, shows: str, signals: Mapping[str, str], site: str, rate: str = "", tested: str = ""
+    ) -> None:
+        self.what = what  # an equation's value does there, with unit and signs
+        self.word = word  # for it in a diagnosis
+        self.shows = shows  # what is seen of what acts there
+        self.signals = signals  # that an equation can ask for by name, with unit and meaning
+        self.site = site  # of which it is a port: joint, link, floor, mounting, channel, encoder, stream
+        self.rate = rate  # signal that the value, a torque, does its work with
+        self.tested = tested  # its name in a test of ports, if that tells more than the word
+
+    @property
+    def title(self) -> str:
+        """Its own name, in words."""
+        return self.name.lower().replace("_", " ")
+
+    @property
+    def of_channel(self) -> bool:
+        """Whether it is a port of a single channel."""
+        return self.site == "channel"
+
+    @property
+    def beneath(self) -> bool:
+        """Whether it is under the transducer's plate, which is one place."""
+        return self.site in ("floor", "mounting")
 
 
 _INSIDE = "windup at the encoder; of the wrench only what the motion's change makes"
 
 
-class Port(Enum):
+class Port(Acts):
     """Where an equation's value acts.
 
     The field is what a driver makes of the controller's command. Motor torque, friction, transmission and joint torque
@@ -100,53 +117,62 @@ class Port(Enum):
     Ports of a drive have their parameters at every joint, the others once in the rig (`rig.model.External`).
     """
 
-    FIELD = Acts(
+    FIELD = (
         "change of the magnetic field's position, as an angle of the motor, rad",
         "controller",
         "what the motor makes of it; where the field was recorded, what the driver does after that",
         FIELD_SIGNALS,
+        "joint",
     )
-    MOTOR_TORQUE = Acts("torque on the rotor, N m", "motor torque", _INSIDE, SIGNALS, rate="rotor_rate")
-    MOTOR_FRICTION = Acts(
+    MOTOR_TORQUE = "torque on the rotor, N m", "motor torque", _INSIDE, SIGNALS, "joint", "rotor_rate"
+    MOTOR_FRICTION = (
         "greatest Coulomb friction torque on the rotor, N m, >= 0: opposes motion, holds at rest",
         "motor torque",
         _INSIDE,
         SIGNALS,
+        "joint",
     )
-    TRANSMISSION = Acts(
-        "torque of the gear on the output, N m; the rotor gets -1/ratio of it", "transmission", _INSIDE, SIGNALS
+    TRANSMISSION = (
+        "torque of the gear on the output, N m; the rotor gets -1/ratio of it",
+        "transmission",
+        _INSIDE,
+        SIGNALS,
+        "joint",
     )
-    JOINT_TORQUE = Acts(
+    JOINT_TORQUE = (
         "torque on the output, N m, reacted by the body that carries the motor",
         "joint torque",
         _INSIDE,
         SIGNALS,
-        rate="joint_rate",
+        "joint",
+        "joint_rate",
     )
-    GROUND_TORQUE = Acts(
+    GROUND_TORQUE = (
         "torque on the output about the joint's axis, N m, reacted by the laboratory",
         "external wrench",
         "windup, and the wrench itself",
         SIGNALS,
-        rate="joint_rate",
-        tested="ground torque",
+        "joint",
+        "joint_rate",
+        "ground torque",
     )
-    EXTERNAL_FORCE = Acts(
+    EXTERNAL_FORCE = (
         "force (x, y, z) of the laboratory on a point of a link, N, along the undeflected T's axes",
         "external wrench",
         "windup, and the wrench itself",
         POINT_SIGNALS,
         "link",
     )
-    BASE_ACCELERATION = Acts(
+    BASE_ACCELERATION = (
         "acceleration (x, y, z) of the laboratory's floor, m/s^2, along the undeflected T's axes",
         "base",
         "the wrench, as of all masses the other way",
         FLOOR_SIGNALS,
         "floor",
-        tested="base",
+        "",
+        "base",
     )
-    BASE_TORQUE = Acts(
+    BASE_TORQUE = (
         "moment (x, y, z) of the mounting on the plate about the axes of the base's angles, N m, beyond the "
         "transducer's stiffness and damping",
         "base",
@@ -154,43 +180,9 @@ class Port(Enum):
         "encoder; nothing where the transducer is rigid",
         MOUNTING_SIGNALS,
         "mounting",
-        tested="base torque",
+        "",
+        "base torque",
     )
-
-    @property
-    def what(self) -> str:
-        """What an equation's value does there, with its unit."""
-        return self.value.what
-
-    @property
-    def word(self) -> str:
-        """The word for it in a diagnosis."""
-        return self.value.word
-
-    @property
-    def shows(self) -> str:
-        """What is seen of what acts there."""
-        return self.value.shows
-
-    @property
-    def tested(self) -> str:
-        """Its name in a test of ports, if that tells more than the word."""
-        return self.value.tested
-
-    @property
-    def site(self) -> str:
-        """What it is a port of: a joint, a link, the floor or the mounting."""
-        return self.value.site
-
-    @property
-    def rate(self) -> str:
-        """Signal of the rate that a torque there does its work with, if it has one."""
-        return self.value.rate
-
-    @property
-    def signals(self) -> Mapping[str, str]:
-        """What an equation at this port can ask for by name, with its unit and meaning."""
-        return self.value.signals
 
     @property
     def of_drive(self) -> bool:
@@ -201,11 +193,6 @@ class Port(Enum):
     def of_rotor(self) -> bool:
         """Whether it is a torque on the rotor alone."""
         return self in (Port.MOTOR_TORQUE, Port.MOTOR_FRICTION)
-
-    @property
-    def beneath(self) -> bool:
-        """Whether it is under the transducer's plate, which is one place."""
-        return self.site in ("floor", "mounting")
 
     @property
     def internal(self) -> bool:
@@ -221,11 +208,6 @@ class Port(Enum):
     def stateful(self) -> bool:
         """Whether an equation at this port may have states of its own: what integrates them is the plant's."""
         return self is Port.BASE_TORQUE or (self.of_drive and self is not Port.FIELD)
-
-    @property
-    def of_channel(self) -> bool:
-        """Whether it is a port of a single channel."""
-        return False
 
 
 @dataclass(frozen=True, slots=True)
@@ -387,7 +369,7 @@ class Law:
     """
 
     name: str
-    port: Any
+    port: Acts
     equation: Callable[..., Any]
     parameters: tuple[Parameter, ...]
     order: int = field(default=LAST, kw_only=True)
@@ -398,6 +380,7 @@ class Law:
     anywhere: bool = field(default=False, kw_only=True)  # a force whose point on its link is not known
     delay: str = field(default="", kw_only=True)  # the parameter by which the field comes late, s
     of_cycles: str = field(default="", kw_only=True)  # family of orders that all come with whole electrical cycles
+    whole_band: bool = field(default=False, kw_only=True)  # what is beyond the working band changes what it does within
 
     @property
     def arguments(self) -> tuple[str, ...]:
@@ -442,12 +425,17 @@ class Law:
     @property
     def port_word(self) -> str:
         """The word in which a diagnosis says where it acts."""
-        return str(self.port.word)
+        return self.port.word
 
     @property
     def in_plant(self) -> bool:
         """Whether the plant can be simulated with it."""
         return False
+
+    @property
+    def jumps(self) -> bool:
+        """Whether it is the jump of a clock, at a time that each recording has."""
+        return "drop_time" in self.arguments
 
 
 @dataclass(frozen=True, slots=True)

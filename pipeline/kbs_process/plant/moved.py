@@ -50,7 +50,7 @@ def added_loads(rig: Rig, effects: Sequence[Effect], q: Array, qd: Array, dt: fl
             if effect.port is Port.GROUND_TORQUE or (effect.port in RIGID and joint.effort is not None):
                 other = q[:, rig.joint_names.index(other_joint(rig, joint.name))]
                 units = unit_torques(effect, joint, q[:, index], known, dt, other)
-                amplitudes = [known[entry.name] for entry in effect.parameters if entry.role == "amplitude"]
+                amplitudes = [known[entry.name] for entry in effect.amplitudes]
                 torque = instants(units @ np.array(amplitudes))
                 if effect.port is Port.GROUND_TORQUE:
                     added += grounds[joint.name] * torque[:, None]

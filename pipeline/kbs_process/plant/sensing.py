@@ -9,12 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from enum import Enum
 from functools import cache, wraps
 from itertools import combinations_with_replacement
 from typing import get_type_hints
 
-from kbs_process.plant.effect import Law, Parameter
+from kbs_process.plant.effect import Acts, Law, Parameter
 from kbs_process.signals.records import Array
 
 READINGS = {
@@ -28,57 +27,29 @@ SCALARS = {
     "code": "rad, one code of the encoder",
     "drop_time": "s, when the clock of this recording's stream seems to jump",
 }
+SIGNALS = READINGS | SCALARS
 BY = "<-"  # in the site of a coupling: channel that reads, channel that acts, or the two of which the product does
 STREAMS = ("wrench", "encoder")
 SPREADS = 100.0  # of a prior, beyond which a size is no sensor's
 
 
-class SensingPort(Enum):
+_CHANNEL = "a channel of the transducer, whatever the mechanism does"
+
+
+class SensingPort(Acts):
     """Which signal an equation changes."""
 
-    CHANNEL = "one channel of the transducer, or the effort of a joint"
-    COUPLING = "one channel, by another"
-    PRODUCT = "one channel, by the product of two"
-    ENCODER = "one encoder's angle, rad"
-    STREAM = "all channels that one clock stamps"
-
-    @property
-    def what(self) -> str:
-        """Which signal an equation changes there."""
-        return self.value
-
-    @property
-    def word(self) -> str:
-        """The word for it in a diagnosis."""
-        return {SensingPort.ENCODER: "encoder", SensingPort.STREAM: "clock"}.get(self, "transducer")
-
-    @property
-    def shows(self) -> str:
-        """What is seen of what acts there."""
-        return {
-            SensingPort.ENCODER: "an angle; in a closed loop without a recorded field also the controller's answer",
-            SensingPort.STREAM: "all channels that a clock stamps",
-        }.get(self, "a channel of the transducer, whatever the mechanism does")
-
-    @property
-    def tested(self) -> str:
-        """Its name in a test of ports, if that tells more than the word."""
-        return ""
-
-    @property
-    def rate(self) -> str:
-        """No sensor does work."""
-        return ""
-
-    @property
-    def beneath(self) -> bool:
-        """No sensor is under the transducer's plate."""
-        return False
-
-    @property
-    def of_channel(self) -> bool:
-        """Whether it is a port of a single channel."""
-        return self.word == "transducer"
+    CHANNEL = "one channel of the transducer, or the effort of a joint", "transducer", _CHANNEL, SIGNALS, "channel"
+    COUPLING = "one channel, by another", "transducer", _CHANNEL, SIGNALS, "channel"
+    PRODUCT = "one channel, by the product of two", "transducer", _CHANNEL, SIGNALS, "channel"
+    ENCODER = (
+        "one encoder's angle, rad",
+        "encoder",
+        "an angle; in a closed loop without a recorded field also the controller's answer",
+        SIGNALS,
+        "encoder",
+    )
+    STREAM = "all channels that one clock stamps", "clock", "all of them", SIGNALS, "stream"
 
     def sites(self, loads: Sequence[str], bridge: Sequence[str], encoders: Sequence[str]) -> list[str]:
         """Return where a law can act: `loads` are all channels of loads, `bridge` those of the transducer."""
@@ -131,15 +102,13 @@ class Sensing(Law):
     """
 
     port: SensingPort
-    whole_band: bool = False
 
     def __post_init__(self) -> None:
         where = f"sensing effect '{self.name}'"
-        known = {*READINGS, *SCALARS}
         if not self.name.isidentifier():
             raise TypeError(f"{where}: the name is not an identifier")
-        if unknown := set(self.arguments) - known - set(self.own):
-            raise TypeError(f"{where}: {sorted(unknown)} is neither a signal ({', '.join(known)}) nor declared")
+        if unknown := set(self.arguments) - set(SIGNALS) - set(self.own):
+            raise TypeError(f"{where}: {sorted(unknown)} is neither a signal ({', '.join(SIGNALS)}) nor declared")
         if unused := set(self.own) - set(self.arguments):
             raise TypeError(f"{where}: {sorted(unused)} is declared, but not an argument of the equation")
         hints = get_type_hints(self.equation)
@@ -157,8 +126,3 @@ class Sensing(Law):
         low, high = entry.bounds
         usual = SPREADS * entry.prior.spread
         return max(low, -usual), min(high, usual)
-
-    @property
-    def jumps(self) -> bool:
-        """Whether it is the jump of a clock, at a time that each recording has."""
-        return "drop_time" in self.arguments

@@ -1,7 +1,8 @@
-"""Commands from a table: what a test engineer writes before there is a recording."""
+"""Commands before a test: of a table that a test engineer writes, or of a recording of the same trajectory."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -9,9 +10,46 @@ import pyarrow as pa
 import pyarrow.csv as csv
 import pyarrow.parquet as pq
 
-from kbs_process.errors import RecordingError, did_you_mean
+from kbs_process.campaign.config import Campaign
+from kbs_process.errors import ConfigError, RecordingError, did_you_mean
 from kbs_process.plant.predict import Schedule
-from kbs_process.signals.records import Array
+from kbs_process.progress import Progress
+from kbs_process.reduction.predicting import approached, schedule_of
+from kbs_process.reduction.reading import read_run
+from kbs_process.rig.model import Rig
+from kbs_process.signals.records import Array, Run
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Commands:
+    """A trajectory's commands, from time zero on."""
+
+    name: str
+    schedule: Schedule
+    source: Path
+    run: Run | None = None  # that they were recorded in
+
+
+def of_table(path: Path, rig: Rig) -> Commands:
+    """Return the commands of a CSV or Parquet file."""
+    schedule = read_commands(path, rig.joint_names)
+    return Commands(path.stem, replace(schedule, t=schedule.t - schedule.t[0]), path)
+
+
+def of_trajectory(campaign: Campaign, trajectory: str | None, progress: Progress) -> Commands:
+    """Return the commands of a trajectory's first recording (default: the trajectory listed last).
+
+    Nothing else of it: before a test nobody knows what field and encoders will do.
+    """
+    first = {entry.trajectory: entry for entry in reversed(campaign.recordings)}
+    name = trajectory or campaign.recordings[-1].trajectory
+    if name not in first:
+        raise ConfigError(f"there is no trajectory '{name}'", where=campaign.name, remedy=did_you_mean(name, first))
+    entry = first[name]
+    with progress.task(f"Reading {entry.name}"):
+        run = read_run(campaign, entry)
+    schedule = approached(replace(schedule_of(run, campaign.rig), field=None, encoder=None))
+    return Commands(name, schedule, entry.path, run)
 
 
 def read_commands(path: Path, joints: tuple[str, ...]) -> Schedule:

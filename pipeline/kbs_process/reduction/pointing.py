@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Literal
 
+import msgspec
+
 from kbs_process.reduction.analysis import Analysis
 from kbs_process.results.pointing import PointingEstimate, RecordedPointing
 from kbs_process.signals.records import Run, Signal
@@ -42,14 +44,4 @@ def _against_command(run: Run, actual: Signal, instrument: Instrument) -> Iterat
 
 def estimate(one: PointingStatistics) -> PointingEstimate:
     """Return statistics as results.json holds them."""
-    return PointingEstimate(
-        axis=one.axis,
-        bias=one.bias,
-        bias_sigma=one.bias_sigma,
-        random=one.random,
-        random_sigma=one.random_sigma,
-        percentile=one.percentile,
-        percentile_sigma=one.percentile_sigma,
-        orbit=one.orbit,
-        greatest=one.greatest,
-    )
+    return msgspec.convert(one, PointingEstimate, from_attributes=True)

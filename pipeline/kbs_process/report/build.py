@@ -1,15 +1,21 @@
-"""Render the report of a results folder."""
+"""Render the report of a results folder: a page, and the same on paper."""
 
 from __future__ import annotations
 
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from kbs_process.errors import OutputError
-from kbs_process.report import pdf as paper
 from kbs_process.report.document import Document
 from kbs_process.results.outcome import Outcome
 from kbs_process.results.records import FILE, ResultsFile, encode
+
+_REMEDY = 'install the extra: pip install "kbs-process[pdf]" (weasyprint also needs the Pango library)'
+_EPOCH = "0"  # the date written into embedded fonts: none of the results' business, hence fixed
 
 
 def build(results: Path, document: Document[Any], pdf: bool | None = None) -> Path:
@@ -23,8 +29,8 @@ def build(results: Path, document: Document[Any], pdf: bool | None = None) -> Pa
     target = results / "index.html"
     try:
         _replace(target, page.render(head, sections, "screen").encode())
-        if pdf or (pdf is None and paper.available()):
-            _replace(results / "report.pdf", paper.render(page.render(head, sections, "paper")))
+        if pdf or (pdf is None and available()):
+            _replace(results / "report.pdf", to_pdf(page.render(head, sections, "paper")))
     except OSError as error:
         raise OutputError(
             f"cannot write the report: {error.strerror or error}",
@@ -35,11 +41,16 @@ def build(results: Path, document: Document[Any], pdf: bool | None = None) -> Pa
 
 
 def publish(
-    folder: Path, target: Path, results: ResultsFile, document: Document[Any], pdf: bool | None, *more: str
+    folder: Path, target: Path, results: ResultsFile, document: Document[Any] | None, pdf: bool | None, *more: str
 ) -> Outcome:
-    """Write results.json and the report into `folder`, which becomes `target`; return what is told, and `more`."""
-    (folder / FILE).write_bytes(encode(results))
-    page = build(folder, document, pdf)
+    """Write results.json and the report into `folder`, which becomes `target`; return what is told, and `more`.
+
+    Without a `document` there is no report; it can be rendered later.
+    """
+    page = folder / FILE
+    page.write_bytes(encode(results))
+    if document is not None:
+        page = build(folder, document, pdf)
     met = {"pass": True, "fail": False}.get(results.verdict.status)
     return Outcome((results.verdict.sentence, *more), met, target / page.name)
 
@@ -52,3 +63,30 @@ def _replace(target: Path, content: bytes) -> None:
         aside.replace(target)
     finally:
         aside.unlink(missing_ok=True)
+
+
+def available() -> bool:
+    """Say whether weasyprint is installed."""
+    return find_spec("weasyprint") is not None
+
+
+def to_pdf(html: str) -> bytes:
+    """Return `html` as PDF; the same page gives the same bytes."""
+    try:
+        import weasyprint  # an extra, and slow to import
+    except (ImportError, OSError) as error:  # OSError: its shared libraries are missing
+        raise OutputError(f"no PDF without weasyprint: {error}", remedy=_REMEDY) from None
+    with _fixed_date():
+        content: bytes = weasyprint.HTML(string=html).write_pdf(presentational_hints=True)
+    return content
+
+
+@contextmanager
+def _fixed_date() -> Iterator[None]:
+    before = os.environ.get("SOURCE_DATE_EPOCH")
+    os.environ["SOURCE_DATE_EPOCH"] = before or _EPOCH
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ["SOURCE_DATE_EPOCH"]

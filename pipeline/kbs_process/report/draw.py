@@ -117,6 +117,12 @@ def grid(height: float, rows: int, columns: int = 1, *, share_x: bool = False) -
     return figure, list(figure.subplots(rows, columns, squeeze=False, sharex=share_x).ravel())
 
 
+def limits(axes: Axes, *levels: float) -> None:
+    """Draw levels that are not to be passed."""
+    for level in levels:
+        axes.axhline(level, color=LIMIT, linewidth=0.8, linestyle=(0, (4, 2)))
+
+
 def legend_above(figure: Figure) -> None:
     """Say above the axes what is what."""
     figure.legend(loc="outside upper left", ncols=4, fontsize=7)

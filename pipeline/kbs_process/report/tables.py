@@ -2,26 +2,21 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import pyarrow.lib
-import pyarrow.parquet
 
-from kbs_process.errors import OutputError
+from kbs_process.results.tables import read_columns
 from kbs_process.signals.records import WRENCH_CHANNELS, Array, Mask
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Table:
-    """Columns of equal length with their units and frame."""
+    """Columns of equal length with their units."""
 
     columns: dict[str, Array]
     units: dict[str, str]
-    frame: str
-    history: tuple[str, ...]
 
     @property
     def valid(self) -> Mask:
@@ -72,20 +67,9 @@ class Tables:
         # Looked up among the files that are there, so that no name can lead out of the folder.
         if not directory.is_dir() or name not in {entry.name for entry in directory.iterdir()}:
             return None
-        return read_table(directory / name)
-
-
-def read_table(path: Path) -> Table:
-    """Read one Parquet table, its columns as float64."""
-    try:
-        content = pyarrow.parquet.read_table(path)
-        about = json.loads((content.schema.metadata or {}).get(b"kbs", b"{}"))
-    except (OSError, ValueError, pyarrow.lib.ArrowException) as error:
-        raise OutputError(
-            f"not a readable table: {error}", where=str(path), remedy="process the campaign again: kbs-process CAMPAIGN"
-        ) from None
-    columns = {
-        name: np.asarray(column.to_numpy(), dtype=np.float64)
-        for name, column in zip(content.column_names, content.columns, strict=True)
-    }
-    return Table(columns, about.get("units", {}), about.get("frame", ""), tuple(about.get("history", ())))
+        content, about = read_columns(directory / name)
+        columns = {
+            name: np.asarray(column.to_numpy(), dtype=np.float64)
+            for name, column in zip(content.column_names, content.columns, strict=True)
+        }
+        return Table(columns, about.get("units", {}))

@@ -1,4 +1,4 @@
-"""The tables of a results folder, written: Parquet with units, frame and history in the file's metadata."""
+"""The tables of a results folder: Parquet with units, frame and history in the file's metadata."""
 
 from __future__ import annotations
 
@@ -6,13 +6,18 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from kbs_process.errors import OutputError
 from kbs_process.signals.grid import overlap
 from kbs_process.signals.records import Array, Envelope, Mask, Signal, Spectrum
+
+if TYPE_CHECKING:  # takes its time to import
+    from pandas import DataFrame
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,3 +114,27 @@ def write_table(
     table = table.replace_schema_metadata({"kbs": json.dumps(about, sort_keys=True)})
     path.parent.mkdir(parents=True, exist_ok=True)
     pq.write_table(table, path, compression="zstd")
+
+
+def read_table(path: Path | str) -> DataFrame:
+    """Return a table as a DataFrame, whose rows are times (s) or frequencies (Hz).
+
+    Its `attrs` hold the "units" of the columns, and the "frame", "history" and "recording" of the signals. Raises
+    OutputError where the file cannot be read.
+    """
+    content, about = read_columns(Path(path))
+    frame: DataFrame = content.to_pandas()
+    frame = frame.set_index(content.column_names[0])
+    frame.attrs.update(about)
+    return frame
+
+
+def read_columns(path: Path) -> tuple[pa.Table, dict[str, Any]]:
+    """Read one table as it is stored, and what its metadata say of it."""
+    try:
+        content = pq.read_table(path)
+        return content, json.loads((content.schema.metadata or {}).get(b"kbs", b"{}"))
+    except (OSError, ValueError, pa.ArrowException) as error:
+        raise OutputError(
+            f"not a readable table: {error}", where=str(path), remedy="process the campaign again: kbs-process CAMPAIGN"
+        ) from None

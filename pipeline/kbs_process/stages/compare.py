@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.signal import welch
 
+from kbs_process.results.records import Record
 from kbs_process.signals.grid import overlap
 from kbs_process.signals.records import Array, Signal
 
@@ -14,8 +13,7 @@ from kbs_process.signals.records import Array, Signal
 MIN_SAMPLES = 16
 
 
-@dataclass(frozen=True, slots=True)
-class Merit:
+class Merit(Record, frozen=True, kw_only=True):
     """Agreement on one channel; rms and peak in the channel's unit, None where it is not defined.
 
     fraction_of_variance = 1 - var(measured - predicted) / var(measured): 1 is perfect, 0 is no better than
@@ -25,11 +23,11 @@ class Merit:
 
     channel: str
     unit: str
-    measured_rms: float
-    predicted_rms: float
-    residual_rms: float
-    measured_peak: float
-    predicted_peak: float
+    measured_rms: float | None
+    predicted_rms: float | None
+    residual_rms: float | None
+    measured_peak: float | None
+    predicted_peak: float | None
     correlation: float | None
     fraction_of_variance: float | None
     spectral_ratio: float | None

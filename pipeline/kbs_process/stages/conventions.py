@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from kbs_process.plant.rigid import static_wrench
+from kbs_process.results.records import Record
 from kbs_process.rig.model import LAB, Rig
 from kbs_process.signals.records import Array, Signal
 
@@ -18,8 +17,7 @@ MIN_VARIATION = 10.0
 LEVEL = 0.1
 
 
-@dataclass(frozen=True, slots=True)
-class SignCheck:
+class SignCheck(Record, frozen=True):
     """What was expected, what was found."""
 
     check: str

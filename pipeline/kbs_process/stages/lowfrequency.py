@@ -14,7 +14,7 @@ operations, and insensitive to offsets, as D takes them off before anything is m
 1e-11 N m at 0.01 Hz and 20 Hz). Rounding perturbs the gain near f0 by about 4e-15 lambda: 4e-5 there.
 
 Chosen among odd, even and constant padding, estimated initial states, regression on low-frequency cosines or Slepian
-sequences, and autoregressive extension; the comparison is in tests/stages_signal/test_low_frequency_methods.py.
+sequences, and autoregressive extension; the comparison is in tests/stages/test_low_frequency_methods.py.
 References: Pollock, J. Econometrics 99 (2000) 317-334; Gomez, J. Bus. Econ. Stat. 19 (2001) 365-373.
 """
 

@@ -1,12 +1,13 @@
-"""Print the JSON Schema of one kind of results: `python -m kbs_process.studies KIND`."""
+"""Print one file of schemas/: `python -m kbs_process.studies KIND > schemas/KIND.schema.json`.
+
+KIND is a kind of results (of which `correlation` is schemas/results.schema.json), or a format of a user's files:
+campaign, parameters, mission, modal, import.
+"""
 
 from __future__ import annotations
 
-import json
 import sys
 
-from kbs_process.results.records import schema_of
-from kbs_process.studies.documents import DOCUMENTS
+from kbs_process.studies.schemas import schema_text
 
-document = DOCUMENTS[sys.argv[1]]
-print(json.dumps(schema_of(document.record, document.title), indent=2))
+print(schema_text(sys.argv[1]), end="")

@@ -10,7 +10,6 @@ from collections.abc import Callable, Sequence
 from time import monotonic
 
 import numpy as np
-from sklearn.ensemble import HistGradientBoostingRegressor
 
 from proof.answer import Answer
 from proof.rivals.case import Array, Case, Recording, detrended
@@ -50,6 +49,8 @@ Predict = Callable[[Array], Array]
 
 
 def _fit(chosen: Sequence[Input], recordings: Sequence[Recording], channel: int) -> Predict:
+    from sklearn.ensemble import HistGradientBoostingRegressor
+
     X = np.concatenate([matrix(chosen, r)[0][r.valid] for r in recordings])
     y = np.concatenate([detrended(r, r.residual[:, [channel]])[:, 0] for r in recordings])
     model = HistGradientBoostingRegressor(

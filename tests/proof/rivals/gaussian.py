@@ -10,15 +10,16 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Sequence
 from time import monotonic
+from typing import TYPE_CHECKING
 
 import numpy as np
-from sklearn.exceptions import ConvergenceWarning
-from sklearn.gaussian_process import GaussianProcessRegressor
-from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 
 from proof.answer import Answer
 from proof.rivals.case import Array, Case, Recording, detrended
 from proof.rivals.inputs import Input, Learnt, answer, channels_worth_learning, explained, folds, inputs, matrix
+
+if TYPE_CHECKING:
+    from sklearn.gaussian_process import GaussianProcessRegressor
 
 _SAMPLES = 300
 
@@ -49,6 +50,10 @@ def _fit(
     chosen: Sequence[Input], recordings: Sequence[Recording], channel: int, kernel: object | None
 ) -> tuple[GaussianProcessRegressor, Callable[[Recording], Array]]:
     """Fit to samples spread over recordings; with `kernel`, its numbers are kept."""
+    from sklearn.exceptions import ConvergenceWarning
+    from sklearn.gaussian_process import GaussianProcessRegressor
+    from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
+
     X = np.concatenate([matrix(chosen, r)[0][r.valid] for r in recordings])
     y = np.concatenate([detrended(r, r.residual[:, [channel]])[:, 0] for r in recordings])
     middle, spread = X.mean(axis=0), X.std(axis=0) + 1e-12

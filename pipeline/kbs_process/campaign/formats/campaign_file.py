@@ -85,6 +85,8 @@ Encoder = Annotated[Annotated[Text, TEXT] | Annotated[EncoderTable, TABLE], by_k
 class TopicsTable(Table):
     """Where the streams are in the recordings."""
 
+    filled: ClassVar[bool] = True
+
     wrench: Topic | None = Field(None, description="transducer, N and N m")
     effort: Topic | None = Field(
         None, description="what the drive of each joint puts in, in the unit that the joint's effort is described in"
@@ -95,8 +97,6 @@ class TopicsTable(Table):
     field: Topic | None = Field(None, description="position of each motor's field, motor rad")
     temperature: Topic | None = Field(None, description="transducer, degC")
     pointing: Topic | None = Field(None, description="angle of each joint by an external instrument, rad")
-
-    rules: ClassVar[dict[str, Any]] = {"minProperties": 1}
 
 
 class ParametersTable(Table):

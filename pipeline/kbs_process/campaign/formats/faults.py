@@ -47,7 +47,7 @@ def _faults(model: type[Table], error: ValidationError) -> Iterator[Fault]:
 def _fault(model: type[Table], entry: ErrorDetails) -> Fault:
     kind, found, context = entry["type"], entry["input"], entry.get("ctx", {})
     # Tags of alternatives are no keys, nor is what marks the key itself.
-    key: Key = tuple(part for part in entry["loc"] if not str(part).startswith(TAGS))
+    key: Key = tuple(part for part in entry["loc"] if part not in TAGS)
     if kind.startswith("string_") and key[-1:] == ("[key]",):
         key = key[:-1]
     match kind:
@@ -62,7 +62,7 @@ def _fault(model: type[Table], entry: ErrorDetails) -> Fault:
             return (*key, name), f"is missing, although {context['given']} is given", _how_to_give(name)
         case "literal_error":
             values = [value for one in _allowed(model, key) for value in get_args(one)]
-            return key, f"{_shown(found)} is not allowed", did_you_mean(str(found), values)
+            return key, f"{_shown(found)} is not allowed", did_you_mean(found if isinstance(found, str) else "", values)
         case "version":
             return key, f"is {_shown(found)}, not 1", "this version reads 1 only"
         case "finite_number":
@@ -84,9 +84,16 @@ def _other_type(allowed: list[Any], key: Key, found: Any) -> tuple[str, str]:
         return "is a list of tables, not one table", f"write [{key[-1]}], in single brackets"
     if type(found) is int and float in allowed:
         return f"{_shown(found)} is beyond all numbers that can be computed with", "give less than 1e308"
-    names = dict.fromkeys(_TYPES.get(get_origin(one) or one, "a table") for one in allowed)
-    wanted = " or ".join(names)
-    return f"{_shown(found)} is {_TYPES.get(type(found), 'a date or time')}, not {wanted}", f"write {wanted}"
+    wanted = " or ".join(dict.fromkeys(_TYPES.get(get_origin(one) or one, "a table") for one in allowed))
+    needed = [
+        name for one in allowed if _is_table(one) for name in one.model_fields if one.model_fields[name].is_required()
+    ]
+    remedy = (
+        f"write {{ {', '.join(f'{name} = ...' for name in needed)} }}" if 0 < len(needed) < 5 else f"write {wanted}"
+    )
+    if isinstance(found, bool):
+        return f"{_shown(found)} is not {wanted}", remedy
+    return f"{_shown(found)} is {_TYPES.get(type(found), 'a date or time')}, not {wanted}", remedy
 
 
 def _limits(kind: str, found: Any, context: dict[str, Any]) -> tuple[str, str]:
@@ -100,7 +107,7 @@ def _limits(kind: str, found: Any, context: dict[str, Any]) -> tuple[str, str]:
             return f"{_shown(found)} is greater than {context['le']:g}", f"give at most {context['le']:g}"
         case "less_than":
             return f"{_shown(found)} is not less than {context['lt']:g}", f"give less than {context['lt']:g}"
-        case "too_short" if isinstance(found, dict):
+        case "empty" | "too_short" if isinstance(found, dict):
             return "is empty", "describe at least one"
         case "too_short":
             least = context["min_length"]
@@ -145,7 +152,7 @@ def _how_to_give(name: str) -> str:
 def _shown(value: Any) -> str:
     if isinstance(value, int) and abs(value) > 10**18:
         return f"{value:#x}"[:20] + "..."  # Python writes no number of very many digits
-    text = f"'{value}'" if isinstance(value, str) else str(value)
+    text = f"'{value}'" if isinstance(value, str) else str(value).lower() if isinstance(value, bool) else str(value)
     text = text.replace("\n", "\\n")
     return text if len(text) <= 60 else text[:57] + "..."
 

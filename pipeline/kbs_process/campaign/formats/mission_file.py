@@ -9,6 +9,7 @@ from pydantic import AfterValidator, AwareDatetime, ConfigDict, Field
 from pydantic_core import PydanticCustomError
 
 from kbs_process.campaign.config import PointingStatistic
+from kbs_process.campaign.formats.kind import Kind
 from kbs_process.campaign.formats.tables import (
     Count,
     LimitTable,
@@ -20,7 +21,6 @@ from kbs_process.campaign.formats.tables import (
     Table,
     Text,
 )
-from kbs_process.campaign.quantities import Kind
 
 
 def _in_utc(epoch: datetime) -> datetime:

@@ -8,7 +8,8 @@ from pydantic import ConfigDict, Field
 
 from kbs_process.campaign.formats.tables import NotNegative, Positive, Some, Table, Version
 
-Six = Annotated[list[float], Field(min_length=6, max_length=6)]
+# Numbers whose squares are numbers, too.
+Six = Annotated[list[Annotated[float, Field(ge=-1e100, le=1e100)]], Field(min_length=6, max_length=6)]
 
 
 class AngleTable(Table):

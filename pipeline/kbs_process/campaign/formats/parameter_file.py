@@ -6,8 +6,8 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import ConfigDict, Field
 
+from kbs_process.campaign.formats.kind import CHANNELWISE, PAIRWISE, Kind
 from kbs_process.campaign.formats.tables import LinkName, QuantityTable, SomeDistinct, Table
-from kbs_process.campaign.quantities import CHANNELWISE, PAIRWISE, Kind
 from kbs_process.rig.model import JointType
 
 Lengths = Annotated[QuantityTable, Kind("m", (3,))]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import json
+from math import inf
 from typing import Any
 
 from pydantic.json_schema import GenerateJsonSchema
@@ -36,18 +36,17 @@ class _Schema(GenerateJsonSchema):
         return made | {"additionalProperties": False} if "patternProperties" in made else made
 
     def default_schema(self, schema: core_schema.WithDefaultSchema) -> dict[str, Any]:
-        if schema.get("default") in (None, [], {}, ""):
+        if schema.get("default") in (None, [], {}, "", False, inf) or isinstance(schema.get("default"), Table):
             return self.generate_inner(schema["schema"])
         return super().default_schema(schema)
 
 
-def schema_text(name: str, model: type[Table] | None = None) -> str:
+def schema_of(name: str, model: type[Table]) -> dict[str, Any]:
     """Return the JSON Schema of a format, as a file in schemas/ has it."""
-    model = model or FORMATS[name]
     schema = model.model_json_schema(schema_generator=_Schema)
     head = {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "$id": f"urn:kbs-process:schema:{name}",
         "title": model.model_config["title"],
     }
-    return json.dumps(head | schema, indent=2, ensure_ascii=False) + "\n"
+    return head | schema

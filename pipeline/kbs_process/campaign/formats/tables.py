@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar, Self, TypeVar
 from pydantic import AfterValidator, BaseModel, ConfigDict, Discriminator, Field, Tag, model_validator
 from pydantic_core import PydanticCustomError
 
-from kbs_process.campaign.quantities import Kind
+from kbs_process.campaign.formats.kind import Kind
 
 # Patterns of texts, and what they ask for in words.
 NAME = "^[A-Za-z0-9][A-Za-z0-9._-]*$"
@@ -51,14 +51,14 @@ SomeDistinct = Annotated[
 ]
 Version = Annotated[int, AfterValidator(_first_version), Field(json_schema_extra={"const": 1})]
 
-# Alternatives are told apart by what TOML has; their tags are in a fault's place, where no key can begin like that.
-TAGS = "\0"
-TABLE, ARRAY, TEXT, TRUTH, NUMBER = (Tag(f"{TAGS}{kind}") for kind in ("table", "array", "text", "truth", "number"))
+# Alternatives are told apart by what TOML has; their tags stand in a fault's place, and are no keys.
+TABLE, ARRAY, TEXT, TRUTH, NUMBER = (Tag(f"\0{kind}") for kind in ("table", "array", "text", "truth", "number"))
+_TAGS = {dict: TABLE, list: ARRAY, str: TEXT, bool: TRUTH, int: NUMBER, float: NUMBER}
+TAGS = {tag.tag for tag in _TAGS.values()}
 
 
 def _kind(value: Any) -> str:
-    kinds = {dict: TABLE, list: ARRAY, str: TEXT, bool: TRUTH, int: NUMBER, float: NUMBER}
-    return kinds[type(value)].tag if type(value) in kinds else f"{TAGS}other"
+    return _TAGS[type(value)].tag if type(value) in _TAGS else "a date or time"
 
 
 by_kind = Discriminator(_kind)
@@ -74,6 +74,8 @@ def _documented(schema: dict[str, Any], model: type[Table]) -> None:
             if isinstance(kind, Kind):
                 words = "; ".join(filter(None, (kind.in_words(), field.description)))
                 schema["properties"][field.alias or name]["description"] = words
+    if model.filled:
+        schema["minProperties"] = 1
     schema.update(model.rules)
 
 
@@ -85,10 +87,13 @@ class Table(BaseModel):
     )
     spread: ClassVar[bool] = False  # may its keys be spread over several files?
     together: ClassVar[tuple[str, ...]] = ()  # keys of which all are given, or none
+    filled: ClassVar[bool] = False  # must it have a key?
     rules: ClassVar[dict[str, Any]] = {}  # what its JSON Schema says besides
 
     @model_validator(mode="after")
     def _complete(self) -> Self:
+        if self.filled and not self.model_fields_set:
+            raise PydanticCustomError("empty", "a table without a key")
         given = [name for name in self.together if name in self.model_fields_set]
         for name in self.together:
             if given and name not in given:

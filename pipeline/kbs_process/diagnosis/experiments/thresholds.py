@@ -1,6 +1,6 @@
 """Every threshold of the diagnosis, with the reason for its value.
 
-They were set on development cases, and on validation trials that were spent; docs/validations.md says which.
+They were set on development cases, and on validation trials that were spent.
 """
 
 from __future__ import annotations

@@ -29,7 +29,6 @@ from kbs_process.diagnosis.screening.suspects import Candidate
 from kbs_process.diagnosis.screening.transfer import BATCH, respond
 from kbs_process.diagnosis.side_by_side import side_by_side
 from kbs_process.estimation.tails import log_tail
-from kbs_process.plant.sensing import Sensing, SensingPort
 from kbs_process.signals.records import WRENCH_CHANNELS, Array
 
 _RUNAWAY = 1e30  # of a unit amplitude's signature
@@ -85,7 +84,7 @@ class Catalogued:
         return PLACES if self.jumps else 1
 
     def inputs(self, drive: int) -> Sequence[Mapping[Inlet, Array]] | None:
-        if isinstance(self.candidate.effect, Sensing):
+        if not self.candidate.effect.in_plant:
             return None
         scene, hypothesis = self.scene, self.scene.hypothesis
         tapped, ways = scene.signals[drive], scene.courses[drive]
@@ -99,7 +98,7 @@ class Catalogued:
         experiment, rig = self.scene.experiment, self.scene.hypothesis.rig
         prediction = self.scene.predicted[drive].values
         law, tapped = self.candidate.effect, self.scene.signals[drive]
-        if isinstance(law, Sensing) and law.whole_band and tapped.readings is not None:
+        if law.whole_band and tapped.readings is not None:
             return reduced(self.candidate, tapped, experiment.channels, rig, experiment.dt, len(prediction))
         if self.size:
             late = self.size * self.late(drive)[:, 0]
@@ -113,11 +112,11 @@ class Catalogued:
     @property
     def jumps(self) -> bool:
         """Whether it is the jump of a clock, at a time that each trajectory has."""
-        return isinstance(self.candidate.effect, Sensing) and self.candidate.effect.jumps
+        return self.candidate.effect.jumps
 
     @property
     def of_clock(self) -> bool:
-        return self.candidate.port is SensingPort.STREAM
+        return self.candidate.port.site == "stream"
 
     @property
     def of_every_clock(self) -> bool:

@@ -14,7 +14,7 @@ from scipy.interpolate import CubicSpline
 
 from kbs_process.diagnosis.experiments.hypothesis import Tapped
 from kbs_process.diagnosis.experiments.stamps import slope
-from kbs_process.diagnosis.screening.inlets import BASE_PORT, MOUNTING_PORT, WRENCH_PORT, Inlet
+from kbs_process.diagnosis.screening.inlets import WRENCH_PORT, Inlet
 from kbs_process.diagnosis.screening.scene import Course, courses
 from kbs_process.diagnosis.screening.suspects import Candidate, own_values, point_of
 from kbs_process.plant.along import along, signals_of
@@ -28,7 +28,6 @@ from kbs_process.signals.records import WRENCH_CHANNELS, Array
 from kbs_process.stages.align.resample import resample
 
 _POSITION = ("x", "y", "z")  # signals of an effect at a point; its velocity is their slopes
-_BENEATH = {Port.BASE_ACCELERATION: BASE_PORT, Port.BASE_TORQUE: MOUNTING_PORT}
 
 
 def port_inputs(candidate: Candidate, tapped: Tapped, rig: Rig, course: Course | None = None) -> Array:
@@ -54,7 +53,7 @@ def port_inputs(candidate: Candidate, tapped: Tapped, rig: Rig, course: Course |
     if joint is not None and joint.drive is not None:
         values["ratio"] = float(joint.drive.ratio)
     whole = along(effect, signals, values, 1.0 / tapped.rate)
-    every = [entry.name for entry in effect.parameters if entry.role == "amplitude"]
+    every = [entry.name for entry in effect.amplitudes]
     return whole[:, [every.index(entry.name) for entry in candidate.amplitudes]]
 
 
@@ -81,9 +80,11 @@ def inputs(
         # Both are meant at the output: the rotor's torque is `ratio` times the motor's, the field's angle a `ratio`-th.
         torque = values[:, :, 0] * by_field[1] / float(drive.ratio) ** 2
         return [{Inlet("motor_torque", site): column} for column in torque.T]
-    if candidate.port in _BENEATH:
+    assert isinstance(candidate.port, Port)
+    inlet = candidate.port.name.lower()
+    if candidate.port.beneath:
         return [
-            {Inlet(_BENEATH[candidate.port], "", axis): values[:, a, k] for k, axis in enumerate(_POSITION)}
+            {Inlet(inlet, "", axis): values[:, a, k] for k, axis in enumerate(_POSITION)}
             for a in range(values.shape[1])
         ]
     if candidate.port is Port.EXTERNAL_FORCE:
@@ -94,8 +95,7 @@ def inputs(
             {Inlet(WRENCH_PORT, site, axis): wrench[:, k] for k, axis in enumerate(WRENCH_CHANNELS)}
             for wrench in wrenches
         ]
-    assert isinstance(candidate.port, Port)
-    return [{Inlet(candidate.port.name.lower(), site): values[:, a, 0]} for a in range(values.shape[1])]
+    return [{Inlet(inlet, site): values[:, a, 0]} for a in range(values.shape[1])]
 
 
 def sensed(

@@ -15,14 +15,11 @@ from kbs_process.diagnosis.screening.scene import Scene
 from kbs_process.diagnosis.screening.screen import Catalogued, Suspect
 from kbs_process.diagnosis.screening.suspects import POINT, Candidate, Point
 from kbs_process.plant.effect import ACTION, ACTIONS, Effect, Port, instance
-from kbs_process.plant.laws import CATALOGUE, SENSING
+from kbs_process.plant.laws import LAWS
 from kbs_process.plant.laws.position.measured_law import Measured
 from kbs_process.plant.sensing import BY, Sensing
 from kbs_process.rig.model import TRANSDUCER
 from kbs_process.signals.records import Array
-
-_EVERY: tuple[Effect | Sensing, ...] = (*CATALOGUE, *SENSING)
-_LAWS = {law.name: law for law in _EVERY}
 
 
 def suspect_of(find: Find, scene: Scene) -> tuple[Suspect, Array] | None:
@@ -33,7 +30,7 @@ def suspect_of(find: Find, scene: Scene) -> tuple[Suspect, Array] | None:
         ends = float(x[0]), float(x[-1])
         coefficients = np.linalg.lstsq(basis(over, x, *ends), find.curve.value, rcond=None)[0]
         return CurveSuspect(scene, over, own.place.site, ends), np.asarray(coefficients)
-    law = _LAWS.get(own.law)
+    law = LAWS.get(own.law)
     mounting = law is not None and law.port is Port.BASE_TORQUE
     site = TRANSDUCER if mounting else BY.join(own.place.channels) or own.place.site
     if law is None or law.each_trial or not site:
@@ -88,5 +85,5 @@ def sigma_of(find: Find, suspect: Suspect, amplitude: Array) -> Array:
     if find.curve is not None and isinstance(find.curve.law, Measured):
         nodes = np.linspace(0.0, len(find.curve.x) - 1.0, len(amplitude)).round().astype(int)
         return np.asarray(find.curve.sigma[nodes])
-    numbers = _numbers(find.estimates if _LAWS[find.identity.law].in_plant else find.actions[0])
+    numbers = _numbers(find.estimates if LAWS[find.identity.law].in_plant else find.actions[0])
     return np.array([numbers[name].sigma for name in suspect.amplitudes])

@@ -15,7 +15,7 @@ part of the rigid bodies, and cannot be left out.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from importlib import import_module
 from pkgutil import iter_modules
 from types import ModuleType
@@ -46,6 +46,8 @@ _FOUND = sorted((law for module in modules() for law in laws_of(module)), key=la
 CATALOGUE: tuple[Effect, ...] = tuple(law for law in _FOUND if isinstance(law, Effect) and not law.measured)
 MEASURED: tuple[Effect, ...] = tuple(law for law in _FOUND if isinstance(law, Effect) and law.measured)
 SENSING: tuple[Sensing, ...] = tuple(law for law in _FOUND if isinstance(law, Sensing))
+
+LAWS: Mapping[str, Effect | Sensing] = {law.name: law for law in _FOUND}
 
 _EVERY = (*CATALOGUE, *MEASURED)
 _POSITION = {effect.name: index for index, effect in enumerate(_EVERY)}

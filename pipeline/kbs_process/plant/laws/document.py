@@ -67,7 +67,7 @@ $\\theta_f$; ratio $R$.
 
 def catalogue() -> str:
     """Return the page."""
-    ports = (f"| {_name(port)} | {port.what} | {port.word} | {port.shows} |\n" for port in (*Port, *SensingPort))
+    ports = (f"| {port.title} | {port.what} | {port.word} | {port.shows} |\n" for port in (*Port, *SensingPort))
     return "".join([_BEGINNING, *ports, _READING, *_laws()])
 
 
@@ -86,7 +86,7 @@ def _laws() -> Iterator[str]:
 
 
 def _law(law: Law) -> Iterator[str]:
-    sides = [f"At: {_name(law.port)}"]
+    sides = [f"At: {law.port.title}"]
     sides += [f"family: {law.family}"] if law.family else []
     sides += ["its size is each recording's own"] if law.each_trial else []
     sides += [] if law.suspected else ["never a suspect"]
@@ -132,7 +132,3 @@ def _first(module: ModuleType) -> str:
 
 def _last(name: str) -> str:
     return name.rpartition(".")[2]
-
-
-def _name(port: Port | SensingPort) -> str:
-    return port.name.lower().replace("_", " ")

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from kbs_process.errors import RecordingError
 from kbs_process.recordings.tables import Cells
 from kbs_process.signals.records import Array, Mask, Stamps
-from kbs_process.studies.convert.mapping import Time
+from kbs_process.studies.convert.mapping_file import Time
 
 _NS = {"s": 1_000_000_000, "ms": 1_000_000, "us": 1000, "ns": 1, "min": 60_000_000_000}
 _GREATEST = 2.0**63 - 1024.0  # ns, the greatest double that an int64 holds

@@ -3,59 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping as MappingOf
-from datetime import datetime
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Literal
 
 import msgspec
 
 from kbs_process.campaign.documents import Document, Key, read, shown
+from kbs_process.campaign.formats.faults import checked
 from kbs_process.campaign.problems import Problems
-from kbs_process.campaign.schema import violations
 from kbs_process.campaign.units import UnitMismatchError, alike, factor
 from kbs_process.errors import ConfigError, did_you_mean
 from kbs_process.recordings.formats import Text, formats
 from kbs_process.signals.records import WRENCH_CHANNELS, WRENCH_UNITS
 from kbs_process.studies.convert import PRESETS, preset_names
+from kbs_process.studies.convert.mapping_file import ColumnTable, MappingFile, Part, Source, Time, TimesTable, Turn
 
 KELVIN = 273.15  # 0 degC, K
-
-TimeUnit = Literal["s", "ms", "us", "ns", "min", "datetime"]
-
-
-class Time(msgspec.Struct, frozen=True):
-    """Where the time of a stream's samples is."""
-
-    column: int | str | None = None
-    unit: TimeUnit = "s"
-    rate_Hz: float | None = None
-    start: datetime | None = None
-
-
-class Source(msgspec.Struct, frozen=True):
-    """Where the files come from."""
-
-    origin: str = ""
-    licence: str = ""
-    reference: str = ""
-
-
-class Part(msgspec.Struct, frozen=True):
-    """One recording, or the part of a source file that becomes one."""
-
-    source: str
-    trajectory: str
-    role: Literal["calibration", "fit", "held-out"]
-    repeat: int = 1
-    name: str = ""
-    start_s: float = 0.0
-    end_s: float = float("inf")
-
-    @property
-    def stem(self) -> str:
-        """Name of the recording's file, without suffix."""
-        return self.name or f"{self.trajectory}_{self.repeat}"
 
 
 class Channel(msgspec.Struct, frozen=True):
@@ -75,14 +38,6 @@ class StreamMap(msgspec.Struct, frozen=True):
     key: str  # as in campaign.toml's [topics]: "wrench", "encoder", ...
     time: Time | None  # None: the file's own
     channels: tuple[Channel, ...]
-
-
-class Turn(msgspec.Struct, frozen=True):
-    """Forces and moments are turned by `factor` times the angle of `joint` about `axis`, to be in T's axes."""
-
-    joint: str
-    axis: tuple[float, float, float]
-    factor: float
 
 
 class Mapping(msgspec.Struct, frozen=True):
@@ -125,44 +80,42 @@ def load_mapping(path: Path) -> Mapping:
     """
     document = read(path, role="mapping", remedy="give a mapping file, or a preset: " + ", ".join(preset_names()))
     problems = Problems(shown(path))
-    for violation in violations(document.tree, "import"):
-        problems.add(document.place(violation.key), violation.what, violation.remedy)
-    problems.raise_any()
-    tree = document.tree
-    if "format" in tree and tree["format"] not in formats():
-        remedy = did_you_mean(tree["format"], formats())
-        problems.add(document.place(("format",)), f"'{tree['format']}' is not allowed", remedy)
-    streams = tuple(_stream(document, key, problems) for key in STREAMS if key in tree)
-    parts = tuple(msgspec.convert(part, Part) for part in tree["recording"])
-    _check_parts(document, parts, problems)
-    turn = msgspec.convert(tree["turn"], Turn) if "turn" in tree else None
-    if turn:
-        _check_turn(document, turn, streams, problems)
+    file = checked(document, MappingFile, problems)
+    if file.format is not None and file.format not in formats():
+        remedy = did_you_mean(file.format, formats())
+        problems.add(document.place(("format",)), f"'{file.format}' is not allowed", remedy)
+    streams = tuple(_stream(document, file, key, problems) for key in STREAMS if key in file.model_fields_set)
+    _check_parts(document, file.recording, problems)
+    if file.turn:
+        _check_turn(document, file.turn, streams, problems)
     problems.raise_any()
     return Mapping(
         path=path,
-        template=path.parent / tree["campaign"],
-        format=tree.get("format"),
-        text=msgspec.convert(tree.get("text", {}), Text),
+        template=path.parent / file.campaign,
+        format=file.format,
+        text=Text(**file.text.model_dump(exclude_none=True)),
         streams=streams,
-        turn=turn,
-        source=msgspec.convert(tree.get("source", {}), Source),
-        parts=parts,
+        turn=file.turn,
+        source=file.source,
+        parts=tuple(file.recording),
     )
 
 
-def _stream(document: Document, key: str, problems: Problems) -> StreamMap:
-    table = document.tree[key]
-    rows: list[tuple[Key, str, tuple[str, ...], dict[str, Any]]] = []  # key, field, SI units, column table
+def _stream(document: Document, file: MappingFile, key: str, problems: Problems) -> StreamMap:
+    table = getattr(file, key)
+    rows: list[tuple[Key, str, tuple[str, ...], ColumnTable]] = []  # key, field, SI units, column
+    # In the order of the file.
     match key:
         case "wrench":
             units = dict(zip(WRENCH_CHANNELS, WRENCH_UNITS, strict=True))
-            rows = [((key, name), WRENCH_FIELDS[name], (units[name],), cell) for name, cell in table.items()]
+            rows = [
+                ((key, name), WRENCH_FIELDS[name], (units[name],), getattr(table, name)) for name in document.tree[key]
+            ]
         case "command":
             rows = [
                 ((key, kind, joint), f"{kind}[{joint}]", JOINT_UNITS[kind], cell)
-                for kind, joints in table.items()
-                for joint, cell in joints.items()
+                for kind in document.tree[key]
+                for joint, cell in getattr(table, kind).items()
             ]
         case "temperature":
             rows = [((key,), "temperature", ("degC",), table)]
@@ -170,17 +123,17 @@ def _stream(document: Document, key: str, problems: Problems) -> StreamMap:
             part = {"rate": "velocity", "effort": "effort"}.get(key, "position")
             rows = [((key, joint), f"{part}[{joint}]", JOINT_UNITS[part], cell) for joint, cell in table.items()]
     channels = tuple(_channel(document, *row, problems) for row in rows)
-    return StreamMap(key, _time(document, key, problems), channels)
+    return StreamMap(key, _time(document, file.time, key, problems), channels)
 
 
 def _channel(
-    document: Document, key: Key, field: str, allowed: tuple[str, ...], cell: MappingOf[str, Any], problems: Problems
+    document: Document, key: Key, field: str, allowed: tuple[str, ...], cell: ColumnTable, problems: Problems
 ) -> Channel:
-    unit, scale, radius = cell["unit"], float(cell.get("scale", 1.0)), cell.get("radius_m")
+    unit, scale, radius, again = cell.unit, cell.scale, cell.radius_m, cell.unwrap
     # A way along a surface of some radius is an angle; any other unit tells by itself which one it is of.
     kin = [] if radius is not None else [si for si in allowed if alike(unit, si)]
     si = kin[0] if kin else allowed[0]
-    if cell.get("unwrap") and si != "rad":
+    if again and si != "rad":
         problems.add(document.place((*key, "unwrap")), "only an angle can be unwrapped", "delete unwrap")
     if radius is not None and si not in ("rad", "rad/s"):
         problems.add(document.place((*key, "radius_m")), "goes with angles and rates only", "delete radius_m")
@@ -193,38 +146,28 @@ def _channel(
             gain = factor(unit, si) if radius is None else factor(unit, si.replace("rad", "m")) / radius
         except UnitMismatchError as error:
             problems.add(document.place((*key, "unit")), str(error), error.remedy)
-    again = cell.get("unwrap", False)
-    turn = 2.0 * math.pi * again if isinstance(again, bool) else abs(float(again) * gain * scale)
-    return Channel(field, cell["column"], si, gain * scale, offset, turn)
+    turn = 2.0 * math.pi * again if isinstance(again, bool) else abs(again * gain * scale)
+    return Channel(field, cell.column, si, gain * scale, offset, turn)
 
 
-def _time(document: Document, key: str, problems: Problems) -> Time | None:
-    common = document.tree.get("time", {})
-    own = key in common
-    table = common[key] if own else {name: value for name, value in common.items() if name not in STREAMS}
-    place: Key = ("time", key) if own else ("time",)
-    if not table:
+def _time(document: Document, common: TimesTable, key: str, problems: Problems) -> Time | None:
+    own: Time | None = getattr(common, key)
+    table, place = (common, ("time",)) if own is None else (own, ("time", key))
+    given = table.model_fields_set & Time.model_fields.keys()
+    if not given:
         return None
-    start = table.get("start")
-    if start is not None and not (isinstance(start, datetime) and start.tzinfo is not None):
-        problems.add(
-            document.place((*place, "start")),
-            "is no date and time with an offset from UTC",
-            "write start = 2026-01-31T12:00:00Z",
-        )
-        table = {name: value for name, value in table.items() if name != "start"}
-    if "column" not in table and "rate_Hz" not in table:
+    if not given & {"column", "rate_Hz"}:
         problems.add(document.place(place), "says nothing about the samples' time", "give column and unit, or rate_Hz")
-    if "unit" in table and "rate_Hz" in table:
+    if {"unit", "rate_Hz"} <= given:
         problems.add(
             document.place((*place, "unit")),
             "goes with a column of times, rate_Hz with one that counts samples",
             "delete one of the two",
         )
-    return msgspec.convert(table, Time)
+    return Time.model_construct(**{name: getattr(table, name) for name in Time.model_fields})
 
 
-def _check_parts(document: Document, parts: tuple[Part, ...], problems: Problems) -> None:
+def _check_parts(document: Document, parts: Sequence[Part], problems: Problems) -> None:
     stems: set[str] = set()
     for index, part in enumerate(parts):
         if part.stem in stems:

@@ -21,7 +21,8 @@ from kbs_process.results.provenance import sha256
 from kbs_process.results.store import writing
 from kbs_process.signals.records import Array, Block
 from kbs_process.studies.convert.description import Origin, prepare, recording_file, write_campaign
-from kbs_process.studies.convert.mapping import WRENCH_FIELDS, Mapping, Part, StreamMap, find_mapping, load_mapping
+from kbs_process.studies.convert.mapping import WRENCH_FIELDS, Mapping, StreamMap, find_mapping, load_mapping
+from kbs_process.studies.convert.mapping_file import Part
 from kbs_process.studies.convert.streams import Findings, read_part
 
 LATEST_NS = (1 << 31) * 1_000_000_000  # the seconds of a ROS 2 time stamp are a signed 32-bit number

@@ -13,7 +13,8 @@ from kbs_process.errors import RecordingError
 from kbs_process.recordings.tables import Cells, Table, find_column
 from kbs_process.signals.records import Array, Block, Mask, Stamps
 from kbs_process.studies.convert.clock import nanoseconds, numbers
-from kbs_process.studies.convert.mapping import Channel, Mapping, Part, StreamMap, Time, Turn
+from kbs_process.studies.convert.mapping import Channel, Mapping, StreamMap
+from kbs_process.studies.convert.mapping_file import Part, Time, Turn
 
 _NO_STAMPS = np.empty(0, dtype=np.int64)
 _TIMELESS = "rows have no time, left out"
@@ -148,7 +149,7 @@ def _stamps(
     if time is not None and not clocks:
         count = len(next(iter(named.values())))
         return nanoseconds(np.arange(rows, rows + count), time, str(table.path))
-    stamp, known = nanoseconds(named[clocks[0]], time or Time(), f"{table.path}: {clocks[0]}")
+    stamp, known = nanoseconds(named[clocks[0]], time or Time.model_construct(), f"{table.path}: {clocks[0]}")
     for clock in clocks[1:]:
         if not np.array_equal(named[clock], named[clocks[0]]):
             raise RecordingError(

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from kbs_process.report.panel import Block, Fold, Grid
 from kbs_process.report.text import band_hz
-from kbs_process.studies.correlate.results import Band, Frame, Recording, Requirement, Results
+from kbs_process.results.judged import Frame, Requirement
+from kbs_process.studies.correlate.results import Band, Recording, Results
 
 ROLES = ("held-out", "fit", "calibration")
 PLATES = 6  # of recordings, on paper

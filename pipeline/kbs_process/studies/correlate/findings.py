@@ -1,61 +1,26 @@
-"""What the analyses of all recordings amount to: repeatability, merit, uncertainty budget, requirements."""
+"""What the analyses of all recordings amount to: bands, repeatability, figures of merit, resonances."""
 
 from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from typing import Literal
 
+import msgspec
 import numpy as np
 
 from kbs_process.campaign.config import Campaign
 from kbs_process.plant.laws import select
 from kbs_process.plant.linear.modes import modes
 from kbs_process.reduction.analysis import Analysis, bands_of, passband
-from kbs_process.reduction.judging import judged
+from kbs_process.results.judged import Budget, Frame
 from kbs_process.stages import repeatability, repeats
 from kbs_process.stages.bandpass import Band, BandStatement, statement
 from kbs_process.stages.compare import compare
-from kbs_process.stages.decouple import Decoupling
 from kbs_process.stages.gravity.model import GravityModel
 from kbs_process.studies.correlate import results
-from kbs_process.studies.correlate.uncertainty import budgets
-
-Frame = Literal["S", "T", "joint"]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Findings:
-    """What the report's tables hold."""
-
-    repeatability: tuple[results.Repeatability, ...]
-    merit: tuple[results.Merit, ...]
-    budget: tuple[results.Budget, ...]
-    requirements: tuple[results.Requirement, ...]
-    bands: tuple[results.Band, ...]
-    resonances: tuple[results.Resonance, ...]
-
-
-def find(campaign: Campaign, analyses: Sequence[Analysis], model: GravityModel, decoupling: Decoupling) -> Findings:
-    """Gather the findings; calibration recordings serve the fit and are judged by its residual alone."""
-    runs = [analysis for analysis in analyses if analysis.entry.role != "calibration"]
-    bands = bands_of(campaign.bands)
-    statements = _statements(bands, runs)
-    repeated = tuple(_repeatability(runs, bands))
-    resonances = _resonances(campaign, runs, model)
-    found = tuple(budgets(campaign, runs, model, decoupling, statements, repeated, resonances))
-    return Findings(
-        repeatability=repeated,
-        merit=tuple(_merits(campaign, runs, bands, found)),
-        budget=found,
-        requirements=tuple(judged(campaign, requirement, runs, found) for requirement in campaign.requirements),
-        bands=tuple(_band(statements[band.name]) for band in bands if band.name in statements),
-        resonances=resonances,
-    )
-
-
-def _statements(bands: Sequence[Band], runs: Sequence[Analysis]) -> dict[str, BandStatement]:
+def statements(bands: Sequence[Band], runs: Sequence[Analysis]) -> dict[str, BandStatement]:
     """Statements for the shortest recording, where edges weigh most."""
     if not runs:
         return {}
@@ -63,7 +28,8 @@ def _statements(bands: Sequence[Band], runs: Sequence[Analysis]) -> dict[str, Ba
     return {band.name: statement(band, shortest.dt, len(shortest)) for band in bands}
 
 
-def _band(stated: BandStatement) -> results.Band:
+def band(stated: BandStatement) -> results.Band:
+    """Return a band as results.json describes it."""
     label = "unfiltered" if stated.high_Hz is None else f"{stated.low_Hz or 0:g} to {stated.high_Hz:g} Hz"
     return results.Band(
         name=stated.name,
@@ -77,7 +43,8 @@ def _band(stated: BandStatement) -> results.Band:
     )
 
 
-def _repeatability(runs: Sequence[Analysis], bands: Sequence[Band]) -> Iterable[results.Repeatability]:
+def repeatabilities(runs: Sequence[Analysis]) -> Iterable[results.Repeatability]:
+    """Yield what the repeats of each trajectory have in common, by band, frame and channel."""
     by_trajectory: dict[str, list[Analysis]] = defaultdict(list)
     for analysis in runs:
         by_trajectory[analysis.entry.trajectory].append(analysis)
@@ -117,38 +84,28 @@ def _lags(group: Sequence[Analysis]) -> dict[int, float]:
     return lags
 
 
-def _merits(
-    campaign: Campaign, runs: Sequence[Analysis], bands: Sequence[Band], budget: Sequence[results.Budget]
-) -> Iterable[results.Merit]:
-    by_name = {band.name: band for band in bands}
+def merits(campaign: Campaign, runs: Sequence[Analysis], budget: Sequence[Budget]) -> Iterable[results.Merit]:
+    """Yield the figures of merit of every recording that has a prediction, by frame, band and channel."""
+    by_name = {band.name: band for band in bands_of(campaign.bands)}
     sigma = {(entry.recording, entry.frame, entry.band, entry.channel): entry.total for entry in budget}
     for analysis in runs:
         for (frame, name), pair in analysis.pairs.items():
             if pair.predicted is None:
                 continue
             limits = passband(by_name[name], campaign.bands.working_rate)
+            key = (analysis.entry.name, _frame(frame), name)
             for merit in compare(pair.measured, pair.predicted, limits):
                 yield results.Merit(
                     recording=analysis.entry.name,
                     role=analysis.entry.role,
                     band=name,
                     frame=_frame(frame),
-                    channel=merit.channel,
-                    unit=merit.unit,
-                    measured_rms=merit.measured_rms,
-                    predicted_rms=merit.predicted_rms,
-                    residual_rms=merit.residual_rms,
-                    measured_peak=merit.measured_peak,
-                    predicted_peak=merit.predicted_peak,
-                    correlation=merit.correlation,
-                    fraction_of_variance=merit.fraction_of_variance,
-                    spectral_ratio=merit.spectral_ratio,
-                    pessimism=merit.pessimism,
-                    sigma=sigma.get((analysis.entry.name, _frame(frame), name, merit.channel)),
+                    sigma=sigma.get((*key, merit.channel)),
+                    **msgspec.structs.asdict(merit),
                 )
 
 
-def _resonances(campaign: Campaign, runs: Sequence[Analysis], model: GravityModel) -> tuple[results.Resonance, ...]:
+def resonances(campaign: Campaign, runs: Sequence[Analysis], model: GravityModel) -> tuple[results.Resonance, ...]:
     """Modes on the transducer at the first and the last pose of the first run: they move with the joints."""
     if not runs:
         return ()

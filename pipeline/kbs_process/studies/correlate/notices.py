@@ -11,12 +11,13 @@ from kbs_process.campaign.config import Campaign
 from kbs_process.reduction.analysis import Analysis, bands_of
 from kbs_process.reduction.judging import band_of, coverage_below
 from kbs_process.reduction.losses import lost
+from kbs_process.report.prose import Prose
+from kbs_process.results.records import Notice, Severity
 from kbs_process.stages.align.clocks import UNKNOWN_OFFSET_S
+from kbs_process.stages.conventions import SignCheck
 from kbs_process.stages.gravity.model import GravityModel
-from kbs_process.stages.gravity.quality import Misfit
 from kbs_process.stages.verdict import COVERAGE
-from kbs_process.studies.correlate import results
-from kbs_process.studies.correlate.findings import Findings
+from kbs_process.studies.correlate.results import Repeatability, Results
 
 # A resonance below this many times a band's edge is next to it: the band then holds part of the resonance's flank.
 NEXT_TO = 4.0
@@ -28,51 +29,43 @@ NOISY = 1.0
 UNJUDGED = 40
 # rad, standard deviation: a phase that may lie anywhere in a turn has 1.8.
 UNKNOWN_PHASE = 1.0
-# Characters of a check's detail that a notice quotes.
-LONG = 160
 QUANTITY = {"torque": "T", "force": "F"}  # first letter of its channels
 
+_SAYS = Prose("kbs_process.studies.correlate", "notices")
 
-def notices(
-    campaign: Campaign,
-    analyses: Sequence[Analysis],
-    model: GravityModel,
-    findings: Findings,
-    conventions: Sequence[results.Convention],
-) -> Iterable[results.Notice]:
+
+def notices(campaign: Campaign, analyses: Sequence[Analysis], model: GravityModel, found: Results) -> Iterable[Notice]:
     """Yield everything worth a notice, worst first."""
-    yield from _conventions(conventions)
-    yield from _losses(analyses)
+    yield from _conventions(found.conventions)
+    for analysis in analyses:
+        yield from lost(analysis.entry, analysis.run.losses)
     yield from _unjudged(analyses)
     yield from _static_load(campaign, analyses, model)
-    yield from _fit(model)
+    for check in model.fit.checks:
+        if not check.passed:
+            yield _notice("info", "fit", check=check)
     yield from _taring(analyses)
-    yield from _peaks(campaign, analyses, findings)
-    yield from _repeats(campaign, findings)
-    yield from _resonance(findings)
-    yield from _predictions(findings)
+    yield from _peaks(campaign, analyses, found)
+    yield from _repeats(campaign, found)
+    yield from _resonance(found)
+    yield from _predictions(found)
     yield from _phases(campaign, analyses)
-    yield from _edges(findings)
+    yield from _edges(found)
     yield from _clocks(analyses)
 
 
-def _conventions(conventions: Sequence[results.Convention]) -> Iterable[results.Notice]:
+def _notice(severity: Severity, name: str, where: str = "", **facts: object) -> Notice:
+    """A notice in the words of its template."""
+    return Notice(severity=severity, what=_SAYS(name, **facts), where=where, remedy=_SAYS(f"{name}_remedy"))
+
+
+def _conventions(conventions: Sequence[SignCheck]) -> Iterable[Notice]:
     for check in conventions:
         if not check.ok:
-            yield results.Notice(
-                severity="error",
-                what=f"sign or frame: {check.check} is {check.found}, expected {check.expected}",
-                remedy="check the topics' fields, the channels' signs and the joints' axes in the parameter files",
-            )
+            yield _notice("error", "convention", check=check)
 
 
-def _losses(analyses: Sequence[Analysis]) -> Iterable[results.Notice]:
-    """One notice a recording: of each kind how much, and between which times."""
-    for analysis in analyses:
-        yield from lost(analysis.entry, analysis.run.losses)
-
-
-def _unjudged(analyses: Sequence[Analysis]) -> Iterable[results.Notice]:
+def _unjudged(analyses: Sequence[Analysis]) -> Iterable[Notice]:
     """Stretches of a recording in which the disturbance is not known, and so in no figure."""
     for analysis in analyses:
         residual = analysis.residual
@@ -80,177 +73,116 @@ def _unjudged(analyses: Sequence[Analysis]) -> Iterable[results.Notice]:
         stretches = [stretch for stretch in edges.reshape(-1, 2) if np.diff(stretch)[0] > UNJUDGED]
         if stretches:
             start, stop = max(stretches, key=lambda stretch: float(stretch[1] - stretch[0]))
-            lost = sum(float(end - begin) for begin, end in stretches) * residual.dt
-            yield results.Notice(
-                severity="warning",
-                what=f"{lost:.1f} s of {len(residual) * residual.dt:.0f} s are in no figure: wrench or angles are "
-                f"missing, longest from {residual.t[start]:.1f} s to {residual.t[stop - 1]:.1f} s",
-                where=analysis.entry.name,
-                remedy="what the article did in that time is not judged: record it again",
+            yield _notice(
+                "warning",
+                "unjudged",
+                analysis.entry.name,
+                lost=sum(float(end - begin) for begin, end in stretches) * residual.dt,
+                whole=len(residual) * residual.dt,
+                start=residual.t[start],
+                end=residual.t[stop - 1],
             )
 
 
-def _fit(model: GravityModel) -> Iterable[results.Notice]:
-    for check in model.fit.checks:
-        if not check.passed:
-            detail = check.detail if len(check.detail) < LONG else f"{check.detail[:LONG]} ..."
-            yield results.Notice(
-                severity="info", what=f"gravity fit, {check.name}: {detail}", remedy="see the gravity fit's table"
-            )
-
-
-def _static_load(campaign: Campaign, analyses: Sequence[Analysis], model: GravityModel) -> Iterable[results.Notice]:
+def _static_load(campaign: Campaign, analyses: Sequence[Analysis], model: GravityModel) -> Iterable[Notice]:
     """A recording whose slow part the model leaves: what is judged or compared is then that load."""
-    matter = "the verdict is" if campaign.requirements else "the figures of merit are"
     for analysis in analyses:
         large = [misfit for misfit in analysis.misfits if not misfit.ok]
         if large:
-            worst = max(misfit.ratio for misfit in large)
-            yield results.Notice(
-                severity="warning",
-                what=f"an unmodelled static load: below {model.settings.low_pass_Hz:.2g} Hz gravity leaves up to "
-                f"{worst:.0f} times what its uncertainty explains (rms: {', '.join(map(_left, large))}); {matter} "
-                "about that load rather than the article's own disturbance",
-                where=analysis.entry.name,
-                remedy="look for what pulls on the article and is in no parameter file (a bungee, a cable, a stop, a "
-                "hand): take it off, or judge a recording without it",
+            yield _notice(
+                "warning",
+                "static_load",
+                analysis.entry.name,
+                low_pass=model.settings.low_pass_Hz,
+                worst=max(misfit.ratio for misfit in large),
+                large=large,
+                judged=bool(campaign.requirements),
             )
 
 
-def _left(misfit: Misfit) -> str:
-    return f"{misfit.channel} {misfit.left:.2g} against {misfit.explained:.2g} {misfit.unit}"
-
-
-def _taring(analyses: Sequence[Analysis]) -> Iterable[results.Notice]:
+def _taring(analyses: Sequence[Analysis]) -> Iterable[Notice]:
     tared = [analysis for analysis in analyses if np.any(analysis.static.taring.noise > 0.0)]
     alone = [analysis.entry.name for analysis in tared if not analysis.static.taring.fitted]
     if alone:
-        yield results.Notice(
-            severity="info",
-            what=f"not in the gravity fit, so tared by themselves: {', '.join(alone)}. One constant a channel was "
-            "estimated from each, and nothing else",
-            remedy="constants and their uncertainty are in the gravity fit's table",
-        )
+        yield _notice("info", "taring", alone=alone)
 
 
-def _peaks(campaign: Campaign, analyses: Sequence[Analysis], findings: Findings) -> Iterable[results.Notice]:
+def _peaks(campaign: Campaign, analyses: Sequence[Analysis], found: Results) -> Iterable[Notice]:
     """Peaks that noise alone may make: the largest of many samples exceeds the true one, never falls short of it."""
-    for requirement in findings.requirements:
-        band = band_of(campaign.requirements[findings.requirements.index(requirement)], bands_of(campaign.bands))
+    for asked, requirement in zip(campaign.requirements, found.requirements, strict=True):
+        band = band_of(asked, bands_of(campaign.bands))
         key = (requirement.frame, band.name)
         signals = [one.pairs[key].measured for one in analyses if one.entry.role != "calibration"]
         below = coverage_below(requirement.statistic, signals, band)
         noise = [c for c in requirement.channels if (c.value or 0.0) < below * (c.sigma or 0.0)]
         if requirement.statistic == "peak" and noise:
-            each = ", ".join(f"{c.channel} {c.value:.2g} of {below * (c.sigma or 0.0):.2g}" for c in noise)
-            yield results.Notice(
-                severity="info",
-                what=f"these peaks are no larger than noise alone may make them in all recordings together, "
-                f"{below:.1f} sigma: {each} {requirement.unit}. The article's own may be anything from zero to the "
-                f"measured value and {COVERAGE:g} sigma",
-                where=requirement.name,
-                remedy="the value is an upper bound; a quieter transducer, or a narrower band, would lower it",
-            )
+            facts = {"below": below, "noise": noise, "unit": requirement.unit, "coverage": COVERAGE}
+            yield _notice("info", "peaks", requirement.name, **facts)
 
 
-def _repeats(campaign: Campaign, findings: Findings) -> Iterable[results.Notice]:
+def _judged(found: Results) -> set[tuple[str, str, str]]:
+    """Frame, band and first letter of the channels that requirements judge."""
+    return {(one.frame, one.band, QUANTITY[one.quantity]) for one in found.requirements}
+
+
+def _repeats(campaign: Campaign, found: Results) -> Iterable[Notice]:
     """One notice a trajectory, band and frame whose channels differ from run to run by more than they share."""
-    if not findings.repeatability:
-        yield results.Notice(
-            severity="warning" if campaign.requirements else "info",
-            what="no trajectory was repeated: the budget holds no repeatability",
-            remedy="run every trajectory two or three times",
-        )
-    judged = {(one.frame, one.band, QUANTITY[one.quantity]) for one in findings.requirements}
-    labels = {band.name: band.label for band in findings.bands}
-    noisy: dict[str, list[results.Repeatability]] = defaultdict(list)
-    for entry in findings.repeatability:
+    if not found.repeatability:
+        yield _notice("warning" if campaign.requirements else "info", "no_repeats")
+    judged = _judged(found)
+    labels = {band.name: band.label for band in found.bands}
+    noisy: dict[str, list[Repeatability]] = defaultdict(list)
+    for entry in found.repeatability:
         key = (entry.frame, entry.band, entry.channel[0])
         if key in judged and entry.ratio is not None and entry.ratio < NOISY:
             noisy[f"{entry.trajectory}, {labels[entry.band]}, frame {entry.frame}"].append(entry)
-    for where, entries in noisy.items():
-        each = ", ".join(
-            f"{e.channel} {e.noise_rms:.2g} {e.unit} against "
-            + (f"{e.signal_rms:.2g} {e.unit}" if e.signal_rms else "nothing that shows")
-            for e in entries
-        )
-        yield results.Notice(
-            severity="warning",
-            what=f"noise is larger than what the repeats have in common (rms): {each}",
-            where=where,
-            remedy="the verdict bounds the disturbance rather than measures it: quieten the transducer, or repeat more",
-        )
+    for where, channels in noisy.items():
+        yield _notice("warning", "noisy_repeats", where, channels=channels)
 
 
-def _resonance(findings: Findings) -> Iterable[results.Notice]:
-    lowest = min(findings.resonances, key=lambda mode: mode.frequency_Hz, default=None)
-    if lowest is None:
-        return
-    for band in findings.bands:
-        if band.low_pass_Hz is not None and lowest.frequency_Hz < NEXT_TO * band.low_pass_Hz:
-            yield results.Notice(
-                severity="info",
-                what=f"the article's resonance on the transducer ({lowest.frequency_Hz:.2f} Hz, {lowest.source}) "
-                f"amplifies what passes below {band.low_pass_Hz:g} Hz",
-                where=band.label,
-                remedy="its size is in the uncertainty budget",
-            )
+def _resonance(found: Results) -> Iterable[Notice]:
+    lowest = min(found.resonances, key=lambda mode: mode.frequency_Hz, default=None)
+    for band in found.bands:
+        edge = band.low_pass_Hz
+        if lowest is not None and edge is not None and lowest.frequency_Hz < NEXT_TO * edge:
+            yield _notice("info", "resonance", band.label, lowest=lowest, edge=edge)
 
 
-def _predictions(findings: Findings) -> Iterable[results.Notice]:
+def _predictions(found: Results) -> Iterable[Notice]:
     """Where the prediction can be tested in a requirement's band, and fails; and where it cannot be tested."""
-    judged = {(one.frame, one.band, QUANTITY[one.quantity]) for one in findings.requirements}
-    of_judged = [merit for merit in findings.merit if (merit.frame, merit.band, merit.channel[0]) in judged]
-    noise = [merit for merit in of_judged if at_the_noise(merit)]
+    judged = _judged(found)
+    of_judged = [merit for merit in found.merit if (merit.frame, merit.band, merit.channel[0]) in judged]
+    noise = {merit.channel for merit in of_judged if merit.at_the_noise}
     if noise:
-        channels = ", ".join(sorted({merit.channel for merit in noise}))
-        yield results.Notice(
-            severity="info",
-            what=f"{channels} in the requirement's band lie within twice their own uncertainty: "
-            "the prediction cannot be tested there",
-            remedy="look at wider bands and at the transducer (frame T) for the correlation",
-        )
-    labels = {band.name: band.label for band in findings.bands}
+        yield _notice("info", "untested", channels=sorted(noise))
+    labels = {band.name: band.label for band in found.bands}
     for merit in of_judged:
         explained = merit.fraction_of_variance
-        if not at_the_noise(merit) and explained is not None and explained < WEAK:
-            yield results.Notice(
-                severity="warning",
-                what=f"the prediction explains {100 * explained:.0f} % of the variance of {merit.channel}",
-                where=f"{merit.recording}, {labels[merit.band]}, frame {merit.frame}",
-                remedy="see figures of merit; phases of cogging and friction are unknown before identification",
-            )
+        if not merit.at_the_noise and explained is not None and explained < WEAK:
+            where = f"{merit.recording}, {labels[merit.band]}, frame {merit.frame}"
+            yield _notice("warning", "weak_prediction", where, explained=explained, channel=merit.channel)
 
 
-def _phases(campaign: Campaign, analyses: Sequence[Analysis]) -> Iterable[results.Notice]:
+def _phases(campaign: Campaign, analyses: Sequence[Analysis]) -> Iterable[Notice]:
     """Phases of which nothing is known, in a prediction: its bursts have a size and a time, and no sign."""
-    drives = {
-        joint.name: [
-            name
-            for name, quantity in joint.drive.parameters.items()
-            if quantity.unit == "rad" and float(quantity.sigma) > UNKNOWN_PHASE
-        ]
+    phases = [
+        f"{name} ({joint.name})"
         for joint in campaign.rig.joints
         if joint.drive is not None
-    }
-    unknown = [f"{name} ({joint})" for joint, names in drives.items() for name in names]
-    if unknown and any(one.predicted is not None for one in analyses):
-        yield results.Notice(
-            severity="info",
-            what=f"phases of which the parameter files know nothing: {', '.join(unknown)}. What they time, as bursts "
-            "where tooth passing crosses the resonance, is predicted in size and place, and may be measured with the "
-            "opposite sign",
-            where="prediction",
-            remedy="compare sizes there, not histories; kbs-process identify finds the phases of one article",
-        )
+        for name, quantity in joint.drive.parameters.items()
+        if quantity.unit == "rad" and float(quantity.sigma) > UNKNOWN_PHASE
+    ]
+    if phases and any(one.predicted is not None for one in analyses):
+        yield _notice("info", "phases", "prediction", phases=phases)
 
 
-def at_the_noise(merit: results.Merit) -> bool:
-    """Is a measured channel within twice its own uncertainty?"""
-    return merit.sigma is not None and (merit.measured_rms or 0.0) < COVERAGE * merit.sigma
+def _edges(found: Results) -> Iterable[Notice]:
+    for band in found.bands:
+        if band.edge_s > 0.0 and band.edge_error:
+            yield _notice("info", "edges", band.label, band=band)
 
 
-def _clocks(analyses: Sequence[Analysis]) -> Iterable[results.Notice]:
+def _clocks(analyses: Sequence[Analysis]) -> Iterable[Notice]:
     """Clocks that nothing in the file relates: an uncertainty was assumed, which nobody has measured."""
     unknown: dict[str, list[str]] = defaultdict(list)
     for analysis in analyses:
@@ -258,23 +190,4 @@ def _clocks(analyses: Sequence[Analysis]) -> Iterable[results.Notice]:
             if not np.isfinite(clock.sigma_offset_s):
                 unknown[stream].append(analysis.entry.name)
     for stream, names in unknown.items():
-        yield results.Notice(
-            severity="info",
-            what=f"the clock of '{stream}' cannot be compared with the wrench's: its stamps are taken as they are, "
-            f"with a standard uncertainty of {1e3 * UNKNOWN_OFFSET_S:g} ms in the budget and in an identification",
-            where=", ".join(names),
-            remedy="let the recorder's own time of every message be written beside the sensors' stamps",
-        )
-
-
-def _edges(findings: Findings) -> Iterable[results.Notice]:
-    for band in findings.bands:
-        if band.edge_s > 0.0 and band.edge_error:
-            yield results.Notice(
-                severity="info",
-                what=f"within {band.edge_s:.0f} s of the ends the filter errs by more than 0.1 % "
-                f"({100 * band.edge_error:.2g} % rms over the record where the spectrum is flat, "
-                f"{100 * (band.edge_error_drift or 0.0):.2g} % of what drifts)",
-                where=band.label,
-                remedy="record longer before and after the motion",
-            )
+        yield _notice("info", "clocks", ", ".join(names), stream=stream, sigma_ms=1e3 * UNKNOWN_OFFSET_S)

@@ -1,39 +1,28 @@
-"""Everything that a results folder holds besides the report: tables, processed recordings, results.json."""
+"""What a results folder holds besides results.json and the report: tables and processed recordings."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-import msgspec
 import numpy as np
 
-from kbs_process.campaign.config import Campaign
 from kbs_process.recordings.mcap.messages.encoding import OutStream
 from kbs_process.recordings.mcap.writer import write_mcap
 from kbs_process.reduction.analysis import Analysis
 from kbs_process.results.tables import TableWriter, write_table
 from kbs_process.signals.records import WRENCH_CHANNELS, Signal
 from kbs_process.stages.repeats import commanded
-from kbs_process.studies.correlate import results
 from kbs_process.studies.correlate.transducer import Study
 
 
-def write_results(
-    folder: Path,
-    campaign: Campaign,
-    analyses: Sequence[Analysis],
-    summary: results.Results,
-    on_transducer: Study | None,
-) -> None:
-    """Write results.json, the tables of every stage, and the processed signals as MCAP."""
+def write_tables(folder: Path, analyses: Sequence[Analysis], on_transducer: Study | None) -> None:
+    """Write the tables of every stage, and the processed signals as MCAP."""
     for analysis in analyses:
         _tables(TableWriter(folder, analysis.entry.name), analysis)
         _recording(folder / "processed", analysis)
     if on_transducer is not None:
         _curves(folder / "tables" / "transducer", on_transducer)
-        summary = msgspec.structs.replace(summary, transducer=on_transducer.findings)
-    (folder / "results.json").write_bytes(results.encode(summary))
 
 
 def _curves(folder: Path, found: Study) -> None:

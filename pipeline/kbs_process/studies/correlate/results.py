@@ -10,24 +10,12 @@ from typing import Literal
 
 import msgspec
 
-from kbs_process.results.judged import Budget as Budget
-from kbs_process.results.judged import BudgetItem as BudgetItem
-from kbs_process.results.judged import ChannelResult as ChannelResult
-from kbs_process.results.judged import Frame as Frame
-from kbs_process.results.judged import Requirement as Requirement
-from kbs_process.results.judged import Verdict as Verdict
+from kbs_process.results.judged import Budget, Frame, Requirement
 from kbs_process.results.pointing import RecordedPointing
-from kbs_process.results.records import Check as Check
-from kbs_process.results.records import Conclusion as Conclusion
-from kbs_process.results.records import Constant as Constant
-from kbs_process.results.records import InputFile as InputFile
-from kbs_process.results.records import Notice as Notice
-from kbs_process.results.records import Provenance as Provenance
-from kbs_process.results.records import Record as Record
-from kbs_process.results.records import ResultsFile
-from kbs_process.results.records import encode as encode
-from kbs_process.signals.records import PUT_IN_ORDER
-from kbs_process.studies.correlate.on_transducer import OnTransducer
+from kbs_process.results.records import Check, Constant, Record, ResultsFile
+from kbs_process.signals.records import Loss
+from kbs_process.stages import compare
+from kbs_process.stages.conventions import SignCheck
 
 Role = Literal["calibration", "fit", "held-out"]
 
@@ -41,17 +29,6 @@ class CampaignSummary(Record, frozen=True, kw_only=True):
     configuration: str
     drive: Literal["command", "motion"]  # what drives the plant: the commands, or the measured angles
     frame: Frame = "T"  # of the loads that were recorded
-
-
-class LossEntry(Record, frozen=True, kw_only=True):
-    """Samples or messages that a recording lacks, holds twice, or holds damaged."""
-
-    kind: str
-    where: str
-    count: int
-    start_s: float | None = None
-    end_s: float | None = None
-    detail: str = ""
 
 
 class Clock(Record, frozen=True, kw_only=True):
@@ -74,22 +51,13 @@ class Recording(Record, frozen=True, kw_only=True):
     sha256: str
     duration_s: float
     rates: dict[str, float] = msgspec.field(default_factory=dict)  # Hz, by stream
-    losses: tuple[LossEntry, ...] = ()
+    losses: tuple[Loss, ...] = ()
     clocks: tuple[Clock, ...] = ()
 
     @property
-    def lost(self) -> tuple[LossEntry, ...]:
+    def lost(self) -> tuple[Loss, ...]:
         """Losses without what was merely put in order."""
-        return tuple(loss for loss in self.losses if loss.kind != PUT_IN_ORDER)
-
-
-class Convention(Record, frozen=True, kw_only=True):
-    """A self-test of signs and frames on this campaign's own data."""
-
-    check: str
-    expected: str
-    found: str
-    ok: bool
+        return tuple(loss for loss in self.losses if loss.real)
 
 
 class FittedParameter(Record, frozen=True, kw_only=True):
@@ -192,24 +160,13 @@ class Repeatability(Record, frozen=True, kw_only=True):
     n: int
 
 
-class Merit(Record, frozen=True, kw_only=True):
+class Merit(compare.Merit, frozen=True, kw_only=True):
     """Figures of merit of a prediction on one channel of one recording, in one band."""
 
     recording: str
     role: Role
     band: str
     frame: Frame
-    channel: str
-    unit: str
-    measured_rms: float | None
-    predicted_rms: float | None
-    residual_rms: float | None
-    measured_peak: float | None
-    predicted_peak: float | None
-    correlation: float | None
-    fraction_of_variance: float | None  # 1 - var(measured - predicted) / var(measured)
-    spectral_ratio: float | None  # predicted over measured power density, geometric mean over the band
-    pessimism: float | None  # predicted over measured peak
     sigma: float | None = None  # of the measured channel in this band
 
     @property
@@ -227,17 +184,79 @@ class Resonance(Record, frozen=True, kw_only=True):
     sigma_Hz: float | None = None
 
 
+class ModeAt(Record, frozen=True, kw_only=True):
+    """A mode of the article on the transducer at one pose."""
+
+    angle_rad: float
+    frequency_Hz: float
+    frequency_sigma_Hz: float
+    damping: float  # of critical
+    damping_sigma: float
+    effective: tuple[float, float, float]  # kg m^2, effective moments of inertia about T's x, y, z
+
+
+class GainAt(Record, frozen=True, kw_only=True):
+    """Torque that the transducer reads over torque on a rigid base, at one pose and frequency."""
+
+    angle_rad: float
+    frequency_Hz: float
+    channel: str
+    gain: float
+    sigma: float
+
+
+class FilterErrorIn(Record, frozen=True, kw_only=True):
+    """What the resonance adds to one channel of the predicted disturbance, in one band and frame."""
+
+    band: str
+    frame: Literal["T", "S"]
+    channel: str
+    unit: str
+    rigid_rms: float  # on a rigid base
+    rigid_peak: float
+    read_rms: float  # on the transducer
+    read_peak: float
+    error_rms: float  # of the one less the other
+    error_rms_sigma: float
+    error_peak: float
+    error_peak_sigma: float
+    leak_rms: float  # the error's part above the band's upper edge
+
+
+class BothWays(Record, frozen=True, kw_only=True):
+    """The coupled plant against the rigid-base wrench through the modes, on one channel in one band, frame T."""
+
+    band: str
+    channel: str
+    unit: str
+    coupled_rms: float
+    modal_rms: float
+    rigid_rms: float
+    difference_rms: float  # coupled less modal
+    noise_rms: float  # of the sensor in this band
+
+
+class OnTransducer(Record, frozen=True, kw_only=True):
+    """The study of one recording; `reason` says why there is none."""
+
+    recording: str
+    joint: str = ""
+    source: str = ""  # of the modes
+    reason: str = ""
+    modes: tuple[ModeAt, ...] = ()
+    gains: tuple[GainAt, ...] = ()
+    errors: tuple[FilterErrorIn, ...] = ()
+    agreement: tuple[BothWays, ...] = ()
+
+
 class Results(ResultsFile, frozen=True, kw_only=True):
     """results.json."""
 
     campaign: CampaignSummary
-    verdict: Conclusion
-    provenance: Provenance
     kind: Literal["correlation"] = "correlation"
     requirements: tuple[Requirement, ...] = ()
-    warnings: tuple[Notice, ...] = ()
     recordings: tuple[Recording, ...] = ()
-    conventions: tuple[Convention, ...] = ()
+    conventions: tuple[SignCheck, ...] = ()
     gravity: Gravity | None = None
     cross_coupling: CrossCoupling | None = None
     bands: tuple[Band, ...] = ()

@@ -4,29 +4,33 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import msgspec
+
 from kbs_process.campaign.config import Campaign
 from kbs_process.progress import Progress
 from kbs_process.reduction.analysis import Analysis, analyse
 from kbs_process.reduction.measurable import check_requirements
 from kbs_process.reduction.preparing import Prepared, fit_gravity, prepare
 from kbs_process.reduction.relief import relieved
-from kbs_process.report.build import build
+from kbs_process.report.build import publish
+from kbs_process.report.text import count
 from kbs_process.results.outcome import Outcome
 from kbs_process.results.store import writing
 from kbs_process.stages import decouple
 from kbs_process.stages.gravity.model import GravityModel
-from kbs_process.studies.correlate import results
 from kbs_process.studies.correlate.earlier_diagnosis import keep_diagnosis
-from kbs_process.studies.correlate.findings import find
-from kbs_process.studies.correlate.output import write_results
+from kbs_process.studies.correlate.output import write_tables
 from kbs_process.studies.correlate.summary import summarise
 from kbs_process.studies.correlate.transducer import study
 
 
-def process(campaign: Campaign, target: Path, *, progress: Progress, pdf: bool | None = None) -> Outcome:
+def process(
+    campaign: Campaign, target: Path, *, progress: Progress, pdf: bool | None = None, page: bool = True
+) -> Outcome:
     """Process a campaign and put its results in `target`, in one step, when all is done.
 
-    A diagnosis of the same inputs that is there already stays.
+    A diagnosis of the same inputs that is there already stays. Without `page`, results.json and the tables are
+    written alone, of which the report can be rendered later.
     """
     check_requirements(campaign)
     with writing(target) as folder:
@@ -35,30 +39,21 @@ def process(campaign: Campaign, target: Path, *, progress: Progress, pdf: bool |
         model = fit_gravity(campaign, prepared, progress)
         analyses = [_analyse(campaign, one, model, progress) for one in prepared]
         with progress.task("Comparing, summing up uncertainties"):
-            findings = find(campaign, analyses, model, decoupling)
-            summary = summarise(campaign, analyses, model, decoupling, findings)
+            found = summarise(campaign, analyses, model, decoupling)
         with progress.task("Following the transducer's resonance") as task:
             on_transducer = study(campaign, analyses, model.rig, task.update)
         with progress.task("Writing the report"):
-            write_results(folder, campaign, analyses, summary, on_transducer)
+            write_tables(folder, analyses, on_transducer)
             keep_diagnosis(campaign, target, folder)
             from kbs_process.studies.correlate.report import DOCUMENT  # draws: takes its time to import
 
-            page = build(folder, DOCUMENT, pdf)
-    return _outcome(summary, target / page.name)
+            found = msgspec.structs.replace(found, transducer=on_transducer and on_transducer.findings)
+            serious = sum(notice.severity != "info" for notice in found.warnings)
+            more = [f"{count(serious, 'warning')}: see the top of the report"] if serious else []
+            return publish(folder, target, found, DOCUMENT if page else None, pdf, *more)
 
 
 def _analyse(campaign: Campaign, one: Prepared, model: GravityModel, progress: Progress) -> Analysis:
     with progress.task(f"Analysing {one.entry.name}") as task:
         run = relieved(campaign, one.entry, one.run, one.motion)
         return analyse(campaign, one.entry, one.raw, run, one.motion, model, task.update)
-
-
-def _outcome(summary: results.Results, report: Path) -> Outcome:
-    """The verdict in words: one line a requirement, then what a reader has to know about it."""
-    lines = [summary.verdict.sentence]
-    serious = sum(notice.severity != "info" for notice in summary.warnings)
-    if serious:
-        lines.append(f"{serious} warning{'s' if serious > 1 else ''}: see the top of the report")
-    met = {"pass": True, "fail": False}.get(summary.verdict.status)
-    return Outcome(tuple(lines), met, report)

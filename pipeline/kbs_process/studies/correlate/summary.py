@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
+import msgspec
 import numpy as np
 
 from kbs_process.campaign.config import Campaign
 from kbs_process.plant.rigid import loads
-from kbs_process.reduction.analysis import Analysis, select
+from kbs_process.reduction.analysis import Analysis, bands_of, select
+from kbs_process.reduction.judging import judged
 from kbs_process.reduction.pointing import recorded_pointing
 from kbs_process.results import provenance
+from kbs_process.results.judged import Requirement
+from kbs_process.results.records import Check, Conclusion
 from kbs_process.signals.records import Signal
 from kbs_process.stages.conventions import SignCheck, check_encoder_sense, check_gravity_sign, check_weight
 from kbs_process.stages.decouple import Decoupling
@@ -20,19 +24,25 @@ from kbs_process.stages.gravity.quality import feasibility
 from kbs_process.stages.repeats import commanded
 from kbs_process.stages.to_cog import ASSUMPTION
 from kbs_process.studies.correlate import results
-from kbs_process.studies.correlate.findings import Findings
+from kbs_process.studies.correlate.findings import band, merits, repeatabilities, resonances, statements
 from kbs_process.studies.correlate.methods import methods
 from kbs_process.studies.correlate.notices import notices
+from kbs_process.studies.correlate.uncertainty import budgets
 
 RESPONSE_UNITS = dict(zip(RESPONSE, ("s", "s^2"), strict=True))
 
 
 def summarise(
-    campaign: Campaign, analyses: Sequence[Analysis], model: GravityModel, decoupling: Decoupling, findings: Findings
+    campaign: Campaign, analyses: Sequence[Analysis], model: GravityModel, decoupling: Decoupling
 ) -> results.Results:
-    """Return the contents of results.json."""
-    conventions = tuple(_conventions(campaign, analyses))
-    return results.Results(
+    """Return the contents of results.json; calibrations serve the fit and are judged by its residual alone."""
+    runs = [analysis for analysis in analyses if analysis.entry.role != "calibration"]
+    stated = statements(bands_of(campaign.bands), runs)
+    repeated = tuple(repeatabilities(runs))
+    modes = resonances(campaign, runs, model)
+    budget = tuple(budgets(campaign, runs, model, decoupling, stated, repeated, modes))
+    requirements = tuple(judged(campaign, requirement, runs, budget) for requirement in campaign.requirements)
+    found = results.Results(
         campaign=results.CampaignSummary(
             name=campaign.name,
             title=campaign.title,
@@ -41,29 +51,29 @@ def summarise(
             drive=campaign.drive,
             frame="joint" if campaign.rig.frame == "joint" else "T",
         ),
-        verdict=_conclusion(findings.requirements),
+        verdict=_conclusion(requirements),
         provenance=provenance.made("", campaign.folder, campaign.files),
-        requirements=findings.requirements,
-        warnings=tuple(notices(campaign, analyses, model, findings, conventions)),
+        requirements=requirements,
         recordings=tuple(_recording(analysis) for analysis in analyses),
-        conventions=conventions,
+        conventions=tuple(_conventions(campaign, analyses)),
         gravity=_gravity(campaign, analyses, model),
         cross_coupling=_cross_coupling(analyses, decoupling) if decoupling.channels else None,
-        bands=findings.bands,
-        repeatability=findings.repeatability,
-        merit=findings.merit,
-        resonances=findings.resonances,
-        budget=findings.budget,
+        bands=tuple(map(band, stated.values())),
+        repeatability=repeated,
+        merit=tuple(merits(campaign, runs, budget)),
+        resonances=modes,
+        budget=budget,
         pointing=tuple(recorded_pointing(analyses)),
-        methods=methods(campaign, analyses, findings),
         parameters=tuple(provenance.constants(campaign.rig)),
         notes=(ASSUMPTION,) if campaign.rig.spacecraft is not None else (),
     )
+    warnings = tuple(notices(campaign, analyses, model, found))
+    return msgspec.structs.replace(found, warnings=warnings, methods=methods(campaign, analyses, found))
 
 
-def _conclusion(requirements: Sequence[results.Requirement]) -> results.Conclusion:
+def _conclusion(requirements: Sequence[Requirement]) -> Conclusion:
     if not requirements:
-        return results.Conclusion(status="none", sentence="The campaign states no requirement.")
+        return Conclusion(status="none", sentence="The campaign states no requirement.")
     worst = max(requirements, key=lambda one: ("pass", "undecided", "fail").index(one.verdict))
     words = {"pass": "met", "fail": "not met", "undecided": "neither met nor broken within the uncertainty"}
     value, low, high = (figure or 0.0 for figure in (worst.value, worst.low, worst.high))
@@ -73,7 +83,7 @@ def _conclusion(requirements: Sequence[results.Requirement]) -> results.Conclusi
         f"({least} to {high:.4f} at 95 %) on {worst.channel} in {worst.recording}, "
         f"{worst.band_Hz[0] or 0:g} to {worst.band_Hz[1] or 0:g} Hz; limit {worst.limit:g} {worst.unit}."
     )
-    return results.Conclusion(status=worst.verdict, sentence=sentence)
+    return Conclusion(status=worst.verdict, sentence=sentence)
 
 
 def _recording(analysis: Analysis) -> results.Recording:
@@ -87,17 +97,7 @@ def _recording(analysis: Analysis) -> results.Recording:
         sha256=provenance.sha256(entry.path),
         duration_s=len(analysis.residual) * analysis.residual.dt,
         rates=run.rates,
-        losses=tuple(
-            results.LossEntry(
-                kind=loss.kind,
-                where=loss.where,
-                count=loss.count,
-                start_s=loss.start_s,
-                end_s=loss.end_s,
-                detail=loss.detail,
-            )
-            for loss in run.losses
-        ),
+        losses=run.losses,
         clocks=tuple(
             results.Clock(
                 stream=stream,
@@ -110,8 +110,8 @@ def _recording(analysis: Analysis) -> results.Recording:
     )
 
 
-def _conventions(campaign: Campaign, analyses: Sequence[Analysis]) -> Iterable[results.Convention]:
-    checks: list[SignCheck] = [*check_weight(campaign.rig)]
+def _conventions(campaign: Campaign, analyses: Sequence[Analysis]) -> Iterable[SignCheck]:
+    yield from check_weight(campaign.rig)
     for analysis in analyses[:2]:  # the calibration and the first run: signs do not change within a campaign
         measured, rest = analysis.run.loads, np.zeros_like(analysis.motion.q)
         assert measured is not None
@@ -123,11 +123,8 @@ def _conventions(campaign: Campaign, analyses: Sequence[Analysis]) -> Iterable[r
         command, angle = commanded(analysis.run), analysis.run.angle
         if command is not None and angle is not None:
             found += check_encoder_sense(angle, command)
-        checks += [
-            SignCheck(f"{check.check}, {analysis.entry.name}", check.expected, check.found, check.ok) for check in found
-        ]
-    for check in checks:
-        yield results.Convention(check=check.check, expected=check.expected, found=check.found, ok=check.ok)
+        for check in found:
+            yield msgspec.structs.replace(check, check=f"{check.check}, {analysis.entry.name}")
 
 
 def _gravity(campaign: Campaign, analyses: Sequence[Analysis], model: GravityModel) -> results.Gravity:
@@ -150,7 +147,7 @@ def _gravity(campaign: Campaign, analyses: Sequence[Analysis], model: GravityMod
     return results.Gravity(
         parameters=tuple(parameters),
         channels=tuple(_gravity_channel(analyses, index) for index in range(len(model.channels))),
-        checks=tuple(results.Check(name=c.name, ok=c.passed, detail=c.detail) for c in fit.checks),
+        checks=tuple(Check(name=c.name, ok=c.passed, detail=c.detail) for c in fit.checks),
         samples=fit.dof + len(fit.value),
         reduced_chi_square=fit.residual_rms**2,
         feasible=_feasible(campaign, model),

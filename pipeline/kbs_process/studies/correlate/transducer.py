@@ -27,7 +27,7 @@ from kbs_process.stages.budget import sensor_noise
 from kbs_process.stages.motion import estimate
 from kbs_process.stages.resonance import Transmitted, amplification, filter_errors, transmit
 from kbs_process.stages.to_cog import to_spacecraft
-from kbs_process.studies.correlate.on_transducer import BothWays, FilterErrorIn, GainAt, ModeAt, OnTransducer
+from kbs_process.studies.correlate.results import BothWays, FilterErrorIn, GainAt, ModeAt, OnTransducer
 
 SPACING = np.radians(2.5)  # of the poses at which modes are derived
 STILL = np.radians(5.0)  # a joint that turns by no more leaves the modes as they are

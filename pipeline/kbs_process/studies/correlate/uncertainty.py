@@ -9,6 +9,7 @@ import numpy as np
 from kbs_process.campaign.config import Campaign
 from kbs_process.reduction.analysis import Analysis, bands_of, passband, select
 from kbs_process.reduction.relief import errors, forces_in
+from kbs_process.results.judged import Budget, BudgetItem, Frame
 from kbs_process.rig.model import Amplifier
 from kbs_process.signals.records import WRENCH_CHANNELS, Array, Clock, Signal
 from kbs_process.stages import bandpass, budget
@@ -19,7 +20,6 @@ from kbs_process.stages.gravity import error as gravity_error
 from kbs_process.stages.gravity.model import GravityModel
 from kbs_process.stages.to_cog import sigma_at_spacecraft, sigma_of_pose
 from kbs_process.studies.correlate import results
-from kbs_process.studies.correlate.results import Frame
 
 
 def budgets(
@@ -30,7 +30,7 @@ def budgets(
     statements: Mapping[str, BandStatement],
     repeated: Sequence[results.Repeatability],
     resonances: Sequence[results.Resonance],
-) -> Iterable[results.Budget]:
+) -> Iterable[Budget]:
     """Yield every recording's own budget; where nothing of a recording is known in a band, there is none."""
     lowest = min((mode.frequency_Hz for mode in resonances), default=None)
     spacecraft, own = campaign.rig.spacecraft, campaign.rig.frame
@@ -138,18 +138,17 @@ def _repeat_noise(of_band: Sequence[results.Repeatability], channels: Sequence[s
 
 def _rows(
     entries: Sequence[budget.Entry], frame: Frame, band: str, recording: str, measured: Signal
-) -> Iterable[results.Budget]:
+) -> Iterable[Budget]:
     sums = budget.total(entries)
     for index, (channel, unit) in enumerate(zip(measured.channels, measured.units, strict=True)):
-        yield results.Budget(
+        yield Budget(
             channel=channel,
             unit=unit,
             frame=frame,
             band=band,
             recording=recording,
             contributions=tuple(
-                results.BudgetItem(stage=entry.stage, source=entry.source, sigma=float(entry.sigma[index]))
-                for entry in entries
+                BudgetItem(stage=entry.stage, source=entry.source, sigma=float(entry.sigma[index])) for entry in entries
             ),
             total=float(sums[index]),
         )

@@ -10,23 +10,20 @@ from pathlib import Path
 import numpy as np
 
 from kbs_process.campaign.config import Campaign, SensingLaw
-from kbs_process.campaign.corrected_model import write_model
 from kbs_process.campaign.sensing_laws import belongs_to_model
+from kbs_process.campaign.writing.corrected_model import write_model
 from kbs_process.diagnosis.acceptance.outcome import Find, Outcome
 from kbs_process.diagnosis.experiments.hypothesis import Hypothesis
 from kbs_process.diagnosis.facts import Estimate
 from kbs_process.plant.effect import Uniform
-from kbs_process.plant.laws import CATALOGUE, SENSING, select
+from kbs_process.plant.laws import LAWS, SENSING, select
 from kbs_process.plant.sensing import BY
 from kbs_process.rig.model import Quantity, substitute
 from kbs_process.signals.records import Array
 
 CORRECTED = "corrected"  # folder of the model, in that of the results
 _SENSORS = {law.name: law for law in SENSING}
-_EACH_TIME = {
-    *(effect.name for effect in CATALOGUE if effect.each_trial),
-    *(law.name for law in SENSING if law.each_trial),
-}
+_EACH_TIME = {name for name, law in LAWS.items() if law.each_trial}
 
 
 def left_out(find: Find) -> bool:

@@ -2,34 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.stats import beta, binom, rankdata
 
 from kbs_process.signals.records import Array, Mask
+from kbs_process.studies.flight.results import Likelihood
 
 
-@dataclass(frozen=True, slots=True)
-class Probability:
-    """A probability estimated by a count, with its 95 % interval."""
-
-    value: float
-    low: float
-    high: float
-
-
-def probability(successes: int, trials: int) -> Probability:
+def probability(successes: int, trials: int) -> Likelihood:
     """Return successes / trials with its Jeffreys interval, which covers 95 % on average over probabilities.
 
     At 0 and at `trials` the interval is one-sided: it begins at 0, or ends at 1. Source: Brown, Cai, DasGupta,
     Statistical Science 16 (2001).
     """
     inside = beta(successes + 0.5, trials - successes + 0.5)
-    return Probability(
-        successes / trials,
-        0.0 if successes == 0 else float(inside.ppf(0.025)),
-        1.0 if successes == trials else float(inside.ppf(0.975)),
+    return Likelihood(
+        value=successes / trials,
+        low=0.0 if successes == 0 else float(inside.ppf(0.025)),
+        high=1.0 if successes == trials else float(inside.ppf(0.975)),
     )
 
 

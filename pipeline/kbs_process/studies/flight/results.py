@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from kbs_process.results.records import Conclusion, Constant, Notice, Provenance, Record, ResultsFile
+from kbs_process.results.records import Constant, Record, ResultsFile
 
 
 class Likelihood(Record, frozen=True, kw_only=True):
@@ -61,8 +61,6 @@ class FlightResults(ResultsFile, frozen=True, kw_only=True):
     name: str
     title: str
     article: str
-    verdict: Conclusion
-    provenance: Provenance
     kind: Literal["flight"] = "flight"
     trajectory: str
     duration_s: float
@@ -72,6 +70,5 @@ class FlightResults(ResultsFile, frozen=True, kw_only=True):
     by_chance: float  # share that a number without effect exceeds with 5 % probability
     requirements: tuple[FlightRequirement, ...] = ()
     drivers: tuple[Driver, ...] = ()
-    warnings: tuple[Notice, ...] = ()
     parameters: tuple[Constant, ...] = ()
     notes: tuple[str, ...] = ()  # what the prediction assumes

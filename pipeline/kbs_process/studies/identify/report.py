@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from kbs_process.report import provenance
 from kbs_process.report.document import Document
-from kbs_process.report.panel import Head, Panel, Text, notices
+from kbs_process.report.panel import Block, Head, Panel, Text, notices
+from kbs_process.report.prose import Prose
 from kbs_process.report.tables import Tables
 from kbs_process.studies.identify.results import IdentifyResults
 from kbs_process.studies.identify.sections import parameters, residuals
@@ -18,11 +19,8 @@ def head(results: IdentifyResults) -> Head:
 
 
 def _methods(results: IdentifyResults, tables: Tables) -> Panel:
-    spread = (
-        f"Friction torques may differ from run to run by {100 * results.run_to_run:.3g} % (one sigma): an estimate "
-        "is of the gear, not of one run."
-    )
-    blocks = (*notices(results.warnings), *(Text(note) for note in (*results.notes, spread)))
+    spread = Prose("kbs_process.studies.identify", "notes")("spread", percent=f"{100 * results.run_to_run:.3g}")
+    blocks: tuple[Block, ...] = (*notices(results.warnings), *(Text(note) for note in (*results.notes, spread)))
     return Panel("methods", "Methods", "How were these numbers obtained?", blocks)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from kbs_process.results.records import Check, Conclusion, Notice, Provenance, Record, ResultsFile
+from kbs_process.results.records import Check, Record, ResultsFile
 
 
 class Interval(Record, frozen=True, kw_only=True):
@@ -63,8 +63,6 @@ class IdentifyResults(ResultsFile, frozen=True, kw_only=True):
     name: str
     title: str
     article: str
-    verdict: Conclusion
-    provenance: Provenance
     kind: Literal["identify"] = "identify"
     band_Hz: tuple[float, float]
     samples: int  # numbers in the whitened residual
@@ -76,5 +74,4 @@ class IdentifyResults(ResultsFile, frozen=True, kw_only=True):
     misfits: tuple[Misfit, ...]
     correlations: Correlations
     files: tuple[str, ...]  # corrected parameter files, relative to the results folder
-    warnings: tuple[Notice, ...] = ()
     notes: tuple[str, ...] = ()

@@ -4,50 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
 from kbs_process.campaign.config import Campaign
 from kbs_process.errors import ConfigError
-from kbs_process.estimation.profile import Profile
 from kbs_process.identification import estimate as identification
 from kbs_process.identification.estimate import Identification, Settings
-from kbs_process.identification.output_error import Experiment, Measured, Spectra, sensor_spectra, unexplained
+from kbs_process.identification.output_error import Experiment, Measured, sensor_spectra, unexplained
 from kbs_process.identification.unknowns import gearbox
 from kbs_process.progress import Progress
 from kbs_process.reduction.reading import read_run
 from kbs_process.results.outcome import Outcome
 from kbs_process.results.parallel import Crew
-from kbs_process.signals.records import Array
 from kbs_process.studies.identify.evaluation import evaluator
 from kbs_process.studies.identify.files import write_identification
+from kbs_process.studies.identify.findings import Outcomes, Prediction
 from kbs_process.studies.identify.measured import measured
 
 _HIGHEST_RATE = 200.0  # Hz; what lies above 80 Hz the amplifiers of such transducers have taken off
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Prediction:
-    """A recording and what the plant leaves unexplained of it, before and after."""
-
-    recording: Measured
-    role: str
-    spectra: Spectra  # of the sensors
-    before: Array  # (n, channels)
-    after: Array
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Outcomes:
-    """Everything that the report shows."""
-
-    found: Identification
-    settings: Settings
-    profiles: tuple[Profile, ...]
-    predictions: tuple[Prediction, ...]
 
 
 def identify(
@@ -83,10 +62,9 @@ def identify(
         with progress.task("Profile likelihood"):
             profiles = identification.intervals(found, evaluate_with)
     with progress.task("Predicting held-out recordings"):
-        predictions = tuple(
-            _predicted(found, recording, role)
-            for role, recordings in (("held-out", held_out), ("fit", fitted))
-            for recording in recordings
+        predictions = (
+            *(_predicted(found, recording, "held-out") for recording in held_out),
+            *(_predicted(found, recording, "fit") for recording in fitted),
         )
     with progress.task("Writing the report"):
         return write_identification(campaign, Outcomes(found, settings, profiles, predictions), target, pdf)
@@ -104,7 +82,7 @@ def _read(campaign: Campaign, role: str, progress: Progress) -> tuple[Measured, 
     return tuple(found)
 
 
-def _predicted(found: Identification, recording: Measured, role: str) -> Prediction:
+def _predicted(found: Identification, recording: Measured, role: Literal["fit", "held-out"]) -> Prediction:
     experiment = replace(found.experiment, recordings=(recording,))
     sensor = sensor_spectra(experiment, recording)
     before, after = (

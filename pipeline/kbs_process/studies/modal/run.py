@@ -9,7 +9,7 @@ import numpy as np
 
 from kbs_process.campaign.config import Campaign
 from kbs_process.campaign.documents import shown
-from kbs_process.campaign.modal_file import modal_text
+from kbs_process.campaign.writing.modal_file import modal_text
 from kbs_process.errors import ConfigError, OutputError, did_you_mean
 from kbs_process.plant.laws import select
 from kbs_process.plant.linear.modal import ModalTable, derive, tracked

@@ -72,7 +72,7 @@ def readings(
     read = values.copy()
     for entry in laws_on(laws, key, names):
         law = LAWS[entry.law]
-        amplitudes = [one.name for one in law.parameters if one.role == "amplitude"]
+        amplitudes = [one.name for one in law.amplitudes]
         numbers = {name: float(quantity) for name, quantity in entry.parameters.items()}
         shape = tuple((name, value) for name, value in numbers.items() if name not in amplitudes)
         if "temperature" in law.arguments and warmth is None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +14,7 @@ from kbs_process.plant.moved import added_loads
 from kbs_process.plant.predict import Schedule, predict
 from kbs_process.plant.rigid import loads
 from kbs_process.progress import Progress
-from kbs_process.reduction.commands import read_commands
+from kbs_process.reduction.commands import of_table, of_trajectory
 from kbs_process.reduction.predicting import approached, schedule_of
 from kbs_process.reduction.reading import read_run
 from kbs_process.reduction.settings import motion_settings
@@ -30,13 +29,18 @@ TABLES = (".csv", ".parquet")  # of commands, by the file's name
 def simulate_commands(campaign: Campaign, commands: Path, target: Path, *, rate_Hz: float, progress: Progress) -> Path:
     """Simulate the commands of a CSV or Parquet file through the controller; return `target`."""
     _require_commands(campaign)
-    schedule = read_commands(commands, campaign.rig.joint_names)
-    schedule = replace(schedule, t=schedule.t - schedule.t[0])
+    given = of_table(commands, campaign.rig)
     with progress.task(f"Simulating {commands.name}") as task:
-        streams = _command_driven(
-            campaign, campaign.effects, schedule, rate_Hz, rate_Hz, float(schedule.t[-1]), task.update
+        streams = predict(
+            campaign.rig,
+            campaign.effects,
+            given.schedule,
+            rate_Hz=rate_Hz,
+            angle_rate_Hz=rate_Hz,
+            duration_s=float(given.schedule.t[-1]),
+            progress=task.update,
         )
-        return write_prediction(campaign, streams, target, "simulated", commands.stem, (commands,))
+        return write_prediction(campaign, streams, target, "simulated", given.name, (commands,))
 
 
 def simulate_trajectory(
@@ -44,18 +48,13 @@ def simulate_trajectory(
 ) -> Path:
     """Simulate the commands recorded in a trajectory's first run (default: the last one listed)."""
     _require_commands(campaign)
-    first = {entry.trajectory: entry for entry in reversed(campaign.recordings)}
-    name = trajectory or campaign.recordings[-1].trajectory
-    if name not in first:
-        raise ConfigError(f"there is no trajectory '{name}'", where=campaign.name, remedy=did_you_mean(name, first))
-    run = _read(campaign, first[name], progress)
-    # Before a test nobody knows what field and encoders will do: the controller is simulated too.
-    schedule = approached(replace(schedule_of(run, campaign.rig), field=None, encoder=None))
-    with progress.task(f"Simulating {name}") as task:
-        rates = rate_Hz or run.rates["wrench"], run.rates.get("angle", run.rates["wrench"])
-        streams = _command_driven(campaign, campaign.effects, schedule, *rates, _duration(run), task.update)
+    given = of_trajectory(campaign, trajectory, progress)
+    run = given.run
+    assert run is not None  # a recording's
+    with progress.task(f"Simulating {given.name}") as task:
+        streams = _as_recorded(campaign, campaign.effects, given.schedule, run, task.update, rate_Hz)
         return write_prediction(
-            campaign, streams, target, "simulated", name, (first[name].path,), epoch_ns=run.epoch_ns
+            campaign, streams, target, "simulated", given.name, (given.source,), epoch_ns=run.epoch_ns
         )
 
 
@@ -65,15 +64,15 @@ def predict_recording(campaign: Campaign, recording: str, target: Path, *, progr
     `recording` is a name of the campaign's, or any other file with its topics. The model's laws of sensors act on it.
     """
     entry = _entry(campaign, recording)
-    run = _read(campaign, entry, progress)
+    with progress.task(f"Reading {entry.name}"):
+        run = read_run(campaign, entry)
     with progress.task(f"Predicting {entry.name}") as task:
         effects = campaign.acting(entry)
         if campaign.drive == "motion":
             streams = _motion_driven(campaign, effects, run)
         else:
             schedule = approached(schedule_of(run, campaign.rig))
-            rates = run.rates["wrench"], run.rates.get("angle", run.rates["wrench"])
-            streams = _command_driven(campaign, effects, schedule, *rates, _duration(run), task.update)
+            streams = _as_recorded(campaign, effects, schedule, run, task.update)
         read = read_through(campaign, streams, run.temperature)
         return write_prediction(campaign, read, target, "predicted", entry.name, (entry.path,), epoch_ns=run.epoch_ns)
 
@@ -101,22 +100,23 @@ def _motion_driven(campaign: Campaign, effects: Sequence[str], run: Run) -> Iter
     yield "angle", Block(stamp, stamp, motion.q + motion.offset)
 
 
-def _command_driven(
+def _as_recorded(
     campaign: Campaign,
     effects: Sequence[str],
     schedule: Schedule,
-    rate_Hz: float,
-    angle_rate_Hz: float,
-    duration_s: float,
+    run: Run,
     update: Callable[[float], None],
+    rate_Hz: float | None = None,
 ) -> Iterable[tuple[str, Block]]:
+    """Return what the plant does on commands, sampled as a run was (the wrench at `rate_Hz`), and for as long."""
+    wrench = run.rates["wrench"]
     return predict(
         campaign.rig,
         effects,
         schedule,
-        rate_Hz=rate_Hz,
-        angle_rate_Hz=angle_rate_Hz,
-        duration_s=duration_s,
+        rate_Hz=rate_Hz or wrench,
+        angle_rate_Hz=run.rates.get("angle", wrench),
+        duration_s=max(float(one.t0 + len(one) * one.dt) for one in (run.wrench, run.angle) if one is not None),
         progress=update,
     )
 
@@ -143,15 +143,3 @@ def _entry(campaign: Campaign, recording: str) -> RecordingEntry:
         where=campaign.name,
         remedy=did_you_mean(recording, names),
     )
-
-
-def _read(campaign: Campaign, entry: RecordingEntry, progress: Progress) -> Run:
-    with progress.task(f"Reading {entry.name}"):
-        return read_run(campaign, entry)
-
-
-def _duration(run: Run) -> float:
-    signals: Sequence[float] = [
-        signal.t0 + len(signal) * signal.dt for signal in (run.wrench, run.angle) if signal is not None
-    ]
-    return max(signals)

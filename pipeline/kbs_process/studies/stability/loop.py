@@ -22,6 +22,7 @@ from scipy.optimize import brentq
 from kbs_process.plant.linear.linearise import Linear
 from kbs_process.rig.model import Controller
 from kbs_process.signals.records import Array
+from kbs_process.studies.stability.results import LoopMargins
 
 Complex = npt.NDArray[np.complex128]
 _HIGHEST = 1e4  # of gain factors that are tried
@@ -53,18 +54,6 @@ class Loop:
         inner = np.linalg.solve(z[:, None, None] * np.eye(len(A)) - A, self.B[:, j][:, None].astype(complex))
         values: Complex = (inner[..., 0] @ self.C[j]).astype(np.complex128)
         return values
-
-
-@dataclass(frozen=True, slots=True)
-class Margins:
-    """Of one joint's loop, the others closed."""
-
-    gain: float  # factor on Kp and Ki together that makes it unstable; inf: none
-    gain_frequency: float  # Hz
-    phase: float  # rad
-    phase_frequency: float  # Hz, where |L| = 1
-    sensitivity_peak: float  # largest |1 / (1 + L)|
-    sensitivity_frequency: float  # Hz
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,8 +167,11 @@ def critical(system: Linear, controller: Controller, *, proportional: float = 1.
     return Critical(float("inf"), 0.0)
 
 
-def margins(loop: Loop, joint: str, points: int = 1000) -> Margins:
-    """Return the margins of one joint's loop, the others closed, by python-control from its frequency response."""
+def margins(loop: Loop, joint: str, angle: float, points: int = 1000) -> LoopMargins:
+    """Return the margins of one joint's loop, the others closed, by python-control from its frequency response.
+
+    `angle` rad is the one that the loop is at.
+    """
     # Imported here: it takes over a second.
     from control import FrequencyResponseData, stability_margins
 
@@ -188,11 +180,18 @@ def margins(loop: Loop, joint: str, points: int = 1000) -> Margins:
     L = loop.response(joint, f)
     gm, pm, sm, gain_w, phase_w, nearest_w = stability_margins(FrequencyResponseData(L, 2.0 * np.pi * f, smooth=True))
     turn = 2.0 * np.pi
-    return Margins(
-        gain=float(gm) if np.isfinite(gm) and gm > 0.0 else float("inf"),
-        gain_frequency=float(gain_w) / turn,
-        phase=float(np.radians(pm)),
-        phase_frequency=float(phase_w) / turn,
+    return LoopMargins(
+        angle_rad=float(angle),
+        joint=joint,
+        gain=float(gm) if np.isfinite(gm) and gm > 0.0 else None,
+        gain_frequency_Hz=finite(float(gain_w) / turn),
+        phase_rad=finite(float(np.radians(pm))),
+        phase_frequency_Hz=finite(float(phase_w) / turn),
         sensitivity_peak=1.0 / float(sm),
-        sensitivity_frequency=float(nearest_w) / turn,
+        sensitivity_frequency_Hz=float(nearest_w) / turn,
     )
+
+
+def finite(value: float) -> float | None:
+    """Return a number, or None where there is none."""
+    return float(value) if np.isfinite(value) else None

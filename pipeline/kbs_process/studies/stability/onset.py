@@ -20,6 +20,7 @@ from kbs_process.plant.laws import CATALOGUE, MEASURED
 from kbs_process.plant.predict import Schedule, predict
 from kbs_process.rig.model import Controller, Rig, substitute
 from kbs_process.signals.records import Array, Block
+from kbs_process.stages.gravity.equation import encoder_offsets
 
 KICK = 1e-3  # rad
 DURATION = 40.0  # s
@@ -97,8 +98,7 @@ def ring(
         quantise=False,
     )
     angle = np.concatenate(list(_angles(blocks)))
-    offset = [0.0 if joint.encoder is None else float(joint.encoder.offset) for joint in rig.joints]
-    moved = angle - np.asarray(q) - kick - offset
+    moved = angle - np.asarray(q) - kick - encoder_offsets(rig)
     early = _rms(moved[int(_WINDOW * rate) : int(2 * _WINDOW * rate)])
     last = moved[-int(_WINDOW * rate) :]
     most = int(np.argmax(_rms(last)))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from kbs_process.results.records import Conclusion, Constant, Notice, Provenance, Record, ResultsFile
+from kbs_process.results.records import Constant, Record, ResultsFile
 
 
 class LoopMargins(Record, frozen=True, kw_only=True):
@@ -71,8 +71,6 @@ class StabilityResults(ResultsFile, frozen=True, kw_only=True):
     name: str
     title: str
     article: str
-    verdict: Conclusion
-    provenance: Provenance
     joint: str  # that is swept
     cycle_s: float
     latency: int
@@ -91,5 +89,4 @@ class StabilityResults(ResultsFile, frozen=True, kw_only=True):
     onsets: tuple[OnsetAt, ...] = ()
     limit_cycles: tuple[LimitCycle, ...] = ()
     sensitivities: tuple[Sensitivity, ...] = ()
-    warnings: tuple[Notice, ...] = ()
     parameters: tuple[Constant, ...] = ()

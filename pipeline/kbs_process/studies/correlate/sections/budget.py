@@ -9,8 +9,9 @@ from kbs_process.report.panel import Block, Figure, Fold, Grid, Panel, Picture, 
 from kbs_process.report.prose import Prose
 from kbs_process.report.tables import Tables
 from kbs_process.report.text import frame_label, label, number, unit
+from kbs_process.results.judged import Budget
 from kbs_process.studies.correlate.choose import band_label, main_band, main_frame
-from kbs_process.studies.correlate.results import Budget, Results
+from kbs_process.studies.correlate.results import Results
 
 _SAYS = Prose("kbs_process.studies.correlate", "budget")
 

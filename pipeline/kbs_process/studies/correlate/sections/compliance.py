@@ -11,7 +11,9 @@ from kbs_process.report.panel import Block, Cell, Figure, Fold, Grid, Notices, P
 from kbs_process.report.prose import Prose
 from kbs_process.report.tables import Tables
 from kbs_process.report.text import MISSING, band_hz, count, exact, frame_label, label, measure, number, percent, unit
-from kbs_process.studies.correlate.results import ChannelResult, Notice, Requirement, Results
+from kbs_process.results.judged import ChannelResult, Requirement
+from kbs_process.results.records import Notice
+from kbs_process.studies.correlate.results import Results
 
 _SAYS = Prose("kbs_process.studies.correlate", "compliance")
 

@@ -9,7 +9,7 @@ from kbs_process.report.panel import Block, Figure, Live, Panel, Picture, Text
 from kbs_process.report.prose import Prose
 from kbs_process.report.tables import Table, Tables
 from kbs_process.report.text import frame_label
-from kbs_process.report.views import Scene, views
+from kbs_process.results.judged import Frame
 from kbs_process.studies.correlate.choose import (
     PLATES,
     band_label,
@@ -19,7 +19,7 @@ from kbs_process.studies.correlate.choose import (
     main_frame,
     peak_limit,
 )
-from kbs_process.studies.correlate.results import Frame, Results
+from kbs_process.studies.correlate.results import Results
 
 _SAYS = Prose("kbs_process.studies.correlate", "disturbance")
 
@@ -36,7 +36,7 @@ def panel(results: Results, tables: Tables) -> Panel:
     scenes = [_scene(results, *entry) for entry in found]
     main = (main_band(results), main_frame(results))
     bursts = (_whole_band(results), results.campaign.frame)
-    live = views(scenes)
+    live = series.views(scenes)
     shown = {view.choice for view in live}
     shortcuts = {"Requirement" if results.requirements else "Narrowest band": main, "Bursts (unfiltered)": bursts}
     figure = Figure(
@@ -104,9 +104,9 @@ def _traces(results: Results, band: str, frame: Frame, table: Table) -> tuple[se
     return tuple(traces)
 
 
-def _scene(results: Results, name: str, band: str, frame: Frame, table: Table) -> Scene:
+def _scene(results: Results, name: str, band: str, frame: Frame, table: Table) -> series.Scene:
     traces = _traces(results, band, frame, table)
-    return Scene(name, _choice(results, band, frame), table.columns["t"], table.valid, traces)
+    return series.Scene(name, _choice(results, band, frame), table.columns["t"], table.valid, traces)
 
 
 def _plate(results: Results, name: str, band: str, frame: Frame, table: Table) -> Picture:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import groupby
+from itertools import groupby, zip_longest
 
 import numpy as np
 
@@ -20,20 +20,9 @@ _MARKS = ("o", "s", "^", "D", "v", "P", "X", "*")
 
 
 _HEAD = (
-    "Recording",
-    "Role",
-    "Channel",
-    "Measured rms",
-    "Predicted rms",
-    "Residual rms",
-    "Measured peak",
-    "Predicted peak",
-    "Correlation",
-    "FVE",
-    "Spectral ratio",
-    "Pessimism",
-    "",
-)
+    "Recording", "Channel", "Measured rms", "Predicted rms", "Residual rms", "Measured peak", "Predicted peak",
+    "Correlation", "FVE", "Spectral ratio", "Pessimism",
+)  # fmt: skip
 
 
 def panel(results: Results, tables: Tables) -> Panel:
@@ -66,16 +55,17 @@ def _rank(results: Results, row: Merit, main: tuple[str, str]) -> tuple[bool, in
 
 def _table(results: Results, band: str, frame: str, rows: tuple[Merit, ...]) -> Grid:
     title = f"Figures of merit, {band_label(results, band)}, {frame_label(frame)}"
-    return Grid(title, _HEAD, _rows(rows), "kkkrrrrrrrrrk", _SAYS("table_note"))
+    return Grid(title, _HEAD, _rows(rows), "kkrrrrrrrrr", _SAYS("table_note"))
 
 
 def _rows(rows: tuple[Merit, ...]) -> tuple[tuple[str | Cell, ...], ...]:
-    """Name a recording in the first of its rows only."""
-    named = [("", "")] + [(row.recording, row.role) for row in rows]
-    return tuple(
-        (*(("", "") if name == before else name), *_figures(row))
-        for row, name, before in zip(rows, named[1:], named, strict=False)
-    )
+    """Name a recording in the first of its rows, and its role in the second."""
+    body: list[tuple[str | Cell, ...]] = []
+    for (recording, role), own in groupby(rows, key=lambda row: (row.recording, row.role)):
+        figures = list(map(_figures, own))
+        names = [recording, Cell(role, "muted")] if len(figures) > 1 else [f"{recording} ({role})"]
+        body += [(name, *row) for name, row in zip_longest(names, figures, fillvalue="")]
+    return tuple(body)
 
 
 def _figures(row: Merit) -> tuple[str | Cell, ...]:
@@ -97,7 +87,6 @@ def _figures(row: Merit) -> tuple[str | Cell, ...]:
         judged(percent(row.fraction_of_variance, 2), doubtful=poor),
         judged(number(row.spectral_ratio, 2)),
         judged(number(row.pessimism, 2), doubtful=optimistic),
-        Cell("at the noise" if noise else "", "muted"),
     )
 
 

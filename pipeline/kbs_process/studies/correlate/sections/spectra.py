@@ -6,18 +6,18 @@ import math
 
 import numpy as np
 
-from kbs_process.report import draw
+from kbs_process.report import draw, sheet
 from kbs_process.report.panel import Block, Figure, Grid, Panel, Picture, Text
 from kbs_process.report.prose import Prose
-from kbs_process.report.sheet import Sheet
 from kbs_process.report.tables import Table, Tables
-from kbs_process.report.text import frame_label, label, measure, number, unit
+from kbs_process.report.text import frame_label, measure, number, unit
 from kbs_process.signals.records import Array
 from kbs_process.studies.correlate.choose import PLATES, by_role
 from kbs_process.studies.correlate.results import Resonance, Results
 
 _SAYS = Prose("kbs_process.studies.correlate", "spectra")
 _BINS = 500
+_APART = 0.15  # in: resonances that are closer on the sheet share a label
 
 
 def panel(results: Results, tables: Tables) -> Panel:
@@ -64,7 +64,7 @@ def _densities(
     columns = 2 if len(channels) > 1 else 1
     rows = math.ceil(len(channels) / columns)
     with draw.style():
-        sheet = Sheet(rows, columns, 1.14 if rows > 1 else 2.2, gap=0.12)
+        plate = sheet.Sheet(rows, columns, 1.14 if rows > 1 else 2.2, gap=0.12)
         names: set[str] = set()
         for index, channel in enumerate(channels):
             column, row = divmod(index, rows)
@@ -73,15 +73,15 @@ def _densities(
                 _range(*(f for f, _ in curves.values())),
                 _range(*(density for _, density in curves.values())),
             )
-            panel = sheet.panel(row, column, frequencies, (0.5 * densities[0], 2.0 * densities[1]), logarithmic=True)
+            panel = plate.panel(row, column, frequencies, (0.5 * densities[0], 2.0 * densities[1]), logarithmic=True)
             for name, (frequency, density) in curves.items():
                 panel.curve(frequency, density, draw.LINES[name])
             _marks(panel, resonances, edges, named=index == 0)
             lowest = row == rows - 1 or index == len(channels) - 1
             panel.frame(f"{channel} / {unit(table.unit(channel))}", below="frequency / Hz" if lowest else None)
             names |= curves.keys()
-        sheet.key(0, sorted(names))
-        return draw.picture(sheet.figure, alt, title, "png")
+        plate.key(0, sorted(names))
+        return draw.picture(plate.figure, alt, title, "png")
 
 
 def _curves(table: Table, channel: str) -> dict[str, tuple[Array, Array]]:
@@ -115,23 +115,25 @@ def _range(*values: Array) -> tuple[float, float]:
     return (float(found.min()), float(found.max())) if found.size else (0.1, 1.0)
 
 
-def _marks(panel: Panel, resonances: tuple[Resonance, ...], edges: tuple[float, ...], *, named: bool) -> None:
-    """Draw band edges and resonances within the panel's range, these with their names in the first panel."""
+def _marks(panel: sheet.Panel, resonances: tuple[Resonance, ...], edges: tuple[float, ...], *, named: bool) -> None:
+    """Draw band edges and resonances within the panel's range, these with their frequencies in the first panel."""
     shown = [edge for edge in edges if panel.x.low <= edge <= panel.x.high]
     panel.upright(shown, colors=draw.INK, linewidths=0.7, linestyles=[(0, (1, 1.5))], zorder=1)
-    ordered = sorted(resonances, key=lambda resonance: resonance.frequency_Hz)
-    ordered = [found for found in ordered if panel.x.low <= found.frequency_Hz <= panel.x.high]
-    frequencies = [resonance.frequency_Hz for resonance in ordered]
-    panel.upright(frequencies, colors=draw.LIMIT, linewidths=0.7, linestyles=[(0, (4, 2))], zorder=1)
-    for index, resonance in enumerate(ordered if named else ()):
-        # Neighbours stand on opposite sides of their lines, as the first two are often close.
-        side = -1 if index % 2 == 0 else 1
+    near = sorted({one.frequency_Hz for one in resonances if panel.x.low <= one.frequency_Hz <= panel.x.high})
+    panel.upright(near, colors=draw.LIMIT, linewidths=0.7, linestyles=[(0, (4, 2))], zorder=1)
+    groups: list[list[float]] = []
+    for frequency in near if named else ():
+        if groups and panel.x.place(frequency) - panel.x.place(groups[-1][0]) < _APART:
+            groups[-1].append(frequency)
+        else:
+            groups.append([frequency])
+    for group in groups:
         panel.sheet.axes.text(
-            float(panel.x.place(resonance.frequency_Hz)) + 0.02 * side,
+            float(panel.x.place(group[0])) - 0.02,
             panel.y.end - 0.015,
-            f"{label(resonance.axis, 12)} {number(resonance.frequency_Hz)} Hz",
+            " to ".join(dict.fromkeys(number(frequency) for frequency in (group[0], group[-1]))) + " Hz",
             rotation=90,
-            ha="right" if side < 0 else "left",
+            ha="right",
             va="top",
             fontsize=5.5,
             color=draw.LIMIT,

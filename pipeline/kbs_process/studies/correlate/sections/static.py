@@ -7,7 +7,6 @@ from kbs_process.report.panel import Block, Figure, Live, Panel, Picture, Text
 from kbs_process.report.prose import Prose
 from kbs_process.report.tables import Table, Tables
 from kbs_process.report.text import count
-from kbs_process.report.views import Scene, views
 from kbs_process.studies.correlate.choose import PLATES, by_role
 from kbs_process.studies.correlate.results import Results
 
@@ -30,7 +29,7 @@ def panel(results: Results, tables: Tables) -> Panel:
         "Measured and static wrench at the transducer (frame T), unfiltered",
         pictures,
         _SAYS.caption("histories"),
-        Live("static", ("measured", "static", "residual"), views(scenes), two_scales=True),
+        Live("static", ("measured", "static", "residual"), series.views(scenes), two_scales=True),
     )
     blocks: list[Block] = [figure]
     if len(found) > PLATES:
@@ -40,7 +39,7 @@ def panel(results: Results, tables: Tables) -> Panel:
     return Panel("static", "Static wrench", question, tuple(blocks))
 
 
-def _scene(name: str, table: Table) -> Scene:
+def _scene(name: str, table: Table) -> series.Scene:
     traces = tuple(
         series.Trace(
             channel,
@@ -51,7 +50,7 @@ def _scene(name: str, table: Table) -> Scene:
         )
         for channel in table.channels
     )
-    return Scene(name, "unfiltered, transducer (T)", table.columns["t"], table.valid, traces)
+    return series.Scene(name, "unfiltered, transducer (T)", table.columns["t"], table.valid, traces)
 
 
 def _plate(name: str, role: str, table: Table) -> Picture:

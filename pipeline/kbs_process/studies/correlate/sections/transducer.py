@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -14,11 +15,10 @@ from kbs_process.report.tables import Table, Tables
 from kbs_process.report.text import frame_label, measure, number, percent, unit
 from kbs_process.signals.records import Array
 from kbs_process.studies.correlate.choose import band_label, main_frame
-from kbs_process.studies.correlate.on_transducer import OnTransducer
-from kbs_process.studies.correlate.results import Results
+from kbs_process.studies.correlate.results import OnTransducer, Results
 
 _SAYS = Prose("kbs_process.studies.correlate", "transducer")
-_KINDS = {
+_KINDS: dict[str, dict[str, Any]] = {
     "rigid": {"color": draw.RESIDUAL, "linewidth": 1.0, "zorder": 2},
     "modal": {"color": draw.PREDICTED, "linewidth": 2.2, "zorder": 2.5},
     "coupled": {"color": draw.MEASURED, "linewidth": 0.7, "zorder": 3},
@@ -164,8 +164,8 @@ def _gain_curves(table: Table, edges: Sequence[float], filters: dict[str, Array]
             names = [name for name in table.columns if name.startswith(f"{channel}.")]
             for index, name in enumerate(names):
                 shade = 0.35 + 0.65 * (index + 1) / len(names)
-                look = {"color": draw.MEASURED, "alpha": shade, "linewidth": 0.9}
-                axis.plot(f, table.columns[name], label=name.split(".", 1)[1], **look)
+                angle = name.split(".", 1)[1]
+                axis.plot(f, table.columns[name], label=angle, color=draw.MEASURED, alpha=shade, linewidth=0.9)
             for index, (name, gain) in enumerate(filters.items()):
                 color = draw.SERIES[(index + 1) % len(draw.SERIES)]
                 axis.plot(f, gain * table.columns[names[-1]], label=f"behind {name}", color=color, linewidth=0.9)

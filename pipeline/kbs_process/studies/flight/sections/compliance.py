@@ -43,11 +43,7 @@ def _probabilities(results: FlightResults) -> Grid:
         for one in results.requirements
     )
     head = ("Requirement", "Band", "Limit", "Nominal", "90 % of units", "95 %/95 % bound", "Probability of meeting")
-    note = (
-        f"{count(results.samples, 'unit')} drawn by Latin hypercube (seed {results.seed}), flown along "
-        f"{results.trajectory} for {number(results.duration_s)} s. The bound holds 95 % of all units with 95 % "
-        "confidence; probabilities have 95 % intervals. Statistic of the channel that is worst."
-    )
+    note = _SAYS("table_note", results=results)
     return Grid("Compliance of the flight model", head, rows, "llrrrrr", note)
 
 

@@ -40,8 +40,7 @@ def _histories(requirement: FlightRequirement, table: Table) -> Picture:
             axis.fill_between(t, q05, q95, color=draw.PREDICTED, alpha=0.5, linewidth=0.0, label="90 % of units")
             axis.fill_between(t, low, high, color=draw.MEASURED, linewidth=0.4, label="nominal unit")
             if row.greatest > 0.5 * requirement.limit:
-                for level in (-requirement.limit, requirement.limit):
-                    axis.axhline(level, color=draw.LIMIT, linewidth=0.8, linestyle=(0, (4, 2)))
+                draw.limits(axis, -requirement.limit, requirement.limit)
             axis.set_ylabel(f"{row.channel} / {unit(requirement.unit)}")
         axes[0].legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
         axes[-1].set_xlabel("time / s")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kbs_process.report.panel import Cell, Grid, Panel, Text, notices
+from kbs_process.report.panel import Block, Cell, Grid, Panel, Text, notices
 from kbs_process.report.tables import Tables
 from kbs_process.report.text import exact, measure, number, percent, unit
 from kbs_process.studies.reference_day.results import Judged, ReferenceDayResults
@@ -16,7 +16,7 @@ def panel(results: ReferenceDayResults, tables: Tables) -> Panel:
     note = "± is one standard deviation. Each axis has to meet each pointing requirement in every section."
     sources = "; ".join(dict.fromkeys(one.source for one in results.requirements))
     rows = tuple(_row(one) for one in results.requirements)
-    blocks = (
+    blocks: tuple[Block, ...] = (
         Grid("Compliance", head, rows, "lrrrlc", f"{note} Source: {sources}."),
         *notices(results.warnings),
         Text("Assumptions behind these figures:", results.notes),

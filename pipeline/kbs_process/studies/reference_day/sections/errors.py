@@ -57,8 +57,7 @@ def _errors(table: Table, limit: float) -> Picture:
         for axis, (column, name, color) in zip(axes, AXES, strict=True):
             mdeg = 1e3 * np.degrees(series.envelope(table.columns[column], size))
             axis.plot(t0 + step * np.arange(len(mdeg)), mdeg, color=color, linewidth=0.4)
-            for level in (-limit, limit):
-                axis.axhline(1e3 * np.degrees(level), color=draw.LIMIT, linewidth=0.8, linestyle=(0, (4, 2)))
+            draw.limits(axis, -1e3 * np.degrees(limit), 1e3 * np.degrees(limit))
             axis.set_ylabel(f"{name} error / mdeg")
         axes[-1].set_xlim(0.0, float(t[-1]))
         axes[-1].set_xlabel("time / s")

@@ -44,8 +44,7 @@ def _torques(tables: Sequence[tuple[str, Table]], limit: float | None) -> Pictur
                 x = series.envelope(np.where(table.valid, table.columns[column], np.nan), size)
                 axis.plot(t0 + step * np.arange(len(x)), x, color=color, linewidth=0.4, label=column)
             if limit is not None and name == tables[0][0]:
-                for level in (-limit, limit):
-                    axis.axhline(level, color=draw.LIMIT, linewidth=0.8, linestyle=(0, (4, 2)))
+                draw.limits(axis, -limit, limit)
             axis.set_ylabel(f"{name}\ntorque / N·m")
         axes[0].legend(loc="upper right", ncols=3)
         axes[-1].set_xlim(0.0, float(t[-1]))

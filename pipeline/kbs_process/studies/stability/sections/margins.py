@@ -25,11 +25,7 @@ def panel(results: StabilityResults, tables: Tables) -> Panel:
         f"{joint}: Kp {number(kp)}, Ki {number(ki)} 1/s"
         for joint, kp, ki in zip(results.joints, results.Kp, results.Ki, strict=True)
     )
-    words = (
-        f"Gains {gains}; cycle {number(results.cycle_s)} s, latency {results.latency} cycle(s). The plant is "
-        "linearised about rest without friction, with base, joints, rotors and the drives' own slopes, and discretised "
-        "exactly for a field that moves linearly within a cycle."
-    )
+    words = _SAYS("loop", gains=gains, cycle_s=results.cycle_s, latency=results.latency)
     alt = "Gain margin, phase margin and sensitivity peak over the angle of the swept joint"
     blocks: list[Block] = [
         Text(words),
@@ -63,12 +59,7 @@ def _table(results: StabilityResults) -> Grid:
         f"Angle of {results.joint}", "Loop", "Gain margin / dB", "at / Hz", "Phase margin / °", "at / Hz",
         "Sensitivity peak", "Critical factor", "with friction's slope at rest",
     )  # fmt: skip
-    note = (
-        "Critical factor: on Kp and Ki of all joints together, by the eigenvalues of the closed loop; the gain margin "
-        "is python-control's, of one joint's loop with the others closed. Friction's slope at rest holds for motions "
-        "below the rate at which it saturates."
-    )
-    return Grid("Margins", head, rows, "kkrrrrrrr", note)
+    return Grid("Margins", head, rows, "kkrrrrrrr", _SAYS("table_note"))
 
 
 def _sensitivities(results: StabilityResults) -> Grid:
@@ -97,7 +88,7 @@ def _margins(results: StabilityResults, alt: str) -> Picture:
             peak.plot(angle, [entry.sensitivity_peak for entry in mine], color=color)
         limits = ((gain, 6.0, "gain margin / dB"), (phase, 30.0, "phase margin / °"), (peak, 2.0, "sensitivity peak"))
         for axis, limit, label in limits:
-            axis.axhline(limit, color=draw.LIMIT, linewidth=0.8, linestyle=(0, (4, 2)))
+            draw.limits(axis, limit)
             axis.set_ylim(bottom=0.0)
             axis.set_xlabel(f"{results.joint} / °")
             axis.set_ylabel(label)

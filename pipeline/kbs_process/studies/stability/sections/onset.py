@@ -19,12 +19,6 @@ _SAYS = Prose("kbs_process.studies.stability", "onset")
 _SMOOTH: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 4.5, "color": draw.MEASURED}
 _FRICTION: dict[str, Any] = {**_SMOOTH, "marker": "s", "markerfacecolor": "white", "markeredgecolor": draw.LIMIT}
 
-_LIMIT_CYCLES = (
-    "What is left of a kick in the last 10 s, with friction, cogging and the encoder's rounding. The integrator moves "
-    "the field until the reading changes its code, friction lets it go late: the joint wanders within a part of a "
-    "code, at any gain. That is a limit cycle, and no instability."
-)
-
 
 def panel(results: StabilityResults, tables: Tables) -> Panel:
     """Figure and tables of onsets and limit cycles."""
@@ -42,12 +36,7 @@ def panel(results: StabilityResults, tables: Tables) -> Panel:
 def _words(results: StabilityResults) -> Text:
     smooth = [e for e in results.onsets if not e.friction and e.found is not None]
     off = max((abs((e.found or 0.0) / e.predicted - 1.0) for e in smooth), default=None)
-    text = (
-        f"A kick of {number(1e3 * results.kick_rad)} mrad on all commands; an oscillation that is larger after 30 s "
-        f"than after 10 s has passed the onset. Without friction the largest deviation from the prediction "
-        f"is {percent(off, 2)}, over {len(smooth)} onsets found to 0.05 %."
-    )
-    return Text(text)
+    return Text(_SAYS("kick", kick_mrad=1e3 * results.kick_rad, off=off, count=len(smooth)))
 
 
 def _table(onsets: tuple[OnsetAt, ...], joint: str) -> Grid:
@@ -65,11 +54,7 @@ def _table(onsets: tuple[OnsetAt, ...], joint: str) -> Grid:
         )
         for e in onsets
     )
-    note = (
-        "Factor on Kp; that on Ki is it times the weight. With friction: friction, cogging and the encoder's rounding, "
-        "and a limit cycle below the kick is no onset."
-    )
-    return Grid("Onsets", head, rows, "krlrrrrr", note)
+    return Grid("Onsets", head, rows, "krlrrrrr", _SAYS("onsets_note"))
 
 
 def _cycles(results: StabilityResults) -> Grid:
@@ -84,7 +69,7 @@ def _cycles(results: StabilityResults) -> Grid:
         for e in results.limit_cycles
     )
     head = ("Factor on the gains", "of the critical one", "Joint's rms", "of an encoder code", "Frequency / Hz")
-    return Grid("Limit cycles", head, rows, "rrrrr", _LIMIT_CYCLES)
+    return Grid("Limit cycles", head, rows, "rrrrr", _SAYS("limit_cycles"))
 
 
 def _onsets(results: StabilityResults, alt: str) -> Picture:
@@ -108,7 +93,7 @@ def _onsets(results: StabilityResults, alt: str) -> Picture:
             color=draw.PREDICTED, linewidth=1.6, label="boundary",
         )  # fmt: skip
         there = [e for e in results.onsets if not e.friction and e.angle_rad == results.worst_angle_rad and e.found]
-        plane.plot([e.integral_weight * (e.found or 0.0) for e in there], [e.found for e in there], **_SMOOTH)
+        plane.plot([e.integral_weight * (e.found or 0.0) for e in there], [e.found or 0.0 for e in there], **_SMOOTH)
         plane.plot([1.0], [1.0], linestyle="none", marker="*", markersize=8, color=draw.LIMIT, label="as run")
         plane.set_xlim(left=0.0)
         plane.set_ylim(bottom=0.0)

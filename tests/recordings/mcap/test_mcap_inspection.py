@@ -1,0 +1,76 @@
+"""What `inspect_recording` says of a recording whose defects are known."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from kbs_process.recordings.inspection import inspect_recording
+from kbs_process.recordings.mcap.messages.encoding import Encoding, OutStream
+from kbs_process.recordings.mcap.writer import write_mcap
+from recordings.mcap.mcap_files import build
+
+
+@pytest.mark.parametrize("encoding", ["ros2", "json", "protobuf"])
+def test_rates_gaps_repeats_and_ranges(tmp_path: Path, encoding: Encoding) -> None:
+    rng = np.random.default_rng(4)
+    n = 20_000
+    log = 1_000_000 * np.arange(n)
+    stamp = log + rng.integers(-1000, 1000, n)
+    stamp[5000:] += 20_000_000  # a gap
+    stamp[700] = stamp[699]  # a repeat
+    stamp[[900, 901]] = stamp[[901, 900]]  # two in the wrong order
+    wrench = rng.uniform(-2, 3, (n, 6))
+    wrench[17, 1] = np.nan
+    joints = np.column_stack([np.linspace(0, 1, 100), np.linspace(2, 3, 100)])
+    streams = [
+        OutStream("/wrench", "wrench", stamp, log, wrench, encoding=encoding),
+        OutStream("/encoder", "joints", log[:100], log[:100], joints, ("az", "el"), encoding),
+    ]
+    write_mcap(tmp_path / "a.mcap", streams)
+    found = inspect_recording(tmp_path / "a.mcap")
+    assert found.state == "lossy"  # the NaN
+    encoder, topic = found.topics
+    assert (topic.topic, topic.count) == ("/wrench", n)
+    assert topic.rate_Hz == pytest.approx(1000, rel=0.01)
+    assert topic.longest_interval_s == pytest.approx(0.021, abs=1e-5)
+    assert (topic.gaps, topic.repeats, topic.out_of_order) == (1 + 1 + 2, 1, 1)
+    assert (topic.start_ns, topic.end_ns) == (stamp.min(), stamp.max())
+    limits = {entry.field: entry for entry in topic.ranges}
+    assert limits["wrench.torque.z"].low == wrench[:, 5].min()
+    assert limits["wrench.torque.z"].high == wrench[:, 5].max()
+    assert limits["wrench.force.y"].not_finite == 1
+    assert encoder.names == ("az", "el")
+    assert [(e.field, e.low, e.high) for e in encoder.ranges][:2] == [("position[az]", 0, 1), ("position[el]", 2, 3)]
+
+
+def test_clean(tmp_path: Path) -> None:
+    t = np.arange(50) * 10**8
+    write_mcap(tmp_path / "a.mcap", [OutStream("/t", "temperature", t, t, np.full((50, 1), 21.5))])
+    found = inspect_recording(tmp_path / "a.mcap")
+    assert (found.state, found.losses, found.reason) == ("clean", (), "")
+    (topic,) = found.topics
+    assert topic.rate_Hz == 10
+    assert (topic.gaps, topic.repeats, topic.out_of_order) == (0, 0, 0)
+
+
+def test_true_and_false_are_no_numbers_and_lose_no_message(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    payload = b'{"locked": true, "temp": 20.5, "flags": [true, false]}'
+    path.write_bytes(build([(i, payload) for i in range(30)], ("State", "jsonschema", b"{}"), "json"))
+    found = inspect_recording(path)
+    (topic,) = found.topics
+    assert (found.state, topic.count) == ("clean", 30)
+    assert [one.field for one in topic.ranges] == ["temp"]
+
+
+def test_messages_of_any_type_are_counted(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    path.write_bytes(build([(i, bytes(100)) for i in range(30)], ("a/Image", "ros1msg", b""), "ros1"))
+    found = inspect_recording(path)
+    assert found.state == "clean"
+    (topic,) = found.topics
+    assert (topic.count, topic.ranges) == (30, ())
+    assert "cannot be read" in topic.note

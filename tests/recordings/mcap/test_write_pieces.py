@@ -1,0 +1,116 @@
+"""Recordings written a piece at a time: the same bytes, in bounded memory."""
+
+from __future__ import annotations
+
+import tracemalloc
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+from mcap.records import Message
+
+from kbs_process.errors import RecordingError
+from kbs_process.recordings.mcap import writer
+from kbs_process.recordings.mcap.messages.encoding import Encoding, OutStream
+from kbs_process.recordings.mcap.source import open_recording
+from kbs_process.recordings.mcap.streams import Stream
+from kbs_process.recordings.mcap.writer import write_mcap, write_pieces
+
+START = 1_700_000_000_000_000_000
+
+
+def temperature(first: int, last: int, *, every: int = 1_000_000, encoding: Encoding = "ros2") -> OutStream:
+    """Messages first .. last - 1 of a temperature's stream, `every` ns apart."""
+    stamp = START + every * np.arange(first, last)
+    values = np.sin(np.arange(first, last) * 0.01)[:, None]
+    return OutStream(f"/t{every}", "temperature", stamp, stamp + 500, values, encoding=encoding)
+
+
+def messages(path: Path) -> list[Message]:
+    """Return the messages in the order of the file, by an independent reader."""
+    with path.open("rb") as file:
+        return [message for _, _, message in make_reader(file).iter_messages(log_time_order=False)]
+
+
+def pieces(count: int, size: int, encoding: Encoding = "ros2") -> Iterator[OutStream]:
+    """Yield two streams, one ten times faster, side by side."""
+    for first in range(0, count, size):
+        yield temperature(first, min(first + size, count), encoding=encoding)
+        slow = slice(-(-first // 10), -(-min(first + size, count) // 10))
+        yield temperature(slow.start, slow.stop, every=10_000_000, encoding=encoding)
+
+
+@pytest.mark.parametrize("encoding", ["ros2", "json", "protobuf"])
+def test_pieces_of_any_size_give_the_bytes_of_the_whole(
+    encoding: Encoding, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(writer, "BATCH", 500)
+    whole = [temperature(0, 3000, encoding=encoding), temperature(0, 300, every=10_000_000, encoding=encoding)]
+    write_mcap(tmp_path / "whole.mcap", whole)
+    logs = [message.log_time for message in messages(tmp_path / "whole.mcap")]
+    assert logs == sorted(logs)
+    for size in (70, 999):
+        write_pieces(tmp_path / "pieces.mcap", pieces(3000, size, encoding))
+        assert (tmp_path / "pieces.mcap").read_bytes() == (tmp_path / "whole.mcap").read_bytes()
+
+
+@pytest.mark.slow
+def test_memory_does_not_grow_with_the_recording(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(writer, "BATCH", 2000)
+    monkeypatch.setattr(writer, "CHUNK", 1 << 16)
+    write_pieces(tmp_path / "a.mcap", pieces(100, 10))  # whatever is made once only
+    peaks = []
+    for count in (10_000, 40_000):
+        tracemalloc.start()
+        write_pieces(tmp_path / "a.mcap", pieces(count, 500))
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    assert peaks[1] < 1.2 * peaks[0]
+    assert peaks[1] < 44_000 * 60  # bytes of the payloads alone
+
+
+def test_a_topic_that_falls_silent_holds_up_no_more_than_it_may(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Beyond `hold` messages the older are written, and a late piece goes behind them."""
+    monkeypatch.setattr(writer, "BATCH", 100)
+    late = temperature(0, 5, every=10_000_000)
+
+    def falling_silent() -> Iterator[OutStream]:
+        yield late
+        for first in range(0, 5000, 100):
+            yield temperature(first, first + 100)
+        yield temperature(5, 6, every=10_000_000)
+
+    write_pieces(tmp_path / "a.mcap", falling_silent(), hold=400)
+    source = open_recording(tmp_path / "a.mcap")
+    read = list(source.read([Stream(t, t, ("temperature",)) for t in ("/t1000000", late.topic)]))
+    assert not source.losses
+    slow = np.concatenate([block.values for topic, block in read if topic == late.topic])
+    fast = np.concatenate([block.stamp for topic, block in read if topic != late.topic])
+    assert np.array_equal(slow, temperature(0, 6, every=10_000_000).values)
+    assert np.array_equal(fast, temperature(0, 5000).stamp)
+
+
+def test_stamps_out_of_order_are_put_in_order_within_reach(tmp_path: Path) -> None:
+    a, b = temperature(0, 50), temperature(50, 100)
+    write_pieces(tmp_path / "a.mcap", iter([b, a]))
+    ((_, block),) = open_recording(tmp_path / "a.mcap").read([Stream("t", a.topic, ("temperature",))])
+    assert np.array_equal(block.stamp, temperature(0, 100).stamp)
+
+
+def test_a_source_that_fails_leaves_nothing(tmp_path: Path) -> None:
+    def failing() -> Iterator[OutStream]:
+        yield temperature(0, 10)
+        raise RecordingError("the source is damaged")
+
+    with pytest.raises(RecordingError, match="damaged"):
+        write_pieces(tmp_path / "a.mcap", failing())
+    assert not list(tmp_path.iterdir())
+
+
+def test_pieces_that_do_not_belong_together_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="different kinds"):
+        write_pieces(tmp_path / "a.mcap", [temperature(0, 5), temperature(5, 9, encoding="json")])

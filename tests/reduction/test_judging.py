@@ -1,0 +1,63 @@
+"""Every channel of every recording is judged by its own uncertainty; the one closest to failing is told."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import archived
+from kbs_process.reduction.analysis import Pair
+from kbs_process.reduction.judging import coverage_below, judged
+from kbs_process.results.judged import Budget, Requirement
+from kbs_process.signals.records import WRENCH_CHANNELS, WRENCH_UNITS, Signal
+from kbs_process.stages.bandpass import Band
+
+BAND = Band("lt1Hz", 0.01, 1.0)
+
+
+def recorded(name: str, peak: float) -> SimpleNamespace:
+    values = np.zeros((100, 6))
+    values[40, 4] = -peak
+    valid = np.ones(100, dtype=bool)
+    signal = Signal(0.0, 0.05, values, WRENCH_CHANNELS, WRENCH_UNITS, "S", valid)
+    return SimpleNamespace(entry=SimpleNamespace(name=name), pairs={("S", "lt1Hz"): Pair(signal, None)})
+
+
+def stated(name: str, sigma: float) -> list[Budget]:
+    return [
+        Budget(channel=channel, unit=unit, frame="S", band="lt1Hz", contributions=(), total=sigma, recording=name)
+        for channel, unit in zip(WRENCH_CHANNELS, WRENCH_UNITS, strict=True)
+    ]
+
+
+def verdict(quiet: tuple[float, float], noisy: tuple[float, float]) -> Requirement:
+    """Judge two recordings, each with a peak and a sigma in N m, against 0.06 N m."""
+    campaign = archived.campaign("EL089")
+    requirement = replace(campaign.requirements[0], limit=0.06)
+    runs = [recorded("quiet", quiet[0]), recorded("noisy", noisy[0])]
+    return judged(campaign, requirement, runs, [*stated("quiet", quiet[1]), *stated("noisy", noisy[1])])
+
+
+def test_a_lower_peak_that_is_less_well_known_decides() -> None:
+    found = verdict((0.05, 0.001), (0.04, 0.02))
+    assert (found.verdict, found.recording, found.channel) == ("undecided", "noisy", "Ty")
+    assert (found.value, found.sigma) == pytest.approx((0.04, 0.02))
+    assert (found.low, found.high) == pytest.approx((0.0, 0.08))
+
+
+def test_a_recording_that_fails_is_told_before_one_that_may() -> None:
+    found = verdict((0.07, 0.0005), (0.05, 0.02))
+    assert (found.verdict, found.recording) == ("fail", "quiet")
+    assert found.low is not None and found.low > found.limit
+
+
+def test_others_noise_does_not_widen_a_well_known_recording() -> None:
+    found = verdict((0.05, 0.001), (0.01, 0.01))
+    below = coverage_below("peak", [one.pairs["S", "lt1Hz"].measured for one in (recorded("", 0.0),) * 2], BAND)
+    assert (found.verdict, found.recording) == ("pass", "quiet")
+    assert (found.low, found.high) == pytest.approx((0.05 - 0.001 * below, 0.052))
+    (channel,) = [one for one in found.channels if one.channel == "Ty"]
+    assert (channel.low, channel.high, channel.sigma) == (found.low, found.high, found.sigma)

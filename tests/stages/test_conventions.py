@@ -1,0 +1,68 @@
+"""The self-test of signs catches a reversed channel, swapped channels and a reversed encoder."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+import archived
+from kbs_process.plant.rigid import static_wrench
+from kbs_process.signals.records import WRENCH_CHANNELS, WRENCH_UNITS, Signal
+from kbs_process.stages.conventions import check_encoder_sense, check_gravity_sign, check_weight
+
+T = np.linspace(0.0, 1.0, 500)
+Q = np.stack([np.radians(150 * np.sin(6 * T)), np.radians(70 + 17 * T)], axis=1)
+
+
+def wrench(values: np.ndarray) -> Signal:
+    return Signal(0.0, 0.05, values, WRENCH_CHANNELS, WRENCH_UNITS, "T", np.ones(len(values), dtype=bool))
+
+
+def angles(values: np.ndarray) -> Signal:
+    return Signal(0.0, 0.05, values, ("az", "el"), ("rad", "rad"), "joint", np.ones(len(values), dtype=bool))
+
+
+@cache
+def computed() -> Signal:
+    """Gravity's wrench on the swing."""
+    return wrench(static_wrench(archived.rig(), Q))
+
+
+def tared() -> Signal:
+    """The same as a transducer shows it that was tared at the start."""
+    return wrench(computed().values - computed().values[0] + 0.01)
+
+
+def verdicts(measured: Signal) -> dict[str, bool]:
+    checks = check_gravity_sign(measured, computed(), archived.rig().transducer.noise.value)
+    return {check.check.split()[3]: check.ok for check in checks}
+
+
+def test_a_tared_transducer_passes_on_the_channels_that_gravity_moves():
+    assert verdicts(tared()) == {"Fx": True, "Fy": True, "Tx": True, "Ty": True}
+
+
+@pytest.mark.parametrize("channel", ["Tx", "Ty"])
+def test_a_reversed_channel_is_caught(channel: str):
+    values = tared().values.copy()
+    values[:, WRENCH_CHANNELS.index(channel)] *= -1.0
+    assert verdicts(wrench(values))[channel] is False
+
+
+def test_swapped_channels_are_caught():
+    values = tared().values.copy()
+    values[:, [3, 4]] = values[:, [4, 3]]
+    assert verdicts(wrench(values))["Tx"] is False
+
+
+def test_an_encoder_that_counts_the_other_way_is_caught():
+    found = check_encoder_sense(angles(Q * [1.0, -1.0]), angles(Q))
+    assert [check.ok for check in found] == [True, False]
+
+
+def test_weight_points_down_on_a_level_plate_and_is_not_asked_in_orbit():
+    (check,) = check_weight(archived.rig())
+    assert check.ok and "-274.58" in check.found
+    weightless = replace(archived.rig(), gravity=replace(archived.rig().gravity, value=np.array(0.0)))
+    assert check_weight(weightless) == ()

@@ -1,0 +1,223 @@
+"""Bad files and mappings are refused with the place and the remedy; what is merely doubtful is counted."""
+
+from __future__ import annotations
+
+import tomllib
+from importlib.machinery import ModuleSpec
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from kbs_process.campaign.load import load_campaign
+from kbs_process.errors import ConfigError, KbsError, OutputError, RecordingError
+from kbs_process.recordings import isolated
+from kbs_process.studies.convert.describe import describe
+from kbs_process.studies.convert.run import import_recordings
+from studies.convert.importer_files import (
+    CAMPAIGN,
+    MAPPING,
+    Writer,
+    read_back,
+    signals,
+    write_csv,
+    write_hdf5,
+    write_mapping,
+    write_mdf,
+    write_parquet,
+    write_tdms,
+)
+
+
+def _import(folder: Path, file: str, mapping: str = MAPPING, notices: list[str] | None = None) -> Path:
+    return import_recordings(
+        write_mapping(folder, file, mapping),
+        folder,
+        folder / "campaign",
+        notice=None if notices is None else notices.append,
+    )
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("[wrench]", "[wrensh]", "did you mean 'wrench'?"),
+        ("Fz =", "Fq =", "wrench.Fq: is not a key that is known here\n  -> known: Fx, Fy, Fz, Tx, Ty, Tz"),
+        ('unit = "rad"', 'unit = "degree"', "did you mean 'deg'?"),
+        ('"Fx", unit = "N"', '"Fx", unit = "N m"', "unit of torque"),
+        ('role = "fit"', 'role = "fitt"', "did you mean 'fit'?"),
+        ("[time]", 'format = "hdf"\n[time]', "'hdf' is not allowed\n  -> did you mean 'hdf5'?"),
+        ('unit = "s"', 'unit = "s"\nrate_Hz = 100.0', "delete one of the two"),
+        ("wheel =", "wheal =", "wheel"),
+        ("description/campaign.toml", "campaign.toml", "does not exist"),
+        ("repeat = 1", "repeat = 1\nstart_s = 5.0\nend_s = 4.0", "is not after start_s"),
+        ('"SOURCE"', '"../SOURCE"', "no file of the source folder"),
+        ("[[recording]]", '[turn]\njoint = "wheel"\naxis = [0, 0, 2]\nfactor = 1.0\n[[recording]]', "unit vector"),
+        ('unit = "s"', 'unit = "s"\nstart = 2026-01-31T12:00:00', "offset from UTC"),
+    ],
+)
+def test_faults_of_the_mapping(tmp_path: Path, old: str, new: str, said: str) -> None:
+    write_csv(tmp_path / "run.csv", signals(20))
+    assert old in MAPPING
+    with pytest.raises(ConfigError) as caught:
+        _import(tmp_path, "run.csv", MAPPING.replace(old, new))
+    assert said in str(caught.value)
+    assert ".toml" in caught.value.where
+    assert ".new-" not in str(caught.value)  # a private folder, which the user does not know
+    assert not (tmp_path / "campaign").exists()
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("t,Fx,Fy,Fz_N,angle\n0,1,2,3,4\n", "did you mean 'Fz_N'"),
+        ("t:Fx:Fy:Fz:angle\n0:1:2:3:4\n", "set the delimiter"),
+        ("", "the file is empty"),
+        ("t,Fx,Fy,Fz,angle\n", "no sample of 'wrench'"),
+        ("t,Fx,Fy,Fz,angle\n" + "0,1,2,3,4\n1,2,3,4,5,6\n", "Expected 5 fields in line 3, saw 6"),
+        ("t,Fx,Fy,Fz,angle\n-1,1,2,3,4\n", "give the date of time zero"),
+        ("t,Fx,Fy,Fz,angle\n\xff", "not text in utf-8"),
+    ],
+)
+def test_faults_of_a_text_file(tmp_path: Path, text: str, said: str) -> None:
+    (tmp_path / "run.csv").write_bytes(text.encode("latin-1"))
+    with pytest.raises(RecordingError, match=said) as caught:
+        _import(tmp_path, "run.csv")
+    assert "run.csv" in caught.value.where
+    assert not (tmp_path / "campaign").exists()
+    assert not list(tmp_path.glob("*.new-*"))
+
+
+def test_doubtful_cells_are_kept_and_counted(tmp_path: Path) -> None:
+    lines = ["t,Fx,Fy,Fz,angle", "0,1,2,3,0", "1,overload,2,3,0", "1,inf,,3,0", ",1,2,3,0", "0.5,7,2,3,0"]
+    (tmp_path / "run.csv").write_text("\n".join(lines))
+    notices: list[str] = []
+    folder = _import(tmp_path, "run.csv", notices=notices)
+    stamp, wrench = read_back(folder, "turn_1")["wrench"]
+    np.testing.assert_array_equal(stamp, np.array([0, 500, 1000, 1000]) * 1_000_000)
+    np.testing.assert_array_equal(wrench[:, 0], [1.0, 7.0, np.nan, np.inf])
+    for finding in (
+        "2 cells of 'wrench' hold no number",
+        "1 values of 'wrench' are infinite",
+        "1 time stamps of 'wrench' repeat",
+        "1 time stamps of 'wrench' lie before",
+        "1 rows have no time",
+    ):
+        assert any(finding in notice for notice in notices), finding
+    stated = tomllib.loads((folder / "campaign.toml").read_text())["source"]["file"][0]
+    assert [f"{stated['name']}, {finding}" for finding in stated["findings"]] == notices
+
+
+def test_a_folder_with_something_in_it_is_left_alone(tmp_path: Path) -> None:
+    write_csv(tmp_path / "run.csv", signals(20))
+    folder = _import(tmp_path, "run.csv")
+    before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    with pytest.raises(OutputError, match="nothing was changed"):
+        _import(tmp_path, "run.csv")
+    assert before == {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def test_unknown_preset_and_missing_source(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="did you mean 'smartwheel'"):
+        import_recordings("smartweel", tmp_path, tmp_path / "campaign")
+    with pytest.raises(RecordingError, match=r"published: github\.com/csu-hmc"):
+        import_recordings("treadmill_fast", tmp_path, tmp_path / "campaign")
+    with pytest.raises(RecordingError, match="tells no format"):
+        (tmp_path / "run.xyz").write_text("1")
+        describe(tmp_path / "run.xyz")
+
+
+WRITERS = {"parquet": write_parquet, "h5": write_hdf5, "tdms": write_tdms, "mf4": write_mdf}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("suffix", "write"), WRITERS.items())
+def test_damaged_binary_files(tmp_path: Path, suffix: str, write: Writer) -> None:
+    """Garbage and truncation end in an error, or in the samples that are left; never in a dead interpreter."""
+    whole = tmp_path / f"whole.{suffix}"
+    write(whole, signals(2000))
+    data = whole.read_bytes()
+    rng = np.random.default_rng(3)
+    for name, damaged in {
+        "garbage": rng.bytes(5000),
+        "half": data[: len(data) // 2],
+        "head": data[:40] + rng.bytes(4000),
+    }.items():
+        path = tmp_path / f"{name}.{suffix}"
+        path.write_bytes(damaged)
+        try:
+            listing = describe(path)
+        except RecordingError as error:
+            assert name in error.where
+            assert "Traceback" not in str(error)
+        else:
+            assert "2000" not in listing
+
+
+@pytest.mark.parametrize(
+    ("body", "said"),
+    [
+        ("import os, signal; os.kill(os.getpid(), signal.SIGSEGV)", "killed by SIGSEGV"),
+        ("import time; time.sleep(60)", "killed by SIGKILL"),
+        ("raise ValueError('block 7 is odd')", "ValueError: block 7 is odd"),
+        ('print(\'[["x", "", ""\', end=\'\')', "no column of numbers"),
+    ],
+)
+def test_a_reader_that_dies_or_hangs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, body: str, said: str) -> None:
+    (tmp_path / "bad_reader.py").write_text(body)
+    (tmp_path / "run.tdms").write_bytes(b"TDSm")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    monkeypatch.setattr(isolated, "MODULE", "bad_reader")
+    monkeypatch.setattr(isolated, "SILENCE_S", 1.0)
+    with pytest.raises(RecordingError, match=said):
+        describe(tmp_path / "run.tdms")
+
+
+def test_a_small_file_that_declares_endless_data(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import h5py
+
+    with h5py.File(tmp_path / "bomb.h5", "w") as file:
+        file.create_dataset("x", shape=(10**12,), dtype="f8", chunks=(1 << 16,))
+    assert (tmp_path / "bomb.h5").stat().st_size < 10_000
+    monkeypatch.setattr(isolated, "DATA_FLOOR", 1 << 22)
+    with pytest.raises(RecordingError, match="far more samples"):
+        describe(tmp_path / "bomb.h5")
+
+
+def test_missing_library_names_the_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def absent(name: str) -> ModuleSpec | None:
+        return None
+
+    (tmp_path / "run.mf4").write_bytes(b"MDF")
+    monkeypatch.setattr(isolated, "find_spec", absent)
+    with pytest.raises(KbsError, match=r"pip install 'kbs-process\[formats\]'"):
+        describe(tmp_path / "run.mf4")
+
+
+def test_description_is_a_mapping_to_start_from(tmp_path: Path) -> None:
+    write_hdf5(tmp_path / "run.h5", signals(100) | {"t": np.arange(100) * 0.5})
+    described = describe(tmp_path / "run.h5")
+    assert tomllib.loads(described)["recording"][0]["source"] == "run.h5"
+    row = next(line for line in described.splitlines() if line.endswith("  t"))
+    assert row.split()[2:6] == ["100", "0", "0", "49.5"]
+
+
+def test_the_description_is_taken_whole_and_from_its_folder_only(tmp_path: Path) -> None:
+    write_csv(tmp_path / "run.csv", signals(20))
+    plan = write_mapping(tmp_path, "run.csv")
+    rig, campaign = tmp_path / "description/parameters/rig.toml", tmp_path / "description/campaign.toml"
+    coupled = rig.read_text().replace("cross_coupling = { value = 0.0", 'cross_coupling = { value = "x.csv"')
+
+    rig.write_text(coupled)
+    with pytest.raises(ConfigError, match=r"'x\.csv' does not exist"):
+        import_recordings(plan, tmp_path, tmp_path / "campaign")
+    np.savetxt(tmp_path / "description" / "x.csv", np.eye(6) * 0.01, delimiter=",")
+    folder = import_recordings(plan, tmp_path, tmp_path / "campaign")
+    assert load_campaign(folder).rig.transducer.cross_coupling.value[2, 2] == 0.01
+
+    rig.rename(tmp_path / "rig.toml")
+    for name, said in {"parameters/rig.toml": "does not exist", "../rig.toml": "outside the campaign"}.items():
+        campaign.write_text(CAMPAIGN.replace("parameters/rig.toml", name))
+        with pytest.raises(ConfigError, match=said):
+            import_recordings(plan, tmp_path, tmp_path / "other")
+    assert not (tmp_path / "other").exists()

@@ -1,0 +1,73 @@
+"""What is installed holds everything that the package reads: templates, presets, assets."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+import tarfile
+import zipfile
+from pathlib import Path
+
+import pytest
+
+pytestmark = pytest.mark.slow
+
+ROOT = Path(__file__).parents[1]
+BUILD = "import sys; from setuptools import build_meta as b; print(getattr(b, sys.argv[1])(sys.argv[2]))"
+
+
+def build(tree: Path, kind: str, target: Path) -> Path:
+    """Build a wheel or a source distribution as an installer does."""
+    target.mkdir(exist_ok=True)
+    done = subprocess.run(
+        [sys.executable, "-c", BUILD, f"build_{kind}", str(target)],
+        cwd=tree,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return target / done.stdout.splitlines()[-1]
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """A copy of the sources, and the wheel built from nothing but the source distribution of that."""
+    place = tmp_path_factory.mktemp("packaging")
+    tree = place / "tree"
+    tree.mkdir()
+    for name in ("pyproject.toml", "README.md", "LICENSE"):
+        shutil.copy(ROOT / name, tree)
+    ignored = shutil.ignore_patterns("*.egg-info", "__pycache__")
+    shutil.copytree(ROOT / "pipeline", tree / "pipeline", ignore=ignored)
+    source = build(tree, "sdist", place / "sdist")
+    with tarfile.open(source) as archive:
+        archive.extraction_filter = getattr(tarfile, "data_filter", None)  # early releases of 3.11 have none
+        archive.extractall(place / "unpacked")
+    (unpacked,) = (place / "unpacked").iterdir()
+    return tree, build(unpacked, "wheel", place / "wheel")
+
+
+def test_the_wheel_holds_every_file_of_the_package(built: tuple[Path, Path]) -> None:
+    with zipfile.ZipFile(built[1]) as wheel:
+        packed = set(wheel.namelist())
+    package = built[0] / "pipeline" / "kbs_process"
+    files = {path.relative_to(package.parent).as_posix() for path in package.rglob("*") if path.is_file()}
+    assert files <= packed
+
+
+def test_the_installed_package_reads_campaigns_and_presets(built: tuple[Path, Path], tmp_path: Path) -> None:
+    with zipfile.ZipFile(built[1]) as wheel:
+        wheel.extractall(tmp_path)
+    code = f"""
+import sys; sys.path.insert(0, {str(tmp_path)!r})
+from pathlib import Path
+import kbs_process
+from kbs_process.campaign.load import load_campaign
+from kbs_process.studies.convert.mapping import find_mapping, load_mapping
+load_mapping(find_mapping("emps"))
+print(load_campaign(Path({str(ROOT / "campaigns" / "EL089")!r}), checksums=False).name, kbs_process.__file__)
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.stdout.split() == ["EL089", str(tmp_path / "kbs_process" / "__init__.py")], done.stderr
