@@ -65,7 +65,7 @@ def test_cogging_is_named_by_its_orders_and_predicts_other_runs(tmp_path: Path) 
     before, after = left(outcome)
     print(f"\nODrive: {[find.identity.law for find in outcome.finds]}, orders {orders}")
     print(f"  below {BAND_HZ:g} Hz: {np.round(before, 3)} -> {np.round(after, 3)} A; known {ODRIVE[12]}")
-    assert (first.identity.port, first.identity.axis) == ("motor torque", "motor")
+    assert (first.identity.place.port, first.identity.place.site) == ("motor torque", "motor")
     assert first.identity.family == "motor order"
     assert 7.0 in orders  # pole pairs
     assert 12.0 in orders  # slots
@@ -79,7 +79,7 @@ def test_friction_is_named_and_predicts_a_run_with_pulses(tmp_path: Path) -> Non
     before, after = left(outcome)
     print(f"\nEMPS: {[find.identity.law for find in outcome.finds]}: {first.estimates}")
     print(f"  below {BAND_HZ:g} Hz: {np.round(before, 2)} -> {np.round(after, 2)} N; known {EMPS[3]}")
-    assert (first.identity.port, first.identity.axis) == ("joint torque", "axis")
+    assert (first.identity.place.port, first.identity.place.site) == ("joint torque", "axis")
     assert first.identity.family == "friction"
     assert first.estimates[0].value == pytest.approx(20.3935, abs=0.5)  # N, as published
     assert before.min() > 0.9 * EMPS[0]

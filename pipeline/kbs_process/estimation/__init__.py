@@ -1,1 +1,4 @@
-"""Estimation: parameters from data and prior knowledge, with their covariance and named checks."""
+"""Numerics of estimation, which know no rig: least squares with priors and bounds, whitening, intervals, tails.
+
+Begin with `fit.py`: parameters with priors, a fit and its checks.
+"""

@@ -1,1 +1,6 @@
-"""Identification of a rig's numbers from its recordings: search, objective, uncertainty."""
+"""Identification of the motor-gears' numbers from recordings.
+
+Begin with `estimate.py`, which tells the story: starts (`screening.py`), searches from them (`search.py`), refinement
+and intervals. `unknowns.py` says which numbers are free and what is known of them, `output_error.py` what is made
+small.
+"""

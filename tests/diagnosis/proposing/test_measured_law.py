@@ -13,6 +13,7 @@ from diagnosis import bench
 from diagnosis.selection.test_rounds import standing
 from kbs_process.campaign.load import load_campaign
 from kbs_process.campaign.writing.corrected_model import write_model
+from kbs_process.diagnosis.acceptance import verdict
 from kbs_process.diagnosis.acceptance.plausible import pushes
 from kbs_process.diagnosis.acceptance.verdict import gated
 from kbs_process.diagnosis.experiments.hypothesis import Hypothesis, predict
@@ -23,7 +24,6 @@ from kbs_process.diagnosis.proposing.measured import extra, inserted
 from kbs_process.diagnosis.screening.gls import Score, Sums, score
 from kbs_process.diagnosis.screening.scene import Scene
 from kbs_process.diagnosis.screening.screen import Bench, Found
-from kbs_process.diagnosis.selection import leaders
 from kbs_process.plant.effect import Port
 from kbs_process.plant.laws.position.measured_law import COEFFICIENTS, MEASURED, Measured, torque, torque_over_rate
 
@@ -200,5 +200,5 @@ def test_a_curve_is_none_that_recordings_held_out_have_nothing_to_show_of(
     assert ("recordings that were held out leave nothing that would show a curve" in reasons) != excess
     assert any("of the held-out excess is no law" in reason for reason in reasons) == excess
     # All that it changes may be right.
-    monkeypatch.setattr(leaders, "foretold", lambda *_: True)
+    monkeypatch.setattr(verdict, "foretold", lambda *_: True)
     assert not any("nothing that would show a curve" in reason for reason in judge().reasons)

@@ -80,7 +80,7 @@ def test_a_law_keeps_its_name_beside_a_curve_that_does_a_little_more(
         return Tried(by_family[family], told, passed, view.screening, Own((), ()))
 
     law, curve = tried(RIGHT, known), tried(CURVE, less)
-    assert identity(law.found.suspect).port == identity(curve.found.suspect).port
+    assert identity(law.found.suspect).place.port == identity(curve.found.suspect).place.port
     assert [one.found.suspect.family for one in named_first([curve, law])] == names[::-1]
     # Where the curve alone passed, laws whose place it took are tried, too, but for those that were.
     assert [one.suspect.family for one in named_there([curve], [], view)] == [RIGHT, KIN]

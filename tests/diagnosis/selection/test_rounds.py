@@ -113,7 +113,7 @@ def test_a_cable_is_found_refitted_in_the_plant_and_accepted(made: Experiment, c
     best = found.candidates[0]
     assert best.suspect.family == ("ground_cable", "el")
     assert best.log_evidence > np.log(99.0) + max(0.0, found.candidates[1].log_evidence)
-    assert (identity(best.suspect).port, identity(best.suspect).family) == ("external wrench", "cable")
+    assert (identity(best.suspect).place.port, identity(best.suspect).family) == ("external wrench", "cable")
     begin = len(cable.known.value)
     after = with_extra(cable, extra_of(best, cable, tried, scene), bench.serial(made))
     spring, sigma = after.known.value[begin], after.known.sigma[begin]  # wide: a CoG does nearly the same
@@ -209,7 +209,7 @@ def test_a_law_of_the_readings_needs_no_plant_and_its_rival_is_told_apart(made: 
     suspects = [Catalogued(one, scene) for one in (law, candidate("channel_lag", "Ty"), candidate("harness", "el"))]
     found = screen(tried, suspects)
     assert found.candidates[0].suspect.family == ("channel_lag", "Ty")
-    assert identity(found.candidates[0].suspect).channels == ("Ty",)
+    assert identity(found.candidates[0].suspect).place.channels == ("Ty",)
     by_family: dict[tuple[str, str], Found] = {one.suspect.family: one for one in found.candidates}
     right, wrong = (
         with_extra(here, extra_of(by_family[family], here, tried, scene), bench.serial(made))
