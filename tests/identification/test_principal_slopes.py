@@ -37,9 +37,8 @@ def length_of_sum(J: np.ndarray) -> float:
 
 
 def test_jumps_make_no_information_of_the_sum() -> None:
-    toy = cast(
-        Experiment, SimpleNamespace(free=("a", "b"), recordings=("only",), rig=SimpleNamespace(joints=()), effects=())
-    )
+    free = tuple(SimpleNamespace(name=name) for name in ("a", "b"))
+    toy = cast(Experiment, SimpleNamespace(free=free, recordings=("only",), rig=SimpleNamespace(joints=()), effects=()))
     noise = cast(Spectra, ())
     slopes = Objective(toy, [noise], evaluate, np.array([0.05, 0.03]), 2, central=True)
     theta, scale = np.array([0.3, 0.2]), np.ones(2)

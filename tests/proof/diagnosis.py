@@ -7,10 +7,9 @@ from collections.abc import Iterable
 
 import msgspec
 
-from kbs_process.diagnosis.facts import Place
 from kbs_process.errors import OutputError
 from kbs_process.results.records import decode
-from kbs_process.studies.diagnose.results import DiagnosisResults, Find, Fitted, Rival
+from kbs_process.studies.diagnose.results import DiagnosisResults, Find, Fitted, Place, Rival
 from proof.answer import Answer, Candidate, Claim, Estimate, HeldOut, Moved, Suspect
 from proof.words import OURS
 

@@ -11,7 +11,13 @@ ALLOWED = {
     "diagnosis.py": {"kbs_process.errors", "kbs_process.results", "kbs_process.studies"},  # reads results.json
     "page.py": {"kbs_process", "kbs_process.report", "kbs_process.results"},  # looks like all reports
     "isolate.py": {"kbs_process.plant"},  # where compiled plants are kept
-    "prepare.py": {"kbs_process.campaign", "kbs_process.diagnosis", "kbs_process.signals"},
+    "prepare.py": {  # what comes before any detection
+        "kbs_process.campaign",
+        "kbs_process.diagnosis",
+        "kbs_process.progress",
+        "kbs_process.signals",
+        "kbs_process.studies",
+    },
 }
 
 

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from typing import Literal
 
-from kbs_process.diagnosis.facts import Answer, Moved, Place, Planned
+from kbs_process.diagnosis.facts import Answer, Moved, Planned
+from kbs_process.diagnosis.facts import Place as Place
 from kbs_process.results.records import Check, Conclusion, Notice, Provenance, Record, ResultsFile
 
 
