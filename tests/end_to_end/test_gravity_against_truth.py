@@ -56,7 +56,7 @@ def _fitted(campaign: Processed) -> Fitted:
 
 
 def test_stated_sigmas_cover_the_truth(fitted: dict[str, Fitted]) -> None:
-    """On many campaigns, drawn for nothing else: `python -m stages.gravity.coverage`."""
+    """On many campaigns, drawn for nothing else: `python -m stages.gravity.drawn_rigs`."""
     z = np.concatenate([one.z for one in fitted.values()])
     gain = np.concatenate([one.prior_sigma / one.sigma for one in fitted.values()])
     informed = z[gain > INFORMED]

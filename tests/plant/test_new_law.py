@@ -80,7 +80,7 @@ def test_a_new_law_is_one_file(tmp_path: Path) -> None:
     package = Path(kbs_process.__file__).parent
     copy = copytree(package, tmp_path / "kbs_process", ignore=ignore_patterns("__pycache__"))
     (copy / "plant" / "laws" / "friction" / "fan.py").write_text(LAW)
-    paths = os.pathsep.join([str(tmp_path), str(Path(__file__).parent)])
+    paths = os.pathsep.join([str(tmp_path), str(Path(__file__).parents[1])])
     run = subprocess.run(
         [sys.executable, "-c", USE],
         env=os.environ | {"PYTHONPATH": paths, "KBS_CACHE": str(tmp_path / "cache")},

@@ -58,6 +58,8 @@ PULL = Effect(
     pulling,
     (amplitude("pull", "N"), amplitude("spring", "N/m"), amplitude("drag", "N s/m")),
 )
+
+pytestmark = pytest.mark.slow  # plants are compiled
 SHAKE = Effect("shake", Port.BASE_ACCELERATION, shaking, (amplitude("shake", "m/s^2"),))
 POINT = np.array([0.1, -0.05, 0.2])
 LOADS = (INSIDE, GROUND, BUNGEE)

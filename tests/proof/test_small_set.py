@@ -23,7 +23,7 @@ def test_the_set_is_whole() -> None:
     assert len(TRIALS) == 2
 
 
-@pytest.mark.slow
+@pytest.mark.validation  # eight minutes on one core
 @pytest.mark.parametrize("name", TRIALS[1:])
 def test_what_is_concealed_is_told(name: str) -> None:
     verdict_is_right(name)

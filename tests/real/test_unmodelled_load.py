@@ -29,7 +29,7 @@ def test_recordings_with_a_bungee_are_named_with_channels_and_a_remedy(tmp_path)
     for notice in told:
         assert "Tx" in notice.what
         assert "Ty" in notice.what
-        assert "the verdict is about that load" in notice.what
+        assert "The verdict is about that load" in notice.what
         assert "bungee" in notice.remedy
 
 

@@ -75,6 +75,7 @@ class TestSuspects:
                 owner = [e for e in CATALOGUE if replace(entry, role="shape") in e.parameters]
                 assert [e.name for e in owner][:1] in (["synchronous_motor"], ["flexspline"])
 
+    @pytest.mark.slow
     def test_compiled_along_signals_it_is_the_equation(self, effect: Effect) -> None:
         """One interval in one part: the equation at its middle, rates the slopes, states after half their step."""
         dt, values = 1e-3, around(effect)

@@ -1,6 +1,6 @@
 """Stated sigmas of fitted parameters and of the subtracted wrench, on campaigns drawn by the independent engine.
 
-`python -m stages.gravity.coverage` does the same with drives and with as many campaigns as asked for.
+`python -m stages.gravity.drawn_rigs` does the same with drives and with as many campaigns as asked for.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from kbs_process.estimation.flicker import fit_flicker, flicker_scores
-from stages.gravity.coverage import INFORMED, lines, make, score
+from stages.gravity.drawn_rigs import INFORMED, lines, make, score
 
 SEEDS = range(8000, 8003)  # ACQ600's, AESTPP00's and ELSTPP00's trajectories
 

@@ -1,6 +1,6 @@
 """Do the gravity fit's sigmas hold the truth as often as they say? Run from tests/:
 
-    python -m gravity.coverage --first 7000 --count 12 [--still]
+    python -m stages.gravity.drawn_rigs --first 7000 --count 12 [--still]
 
 Each seed draws hardware from the priors of an archived campaign, in turn EL089, AESING00, ACQ600, AESTPP00, ELSTPP00
 and AZPS_ATA (so seed 7000 is ELSTPP00), and records it three times by the independent engine: calibration, a run that
@@ -132,7 +132,7 @@ def _line(name: str, z: Array) -> str:
 
 def main() -> None:
     """Print the figures."""
-    parser = argparse.ArgumentParser(prog="python -m gravity.coverage", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m stages.gravity.drawn_rigs", description=__doc__)
     parser.add_argument("--first", type=int, required=True)
     parser.add_argument("--count", type=int, default=12)
     parser.add_argument("--still", action="store_true")
