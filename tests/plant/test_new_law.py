@@ -60,8 +60,8 @@ rig = one_axis()
 t = np.linspace(0.0, 1.0, 11)
 turning = Schedule(t, 0.1 * t[:, None] ** 2, 0.2 * t[:, None])
 settings = {"rate_Hz": 50.0, "angle_rate_Hz": 50.0, "duration_s": 1.0}
-angles = [
-    streams(attach(rig, law, {"fan": size}), (*NOMINAL, "fan"), turning, **settings)["angle"][:, 0].tolist()
+wrenches = [
+    streams(attach(rig, law, {"fan": size}), (*NOMINAL, "fan"), turning, **settings)["wrench"].tolist()
     for size in (0.0, 5e-4)
 ]
 suspects = candidates(rig, NOMINAL, Ranges({}), tap_columns(rig), ("tip",))
@@ -69,7 +69,7 @@ print(json.dumps({
     "package": kbs_process.__file__,
     "order": [effect.name for effect in CATALOGUE],
     "page": catalogue(),
-    "angles": angles,
+    "wrenches": wrenches,
     "suspects": [(one.name, one.site) for one in suspects if one.effect is law],
 }))
 """
@@ -93,6 +93,7 @@ def test_a_new_law_is_one_file(tmp_path: Path) -> None:
     assert told["order"][-1] == "fan"  # no order is declared: it comes after all that declare one
     assert "#### `fan`\n\nAt: motor torque; family: viscous." in told["page"]
     assert "| `fan` | N m s^2/rad^2 | drag of the fan | N(0, 0.001) | 0 to 1 | amplitude |" in told["page"]
-    without, with_fan = told["angles"]
-    assert without != with_fan
+    without, with_fan = told["wrenches"]
+    changes = [abs(a - b) for one, other in zip(without, with_fan, strict=True) for a, b in zip(one, other, strict=True)]
+    assert 1e-6 < max(changes) < 1.0  # N, N m
     assert told["suspects"] == [["fan", "tip"]]
