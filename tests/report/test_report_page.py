@@ -20,6 +20,8 @@ from kbs_process.results.records import encode
 from kbs_process.studies.documents import render as build
 from report import sample
 
+pytestmark = pytest.mark.slow  # every figure of a page is drawn
+
 HOSTILE = '<script>alert("x")</script>&$\\frac{1}$"onerror="alert(1)'
 
 
