@@ -456,3 +456,16 @@ def test_the_list_of_results_is_one_that_others_can_check(tmp_path: Path) -> Non
     write(target, "new")
     told = subprocess.check_output(["sha256sum", "-c", "--strict", store.LIST], cwd=target, text=True)
     assert told == "results.json: OK\ntables/a.parquet: OK\n"
+
+
+def test_results_of_before_such_lists_are_revised_but_not_replaced(tmp_path: Path) -> None:
+    target = tmp_path / "A"
+    target.mkdir()
+    for name in (MARKER, "index.html", "notes.txt"):
+        (target / name).write_text("old")
+    with revising(target, without=("index.html",)) as folder:
+        (folder / "index.html").write_text("new page")
+    assert content(target) == {MARKER: "old", "index.html": "new page", "notes.txt": "old"}
+    with pytest.raises(OutputError, match="stands where a result has to be"):
+        write(target, "new")
+    assert content(target) == {MARKER: "old", "index.html": "new page", "notes.txt": "old"}

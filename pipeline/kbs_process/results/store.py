@@ -58,7 +58,7 @@ def writing(target: Path) -> Iterator[Path]:
     Raises OutputError if the place cannot be written, is full, holds something else, or is being written; or if a file
     was changed since it was written here.
     """
-    with _replacing(target, revised=False) as private:
+    with _replacing(target) as private:
         yield private
 
 
@@ -70,14 +70,17 @@ def revising(target: Path, *, without: Collection[str] = ()) -> Iterator[Path]:
     """
     if not (target / RESULTS).is_file():
         raise OutputError(f"holds no results (no {RESULTS})", where=str(target), remedy="process the campaign first")
-    with _replacing(target, revised=True) as private:
+    with _replacing(target, revised=without) as private:
         link_tree(target, private, without={*without, LIST})
         yield private
 
 
 @contextmanager
-def _replacing(target: Path, *, revised: bool) -> Iterator[Path]:
-    """Yield the private folder of `target`; a folder that is `revised` may be one of before such lists."""
+def _replacing(target: Path, *, revised: Collection[str] | None = None) -> Iterator[Path]:
+    """Yield the private folder of `target`, which, where it is `revised`, may be of before such lists.
+
+    Then those entries of it are taken for this program's.
+    """
     with _explaining(target):
         target = Path(os.path.realpath(target))
         with _locked(target):
@@ -201,11 +204,11 @@ def _is_ours(folder: Path) -> bool:
     return folder.is_dir() and not folder.is_symlink() and (folder / LIST).is_file()
 
 
-def _files_of_the_user(target: Path, *, revised: bool) -> list[str]:
+def _files_of_the_user(target: Path, *, revised: Collection[str] | None) -> list[str]:
     """Return the files in the folder that this program did not write; refuse one that it cannot replace."""
     if not target.exists():
         return []
-    if not target.is_dir() or (any(target.iterdir()) and not _is_ours(target) and not revised):
+    if not target.is_dir() or (any(target.iterdir()) and not _is_ours(target) and revised is None):
         raise OutputError(
             f"is there already, and kbs-process did not make it (no {LIST})",
             where=str(target),
@@ -215,7 +218,8 @@ def _files_of_the_user(target: Path, *, revised: bool) -> list[str]:
     users = []
     for name in _files(target):
         if name not in written:
-            users.append(name)
+            if written or name.partition("/")[0] not in (revised or ()):
+                users.append(name)
         elif _digest(target / name) != written[name]:
             raise OutputError(
                 "was changed since kbs-process wrote it, and would be lost",
