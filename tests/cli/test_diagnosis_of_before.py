@@ -13,6 +13,7 @@ from kbs_process import cli
 from kbs_process.campaign.load import load_campaign
 from kbs_process.results import provenance
 from kbs_process.results.records import encode
+from kbs_process.results.store import writing
 from kbs_process.studies.correlate.earlier_diagnosis import earlier_diagnosis
 from studies.diagnose.test_report_diagnosis import results
 
