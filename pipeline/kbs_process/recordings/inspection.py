@@ -14,7 +14,7 @@ from kbs_process.errors import RecordingError
 from kbs_process.recordings.mcap.messages.fields import STAMPS
 from kbs_process.recordings.mcap.source import TopicSummary, open_recording
 from kbs_process.recordings.mcap.streams import Sample, Stream
-from kbs_process.signals.records import Array, Block, Loss, Stamps
+from kbs_process.signals.records import Block, Loss, Stamps
 
 LONGEST_ARRAY = 64  # elements of a sequence whose ranges are given
 GAP = 1.5  # of the median interval
@@ -66,8 +66,7 @@ class Inspection:
 class Intervals:
     """Intervals between successive stamps: a histogram with logarithmic bins, exact counts of what is amiss."""
 
-    counts: Stamps = field(default_factory=lambda: np.zeros(64 * BINS_PER_OCTAVE, dtype=np.int64))
-    sums: Array = field(default_factory=lambda: np.zeros(64 * BINS_PER_OCTAVE))  # ns
+    bins: dict[int, tuple[int, float]] = field(default_factory=dict)  # -> how many, and their sum, ns
     last: int | None = None
     repeats: int = 0
     out_of_order: int = 0
@@ -83,17 +82,23 @@ class Intervals:
         steps = steps[steps > 0]
         if len(steps):
             self.longest = max(self.longest, int(steps.max()))
-            bins = (np.log2(steps) * BINS_PER_OCTAVE).astype(np.int64)
-            self.counts += np.bincount(bins, minlength=len(self.counts))
-            self.sums += np.bincount(bins, weights=steps.astype(np.float64), minlength=len(self.sums))
+            bins, places, counts = np.unique(
+                (np.log2(steps) * BINS_PER_OCTAVE).astype(np.int64), return_inverse=True, return_counts=True
+            )
+            sums = np.bincount(places, weights=steps.astype(np.float64))
+            for place, count, total in zip(bins.tolist(), counts.tolist(), sums.tolist(), strict=True):
+                before, sum_before = self.bins.get(place, (0, 0.0))
+                self.bins[place] = before + count, sum_before + total
 
     def median(self) -> float | None:
         """Return the median interval, ns: the mean of the bin that it lies in."""
-        total = int(self.counts.sum())
-        if not total:
-            return None
-        middle = int(np.searchsorted(np.cumsum(self.counts), (total + 1) // 2))
-        return float(self.sums[middle] / self.counts[middle])
+        left = (sum(count for count, _ in self.bins.values()) + 1) // 2
+        for place in sorted(self.bins):
+            count, total = self.bins[place]
+            left -= count
+            if left <= 0:
+                return total / count
+        return None
 
     def usual(self) -> float | None:
         """Return the mean of intervals of half to one and a half medians, ns: no gaps, and jitter is averaged."""
@@ -101,15 +106,16 @@ class Intervals:
         if median is None:
             return None
         low, high = (int(np.log2(share * median) * BINS_PER_OCTAVE) for share in (2.0 - GAP, GAP))
-        inside = slice(max(low, 0), high + 1)
-        return float(self.sums[inside].sum() / self.counts[inside].sum())
+        inside = [entry for place, entry in self.bins.items() if low <= place <= high]
+        return sum(total for _, total in inside) / sum(count for count, _ in inside)
 
     def gaps(self) -> int:
         """Return how many intervals exceed `GAP` medians."""
         median = self.median()
         if median is None:
             return 0
-        return int(self.counts[int(np.log2(GAP * median) * BINS_PER_OCTAVE) + 1 :].sum())
+        limit = int(np.log2(GAP * median) * BINS_PER_OCTAVE)
+        return sum(count for place, (count, _) in self.bins.items() if place > limit)
 
 
 class _Gathered:
@@ -181,7 +187,7 @@ def _plan(sample: Sample | str | None) -> _Plan:
         if entry.count is None:
             fields.append(entry.path)
             continue
-        elements = sample.type.elements(sample.payload, entry.path)
+        elements = sample.elements(entry.path)
         named = entry.named and len(elements.names) >= elements.count
         keys = elements.names if named else map(str, range(elements.count))
         if elements.count <= LONGEST_ARRAY:
