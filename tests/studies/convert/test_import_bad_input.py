@@ -74,7 +74,8 @@ def test_faults_of_the_mapping(tmp_path: Path, old: str, new: str, said: str) ->
         ("t:Fx:Fy:Fz:angle\n0:1:2:3:4\n", "set the delimiter"),
         ("", "the file is empty"),
         ("t,Fx,Fy,Fz,angle\n", "no sample of 'wrench'"),
-        ("t,Fx,Fy,Fz,angle\n" + "0,1,2,3,4\n1,2,3,4,5,6\n", "Expected 5 fields in line 3, saw 6"),
+        ("t,Fx,Fy,Fz\n" + "0,1,2,3,4\n1,2,3,4,5\n", "line of names has 4 cells, and its rows have 5"),
+        ("t,Fx,Fx,Fx (2),Fy,Fz,angle\n0,1,9,5,2,3,0\n", "known: Fx .1., Fx .2., Fx .3."),
         ("t,Fx,Fy,Fz,angle\n-1,1,2,3,4\n", "give the date of time zero"),
         ("t,Fx,Fy,Fz,angle\n\xff", "not text in utf-8"),
     ],
@@ -106,6 +107,32 @@ def test_doubtful_cells_are_kept_and_counted(tmp_path: Path) -> None:
         assert any(finding in notice for notice in notices), finding
     stated = tomllib.loads((folder / "campaign.toml").read_text())["source"]["file"][0]
     assert [f"{stated['name']}, {finding}" for finding in stated["findings"]] == notices
+
+
+ROW = "{},1,2,3,0\n"
+AGAIN = [*range(40), *range(40)]
+ZEROS = [*range(1000, 1040), *[0] * 40]
+
+
+@pytest.mark.parametrize(
+    ("times", "said"),
+    [(AGAIN, "starts again at row 41"), (ZEROS, "at row 41"), ([*range(40), *range(10**9, 10**9 + 40)], "gap of 1e")],
+)
+def test_times_of_no_one_recording_are_refused(tmp_path: Path, times: list[int], said: str) -> None:
+    (tmp_path / "run.csv").write_text("t,Fx,Fy,Fz,angle\n" + "".join(ROW.format(t) for t in times))
+    with pytest.raises(RecordingError, match=said):
+        _import(tmp_path, "run.csv")
+
+
+@pytest.mark.parametrize("place", [0, 17, 39])
+def test_a_lone_time_far_from_all_others_is_left_out(tmp_path: Path, place: int) -> None:
+    times = [1_780_000_000 + i for i in range(40)]
+    times[place] = 0
+    (tmp_path / "run.csv").write_text("t,Fx,Fy,Fz,angle\n" + "".join(ROW.format(t) for t in times))
+    notices: list[str] = []
+    stamp, _ = read_back(_import(tmp_path, "run.csv", notices=notices), "turn_1")["wrench"]
+    assert len(stamp) == 39
+    assert f"1 rows have a time far from all others, left out (the first is row {place + 1})" in notices[0]
 
 
 def test_a_folder_with_something_in_it_is_left_alone(tmp_path: Path) -> None:

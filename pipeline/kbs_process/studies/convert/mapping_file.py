@@ -35,8 +35,12 @@ class TextTable(Table):
     header: bool | None = Field(None, description="is there a line with the names of the columns?")
     units_row: bool | None = Field(None, description="is there a line with their units below it?")
     skip_rows: Annotated[int, Field(ge=0, le=1_000_000)] | None = Field(None, description="lines above all that")
+    rows: Annotated[int, Field(ge=1)] | None = Field(None, description="rows that are read, of more")
     decimal: Literal[".", ","] | None = None
-    comment: OneCharacter | None = Field(None, description="what begins a comment")
+    thousands: Literal[".", ",", " ", "'"] | None = Field(None, description="what parts thousands")
+    comment: Annotated[str, Field(min_length=1, max_length=20)] | None = Field(
+        None, description="what begins a comment"
+    )
     encoding: Words | None = None
 
 

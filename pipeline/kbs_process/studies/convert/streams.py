@@ -17,6 +17,8 @@ from kbs_process.studies.convert.mapping import Channel, Mapping, StreamMap
 from kbs_process.studies.convert.mapping_file import Part, Time, Turn
 
 _NO_STAMPS = np.empty(0, dtype=np.int64)
+_FEWEST = 16  # rows that show what is usual
+_DAY_NS, _SECOND_NS = 86_400_000_000_000, 1_000_000_000
 _TIMELESS = "rows have no time, left out"
 Piece = dict[str, Block]  # by stream key; the streams of one pass over the file
 
@@ -70,6 +72,8 @@ def read_part(table: Table, mapping: Mapping, part: Part, findings: Findings) ->
             if len(inside):
                 empty.discard(key)
                 yield streams[key], inside
+    for what, count in table.odd.items():
+        findings.counts[what] = count
     for key in streams:
         if key in empty:
             raise RecordingError(
@@ -111,6 +115,54 @@ def _passes(streams: Sequence[StreamMap]) -> list[list[StreamMap]]:
     return passes
 
 
+@dataclass(slots=True)
+class _Clock:
+    """The times of a pass: lone ones far from all others are left out, and what is no one recording is refused."""
+
+    where: str
+    findings: Findings
+    rows: int = 0
+    first: int | None = None
+    latest: int = 0
+
+    def check(self, stamp: Stamps, known: Mask) -> Mask:
+        """Return which stamps of the next rows are of the recording."""
+        places = np.flatnonzero(known)
+        inside = stamp[places]
+        if len(inside) >= _FEWEST:
+            early, middle, late = np.quantile(inside, (0.1, 0.5, 0.9))
+            far = np.abs(inside - middle) > _DAY_NS + 1000.0 * (late - early)
+            if 0 < far.sum() <= max(1, len(inside) // 1000):
+                row = self.rows + int(places[far][0]) + 1
+                what = f"rows have a time far from all others, left out (the first is row {row})"
+                self.findings.counts[what] += int(far.sum())
+                known = known.copy()
+                known[places[far]] = False
+                places, inside = places[~far], inside[~far]
+        if len(inside):
+            self._refuse(places, inside)
+        self.rows += len(stamp)
+        return known
+
+    def _refuse(self, places: Stamps, stamp: Stamps) -> None:
+        self.first = int(stamp[0]) if self.first is None else self.first
+        reached = np.maximum.accumulate(np.concatenate([[max(self.latest, self.first)], stamp]))
+        span = reached[:-1] - self.first
+        again = (reached[:-1] - stamp > 0.9 * span) & (span > _SECOND_NS) & (self.rows + places >= _FEWEST)
+        stays = np.append(again[1:], True) | np.append(again[2:], [True, True])[: len(again)]
+        remedy = "split the file, or, of a text file, take one part by skip_rows and rows in the mapping's [text]"
+        if (again & stays).any():
+            row = self.rows + int(places[again & stays][0]) + 1
+            what = f"its time starts again at row {row}: two recordings in one file, or rows that were never written"
+            raise RecordingError(what, where=self.where, remedy=remedy)
+        steps = np.diff(reached[0 if self.latest else 1 :])
+        gap = int(steps.max(initial=0))
+        if gap > _DAY_NS and gap > 10 * (int(reached[-1]) - self.first - gap):
+            what = f"it has a gap of {gap / 1e9:.6g} s, far longer than all that was recorded"
+            raise RecordingError(what, where=self.where, remedy=remedy)
+        self.latest = int(reached[-1])
+
+
 def _pieces(table: Table, mapping: Mapping, streams: Sequence[StreamMap], findings: Findings) -> Iterator[Piece]:
     time = streams[0].time
     channels = [channel for stream in streams for channel in stream.channels]
@@ -118,8 +170,9 @@ def _pieces(table: Table, mapping: Mapping, streams: Sequence[StreamMap], findin
     if time is None:
         clocks = [column.clock for column in columns]
         if not all(clocks):
+            why = "; ".join(one for one in table.left_out if ": time: " in one)
             raise RecordingError(
-                f"'{columns[clocks.index('')].name}' comes without a time of its own",
+                f"'{columns[clocks.index('')].name}' comes without a time of its own" + (f" ({why})" if why else ""),
                 where=str(table.path),
                 remedy="say in the mapping's [time] which column holds it, or give rate_Hz",
             )
@@ -127,13 +180,13 @@ def _pieces(table: Table, mapping: Mapping, streams: Sequence[StreamMap], findin
         clocks = [find_column(table, time.column).name] if time.column is not None else []
     wanted = list(dict.fromkeys([column.name for column in columns] + clocks))
     carry: dict[str, float] = {}
-    rows = 0
+    clock = _Clock(str(table.path), findings)
     for cells in table.chunks(wanted):
         named = dict(zip(wanted, cells, strict=True))
         _check_lengths(table, named)
-        stamp, known = _stamps(table, time, clocks, named, rows)
-        rows += len(stamp)
-        findings.counts[_TIMELESS] += int((~known).sum())
+        stamp, timed = _stamps(table, time, clocks, named, clock.rows)
+        findings.counts[_TIMELESS] += int((~timed).sum())
+        known = clock.check(stamp, timed)
         values = {
             channel.field: _si(named[column.name], channel, carry)
             for channel, column in zip(channels, columns, strict=True)
