@@ -56,7 +56,9 @@ class BandsTable(Table):
     """The frequency bands in which histories are compared."""
 
     high_pass_Hz: NotNegative = Field(description="lower edge of every band, Hz; 0 is none")
-    low_pass_Hz: SomeDistinct[Positive] = Field(description="upper edges, Hz: one band each")
+    low_pass_Hz: Annotated[SomeDistinct[Positive], Field(max_length=20)] = Field(
+        description="upper edges, Hz: one band each"
+    )
     working_rate_Hz: Positive = Field(description="sampling rate after decimation, Hz; all stages work at this rate")
 
 
