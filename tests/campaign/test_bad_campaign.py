@@ -124,6 +124,7 @@ FAULTS = {
     "gains of another rig": (DRIVES, "Kp = { value = [0.05, 0.05]", "Kp = { value = [0.05]", ["controller.Kp.value", "array of 2"]),
     "bands of one name": (CAMPAIGN, "[1.0, 2.0]", "[1.0, 1.0000001, 2.0]", ["bands.low_pass_Hz", "would be called lt1Hz"]),
     "rate far beyond the bands": (CAMPAIGN, "working_rate_Hz = 20.0", "working_rate_Hz = 1e5", ["more than 100 times", "2 Hz"]),
+    "high-pass beyond computing": (CAMPAIGN, "high_pass_Hz = 0.01", "high_pass_Hz = 1e-9", ["bands.high_pass_Hz", "cannot be cut"]),
     "mass beyond all": (RIG, "value = 8.0", "value = 1e308", ["body.base.mass.value", "1e+308 in SI", "less than 1e+12"]),
     "no stiffness": (RIG, "[4000, 4000, 6000]", "[1e-308, 4000, 6000]", ["transducer.stiffness.value", "1e-308 in SI", "1e-15"]),
     "endless bias": (RIG, "bias = { value = [0,", "bias = { value = [1e12,", ["transducer.bias.value", "so large"]),
