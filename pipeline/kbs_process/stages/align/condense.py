@@ -83,7 +83,7 @@ def condense(
     """
     load = next((key for key in LOADS if key in channels), None)
     streams: dict[str, Uniform | Collected] = {
-        key: _stream(name, key, columns, settings, (units or {}).get(key), is_load=key == load)
+        key: _stream(name, file or name, key, columns, settings, (units or {}).get(key), is_load=key == load)
         for key, columns in channels.items()
     }
     for key, block in blocks:
@@ -110,6 +110,7 @@ def condense(
     reference = next(iter(kept))
     present = {key: s.line for key, s in streams.items() if s.line.samples}
     clocks = align({key: line.clock() for key, line in present.items()}, reference)
+    _check_overlap(present, clocks, reference, kept, file or name)
 
     dt = 1.0 / settings.working_rate_Hz
     count = int(np.floor(sampled[reference].line.span / dt * (1.0 + 1e-12))) + 1
@@ -143,6 +144,20 @@ def condense(
     )
 
 
+def _check_overlap(
+    lines: dict[str, Timeline], clocks: dict[str, Clock], reference: str, kept: Iterable[str], file: str
+) -> None:
+    """Raise RecordingError where a stream that is sampled lies all before or all after the reference."""
+    for key in kept:
+        start = clocks[key].offset_s
+        if start > lines[reference].span or start + lines[key].span < 0.0:
+            raise RecordingError(
+                f"its first sample comes {start:.6g} s after that of {reference}: the two have no time in common",
+                where=_place(file, key),
+                remedy="look for stamps of another time zone or unit, or an unset clock, with `kbs-process inspect`",
+            )
+
+
 def _losses(lines: dict[str, Timeline], clocks: dict[str, Clock]) -> list[Loss]:
     return [loss for key, line in lines.items() for loss in line.losses(clocks[key].offset_s, 1.0 + clocks[key].skew)]
 
@@ -153,6 +168,7 @@ def _missing(line: Timeline) -> Loss:
 
 def _stream(
     name: str,
+    file: str,
     key: str,
     columns: tuple[str, ...],
     settings: CondenseSettings,
@@ -162,7 +178,7 @@ def _stream(
 ) -> Uniform | Collected:
     where = f"{name}: {key}"
     if key in SLOW:
-        return Collected(where, columns)
+        return Collected(where, columns, _place(file, key))
     if key not in SAMPLED:
         raise KeyError(f"no stream is called {key!r}")
     if is_load:
@@ -172,6 +188,7 @@ def _stream(
             settings.working_rate_Hz,
             spectrum=(settings.spectrum_resolution_Hz, settings.spectrum_limit_Hz),
             stretches=settings.envelope_stretches,
+            file=_place(file, key),
         )
     angle = key == "angle"
     return Uniform(
@@ -180,6 +197,7 @@ def _stream(
         settings.working_rate_Hz,
         turning=[unit == "rad" for unit in units or ["rad"] * len(columns)] if key in TURNING else (),
         keep_below=settings.encoder_limit_Hz if angle else 0.0,
+        file=_place(file, key),
     )
 
 

@@ -7,15 +7,23 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from kbs_process.errors import RecordingError
 from kbs_process.signals.records import PUT_IN_ORDER, Array, Block, Loss, Mask, Stamps
+from kbs_process.stages.align.arrival import Arrival
 from kbs_process.stages.align.clocks import ClockData, LatencyFloor
 from kbs_process.stages.align.envelope import MinMax
 from kbs_process.stages.align.grid import AROUND, Grid, Regridder, counted, longest_bridged, nominal_grid
 from kbs_process.stages.align.ordering import Orderer, Reblock, finite_rows, judge
 from kbs_process.stages.align.resample import Kept, Reducer, design
 from kbs_process.stages.align.spectrum import Welch
+from kbs_process.stages.align.spikes import Oddity, Spikes
 
 GAPS_LISTED = 20  # one by one; the others in one line
+# Samples that may be made up for missing ones: so many, and so many for each that is there.
+MADE_UP, MADE_UP_EACH = 1 << 20, 10
+FAR_SLOW_NS = 3_600_000_000_000  # what is sent now and then may have one sample long before the others
+# What to do about a recording that is not one.
+ONE_PART = "use one part of it: start_s and end_s of its [[recording]] in campaign.toml, or those of the import"
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,8 +50,15 @@ class Timeline:
     missing_unlisted: int = 0
     non_finite: int = 0  # samples that are NaN or infinite in some channel: all of each is left out
     samples: int = 0
+    missing: int = 0
+    longest: float = 0.0  # s, of all gaps
+    file: str = ""  # as errors call it, with the stream
+    filled: bool = False  # whether gaps are filled with samples
+    spikes: Spikes | None = None
     _non_finite_in: dict[str, int] = field(default_factory=dict)  # by channel
     _reblock: Reblock = field(default_factory=Reblock)
+    _arrival: Arrival = field(default_factory=Arrival)
+    _ready: Reblock = field(default_factory=Reblock)
     _orderer: Orderer | None = None
     _floor: LatencyFloor | None = None
     _first: int = 0
@@ -52,26 +67,49 @@ class Timeline:
     _judged: int = 0  # steps between these that are
 
     def push(self, chunk: Block) -> list[Block]:
-        """Take a chunk in file order; return ordered blocks that nothing can precede any more."""
-        return [ready for block in self._reblock.push(chunk) for ready in self._order(block)]
+        """Take a chunk in file order; return ordered blocks that nothing can precede any more.
+
+        Raises RecordingError where time goes back for good, or where more is missing than is there.
+        """
+        return [ready for block in self._reblock.push(chunk) for ready in self._judge(block)]
 
     def flush(self) -> list[Block]:
-        """Return what was held back."""
-        ready = [ready for block in self._reblock.flush() for ready in self._order(block)]
+        """Return what was held back; raises RecordingError like `push`."""
+        ready = [ready for block in self._reblock.flush() for ready in self._judge(block)]
+        if (held := self._arrival.flush()) is not None:
+            ready += self._arrived(held)
+        ready += [ready for block in self._ready.flush() for ready in self._order(block)]
         last = self._orderer.flush() if self._orderer else None
         if last is not None:
             ready.append(self._timed(last))
         if self.grid is not None:
             self._find_gaps(self._near[:0], self.grid, held_back=0)
+            self._check_gaps(self.grid, at_end=True)
         return ready
 
-    def _order(self, block: Block) -> list[Block]:
+    def _judge(self, block: Block) -> list[Block]:
         if self._orderer is None:
             sense = judge(block)
             self.by_recorder = not sense.stamp and sense.log
             self._orderer = Orderer(sense)
         if self.by_recorder:
             block = Block(block.log, block.log, block.values)
+        return self._arrived(self._arrival.push(block))
+
+    def _arrived(self, arrived: Block) -> list[Block]:
+        if self._arrival.set_back is not None:
+            at, by = self._arrival.set_back
+            since = f" {(at - self._first) * 1e-9:.6g} s after the first sample" if self._floor else ""
+            raise RecordingError(
+                f"time goes back by {by * 1e-9:.6g} s{since}, and goes on from there: the clock was set back, or the "
+                "logger started again",
+                where=self.file or self.where,
+                remedy=ONE_PART,
+            )
+        return [ready for block in self._ready.push(arrived) for ready in self._order(block)]
+
+    def _order(self, block: Block) -> list[Block]:
+        assert self._orderer is not None
         released = self._orderer.push(block)
         return [] if released is None else [self._timed(released)]
 
@@ -84,6 +122,7 @@ class Timeline:
         self._floor.push(block.stamp, block.log)
         if self.grid is not None:
             self._find_gaps(block.stamp, self.grid, held_back=AROUND)
+            self._check_gaps(self.grid, at_end=False)
         self._last = int(block.stamp[-1])
         self.samples += len(block)
         return block
@@ -95,7 +134,9 @@ class Timeline:
         judged = max(len(count) - held_back, self._judged)
         for index in self._judged + np.flatnonzero(count[self._judged : judged] > 1.0):
             missing = int(count[index]) - 1
+            self.missing += missing
             start, end = (self.own_one(int(one)) for one in stamp[index : index + 2])
+            self.longest = max(self.longest, end - start)
             if end - start <= self.bridged:
                 self.missing_bridged += missing
             elif len(self.gaps) < GAPS_LISTED:
@@ -105,6 +146,31 @@ class Timeline:
                 self.missing_unlisted += missing
         kept = max(judged - AROUND, 0)
         self._near, self._judged = stamp[kept:].copy(), judged - kept
+
+    def _check_gaps(self, grid: Grid, *, at_end: bool) -> None:
+        """Raise RecordingError where more was made up than is worth it: work follows the samples, not their span."""
+        there = self.samples * grid.period_ns * 1e-9
+        too_many = self.missing > MADE_UP + MADE_UP_EACH * self.samples
+        if self.filled and (too_many or (at_end and self.longest > there)):
+            raise RecordingError(
+                f"a gap of {self.longest:.6g} s among samples that cover {there:.4g} s: this is not one recording",
+                where=self.file or self.where,
+                remedy=ONE_PART,
+            )
+
+    def check_steps(self) -> None:
+        """Raise RecordingError where a channel is elsewhere from one sample to the next, and stays there."""
+        lasting: list[Oddity] = self.spikes.lasting() if self.spikes else []
+        if lasting:
+            one = lasting[0]
+            name = self.channels[one.channel]
+            more = f", one of {len(lasting)} such steps" if len(lasting) > 1 else ""
+            raise RecordingError(
+                f"{name} steps by {one.by:.4g} from one sample to the next, {self.own_one(one.first):.6g} s after the "
+                f"first, and stays there{more}: a count was lost, or a zero was set",
+                where=self.file or self.where,
+                remedy=ONE_PART,
+            )
 
     def finite(self, block: Block) -> tuple[Stamps, Array]:
         """Return stamps and values of the samples that are numbers in every channel; count the others, by channel."""
@@ -165,12 +231,30 @@ class Timeline:
         if self.by_recorder:
             detail = "the sensor's stamps do not advance: the recorder's clock is used"
             found.append(Loss("clock", self.where, self.samples, detail=detail))
+        for kind, oddities, detail in (
+            ("spike", self.spikes.spikes if self.spikes else [], "interpolated"),
+            ("blow", self.spikes.blows if self.spikes else [], "several channels at once: kept"),
+        ):
+            for channel, name in enumerate(self.channels):
+                if own := [one for one in oddities if one.channel == channel]:
+                    start, end = (offset + rate * self.own_one(one) for one in (own[0].first, own[-1].last))
+                    by = max((one.by for one in own), key=abs)
+                    what = f"off by {'up to ' if len(own) > 1 else ''}{by:.4g}: {detail}"
+                    found.append(Loss(kind, f"{self.where}, {name}", len(own), start, end, what))
         if self._orderer is not None:
-            found += self._disorder(self._orderer)
+            found += self._disorder(self._orderer, offset, rate)
         return found
 
-    def _disorder(self, orderer: Orderer) -> list[Loss]:
+    def _disorder(self, orderer: Orderer, offset: float, rate: float) -> list[Loss]:
         found = []
+        arrival = self._arrival
+        if arrival.odd:
+            start, end = (self.own_one(one) for one in arrival.odd_span)
+            detail = "stamps that do not fit where they arrived: left out"
+            found.append(Loss("odd stamp", self.where, arrival.odd, offset + rate * start, offset + rate * end, detail))
+        if arrival.lone:
+            detail = f"{arrival.lone_by * 1e-9:.6g} s from all others: left out"
+            found.append(Loss("far stamp", self.where, arrival.lone, detail=detail))
         if orderer.repeats:
             found.append(Loss("repeat", self.where, orderer.repeats, detail="same stamp: the first is kept"))
         if orderer.late:
@@ -189,8 +273,8 @@ class Timeline:
 class Collected:
     """A slow stream, kept sample by sample."""
 
-    def __init__(self, where: str, channels: tuple[str, ...]) -> None:
-        self.line = Timeline(where, channels)
+    def __init__(self, where: str, channels: tuple[str, ...], file: str = "") -> None:
+        self.line = Timeline(where, channels, file=file, _arrival=Arrival(FAR_SLOW_NS))
         self._own: list[Array] = []
         self._values: list[Array] = []
 
@@ -224,17 +308,20 @@ class Uniform:
         spectrum: tuple[float, float] | None = None,
         stretches: int = 0,
         keep_below: float = 0.0,
+        file: str = "",
+        keep_spikes: bool = False,
     ) -> None:
         """`turning` channels are angles, which go on through full turns; `spectrum`: (resolution, limit), Hz; below a
         rate of `keep_below`, Hz, samples are kept as such.
         """
-        self.line = Timeline(where, channels, bridged=longest_bridged(working_rate / 2.0))
+        self.line = Timeline(where, channels, bridged=longest_bridged(working_rate / 2.0), file=file, filled=True)
         self.welch: Welch | None = None
         self.envelope = MinMax(len(channels), stretches) if stretches else None
         self._working_rate = working_rate
         self._spectrum = spectrum
         self._keep_below = keep_below
-        self._turning = np.array(turning, dtype=np.float64)
+        self._turning = np.array(turning or [False] * len(channels), dtype=np.float64)
+        self._keep_spikes = keep_spikes
         self._turns = np.zeros(len(channels)) if any(turning) else None
         self._before: Array | None = None
         self._regrid: Regridder | None = None
@@ -250,6 +337,9 @@ class Uniform:
         """Return the reduced stream, or None where it is too short for the filters."""
         for block in self.line.flush():
             self._take(block)
+        if self.line.spikes is not None and (last := self.line.spikes.flush()) is not None:
+            self._lay(*last)
+        self.line.check_steps()
         if self._regrid is None or self._reduce is None:
             return None
         for rows, invented in self._regrid.flush():
@@ -269,7 +359,15 @@ class Uniform:
             self._reduce = Reducer(design(grid.rate, self._working_rate))
             if self._spectrum:
                 self.welch = Welch(grid.rate, *self._spectrum, self.line.channels)
+            self.line.spikes = Spikes(self._turning, grid.period_ns * 1e-9, self._keep_spikes)
         stamp, values = self.line.finite(block)
+        if len(stamp) and self.line.spikes is not None:
+            self._lay(*self.line.spikes.push(stamp, values))
+
+    def _lay(self, stamp: Stamps, values: Array) -> None:
+        """Lay samples on the grid, and reduce them."""
+        grid = self.line.grid
+        assert grid is not None and self._regrid is not None
         if self._turns is not None and len(values):
             values = self._unwrapped(values, self._turns)
         if grid.rate <= self._keep_below:
