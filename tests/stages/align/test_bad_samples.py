@@ -185,3 +185,17 @@ def test_streams_without_common_time_are_refused() -> None:
     streams["angle"] = replace(angle, stamp=angle.stamp + HOUR, log=angle.log + HOUR)
     with pytest.raises(RecordingError, match="3600 s after that of wrench"):
         run_of(streams)
+
+
+@pytest.mark.parametrize("every", [1, 2, 3, 10])
+def test_two_sources_in_one_stream_are_refused(every: int) -> None:
+    streams = recording()
+    wrench = streams["wrench"]
+    other = rows(wrench, slice(None, None, every))
+    late = Block(other.stamp + 5_000_000, other.log + 5_000_000, np.zeros_like(other.values))
+    both = [np.concatenate(pair) for pair in ((wrench.stamp, late.stamp), (wrench.log, late.log))]
+    order = np.argsort(both[1])
+    values = np.concatenate((wrench.values, late.values))
+    streams["wrench"] = Block(both[0][order], both[1][order], values[order])
+    with pytest.raises(RecordingError, match="two sources are in one stream"):
+        run_of(streams)

@@ -60,6 +60,9 @@ class BandsTable(Table):
     working_rate_Hz: Positive = Field(description="sampling rate after decimation, Hz; all stages work at this rate")
 
 
+ChannelNumber = Annotated[int, Field(ge=0, le=65535)]  # in an MCAP file
+
+
 class TopicTable(Table):
     """A topic whose messages are laid out in some other way than plain ROS 2 messages."""
 
@@ -69,6 +72,9 @@ class TopicTable(Table):
         alias="fields",
         description='where in the message each channel is: "wrench.force.x", "position[az]"; default: plain ROS 2 '
         "messages whose names are the joints'",
+    )
+    channel: ChannelNumber | None = Field(
+        None, description="number of the MCAP channel that is read, where several publishers bring the topic"
     )
 
 

@@ -50,6 +50,7 @@ class Source:
     def __init__(self, path: Path) -> None:
         self.path = path
         self.start_ns: int | None = None  # log time of the first message
+        self._readings: list[Reading] = []
         self._losses: tuple[Loss, ...] = ()
         self._topics: tuple[TopicSummary, ...] | None = None
         self._summary: mcap.Summary | None = None
@@ -94,6 +95,11 @@ class Source:
         """What the recording has lost; complete once `read` is exhausted."""
         return self._losses
 
+    @property
+    def publishers(self) -> dict[str, tuple[int, ...]]:
+        """By stream, the channels that bring it by turns, as far as it is read."""
+        return {reading.stream.key: reading.publishers for reading in self._readings if reading.publishers}
+
     def read(self, streams: Sequence[Stream]) -> Iterator[tuple[str, Block]]:
         """Yield (key, block) for every stream wherever it has messages, in the order of the file.
 
@@ -104,7 +110,7 @@ class Source:
         container, counter = self._container(), Counter()
         if self._indexed:
             self._require_topics(streams, container.dictionary)
-        readings = [Reading(stream, container) for stream in streams]
+        readings = self._readings = [Reading(stream, container) for stream in streams]
         for segment in ahead(container.segments()):
             counter.add(segment)
             for reading in readings:

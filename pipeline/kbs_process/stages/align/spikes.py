@@ -26,6 +26,34 @@ FASTEST = 100.0  # rad/s^2 that no antenna reaches
 SLOWEST_S = 0.05  # period of samples, beyond which a rig may well get from one place to another in between
 MOST_STEPS = 3  # more of them are how the signal is
 LISTED = 1000
+TURNS, TURNS_SHARE = 20, 0.01  # changes between two levels in a block, and their share of it
+APART = 30.0  # of what the next but one sample differs by
+
+
+def by_turns(x: Array) -> bool:
+    """Whether samples (n,) come from two sources: they change between two levels, and back after one or two samples.
+
+    A tone next to half the sampling rate does that as well, but its phase drifts: what was up comes to be down.
+    """
+    if len(x) < 2 * TURNS:
+        return False
+    d = np.diff(x)
+    jump = np.flatnonzero(np.abs(d) > APART * max(np.quantile(np.abs(x[2:] - x[:-2]), 0.25), 1e-300))
+    if len(jump) < max(TURNS, TURNS_SHARE * len(x)):
+        return False
+    pieces = np.array_split(jump, len(jump) // TURNS)  # what the two differ by may change its sign
+    return float(np.mean([_to_and_fro(piece, d[piece]) for piece in pieces])) > 0.8
+
+
+def _to_and_fro(jump: Stamps, size: Array) -> bool:
+    """Whether jumps at these samples lead to and fro between two levels, one of which is held for shorter."""
+    up = size[:-1] > 0.0
+    if up.all() or not up.any() or np.mean(np.abs(size[1:] + size[:-1]) < 0.2 * np.abs(size[:-1])) < 0.9:
+        return False
+    runs = np.diff(jump)
+    short, long = sorted((float(runs[up].mean()), float(runs[~up].mean())))
+    even = float(np.mean((jump[:-1] % 2 == 0) == up))
+    return short < 2.0 and (long > 1.5 * short or abs(even - 0.5) > 0.45)
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +77,7 @@ class Spikes:
     blows: list[Oddity] = field(default_factory=list)  # of several channels and samples at once: kept
     steps: list[Oddity] = field(default_factory=list)
     unlisted: int = 0
+    mixed: Oddity | None = None  # a channel that two sources bring by turns
     _code: Array | None = None  # (c,) least difference between readings
     _largest: Array | None = None  # (c,) second difference beside spikes and steps
     _stamp: Stamps | None = None
@@ -84,6 +113,9 @@ class Spikes:
             turn = 2.0 * np.pi if self.turning[channel] else 0.0
             *places, largest = _find(column, gap, turn, done, end, self._code[channel])
             self._largest[channel] = max(self._largest[channel], largest)
+            if self.mixed is None and by_turns(column[done:end]):
+                by = float(np.quantile(np.abs(np.diff(column[done:end])), 0.95))
+                self.mixed = Oddity(channel, int(stamp[done]), int(stamp[end - 1]), by)
             found += [(channel, *one) for one in zip(*(each.tolist() for each in places), strict=True)]
             if len(places[0]):
                 before = x.copy() if before is x else before

@@ -9,7 +9,7 @@ import numpy as np
 
 from kbs_process.errors import RecordingError
 from kbs_process.signals.records import PUT_IN_ORDER, Array, Block, Loss, Mask, Stamps
-from kbs_process.stages.align.arrival import Arrival
+from kbs_process.stages.align.arrival import REGULAR, Arrival
 from kbs_process.stages.align.clocks import ClockData, LatencyFloor
 from kbs_process.stages.align.envelope import MinMax
 from kbs_process.stages.align.grid import AROUND, Grid, Regridder, counted, longest_bridged, nominal_grid
@@ -54,6 +54,9 @@ class Timeline:
     longest: float = 0.0  # s, of all gaps
     file: str = ""  # as errors call it, with the stream
     filled: bool = False  # whether gaps are filled with samples
+    turning: Array = field(default_factory=lambda: np.zeros(0))  # (c,) 1 for angles, of a fast stream
+    keep_spikes: bool = False
+    regular: bool = True  # whether most steps are like their median
     spikes: Spikes | None = None
     _non_finite_in: dict[str, int] = field(default_factory=dict)  # by channel
     _reblock: Reblock = field(default_factory=Reblock)
@@ -119,6 +122,8 @@ class Timeline:
             self._first = self._last = int(block.stamp[0])
         if self.grid is None and len(block) > 1:
             self.grid = nominal_grid(block.stamp)
+            steps = np.diff(block.stamp)
+            self.regular = bool(np.mean(np.abs(steps / np.median(steps) - 1.0) <= 0.5) >= REGULAR)
         self._floor.push(block.stamp, block.log)
         if self.grid is not None:
             self._find_gaps(block.stamp, self.grid, held_back=AROUND)
@@ -158,8 +163,28 @@ class Timeline:
                 remedy=ONE_PART,
             )
 
-    def check_steps(self) -> None:
-        """Raise RecordingError where a channel is elsewhere from one sample to the next, and stays there."""
+    def clean(self, block: Block) -> tuple[Stamps, Array]:
+        """Return stamps and values of a fast stream's samples that are numbers, their spikes interpolated."""
+        if self.spikes is None and self.grid is not None:
+            self.spikes = Spikes(self.turning, self.grid.period_ns * 1e-9, self.keep_spikes)
+        stamp, values = self.finite(block)
+        return self.spikes.push(stamp, values) if self.spikes is not None and len(stamp) else (stamp, values)
+
+    def end(self) -> tuple[Stamps, Array] | None:
+        """Return what `clean` held back; raises RecordingError where two sources bring a channel, or it steps."""
+        last = self.spikes.flush() if self.spikes is not None else None
+        self.check_sources()
+        return last
+
+    def check_sources(self) -> None:
+        """Raise RecordingError where two sources bring a channel, or where it steps and stays there."""
+        if self.spikes is not None and (mixed := self.spikes.mixed) is not None:
+            raise RecordingError(
+                f"{self.channels[mixed.channel]} changes to and fro by {mixed.by:.4g} from sample to sample: two "
+                "sources are in one stream",
+                where=self.file or self.where,
+                remedy="record each source under a topic of its own",
+            )
         lasting: list[Oddity] = self.spikes.lasting() if self.spikes else []
         if lasting:
             one = lasting[0]
@@ -314,14 +339,20 @@ class Uniform:
         """`turning` channels are angles, which go on through full turns; `spectrum`: (resolution, limit), Hz; below a
         rate of `keep_below`, Hz, samples are kept as such.
         """
-        self.line = Timeline(where, channels, bridged=longest_bridged(working_rate / 2.0), file=file, filled=True)
+        self.line = Timeline(
+            where,
+            channels,
+            bridged=longest_bridged(working_rate / 2.0),
+            file=file,
+            filled=True,
+            keep_spikes=keep_spikes,
+        )
         self.welch: Welch | None = None
         self.envelope = MinMax(len(channels), stretches) if stretches else None
         self._working_rate = working_rate
         self._spectrum = spectrum
         self._keep_below = keep_below
-        self._turning = np.array(turning or [False] * len(channels), dtype=np.float64)
-        self._keep_spikes = keep_spikes
+        self.line.turning = np.array(turning or [False] * len(channels), dtype=np.float64)
         self._turns = np.zeros(len(channels)) if any(turning) else None
         self._before: Array | None = None
         self._regrid: Regridder | None = None
@@ -337,9 +368,8 @@ class Uniform:
         """Return the reduced stream, or None where it is too short for the filters."""
         for block in self.line.flush():
             self._take(block)
-        if self.line.spikes is not None and (last := self.line.spikes.flush()) is not None:
+        if (last := self.line.end()) is not None:
             self._lay(*last)
-        self.line.check_steps()
         if self._regrid is None or self._reduce is None:
             return None
         for rows, invented in self._regrid.flush():
@@ -359,10 +389,7 @@ class Uniform:
             self._reduce = Reducer(design(grid.rate, self._working_rate))
             if self._spectrum:
                 self.welch = Welch(grid.rate, *self._spectrum, self.line.channels)
-            self.line.spikes = Spikes(self._turning, grid.period_ns * 1e-9, self._keep_spikes)
-        stamp, values = self.line.finite(block)
-        if len(stamp) and self.line.spikes is not None:
-            self._lay(*self.line.spikes.push(stamp, values))
+        self._lay(*self.line.clean(block))
 
     def _lay(self, stamp: Stamps, values: Array) -> None:
         """Lay samples on the grid, and reduce them."""
@@ -389,7 +416,7 @@ class Uniform:
         first = values[:1] if self._before is None else self._before
         whole = np.concatenate((first, values))
         self._before = values[-1:].copy()
-        jumps = -np.rint(np.diff(whole, axis=0) / (2.0 * np.pi)) * self._turning
+        jumps = -np.rint(np.diff(whole, axis=0) / (2.0 * np.pi)) * self.line.turning
         if not jumps.any() and not turned.any():
             return values
         turns = turned + np.cumsum(jumps, axis=0)
