@@ -199,3 +199,42 @@ def test_two_sources_in_one_stream_are_refused(every: int) -> None:
     streams["wrench"] = Block(both[0][order], both[1][order], values[order])
     with pytest.raises(RecordingError, match="two sources are in one stream"):
         run_of(streams)
+
+
+@pytest.mark.parametrize("by", [-0.4037, -0.0437, -0.01, 0.004, 0.01, 0.02])
+def test_a_clock_that_is_set_by_little_is_refused(by: float) -> None:
+    streams = recording()
+    streams["angle"].stamp[3000:] -= round(by * 1e9)
+    with pytest.raises(RecordingError, match=r"encoder: log times less stamps step by .*a clock was set"):
+        run_of(streams)
+
+
+def test_a_recorder_s_clock_that_is_set_is_refused() -> None:
+    streams = recording()
+    streams["angle"].stamp[3000:] += 500_000_000
+    for one in streams.values():
+        one.log[3000:] += 500_000_000
+    with pytest.raises(RecordingError, match=r"wrench: log times less stamps step by \+0.5 s.*stamps of encoder jump"):
+        run_of(streams)
+
+
+@pytest.mark.parametrize("growth", [3e-3, 25e-3, -1e-3])
+def test_a_latency_that_grows_is_no_skew(growth: float) -> None:
+    streams = recording()
+    wrench = streams["wrench"]
+    wrench.log[:] += (growth * (wrench.stamp - EPOCH)).astype(np.int64)
+    run = run_of(streams)
+    (clock,) = told(run, "clock")
+    assert clock.where == "test: wrench" and f"by {1e3 * abs(growth):.3g} ms each second" in clock.detail
+    assert run.clocks["angle"].skew == 0.0 and abs(run.clocks["angle"].offset_s) < 1e-6
+    assert error(run)[1] < 1e-3
+
+
+def test_a_latency_that_comes_and_goes_or_steps_moves_no_clock() -> None:
+    t = np.arange(6000) * 0.01
+    for late in (np.interp(t, [0, 20, 30, 40, 60], [0, 0, 2, 0, 0]), 0.02 * (t > 30.0), 3e-6 * t**2):
+        streams = recording()
+        streams["wrench"].log[:] += np.rint(1e9 * late).astype(np.int64)
+        run = run_of(streams)
+        assert error(run)[1] < 1e-3 and error(run)[0] < 4.0 * NOISE
+        assert abs(run.clocks["angle"].offset_s) < 1e-3

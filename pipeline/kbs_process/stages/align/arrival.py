@@ -6,7 +6,7 @@ hole where it arrived. A clock that was set back leaves no hole, and comes by th
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numba
 import numpy as np
@@ -18,6 +18,7 @@ AHEAD = 512  # samples that wait for those behind them
 LONE = 64  # samples that are left out where they lie far from all others, at either end
 SET_BACK = 3  # samples that come by times that have been, without a hole that they fill: fewer are odd stamps
 REGULAR = 0.6  # share of steps within half a period of their median, without which nothing is judged
+LISTED = 64
 OFF = 2.5  # periods off its neighbours in the file, from which on a stamp may be odd
 
 
@@ -31,6 +32,7 @@ class Arrival:
     lone: int = 0  # samples far from all others, left out
     lone_by: int = 0  # ns, how far
     set_back: tuple[int, int] | None = None  # ns: the stamp before, and by how much time goes back
+    doubled: list[int] = field(default_factory=list)  # ns, times of odd stamps that left no hole where they arrived
     _kept: Block | None = None  # passed on
     _held: Block | None = None
 
@@ -88,16 +90,22 @@ class Arrival:
         ).all(1)
         clash = same | (np.bincount(hole, minlength=len(line) + 1)[hole] > room)
         for run in np.split(np.arange(len(index)), np.flatnonzero(np.diff(index) > 1) + 1):
-            if not off[run].any() or not (clash[run] & ~repeated[run]).all() or index[run[0]] >= end:
+            if not (clash[run] & ~repeated[run]).all() or index[run[0]] >= end:
                 continue
             begin, after = previous[run[0]], following[run[-1]]
             first, last = int(own[run[0]]), int(own[run[-1]])
             inner = place[run[0]] > 0 and place[run[0]] < len(line)
             missing = inner and after - begin > (1.0 + 0.5 * len(run)) * period
+            if not off[run].any():
+                if inner and not missing and len(self.doubled) < LISTED:
+                    self.doubled.append(int(begin))
+                continue
             at_start = before == 0 and place[run[0]] == 0 and len(run) <= LONE
             if missing or len(run) < SET_BACK or at_start:
                 # What precedes all that is known may be late, and is judged by its order.
                 gone[index[run]] = ~((hole[run] == 0) & (before >= BLOCK))
+                if inner and not missing and len(self.doubled) < LISTED:
+                    self.doubled.append(int(begin))
             elif self.set_back is None:
                 by = begin + period - first if place[run[0]] > 0 and first < begin else last + period - after
                 self.set_back = (int(begin if first < begin else last), int(by))

@@ -28,7 +28,7 @@ from kbs_process.signals.records import (
 )
 from kbs_process.stages.align.clocks import align
 from kbs_process.stages.align.resample import Kept, design
-from kbs_process.stages.align.stream import Collected, Timeline, Uniform
+from kbs_process.stages.align.stream import ONE_PART, Collected, Timeline, Uniform
 
 Progress = Callable[[str, int], None]  # stream, samples just taken
 
@@ -110,6 +110,7 @@ def condense(
     reference = next(iter(kept))
     present = {key: s.line for key, s in streams.items() if s.line.samples}
     clocks = align({key: line.clock() for key, line in present.items()}, reference)
+    _check_set({key: sampled[key].line for key in kept}, file or name)
     _check_overlap(present, clocks, reference, kept, file or name)
 
     dt = 1.0 / settings.working_rate_Hz
@@ -142,6 +143,23 @@ def condense(
         pointing=signals.get("pointing"),
         effort=signals.get("effort"),
     )
+
+
+def _check_set(lines: dict[str, Timeline], file: str) -> None:
+    """Raise RecordingError where log - stamp steps for good, and stamps of this stream or another jump with it."""
+    for key, line in lines.items():
+        if (step := line.floor_step()) is None:
+            continue
+        for other, jumping in lines.items():
+            at = step.own + (line.clock().first_log - jumping.clock().first_log) * 1e-9
+            if jumping.jumps(step, at):
+                whose = "encoder" if other == "angle" else other
+                raise RecordingError(
+                    f"log times less stamps step by {step.by:+.4g} s, {step.own:.4g} s after the first sample, and "
+                    f"stamps of {whose} jump there: a clock was set",
+                    where=_place(file, key),
+                    remedy=ONE_PART,
+                )
 
 
 def _check_overlap(

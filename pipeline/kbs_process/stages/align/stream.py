@@ -10,7 +10,7 @@ import numpy as np
 from kbs_process.errors import RecordingError
 from kbs_process.signals.records import PUT_IN_ORDER, Array, Block, Loss, Mask, Stamps
 from kbs_process.stages.align.arrival import REGULAR, Arrival
-from kbs_process.stages.align.clocks import ClockData, LatencyFloor
+from kbs_process.stages.align.clocks import ClockData, FloorStep, LatencyFloor
 from kbs_process.stages.align.envelope import MinMax
 from kbs_process.stages.align.grid import AROUND, Grid, Regridder, counted, longest_bridged, nominal_grid
 from kbs_process.stages.align.ordering import Orderer, Reblock, finite_rows, judge
@@ -21,6 +21,7 @@ from kbs_process.stages.align.spikes import Oddity, Spikes
 GAPS_LISTED = 20  # one by one; the others in one line
 # Samples that may be made up for missing ones: so many, and so many for each that is there.
 MADE_UP, MADE_UP_EACH = 1 << 20, 10
+UNEVEN = 64  # steps that are told apart from what jitters
 FAR_SLOW_NS = 3_600_000_000_000  # what is sent now and then may have one sample long before the others
 # What to do about a recording that is not one.
 ONE_PART = "use one part of it: start_s and end_s of its [[recording]] in campaign.toml, or those of the import"
@@ -66,6 +67,7 @@ class Timeline:
     _floor: LatencyFloor | None = None
     _first: int = 0
     _last: int = 0
+    _uneven: list[float] = field(default_factory=list)  # s, steps that are no whole number of periods
     _near: Stamps = field(default_factory=lambda: np.empty(0, dtype=np.int64))  # of steps that are not judged yet
     _judged: int = 0  # steps between these that are
 
@@ -128,6 +130,10 @@ class Timeline:
         if self.grid is not None:
             self._find_gaps(block.stamp, self.grid, held_back=AROUND)
             self._check_gaps(self.grid, at_end=False)
+            if len(self._uneven) < UNEVEN:
+                periods = np.diff(block.stamp, prepend=self._last) / self.grid.period_ns
+                uneven = np.abs(periods - np.maximum(np.rint(periods), 1.0)) > 0.2
+                self._uneven += [self.own_one(int(one)) for one in block.stamp[uneven][:UNEVEN]]
         self._last = int(block.stamp[-1])
         self.samples += len(block)
         return block
@@ -233,6 +239,24 @@ class Timeline:
         """From the first sample to the last, s."""
         return self.own_one(self._last)
 
+    def floor_step(self) -> FloorStep | None:
+        """A step of log - stamp that lasts: a clock was set, or a latency changed."""
+        return None if self._floor is None or self.by_recorder else self._floor.step()
+
+    def jumps(self, step: FloorStep, at: float) -> bool:
+        """Whether stamps jump about `at`, s from the first log time, by what the floor steps by."""
+        odd = [self.own_one(stamp) for stamp in self._arrival.doubled]
+        odd += self._uneven if len(self._uneven) < UNEVEN else []
+        return any(abs(one - at) <= step.within for one in odd) or any(
+            abs(gap.end - gap.start - abs(step.by)) < 0.2 * abs(step.by) + self._period
+            and abs(0.5 * (gap.start + gap.end) - at) <= step.within + abs(step.by)
+            for gap in self.gaps
+        )
+
+    @property
+    def _period(self) -> float:
+        return 1.5e-9 * self.grid.period_ns if self.grid is not None else 0.0
+
     def clock(self) -> ClockData:
         """What the stream tells about its clock."""
         assert self._floor is not None
@@ -266,6 +290,8 @@ class Timeline:
                     by = max((one.by for one in own), key=abs)
                     what = f"off by {'up to ' if len(own) > 1 else ''}{by:.4g}: {detail}"
                     found.append(Loss(kind, f"{self.where}, {name}", len(own), start, end, what))
+        if self._floor is not None and not self.by_recorder and (trouble := self._floor.trouble()):
+            found.append(Loss("clock", self.where, 0, detail=trouble))
         if self._orderer is not None:
             found += self._disorder(self._orderer, offset, rate)
         return found
