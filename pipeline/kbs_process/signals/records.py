@@ -104,6 +104,7 @@ class Events:
 
 
 PUT_IN_ORDER = "put in order"  # messages that came after younger ones: told, although nothing is lost by that
+ROUNDED = "rounded stamps"  # behind which a regular rate was found: likewise
 TRUNCATED = "truncated"  # the loss of a file that breaks off: all that would have followed
 
 
@@ -121,7 +122,7 @@ class Loss:
     @property
     def real(self) -> bool:
         """Whether anything is missing, doubtful or left out by it."""
-        return self.kind != PUT_IN_ORDER
+        return self.kind not in (PUT_IN_ORDER, ROUNDED)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -238,3 +238,39 @@ def test_a_latency_that_comes_and_goes_or_steps_moves_no_clock() -> None:
         run = run_of(streams)
         assert error(run)[1] < 1e-3 and error(run)[0] < 4.0 * NOISE
         assert abs(run.clocks["angle"].offset_s) < 1e-3
+
+
+@pytest.mark.parametrize("rate", [999.7, 1000.6, 800.0, 333.3])
+@pytest.mark.parametrize("logged", [True, False])
+def test_stamps_rounded_to_a_period_hide_a_regular_rate_and_lose_nothing(rate: float, logged: bool) -> None:
+    streams = recording(rate)
+    for one in streams.values():
+        one.stamp[:] = EPOCH + 1_000_000 * np.rint((one.stamp - EPOCH) / 1e6).astype(np.int64)
+        if not logged:
+            one.log[:] = one.stamp
+    if rate > 1000.0:  # what shares its stamp with another is a repeat
+        streams = {key: rows(one, np.unique(one.stamp, return_index=True)[1]) for key, one in streams.items()}
+    run = run_of(streams)
+    if rate < 1000.0:
+        assert {loss.kind for loss in run.losses} == {"rounded stamps"} and not any(loss.real for loss in run.losses)
+        assert run.rates["wrench"] == pytest.approx(rate, rel=2e-4)
+    assert error(run)[0] < 4.0 * NOISE and error(run)[1] < 1e-3
+
+
+def test_samples_lost_of_rounded_stamps_are_gaps() -> None:
+    streams = recording(1000.0)
+    keep = np.delete(np.arange(60_000), [7000, 7500, 9000, *range(30_000, 30_040)])
+    streams["wrench"] = rows(streams["wrench"], keep)
+    run = run_of(streams)
+    assert sum(loss.count for loss in run.losses if loss.kind in ("gap", "short gap")) == 43
+
+
+def test_bursts_that_were_stamped_on_arrival_are_refused_by_name() -> None:
+    streams = recording()
+    k = np.arange(6000)
+    for one in streams.values():
+        one.stamp[:] = EPOCH + (k // 5 * 5 + 4) * 10_000_000 + k % 5 * 100_000
+    with pytest.raises(
+        RecordingError, match=r"bursts of about 5, 0.1 ms apart, every 49.6 ms: they are times of arrival"
+    ):
+        run_of(streams)

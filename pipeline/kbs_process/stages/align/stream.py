@@ -8,11 +8,20 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from kbs_process.errors import RecordingError
-from kbs_process.signals.records import PUT_IN_ORDER, Array, Block, Loss, Mask, Stamps
+from kbs_process.signals.records import PUT_IN_ORDER, ROUNDED, Array, Block, Loss, Mask, Stamps
 from kbs_process.stages.align.arrival import REGULAR, Arrival
 from kbs_process.stages.align.clocks import ClockData, FloorStep, LatencyFloor
 from kbs_process.stages.align.envelope import MinMax
-from kbs_process.stages.align.grid import AROUND, Grid, Regridder, counted, longest_bridged, nominal_grid
+from kbs_process.stages.align.grid import (
+    AROUND,
+    Grid,
+    Regridder,
+    counted,
+    evened,
+    longest_bridged,
+    nominal_grid,
+    quantum,
+)
 from kbs_process.stages.align.ordering import Orderer, Reblock, finite_rows, judge
 from kbs_process.stages.align.resample import Kept, Reducer, design
 from kbs_process.stages.align.spectrum import Welch
@@ -21,6 +30,7 @@ from kbs_process.stages.align.spikes import Oddity, Spikes
 GAPS_LISTED = 20  # one by one; the others in one line
 # Samples that may be made up for missing ones: so many, and so many for each that is there.
 MADE_UP, MADE_UP_EACH = 1 << 20, 10
+BURST = 5.0  # times the usual step: what lies between bursts
 UNEVEN = 64  # steps that are told apart from what jitters
 FAR_SLOW_NS = 3_600_000_000_000  # what is sent now and then may have one sample long before the others
 # What to do about a recording that is not one.
@@ -52,6 +62,7 @@ class Timeline:
     non_finite: int = 0  # samples that are NaN or infinite in some channel: all of each is left out
     samples: int = 0
     missing: int = 0
+    rounded: float = 0.0  # s, to which stamps were rounded that a regular rate was found behind
     longest: float = 0.0  # s, of all gaps
     file: str = ""  # as errors call it, with the stream
     filled: bool = False  # whether gaps are filled with samples
@@ -119,12 +130,18 @@ class Timeline:
         return [] if released is None else [self._timed(released)]
 
     def _timed(self, block: Block) -> Block:
+        stamp = evened(block.stamp, block.log, known=self.rounded > 0.0)
+        if stamp is not block.stamp:
+            self.rounded = max(self.rounded, quantum(block.stamp) * 1e-9)
+            later = 0 if self._floor is None else max(self._last + 1 - int(stamp[0]), 0)
+            block = Block(stamp + later, block.log, block.values)
         if self._floor is None:
             self._floor = LatencyFloor(int(block.stamp[0]), int(block.log[0]))
             self._first = self._last = int(block.stamp[0])
         if self.grid is None and len(block) > 1:
             self.grid = nominal_grid(block.stamp)
             steps = np.diff(block.stamp)
+            self._check_bursts(steps)
             self.regular = bool(np.mean(np.abs(steps / np.median(steps) - 1.0) <= 0.5) >= REGULAR)
         self._floor.push(block.stamp, block.log)
         if self.grid is not None:
@@ -157,6 +174,19 @@ class Timeline:
                 self.missing_unlisted += missing
         kept = max(judged - AROUND, 0)
         self._near, self._judged = stamp[kept:].copy(), judged - kept
+
+    def _check_bursts(self, steps: Stamps) -> None:
+        """Raise RecordingError where samples come in bursts: their stamps are times of arrival."""
+        usual = float(np.median(steps))
+        long = steps > BURST * usual
+        if self.filled and 0.01 < np.mean(long) <= 0.5 and steps[long].sum() > 0.8 * steps.sum():
+            raise RecordingError(
+                f"stamps come in bursts of about {1.0 / np.mean(long):.3g}, {1e-6 * usual:.3g} ms apart, every "
+                f"{1e-6 * float(np.median(steps[long])):.3g} ms: they are times of arrival and not of sampling, or "
+                "parts of a second in a wrong unit",
+                where=self.file or self.where,
+                remedy="stamp each sample where it is taken; where a file is imported, give rate_Hz and no time column",
+            )
 
     def _check_gaps(self, grid: Grid, *, at_end: bool) -> None:
         """Raise RecordingError where more was made up than is worth it: work follows the samples, not their span."""
@@ -290,6 +320,12 @@ class Timeline:
                     by = max((one.by for one in own), key=abs)
                     what = f"off by {'up to ' if len(own) > 1 else ''}{by:.4g}: {detail}"
                     found.append(Loss(kind, f"{self.where}, {name}", len(own), start, end, what))
+        if self.rounded and self.grid is not None:
+            detail = (
+                f"rounded to {1e3 * self.rounded:.3g} ms: taken as regular at {self.grid.rate:.6g} Hz, each to "
+                f"{0.5e3 * self.rounded:.2g} ms"
+            )
+            found.append(Loss(ROUNDED, self.where, 0, detail=detail))
         if self._floor is not None and not self.by_recorder and (trouble := self._floor.trouble()):
             found.append(Loss("clock", self.where, 0, detail=trouble))
         if self._orderer is not None:
