@@ -19,8 +19,8 @@ def test_rates_gaps_repeats_and_ranges(tmp_path: Path, encoding: Encoding) -> No
     rng = np.random.default_rng(4)
     n = 20_000
     log = 1_000_000 * np.arange(n)
+    log[5000:] += 20_000_000  # a gap
     stamp = log + rng.integers(-1000, 1000, n)
-    stamp[5000:] += 20_000_000  # a gap
     stamp[700] = stamp[699]  # a repeat
     stamp[[900, 901]] = stamp[[901, 900]]  # two in the wrong order
     wrench = rng.uniform(-2, 3, (n, 6))
@@ -46,6 +46,22 @@ def test_rates_gaps_repeats_and_ranges(tmp_path: Path, encoding: Encoding) -> No
     assert limits["wrench.force.y"].not_finite == 1
     assert encoder.names == ("az", "el")
     assert [(e.field, e.low, e.high) for e in encoder.ranges][:2] == [("position[az]", 0, 1), ("position[el]", 2, 3)]
+
+
+def test_a_clock_that_was_set_is_told_as_processing_tells_it(tmp_path: Path) -> None:
+    t = np.arange(6000) * 10_000_000
+    rng = np.random.default_rng(1)
+    force, angle = rng.normal(0.0, 1.0, (6000, 6)), np.cumsum(rng.normal(0.0, 1e-4, (6000, 1)), axis=0)
+    log = t + 200_000 + rng.exponential(1e5, 6000).astype(np.int64)
+    streams = [
+        OutStream("/wrench", "wrench", t, log, force),
+        OutStream("/encoder", "joints", np.where(t < 30 * 10**9, t, t + 400_000_000), log, angle, ("arm",)),
+    ]
+    write_mcap(tmp_path / "a.mcap", streams)
+    found = inspect_recording(tmp_path / "a.mcap")
+    (refused,) = [loss for loss in found.losses if loss.kind == "unusable"]
+    assert found.state == "lossy" and refused.where == "/encoder"
+    assert "step by -0.4 s, 30" in refused.detail and refused.detail.endswith("a clock was set")
 
 
 def test_clean(tmp_path: Path) -> None:

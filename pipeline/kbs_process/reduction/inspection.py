@@ -18,7 +18,7 @@ from kbs_process.recordings.mcap.messages.fields import STAMPS
 from kbs_process.recordings.mcap.source import Source, TopicSummary, open_recording
 from kbs_process.recordings.mcap.streams import Sample, Stream
 from kbs_process.signals.records import Block, Loss
-from kbs_process.stages.align.condense import CondenseSettings
+from kbs_process.stages.align.condense import CondenseSettings, set_clock
 from kbs_process.stages.align.grid import longest_bridged
 from kbs_process.stages.align.stream import Timeline
 
@@ -81,7 +81,7 @@ class _Gathered:
         self.count = 0
         self.start: int | None = None
         self.end: int | None = None
-        self.refused: RecordingError | None = None
+        self.refused = ""  # why processing refuses it
         self.low = np.full(columns, np.inf)
         self.high = np.full(columns, -np.inf)
         self.not_finite = np.zeros(columns, dtype=np.int64)
@@ -112,20 +112,24 @@ class _Gathered:
     def _judge(self, block: Block | None) -> None:
         """Take the next block, or end with None."""
         try:
-            if self.refused is None:
+            if not self.refused:
                 for ready in self.line.flush() if block is None else self.line.push(block):
                     if self._read:
                         self.line.clean(ready)
                 if block is None and self._read:
                     self.line.end()
         except RecordingError as error:
-            self.refused = error
+            self.refused = error.what
+
+    def finish(self) -> Timeline | None:
+        """Take what was held back; return the timeline of readings whose clock can be judged."""
+        self._judge(None)
+        return self.line if self._read and self.line.samples and not self.refused else None
 
     def losses(self, origin: int | None) -> Iterator[Loss]:
         """Yield what is wrong with the stream, in s from `origin` of the recorder's clock."""
-        self._judge(None)
-        if self.refused is not None:
-            yield Loss("unusable", self.line.where, self.count, detail=self.refused.what)
+        if self.refused:
+            yield Loss("unusable", self.line.where, self.count, detail=self.refused)
         if self.line.samples:
             start = (self.line.clock().first_log - (origin or 0)) * 1e-9
             for loss in self.line.losses(start, 1.0):
@@ -151,6 +155,9 @@ def inspect_recording(path: Path) -> Inspection:
             gathered[topic].add(block)
     except RecordingError as error:
         return Inspection(path, "unreadable", (), (), str(error))
+    lines = {topic: one.finish() for topic, one in gathered.items()}
+    if (found_set := set_clock({topic: line for topic, line in lines.items() if line is not None})) is not None:
+        gathered[found_set[0]].refused = found_set[1]
     losses = [*source.losses, *_by_turns(source)]
     losses += [loss for one in gathered.values() for loss in one.losses(source.start_ns)]
     found = tuple(_conclude(topic, plans[topic.topic], gathered[topic.topic]) for topic in topics)

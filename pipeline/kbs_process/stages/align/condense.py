@@ -110,7 +110,8 @@ def condense(
     reference = next(iter(kept))
     present = {key: s.line for key, s in streams.items() if s.line.samples}
     clocks = align({key: line.clock() for key, line in present.items()}, reference)
-    _check_set({key: sampled[key].line for key in kept}, file or name)
+    if (found := set_clock({key: sampled[key].line for key in kept})) is not None:
+        raise RecordingError(found[1], where=_place(file or name, found[0]), remedy=ONE_PART)
     _check_overlap(present, clocks, reference, kept, file or name)
 
     dt = 1.0 / settings.working_rate_Hz
@@ -145,8 +146,8 @@ def condense(
     )
 
 
-def _check_set(lines: dict[str, Timeline], file: str) -> None:
-    """Raise RecordingError where log - stamp steps for good, and stamps of this stream or another jump with it."""
+def set_clock(lines: Mapping[str, Timeline]) -> tuple[str, str] | None:
+    """Find a stream whose log - stamp steps for good, where stamps of this stream or another jump with it; in words."""
     for key, line in lines.items():
         if (step := line.floor_step()) is None:
             continue
@@ -154,12 +155,11 @@ def _check_set(lines: dict[str, Timeline], file: str) -> None:
             at = step.own + (line.clock().first_log - jumping.clock().first_log) * 1e-9
             if jumping.jumps(step, at):
                 whose = "encoder" if other == "angle" else other
-                raise RecordingError(
+                return key, (
                     f"log times less stamps step by {step.by:+.4g} s, {step.own:.4g} s after the first sample, and "
-                    f"stamps of {whose} jump there: a clock was set",
-                    where=_place(file, key),
-                    remedy=ONE_PART,
+                    f"stamps of {whose} jump there: a clock was set"
                 )
+    return None
 
 
 def _check_overlap(
