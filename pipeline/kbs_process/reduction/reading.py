@@ -24,10 +24,13 @@ _OTHERWISE = {
 Blocks = Iterator[tuple[str, Block]]
 
 
-def read_run(campaign: Campaign, entry: RecordingEntry, through: Callable[[Blocks], Blocks] = iter) -> Run:
+def read_run(
+    campaign: Campaign, entry: RecordingEntry, through: Callable[[Blocks], Blocks] = iter, *, keep_spikes: bool = False
+) -> Run:
     """Read one recording chunk by chunk and reduce it; what it lost is listed in the run's losses.
 
-    What is read goes `through` whatever may leave some of it out.
+    What is read goes `through` whatever may leave some of it out. Single bad samples are interpolated, but for
+    `keep_spikes`.
     """
     source = open_recording(entry.path)
     there = {summary.topic for summary in source.topics}
@@ -42,6 +45,7 @@ def read_run(campaign: Campaign, entry: RecordingEntry, through: Callable[[Block
         CondenseSettings(working_rate_Hz=campaign.bands.working_rate),
         units={topic.key: topic.units for topic in topics},
         file=str(entry.path),
+        keep_spikes=keep_spikes,
     )
     late = ((source.start_ns or run.log_epoch_ns) - run.log_epoch_ns) * 1e-9
     return replace(run, losses=(*(_later(loss, late) for loss in source.losses), *run.losses))

@@ -69,11 +69,13 @@ def condense(
     progress: Progress | None = None,
     units: Mapping[str, tuple[str, ...]] | None = None,
     file: str | None = None,
+    *,
+    keep_spikes: bool = False,
 ) -> Run:
     """Reduce a recording to a `Run`; `channels` names the columns of every stream that `blocks` brings.
 
     `units` are those of streams of the joints that are not rad or rad/s throughout; `file` is what errors call the
-    recording, its name without it.
+    recording, its name without it. With `keep_spikes` single bad samples are told, and stay.
 
     Time zero is the reference stream's first sample (the wrench's, where there is one), and the axis covers
     that stream. Samples that lean on invented input (gaps, the ends' continuation, times at which a stream
@@ -83,7 +85,9 @@ def condense(
     """
     load = next((key for key in LOADS if key in channels), None)
     streams: dict[str, Uniform | Collected] = {
-        key: _stream(name, file or name, key, columns, settings, (units or {}).get(key), is_load=key == load)
+        key: _stream(
+            name, file or name, key, columns, settings, (units or {}).get(key), is_load=key == load, keep=keep_spikes
+        )
         for key, columns in channels.items()
     }
     for key, block in blocks:
@@ -193,6 +197,7 @@ def _stream(
     units: Sequence[str] | None,
     *,
     is_load: bool,
+    keep: bool,
 ) -> Uniform | Collected:
     where = f"{name}: {key}"
     if key in SLOW:
@@ -207,6 +212,7 @@ def _stream(
             spectrum=(settings.spectrum_resolution_Hz, settings.spectrum_limit_Hz),
             stretches=settings.envelope_stretches,
             file=_place(file, key),
+            keep_spikes=keep,
         )
     angle = key == "angle"
     return Uniform(
@@ -216,6 +222,7 @@ def _stream(
         turning=[unit == "rad" for unit in units or ["rad"] * len(columns)] if key in TURNING else (),
         keep_below=settings.encoder_limit_Hz if angle else 0.0,
         file=_place(file, key),
+        keep_spikes=keep,
     )
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from kbs_process.errors import RecordingError
-from kbs_process.signals.records import PUT_IN_ORDER, ROUNDED, Array, Block, Loss, Mask, Stamps
+from kbs_process.signals.records import PUT_IN_ORDER, ROUNDED, SPIKE, Array, Block, Loss, Mask, Stamps
 from kbs_process.stages.align.arrival import REGULAR, Arrival
 from kbs_process.stages.align.clocks import ClockData, FloorStep, LatencyFloor
 from kbs_process.stages.align.envelope import MinMax
@@ -27,6 +27,7 @@ from kbs_process.stages.align.resample import Kept, Reducer, design
 from kbs_process.stages.align.spectrum import Welch
 from kbs_process.stages.align.spikes import Oddity, Spikes
 
+TIMES = 10  # of single bad samples, one by one
 GAPS_LISTED = 20  # one by one; the others in one line
 # Samples that may be made up for missing ones: so many, and so many for each that is there.
 MADE_UP, MADE_UP_EACH = 1 << 20, 10
@@ -311,14 +312,17 @@ class Timeline:
             detail = "the sensor's stamps do not advance: the recorder's clock is used"
             found.append(Loss("clock", self.where, self.samples, detail=detail))
         for kind, oddities, detail in (
-            ("spike", self.spikes.spikes if self.spikes else [], "interpolated"),
+            (SPIKE, self.spikes.spikes if self.spikes else [], "interpolated"),
             ("blow", self.spikes.blows if self.spikes else [], "several channels at once: kept"),
         ):
             for channel, name in enumerate(self.channels):
                 if own := [one for one in oddities if one.channel == channel]:
                     start, end = (offset + rate * self.own_one(one) for one in (own[0].first, own[-1].last))
                     by = max((one.by for one in own), key=abs)
-                    what = f"off by {'up to ' if len(own) > 1 else ''}{by:.4g}: {detail}"
+                    times = ", ".join(f"{offset + rate * self.own_one(one.first):.4f}" for one in own[:TIMES])
+                    what = f"off by {by:.4g}: {detail}"
+                    if len(own) > 1:
+                        what = f"at {times}{'' if len(own) <= TIMES else ' ...'} s, off by up to {by:.4g}: {detail}"
                     found.append(Loss(kind, f"{self.where}, {name}", len(own), start, end, what))
         if self.rounded and self.grid is not None:
             detail = (
