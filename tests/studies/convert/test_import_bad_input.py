@@ -221,3 +221,40 @@ def test_the_description_is_taken_whole_and_from_its_folder_only(tmp_path: Path)
         with pytest.raises(ConfigError, match=said):
             import_recordings(plan, tmp_path, tmp_path / "other")
     assert not (tmp_path / "other").exists()
+
+
+@pytest.mark.parametrize(
+    ("rows", "stamps", "said"),
+    [
+        ([700], [12.5], "1 time stamps of 'wrench' do not fit where they stand, rows left out"),
+        (
+            [0, 1, 2],
+            [-1.78e9 + 1.0, -1.78e9 + 1.001, -1.78e9 + 1.002],
+            "3 time stamps of 'wrench' lie far from all others",
+        ),
+        (range(1200, 1500), [-1.78e9] * 300, "300 time stamps of 'wrench' do not fit where they stand, rows left out"),
+    ],
+)
+def test_rows_whose_time_fits_nowhere_are_left_out_and_counted(
+    tmp_path: Path, rows: list[int], stamps: list[float], said: str
+) -> None:
+    columns = signals(1500)
+    t = 1.78e9 + np.arange(1500) * 1e-3
+    t[list(rows)] = 1.78e9 + np.array(stamps)
+    write_csv(tmp_path / "run.csv", {**columns, "t": t})
+    notices: list[str] = []
+    found = read_back(_import(tmp_path, "run.csv", notices=notices), "turn_1")
+    assert any(said in line for line in notices)
+    good = np.delete(np.arange(1500), list(rows))
+    np.testing.assert_array_equal(found["encoder"][1][:, 0], columns["angle"][good])
+
+
+def test_time_that_starts_again_is_refused_with_its_row(tmp_path: Path) -> None:
+    columns = signals(3000)
+    t = np.concatenate([np.arange(2000), np.arange(1000) + 0.25]) * 1e-3
+    write_csv(tmp_path / "run.csv", {**columns, "t": t})
+    with pytest.raises(
+        RecordingError, match=r"goes back by 1.99\d+ s at sample 2001, .* logger started again"
+    ) as caught:
+        _import(tmp_path, "run.csv")
+    assert "split the file there" in str(caught.value)

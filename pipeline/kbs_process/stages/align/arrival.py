@@ -24,17 +24,22 @@ OFF = 2.5  # periods off its neighbours in the file, from which on a stamp may b
 
 @dataclass(slots=True)
 class Arrival:
-    """Takes the samples of a stream in file order; the last ones wait until what follows is known."""
+    """Takes the samples of a stream in file order; the last ones wait until what follows is known.
+
+    Samples that all have one stamp, as where a file was filled up with zeros, are odd however many they are.
+    """
 
     far_ns: int = 10_000_000_000  # at least so far from all others are the lone ones
     odd: int = 0  # samples with odd stamps, left out
     odd_span: tuple[int, int] = (0, 0)  # ns, between which they arrived
     lone: int = 0  # samples far from all others, left out
     lone_by: int = 0  # ns, how far
-    set_back: tuple[int, int] | None = None  # ns: the stamp before, and by how much time goes back
+    set_back: tuple[int, int, int] | None = None  # samples before; ns: since the first, by how much time goes back
     doubled: list[int] = field(default_factory=list)  # ns, times of odd stamps that left no hole where they arrived
     _kept: Block | None = None  # passed on
     _held: Block | None = None
+    _first: int = 0  # ns
+    _passed: int = 0  # samples that were judged
 
     def push(self, block: Block) -> Block:
         """Take the next samples; return those that can be judged, without odd ones."""
@@ -59,6 +64,9 @@ class Arrival:
         if far[before:end].any():
             self.lone, self.lone_by = self.lone + int(np.count_nonzero(far[before:end])), max(self.lone_by, apart)
         gone |= far
+        if before == 0 and not gone.all():
+            self._first = int(whole.stamp[~gone].min())
+        self._passed += end - before
         self._held = select(fresh, slice(end - before, None))
         self._kept = select(whole, np.flatnonzero(~gone[:end])[-BLOCK:])
         return select(whole, before + np.flatnonzero(~gone[before:end]))
@@ -101,14 +109,16 @@ class Arrival:
                     self.doubled.append(int(begin))
                 continue
             at_start = before == 0 and place[run[0]] == 0 and len(run) <= LONE
-            if missing or len(run) < SET_BACK or at_start:
+            if missing or len(run) < SET_BACK or at_start or first == last == int(own[run].min()):
                 # What precedes all that is known may be late, and is judged by its order.
                 gone[index[run]] = ~((hole[run] == 0) & (before >= BLOCK))
                 if inner and not missing and len(self.doubled) < LISTED:
                     self.doubled.append(int(begin))
             elif self.set_back is None:
                 by = begin + period - first if place[run[0]] > 0 and first < begin else last + period - after
-                self.set_back = (int(begin if first < begin else last), int(by))
+                number = self._passed - before + int(index[run[0]])
+                since = int(begin if first < begin else last) - (self._first if before else int(line[0]))
+                self.set_back = (number, since, int(by))
         return gone
 
 

@@ -115,11 +115,10 @@ class Timeline:
 
     def _arrived(self, arrived: Block) -> list[Block]:
         if self._arrival.set_back is not None:
-            at, by = self._arrival.set_back
-            since = f" {(at - self._first) * 1e-9:.6g} s after the first sample" if self._floor else ""
+            number, since, by = self._arrival.set_back
             raise RecordingError(
-                f"time goes back by {by * 1e-9:.6g} s{since}, and goes on from there: the clock was set back, or the "
-                "logger started again",
+                f"time goes back by {by * 1e-9:.6g} s at sample {number + 1}, {since * 1e-9:.6g} s after the first, "
+                "and goes on from there: the clock was set back, or the logger started again",
                 where=self.file or self.where,
                 remedy=ONE_PART,
             )

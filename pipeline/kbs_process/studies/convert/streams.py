@@ -12,6 +12,9 @@ import numpy as np
 from kbs_process.errors import RecordingError
 from kbs_process.recordings.tables import Cells, Table, find_column
 from kbs_process.signals.records import Array, Block, Mask, Stamps
+from kbs_process.stages.align.arrival import Arrival
+from kbs_process.stages.align.condense import SLOW
+from kbs_process.stages.align.stream import FAR_SLOW_NS
 from kbs_process.studies.convert.clock import nanoseconds, numbers
 from kbs_process.studies.convert.mapping import Channel, Mapping, StreamMap
 from kbs_process.studies.convert.mapping_file import Part, Time, Turn
@@ -63,18 +66,40 @@ def read_part(table: Table, mapping: Mapping, part: Part, findings: Findings) ->
         end = first + round(part.end_s * 1e9) if np.isfinite(part.end_s) else end
 
     empty = set(streams)
-    for piece in _side_by_side(passes):
-        for key, block in piece.items():
-            inside = _select(block, (block.stamp >= start) & (block.stamp < end))
-            findings.check(key, inside)
-            if len(inside):
-                empty.discard(key)
-                yield streams[key], inside
+    arrivals = {key: Arrival(FAR_SLOW_NS) if key in SLOW else Arrival() for key in streams}
+    for key, inside in chain(
+        (
+            (key, arrivals[key].push(_select(block, (block.stamp >= start) & (block.stamp < end))))
+            for piece in _side_by_side(passes)
+            for key, block in piece.items()
+        ),
+        ((key, last) for key, arrival in arrivals.items() if (last := arrival.flush()) is not None),
+    ):
+        _check_order(arrivals[key], table, key)
+        findings.check(key, inside)
+        if len(inside):
+            empty.discard(key)
+            yield streams[key], inside
+    for key, arrival in arrivals.items():
+        findings.counts[f"time stamps of '{key}' do not fit where they stand, rows left out"] += arrival.odd
+        findings.counts[f"time stamps of '{key}' lie far from all others, rows left out"] += arrival.lone
     for key in streams:
         if key in empty:
             raise RecordingError(
                 f"no sample of '{key}' for recording '{part.stem}'", where=str(table.path), remedy=_why_empty(findings)
             )
+
+
+def _check_order(arrival: Arrival, table: Table, key: str) -> None:
+    """Raise RecordingError where time goes back for good."""
+    if arrival.set_back is not None:
+        number, _, by = arrival.set_back
+        raise RecordingError(
+            f"time of '{key}' goes back by {by * 1e-9:.6g} s at sample {number + 1}, and goes on from there: the "
+            "clock was set back, or the logger started again",
+            where=str(table.path),
+            remedy="split the file there, and import each part as a recording of its own",
+        )
 
 
 def _why_empty(findings: Findings) -> str:
