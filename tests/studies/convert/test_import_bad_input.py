@@ -109,30 +109,17 @@ def test_doubtful_cells_are_kept_and_counted(tmp_path: Path) -> None:
     assert [f"{stated['name']}, {finding}" for finding in stated["findings"]] == notices
 
 
-ROW = "{},1,2,3,0\n"
-AGAIN = [*range(40), *range(40)]
-ZEROS = [*range(1000, 1040), *[0] * 40]
-
-
 @pytest.mark.parametrize(
-    ("times", "said"),
-    [(AGAIN, "starts again at row 41"), (ZEROS, "at row 41"), ([*range(40), *range(10**9, 10**9 + 40)], "gap of 1e")],
+    ("by", "said"),
+    [(3600.0, "summer to winter"), (43200.0, "twelve hours"), (65.536, "counter of 16 bits"), (40.0, "was set back")],
 )
-def test_times_of_no_one_recording_are_refused(tmp_path: Path, times: list[int], said: str) -> None:
-    (tmp_path / "run.csv").write_text("t,Fx,Fy,Fz,angle\n" + "".join(ROW.format(t) for t in times))
-    with pytest.raises(RecordingError, match=said):
+def test_why_time_goes_back_is_told_by_how_far(tmp_path: Path, by: float, said: str) -> None:
+    t = np.arange(20_000) * 0.01
+    t[10_000:] -= by
+    write_csv(tmp_path / "run.csv", {**signals(20_000), "t": t})
+    with pytest.raises(RecordingError, match="at sample 10001, and goes on from there: ") as caught:
         _import(tmp_path, "run.csv")
-
-
-@pytest.mark.parametrize("place", [0, 17, 39])
-def test_a_lone_time_far_from_all_others_is_left_out(tmp_path: Path, place: int) -> None:
-    times = [1_780_000_000 + i for i in range(40)]
-    times[place] = 0
-    (tmp_path / "run.csv").write_text("t,Fx,Fy,Fz,angle\n" + "".join(ROW.format(t) for t in times))
-    notices: list[str] = []
-    stamp, _ = read_back(_import(tmp_path, "run.csv", notices=notices), "turn_1")["wrench"]
-    assert len(stamp) == 39
-    assert f"1 rows have a time far from all others, left out (the first is row {place + 1})" in notices[0]
+    assert said in str(caught.value)
 
 
 def test_a_folder_with_something_in_it_is_left_alone(tmp_path: Path) -> None:
@@ -248,3 +235,40 @@ def test_the_description_is_taken_whole_and_from_its_folder_only(tmp_path: Path)
         with pytest.raises(ConfigError, match=said):
             import_recordings(plan, tmp_path, tmp_path / "other")
     assert not (tmp_path / "other").exists()
+
+
+@pytest.mark.parametrize(
+    ("rows", "stamps", "said"),
+    [
+        ([700], [12.5], "1 time stamps of 'wrench' do not fit where they stand, rows left out"),
+        (
+            [0, 1, 2],
+            [-1.78e9 + 1.0, -1.78e9 + 1.001, -1.78e9 + 1.002],
+            "3 time stamps of 'wrench' lie far from all others",
+        ),
+        (range(1200, 1500), [-1.78e9] * 300, "300 time stamps of 'wrench' do not fit where they stand, rows left out"),
+    ],
+)
+def test_rows_whose_time_fits_nowhere_are_left_out_and_counted(
+    tmp_path: Path, rows: list[int], stamps: list[float], said: str
+) -> None:
+    columns = signals(1500)
+    t = 1.78e9 + np.arange(1500) * 1e-3
+    t[list(rows)] = 1.78e9 + np.array(stamps)
+    write_csv(tmp_path / "run.csv", {**columns, "t": t})
+    notices: list[str] = []
+    found = read_back(_import(tmp_path, "run.csv", notices=notices), "turn_1")
+    assert any(said in line for line in notices)
+    good = np.delete(np.arange(1500), list(rows))
+    np.testing.assert_array_equal(found["encoder"][1][:, 0], columns["angle"][good])
+
+
+def test_time_that_starts_again_is_refused_with_its_row(tmp_path: Path) -> None:
+    columns = signals(3000)
+    t = np.concatenate([np.arange(2000), np.arange(1000) + 0.25]) * 1e-3
+    write_csv(tmp_path / "run.csv", {**columns, "t": t})
+    with pytest.raises(
+        RecordingError, match=r"goes back by 1.99\d+ s at sample 2001, .* logger started again"
+    ) as caught:
+        _import(tmp_path, "run.csv")
+    assert "split the file there" in str(caught.value)

@@ -64,6 +64,9 @@ class BandsTable(Table):
     )
 
 
+ChannelNumber = Annotated[int, Field(ge=0, le=65535)]  # in an MCAP file
+
+
 class TopicTable(Table):
     """A topic whose messages are laid out in some other way than plain ROS 2 messages."""
 
@@ -73,6 +76,9 @@ class TopicTable(Table):
         alias="fields",
         description='where in the message each channel is: "wrench.force.x", "position[az]"; default: plain ROS 2 '
         "messages whose names are the joints'",
+    )
+    channel: ChannelNumber | None = Field(
+        None, description="number of the MCAP channel that is read, where several publishers bring the topic"
     )
 
 

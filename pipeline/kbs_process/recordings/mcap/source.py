@@ -32,6 +32,7 @@ class Source:
     def __init__(self, path: Path) -> None:
         self.path = path
         self.start_ns: int | None = None  # log time of the first message
+        self._readings: list[Reading] = []
         self._losses: tuple[Loss, ...] = ()
         self._topics: tuple[TopicSummary, ...] | None = None
         self._summary: mcap.Summary | None = None
@@ -76,6 +77,11 @@ class Source:
         """What the recording has lost; complete once `read` is exhausted."""
         return self._losses
 
+    @property
+    def publishers(self) -> dict[str, tuple[int, ...]]:
+        """By stream, the channels that bring it by turns, as far as it is read."""
+        return {reading.stream.key: reading.publishers for reading in self._readings if reading.publishers}
+
     def read(self, streams: Sequence[Stream]) -> Iterator[tuple[str, Block]]:
         """Yield (key, block) for every stream wherever it has messages, in the order of the file.
 
@@ -86,7 +92,7 @@ class Source:
         container, counts = self._container(), Counter[int]()
         if self._indexed:
             self._require_topics(streams, container.dictionary)
-        readings = [Reading(stream, container) for stream in streams]
+        readings = self._readings = [Reading(stream, container) for stream in streams]
         wanting: dict[str, list[int]] = {}
         for place, stream in enumerate(streams):
             wanting.setdefault(stream.topic, []).append(place)
@@ -98,7 +104,7 @@ class Source:
             found = sorted((place, topic) for topic in channels for place in wanting.get(topic, ()))
             for place, topic in found:
                 block = readings[place].block(segment, channels[topic])
-                if len(block):
+                if block is not None and len(block):
                     yield streams[place].key, block
         self._learn(container, counts)
         self._conclude(container, counts)

@@ -16,6 +16,7 @@ from kbs_process.recordings.mcap.messages.decoders import Decoder, MessageType, 
 from kbs_process.recordings.mcap.messages.fields import Elements, Step, resolve
 from kbs_process.signals.records import Block, Loss, Stamps
 
+RETURNS = 2  # to a channel that was left for another of the same topic: there are two publishers
 SAMPLES = 64  # messages from which the numbers of a type without schema are learnt
 _NO_STAMP = "seconds beyond 2^33, or nanoseconds outside 0 to 999999999: mend the driver, or leave its stamp out"
 
@@ -28,6 +29,7 @@ class Stream:
     topic: str
     fields: tuple[str, ...]
     otherwise: str = ""  # what to do where no message has one of the elements that fields name
+    channel: int | None = None  # number of the one channel of the topic that is wanted; None: all
 
 
 @dataclass(slots=True, eq=False)
@@ -77,6 +79,33 @@ class _Plan:
     decode: Decoder
 
 
+@dataclass(slots=True)
+class _Turns:
+    """Which channels brought a topic, one after the other."""
+
+    seen: set[int] = field(default_factory=set)
+    last: int | None = None
+    returns: int = 0  # to a channel that had been left
+
+    def add(self, numbers: Sequence[int]) -> None:
+        for number in numbers:
+            if number != self.last:
+                self.returns += number in self.seen
+                self.seen.add(number)
+                self.last = number
+
+
+def _twice(blocks: Sequence[Block]) -> bool:
+    """Whether several channels bring the same messages, but for those that a chunk's edge parts."""
+    first, *others = blocks
+    for one in others:
+        common, mine, theirs = np.intersect1d(first.stamp, one.stamp, return_indices=True)
+        same = np.array_equal(first.values[mine], one.values[theirs], equal_nan=True)
+        if not same or 2 * len(common) < min(len(first), len(one)):
+            return False
+    return True
+
+
 class Reading:
     """The state of one stream during a pass."""
 
@@ -86,19 +115,32 @@ class Reading:
         self._plans: dict[int, _Plan] = {}
         self._tally = Tally()
         self._where = f"{container.path.name}, {stream.topic}"
+        self._turns = _Turns()
 
-    def block(self, segment: Segment, channels: Sequence[Described]) -> Block:
+    def block(self, segment: Segment, channels: Sequence[Described]) -> Block | None:
         """Return the stream's messages in the segment, in their order; `channels` are those of its topic there."""
+        channels = [one for one in channels if self.stream.channel in (None, one.number)]
+        numbers = [channel.number for channel in channels]
         parts = [self._decode(channel, segment) for channel in channels]
-        if len(parts) == 1:
-            return parts[0][1]
+        if len(parts) < 2:
+            self._turns.add(numbers)
+            return parts[0][1] if parts else None
         order = np.argsort(np.concatenate([places for places, _ in parts]))
         blocks = [block for _, block in parts]
+        lengths = [len(block) for block in blocks]
+        if not _twice(blocks):
+            came = np.repeat(numbers, lengths)[order]
+            self._turns.add(came[np.flatnonzero(np.diff(came, prepend=-1))].tolist())
         return Block(
             np.concatenate([block.stamp for block in blocks])[order],
             np.concatenate([block.log for block in blocks])[order],
             np.concatenate([block.values for block in blocks])[order],
         )
+
+    @property
+    def publishers(self) -> tuple[int, ...]:
+        """The channels that bring the topic by turns; none where each ends before the next begins."""
+        return tuple(sorted(self._turns.seen)) if self._turns.returns >= RETURNS else ()
 
     def losses(self) -> Iterator[Loss]:
         """Yield what the stream has lost."""

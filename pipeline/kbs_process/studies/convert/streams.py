@@ -12,13 +12,15 @@ import numpy as np
 from kbs_process.errors import RecordingError
 from kbs_process.recordings.tables import Cells, Table, find_column
 from kbs_process.signals.records import Array, Block, Mask, Stamps
+from kbs_process.stages.align.arrival import Arrival
+from kbs_process.stages.align.condense import SLOW
+from kbs_process.stages.align.stream import FAR_SLOW_NS
 from kbs_process.studies.convert.clock import nanoseconds, numbers
 from kbs_process.studies.convert.mapping import Channel, Mapping, StreamMap
 from kbs_process.studies.convert.mapping_file import Part, Time, Turn
 
 _NO_STAMPS = np.empty(0, dtype=np.int64)
-_FEWEST = 16  # rows that show what is usual
-_DAY_NS, _SECOND_NS = 86_400_000_000_000, 1_000_000_000
+_SET_BACK = {3600.0: "clocks went from summer to winter time", 43200.0: "it has twelve hours, without a.m. and p.m."}
 _TIMELESS = "rows have no time, left out"
 Piece = dict[str, Block]  # by stream key; the streams of one pass over the file
 
@@ -65,20 +67,50 @@ def read_part(table: Table, mapping: Mapping, part: Part, findings: Findings) ->
         end = first + round(part.end_s * 1e9) if np.isfinite(part.end_s) else end
 
     empty = set(streams)
-    for piece in _side_by_side(passes):
-        for key, block in piece.items():
-            inside = _select(block, (block.stamp >= start) & (block.stamp < end))
-            findings.check(key, inside)
-            if len(inside):
-                empty.discard(key)
-                yield streams[key], inside
+    arrivals = {key: Arrival(FAR_SLOW_NS) if key in SLOW else Arrival() for key in streams}
+    for key, inside in chain(
+        (
+            (key, arrivals[key].push(_select(block, (block.stamp >= start) & (block.stamp < end))))
+            for piece in _side_by_side(passes)
+            for key, block in piece.items()
+        ),
+        ((key, last) for key, arrival in arrivals.items() if (last := arrival.flush()) is not None),
+    ):
+        _check_order(arrivals[key], table, streams[key])
+        findings.check(key, inside)
+        if len(inside):
+            empty.discard(key)
+            yield streams[key], inside
     for what, count in table.odd.items():
         findings.counts[what] = count
+    for key, arrival in arrivals.items():
+        findings.counts[f"time stamps of '{key}' do not fit where they stand, rows left out"] += arrival.odd
+        findings.counts[f"time stamps of '{key}' lie far from all others, rows left out"] += arrival.lone
     for key in streams:
         if key in empty:
             raise RecordingError(
                 f"no sample of '{key}' for recording '{part.stem}'", where=str(table.path), remedy=_why_empty(findings)
             )
+
+
+def _check_order(arrival: Arrival, table: Table, stream: StreamMap) -> None:
+    """Raise RecordingError where time goes back for good."""
+    if arrival.set_back is None:
+        return
+    number, _, by = arrival.set_back
+    rate = stream.time.rate_Hz if stream.time is not None else None
+    ticks = [1.0, 1e3, 1e6] if rate is None else [1e9 / rate]
+    causes = {
+        2.0**bits * tick * 1e-9: f"a counter of {bits} bits began anew" for bits in (16, 24, 32) for tick in ticks
+    }
+    near = [cause for span, cause in (_SET_BACK | causes).items() if abs(by * 1e-9 - span) < 1e-3 * span]
+    raise RecordingError(
+        f"time of '{stream.key}' goes back by {by * 1e-9:.6g} s at sample {number + 1}, and goes on from there: "
+        + (near[0] if near else "the clock was set back, or the logger started again"),
+        where=str(table.path),
+        remedy="split the file there (of a text file, skip_rows and rows in the mapping's [text] take one part), and "
+        "import each part as a recording of its own; or give rate_Hz",
+    )
 
 
 def _why_empty(findings: Findings) -> str:
@@ -115,54 +147,6 @@ def _passes(streams: Sequence[StreamMap]) -> list[list[StreamMap]]:
     return passes
 
 
-@dataclass(slots=True)
-class _Clock:
-    """The times of a pass: lone ones far from all others are left out, and what is no one recording is refused."""
-
-    where: str
-    findings: Findings
-    rows: int = 0
-    first: int | None = None
-    latest: int = 0
-
-    def check(self, stamp: Stamps, known: Mask) -> Mask:
-        """Return which stamps of the next rows are of the recording."""
-        places = np.flatnonzero(known)
-        inside = stamp[places]
-        if len(inside) >= _FEWEST:
-            early, middle, late = np.quantile(inside, (0.1, 0.5, 0.9))
-            far = np.abs(inside - middle) > _DAY_NS + 1000.0 * (late - early)
-            if 0 < far.sum() <= max(1, len(inside) // 1000):
-                row = self.rows + int(places[far][0]) + 1
-                what = f"rows have a time far from all others, left out (the first is row {row})"
-                self.findings.counts[what] += int(far.sum())
-                known = known.copy()
-                known[places[far]] = False
-                places, inside = places[~far], inside[~far]
-        if len(inside):
-            self._refuse(places, inside)
-        self.rows += len(stamp)
-        return known
-
-    def _refuse(self, places: Stamps, stamp: Stamps) -> None:
-        self.first = int(stamp[0]) if self.first is None else self.first
-        reached = np.maximum.accumulate(np.concatenate([[max(self.latest, self.first)], stamp]))
-        span = reached[:-1] - self.first
-        again = (reached[:-1] - stamp > 0.9 * span) & (span > _SECOND_NS) & (self.rows + places >= _FEWEST)
-        stays = np.append(again[1:], True) | np.append(again[2:], [True, True])[: len(again)]
-        remedy = "split the file, or, of a text file, take one part by skip_rows and rows in the mapping's [text]"
-        if (again & stays).any():
-            row = self.rows + int(places[again & stays][0]) + 1
-            what = f"its time starts again at row {row}: two recordings in one file, or rows that were never written"
-            raise RecordingError(what, where=self.where, remedy=remedy)
-        steps = np.diff(reached[0 if self.latest else 1 :])
-        gap = int(steps.max(initial=0))
-        if gap > _DAY_NS and gap > 10 * (int(reached[-1]) - self.first - gap):
-            what = f"it has a gap of {gap / 1e9:.6g} s, far longer than all that was recorded"
-            raise RecordingError(what, where=self.where, remedy=remedy)
-        self.latest = int(reached[-1])
-
-
 def _pieces(table: Table, mapping: Mapping, streams: Sequence[StreamMap], findings: Findings) -> Iterator[Piece]:
     time = streams[0].time
     channels = [channel for stream in streams for channel in stream.channels]
@@ -180,13 +164,13 @@ def _pieces(table: Table, mapping: Mapping, streams: Sequence[StreamMap], findin
         clocks = [find_column(table, time.column).name] if time.column is not None else []
     wanted = list(dict.fromkeys([column.name for column in columns] + clocks))
     carry: dict[str, float] = {}
-    clock = _Clock(str(table.path), findings)
+    rows = 0
     for cells in table.chunks(wanted):
         named = dict(zip(wanted, cells, strict=True))
         _check_lengths(table, named)
-        stamp, timed = _stamps(table, time, clocks, named, clock.rows)
-        findings.counts[_TIMELESS] += int((~timed).sum())
-        known = clock.check(stamp, timed)
+        stamp, known = _stamps(table, time, clocks, named, rows)
+        rows += len(stamp)
+        findings.counts[_TIMELESS] += int((~known).sum())
         values = {
             channel.field: _si(named[column.name], channel, carry)
             for channel, column in zip(channels, columns, strict=True)
