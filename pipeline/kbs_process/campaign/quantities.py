@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from kbs_process.campaign.documents import within
 from kbs_process.campaign.formats.kind import CHANNELWISE, PAIRWISE, Kind
 from kbs_process.campaign.formats.tables import PlainQuantity, QuantityTable
 from kbs_process.campaign.units import UnitMismatchError, factor
@@ -62,7 +63,7 @@ def _extreme(array: Array) -> float:
 
 def _array(given: Any, key: str, folder: Path) -> Array:
     if isinstance(given, str):
-        return from_csv(folder / given, key)
+        return from_csv(within(folder, given, where=key), key)
     try:
         array = np.asarray(given, dtype=np.float64)
     except ValueError as error:

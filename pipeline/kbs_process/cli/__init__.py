@@ -9,6 +9,7 @@ import io
 import os
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 
 import click
 
@@ -37,6 +38,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
         if any("\ud800" <= letter <= "\udfff" for letter in word):  # bytes that are no UTF-8
             complain(f"error: '{word}' is no name in UTF-8\n  -> rename the file or folder")
             sys.exit(BAD_INPUT)
+    try:
+        Path.cwd()
+    except FileNotFoundError:
+        complain("error: the folder that this terminal is in was removed\n  -> change to another one: cd")
+        sys.exit(BAD_INPUT)
     try:
         with interruption.heeded():
             cli.main([word for word in words if word != "--debug"], prog_name="kbs-process", standalone_mode=False)
