@@ -12,7 +12,9 @@ import pytest
 from kbs_process.campaign.load import load_campaign
 from kbs_process.errors import ConfigError, KbsError, OutputError, RecordingError
 from kbs_process.recordings import isolated
+from kbs_process.studies.convert.clock import nanoseconds
 from kbs_process.studies.convert.describe import describe
+from kbs_process.studies.convert.mapping_file import Time
 from kbs_process.studies.convert.run import import_recordings
 from studies.convert.importer_files import (
     CAMPAIGN,
@@ -114,12 +116,30 @@ def test_doubtful_cells_are_kept_and_counted(tmp_path: Path) -> None:
     [(3600.0, "summer to winter"), (43200.0, "twelve hours"), (65.536, "counter of 16 bits"), (40.0, "was set back")],
 )
 def test_why_time_goes_back_is_told_by_how_far(tmp_path: Path, by: float, said: str) -> None:
-    t = np.arange(20_000) * 0.01
-    t[10_000:] -= by
-    write_csv(tmp_path / "run.csv", {**signals(20_000), "t": t})
-    with pytest.raises(RecordingError, match="at sample 10001, and goes on from there: ") as caught:
+    t = np.arange(4000) * 0.05
+    t[2000:] -= by
+    write_csv(tmp_path / "run.csv", {**signals(4000), "t": t})
+    with pytest.raises(RecordingError, match="at sample 2001, and goes on from there: ") as caught:
         _import(tmp_path, "run.csv")
     assert said in str(caught.value)
+
+
+@pytest.mark.parametrize(("digits", "rows"), [(0, 1998), (1, 1980), (2, 1800)])
+def test_times_coarser_than_the_rows_are_refused(tmp_path: Path, digits: int, rows: int) -> None:
+    t = np.floor(np.arange(2000) * 0.001 * 10**digits) / 10**digits
+    write_csv(tmp_path / "run.csv", {**signals(2000), "t": t})
+    with pytest.raises(RecordingError, match=f"too coarse: {rows} of 2000") as caught:
+        _import(tmp_path, "run.csv")
+    assert "give rate_Hz" in str(caught.value)
+
+
+def test_times_as_floats_of_32_bits_are_refused_where_they_are_too_coarse() -> None:
+    t = np.arange(2000) * 0.01
+    with pytest.raises(RecordingError, match=r"floats of 32 bits know these times to 0.00781 s .* every 0.01"):
+        nanoseconds((t + 1e5).astype(np.float32), Time.model_construct(), "t")
+    stamp, known = nanoseconds((t + 100.0).astype(np.float32), Time.model_construct(), "t")
+    assert known.all()
+    np.testing.assert_allclose(stamp * 1e-9, t + 100.0, atol=1e-5)
 
 
 def test_a_folder_with_something_in_it_is_left_alone(tmp_path: Path) -> None:

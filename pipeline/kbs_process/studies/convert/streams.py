@@ -21,6 +21,7 @@ from kbs_process.studies.convert.mapping_file import Part, Time, Turn
 
 _NO_STAMPS = np.empty(0, dtype=np.int64)
 _SET_BACK = {3600.0: "clocks went from summer to winter time", 43200.0: "it has twelve hours, without a.m. and p.m."}
+_FEWEST = 16  # rows that show how fine times are
 _TIMELESS = "rows have no time, left out"
 Piece = dict[str, Block]  # by stream key; the streams of one pass over the file
 
@@ -31,6 +32,8 @@ class Findings:
 
     counts: Counter[str] = field(default_factory=Counter)
     last: dict[str, int] = field(default_factory=dict)  # stream -> its last stamp
+    rows: Counter[str] = field(default_factory=Counter)  # by stream
+    repeats: Counter[str] = field(default_factory=Counter)  # stamps as the one before, by stream
 
     def check(self, key: str, block: Block) -> None:
         """Count cells without a number and stamps that do not grow."""
@@ -38,13 +41,16 @@ class Findings:
         self.counts[f"values of '{key}' are infinite, kept"] += int(np.isinf(block.values).sum())
         if len(block):
             steps = np.diff(block.stamp, prepend=self.last.get(key, int(block.stamp[0]) - 1))
-            self.counts[f"time stamps of '{key}' repeat the one before, kept"] += int((steps == 0).sum())
+            self.rows[key] += len(block)
+            self.repeats[key] += int((steps == 0).sum())
             self.counts[f"time stamps of '{key}' lie before their predecessor, put in order"] += int((steps < 0).sum())
             self.last[key] = int(block.stamp[-1])
 
     def lines(self) -> tuple[str, ...]:
         """Return what was found, most frequent first."""
-        return tuple(f"{count} {what}" for what, count in self.counts.most_common() if count)
+        repeats = {f"time stamps of '{key}' repeat the one before, kept": n for key, n in self.repeats.items()}
+        found = Counter(self.counts | Counter(repeats))
+        return tuple(f"{count} {what}" for what, count in found.most_common() if count)
 
 
 def read_part(table: Table, mapping: Mapping, part: Part, findings: Findings) -> Iterator[tuple[StreamMap, Block]]:
@@ -87,6 +93,13 @@ def read_part(table: Table, mapping: Mapping, part: Part, findings: Findings) ->
         findings.counts[f"time stamps of '{key}' do not fit where they stand, rows left out"] += arrival.odd
         findings.counts[f"time stamps of '{key}' lie far from all others, rows left out"] += arrival.lone
     for key in streams:
+        if findings.rows[key] >= _FEWEST and 2 * findings.repeats[key] >= findings.rows[key]:
+            raise RecordingError(
+                f"the times of '{key}' are too coarse: {findings.repeats[key]} of {findings.rows[key]} are those of "
+                "the row before",
+                where=str(table.path),
+                remedy="give rate_Hz in the mapping's [time] if rows come at an even rate, else times of more digits",
+            )
         if key in empty:
             raise RecordingError(
                 f"no sample of '{key}' for recording '{part.stem}'", where=str(table.path), remedy=_why_empty(findings)
