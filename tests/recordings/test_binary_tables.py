@@ -201,6 +201,7 @@ def test_parquet_kinds(tmp_path: Path) -> None:
         "flag": pa.array((T > 2).tolist()),
         "zone": pa.array(stamps, pa.timestamp("us", "America/New_York")),
         "lasts": pa.array((T * 1e9).astype("i8"), pa.duration("ns")),
+        "half": pa.array([None, *(T[1:] + 1e5)], pa.float32()),
         "list": pa.array([[1.0]] * 20),
         "struct": pa.array([{"a": 1.0}] * 20),
     }
@@ -213,6 +214,7 @@ def test_parquet_kinds(tmp_path: Path) -> None:
     np.testing.assert_array_equal(column(table, "flag"), T > 2)
     np.testing.assert_array_equal(column(table, "lasts"), T)
     np.testing.assert_array_equal(cells(table, "zone"), stamps.astype("M8[ns]"))
+    assert cells(table, "half").dtype == np.float32  # which tells how coarse times are
     assert all(told(table, name) for name in ("list", "struct"))
     twice = pa.Table.from_arrays([pa.array(T), pa.array(T), pa.array(T)], names=["a", "a", "b"])
     pq.write_table(twice, tmp_path / "b.parquet")
@@ -251,13 +253,16 @@ def test_tdms_that_breaks_off_and_an_index_of_another_file(tmp_path: Path) -> No
     assert "breaks off" in next(iter(table.odd))
 
 
-def mdf(path: Path, **options: Any) -> Table:
+def mdf(path: Path, times: Any = T, **options: Any) -> Table:
     asammdf = pytest.importorskip("asammdf")
     invalid = np.zeros(20, bool)
     invalid[3:5] = True
     with asammdf.MDF(version="4.10") as file:
         file.append(
-            [asammdf.Signal(T, T, name="a", **options), asammdf.Signal(T, T, name="b", invalidation_bits=invalid)]
+            [
+                asammdf.Signal(T, times, name="a", **options),
+                asammdf.Signal(T, times, name="b", invalidation_bits=invalid),
+            ]
         )
         file.start_time = np.datetime64("2026-01-31T12:00:00").astype(object)
         file.save(path, overwrite=True)
@@ -278,3 +283,11 @@ def test_mdf_masters_that_are_no_time(tmp_path: Path, kind: tuple[str, int]) -> 
     table = mdf(tmp_path / "a.mf4", master_metadata=kind)
     assert all(not one.clock for one in table.columns)
     assert kind[0] in told(table, "0: time")
+
+
+@pytest.mark.slow
+def test_mdf_masters_of_half_size_that_are_too_coarse(tmp_path: Path) -> None:
+    assert not told(mdf(tmp_path / "a.mf4", times=T.astype(np.float32)), "0: time")
+    table = mdf(tmp_path / "b.mf4", times=(T + 4e6).astype(np.float32))
+    assert "floats of 32 bits know these times to 0.25 s only; rows come every 0.5" in told(table, "0: time")
+    assert all(not one.clock for one in table.columns)

@@ -21,6 +21,7 @@ Slice = Callable[[int, int], Cells]
 CHUNK_ROWS = 65536
 CHUNK_CELLS = 64 * CHUNK_ROWS
 LONGEST_TEXT = 100  # characters of a cell: what is longer is no number, and no date
+_COARSE = 0.2  # of the step of times: what they may be rounded to
 _NUMBER = re.compile(r"\s*[+-]?((\d+\.?\d*|\.\d+)(e[+-]?\d+)?|inf|infinity|nan)\s*", re.IGNORECASE | re.ASCII)
 
 
@@ -29,6 +30,20 @@ def stamps_after(start: Any, seconds: Any) -> Cells:
     known = np.abs(seconds) < 9e9  # False for NaN too
     ns = np.rint(np.where(known, seconds, 0.0) * 1e9).astype("timedelta64[ns]")
     return np.where(known, np.datetime64(start, "ns") + ns, np.datetime64("NaT", "ns"))
+
+
+def too_coarse(times: Cells, unit: float = 1.0) -> str:
+    """Say why times (n,), in units of so many s, are too coarse: floats of half size have seven digits."""
+    known = times[np.isfinite(times)] if times.dtype.kind == "f" and times.dtype.itemsize < 8 else times[:0]
+    if len(known) < 2:
+        return ""
+    early, late = np.quantile(known.astype(np.float64), (0.1, 0.9))
+    step = float(late - early) / (0.8 * (len(known) - 1))
+    digit = float(np.spacing(np.abs(known).max()))
+    if digit <= _COARSE * step:
+        return ""
+    size = 8 * times.dtype.itemsize
+    return f"floats of {size} bits know these times to {digit * unit:.3g} s only; rows come every {step * unit:.3g} s"
 
 
 LeftOut = tuple[str, ...]  # what a file holds and no column shows, each with why

@@ -135,7 +135,9 @@ def test_times_coarser_than_the_rows_are_refused(tmp_path: Path, digits: int, ro
 
 def test_times_as_floats_of_32_bits_are_refused_where_they_are_too_coarse() -> None:
     t = np.arange(2000) * 0.01
-    with pytest.raises(RecordingError, match=r"floats of 32 bits know these times to 0.00781 s .* every 0.01"):
+    with pytest.raises(
+        RecordingError, match=r"floats of 32 bits know these times to 0.00781 s only; rows come every 0.01 s"
+    ):
         nanoseconds((t + 1e5).astype(np.float32), Time.model_construct(), "t")
     stamp, known = nanoseconds((t + 100.0).astype(np.float32), Time.model_construct(), "t")
     assert known.all()

@@ -11,7 +11,18 @@ from typing import Any
 import numpy as np
 
 from kbs_process.recordings.formats import Format, Text
-from kbs_process.recordings.tables import Cells, Column, Item, Series, SeriesTable, Slice, stamps_after, texts
+from kbs_process.recordings.tables import (
+    CHUNK_ROWS,
+    Cells,
+    Column,
+    Item,
+    Series,
+    SeriesTable,
+    Slice,
+    stamps_after,
+    texts,
+    too_coarse,
+)
 
 _SYNCHRONISED_BY = {2: "an angle", 3: "a distance", 4: "an index"}  # of a group's master, which else is time
 
@@ -38,6 +49,10 @@ def _series(path: Path) -> Iterator[Item]:
         other = "" if master is None else _SYNCHRONISED_BY.get(getattr(group.channels[master], "sync_type", 1), "")
         if other:
             yield f"{number}: time: the master of that group is {other}, and no time"
+        elif master is not None and group.channels[master].dtype_fmt.kind == "f":
+            last = _master(file, number, max(0, rows - CHUNK_ROWS), CHUNK_ROWS).astype(group.channels[master].dtype_fmt)
+            if other := too_coarse(last):
+                yield f"{number}: time: {other}"
         clock = "" if master is None or other else f"{number}: time"
         if clock:
             yield Series(Column(clock, "datetime"), rows, _time(file, number, rows, start))
@@ -58,6 +73,10 @@ def _read(file: Any, group: int, index: int, first: int, count: int) -> tuple[An
     return np.asarray(signal.samples), signal.invalidation_bits
 
 
+def _master(file: Any, group: int, first: int, count: int) -> Cells:
+    return np.asarray(file.get_master(group, record_offset=first, record_count=count), dtype=np.float64)
+
+
 def _data(file: Any, group: int, index: int, rows: int) -> Slice:
     def read(first: int, count: int) -> Cells:
         if first >= rows:
@@ -75,8 +94,7 @@ def _time(file: Any, group: int, rows: int, start: Any) -> Slice:
     def read(first: int, count: int) -> Cells:
         if first >= rows:
             return np.empty(0, dtype="datetime64[ns]")
-        master = file.get_master(group, record_offset=first, record_count=min(count, rows - first))
-        return stamps_after(start, np.asarray(master, dtype=np.float64))
+        return stamps_after(start, _master(file, group, first, min(count, rows - first)))
 
     return read
 

@@ -65,11 +65,11 @@ def _cells(array: Any) -> Cells:
     if pa.types.is_duration(kind):
         ns = array.cast(pa.duration("ns")).to_numpy(zero_copy_only=False)
         return np.where(np.isnat(ns), np.nan, ns.astype(np.int64) / 1e9)
-    if pa.types.is_integer(kind) and array.null_count == 0:
+    if pa.types.is_floating(kind) or (pa.types.is_integer(kind) and array.null_count == 0):
         return np.asarray(array.to_numpy(zero_copy_only=False))
     if pa.types.is_decimal(kind):
         return np.array([float("nan") if cell is None else float(cell) for cell in array.to_pylist()])
-    if pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_boolean(kind):
+    if pa.types.is_integer(kind) or pa.types.is_boolean(kind):
         array = array.cast(pa.int8()) if pa.types.is_boolean(kind) else array
         return np.asarray(array.cast(pa.float64(), safe=False).to_numpy(zero_copy_only=False))
     return texts("" if cell is None else str(cell) for cell in array.to_pylist())

@@ -10,13 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kbs_process.errors import RecordingError
-from kbs_process.recordings.tables import Cells, number
+from kbs_process.recordings.tables import Cells, number, too_coarse
 from kbs_process.signals.records import Array, Mask, Stamps
 from kbs_process.studies.convert.mapping_file import Time
 
 _NS = {"s": 1_000_000_000, "ms": 1_000_000, "us": 1000, "ns": 1, "min": 60_000_000_000}
 _GREATEST = 2.0**63 - 1024.0  # ns, the greatest double that an int64 holds
-_COARSE = 0.2  # of the step of times: what they may be rounded to
 
 
 def numbers(cells: Cells) -> Array:
@@ -42,29 +41,15 @@ def nanoseconds(cells: Cells, time: Time, where: str) -> tuple[Stamps, Mask]:
     if time.unit == "datetime":
         return _from_texts(cells, where)
     start = epoch_ns(time.start)
-    if cells.dtype.kind == "f" and cells.dtype.itemsize < 8:
-        _check_resolution(cells, _NS[time.unit] if time.rate_Hz is None else 1e9 / time.rate_Hz, where)
+    if why := too_coarse(cells, 1e-9 * _NS[time.unit] if time.rate_Hz is None else 1.0 / time.rate_Hz):
+        remedy = "give rate_Hz in the mapping's [time], or record times as 64 bits"
+        raise RecordingError(why, where=where, remedy=remedy)
     if time.rate_Hz is not None:
         return _rounded(numbers(cells) / time.rate_Hz * 1e9, start)
     scale = _NS[time.unit]
     if cells.dtype.kind in "iu" and np.abs(cells.astype(np.float64)).max(initial=0.0) * scale < _GREATEST:
         return cells.astype(np.int64) * scale + start, np.ones(len(cells), dtype=np.bool_)
     return _rounded(numbers(cells) * scale, start)
-
-
-def _check_resolution(cells: Cells, scale: float, where: str) -> None:
-    """Raise RecordingError where floats of half size hold times too coarsely: they have seven digits."""
-    known = cells[np.isfinite(cells)]
-    early, late = np.quantile(known.astype(np.float64), (0.1, 0.9)) if len(known) else (0.0, 0.0)
-    step = float(late - early) / (0.8 * max(len(known) - 1, 1))
-    unit = float(np.spacing(np.abs(known).max(initial=0.0)))
-    if len(known) > 1 and unit > _COARSE * step:
-        raise RecordingError(
-            f"floats of {8 * cells.dtype.itemsize} bits know these times to {unit * scale * 1e-9:.3g} s only, where "
-            f"rows come every {step * scale * 1e-9:.3g} s",
-            where=where,
-            remedy="give rate_Hz in the mapping's [time], or record times as 64 bits",
-        )
 
 
 def epoch_ns(start: datetime | None) -> int:
