@@ -71,6 +71,7 @@ class _Plan:
     fields: tuple[str, ...] = ()
     names: tuple[str, ...] = ()
     note: str = ""
+    damaged: bool = False  # none of its first messages can be decoded
 
 
 class _Gathered:
@@ -81,7 +82,7 @@ class _Gathered:
         self.count = 0
         self.start: int | None = None
         self.end: int | None = None
-        self.refused = ""  # why processing refuses it
+        self.refused = plan.note if plan.damaged else ""  # why processing refuses it
         self.low = np.full(columns, np.inf)
         self.high = np.full(columns, -np.inf)
         self.not_finite = np.zeros(columns, dtype=np.int64)
@@ -176,6 +177,8 @@ def _plan(sample: Sample | str | None) -> _Plan:
     """Plan for every number of a topic, and the elements of its sequences that one message has."""
     if sample is None or isinstance(sample, str):
         return _Plan(note=sample or "no messages")
+    if fault := sample.fault():
+        return _Plan(note=fault, damaged=True)
     fields: list[str] = []
     names: tuple[str, ...] = ()
     for entry in sample.type.fields:
@@ -202,7 +205,7 @@ def _conclude(topic: TopicSummary, plan: _Plan, gathered: _Gathered) -> TopicIns
         gathered.start,
         gathered.end,
         gathered.line.grid.rate if gathered.line.grid is not None else None,
-        gathered.ranges(plan.fields),
+        gathered.ranges(plan.fields) if gathered.count else (),
         plan.names,
         plan.note,
     )

@@ -81,7 +81,7 @@ CHAIN = "\n".join(["p/A1 x", *(f"===\nMSG: p/A{i}\np/A{i + 1} x" for i in range(
         ("p/E[1000000000000] x\n===\nMSG: p/E\nfloat64 y", ""),
         ("p/E[1000000000000] x\n===\nMSG: p/E", ""),
         ("string[1000000000000] x", ""),
-        ("float64[1000000000000] x", ""),
+        ("float64[1000000000000] x", "too early"),
         (CHAIN, "too much"),
     ],
 )
@@ -192,3 +192,18 @@ def test_the_gaps_of_many_topics_take_no_room(tmp_path: Path) -> None:
     path = tmp_path / "a.mcap"
     write_mcap(path, [OutStream(f"/t{i}", "temperature", stamp, stamp, np.ones((100, 1))) for i in range(3)])
     assert [one.rate_Hz for one in inspect_recording(path).topics] == [100] * 3
+
+
+@pytest.mark.parametrize(
+    ("start", "why"), [(b"\0\7\0\0", "XCDR2"), (b"\x28\xb5\x2f\xfd", "compression-mode"), (b"abcd", "no plain CDR")]
+)
+def test_a_topic_of_sequences_that_cannot_be_decoded_is_told(tmp_path: Path, start: bytes, why: str) -> None:
+    path = tmp_path / "a.mcap"
+    path.write_bytes(build([(10**7 * i, start + bytes(32)) for i in range(100)], JOINTS, "cdr"))
+    inspection = inspect_recording(path)
+    (topic,), (loss,) = inspection.topics, inspection.losses
+    assert inspection.state == "lossy"
+    assert loss.count == topic.count == 100
+    assert why in loss.detail
+    assert why in topic.note
+    assert not topic.ranges

@@ -123,7 +123,8 @@ class Source:
                     rows = segment.table[AT, places], segment.table[SIZE, places]
                     for sample in _samples(channel, payloads(segment.buffer, *rows), payloads(segment.buffer, *rows)):
                         tells = isinstance(sample, str) or sample.tells()
-                        if tells or channel.topic not in found:
+                        before = found.get(channel.topic)
+                        if tells or before is None or (isinstance(before, Sample) and before.fault()):
                             found[channel.topic] = sample
                         tried[channel.topic] += 1
                         if tells or tried[channel.topic] >= SAMPLES:

@@ -65,9 +65,21 @@ class Sample:
             return Elements((), 0)
 
     def tells(self) -> bool:
-        """Whether the message shows how long sequences are: a first one may be damaged, or hold nothing yet."""
-        sequences = [field.path for field in self.type.fields if field.count is not None]
+        """Whether the message shows how long sequences are: a first one may hold nothing yet."""
+        sequences = self._sequences()
         return not sequences or any(self.elements(path).count for path in sequences)
+
+    def fault(self) -> str:
+        """Say why the message's sequences cannot be decoded, "" where they can."""
+        try:
+            for path in self._sequences():
+                self.type.elements(self.payload, path)
+        except MalformedError as error:
+            return str(error)
+        return ""
+
+    def _sequences(self) -> list[str]:
+        return [field.path for field in self.type.fields if field.count is not None]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
