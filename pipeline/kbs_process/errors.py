@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable
 from difflib import get_close_matches
 
+_LISTED = 40  # names that an error tells
+_COMPARED = 2000  # names that one may be meant by
+
 
 class KbsError(Exception):
     """An error that ends the command with one clear message and `exit_status`."""
@@ -57,7 +60,9 @@ def did_you_mean(word: str, known: Iterable[str], taken: Collection[str] = (), b
     Each is told with what stands `before` it.
     """
     names = sorted(known)
-    close = get_close_matches(word, [name for name in names if name not in taken], n=1, cutoff=0.6)
+    free = [name for name in names if name not in taken and abs(len(name) - len(word)) <= len(word)]
+    close = get_close_matches(word[:200], free[:_COMPARED], n=1, cutoff=0.6)
     if close:
         return f"did you mean '{before}{close[0]}'?"
-    return "known: " + ", ".join(before + name for name in names) if names else "nothing is known here"
+    more = f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
+    return "known: " + ", ".join(before + name for name in names[:_LISTED]) + more if names else "nothing is known here"

@@ -122,13 +122,23 @@ FAULTS = {
     "unknown drive parameter": (DRIVES, "Tmax =", "Tmx =", ["joint.az.drive.parameters.Tmx", "did you mean 'Tmax'"]),
     "drive parameter out of bounds": (DRIVES, "delta = { value = 0.5", "delta = { value = 5.0", ["delta", "out of bounds"]),
     "gains of another rig": (DRIVES, "Kp = { value = [0.05, 0.05]", "Kp = { value = [0.05]", ["controller.Kp.value", "array of 2"]),
+    "bands of one name": (CAMPAIGN, "[1.0, 2.0]", "[1.0, 1.0000001, 2.0]", ["bands.low_pass_Hz", "would be called lt1Hz"]),
+    "rate far beyond the bands": (CAMPAIGN, "working_rate_Hz = 20.0", "working_rate_Hz = 1e5", ["more than 100 times", "2 Hz"]),
+    "high-pass beyond computing": (CAMPAIGN, "high_pass_Hz = 0.01", "high_pass_Hz = 1e-9", ["bands.high_pass_Hz", "cannot be cut"]),
+    "mass beyond all": (RIG, "value = 8.0", "value = 1e308", ["body.base.mass.value", "1e+308 in SI", "less than 1e+12"]),
+    "no stiffness": (RIG, "[4000, 4000, 6000]", "[1e-308, 4000, 6000]", ["transducer.stiffness.value", "1e-308 in SI", "1e-15"]),
+    "endless bias": (RIG, "bias = { value = [0,", "bias = { value = [1e12,", ["transducer.bias.value", "so large"]),
+    "cycle of a microsecond": (DRIVES, "cycle = { value = 0.1", "cycle = { value = 1e-6", ["controller.cycle.value", "at least 1e-05"]),
+    "latency for ever": (DRIVES, "latency = 1", "latency = 1e12", ["controller.latency", "greater than 1e+06"]),
+    "half a cycle": (DRIVES, "latency = 1", "latency = 1.5", ["controller.latency", "is a number, not a whole number"]),
+    "coupling that cannot be inverted": (RIG, "[0.0010, 0.0020, 0.0000, 0.0300, -0.0400, 0.0100]", "[0, 0, -1.0, 0, 0, 0]", ["cross_coupling"]),
     "no controller": (DRIVES, "loop = ", "# ", ["controller.loop", "is missing"]),
 }  # fmt: skip
 
 # Told at another line than that which was changed: the key is gone, or another one shows the fault.
 ELSEWHERE = {
     "unknown effect", "rate too low", "repeat twice", "recording twice", "no commands", "loop", "given twice",
-    "missing parameter file", "stiffness without damping", "absent drive parameter", "no controller",
+    "missing parameter file", "coupling that cannot be inverted", "stiffness without damping", "absent drive parameter", "no controller",
 }  # fmt: skip
 
 
@@ -144,6 +154,18 @@ def test_fault_is_refused(folder: CampaignFolder, fault: str) -> None:
     assert file in message
     if fault not in ELSEWHERE:
         assert f"{file}:{line}: " in message
+
+
+def test_a_whole_number_may_be_written_with_a_point(folder: CampaignFolder) -> None:
+    folder.replace(DRIVES, "latency = 1", "latency = 1.0")
+    folder.replace(RIG, "order = 2", "order = 2.0")
+    folder.replace(CAMPAIGN, "repeat = 1", "repeat = 1.0")
+    folder.replace(CAMPAIGN, "schema = 1", "schema = 1.0")
+    campaign = load_campaign(folder.path)
+    assert campaign.rig.controller is not None
+    assert campaign.rig.transducer.amplifier is not None
+    whole = (campaign.rig.controller.latency, campaign.rig.transducer.amplifier.order, campaign.recordings[0].repeat)
+    assert [(number, type(number)) for number in whole] == [(1, int), (2, int), (1, int)]
 
 
 def test_no_campaign_file(folder: CampaignFolder) -> None:

@@ -20,7 +20,7 @@ from kbs_process.campaign.writing.corrected_model import write_model
 from kbs_process.diagnosis.experiments.hypothesis import Hypothesis
 from kbs_process.diagnosis.proposing.measured import inserted
 from kbs_process.plant.laws.position.measured_law import MEASURED
-from kbs_process.recordings.inspection import inspect_recording
+from kbs_process.reduction.inspection import inspect_recording
 from kbs_process.rig.model import Quantity
 from kbs_process.signals.records import Array
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from math import isclose
 from pathlib import Path
 
@@ -18,6 +19,8 @@ from kbs_process.results.provenance import sha256
 from kbs_process.rig.model import LAB, Joint, Quantity
 
 _KEPT = 0.4  # of the working rate: decimation changes nothing below (stages.resample)
+_SLOWEST, _FASTEST = 2e-4, 0.25  # of the working rate: high-passes that can be computed (stages.lowfrequency)
+_MOST_WORKING = 100.0  # times the greatest edge: beyond it, samples tell nothing and only cost
 _DERIVED = 8.0  # times the widest band: angles are differentiated up to twice that, by filters that need as much again
 
 
@@ -194,6 +197,17 @@ class _Checks:
     def bands(self) -> None:
         bands = self.campaign.bands
         key, widest = ("bands", "low_pass_Hz"), bands.low_pass[-1]
+        for lower, upper in pairwise(bands.low_pass):
+            if f"{lower:g}" == f"{upper:g}":
+                what = f"{lower} Hz and {upper} Hz differ too little: both bands would be called lt{lower:g}Hz"
+                self._note(key, what, "keep one of them")
+        if bands.working_rate > _MOST_WORKING * widest:
+            what = f"{bands.working_rate:g} Hz is more than {_MOST_WORKING:g} times the greatest edge, {widest:g} Hz"
+            self._note(("bands", "working_rate_Hz"), what, "lower it (10 times the greatest edge is plenty)")
+        least, most = _SLOWEST * bands.working_rate, _FASTEST * bands.working_rate
+        if bands.high_pass and not least <= bands.high_pass <= most:
+            what = f"{bands.high_pass:g} Hz cannot be cut at the working rate, only {least:g} to {most:g} Hz"
+            self._note(("bands", "high_pass_Hz"), what, "give 0 for no high-pass, or another working rate")
         if bands.low_pass[0] <= bands.high_pass:
             what = f"{bands.low_pass[0]:g} Hz is not above the high-pass, {bands.high_pass:g} Hz"
             self._note(key, what, "give greater edges, or lower high_pass_Hz")

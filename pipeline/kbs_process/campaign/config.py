@@ -59,6 +59,7 @@ class Topic:
     fields: tuple[str, ...]  # place of each channel in a message: "wrench.force.x", "position[az]"
     channels: tuple[str, ...]  # names of the channels: "Fx"; "az"; "az.rate"
     units: tuple[str, ...]  # of the channels, SI
+    channel: int | None = None  # of the file, where several publishers bring the topic; None: all
 
 
 @dataclass(frozen=True, slots=True)

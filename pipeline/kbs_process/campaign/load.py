@@ -153,10 +153,11 @@ def _topics(named: TopicsTable, rig: Rig) -> Topics:
     def topic(given: str | TopicTable | None, key: str, fields: tuple[str, ...], units: dict[str, str]) -> Topic | None:
         if given is None:
             return None
+        channel = None
         if isinstance(given, TopicTable):
-            fields = tuple(given.fields_ or fields)
+            fields, channel = tuple(given.fields_ or fields), given.channel
             given = given.topic
-        return Topic(key, given, fields, tuple(units), tuple(units.values()))
+        return Topic(key, given, fields, tuple(units), tuple(units.values()), channel)
 
     both = joints | {f"{name}.rate": unit for name, unit in rates.items()}
     effort_units = {f"{name}.effort": unit for name, unit in efforts.items()}

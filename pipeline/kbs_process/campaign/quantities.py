@@ -16,6 +16,8 @@ from kbs_process.rig.model import Quantity
 from kbs_process.signals.records import WRENCH_CHANNELS, WRENCH_UNITS, Array
 
 _NEAREST = 1e-6  # of the distance from its bound: what a number is that must not reach it
+# Of what is measured or made, in SI. Beyond them, squares and ratios of numbers are none that can be computed with.
+MOST, LEAST = 1e12, 1e-15
 
 
 def read_quantity(name: str, table: QuantityTable | PlainQuantity, kind: Kind, folder: Path) -> Quantity:
@@ -30,8 +32,13 @@ def read_quantity(name: str, table: QuantityTable | PlainQuantity, kind: Kind, f
     with np.errstate(over="ignore"):
         value, sigma = value * scale, sigma * scale
     for key, array in (("value", value), ("sigma", sigma)):
-        if not np.isfinite(array).all():
-            raise ConfigError("is beyond all numbers in SI", where=key, remedy="check number and unit")
+        if not (np.abs(array) < MOST).all():
+            what = f"is {_extreme(array):.3g} in SI: nothing on a test bench is so large"
+            raise ConfigError(what, where=key, remedy=f"check number and unit; give less than {MOST:g}")
+        tiny = (array != 0.0) & (np.abs(array) < LEAST)
+        if (key == "sigma" or kind.strict) and tiny.any():
+            what = f"is {array[tiny].flat[0]:.3g} in SI: nothing on a test bench is so small"
+            raise ConfigError(what, where=key, remedy=f"check number and unit; give {LEAST:g} or more")
     if (sigma < 0.0).any():
         raise ConfigError("a standard deviation is negative", where="sigma", remedy="give 0 or more")
     if kind.low is not None and ((value <= kind.low) if kind.strict else (value < kind.low)).any():
@@ -55,6 +62,11 @@ def quantity_or_fault(
     except ConfigError as error:
         zero = np.zeros(kind.shape)
         return Quantity(name, zero, kind.unit, zero, ""), error
+
+
+def _extreme(array: Array) -> float:
+    """Return the element that is largest, or none of the numbers that there are."""
+    return float(array.flat[int(np.argmax(np.where(np.isfinite(array), np.abs(array), np.inf)))])
 
 
 def _array(given: Any, key: str, folder: Path) -> Array:

@@ -47,6 +47,8 @@ from kbs_process.rig.model import (
     unit_of,
 )
 
+_MOST_COUPLED = 1e6  # condition of a transducer's matrix, its rows scaled
+
 
 @dataclass(frozen=True, slots=True)
 class RigBuilder:
@@ -116,6 +118,7 @@ class RigBuilder:
     def _transducer(self, table: TransducerTable) -> Transducer:
         channels = tuple(table.channels)
         own = self._quantities(table, "transducer", channels=channels)
+        self._check_coupling(own["cross_coupling"])
         amplifier = table.amplifier
         return Transducer(
             on=table.on,
@@ -127,6 +130,15 @@ class RigBuilder:
             damping=own.pop("damping", None),
             **own,
         )
+
+    def _check_coupling(self, coupling: Quantity) -> None:
+        """The wrench is what the channels read, times the inverse of I + coupling."""
+        matrix = np.eye(len(coupling.value)) + coupling.value
+        scale = np.abs(matrix).max(axis=1, keepdims=True)  # rows of forces and of torques have other units
+        if not scale.all() or np.linalg.cond(matrix / np.where(scale == 0.0, 1.0, scale)) > _MOST_COUPLED:
+            place = self.tables.place(("transducer", "cross_coupling", "value"))
+            what = "leaves channels that tell nothing of their own: I + cross_coupling cannot be inverted"
+            self.problems.add(place, what, "give what a channel reads of others only, without its own 1")
 
     def _body(self, name: str, table: BodyTable, links: set[str]) -> Body:
         if table.on not in links:

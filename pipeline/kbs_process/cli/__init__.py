@@ -5,6 +5,7 @@ Nothing that computes is imported at the top of any of its files, so that `--hel
 
 from __future__ import annotations
 
+import io
 import os
 import sys
 from collections.abc import Sequence
@@ -25,8 +26,18 @@ def main(arguments: Sequence[str] | None = None) -> None:
     # One thread, whatever the user's shell says: sums in one order give the same bits, and small matrices are no faster
     # with two.
     os.environ["OPENBLAS_NUM_THREADS"] = "1"
+    if arguments is None and sys.getfilesystemencoding() != "utf-8":  # some libraries would know no name with an umlaut
+        again = [sys.executable, "-P", "-X", "utf8", "-m", "kbs_process", *sys.argv[1:]]
+        os.execv(sys.executable, again)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # a terminal that lacks a letter gets its number
+            stream.reconfigure(errors="backslashreplace")
     words = list(sys.argv[1:] if arguments is None else arguments)
     debug = "--debug" in words
+    for word in (*words, os.environ.get("PWD", "")):
+        if any("\ud800" <= letter <= "\udfff" for letter in word):  # bytes that are no UTF-8
+            complain(f"error: '{word}' is no name in UTF-8\n  -> rename the file or folder")
+            sys.exit(BAD_INPUT)
     try:
         Path.cwd()
     except FileNotFoundError:

@@ -30,7 +30,7 @@ def inspect(files: tuple[Path, ...], check: bool) -> None:
 
     Exits with 2 if one of them cannot be read at all.
     """
-    from kbs_process.recordings.inspection import inspect_recording
+    from kbs_process.reduction.inspection import inspect_recording
     from kbs_process.studies.validate.listing import describe_inspection
 
     states = set()

@@ -1,7 +1,8 @@
 """Reading in a child process: a damaged or hostile file may kill, hang or bloat the child, not the command.
 
-Protocol, on the child's standard output: the columns, one line of JSON; or, where columns were asked for, their
-cells, each array one line of JSON (dtype, count) and its bytes. Nothing that is received is executed or unpickled.
+Protocol, on the child's standard output: the columns and what is left out, one line of JSON; or, where columns were
+asked for, their cells, each array one line of JSON (dtype, count) and its bytes, and in the end what was odd, one line
+of JSON (an object). Nothing that is received is executed or unpickled.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from importlib.util import find_spec
@@ -23,14 +25,16 @@ import numpy as np
 
 from kbs_process.errors import KbsError, RecordingError
 from kbs_process.recordings.formats import Format, Text, format_named
-from kbs_process.recordings.tables import Cells, Column
+from kbs_process.recordings.tables import Cells, Column, LeftOut
 
 MODULE = "kbs_process.recordings.isolated"
 SILENCE_S = 300.0  # a child that sends nothing for so long hangs
+CPU_FLOOR_S = 120  # that reading may take, whatever the size
+BYTES_A_CPU_S = 1 << 18  # and a second for so many bytes more
 DATA_FLOOR = 1 << 30  # bytes that a file of any size may expand to
 DATA_BY_SIZE = 1000  # and so many times its size: the best that compression makes of constants
-MEMORY_FLOOR = 4 << 30  # bytes of address space; the libraries themselves take less than one quarter of it
-MEMORY_BY_SIZE = 8  # and so many times the file's size
+MEMORY_FLOOR = 1 << 29  # bytes of private memory; the libraries themselves take less than half of it
+MEMORY_BY_SIZE = 64  # and so many times the file's size
 
 
 class IsolatedTable:
@@ -45,18 +49,21 @@ class IsolatedTable:
             )
         self.path = path
         self._format = name
+        self.odd = Counter[str]()
         with self._child(()) as child, _watched(child) as stream:
             line = stream.readline()
-            entries = json.loads(line) if line.endswith(b"\n") else []
+            entries, left_out = json.loads(line) if line.endswith(b"\n") else ((), ())
         self.columns = tuple(Column(*entry) for entry in entries)
+        self.left_out: LeftOut = tuple(left_out)
         if not self.columns:
-            raise RecordingError("holds no column of numbers", where=str(path))
+            remedy = "; ".join(self.left_out[:5]) or "export it again, with numbers"
+            raise RecordingError("holds no column of numbers", where=str(path), remedy=remedy)
 
     def chunks(self, names: Sequence[str]) -> Iterator[tuple[Cells, ...]]:
         left = DATA_FLOOR + DATA_BY_SIZE * self.path.stat().st_size
         with self._child(names) as child:
             while True:
-                received = [_receive(child) for _ in names]
+                received = [self._receive(child) for _ in names]
                 cells = tuple(one for one in received if one is not None)
                 if len(cells) < len(names):
                     return  # the end; if it came too soon, leaving the context raises
@@ -69,16 +76,41 @@ class IsolatedTable:
                     )
                 yield cells
 
+    def _receive(self, child: subprocess.Popen[bytes]) -> Cells | None:
+        """Return the next array, or None where there is no more."""
+        with _watched(child) as stream:
+            header = stream.readline()
+            if not header.endswith(b"\n"):
+                return None
+            message = json.loads(header)
+            if isinstance(message, dict):
+                self.odd = Counter(message)
+                return None
+            kind, count = message
+            dtype = np.dtype(kind)
+            data = stream.read(count * dtype.itemsize)
+        return np.frombuffer(data, dtype) if len(data) == count * dtype.itemsize else None
+
     @contextmanager
     def _child(self, names: Sequence[str]) -> Iterator[subprocess.Popen[bytes]]:
         """Run a child; raise RecordingError with its last words where it fails."""
         command = [sys.executable, "-P", "-m", MODULE, self._format, str(self.path), json.dumps(list(names))]
         with (
             tempfile.TemporaryFile() as complaints,
-            subprocess.Popen(command, stdout=subprocess.PIPE, stderr=complaints) as child,
+            # In one zone everywhere: what is read must not depend on where it is read.
+            subprocess.Popen(
+                command, stdout=subprocess.PIPE, stderr=complaints, env={**os.environ, "TZ": "UTC"}
+            ) as child,
         ):
             try:
                 yield child
+            except (ValueError, TypeError) as error:  # what comes is not of the protocol
+                child.kill()
+                raise RecordingError(
+                    f"cannot be read as {self._format}: its reader speaks no sense ({error})",
+                    where=str(self.path),
+                    remedy="check that the file is whole, and its format (format = ... in the mapping)",
+                ) from error
             except BaseException:
                 child.kill()
                 raise
@@ -112,24 +144,16 @@ def _watched(child: subprocess.Popen[bytes]) -> Iterator[IO[bytes]]:
         timer.cancel()
 
 
-def _receive(child: subprocess.Popen[bytes]) -> Cells | None:
-    """Return the next array, or None where there is no more."""
-    with _watched(child) as stream:
-        header = stream.readline()
-        if not header.endswith(b"\n"):
-            return None
-        kind, count = json.loads(header)
-        dtype = np.dtype(kind)
-        data = stream.read(count * dtype.itemsize)
-    return np.frombuffer(data, dtype) if len(data) == count * dtype.itemsize else None
-
-
-def _limit_memory(path: Path) -> None:
+def _limit_costs(path: Path) -> None:
     if sys.platform != "win32":
         import resource
 
-        limit = MEMORY_FLOOR + MEMORY_BY_SIZE * path.stat().st_size
-        resource.setrlimit(resource.RLIMIT_AS, (limit, resource.getrlimit(resource.RLIMIT_AS)[1]))
+        size = path.stat().st_size
+        for kind, limit in (
+            (resource.RLIMIT_DATA, MEMORY_FLOOR + MEMORY_BY_SIZE * size),
+            (resource.RLIMIT_CPU, CPU_FLOOR_S + size // BYTES_A_CPU_S),
+        ):
+            resource.setrlimit(kind, (limit, resource.getrlimit(kind)[1]))
 
 
 def main(name: str, path: Path, names: Sequence[str]) -> None:
@@ -137,17 +161,20 @@ def main(name: str, path: Path, names: Sequence[str]) -> None:
     # Whatever a library prints must not get between the arrays.
     with os.fdopen(os.dup(1), "wb") as out:
         os.dup2(2, 1)
-        _limit_memory(path)
+        _limit_costs(path)
         table = format_named(name).read(path, Text())
         if not names:
             entries = [(column.name, column.unit, column.clock) for column in table.columns]
-            out.write(json.dumps(entries).encode() + b"\n")
+            out.write(json.dumps((entries, table.left_out)).encode() + b"\n")
             return
         for cells in table.chunks(names):
             for one in cells:
                 plain = np.ascontiguousarray(one)
+                if plain.ndim != 1 or plain.dtype.kind not in "iufbMU":
+                    raise TypeError(f"cells of {plain.ndim} dimensions, {plain.dtype}")
                 out.write(json.dumps([plain.dtype.str, len(plain)]).encode() + b"\n")
                 out.write(plain.tobytes())
+        out.write(json.dumps(table.odd).encode() + b"\n")
 
 
 if __name__ == "__main__":

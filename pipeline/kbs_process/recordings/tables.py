@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +19,49 @@ Cells = NDArray[Any]  # one column's cells as the file has them: numbers, dateti
 Slice = Callable[[int, int], Cells]
 
 CHUNK_ROWS = 65536
+CHUNK_CELLS = 64 * CHUNK_ROWS
+LONGEST_TEXT = 100  # characters of a cell: what is longer is no number, and no date
+_COARSE = 0.2  # of the step of times: what they may be rounded to
+_NUMBER = re.compile(r"\s*[+-]?((\d+\.?\d*|\.\d+)(e[+-]?\d+)?|inf|infinity|nan)\s*", re.IGNORECASE | re.ASCII)
+
+
+def stamps_after(start: Any, seconds: Any) -> Cells:
+    """Return dates so many seconds after one, "not a time" where there are none."""
+    known = np.abs(seconds) < 9e9  # False for NaN too
+    ns = np.rint(np.where(known, seconds, 0.0) * 1e9).astype("timedelta64[ns]")
+    return np.where(known, np.datetime64(start, "ns") + ns, np.datetime64("NaT", "ns"))
+
+
+def too_coarse(times: Cells, unit: float = 1.0) -> str:
+    """Say why times (n,), in units of so many s, are too coarse: floats of half size have seven digits."""
+    known = times[np.isfinite(times)] if times.dtype.kind == "f" and times.dtype.itemsize < 8 else times[:0]
+    if len(known) < 2:
+        return ""
+    early, late = np.quantile(known.astype(np.float64), (0.1, 0.9))
+    step = float(late - early) / (0.8 * (len(known) - 1))
+    digit = float(np.spacing(np.abs(known).max()))
+    if digit <= _COARSE * step:
+        return ""
+    size = 8 * times.dtype.itemsize
+    return f"floats of {size} bits know these times to {digit * unit:.3g} s only; rows come every {step * unit:.3g} s"
+
+
+LeftOut = tuple[str, ...]  # what a file holds and no column shows, each with why
+
+
+def rows_a_piece(columns: int) -> int:
+    """Return how many rows of so many columns are in memory at once."""
+    return min(CHUNK_ROWS, max(1, CHUNK_CELLS // max(1, columns)))
+
+
+def texts(cells: Iterable[str]) -> Cells:
+    """Return cells of text; one that is too long to mean anything is left empty."""
+    return np.array([cell if len(cell) <= LONGEST_TEXT else "" for cell in cells], dtype=np.str_)
+
+
+def number(cell: Any) -> float:
+    """Return a cell of text as a number, NaN where it is none: "1_2" is, and other scripts' digits are none."""
+    return float(cell) if _NUMBER.fullmatch(str(cell)) else float("nan")
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,8 +82,15 @@ class Table(Protocol):
     @property
     def columns(self) -> tuple[Column, ...]: ...
 
+    @property
+    def left_out(self) -> LeftOut: ...
+
+    @property
+    def odd(self) -> Counter[str]:
+        """How often what was odd, in words, in the last pass over the file."""
+
     def chunks(self, names: Sequence[str]) -> Iterator[tuple[Cells, ...]]:
-        """Yield the cells of the columns `names`, in the order of the file, at most CHUNK_ROWS at a time."""
+        """Yield the cells of the columns `names`, in the order of the file, a piece at a time."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,47 +102,77 @@ class Series:
     read: Slice
 
 
+Item = Series | str | Counter[str]  # a column; something that is none, and why; or what is odd, and how often
+
+
 class SeriesTable:
     """A file whose columns can be read each on its own."""
 
-    def __init__(self, path: Path, series: Iterable[Series]) -> None:
+    def __init__(self, path: Path, items: Iterable[Item]) -> None:
         self.path = path
-        self._series = {one.column.name: one for one in series}
+        self.odd = Counter[str]()
+        self._series: dict[str, Series] = {}
+        left_out = []
+        for item in items:
+            if isinstance(item, str):
+                left_out.append(item)
+            elif isinstance(item, Counter):
+                self.odd += item
+            elif item.column.name in self._series:
+                left_out.append(f"{item.column.name}: one before it has the same name")
+            else:
+                self._series[item.column.name] = item
         self.columns = tuple(one.column for one in self._series.values())
+        self.left_out = tuple(left_out)
 
     def chunks(self, names: Sequence[str]) -> Iterator[tuple[Cells, ...]]:
         """Yield equal stretches of several columns; the shorter ones run out first."""
         series = [self._series[name] for name in names]
-        for first in range(0, max((one.rows for one in series), default=0), CHUNK_ROWS):
-            yield tuple(one.read(first, CHUNK_ROWS) for one in series)
+        rows = rows_a_piece(len(names))
+        for first in range(0, max((one.rows for one in series), default=0), rows):
+            yield tuple(one.read(first, rows) for one in series)
 
 
-def rows_of(data: Any) -> Slice:
-    """Return how to read an array of one dimension, in memory or in a file."""
-    return lambda first, count: np.asarray(data[first : first + count])
-
-
-def series_of(data: Any, name: str, unit: str = "") -> Iterator[Series]:
+def series_of(data: Any, name: str, unit: str = "", change: Callable[[Cells], Cells] | None = None) -> Iterator[Item]:
     """Yield the columns of an array of numbers, in memory or in a file: `name`, or "name[1]", "name[2]"... of a matrix.
 
     The longer side of a matrix is time (MATLAB's HDF5 files have theirs transposed); other arrays have no columns.
+    `change` makes numbers of what is stored.
     """
-    if data.dtype.kind not in "iufb" or data.ndim not in (1, 2):
+    if data.dtype.kind not in "iufbM":
+        yield f"{name or 'the array'}: it holds {_KINDS.get(data.dtype.kind, 'no numbers')}"
+    elif data.ndim == 1:
+        yield Series(Column(name or "[1]", unit), len(data), _changed(lambda rows: data[rows], change))
+    elif data.ndim == 2:
+        yield from matrix_of(data, name, unit, change, upright=data.shape[0] >= data.shape[1])
+    else:
+        yield f"{name or 'the array'}: it has {data.ndim} dimensions, where columns have one, and matrices two"
+
+
+_KINDS = {"c": "complex numbers", "S": "text", "U": "text", "O": "objects", "V": "records", "m": "durations"}
+
+
+def matrix_of(
+    data: Any, name: str, unit: str = "", change: Callable[[Cells], Cells] | None = None, *, upright: bool
+) -> Iterator[Item]:
+    """Yield the columns of a matrix, which are its rows where it is not `upright`."""
+    if data.dtype.kind not in "iufbM":
+        yield f"{name or 'the array'}: it holds {_KINDS.get(data.dtype.kind, 'no numbers')}"
         return
-    if data.ndim == 1:
-        yield Series(Column(name or "[1]", unit), len(data), rows_of(data))
-        return
-    upright = data.shape[0] >= data.shape[1]
     rows, width = data.shape if upright else data.shape[::-1]
     for index in range(width):
         label = name if name and width == 1 else f"{name}[{index + 1}]"
-        yield Series(Column(label, unit), rows, _line_of(data, index, upright))
+        yield Series(Column(label, unit), rows, _changed(_line_of(data, index, upright), change))
 
 
-def _line_of(data: Any, index: int, upright: bool) -> Slice:
-    if upright:
-        return lambda first, count: np.asarray(data[first : first + count, index])
-    return lambda first, count: np.asarray(data[index, first : first + count])
+def _line_of(data: Any, index: int, upright: bool) -> Callable[[slice], Any]:
+    return lambda rows: data[(rows, index) if upright else (index, rows)]
+
+
+def _changed(read: Callable[[slice], Any], change: Callable[[Cells], Cells] | None) -> Slice:
+    if change is None:
+        return lambda first, count: np.asarray(read(slice(first, first + count)))
+    return lambda first, count: change(np.asarray(read(slice(first, first + count))))
 
 
 def find_column(table: Table, wanted: int | str) -> Column:

@@ -58,13 +58,13 @@ class Alive:
         return tuple(self._stream.losses())
 
 
-def read_alive(campaign: Campaign, entry: RecordingEntry, *, keep: bool = False) -> Run:
+def read_alive(campaign: Campaign, entry: RecordingEntry, *, keep: bool = False, keep_spikes: bool = False) -> Run:
     """Read a recording without what its channels were held in, or with it (`keep`); its losses tell of that.
 
     Raises RecordingError where a channel was held most of the time, and that is not kept.
     """
     alive = Alive(campaign.rig, entry, keep=keep)
-    run = read_run(campaign, entry, alive)
+    run = read_run(campaign, entry, alive, keep_spikes=keep_spikes)
     return replace(run, losses=(*run.losses, *alive.losses))
 
 

@@ -30,10 +30,12 @@ class Prepared:
     motion: Motion
 
 
-def prepare(campaign: Campaign, entry: RecordingEntry, decoupling: Decoupling, progress: Progress) -> Prepared:
-    """Read a recording as processing needs it."""
+def prepare(
+    campaign: Campaign, entry: RecordingEntry, decoupling: Decoupling, progress: Progress, *, keep_spikes: bool = False
+) -> Prepared:
+    """Read a recording as processing needs it; `keep_spikes`: with its single bad samples."""
     with progress.task(f"Reading {entry.name}"):
-        run = read_alive(campaign, entry, keep=True)
+        run = read_alive(campaign, entry, keep=True, keep_spikes=keep_spikes)
         if run.loads is None:
             raise RecordingError("there is neither wrench nor effort in this recording", where=str(entry.path))
         return Prepared(

@@ -6,7 +6,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 from kbs_process.campaign.config import Campaign, RecordingEntry
-from kbs_process.recordings.mcap.source import open_recording
+from kbs_process.errors import RecordingError
+from kbs_process.recordings.mcap.source import Source, open_recording
 from kbs_process.recordings.mcap.streams import Stream
 from kbs_process.signals.records import Block, Loss, Run
 from kbs_process.stages.align.condense import CondenseSettings, condense
@@ -23,27 +24,45 @@ _OTHERWISE = {
 Blocks = Iterator[tuple[str, Block]]
 
 
-def read_run(campaign: Campaign, entry: RecordingEntry, through: Callable[[Blocks], Blocks] = iter) -> Run:
+def read_run(
+    campaign: Campaign, entry: RecordingEntry, through: Callable[[Blocks], Blocks] = iter, *, keep_spikes: bool = False
+) -> Run:
     """Read one recording chunk by chunk and reduce it; what it lost is listed in the run's losses.
 
-    What is read goes `through` whatever may leave some of it out.
+    What is read goes `through` whatever may leave some of it out. Single bad samples are interpolated, but for
+    `keep_spikes`.
     """
     source = open_recording(entry.path)
     there = {summary.topic for summary in source.topics}
     topics = [topic for topic in campaign.topics.present() if topic.topic in there or topic.key not in OPTIONAL_STREAMS]
     blocks = source.read(
-        [Stream(topic.key, topic.topic, topic.fields, _OTHERWISE.get(topic.key, "")) for topic in topics]
+        [Stream(topic.key, topic.topic, topic.fields, _OTHERWISE.get(topic.key, ""), topic.channel) for topic in topics]
     )
     run = condense(
         entry.name,
-        through(_within(blocks, entry.start, entry.end)),
+        through(_within(_of_one_publisher(blocks, source), entry.start, entry.end)),
         {topic.key: topic.channels for topic in topics},
         CondenseSettings(working_rate_Hz=campaign.bands.working_rate),
         units={topic.key: topic.units for topic in topics},
         file=str(entry.path),
+        keep_spikes=keep_spikes,
     )
     late = ((source.start_ns or run.log_epoch_ns) - run.log_epoch_ns) * 1e-9
     return replace(run, losses=(*(_later(loss, late) for loss in source.losses), *run.losses))
+
+
+def _of_one_publisher(blocks: Blocks, source: Source) -> Blocks:
+    """Raise RecordingError where several channels of the file bring one stream by turns."""
+    for key, block in blocks:
+        if found := source.publishers.get(key):
+            named = "encoder" if key == "angle" else key
+            raise RecordingError(
+                f"{len(found)} publishers bring the topic of '{named}' by turns, in channels "
+                f"{', '.join(map(str, found))} of the file",
+                where=str(source.path),
+                remedy=f"choose one in campaign.toml: under [topics.{named}], give `topic` and `channel`",
+            )
+        yield key, block
 
 
 def _later(loss: Loss, by: float) -> Loss:

@@ -104,6 +104,8 @@ class Events:
 
 
 PUT_IN_ORDER = "put in order"  # messages that came after younger ones: told, although nothing is lost by that
+ROUNDED = "rounded stamps"  # behind which a regular rate was found: likewise
+SPIKE = "spike"  # single samples off their neighbours: interpolated, and the figures with them are told as well
 TRUNCATED = "truncated"  # the loss of a file that breaks off: all that would have followed
 
 
@@ -121,7 +123,7 @@ class Loss:
     @property
     def real(self) -> bool:
         """Whether anything is missing, doubtful or left out by it."""
-        return self.kind != PUT_IN_ORDER
+        return self.kind not in (PUT_IN_ORDER, ROUNDED)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

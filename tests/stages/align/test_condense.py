@@ -187,7 +187,7 @@ def test_a_wild_stamp_is_dropped_and_counted() -> None:
     streams = recording()
     streams["wrench"].stamp[31_234] += 3_600_000_000_000
     run = run_of(streams)
-    assert loss(run, "clock") == 1 and loss(run, "gap") == 1
+    assert loss(run, "odd stamp") == 1 and loss(run, "gap") == 1
     assert error(run).max() < 2e-3
 
 

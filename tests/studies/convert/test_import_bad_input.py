@@ -12,7 +12,9 @@ import pytest
 from kbs_process.campaign.load import load_campaign
 from kbs_process.errors import ConfigError, KbsError, OutputError, RecordingError
 from kbs_process.recordings import isolated
+from kbs_process.studies.convert.clock import nanoseconds
 from kbs_process.studies.convert.describe import describe
+from kbs_process.studies.convert.mapping_file import Time
 from kbs_process.studies.convert.run import import_recordings
 from studies.convert.importer_files import (
     CAMPAIGN,
@@ -74,7 +76,8 @@ def test_faults_of_the_mapping(tmp_path: Path, old: str, new: str, said: str) ->
         ("t:Fx:Fy:Fz:angle\n0:1:2:3:4\n", "set the delimiter"),
         ("", "the file is empty"),
         ("t,Fx,Fy,Fz,angle\n", "no sample of 'wrench'"),
-        ("t,Fx,Fy,Fz,angle\n" + "0,1,2,3,4\n1,2,3,4,5,6\n", "Expected 5 fields in line 3, saw 6"),
+        ("t,Fx,Fy,Fz\n" + "0,1,2,3,4\n1,2,3,4,5\n", "line of names has 4 cells, and its rows have 5"),
+        ("t,Fx,Fx,Fx (2),Fy,Fz,angle\n0,1,9,5,2,3,0\n", "known: Fx .1., Fx .2., Fx .3."),
         ("t,Fx,Fy,Fz,angle\n-1,1,2,3,4\n", "give the date of time zero"),
         ("t,Fx,Fy,Fz,angle\n\xff", "not text in utf-8"),
     ],
@@ -106,6 +109,39 @@ def test_doubtful_cells_are_kept_and_counted(tmp_path: Path) -> None:
         assert any(finding in notice for notice in notices), finding
     stated = tomllib.loads((folder / "campaign.toml").read_text())["source"]["file"][0]
     assert [f"{stated['name']}, {finding}" for finding in stated["findings"]] == notices
+
+
+@pytest.mark.parametrize(
+    ("by", "said"),
+    [(3600.0, "summer to winter"), (43200.0, "twelve hours"), (65.536, "counter of 16 bits"), (40.0, "was set back")],
+)
+def test_why_time_goes_back_is_told_by_how_far(tmp_path: Path, by: float, said: str) -> None:
+    t = np.arange(4000) * 0.05
+    t[2000:] -= by
+    write_csv(tmp_path / "run.csv", {**signals(4000), "t": t})
+    with pytest.raises(RecordingError, match="at sample 2001, and goes on from there: ") as caught:
+        _import(tmp_path, "run.csv")
+    assert said in str(caught.value)
+
+
+@pytest.mark.parametrize(("digits", "rows"), [(0, 1998), (1, 1980), (2, 1800)])
+def test_times_coarser_than_the_rows_are_refused(tmp_path: Path, digits: int, rows: int) -> None:
+    t = np.floor(np.arange(2000) * 0.001 * 10**digits) / 10**digits
+    write_csv(tmp_path / "run.csv", {**signals(2000), "t": t})
+    with pytest.raises(RecordingError, match=f"too coarse: {rows} of 2000") as caught:
+        _import(tmp_path, "run.csv")
+    assert "give rate_Hz" in str(caught.value)
+
+
+def test_times_as_floats_of_32_bits_are_refused_where_they_are_too_coarse() -> None:
+    t = np.arange(2000) * 0.01
+    with pytest.raises(
+        RecordingError, match=r"floats of 32 bits know these times to 0.00781 s only; rows come every 0.01 s"
+    ):
+        nanoseconds((t + 1e5).astype(np.float32), Time.model_construct(), "t")
+    stamp, known = nanoseconds((t + 100.0).astype(np.float32), Time.model_construct(), "t")
+    assert known.all()
+    np.testing.assert_allclose(stamp * 1e-9, t + 100.0, atol=1e-5)
 
 
 def test_a_folder_with_something_in_it_is_left_alone(tmp_path: Path) -> None:
@@ -221,3 +257,40 @@ def test_the_description_is_taken_whole_and_from_its_folder_only(tmp_path: Path)
         with pytest.raises(ConfigError, match=said):
             import_recordings(plan, tmp_path, tmp_path / "other")
     assert not (tmp_path / "other").exists()
+
+
+@pytest.mark.parametrize(
+    ("rows", "stamps", "said"),
+    [
+        ([700], [12.5], "1 time stamps of 'wrench' do not fit where they stand, rows left out"),
+        (
+            [0, 1, 2],
+            [-1.78e9 + 1.0, -1.78e9 + 1.001, -1.78e9 + 1.002],
+            "3 time stamps of 'wrench' lie far from all others",
+        ),
+        (range(1200, 1500), [-1.78e9] * 300, "300 time stamps of 'wrench' do not fit where they stand, rows left out"),
+    ],
+)
+def test_rows_whose_time_fits_nowhere_are_left_out_and_counted(
+    tmp_path: Path, rows: list[int], stamps: list[float], said: str
+) -> None:
+    columns = signals(1500)
+    t = 1.78e9 + np.arange(1500) * 1e-3
+    t[list(rows)] = 1.78e9 + np.array(stamps)
+    write_csv(tmp_path / "run.csv", {**columns, "t": t})
+    notices: list[str] = []
+    found = read_back(_import(tmp_path, "run.csv", notices=notices), "turn_1")
+    assert any(said in line for line in notices)
+    good = np.delete(np.arange(1500), list(rows))
+    np.testing.assert_array_equal(found["encoder"][1][:, 0], columns["angle"][good])
+
+
+def test_time_that_starts_again_is_refused_with_its_row(tmp_path: Path) -> None:
+    columns = signals(3000)
+    t = np.concatenate([np.arange(2000), np.arange(1000) + 0.25]) * 1e-3
+    write_csv(tmp_path / "run.csv", {**columns, "t": t})
+    with pytest.raises(
+        RecordingError, match=r"goes back by 1.99\d+ s at sample 2001, .* logger started again"
+    ) as caught:
+        _import(tmp_path, "run.csv")
+    assert "split the file there" in str(caught.value)

@@ -9,7 +9,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from kbs_process.recordings.formats import Text, text
+from kbs_process.recordings import tables
+from kbs_process.recordings.formats import Text
+from kbs_process.recordings.formats.text import TextTable
 from kbs_process.studies.convert.clock import numbers
 from kbs_process.studies.convert.run import import_recordings
 from studies.convert.importer_files import (
@@ -136,7 +138,7 @@ def test_dates_and_absolute_start(tmp_path: Path) -> None:
 
 
 def test_units_signs_and_wrapped_angles_across_pieces(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(text, "CHUNK_ROWS", 7)  # every piece ends at another angle
+    monkeypatch.setattr(tables, "CHUNK_ROWS", 7)  # every piece ends at another angle
     t = np.arange(400) * 0.01
     degrees = 100.0 - 250.0 * t  # three turns backwards
     force = np.linspace(-1.0, 1.0, 400)
@@ -180,7 +182,7 @@ def test_what_loggers_write(
     tmp_path: Path, content: str, options: dict[str, Any], names: tuple[str, ...], first: list[float]
 ) -> None:
     (tmp_path / "a.csv").write_text(content)
-    table = text.TextTable(tmp_path / "a.csv", Text(**options))
+    table = TextTable(tmp_path / "a.csv", Text(**options))
     assert tuple(column.name for column in table.columns) == names
     (cells,) = table.chunks(names)
     np.testing.assert_array_equal([numbers(column)[0] for column in cells], first)

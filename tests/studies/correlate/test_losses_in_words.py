@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from kbs_process.campaign.config import RecordingEntry
-from kbs_process.signals.records import PUT_IN_ORDER, TRUNCATED, Loss
+from kbs_process.signals.records import PUT_IN_ORDER, SPIKE, TRUNCATED, Loss
 from kbs_process.studies.correlate import results
-from kbs_process.studies.correlate.notices import lost
+from kbs_process.studies.correlate.notices import lost, spikes
 from kbs_process.studies.validate.run import in_words
 
 
@@ -40,3 +41,22 @@ def test_what_was_put_in_order_alone_is_no_warning(also: tuple[str, ...], severi
         losses=listed,
     )  # fmt: skip
     assert [one.kind for one in recording.lost] == list(also)
+
+
+def test_single_bad_samples_are_told_with_the_figures_with_and_without_them() -> None:
+    entry = RecordingEntry("a", Path("a.mcap"), "A", "fit", 1, None, None, None)
+    losses = (
+        Loss(SPIKE, "a: wrench, Fz", 1, 50.0, 50.0, "off by 49.99: interpolated"),
+        Loss(SPIKE, "a: wrench, Ty", 2, 30.0, 40.0, "at 30.0000, 40.0000 s, off by up to 3: interpolated"),
+    )
+    analyses = [SimpleNamespace(entry=entry, run=SimpleNamespace(losses=own)) for own in (losses, ())]
+    judged = [
+        SimpleNamespace(name="Torque", statistic="peak", value=value, unit="N m", verdict=verdict)
+        for value, verdict in ((0.002, "pass"), (0.07, "fail"))
+    ]
+    (notice,) = spikes(analyses, judged[:1], lambda: judged[1:])  # type: ignore[arg-type]
+    assert "1 in Fz at 50.0000 s, off by 49.99; 2 in Ty at 30.0000, 40.0000 s, off by up to 3." in notice.what
+    assert notice.what.endswith("Torque: peak 0.0020 N m without them, 0.0700 N m with them (not met)")
+    (alone,) = spikes(analyses, judged[:1], tuple)  # type: ignore[arg-type]
+    assert alone.what.endswith("without them, and nothing can be judged with them")
+    assert list(spikes(analyses[1:], judged[:1], tuple)) == []  # type: ignore[arg-type]

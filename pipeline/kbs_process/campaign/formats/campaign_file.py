@@ -56,8 +56,15 @@ class BandsTable(Table):
     """The frequency bands in which histories are compared."""
 
     high_pass_Hz: NotNegative = Field(description="lower edge of every band, Hz; 0 is none")
-    low_pass_Hz: SomeDistinct[Positive] = Field(description="upper edges, Hz: one band each")
-    working_rate_Hz: Positive = Field(description="sampling rate after decimation, Hz; all stages work at this rate")
+    low_pass_Hz: Annotated[SomeDistinct[Positive], Field(max_length=20)] = Field(
+        description="upper edges, Hz: one band each"
+    )
+    working_rate_Hz: Annotated[float, Field(ge=0.01)] = Field(
+        description="sampling rate after decimation, Hz; all stages work at this rate"
+    )
+
+
+ChannelNumber = Annotated[int, Field(ge=0, le=65535)]  # in an MCAP file
 
 
 class TopicTable(Table):
@@ -69,6 +76,9 @@ class TopicTable(Table):
         alias="fields",
         description='where in the message each channel is: "wrench.force.x", "position[az]"; default: plain ROS 2 '
         "messages whose names are the joints'",
+    )
+    channel: ChannelNumber | None = Field(
+        None, description="number of the MCAP channel that is read, where several publishers bring the topic"
     )
 
 

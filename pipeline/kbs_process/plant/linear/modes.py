@@ -16,6 +16,7 @@ from kbs_process.signals.records import Array
 AXES = "xyz"
 # Only modes that turn the plate by this share of their strain energy are seen by the transducer.
 SEEN = 0.02
+MASSLESS = 1e-12  # of the greatest inertia
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +37,10 @@ def modes(rig: Rig, effects: Sequence[Effect], q: Array) -> tuple[Mode, ...]:
     if stiffness is None or rig.transducer.on != LAB:
         return ()
     system = linearise(rig, effects, q)
-    squared, shapes = eigh(system.K, system.M)
+    # What no mass turns, as a point on the axis, resonates beyond all frequencies.
+    bare = MASSLESS * float(np.diag(system.M).max(initial=0.0))
+    massless = float(np.linalg.eigvalsh(system.M)[0]) < bare
+    squared, shapes = eigh(system.K, system.M + (bare * np.eye(len(system.M)) if massless else 0.0))
     found = []
     for value, shape in zip(squared, shapes.T, strict=True):
         # Shares of the strain energy: shapes are normed by M.

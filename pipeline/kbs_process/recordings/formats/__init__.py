@@ -27,7 +27,9 @@ class Text(msgspec.Struct, frozen=True):
     header: bool | None = None
     units_row: bool = False
     skip_rows: int = 0
+    rows: int | None = None
     decimal: Literal[".", ","] = "."
+    thousands: str | None = None
     comment: str | None = None
     encoding: str = "utf-8-sig"
 

@@ -1,36 +1,190 @@
-"""HDF5: data sets of numbers by name, columns of a matrix "name[1]", fields of compounds "name[Fx]"."""
+"""HDF5: data sets of numbers by name, columns of a matrix "name[1]", fields of compounds "name[Fx]", "name[values][1]".
+
+The conventions of netCDF are kept: what `scale_factor` and `add_offset` pack is unpacked, and what is called missing
+(`_FillValue`, `missing_value`) or not valid (`valid_min`, `valid_max`, `valid_range`, of packed numbers) is NaN.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from kbs_process.recordings.formats import Format, Text
-from kbs_process.recordings.tables import Column, Series, SeriesTable, rows_of, series_of
+from kbs_process.recordings.tables import Cells, Column, Item, Series, SeriesTable, Slice, matrix_of, series_of, texts
+
+_NO_VARIABLE = "This is a netCDF dimension but not a netCDF variable"
+_BLOCK_CELLS = 1 << 22  # of a matrix, read together for its columns
 
 
 def read_hdf5(path: Path, _: Text) -> SeriesTable:
     """Open an HDF5 file; a data set's unit is its attribute "unit" or "units"."""
-    return SeriesTable(path, _series(path))
+    return SeriesTable(path, datasets(path))
 
 
-def _series(path: Path) -> Iterator[Series]:
+def datasets(path: Path, separator: str = "/", classes: bool = False) -> Iterator[Item]:
+    """Yield the columns of a file; with `classes`, MATLAB says what its data sets are."""
     import h5py
 
     file = h5py.File(path, "r")
     found: list[tuple[str, Any]] = []
-    file.visititems(lambda name, node: found.append((name, node)) if isinstance(node, h5py.Dataset) else None)
+    file.visititems(lambda name, node: found.append((name, node)))
+    sparse = tuple(f"{name}/" for name, node in found if "MATLAB_sparse" in node.attrs)
     for name, data in found:
-        unit = _text(data.attrs.get("unit", data.attrs.get("units", "")))
-        if data.dtype.names and data.ndim == 1:
-            for field in data.dtype.names:
-                yield Series(Column(f"{name}[{field}]", unit), len(data), rows_of(data.fields(field)))
-        else:
-            yield from series_of(data, name, unit)
+        if not isinstance(data, h5py.Dataset) or (classes and name.startswith("#")):
+            continue
+        label = name.replace("/", separator)
+        if why := _why_not(data, path, classes) or ("it is a sparse matrix" if name.startswith(sparse) else ""):
+            yield f"{label}: {why}"
+        elif not data.attrs.get("MATLAB_empty"):
+            yield from _columns(data, label)
+
+
+def _why_not(data: Any, path: Path, classes: bool) -> str:
+    import h5py
+
+    kind = data.attrs.get("MATLAB_class", b"") if classes else b""
+    outside = [source.file_name for source in data.virtual_sources()] if data.is_virtual else []
+    if data.external or any(name != "." for name in outside):
+        return "its numbers lie in other files, which are not opened: copy them into this one"
+    if _text(data.attrs.get("NAME", "")).startswith(_NO_VARIABLE):
+        return "it is a dimension without values"
+    if _text(kind) in ("char", "cell", "function_handle", "table", "string", "timetable", "datetime"):
+        return f"it is a {_text(kind)}: save numbers"
+    if data.dtype.kind == "O" and not (h5py.check_string_dtype(data.dtype) and data.ndim == 1):
+        return "it has no numbers"
+    return ""
+
+
+def _columns(data: Any, name: str) -> Iterator[Item]:
+    unit = _text(data.attrs.get("units", "")) if "unit" not in data.attrs else _text(data.attrs["unit"])
+    if data.dtype.names and data.ndim == 1:
+        for member in data.dtype.names:
+            label, kind = f"{name}[{member}]", data.dtype[member]
+            cells = _Field(data, member, kind.base, (len(data), *kind.shape))
+            if len(kind.shape) == 1:
+                yield from matrix_of(cells, label, unit, upright=True)
+            else:
+                yield from series_of(cells, label, unit)
+        return
+    if data.dtype.kind in "OS" and data.ndim == 1:
+        yield Series(Column(name, unit), len(data), _words(data))
+        return
+    packing = _Packing.of(data.attrs) if data.dtype.kind in "iuf" else None
+    yield from series_of(
+        _Cached(data) if data.ndim == 2 else data, name, unit, None if packing is None else packing.unpacked
+    )
+
+
+def _words(data: Any) -> Slice:
+    def read(first: int, count: int) -> Cells:
+        return texts(_text(one) for one in data[first : first + count].tolist())
+
+    return read
+
+
+@dataclass(slots=True)
+class _Cached:
+    """A matrix in a file, whose columns are read one after the other: the stretch that was read last is kept."""
+
+    data: Any
+    at: tuple[int, int] = (0, 0)
+    block: Any = None
+
+    @property
+    def dtype(self) -> Any:
+        return self.data.dtype
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        return self.data.shape  # type: ignore[no-any-return]
+
+    @property
+    def ndim(self) -> int:
+        return 2
+
+    def __getitem__(self, key: Any) -> Cells:
+        upright = isinstance(key[0], slice)
+        stretch, column = key if upright else key[::-1]
+        first, end, _ = stretch.indices(self.shape[0 if upright else 1])
+        if (end - first) * self.shape[1 if upright else 0] > _BLOCK_CELLS:
+            return np.asarray(self.data[key])
+        if self.block is None or self.at != (first, end):
+            self.block = self.data[first:end] if upright else self.data[:, first:end].T
+            self.at = (first, end)
+        return np.asarray(self.block[:, column])
+
+
+@dataclass(frozen=True, slots=True)
+class _Field:
+    """A field of the records of a data set, of one number or several."""
+
+    data: Any
+    name: str
+    dtype: Any
+    shape: tuple[int, ...]
+
+    @property
+    def ndim(self) -> int:
+        return len(self.shape)
+
+    def __len__(self) -> int:
+        return self.shape[0]
+
+    def __getitem__(self, key: Any) -> Cells:
+        rows, *column = key if isinstance(key, tuple) else (key,)
+        return np.asarray(self.data.fields(self.name)[rows])[(slice(None), *column)]
+
+
+@dataclass(frozen=True, slots=True)
+class _Packing:
+    """How numbers are packed, and which mean that there is none."""
+
+    scale: float
+    offset: float
+    missing: tuple[float, ...]
+    low: float
+    high: float
+    unsigned: bool
+    packed: bool = field(default=False)
+
+    @classmethod
+    def of(cls, attributes: Mapping[str, Any]) -> _Packing | None:
+        """Return the packing that attributes state, None where they state none."""
+        names = ("scale_factor", "add_offset", "_FillValue", "missing_value", "valid_min", "valid_max", "valid_range")
+        given = {name: np.ravel(attributes[name]).astype(np.float64) for name in names if name in attributes}
+        unsigned = _text(attributes.get("_Unsigned", "")).lower() == "true"
+        if not given and not unsigned:
+            return None
+        lowest, highest = given.get("valid_range", np.array([-np.inf, np.inf]))
+        missing = np.concatenate([given.get("_FillValue", np.empty(0)), given.get("missing_value", np.empty(0))])
+        return cls(
+            scale=float(given.get("scale_factor", np.ones(1))[0]),
+            offset=float(given.get("add_offset", np.zeros(1))[0]),
+            missing=tuple(missing.tolist()),
+            low=float(given.get("valid_min", np.array([lowest]))[0]),
+            high=float(given.get("valid_max", np.array([highest]))[0]),
+            unsigned=unsigned,
+            packed="scale_factor" in given or "add_offset" in given,
+        )
+
+    def unpacked(self, cells: Cells) -> Cells:
+        """Return the numbers that were packed, NaN where there is none."""
+        if self.unsigned and cells.dtype.kind == "i":
+            cells = cells.view(cells.dtype.str.replace("i", "u"))
+        lacking = np.isin(cells, self.missing) | (cells < self.low) | (cells > self.high)
+        if not self.packed and not lacking.any():
+            return cells
+        values = cells.astype(np.float64)
+        values = values * self.scale + self.offset if self.packed else values
+        return np.where(lacking, np.nan, values)
 
 
 def _text(value: Any) -> str:
+    value = value.item() if isinstance(value, np.ndarray) and value.size == 1 else value
     return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
 
 

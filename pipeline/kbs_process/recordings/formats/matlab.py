@@ -1,29 +1,51 @@
-"""MATLAB: numeric variables by name, the columns of a matrix "name[1]"; since MATLAB 7.3 a file is one of HDF5."""
+"""MATLAB: numeric variables by name, columns of a matrix "name[1]", fields of a structure "name.field".
+
+Since MATLAB 7.3 a file is one of HDF5.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from kbs_process.recordings.formats import Format, Text
-from kbs_process.recordings.formats.hdf5 import read_hdf5
-from kbs_process.recordings.tables import SeriesTable, series_of
+from kbs_process.recordings.formats.hdf5 import datasets
+from kbs_process.recordings.tables import Item, SeriesTable, series_of
 
 _HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 _MATLAB_HEADER = 512  # bytes that MATLAB writes before the HDF5 file
+_DEPTH = 8  # of structures within structures
 
 
-def read_matlab(path: Path, text: Text) -> SeriesTable:
+def read_matlab(path: Path, _: Text) -> SeriesTable:
     """Open a .mat file of any version."""
     with path.open("rb") as file:
         head = file.read(_MATLAB_HEADER + len(_HDF5_SIGNATURE))
     if head[_MATLAB_HEADER:] == _HDF5_SIGNATURE or head.startswith(_HDF5_SIGNATURE):
-        return read_hdf5(path, text)
+        return SeriesTable(path, datasets(path, ".", classes=True))
     from scipy.io import loadmat
 
-    arrays = {name: data for name, data in loadmat(path, mat_dtype=False).items() if isinstance(data, np.ndarray)}
-    return SeriesTable(path, (one for name, data in arrays.items() for one in series_of(data, name)))
+    variables = loadmat(path, mat_dtype=False)
+    names = [name for name in variables if not name.startswith("__")]
+    return SeriesTable(path, (one for name in names for one in _columns(variables[name], name, _DEPTH)))
+
+
+def _columns(data: Any, name: str, depth: int) -> Iterator[Item]:
+    """Yield the columns of a variable, or of a field."""
+    if not isinstance(data, np.ndarray):
+        yield f"{name}: it is a sparse matrix, or an object: save full(x), or table2struct(x)"
+    elif data.dtype.names and data.size == 1 and depth and not hasattr(data, "classname"):
+        for field in data.dtype.names:
+            yield from _columns(data.flat[0][field], f"{name}.{field}", depth - 1)
+    elif data.dtype.names or data.dtype.kind == "O":
+        yield f"{name}: it is an array of cells, structures or objects: save each field as numbers"
+    elif data.dtype.kind == "U":
+        yield f"{name}: it is text"
+    elif data.size:
+        yield from series_of(data, name)
 
 
 FORMAT = Format(suffixes=(".mat",), read=read_matlab)

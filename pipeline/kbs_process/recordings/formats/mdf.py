@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from datetime import UTC
 from pathlib import Path
@@ -10,39 +11,81 @@ from typing import Any
 import numpy as np
 
 from kbs_process.recordings.formats import Format, Text
-from kbs_process.recordings.tables import Cells, Column, Series, SeriesTable, Slice
+from kbs_process.recordings.tables import (
+    CHUNK_ROWS,
+    Cells,
+    Column,
+    Item,
+    Series,
+    SeriesTable,
+    Slice,
+    stamps_after,
+    texts,
+    too_coarse,
+)
+
+_SYNCHRONISED_BY = {2: "an angle", 3: "a distance", 4: "an index"}  # of a group's master, which else is time
 
 
 def read_mdf(path: Path, _: Text) -> SeriesTable:
-    """Open an MDF file."""
+    """Open an MDF file; a local time without its zone is taken for UTC, as in other formats."""
     return SeriesTable(path, _series(path))
 
 
-def _series(path: Path) -> Iterator[Series]:
+def _series(path: Path) -> Iterator[Item]:
     from asammdf import MDF
 
     file: Any = MDF(path)
-    start = np.datetime64(file.start_time.astimezone(UTC).replace(tzinfo=None), "ns")
+    begun = file.start_time
+    begun = begun.astimezone(UTC).replace(tzinfo=None) if begun.tzinfo else begun
+    start = np.datetime64(begun, "ns")
+    if file.start_time.tzinfo is None:
+        yield Counter({f"file has local times without their zone, taken for UTC: it begins at {begun}": 1})
     for number, group in enumerate(file.groups):
         master = file.masters_db.get(number)
-        clock = "" if master is None else f"{number}: time"
         rows = int(group.channel_group.cycles_nr)
-        if clock and rows:
+        if not rows:
+            continue
+        other = "" if master is None else _SYNCHRONISED_BY.get(getattr(group.channels[master], "sync_type", 1), "")
+        if other:
+            yield f"{number}: time: the master of that group is {other}, and no time"
+        elif master is not None and group.channels[master].dtype_fmt.kind == "f":
+            last = _master(file, number, max(0, rows - CHUNK_ROWS), CHUNK_ROWS).astype(group.channels[master].dtype_fmt)
+            if other := too_coarse(last):
+                yield f"{number}: time: {other}"
+        clock = "" if master is None or other else f"{number}: time"
+        if clock:
             yield Series(Column(clock, "datetime"), rows, _time(file, number, rows, start))
         for index, channel in enumerate(group.channels):
-            if index == master or not rows:
+            if index == master and not other:
                 continue
             name = channel.name if len(file.channels_db[channel.name]) == 1 else f"{number}/{channel.name}"
+            head = _read(file, number, index, 0, 1)[0]
+            if head.ndim != 1 or head.dtype.names or head.dtype.kind not in "iufbSU":
+                yield f"{name}: it holds arrays, structures or bytes"
+                continue
             yield Series(Column(name, str(channel.unit or ""), clock), rows, _data(file, number, index, rows))
+
+
+def _read(file: Any, group: int, index: int, first: int, count: int) -> tuple[Any, Any]:
+    """Return samples, and which of them are marked as not valid, or None."""
+    signal = file.get(group=group, index=index, record_offset=first, record_count=count, ignore_invalidation_bits=True)
+    return np.asarray(signal.samples), signal.invalidation_bits
+
+
+def _master(file: Any, group: int, first: int, count: int) -> Cells:
+    return np.asarray(file.get_master(group, record_offset=first, record_count=count), dtype=np.float64)
 
 
 def _data(file: Any, group: int, index: int, rows: int) -> Slice:
     def read(first: int, count: int) -> Cells:
         if first >= rows:
             return np.empty(0)
-        signal = file.get(group=group, index=index, record_offset=first, record_count=min(count, rows - first))
-        samples = np.asarray(signal.samples)
-        return np.char.decode(samples, "utf-8", "replace") if samples.dtype.kind == "S" else samples
+        samples, invalid = _read(file, group, index, first, min(count, rows - first))
+        if samples.dtype.kind in "SU":
+            plain = np.char.decode(samples, "utf-8", "replace") if samples.dtype.kind == "S" else samples
+            return texts(plain.tolist() if invalid is None else np.where(invalid, "", plain).tolist())
+        return samples if invalid is None or not invalid.any() else np.where(invalid, np.nan, samples)
 
     return read
 
@@ -51,9 +94,7 @@ def _time(file: Any, group: int, rows: int, start: Any) -> Slice:
     def read(first: int, count: int) -> Cells:
         if first >= rows:
             return np.empty(0, dtype="datetime64[ns]")
-        master = file.get_master(group, record_offset=first, record_count=min(count, rows - first))
-        stamps: Cells = start + np.rint(np.asarray(master, dtype=np.float64) * 1e9).astype("timedelta64[ns]")
-        return stamps
+        return stamps_after(start, _master(file, group, first, min(count, rows - first)))
 
     return read
 

@@ -1,22 +1,38 @@
-"""NumPy: one array of one or two dimensions, columns "[1]", "[2]"... along its shorter side, or records by field."""
+"""NumPy: one array of one or two dimensions, columns "[1]", "[2]"... along its shorter side, or records by field.
+
+In a .npz, which holds several, their names come before: "forces[2]", "run[Fx]".
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from kbs_process.recordings.formats import Format, Text
-from kbs_process.recordings.tables import Column, Series, SeriesTable, rows_of, series_of
+from kbs_process.recordings.tables import Item, SeriesTable, matrix_of, series_of
 
 
 def read_numpy(path: Path, _: Text) -> SeriesTable:
-    """Open a .npy file."""
+    """Open a .npy or .npz file."""
     data = np.load(path, mmap_mode="r", allow_pickle=False)
-    if data.dtype.names and data.ndim == 1:
-        fields = data.dtype.names
-        return SeriesTable(path, (Series(Column(field), len(data), rows_of(data[field])) for field in fields))
-    return SeriesTable(path, series_of(data, ""))
+    if isinstance(data, np.ndarray):
+        return SeriesTable(path, _columns(data, ""))
+    return SeriesTable(path, (one for name in data.files for one in _columns(data[name], name)))
 
 
-FORMAT = Format(suffixes=(".npy",), read=read_numpy)
+def _columns(data: Any, name: str) -> Iterator[Item]:
+    if not data.dtype.names or data.ndim != 1:
+        yield from series_of(data, name)
+        return
+    for field in data.dtype.names:
+        label = f"{name}[{field}]" if name else field
+        if data[field].ndim == 2:
+            yield from matrix_of(data[field], label, upright=True)
+        else:
+            yield from series_of(data[field], label)
+
+
+FORMAT = Format(suffixes=(".npy", ".npz"), read=read_numpy)

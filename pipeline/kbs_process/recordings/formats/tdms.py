@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -9,46 +10,79 @@ from typing import Any
 import numpy as np
 
 from kbs_process.recordings.formats import Format, Text
-from kbs_process.recordings.tables import Cells, Column, Series, SeriesTable, Slice
+from kbs_process.recordings.tables import Cells, Column, Item, Series, SeriesTable, Slice, stamps_after, texts
+
+_CLOCK = ("wf_start_time", "wf_start_offset", "wf_increment")
 
 
 def read_tdms(path: Path, _: Text) -> SeriesTable:
-    """Open a TDMS file."""
+    """Open a TDMS file; an index beside it, which may belong to another, is not used."""
     return SeriesTable(path, _series(path))
 
 
-def _series(path: Path) -> Iterator[Series]:
+def _series(path: Path) -> Iterator[Item]:
     from nptdms import TdmsFile
 
-    file = TdmsFile.open(path)
+    changed = _changed_clocks(path)
+    file = TdmsFile.open(path.open("rb"))
+    if file.file_status.incomplete_final_segment:
+        yield Counter({"file breaks off within its last segment, of which what there is is read": 1})
     for group in file.groups():
         for channel in group.channels():
+            name = f"{group.name}/{channel.name}"
             if channel.dtype is None or len(channel) == 0:
                 continue
-            name = f"{group.name}/{channel.name}"
-            clock = f"{name}: time" if "wf_increment" in channel.properties else ""
+            if np.dtype(channel.dtype).kind == "c":
+                yield f"{name}: it holds complex numbers"
+                continue
+            step = channel.properties.get("wf_increment")
+            clock = ""
+            if channel.path in changed:
+                yield f"{name}: time: its start or step changes within the file, so it has no clock: split the file"
+            elif isinstance(step, int | float) and 0.0 < step < np.inf:
+                clock = f"{name}: time"
             unit = str(channel.properties.get("unit_string", ""))
             yield Series(Column(name, unit, clock), len(channel), _data(channel))
             if clock:
                 yield Series(Column(clock, "datetime"), len(channel), _time(channel))
 
 
+def _changed_clocks(path: Path) -> set[str]:
+    """Return the channels whose waveform begins again in a later segment: of its properties only the last is kept."""
+    from nptdms.reader import TdmsReader
+
+    first: dict[tuple[str, str], Any] = {}
+    changed: set[str] = set()
+
+    class Reader(TdmsReader):  # type: ignore[misc]
+        def _update_object_properties(self, properties: Any) -> None:
+            for owner, pairs in (properties or {}).items():
+                for key, value in pairs:
+                    if key in _CLOCK and first.setdefault((owner, key), value) != value:
+                        changed.add(owner)
+            super()._update_object_properties(properties)
+
+    with path.open("rb") as file:
+        Reader(file).read_metadata()
+    return changed
+
+
 def _data(channel: Any) -> Slice:
     def read(first: int, count: int) -> Cells:
         data = np.asarray(channel.read_data(first, min(count, max(len(channel) - first, 0))))
-        return data if data.dtype.kind != "O" else data.astype(np.str_)
+        return data if data.dtype.kind not in "OU" else texts(map(str, data.tolist()))
 
     return read
 
 
 def _time(channel: Any) -> Slice:
     properties = channel.properties
-    start = np.datetime64(properties.get("wf_start_time", 0), "ns").astype(np.int64)
+    start = np.datetime64(properties.get("wf_start_time", 0), "ns")
     offset, step = float(properties.get("wf_start_offset", 0.0)), float(properties["wf_increment"])
 
     def read(first: int, count: int) -> Cells:
         index = np.arange(first, min(first + count, len(channel)), dtype=np.float64)
-        return (start + np.rint((offset + index * step) * 1e9).astype(np.int64)).astype("datetime64[ns]")
+        return stamps_after(start, offset + index * step)
 
     return read
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import csv
+import io
 import itertools
 import re
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,97 +15,182 @@ import numpy as np
 
 from kbs_process.errors import RecordingError
 from kbs_process.recordings.formats import Format, Text
-from kbs_process.recordings.tables import CHUNK_ROWS, Cells, Column
+from kbs_process.recordings.tables import Cells, Column, LeftOut, number, rows_a_piece, texts
 
 if TYPE_CHECKING:
     import pandas as pd
 
 DELIMITERS = "\t;,|"
 _HEAD_LINES = 32
+_LONGEST_LINE = 1 << 24  # characters
 _DATE = re.compile(r"\d{4}-\d\d-\d\d([T ]\d\d:\d\d.*)?")
+_UTF16 = (b"\xff\xfe", b"\xfe\xff")
 
 
 class TextTable:
-    """A delimited text file; pandas parses numbers to the nearest double (before 3.1 it did not)."""
+    """A delimited text file; pandas parses numbers to the nearest double (before 3.1 it did not).
+
+    A line with more or fewer cells than the table has columns is no row of it: nobody knows which cell is missing.
+    """
 
     def __init__(self, path: Path, options: Text) -> None:
         self.path = path
+        self.left_out: LeftOut = ()
+        self.odd = Counter[str]()
         self._options = options
-        numbered = self._head()
-        head = [line for _, line in numbered]
-        self._delimiter = options.delimiter or sniff_delimiter(head, options.decimal)
-        cells = [_split(line, self._delimiter) for line in head]
+        if options.thousands == options.decimal:
+            remedy = "give one of decimal and thousands in the mapping's [text] another sign"
+            raise RecordingError(f"'{options.decimal}' cannot part thousands too", where=str(path), remedy=remedy)
+        with path.open("rb") as file:
+            wide = file.read(2) in _UTF16 and options.encoding == Text().encoding
+        self._encoding = "utf-16" if wide else options.encoding
+        head = list(itertools.islice(self._lines(options.skip_rows), _HEAD_LINES))
+        if not head:
+            raise RecordingError("the file is empty", where=str(path))
+        self._delimiter = options.delimiter or sniff_delimiter([line for _, line in head], options.decimal)
+        cells = [_split(line, self._delimiter) for _, line in head]
         named = not all(map(self._is_number, cells[0])) if options.header is None else options.header
         # What is read later counts every line of the file, comments and blank ones too.
         told = named + options.units_row
-        self._first_data_row = numbered[told][0] if told < len(numbered) else numbered[-1][0] + 1
-        # Rows may end with a delimiter where the line of names does not.
-        width = max(len(cells[0]), len(cells[min(named + options.units_row, len(cells) - 1)]))
-        names = _unique(_widened(cells[0] if named else [], width))
-        units = _widened(cells[named] if options.units_row and len(cells) > named else [], width)
-        self.columns = tuple(Column(name, unit.strip("()[] ")) for name, unit in zip(names, units, strict=True))
+        self._first_data_row = head[told][0] if told < len(head) else head[-1][0] + 1
+        rows = cells[told:]
+        usual = Counter(map(len, rows or cells)).most_common(1)[0][0]
+        names = self._fitted(cells[0], rows) if named else [""] * usual
+        units = cells[named][: len(names)] if options.units_row and len(cells) > named else []
+        units += [""] * (len(names) - len(units))
+        self.columns = tuple(
+            Column(name, unit.strip("()[] ")) for name, unit in zip(_unique(names), units, strict=True)
+        )
 
     def chunks(self, names: Sequence[str]) -> Iterator[tuple[Cells, ...]]:
+        self.odd.clear()
+        every = [column.name for column in self.columns]
+        lines = self._rows(len(every))
+        while piece := list(itertools.islice(lines, rows_a_piece(len(every)))):
+            frame = self._parsed(piece, every)
+            yield tuple(self._cells(frame[name]) for name in names)
+
+    def _rows(self, width: int) -> Iterator[str]:
+        """Yield the lines that are rows of the table, and count those that are none."""
+        delimiter = self._delimiter
+        left = self._options.rows
+        for place, line in self._lines(self._first_data_row):
+            if '"' in line or delimiter == " ":
+                count = len(_split(line, delimiter)) if line.count('"') % 2 == 0 else 0
+            else:
+                count = line.count(delimiter) + 1
+            if count > width:  # rows may end with delimiters where the line of names does not
+                line, count = _without_empty_end(line, delimiter, count - width), width
+            if count != width or line == "" or "\0" in line:
+                first = f"lines are no rows of {width} cells, left out (the first is line {place + 1})"
+                known = next((what for what in self.odd if what.startswith("lines are no rows")), first)
+                self.odd[known] += 1
+                continue
+            if left is not None:
+                if not left:
+                    return
+                left -= 1
+            yield line
+
+    def _parsed(self, lines: Sequence[str], names: Sequence[str]) -> pd.DataFrame:
         import pandas as pd
 
-        every = [column.name for column in self.columns]
         try:
-            with pd.read_csv(
-                self.path,
+            frame: pd.DataFrame = pd.read_csv(
+                io.StringIO("\n".join(lines)),
                 sep=self._delimiter if self._delimiter != " " else r"\s+",
                 header=None,
-                names=every,  # all are parsed: with `usecols`, surplus cells would be dropped without a word
+                names=list(names),
                 index_col=False,
-                skiprows=self._first_data_row,
-                chunksize=CHUNK_ROWS,
-                decimal=self._options.decimal,
-                comment=self._options.comment,
-                encoding=self._options.encoding,
+                # Where a comma is the decimal mark, each cell decides what its points mean: see `_cells`.
+                dtype="str" if self._options.decimal == "," or self._options.thousands else None,
                 skipinitialspace=True,
-            ) as reader:
-                for frame in reader:
-                    yield tuple(_cells(frame[name], self._options.decimal) for name in names)
-        except pd.errors.EmptyDataError:
-            return
-        except (pd.errors.ParserError, UnicodeDecodeError) as error:
+                skip_blank_lines=False,
+            )
+            return frame
+        except (pd.errors.ParserError, OverflowError) as error:
             raise RecordingError(
-                f"not a table of {len(every)} columns: {error}",
+                f"not a table of {len(names)} columns: {error}",
                 where=str(self.path),
                 remedy="check delimiter, skip_rows and encoding in the mapping's [text]",
             ) from error
 
-    def _head(self) -> list[tuple[int, str]]:
-        """Return the first lines that hold data or names, with their places in the file."""
+    def _cells(self, series: pd.Series[float]) -> Cells:
+        """Return a parsed column as numbers where pandas found nothing else in this piece, else as text with points."""
+        if series.dtype.kind in "iuf":
+            return series.to_numpy()
+        cells = ["" if absent else str(cell) for cell, absent in zip(series, series.isna(), strict=True)]
+        decimal, thousands = self._options.decimal, self._options.thousands
+        if decimal == "," and not thousands:
+            pointed = next((cell for cell in cells if "." in cell and np.isfinite(number(cell))), None)
+            if pointed is not None:
+                raise RecordingError(
+                    f"'{pointed[:40]}' in column '{series.name}' has a point, where the comma is the decimal mark",
+                    where=str(self.path),
+                    remedy='if it parts thousands, give thousands = "." in the mapping\'s [text]; else correct decimal',
+                )
+        return texts([_plain(cell, decimal, thousands) for cell in cells])
+
+    def _lines(self, skipped: int) -> Iterator[tuple[int, str]]:
+        """Yield the lines that hold data or names, with their places in the file."""
         comment = self._options.comment
         try:
-            with self.path.open(encoding=self._options.encoding, newline=None) as file:
-                lines = itertools.islice(enumerate(file), self._options.skip_rows, None)
-                bounded = ((place, line.rstrip("\n")[:1_000_000]) for place, line in lines)
-                kept = (
-                    (place, line)
-                    for place, line in bounded
-                    if line.strip() and not (comment and line.startswith(comment))
-                )
-                head = list(itertools.islice(kept, _HEAD_LINES))
-        except (UnicodeDecodeError, LookupError) as error:
+            with self.path.open(encoding=self._encoding, newline=None) as file:
+                for place in itertools.count():
+                    line = file.readline(_LONGEST_LINE)
+                    if not line:
+                        return
+                    if len(line) == _LONGEST_LINE:
+                        raise RecordingError(f"line {place + 1} is endless", where=str(self.path), remedy=_NO_TEXT)
+                    line = line.partition(comment)[0] if comment else line
+                    if place >= skipped and line.strip():
+                        yield place, line.rstrip("\n")
+        except (UnicodeError, LookupError) as error:
             raise RecordingError(
-                f"not text in {self._options.encoding}: {error}",
-                where=str(self.path),
-                remedy="set encoding in the mapping's [text], or format where the file is no text at all",
+                f"not text in {self._encoding}: {error}", where=str(self.path), remedy=_NO_TEXT
             ) from error
-        if not head:
-            raise RecordingError("the file is empty", where=str(self.path))
-        return head
+
+    def _fitted(self, names: list[str], rows: Sequence[list[str]]) -> list[str]:
+        """Return the names that the first rows have cells for: those may end with empty cells, or names with none."""
+        trimmed = list(names)
+        while len(trimmed) > 1 and not trimmed[-1]:
+            trimmed.pop()
+        for able in (names, trimmed):
+            if not rows or any(len(row) >= len(able) and not any(row[len(able) :]) for row in rows):
+                return able
+        raise RecordingError(
+            f"its line of names has {len(names)} cells, and its rows have {len(rows[0])}: which is whose, nobody knows",
+            where=str(self.path),
+            remedy="correct the line of names; or leave it out (skip_rows, header = false) and number the columns",
+        )
 
     def _is_number(self, cell: str) -> bool:
         """Whether a cell is no name: a number, a date, or nothing."""
-        if not cell or _DATE.fullmatch(cell):
-            return True
-        try:
-            float(cell.replace(self._options.decimal, "."))
-        except ValueError:
-            return False
-        return True
+        plain = _plain(cell, self._options.decimal, self._options.thousands)
+        return not cell or bool(_DATE.fullmatch(cell)) or plain.lower() == "nan" or not np.isnan(number(plain))
+
+
+_NO_TEXT = "set encoding in the mapping's [text], or format where the file is no text at all"
+
+
+def _plain(cell: str, decimal: str, thousands: str | None) -> str:
+    """Return a number as it is written with a point; thousands are parted in threes, or it is none."""
+    cell = cell.strip()
+    if thousands and thousands in cell:
+        whole, mark, rest = cell.partition(decimal)
+        parted = rf"[+-]?\d{{1,3}}({re.escape(thousands)}\d{{3}})+"
+        cell = whole.replace(thousands, "") + mark + rest if re.fullmatch(parted, whole, re.ASCII) else ""
+    return cell.replace(decimal, ".")
+
+
+def _without_empty_end(line: str, delimiter: str, surplus: int) -> str:
+    """Return a line without so many empty cells at its end; "" where they are not empty."""
+    for _ in range(surplus):
+        line = line.rstrip(" ")
+        if not line.endswith(delimiter):
+            return ""
+        line = line[: -len(delimiter)]
+    return line
 
 
 def sniff_delimiter(lines: Sequence[str], decimal: str = ".") -> str:
@@ -129,27 +216,21 @@ def _split(line: str, delimiter: str) -> list[str]:
     return [cell.strip().strip('"') for cell in cells]
 
 
-def _widened(cells: Sequence[str], width: int) -> list[str]:
-    return [*cells, *[""] * (width - len(cells))]
-
-
 def _unique(names: Sequence[str]) -> tuple[str, ...]:
-    """Return `names` with " (2)", " (3)"... added to those that come again, and a number to those left empty."""
-    seen: dict[str, int] = {}
+    """Return `names`, those that come again with " (1)", " (2)"... added, and a number for those left empty."""
+    named = [name or str(position) for position, name in enumerate(names, start=1)]
+    counts = Counter(named)
+    taken = {name for name in named if counts[name] == 1}
+    seen = Counter[str]()
     unique = []
-    for position, name in enumerate(names, start=1):
-        name = name or str(position)
-        seen[name] = seen.get(name, 0) + 1
-        unique.append(name if seen[name] == 1 else f"{name} ({seen[name]})")
+    for name in named:
+        free = name
+        while counts[name] > 1 and (free == name or free in taken):
+            seen[name] += 1
+            free = f"{name} ({seen[name]})"
+        taken.add(free)
+        unique.append(free)
     return tuple(unique)
-
-
-def _cells(series: pd.Series[float], decimal: str) -> Cells:
-    """Return a parsed column as numbers where pandas found nothing else in this piece, else as text with points."""
-    if series.dtype.kind in "iuf":
-        return series.to_numpy()
-    cells = zip(series, series.isna(), strict=True)
-    return np.array(["" if absent else str(cell).replace(decimal, ".") for cell, absent in cells], dtype=np.str_)
 
 
 FORMAT = Format(suffixes=(".csv", ".tsv", ".txt", ".dat", ".asc"), read=TextTable, isolated=False)

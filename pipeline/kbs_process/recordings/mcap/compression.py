@@ -67,12 +67,17 @@ class Decompressor:
 
 
 def _decompress_lz4(compressed: memoryview, declared: int) -> Bytes:
-    context = lz4.frame.create_decompression_context()
-    try:
-        # One byte more than declared: a frame that has it to give is refused.
-        result, used, ended = lz4.frame.decompress_chunk(context, compressed, max_length=declared + 1)
-    except RuntimeError as error:
-        raise MalformedError(str(error)) from error
-    if not ended or used != len(compressed):
-        raise MalformedError(f"the frame does not end after the {declared} bytes declared")
-    return np.frombuffer(result, dtype=np.uint8)
+    parts: list[bytes] = []
+    size = at = 0
+    while at < len(compressed):  # frames may follow one another
+        context = lz4.frame.create_decompression_context()
+        try:
+            # One byte more than declared: a frame that has it to give is refused.
+            part, used, ended = lz4.frame.decompress_chunk(context, compressed[at:], max_length=declared - size + 1)
+        except RuntimeError as error:
+            raise MalformedError(str(error)) from error
+        if not ended or not used:
+            raise MalformedError(f"the frame does not end after the {declared} bytes declared")
+        parts.append(part)
+        size, at = size + len(part), at + used
+    return np.frombuffer(parts[0] if len(parts) == 1 else b"".join(parts), dtype=np.uint8)

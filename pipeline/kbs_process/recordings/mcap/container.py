@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kbs_process.recordings.mcap import framing as mcap
 from kbs_process.recordings.mcap.checksum import crc32
@@ -28,13 +29,37 @@ MOST_ENTRIES = 1 << 17  # schemas and channels that one chunk may hold: all numb
 OPCODE, CHANNEL, LOG, AT, SIZE = range(5)  # rows of the table that `walk` returns
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Segment:
-    """Messages in one buffer, which is theirs alone, and what the file has described up to there."""
+@dataclass(frozen=True, slots=True)
+class Described:
+    """A channel and its schema, as the file has described them up to the messages at hand."""
 
-    buffer: Bytes
-    table: Words  # (5, n): OPCODE, CHANNEL, LOG, AT, SIZE
-    dictionary: mcap.Dictionary
+    number: int
+    topic: str
+    encoding: str
+    schema: mcap.Schema
+
+
+class Segment:
+    """Messages in one buffer, which is theirs alone; work and memory follow their number, not the file's channels."""
+
+    def __init__(self, buffer: Bytes, table: Words, dictionary: mcap.Dictionary) -> None:
+        self.buffer = buffer
+        self.table = table  # (5, n): OPCODE, CHANNEL, LOG, AT, SIZE
+        channels = table[CHANNEL].astype(np.uint16)
+        self._order = np.argsort(channels, kind="stable")
+        numbers, firsts, counts = np.unique(channels[self._order], return_index=True, return_counts=True)
+        self._firsts = dict(zip(numbers.tolist(), firsts.tolist(), strict=True))
+        self.counts: dict[int, int] = dict(zip(numbers.tolist(), counts.tolist(), strict=True))
+        # Looked up here, as the dictionary grows while others use the segment.
+        known = ((number, dictionary.channels.get(number)) for number in self.counts)
+        self.channels = [
+            Described(number, one.topic, one.encoding, dictionary.schema_of(one)) for number, one in known if one
+        ]
+
+    def places(self, number: int) -> NDArray[np.int64]:
+        """Return which columns of the table are the channel's."""
+        first = self._firsts[number]
+        return self._order[first : first + self.counts[number]]
 
 
 class Container:
@@ -44,7 +69,6 @@ class Container:
         self.path = path
         self.size = path.stat().st_size
         self.dictionary = dictionary
-        self._known = dictionary.copy()  # as the segments have it: they may be in use while reading goes on
         self.losses: list[Loss] = []
         self.origin = origin  # log time of the recording's first message, ns: zero of the losses' times
         self._last: int | None = None
@@ -69,7 +93,7 @@ class Container:
             self._seek(file, len(mcap.MAGIC))
             while (stop := self._fill(file)) > 0:
                 end, table = self._walk(self._buffer, stop, chunk=False)
-                ends = np.flatnonzero((table[OPCODE] == mcap.DATA_END_OP) & (table[SIZE] == 4))
+                ends = np.flatnonzero((table[OPCODE] == mcap.DATA_END_OP) & (table[SIZE] >= 4))
                 yield from self._window(table[:, : ends[0]] if len(ends) else table)
                 if len(ends):
                     self._check_data_section(int(table[AT, ends[0]]))
@@ -129,16 +153,30 @@ class Container:
         if opcode != mcap.ATTACHMENT_OP:
             self.lose("undecodable", f"a record of {length} bytes at byte {self._at}")
         file.seek(self._at)
-        self._add_crc(file.read(mcap.RECORD_HEAD.size))
-        crc, left = 0, length - 4
-        while left and (piece := file.read(min(left, WINDOW))):
-            crc, left = crc32(piece, crc), left - len(piece)
-            self._add_crc(piece)
-        tail = file.read(4)
+        head = file.read(mcap.RECORD_HEAD.size + WINDOW)
+        self._add_crc(head[: mcap.RECORD_HEAD.size])
+        try:
+            end = mcap.attachment_end(memoryview(head)[mcap.RECORD_HEAD.size :], length)
+        except MalformedError as error:
+            end = length
+            if opcode == mcap.ATTACHMENT_OP:
+                self.lose("undecodable", f"record at byte {self._at}: {error}")
+        file.seek(self._at + mcap.RECORD_HEAD.size)
+        crc = self._skip(file, end)
+        tail = file.read(min(4, length - end))
         self._add_crc(tail)
-        if opcode == mcap.ATTACHMENT_OP:
+        self._skip(file, length - end - len(tail))
+        if opcode == mcap.ATTACHMENT_OP and tail:
             self._check_attachment(crc, int.from_bytes(tail, "little"))
         self._seek(file, self._at + mcap.RECORD_HEAD.size + length)
+
+    def _skip(self, file: BinaryIO, size: int) -> int:
+        """Read on over so many bytes, a piece at a time; return their CRC."""
+        crc = 0
+        while size and (piece := file.read(min(size, WINDOW))):
+            crc, size = crc32(piece, crc), size - len(piece)
+            self._add_crc(piece)
+        return crc
 
     def _add_crc(self, piece: Bytes | bytes) -> None:
         if self._crc is not None:
@@ -175,9 +213,7 @@ class Container:
         if self.origin is None:
             self.origin = int(table[LOG, 0])
         self._last = int(table[LOG, -1])
-        if self.dictionary.size > self._known.size:
-            self._known = self.dictionary.copy()
-        return Segment(buffer, table, self._known)
+        return Segment(buffer, table, self.dictionary)
 
     @staticmethod
     def _content(buffer: Bytes, column: Words) -> memoryview:
@@ -192,8 +228,8 @@ class Container:
             elif opcode == mcap.MESSAGE_INDEX_OP:
                 mcap.parse_message_index(bytes(content))
             elif opcode == mcap.ATTACHMENT_OP:
-                crc = int.from_bytes(content[-4:], "little")
-                self._check_attachment(crc32(content[:-4]), crc)
+                end = mcap.attachment_end(content)
+                self._check_attachment(crc32(content[:end]), int.from_bytes(content[end : end + 4], "little"))
             elif opcode == mcap.HEADER_OP and place != len(mcap.MAGIC) + mcap.RECORD_HEAD.size:
                 raise MalformedError("a second header")
             elif opcode not in (mcap.HEADER_OP, mcap.METADATA_OP) and opcode < mcap.PRIVATE_OP:
@@ -214,7 +250,7 @@ class Container:
             return
         span = {"start": head.start, "end": head.end}
         try:
-            buffer = self._decompress(head.compression, content[head.at :], head.size)
+            buffer = self._decompress(head.compression, content[head.at : head.at + head.compressed], head.size)
         except MalformedError as error:
             self.lose("undecodable", f"chunk: {error}", **span)
             return

@@ -63,15 +63,6 @@ class Dictionary:
             number, channel = parse_channel(content)
             self.conflicts += self.channels.setdefault(number, channel) != channel
 
-    @property
-    def size(self) -> int:
-        """How many entries there are: one that has not grown is the same, as the first of a number holds."""
-        return len(self.schemas) + len(self.channels)
-
-    def copy(self) -> Dictionary:
-        """Return the dictionary as it is now."""
-        return Dictionary(dict(self.schemas), dict(self.channels), self.conflicts)
-
     def schema_of(self, channel: Channel) -> Schema:
         """Return the channel's schema; one without a name where the file gives none."""
         return self.schemas.get(channel.schema, Schema("", "", b""))
@@ -144,7 +135,7 @@ def parse_chunk_head(content: bytes, length: int) -> ChunkHead:
         raise MalformedError("no compression has so long a name")
     compression = fields.bytes(name).decode("ascii", errors="replace")
     compressed = fields.integer(8)
-    if fields.at + compressed != length:
+    if fields.at + compressed > length:  # what follows the known fields belongs to later versions of the format
         raise MalformedError(f"a chunk of {length} bytes that states {compressed} bytes of records")
     return ChunkHead(start, end, size, crc, compression, fields.at, compressed)
 
@@ -154,9 +145,21 @@ def parse_message_index(content: bytes) -> int:
     fields = Fields(content)
     channel = fields.integer(2)
     size = fields.integer(4)
-    if size % 16 or size + 6 != len(content):
+    if size % 16 or size + 6 > len(content):
         raise MalformedError("a message index of an impossible size")
     return channel
+
+
+def attachment_end(content: memoryview, length: int | None = None) -> int:
+    """Return where the CRC of an attachment of `length` bytes stands, of which `content` is the beginning."""
+    fields = Fields(bytes(content[: 1 << 16]))
+    fields.bytes(8 + 8)
+    for _ in range(2):  # its name and media type
+        fields.bytes(fields.integer(4))
+    end = fields.integer(8) + fields.at
+    if end + 4 > (len(content) if length is None else length):
+        raise MalformedError("an attachment that ends behind its record")
+    return end
 
 
 def parse_statistics(content: bytes) -> tuple[int, dict[int, int]]:

@@ -34,13 +34,15 @@ SHORTEST = 14  # content of a schema record without a single letter
 LITTLE, BIG, VARINT, ZERO, MISSING = range(5)
 FLOAT64, FLOAT32, SIGNED, UNSIGNED, ZIGZAG = range(5)
 
+MOST_SECONDS = 1 << 33  # of a stamp: nanoseconds then fit 64 bits
+NO_STAMP = -(1 << 63)  # of a message whose seconds or nanoseconds are beyond all that clocks show
+
 U = np.uint64
 BUFFER = types.Array(types.uint8, 1, "C", readonly=True)
 WORDS = types.Array(types.uint64, 1, "C")
 STAMPS = types.Array(types.int64, 1, "C")
 TABLE = types.Array(types.uint64, 2, "C")
 TABLE_ANY = types.Array(types.uint64, 2, "A")
-CHOSEN = types.Tuple((STAMPS, STAMPS, WORDS, WORDS))  # type: ignore[no-untyped-call]
 DONE = types.Tuple((types.int64, types.boolean))  # type: ignore[no-untyped-call]
 CUBE = types.Array(types.uint64, 3, "C")
 
@@ -122,25 +124,6 @@ def _swapped(word: np.uint64) -> np.uint64:
     return word << U(32) | word >> U(32)
 
 
-@njit(CHOSEN(TABLE_ANY, types.uint64), cache=True, nogil=True)
-def select(table: Words, channel: np.uint64) -> tuple[Stamps, Stamps, Words, Words]:
-    """Return place in `table`, log time, at and size of each of the channel's messages."""
-    count = 0
-    for i in range(table.shape[1]):
-        count += table[1, i] == channel
-    place, log = np.empty(count, dtype=np.int64), np.empty(count, dtype=np.int64)
-    at, size = np.empty(count, dtype=np.uint64), np.empty(count, dtype=np.uint64)
-    k = 0
-    for i in range(table.shape[1]):
-        if table[1, i] == channel:
-            place[k] = i
-            log[k] = np.int64(table[2, i])
-            at[k] = table[3, i]
-            size[k] = table[4, i]
-            k += 1
-    return place, log, at, size
-
-
 @njit(inline="always")
 def _load(buffer: Bytes, place: np.uint64, size: np.uint64, form: np.uint64) -> np.uint64:
     """Return the bits of a cell of `size` bytes."""
@@ -209,7 +192,7 @@ def decode(
     and expected word. `cells` (k, c, 4): offset, size, form, kind; `clocks` (k, 2, 4) likewise for seconds and ns,
     or (k, 0, 4). `plain` says of a layout that all of its cells are float64 in this machine's byte order, the usual
     case. Adds to the layouts' `counts`; writes a layout's number, counted from `number`, into `which`, and rows of
-    `stamp` and `values`.
+    `stamp` (`NO_STAMP` where there is none) and `values`.
     """
     bits = values.view(np.uint64)
     single = np.zeros(1, dtype=np.uint32)
@@ -241,12 +224,18 @@ def decode(
         which[i] = number + found
         if clocks.shape[1] == 2:
             time = np.int64(0)
+            known = True
             for c in range(2):
-                time = time * 1_000_000_000
+                part = np.int64(0)
                 if clocks[found, c, 2] != ZERO:
-                    part = _load(buffer, at[i] + clocks[found, c, 0], clocks[found, c, 1], clocks[found, c, 2])
-                    time += _signed(part, clocks[found, c, 1], clocks[found, c, 2])
-            stamp[i] = time
+                    word = _load(buffer, at[i] + clocks[found, c, 0], clocks[found, c, 1], clocks[found, c, 2])
+                    # An unsigned 32-bit word is no negative number, and one of 64 bits beyond 2^63 no time.
+                    wide = clocks[found, c, 3] == UNSIGNED and clocks[found, c, 1] < U(8)
+                    part = np.int64(word) if wide else _signed(word, clocks[found, c, 1], clocks[found, c, 2])
+                within = -MOST_SECONDS <= part <= MOST_SECONDS if c == 0 else 0 <= part < 1_000_000_000
+                known = bool(known and within)
+                time = time * 1_000_000_000 + part
+            stamp[i] = time if known else NO_STAMP
         if plain[found]:
             for c in range(cells.shape[1]):
                 word = _inner_word(buffer, at[i] + cells[found, c, 0])

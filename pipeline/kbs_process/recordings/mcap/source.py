@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import islice
 from pathlib import Path
 from typing import BinaryIO
-
-import numpy as np
 
 from kbs_process.errors import RecordingError, did_you_mean
 from kbs_process.recordings.mcap import framing as mcap
 from kbs_process.recordings.mcap.ahead import ahead
-from kbs_process.recordings.mcap.container import AT, CHANNEL, SIZE, Container, Segment
+from kbs_process.recordings.mcap.container import AT, SIZE, Container, Described
 from kbs_process.recordings.mcap.streams import SAMPLES, Reading, Sample, Stream, payloads, type_of
-from kbs_process.signals.records import TRUNCATED, Block, Loss, Stamps
+from kbs_process.signals.records import TRUNCATED, Block, Loss
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,28 +26,13 @@ class TopicSummary:
     count: int | None
 
 
-class Counter:
-    """Counts the messages of each channel."""
-
-    def __init__(self) -> None:
-        self.counts: Stamps = np.zeros(1 << 16, dtype=np.int64)
-
-    def add(self, segment: Segment) -> None:
-        """Count the messages of a segment."""
-        found = np.bincount(segment.table[CHANNEL].view(np.int64))
-        self.counts[: len(found)] += found
-
-    def found(self) -> dict[int, int]:
-        """Return the number of messages of each channel that has any."""
-        return {int(number): int(self.counts[number]) for number in np.flatnonzero(self.counts)}
-
-
 class Source:
     """A recording on disk. Times in its losses are seconds of log time since `start_ns`."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
         self.start_ns: int | None = None  # log time of the first message
+        self._readings: list[Reading] = []
         self._losses: tuple[Loss, ...] = ()
         self._topics: tuple[TopicSummary, ...] | None = None
         self._summary: mcap.Summary | None = None
@@ -83,16 +66,21 @@ class Source:
     def topics(self) -> tuple[TopicSummary, ...]:
         """The topics, by name. A file without an index is read through once to find them."""
         if self._topics is None:
-            container, counter = self._container(), Counter()
+            container, counts = self._container(), Counter[int]()
             for segment in container.segments():
-                counter.add(segment)
-            self._learn(container, counter)
+                counts.update(segment.counts)
+            self._learn(container, counts)
         return self._topics or ()
 
     @property
     def losses(self) -> tuple[Loss, ...]:
         """What the recording has lost; complete once `read` is exhausted."""
         return self._losses
+
+    @property
+    def publishers(self) -> dict[str, tuple[int, ...]]:
+        """By stream, the channels that bring it by turns, as far as it is read."""
+        return {reading.stream.key: reading.publishers for reading in self._readings if reading.publishers}
 
     def read(self, streams: Sequence[Stream]) -> Iterator[tuple[str, Block]]:
         """Yield (key, block) for every stream wherever it has messages, in the order of the file.
@@ -101,40 +89,48 @@ class Source:
         block where the file's index tells, else where the topic begins, or at the end of the file.
         """
         self._losses = ()
-        container, counter = self._container(), Counter()
+        container, counts = self._container(), Counter[int]()
         if self._indexed:
             self._require_topics(streams, container.dictionary)
-        readings = [Reading(stream, container) for stream in streams]
+        readings = self._readings = [Reading(stream, container) for stream in streams]
+        wanting: dict[str, list[int]] = {}
+        for place, stream in enumerate(streams):
+            wanting.setdefault(stream.topic, []).append(place)
         for segment in ahead(container.segments()):
-            counter.add(segment)
-            for reading in readings:
-                block = reading.block(segment)
+            counts.update(segment.counts)
+            channels: dict[str, list[Described]] = {}
+            for channel in segment.channels:
+                channels.setdefault(channel.topic, []).append(channel)
+            found = sorted((place, topic) for topic in channels for place in wanting.get(topic, ()))
+            for place, topic in found:
+                block = readings[place].block(segment, channels[topic])
                 if block is not None and len(block):
-                    yield reading.stream.key, block
-        self._learn(container, counter)
-        self._conclude(container, counter)
+                    yield streams[place].key, block
+        self._learn(container, counts)
+        self._conclude(container, counts)
         self._losses = (*container.losses, *(loss for reading in readings for loss in reading.losses()))
         self._require_topics(streams, container.dictionary)
 
     def samples(self) -> dict[str, Sample | str]:
         """Return a message of every topic that has any, or why its messages cannot be read."""
         found: dict[str, Sample | str] = {}
+        tried = Counter[str]()
         wanted = {topic.topic for topic in self.topics if topic.count != 0}
-        container = self._container()
-        for segment in container.segments():
-            channels = segment.dictionary.channels
-            numbers, firsts = np.unique(segment.table[CHANNEL], return_index=True)
-            for number, first in zip(numbers.tolist(), firsts.tolist(), strict=True):
-                if number in channels and channels[number].topic not in found:
-                    table = segment.table[:, first:]
-                    table = table[:, table[CHANNEL] == np.uint64(number)]
-                    topic = channels[number].topic
-                    texts = list(islice(payloads(segment.buffer, table[AT], table[SIZE]), SAMPLES))
-                    try:
-                        found[topic] = Sample(type_of(segment.dictionary, number, iter(texts), topic), texts[0])
-                    except RecordingError as error:
-                        found[topic] = error.what
-            if wanted <= found.keys():
+        for segment in self._container().segments():
+            for channel in segment.channels:
+                if channel.topic in wanted:
+                    places = segment.places(channel.number)[:SAMPLES]
+                    rows = segment.table[AT, places], segment.table[SIZE, places]
+                    for sample in _samples(channel, payloads(segment.buffer, *rows), payloads(segment.buffer, *rows)):
+                        tells = isinstance(sample, str) or sample.tells()
+                        before = found.get(channel.topic)
+                        if tells or before is None or (isinstance(before, Sample) and before.fault()):
+                            found[channel.topic] = sample
+                        tried[channel.topic] += 1
+                        if tells or tried[channel.topic] >= SAMPLES:
+                            wanted.discard(channel.topic)
+                            break
+            if not wanted:
                 break
         return found
 
@@ -145,21 +141,22 @@ class Source:
             dictionary.channels |= self._summary.dictionary.channels
         return Container(self.path, dictionary, self.start_ns)
 
-    def _learn(self, container: Container, counter: Counter) -> None:
+    def _learn(self, container: Container, counts: Counter[int]) -> None:
         self.start_ns = container.origin
         if self._topics is None:
-            self._topics = _topics(container.dictionary, counter.found())
+            self._topics = _topics(container.dictionary, counts)
 
     def _require_topics(self, streams: Sequence[Stream], dictionary: mcap.Dictionary) -> None:
-        topics = sorted({channel.topic for channel in dictionary.channels.values()})
+        known = {channel.topic for channel in dictionary.channels.values()}
         for stream in streams:
-            if stream.topic not in topics:
+            if stream.topic not in known:
+                topics = sorted(known)
                 remedy = did_you_mean(stream.topic, topics)
                 if topics and not remedy.startswith("known"):
                     remedy += f" (known: {', '.join(topics)})"
                 raise RecordingError(f"there is no topic '{stream.topic}'", where=str(self.path), remedy=remedy)
 
-    def _conclude(self, container: Container, counter: Counter) -> None:
+    def _conclude(self, container: Container, found: Counter[int]) -> None:
         """Note what only shows at the end of a pass."""
         if self._damage:
             container.lose("undecodable", f"the summary: {self._damage}")
@@ -171,7 +168,6 @@ class Source:
         if container.dictionary.conflicts:
             conflicts = container.dictionary.conflicts
             container.lose("undecodable", "schemas or channels that contradict others", count=conflicts)
-        found = counter.found()
         unknown = sum(count for number, count in found.items() if number not in container.dictionary.channels)
         if unknown:
             container.lose("undecodable", "messages of channels that the file does not describe", count=unknown)
@@ -183,7 +179,18 @@ class Source:
                 container.lose("missing", detail, count=count - found.get(number, 0))
 
 
-def _topics(dictionary: mcap.Dictionary, counts: dict[int, int] | None) -> tuple[TopicSummary, ...]:
+def _samples(channel: Described, first: Iterator[bytes], texts: Iterator[bytes]) -> Iterator[Sample | str]:
+    """Yield messages of a channel, whose type the `first` of them may tell, or why they cannot be read."""
+    try:
+        kind = type_of(channel, first, channel.topic)
+    except RecordingError as error:
+        yield error.what
+        return
+    for text in texts:
+        yield Sample(kind, text)
+
+
+def _topics(dictionary: mcap.Dictionary, counts: Mapping[int, int] | None) -> tuple[TopicSummary, ...]:
     found: dict[str, TopicSummary] = {}
     for number, channel in sorted(dictionary.channels.items()):
         count = None if counts is None else counts.get(number, 0)

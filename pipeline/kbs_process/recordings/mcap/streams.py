@@ -9,14 +9,16 @@ from itertools import islice
 import numpy as np
 
 from kbs_process.errors import RecordingError, did_you_mean
-from kbs_process.recordings.mcap.container import Container, Segment
-from kbs_process.recordings.mcap.framing import Dictionary
-from kbs_process.recordings.mcap.kernels import Bytes, Words, select
+from kbs_process.recordings.mcap.container import AT, LOG, SIZE, Container, Described, Segment
+from kbs_process.recordings.mcap.framing import MalformedError
+from kbs_process.recordings.mcap.kernels import NO_STAMP, Bytes, Words
 from kbs_process.recordings.mcap.messages.decoders import Decoder, MessageType, message_type
-from kbs_process.recordings.mcap.messages.fields import Step, resolve
+from kbs_process.recordings.mcap.messages.fields import Elements, Step, resolve
 from kbs_process.signals.records import Block, Loss, Stamps
 
+RETURNS = 2  # to a channel that was left for another of the same topic: there are two publishers
 SAMPLES = 64  # messages from which the numbers of a type without schema are learnt
+_NO_STAMP = "seconds beyond 2^33, or nanoseconds outside 0 to 999999999: mend the driver, or leave its stamp out"
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +29,7 @@ class Stream:
     topic: str
     fields: tuple[str, ...]
     otherwise: str = ""  # what to do where no message has one of the elements that fields name
+    channel: int | None = None  # number of the one channel of the topic that is wanted; None: all
 
 
 @dataclass(slots=True, eq=False)
@@ -35,14 +38,16 @@ class Tally:
 
     counts: dict[str, int] = field(default_factory=dict)
     spans: dict[str, tuple[int, int]] = field(default_factory=dict)
+    details: dict[str, str] = field(default_factory=dict)  # of the first
 
-    def add(self, kind: str, log: Stamps) -> None:
+    def add(self, kind: str, log: Stamps, detail: str = "") -> None:
         """Add the messages with these log times."""
         if len(log):
             low, high = int(log.min()), int(log.max())
             first, last = self.spans.get(kind, (low, high))
             self.spans[kind] = (min(first, low), max(last, high))
             self.counts[kind] = self.counts.get(kind, 0) + len(log)
+            self.details.setdefault(kind, detail)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,6 +56,30 @@ class Sample:
 
     type: MessageType
     payload: bytes
+
+    def elements(self, path: str) -> Elements:
+        """Return the names and the length of a sequence in the message; none where it cannot be decoded."""
+        try:
+            return self.type.elements(self.payload, path)
+        except MalformedError:
+            return Elements((), 0)
+
+    def tells(self) -> bool:
+        """Whether the message shows how long sequences are: a first one may hold nothing yet."""
+        sequences = self._sequences()
+        return not sequences or any(self.elements(path).count for path in sequences)
+
+    def fault(self) -> str:
+        """Say why the message's sequences cannot be decoded, "" where they can."""
+        try:
+            for path in self._sequences():
+                self.type.elements(self.payload, path)
+        except MalformedError as error:
+            return str(error)
+        return ""
+
+    def _sequences(self) -> list[str]:
+        return [field.path for field in self.type.fields if field.count is not None]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,6 +91,33 @@ class _Plan:
     decode: Decoder
 
 
+@dataclass(slots=True)
+class _Turns:
+    """Which channels brought a topic, one after the other."""
+
+    seen: set[int] = field(default_factory=set)
+    last: int | None = None
+    returns: int = 0  # to a channel that had been left
+
+    def add(self, numbers: Sequence[int]) -> None:
+        for number in numbers:
+            if number != self.last:
+                self.returns += number in self.seen
+                self.seen.add(number)
+                self.last = number
+
+
+def _twice(blocks: Sequence[Block]) -> bool:
+    """Whether several channels bring the same messages, but for those that a chunk's edge parts."""
+    first, *others = blocks
+    for one in others:
+        common, mine, theirs = np.intersect1d(first.stamp, one.stamp, return_indices=True)
+        same = np.array_equal(first.values[mine], one.values[theirs], equal_nan=True)
+        if not same or 2 * len(common) < min(len(first), len(one)):
+            return False
+    return True
+
+
 class Reading:
     """The state of one stream during a pass."""
 
@@ -71,69 +127,76 @@ class Reading:
         self._plans: dict[int, _Plan] = {}
         self._tally = Tally()
         self._where = f"{container.path.name}, {stream.topic}"
+        self._turns = _Turns()
 
-    def block(self, segment: Segment) -> Block | None:
-        """Return the stream's messages in the segment, in their order; None where there is none."""
-        dictionary = segment.dictionary
-        parts = []
-        for number in [n for n, channel in dictionary.channels.items() if channel.topic == self.stream.topic]:
-            places, log, at, size = select(segment.table, np.uint64(number))
-            if len(places):
-                parts.append(self._decode(number, segment, places, log, at, size))
+    def block(self, segment: Segment, channels: Sequence[Described]) -> Block | None:
+        """Return the stream's messages in the segment, in their order; `channels` are those of its topic there."""
+        channels = [one for one in channels if self.stream.channel in (None, one.number)]
+        numbers = [channel.number for channel in channels]
+        parts = [self._decode(channel, segment) for channel in channels]
         if len(parts) < 2:
+            self._turns.add(numbers)
             return parts[0][1] if parts else None
         order = np.argsort(np.concatenate([places for places, _ in parts]))
         blocks = [block for _, block in parts]
+        lengths = [len(block) for block in blocks]
+        if not _twice(blocks):
+            came = np.repeat(numbers, lengths)[order]
+            self._turns.add(came[np.flatnonzero(np.diff(came, prepend=-1))].tolist())
         return Block(
             np.concatenate([block.stamp for block in blocks])[order],
             np.concatenate([block.log for block in blocks])[order],
             np.concatenate([block.values for block in blocks])[order],
         )
 
+    @property
+    def publishers(self) -> tuple[int, ...]:
+        """The channels that bring the topic by turns; none where each ends before the next begins."""
+        return tuple(sorted(self._turns.seen)) if self._turns.returns >= RETURNS else ()
+
     def losses(self) -> Iterator[Loss]:
         """Yield what the stream has lost."""
         seconds = self._container.seconds
         for kind, count in self._tally.counts.items():
             first, last = self._tally.spans[kind]
-            yield Loss(kind, self._where, count, seconds(first), seconds(last))
+            yield Loss(kind, self._where, count, seconds(first), seconds(last), self._tally.details[kind])
 
-    def _decode(
-        self, number: int, segment: Segment, places: Stamps, log: Stamps, at: Words, size: Words
-    ) -> tuple[Stamps, Block]:
+    def _decode(self, channel: Described, segment: Segment) -> tuple[Stamps, Block]:
+        places = segment.places(channel.number)
+        at, size = segment.table[AT, places], segment.table[SIZE, places]
+        log = segment.table[LOG, places].view(np.int64)
         if not self.stream.fields:  # messages of any type can be counted
             return places, Block(log, log, np.empty((len(log), 0)))
-        fresh = number not in self._plans
+        fresh = channel.number not in self._plans
         if fresh:
-            self._plans[number] = self._plan(number, segment.dictionary, payloads(segment.buffer, at, size))
-        plan = self._plans[number]
+            self._plans[channel.number] = self._plan(channel, payloads(segment.buffer, at, size))
+        plan = self._plans[channel.number]
         decoded = plan.decode(segment.buffer, at, size, log)
-        good = decoded.good
+        values, stamp, lacking, good = decoded.values, decoded.stamp, decoded.lacking, decoded.good
         if fresh and good.any():
             payload = next(payloads(segment.buffer, at[good], size[good]))
             _require_names(plan, decoded.present.tolist(), payload, self._where, self.stream.otherwise)
-        if decoded.flawless:
-            return places, Block(decoded.stamp, log, decoded.values)
-        self._tally.add("missing field", log[decoded.lacking])
-        values, stamp, lacking = decoded.values, decoded.stamp, decoded.lacking
-        if not good.all():
-            self._tally.add("undecodable", log[~good])
-            places, log, lacking = places[good], log[good], lacking[good]
-            stamp, values = stamp[good], values[good]
-        bad = ~np.isfinite(values).all(axis=1)
-        self._tally.add("non-finite", log[bad & ~lacking])
-        return places, Block(stamp, log, values)
+        stamped = stamp != NO_STAMP
+        if decoded.flawless and stamped.all():
+            return places, Block(stamp, log, values)
+        self._tally.add("missing field", log[lacking])
+        self._tally.add("undecodable", log[~good], decoded.reason)
+        self._tally.add("no valid stamp", log[good & ~stamped], _NO_STAMP)
+        kept = good & stamped
+        bad = kept & ~lacking & ~np.isfinite(np.where(good[:, None], values, 0.0)).all(axis=1)
+        self._tally.add("non-finite", log[bad])
+        return places[kept], Block(stamp[kept], log[kept], values[kept])
 
-    def _plan(self, number: int, dictionary: Dictionary, samples: Iterator[bytes]) -> _Plan:
-        kind = type_of(dictionary, number, samples, self._where)
-        name = dictionary.schema_of(dictionary.channels[number]).name
+    def _plan(self, channel: Described, samples: Iterator[bytes]) -> _Plan:
+        kind = type_of(channel, samples, self._where)
+        name = channel.schema.name
         steps = resolve(self.stream.fields, kind.fields, f"{self._where} ({name})" if name else self._where)
         return _Plan(kind, steps, kind.decoder(steps))
 
 
-def type_of(dictionary: Dictionary, number: int, samples: Iterator[bytes], where: str) -> MessageType:
+def type_of(channel: Described, samples: Iterator[bytes], where: str) -> MessageType:
     """Return the type of a channel's messages."""
-    channel = dictionary.channels[number]
-    return message_type(channel, dictionary.schema_of(channel), islice(samples, SAMPLES), where)
+    return message_type(channel.encoding, channel.schema, islice(samples, SAMPLES), where)
 
 
 def payloads(buffer: Bytes, at: Words, size: Words) -> Iterator[bytes]:
@@ -143,11 +206,11 @@ def payloads(buffer: Bytes, at: Words, size: Words) -> Iterator[bytes]:
 
 
 def _require_names(plan: _Plan, present: Sequence[bool], payload: bytes, where: str, otherwise: str) -> None:
-    """Raise an error for a name that no message has; a merely empty array is a loss, not an error."""
+    """Raise an error for a name that no message has; a merely empty array, or one without names, is a loss."""
     for step, there in zip(plan.steps, present, strict=True):
         if not there and isinstance(step.key, str):
             names = plan.type.elements(payload, step.path).names
-            if step.key not in names:
+            if names and step.key not in names:  # a first message may name nothing yet
                 remedy = did_you_mean(step.key, names)
                 raise RecordingError(
                     f"no message names an element '{step.key}' of {step.path}",

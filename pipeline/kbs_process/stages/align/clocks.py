@@ -18,7 +18,12 @@ from kbs_process.signals.records import Array, Clock, Stamps
 STRETCHES = 256  # bound on the pairs kept, however long the recording
 LEAST_PAIRS = 8
 UNKNOWN_OFFSET_S = 1e-3  # standard uncertainty taken for clocks that cannot be compared
-LARGEST_SKEW = 0.01  # beyond it the recorder's clock is not a clock (a file written in one go)
+NO_CLOCK = 0.1  # beyond it the recorder's clock tells nothing (a file written in one go)
+LARGEST_SKEW = 3e-4  # no oscillator is further off, and some latency grows
+BENT = 5e-5  # by how much an oscillator's skew may differ between the halves of a recording, as it warms up
+LEAST_STEP_S = 1e-3
+STEP_SCATTERS = 8.0  # a step of the floor: so many times what it changes by from stretch to stretch
+LEVEL = 8  # stretches on either side that a step lasts
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +40,15 @@ class ClockLine:
     def sigma(self, own: float) -> float:
         """Standard uncertainty of the recorder time at own time `own`, s."""
         return float(np.hypot(self.sigma_middle, self.sigma_skew * (own - self.middle)))
+
+
+@dataclass(frozen=True, slots=True)
+class FloorStep:
+    """A step of log - stamp that lasts."""
+
+    own: float  # s, on the stream's own clock
+    by: float  # s
+    within: float  # s, how well `own` is known
 
 
 class LatencyFloor:
@@ -73,12 +87,56 @@ class LatencyFloor:
             self._floor[stretch] = (own, latency)
 
     def line(self) -> ClockLine | None:
-        """Fit the floor; None where it is too short, or no clock at all."""
+        """Fit the floor; None where it is too short, or does not run like a clock (`trouble`)."""
+        line = self._fitted()
+        return None if line is None or self.trouble() else line
+
+    def trouble(self) -> str:
+        """Why the floor is no line of two clocks, or nothing."""
+        line = self._fitted()
+        if line is None:
+            return ""
+        own, floor = self._pairs()
+        if abs(line.skew) >= LARGEST_SKEW:
+            ways = f"{'later' if line.skew > 0.0 else 'earlier'} by {1e3 * abs(line.skew):.3g} ms each second"
+            return f"log times come {ways}, and no oscillator is so far off: a latency that grows, not a skew"
+        if (step := self.step()) is not None:
+            return (
+                f"log times come {1e3 * step.by:+.3g} ms later from {step.own:.4g} s on: no clock is compared by them"
+            )
+        if len(own) >= 4 * LEAST_PAIRS:
+            half = len(own) // 2
+            parts = [fit_floor(own[part], floor[part], 0.0) for part in (slice(0, half), slice(half, None))]
+            bent = parts[1].skew - parts[0].skew
+            if abs(bent) > BENT + 6.0 * np.hypot(parts[0].sigma_skew, parts[1].sigma_skew):
+                return f"log times drift, {1e6 * bent:+.3g} ppm from half to half: a latency that changes, not a skew"
+        return ""
+
+    def step(self) -> FloorStep | None:
+        """Find the largest step of the floor from one level to another, both of which last."""
+        if len(self._floor) < 2 * LEAST_PAIRS:
+            return None
+        own, floor = self._pairs()
+        change = np.diff(floor)
+        scatter = 1.4826 * float(np.median(np.abs(change - np.median(change))))
+        best: FloorStep | None = None
+        for at in np.flatnonzero(np.abs(change) > max(LEAST_STEP_S, STEP_SCATTERS * scatter)):
+            before, after = floor[max(at + 1 - LEVEL, 0) : at + 1], floor[at + 1 : at + 1 + LEVEL]
+            by = float(np.median(after) - np.median(before))
+            lasts = min(len(before), len(after)) >= LEAST_PAIRS // 2 and abs(by - change[at]) < 0.3 * abs(by)
+            if lasts and (best is None or abs(by) > abs(best.by)):
+                best = FloorStep(float(own[at : at + 2].mean()), by, float(own[at + 1] - own[at]))
+        return best
+
+    def _pairs(self) -> tuple[Array, Array]:
+        pairs = np.array(sorted(self._floor.values()), dtype=np.float64) * 1e-9
+        return pairs[:, 0], pairs[:, 1]
+
+    def _fitted(self) -> ClockLine | None:
         if len(self._floor) < LEAST_PAIRS:
             return None
-        pairs = np.array(sorted(self._floor.values()), dtype=np.float64) * 1e-9
-        line = fit_floor(pairs[:, 0], pairs[:, 1], self._sum / self._count * 1e-9)
-        return line if abs(line.skew) < LARGEST_SKEW else None
+        line = fit_floor(*self._pairs(), self._sum / self._count * 1e-9)
+        return line if abs(line.skew) < NO_CLOCK else None
 
 
 def fit_floor(own: Array, floor: Array, mean: float) -> ClockLine:

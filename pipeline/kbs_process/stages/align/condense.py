@@ -28,7 +28,7 @@ from kbs_process.signals.records import (
 )
 from kbs_process.stages.align.clocks import align
 from kbs_process.stages.align.resample import Kept, design
-from kbs_process.stages.align.stream import Collected, Timeline, Uniform
+from kbs_process.stages.align.stream import ONE_PART, Collected, Timeline, Uniform
 
 Progress = Callable[[str, int], None]  # stream, samples just taken
 
@@ -69,11 +69,13 @@ def condense(
     progress: Progress | None = None,
     units: Mapping[str, tuple[str, ...]] | None = None,
     file: str | None = None,
+    *,
+    keep_spikes: bool = False,
 ) -> Run:
     """Reduce a recording to a `Run`; `channels` names the columns of every stream that `blocks` brings.
 
     `units` are those of streams of the joints that are not rad or rad/s throughout; `file` is what errors call the
-    recording, its name without it.
+    recording, its name without it. With `keep_spikes` single bad samples are told, and stay.
 
     Time zero is the reference stream's first sample (the wrench's, where there is one), and the axis covers
     that stream. Samples that lean on invented input (gaps, the ends' continuation, times at which a stream
@@ -83,7 +85,9 @@ def condense(
     """
     load = next((key for key in LOADS if key in channels), None)
     streams: dict[str, Uniform | Collected] = {
-        key: _stream(name, key, columns, settings, (units or {}).get(key), is_load=key == load)
+        key: _stream(
+            name, file or name, key, columns, settings, (units or {}).get(key), is_load=key == load, keep=keep_spikes
+        )
         for key, columns in channels.items()
     }
     for key, block in blocks:
@@ -110,6 +114,9 @@ def condense(
     reference = next(iter(kept))
     present = {key: s.line for key, s in streams.items() if s.line.samples}
     clocks = align({key: line.clock() for key, line in present.items()}, reference)
+    if (found := set_clock({key: sampled[key].line for key in kept})) is not None:
+        raise RecordingError(found[1], where=_place(file or name, found[0]), remedy=ONE_PART)
+    _check_overlap(present, clocks, reference, kept, file or name)
 
     dt = 1.0 / settings.working_rate_Hz
     count = int(np.floor(sampled[reference].line.span / dt * (1.0 + 1e-12))) + 1
@@ -143,6 +150,36 @@ def condense(
     )
 
 
+def set_clock(lines: Mapping[str, Timeline]) -> tuple[str, str] | None:
+    """Find a stream whose log - stamp steps for good, where stamps of this stream or another jump with it; in words."""
+    for key, line in lines.items():
+        if (step := line.floor_step()) is None:
+            continue
+        for other, jumping in lines.items():
+            at = step.own + (line.clock().first_log - jumping.clock().first_log) * 1e-9
+            if jumping.jumps(step, at):
+                whose = "encoder" if other == "angle" else other
+                return key, (
+                    f"log times less stamps step by {step.by:+.4g} s, {step.own:.4g} s after the first sample, and "
+                    f"stamps of {whose} jump there: a clock was set"
+                )
+    return None
+
+
+def _check_overlap(
+    lines: dict[str, Timeline], clocks: dict[str, Clock], reference: str, kept: Iterable[str], file: str
+) -> None:
+    """Raise RecordingError where a stream that is sampled lies all before or all after the reference."""
+    for key in kept:
+        start = clocks[key].offset_s
+        if start > lines[reference].span or start + lines[key].span < 0.0:
+            raise RecordingError(
+                f"its first sample comes {start:.6g} s after that of {reference}: the two have no time in common",
+                where=_place(file, key),
+                remedy="look for stamps of another time zone or unit, or an unset clock, with `kbs-process inspect`",
+            )
+
+
 def _losses(lines: dict[str, Timeline], clocks: dict[str, Clock]) -> list[Loss]:
     return [loss for key, line in lines.items() for loss in line.losses(clocks[key].offset_s, 1.0 + clocks[key].skew)]
 
@@ -153,16 +190,18 @@ def _missing(line: Timeline) -> Loss:
 
 def _stream(
     name: str,
+    file: str,
     key: str,
     columns: tuple[str, ...],
     settings: CondenseSettings,
     units: Sequence[str] | None,
     *,
     is_load: bool,
+    keep: bool,
 ) -> Uniform | Collected:
     where = f"{name}: {key}"
     if key in SLOW:
-        return Collected(where, columns)
+        return Collected(where, columns, _place(file, key))
     if key not in SAMPLED:
         raise KeyError(f"no stream is called {key!r}")
     if is_load:
@@ -172,6 +211,8 @@ def _stream(
             settings.working_rate_Hz,
             spectrum=(settings.spectrum_resolution_Hz, settings.spectrum_limit_Hz),
             stretches=settings.envelope_stretches,
+            file=_place(file, key),
+            keep_spikes=keep,
         )
     angle = key == "angle"
     return Uniform(
@@ -180,6 +221,8 @@ def _stream(
         settings.working_rate_Hz,
         turning=[unit == "rad" for unit in units or ["rad"] * len(columns)] if key in TURNING else (),
         keep_below=settings.encoder_limit_Hz if angle else 0.0,
+        file=_place(file, key),
+        keep_spikes=keep,
     )
 
 

@@ -14,6 +14,9 @@ GAP = 1.5  # nominal periods: a longer step is a gap, if the stamps around it do
 LEFT, RIGHT = 3, 3  # neighbours that the six-point interpolation needs on either side
 AROUND = 4  # stamps on either side that a long step is held against
 BRIDGED = 1e-3  # error, in the band, up to which a straight line across a gap is no invention
+COARSE = 0.2  # of a period: stamps rounded to less are taken as they are
+AROUND_LOG = 16  # log times on either side of a long step, whose mean tells whether the recorder saw it
+MOST_MISSING = 32  # samples that are looked for one by one in a block of stamps that are rounded
 PIECE = 65536  # grid points made at a time, which bounds what a long gap costs in memory
 
 
@@ -49,6 +52,69 @@ def nominal_grid(stamp: Stamps) -> Grid:
     index = np.concatenate(([0.0], np.cumsum(counted(y / period))))
     x = index - index.mean()
     return Grid(int(stamp[0]), float(x @ (y - y.mean()) / (x @ x)))
+
+
+def quantum(stamp: Stamps) -> int:
+    """The decimal step, ns, that all stamps are rounded to: 1 where they are not."""
+    apart = stamp - stamp[0]
+    steps = (one for one in (10**power for power in range(9, 2, -1)))
+    return next((one for one in steps if (np.abs(apart - one * np.rint(apart / one)) <= 2).all()), 1)
+
+
+def evened(stamp: Stamps, log: Stamps, *, known: bool = False) -> Stamps:
+    """Stamps (n,), which increase, without their rounding, where that is coarse; else as they are.
+
+    A sensor at 999.7 Hz whose stamps are rounded to 1 ms shows a step of 2 ms every 3.3 s. Nothing is missing as long
+    as a line through all stamps over their numbers leaves less than the rounding; where samples are missing, it leaves
+    more, until each is counted. Times are uncertain by half the rounding at most.
+    """
+    usual = float(np.median(np.diff(stamp))) if len(stamp) > AROUND else np.inf
+    step = quantum(stamp) if np.isfinite(usual) else 1
+    if step < COARSE * usual:
+        return stamp
+    if step > 0.75 * usual and not known and not _of_rounding(stamp, log):
+        return stamp
+    y = (stamp - stamp[0]).astype(np.float64)
+    k = np.arange(len(y), dtype=np.float64)
+    period = float(np.mean(np.diff(y)[np.diff(y) <= GAP * usual]))
+    # Where a step is that long, samples are missing for certain.
+    k[1:] += np.cumsum(np.where(np.diff(y) > period + 2.0 * step, np.rint(np.diff(y) / period) - 1.0, 0.0))
+    for _ in range(MOST_MISSING):
+        x = k - k.mean()
+        slope = float(x @ (y - y.mean()) / (x @ x))
+        left = y - y.mean() - slope * x
+        if np.ptp(left) <= 1.1 * step:
+            even: Stamps = stamp[0] + np.rint(y.mean() + slope * x).astype(np.int64)
+            return even
+        # The one sample more, at the long steps, that brings what is left down the most.
+        long = np.flatnonzero(np.diff(y) > 1.5 * period)
+        if not len(long) or step < 0.5 * period:
+            return stamp
+        sums = np.cumsum(left[::-1])[::-1]  # correlation of what is left with a step behind each
+        k[long[int(np.argmax(sums[long + 1]))] + 1 :] += 1.0
+    return stamp
+
+
+def _of_rounding(stamp: Stamps, log: Stamps) -> bool:
+    """Whether steps of two periods are the rounding's: the recorder saw none, or else they come at even intervals."""
+    steps = np.diff(stamp)
+    usual, mean = float(np.median(steps)), float(steps.mean())
+    double = np.flatnonzero(np.rint(steps / mean) == 2.0)
+    if len(double) < 2:
+        return False
+    lag = (log - log[0]) / mean - np.arange(len(log))
+    told = not np.array_equal(np.diff(log), steps) and np.std(np.diff(lag)) < 1.0
+    inside = double[(double >= AROUND_LOG) & (double + AROUND_LOG < len(log))]
+    if told and len(inside):
+        rises = [
+            np.mean(lag[at + 1 : at + 1 + AROUND_LOG]) - np.mean(lag[at + 1 - AROUND_LOG : at + 1]) for at in inside
+        ]
+        # A clock that is set makes such a step as well; but then the recorder's time runs at the usual step.
+        slow = (np.mean(log[-AROUND_LOG:]) - np.mean(log[:AROUND_LOG])) / (len(log) - AROUND_LOG) - usual
+        return bool(np.median(rises) < 0.5 and slow > 0.5 * (mean - usual))
+    apart = np.diff(double)
+    ends = max(int(double[0]), len(stamp) - 1 - int(double[-1]))
+    return int(np.ptp(apart)) <= 2 and ends <= int(apart.max()) + 2
 
 
 def counted(u: Array) -> Array:

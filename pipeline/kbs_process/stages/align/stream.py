@@ -7,15 +7,35 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from kbs_process.signals.records import PUT_IN_ORDER, Array, Block, Loss, Mask, Stamps
-from kbs_process.stages.align.clocks import ClockData, LatencyFloor
+from kbs_process.errors import RecordingError
+from kbs_process.signals.records import PUT_IN_ORDER, ROUNDED, SPIKE, Array, Block, Loss, Mask, Stamps
+from kbs_process.stages.align.arrival import REGULAR, Arrival
+from kbs_process.stages.align.clocks import ClockData, FloorStep, LatencyFloor
 from kbs_process.stages.align.envelope import MinMax
-from kbs_process.stages.align.grid import AROUND, Grid, Regridder, counted, longest_bridged, nominal_grid
+from kbs_process.stages.align.grid import (
+    AROUND,
+    Grid,
+    Regridder,
+    counted,
+    evened,
+    longest_bridged,
+    nominal_grid,
+    quantum,
+)
 from kbs_process.stages.align.ordering import Orderer, Reblock, finite_rows, judge
 from kbs_process.stages.align.resample import Kept, Reducer, design
 from kbs_process.stages.align.spectrum import Welch
+from kbs_process.stages.align.spikes import Oddity, Spikes
 
+TIMES = 10  # of single bad samples, one by one
 GAPS_LISTED = 20  # one by one; the others in one line
+# Samples that may be made up for missing ones: so many, and so many for each that is there.
+MADE_UP, MADE_UP_EACH = 1 << 20, 10
+BURST = 5.0  # times the usual step: what lies between bursts
+UNEVEN = 64  # steps that are told apart from what jitters
+FAR_SLOW_NS = 3_600_000_000_000  # what is sent now and then may have one sample long before the others
+# What to do about a recording that is not one.
+ONE_PART = "use one part of it: start_s and end_s of its [[recording]] in campaign.toml, or those of the import"
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,48 +62,95 @@ class Timeline:
     missing_unlisted: int = 0
     non_finite: int = 0  # samples that are NaN or infinite in some channel: all of each is left out
     samples: int = 0
+    missing: int = 0
+    rounded: float = 0.0  # s, to which stamps were rounded that a regular rate was found behind
+    longest: float = 0.0  # s, of all gaps
+    file: str = ""  # as errors call it, with the stream
+    filled: bool = False  # whether gaps are filled with samples
+    turning: Array = field(default_factory=lambda: np.zeros(0))  # (c,) 1 for angles, of a fast stream
+    keep_spikes: bool = False
+    regular: bool = True  # whether most steps are like their median
+    spikes: Spikes | None = None
     _non_finite_in: dict[str, int] = field(default_factory=dict)  # by channel
     _reblock: Reblock = field(default_factory=Reblock)
+    _arrival: Arrival = field(default_factory=Arrival)
+    _ready: Reblock = field(default_factory=Reblock)
     _orderer: Orderer | None = None
     _floor: LatencyFloor | None = None
     _first: int = 0
     _last: int = 0
+    _uneven: list[float] = field(default_factory=list)  # s, steps that are no whole number of periods
     _near: Stamps = field(default_factory=lambda: np.empty(0, dtype=np.int64))  # of steps that are not judged yet
     _judged: int = 0  # steps between these that are
 
     def push(self, chunk: Block) -> list[Block]:
-        """Take a chunk in file order; return ordered blocks that nothing can precede any more."""
-        return [ready for block in self._reblock.push(chunk) for ready in self._order(block)]
+        """Take a chunk in file order; return ordered blocks that nothing can precede any more.
+
+        Raises RecordingError where time goes back for good, or where more is missing than is there.
+        """
+        return [ready for block in self._reblock.push(chunk) for ready in self._judge(block)]
 
     def flush(self) -> list[Block]:
-        """Return what was held back."""
-        ready = [ready for block in self._reblock.flush() for ready in self._order(block)]
+        """Return what was held back; raises RecordingError like `push`."""
+        ready = [ready for block in self._reblock.flush() for ready in self._judge(block)]
+        if (held := self._arrival.flush()) is not None:
+            ready += self._arrived(held)
+        ready += [ready for block in self._ready.flush() for ready in self._order(block)]
         last = self._orderer.flush() if self._orderer else None
         if last is not None:
             ready.append(self._timed(last))
         if self.grid is not None:
             self._find_gaps(self._near[:0], self.grid, held_back=0)
+            self._check_gaps(self.grid, at_end=True)
         return ready
 
-    def _order(self, block: Block) -> list[Block]:
+    def _judge(self, block: Block) -> list[Block]:
         if self._orderer is None:
             sense = judge(block)
             self.by_recorder = not sense.stamp and sense.log
             self._orderer = Orderer(sense)
         if self.by_recorder:
             block = Block(block.log, block.log, block.values)
+        return self._arrived(self._arrival.push(block))
+
+    def _arrived(self, arrived: Block) -> list[Block]:
+        if self._arrival.set_back is not None:
+            number, since, by = self._arrival.set_back
+            raise RecordingError(
+                f"time goes back by {by * 1e-9:.6g} s at sample {number + 1}, {since * 1e-9:.6g} s after the first, "
+                "and goes on from there: the clock was set back, or the logger started again",
+                where=self.file or self.where,
+                remedy=ONE_PART,
+            )
+        return [ready for block in self._ready.push(arrived) for ready in self._order(block)]
+
+    def _order(self, block: Block) -> list[Block]:
+        assert self._orderer is not None
         released = self._orderer.push(block)
         return [] if released is None else [self._timed(released)]
 
     def _timed(self, block: Block) -> Block:
+        stamp = evened(block.stamp, block.log, known=self.rounded > 0.0)
+        if stamp is not block.stamp:
+            self.rounded = max(self.rounded, quantum(block.stamp) * 1e-9)
+            later = 0 if self._floor is None else max(self._last + 1 - int(stamp[0]), 0)
+            block = Block(stamp + later, block.log, block.values)
         if self._floor is None:
             self._floor = LatencyFloor(int(block.stamp[0]), int(block.log[0]))
             self._first = self._last = int(block.stamp[0])
         if self.grid is None and len(block) > 1:
             self.grid = nominal_grid(block.stamp)
+            steps = np.diff(block.stamp)
+            self._check_bursts(steps)
+            self.regular = bool(np.mean(np.abs(steps / np.median(steps) - 1.0) <= 0.5) >= REGULAR)
         self._floor.push(block.stamp, block.log)
         if self.grid is not None:
             self._find_gaps(block.stamp, self.grid, held_back=AROUND)
+            self._check_gaps(self.grid, at_end=False)
+            if len(self._uneven) < UNEVEN:
+                periods = np.diff(block.stamp, prepend=self._last) / self.grid.period_ns
+                uneven = np.abs(periods - np.maximum(np.rint(periods), 1.0)) > 0.2
+                self._uneven += [self.own_one(int(one)) for one in block.stamp[uneven][:UNEVEN]]
         self._last = int(block.stamp[-1])
         self.samples += len(block)
         return block
@@ -95,7 +162,9 @@ class Timeline:
         judged = max(len(count) - held_back, self._judged)
         for index in self._judged + np.flatnonzero(count[self._judged : judged] > 1.0):
             missing = int(count[index]) - 1
+            self.missing += missing
             start, end = (self.own_one(int(one)) for one in stamp[index : index + 2])
+            self.longest = max(self.longest, end - start)
             if end - start <= self.bridged:
                 self.missing_bridged += missing
             elif len(self.gaps) < GAPS_LISTED:
@@ -105,6 +174,64 @@ class Timeline:
                 self.missing_unlisted += missing
         kept = max(judged - AROUND, 0)
         self._near, self._judged = stamp[kept:].copy(), judged - kept
+
+    def _check_bursts(self, steps: Stamps) -> None:
+        """Raise RecordingError where samples come in bursts: their stamps are times of arrival."""
+        usual = float(np.median(steps))
+        long = steps > BURST * usual
+        if self.filled and 0.01 < np.mean(long) <= 0.5 and steps[long].sum() > 0.8 * steps.sum():
+            raise RecordingError(
+                f"stamps come in bursts of about {1.0 / np.mean(long):.3g}, {1e-6 * usual:.3g} ms apart, every "
+                f"{1e-6 * float(np.median(steps[long])):.3g} ms: they are times of arrival and not of sampling, or "
+                "parts of a second in a wrong unit",
+                where=self.file or self.where,
+                remedy="stamp each sample where it is taken; where a file is imported, give rate_Hz and no time column",
+            )
+
+    def _check_gaps(self, grid: Grid, *, at_end: bool) -> None:
+        """Raise RecordingError where more was made up than is worth it: work follows the samples, not their span."""
+        there = self.samples * grid.period_ns * 1e-9
+        too_many = self.missing > MADE_UP + MADE_UP_EACH * self.samples
+        if self.filled and (too_many or (at_end and self.longest > there)):
+            raise RecordingError(
+                f"a gap of {self.longest:.6g} s among samples that cover {there:.4g} s: this is not one recording",
+                where=self.file or self.where,
+                remedy=ONE_PART,
+            )
+
+    def clean(self, block: Block) -> tuple[Stamps, Array]:
+        """Return stamps and values of a fast stream's samples that are numbers, their spikes interpolated."""
+        if self.spikes is None and self.grid is not None:
+            self.spikes = Spikes(self.turning, self.grid.period_ns * 1e-9, self.keep_spikes)
+        stamp, values = self.finite(block)
+        return self.spikes.push(stamp, values) if self.spikes is not None and len(stamp) else (stamp, values)
+
+    def end(self) -> tuple[Stamps, Array] | None:
+        """Return what `clean` held back; raises RecordingError where two sources bring a channel, or it steps."""
+        last = self.spikes.flush() if self.spikes is not None else None
+        self.check_sources()
+        return last
+
+    def check_sources(self) -> None:
+        """Raise RecordingError where two sources bring a channel, or where it steps and stays there."""
+        if self.spikes is not None and (mixed := self.spikes.mixed) is not None:
+            raise RecordingError(
+                f"{self.channels[mixed.channel]} changes to and fro by {mixed.by:.4g} from sample to sample: two "
+                "sources are in one stream",
+                where=self.file or self.where,
+                remedy="record each source under a topic of its own",
+            )
+        lasting: list[Oddity] = self.spikes.lasting() if self.spikes else []
+        if lasting:
+            one = lasting[0]
+            name = self.channels[one.channel]
+            more = f", one of {len(lasting)} such steps" if len(lasting) > 1 else ""
+            raise RecordingError(
+                f"{name} steps by {one.by:.4g} from one sample to the next, {self.own_one(one.first):.6g} s after the "
+                f"first, and stays there{more}: a count was lost, or a zero was set",
+                where=self.file or self.where,
+                remedy=ONE_PART,
+            )
 
     def finite(self, block: Block) -> tuple[Stamps, Array]:
         """Return stamps and values of the samples that are numbers in every channel; count the others, by channel."""
@@ -142,6 +269,24 @@ class Timeline:
         """From the first sample to the last, s."""
         return self.own_one(self._last)
 
+    def floor_step(self) -> FloorStep | None:
+        """A step of log - stamp that lasts: a clock was set, or a latency changed."""
+        return None if self._floor is None or self.by_recorder else self._floor.step()
+
+    def jumps(self, step: FloorStep, at: float) -> bool:
+        """Whether stamps jump about `at`, s from the first log time, by what the floor steps by."""
+        odd = [self.own_one(stamp) for stamp in self._arrival.doubled]
+        odd += self._uneven if len(self._uneven) < UNEVEN else []
+        return any(abs(one - at) <= step.within for one in odd) or any(
+            abs(gap.end - gap.start - abs(step.by)) < 0.2 * abs(step.by) + self._period
+            and abs(0.5 * (gap.start + gap.end) - at) <= step.within + abs(step.by)
+            for gap in self.gaps
+        )
+
+    @property
+    def _period(self) -> float:
+        return 1.5e-9 * self.grid.period_ns if self.grid is not None else 0.0
+
     def clock(self) -> ClockData:
         """What the stream tells about its clock."""
         assert self._floor is not None
@@ -165,12 +310,41 @@ class Timeline:
         if self.by_recorder:
             detail = "the sensor's stamps do not advance: the recorder's clock is used"
             found.append(Loss("clock", self.where, self.samples, detail=detail))
+        for kind, oddities, detail in (
+            (SPIKE, self.spikes.spikes if self.spikes else [], "interpolated"),
+            ("blow", self.spikes.blows if self.spikes else [], "several channels at once: kept"),
+        ):
+            for channel, name in enumerate(self.channels):
+                if own := [one for one in oddities if one.channel == channel]:
+                    start, end = (offset + rate * self.own_one(one) for one in (own[0].first, own[-1].last))
+                    by = max((one.by for one in own), key=abs)
+                    times = ", ".join(f"{offset + rate * self.own_one(one.first):.4f}" for one in own[:TIMES])
+                    what = f"off by {by:.4g}: {detail}"
+                    if len(own) > 1:
+                        what = f"at {times}{'' if len(own) <= TIMES else ' ...'} s, off by up to {by:.4g}: {detail}"
+                    found.append(Loss(kind, f"{self.where}, {name}", len(own), start, end, what))
+        if self.rounded and self.grid is not None:
+            detail = (
+                f"rounded to {1e3 * self.rounded:.3g} ms: taken as regular at {self.grid.rate:.6g} Hz, each to "
+                f"{0.5e3 * self.rounded:.2g} ms"
+            )
+            found.append(Loss(ROUNDED, self.where, 0, detail=detail))
+        if self._floor is not None and not self.by_recorder and (trouble := self._floor.trouble()):
+            found.append(Loss("clock", self.where, 0, detail=trouble))
         if self._orderer is not None:
-            found += self._disorder(self._orderer)
+            found += self._disorder(self._orderer, offset, rate)
         return found
 
-    def _disorder(self, orderer: Orderer) -> list[Loss]:
+    def _disorder(self, orderer: Orderer, offset: float, rate: float) -> list[Loss]:
         found = []
+        arrival = self._arrival
+        if arrival.odd:
+            start, end = (self.own_one(one) for one in arrival.odd_span)
+            detail = "stamps that do not fit where they arrived: left out"
+            found.append(Loss("odd stamp", self.where, arrival.odd, offset + rate * start, offset + rate * end, detail))
+        if arrival.lone:
+            detail = f"{arrival.lone_by * 1e-9:.6g} s from all others: left out"
+            found.append(Loss("far stamp", self.where, arrival.lone, detail=detail))
         if orderer.repeats:
             found.append(Loss("repeat", self.where, orderer.repeats, detail="same stamp: the first is kept"))
         if orderer.late:
@@ -189,8 +363,8 @@ class Timeline:
 class Collected:
     """A slow stream, kept sample by sample."""
 
-    def __init__(self, where: str, channels: tuple[str, ...]) -> None:
-        self.line = Timeline(where, channels)
+    def __init__(self, where: str, channels: tuple[str, ...], file: str = "") -> None:
+        self.line = Timeline(where, channels, file=file, _arrival=Arrival(FAR_SLOW_NS))
         self._own: list[Array] = []
         self._values: list[Array] = []
 
@@ -224,17 +398,26 @@ class Uniform:
         spectrum: tuple[float, float] | None = None,
         stretches: int = 0,
         keep_below: float = 0.0,
+        file: str = "",
+        keep_spikes: bool = False,
     ) -> None:
         """`turning` channels are angles, which go on through full turns; `spectrum`: (resolution, limit), Hz; below a
         rate of `keep_below`, Hz, samples are kept as such.
         """
-        self.line = Timeline(where, channels, bridged=longest_bridged(working_rate / 2.0))
+        self.line = Timeline(
+            where,
+            channels,
+            bridged=longest_bridged(working_rate / 2.0),
+            file=file,
+            filled=True,
+            keep_spikes=keep_spikes,
+        )
         self.welch: Welch | None = None
         self.envelope = MinMax(len(channels), stretches) if stretches else None
         self._working_rate = working_rate
         self._spectrum = spectrum
         self._keep_below = keep_below
-        self._turning = np.array(turning, dtype=np.float64)
+        self.line.turning = np.array(turning or [False] * len(channels), dtype=np.float64)
         self._turns = np.zeros(len(channels)) if any(turning) else None
         self._before: Array | None = None
         self._regrid: Regridder | None = None
@@ -250,6 +433,8 @@ class Uniform:
         """Return the reduced stream, or None where it is too short for the filters."""
         for block in self.line.flush():
             self._take(block)
+        if (last := self.line.end()) is not None:
+            self._lay(*last)
         if self._regrid is None or self._reduce is None:
             return None
         for rows, invented in self._regrid.flush():
@@ -269,7 +454,12 @@ class Uniform:
             self._reduce = Reducer(design(grid.rate, self._working_rate))
             if self._spectrum:
                 self.welch = Welch(grid.rate, *self._spectrum, self.line.channels)
-        stamp, values = self.line.finite(block)
+        self._lay(*self.line.clean(block))
+
+    def _lay(self, stamp: Stamps, values: Array) -> None:
+        """Lay samples on the grid, and reduce them."""
+        grid = self.line.grid
+        assert grid is not None and self._regrid is not None
         if self._turns is not None and len(values):
             values = self._unwrapped(values, self._turns)
         if grid.rate <= self._keep_below:
@@ -291,7 +481,7 @@ class Uniform:
         first = values[:1] if self._before is None else self._before
         whole = np.concatenate((first, values))
         self._before = values[-1:].copy()
-        jumps = -np.rint(np.diff(whole, axis=0) / (2.0 * np.pi)) * self._turning
+        jumps = -np.rint(np.diff(whole, axis=0) / (2.0 * np.pi)) * self.line.turning
         if not jumps.any() and not turned.any():
             return values
         turns = turned + np.cumsum(jumps, axis=0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from datetime import UTC, datetime, timedelta
 from typing import Any
 
@@ -9,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kbs_process.errors import RecordingError
-from kbs_process.recordings.tables import Cells
+from kbs_process.recordings.tables import Cells, number, too_coarse
 from kbs_process.signals.records import Array, Mask, Stamps
 from kbs_process.studies.convert.mapping_file import Time
 
@@ -21,14 +22,12 @@ def numbers(cells: Cells) -> Array:
     """Return cells as doubles, bit for bit where they are; NaN where a text is no number."""
     if cells.dtype.kind in "iufb":
         return cells.astype(np.float64)
-    return np.array([_number(cell) for cell in cells.tolist()], dtype=np.float64)
-
-
-def _number(cell: Any) -> float:
-    try:
-        return float(cell)
-    except (TypeError, ValueError):
-        return float("nan")
+    words = [str(cell) for cell in cells.tolist()]
+    together = "".join(words)
+    if together.isascii() and "_" not in together:  # then Python reads a number as we do
+        with suppress(ValueError):
+            return np.array(list(map(float, words)), dtype=np.float64)
+    return np.array(list(map(number, words)), dtype=np.float64)
 
 
 def nanoseconds(cells: Cells, time: Time, where: str) -> tuple[Stamps, Mask]:
@@ -42,6 +41,9 @@ def nanoseconds(cells: Cells, time: Time, where: str) -> tuple[Stamps, Mask]:
     if time.unit == "datetime":
         return _from_texts(cells, where)
     start = epoch_ns(time.start)
+    if why := too_coarse(cells, 1e-9 * _NS[time.unit] if time.rate_Hz is None else 1.0 / time.rate_Hz):
+        remedy = "give rate_Hz in the mapping's [time], or record times as 64 bits"
+        raise RecordingError(why, where=where, remedy=remedy)
     if time.rate_Hz is not None:
         return _rounded(numbers(cells) / time.rate_Hz * 1e9, start)
     scale = _NS[time.unit]

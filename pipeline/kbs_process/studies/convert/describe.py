@@ -14,8 +14,6 @@ from kbs_process.recordings.open_table import open_table
 from kbs_process.recordings.tables import Cells, Column, Table
 from kbs_process.studies.convert.clock import numbers
 
-BATCH = 64  # columns read at a time
-
 
 @dataclass(slots=True)
 class Range:
@@ -62,19 +60,17 @@ def describe(source: Path) -> str:
     ranges = _ranges(table)
     header = f"# {'no.':>4}  {'rows':>9}  {'no num.':>7}  {'least':>12}  {'greatest':>12}  {'unit':<8}  column"
     listing = "\n".join([header, *(entry.line(1 + index) for index, entry in enumerate(ranges))])
-    return f"#:schema import.schema.json\n# Columns of {source.name}\n{listing}\n\n{_skeleton(source, ranges)}"
+    told = [f"left out: {one}" for one in table.left_out] + [f"{count} {what}" for what, count in table.odd.items()]
+    notes = "".join(f"# {' '.join(one.split())}\n" for one in told)
+    return f"#:schema import.schema.json\n# Columns of {source.name}\n{listing}\n{notes}\n{_skeleton(source, ranges)}"
 
 
 def _ranges(table: Table) -> list[Range]:
-    """Read the whole file, equally long columns together."""
-    columns = table.columns
-    ranges = []
-    for first in range(0, len(columns), BATCH):
-        batch = [Range(column) for column in columns[first : first + BATCH]]
-        for cells in table.chunks([entry.column.name for entry in batch]):
-            for entry, one in zip(batch, cells, strict=True):
-                entry.add(one)
-        ranges += batch
+    """Read the whole file."""
+    ranges = [Range(column) for column in table.columns]
+    for cells in table.chunks([entry.column.name for entry in ranges]):
+        for entry, one in zip(ranges, cells, strict=True):
+            entry.add(one)
     return ranges
 
 

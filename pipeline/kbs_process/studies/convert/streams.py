@@ -12,11 +12,16 @@ import numpy as np
 from kbs_process.errors import RecordingError
 from kbs_process.recordings.tables import Cells, Table, find_column
 from kbs_process.signals.records import Array, Block, Mask, Stamps
+from kbs_process.stages.align.arrival import Arrival
+from kbs_process.stages.align.condense import SLOW
+from kbs_process.stages.align.stream import FAR_SLOW_NS
 from kbs_process.studies.convert.clock import nanoseconds, numbers
 from kbs_process.studies.convert.mapping import Channel, Mapping, StreamMap
 from kbs_process.studies.convert.mapping_file import Part, Time, Turn
 
 _NO_STAMPS = np.empty(0, dtype=np.int64)
+_SET_BACK = {3600.0: "clocks went from summer to winter time", 43200.0: "it has twelve hours, without a.m. and p.m."}
+_FEWEST = 16  # rows that show how fine times are
 _TIMELESS = "rows have no time, left out"
 Piece = dict[str, Block]  # by stream key; the streams of one pass over the file
 
@@ -27,6 +32,8 @@ class Findings:
 
     counts: Counter[str] = field(default_factory=Counter)
     last: dict[str, int] = field(default_factory=dict)  # stream -> its last stamp
+    rows: Counter[str] = field(default_factory=Counter)  # by stream
+    repeats: Counter[str] = field(default_factory=Counter)  # stamps as the one before, by stream
 
     def check(self, key: str, block: Block) -> None:
         """Count cells without a number and stamps that do not grow."""
@@ -34,13 +41,16 @@ class Findings:
         self.counts[f"values of '{key}' are infinite, kept"] += int(np.isinf(block.values).sum())
         if len(block):
             steps = np.diff(block.stamp, prepend=self.last.get(key, int(block.stamp[0]) - 1))
-            self.counts[f"time stamps of '{key}' repeat the one before, kept"] += int((steps == 0).sum())
+            self.rows[key] += len(block)
+            self.repeats[key] += int((steps == 0).sum())
             self.counts[f"time stamps of '{key}' lie before their predecessor, put in order"] += int((steps < 0).sum())
             self.last[key] = int(block.stamp[-1])
 
     def lines(self) -> tuple[str, ...]:
         """Return what was found, most frequent first."""
-        return tuple(f"{count} {what}" for what, count in self.counts.most_common() if count)
+        repeats = {f"time stamps of '{key}' repeat the one before, kept": n for key, n in self.repeats.items()}
+        found = Counter(self.counts | Counter(repeats))
+        return tuple(f"{count} {what}" for what, count in found.most_common() if count)
 
 
 def read_part(table: Table, mapping: Mapping, part: Part, findings: Findings) -> Iterator[tuple[StreamMap, Block]]:
@@ -63,18 +73,57 @@ def read_part(table: Table, mapping: Mapping, part: Part, findings: Findings) ->
         end = first + round(part.end_s * 1e9) if np.isfinite(part.end_s) else end
 
     empty = set(streams)
-    for piece in _side_by_side(passes):
-        for key, block in piece.items():
-            inside = _select(block, (block.stamp >= start) & (block.stamp < end))
-            findings.check(key, inside)
-            if len(inside):
-                empty.discard(key)
-                yield streams[key], inside
+    arrivals = {key: Arrival(FAR_SLOW_NS) if key in SLOW else Arrival() for key in streams}
+    for key, inside in chain(
+        (
+            (key, arrivals[key].push(_select(block, (block.stamp >= start) & (block.stamp < end))))
+            for piece in _side_by_side(passes)
+            for key, block in piece.items()
+        ),
+        ((key, last) for key, arrival in arrivals.items() if (last := arrival.flush()) is not None),
+    ):
+        _check_order(arrivals[key], table, streams[key])
+        findings.check(key, inside)
+        if len(inside):
+            empty.discard(key)
+            yield streams[key], inside
+    for what, count in table.odd.items():
+        findings.counts[what] = count
+    for key, arrival in arrivals.items():
+        findings.counts[f"time stamps of '{key}' do not fit where they stand, rows left out"] += arrival.odd
+        findings.counts[f"time stamps of '{key}' lie far from all others, rows left out"] += arrival.lone
     for key in streams:
+        if findings.rows[key] >= _FEWEST and 2 * findings.repeats[key] >= findings.rows[key]:
+            raise RecordingError(
+                f"the times of '{key}' are too coarse: {findings.repeats[key]} of {findings.rows[key]} are those of "
+                "the row before",
+                where=str(table.path),
+                remedy="give rate_Hz in the mapping's [time] if rows come at an even rate, else times of more digits",
+            )
         if key in empty:
             raise RecordingError(
                 f"no sample of '{key}' for recording '{part.stem}'", where=str(table.path), remedy=_why_empty(findings)
             )
+
+
+def _check_order(arrival: Arrival, table: Table, stream: StreamMap) -> None:
+    """Raise RecordingError where time goes back for good."""
+    if arrival.set_back is None:
+        return
+    number, _, by = arrival.set_back
+    rate = stream.time.rate_Hz if stream.time is not None else None
+    ticks = [1.0, 1e3, 1e6] if rate is None else [1e9 / rate]
+    causes = {
+        2.0**bits * tick * 1e-9: f"a counter of {bits} bits began anew" for bits in (16, 24, 32) for tick in ticks
+    }
+    near = [cause for span, cause in (_SET_BACK | causes).items() if abs(by * 1e-9 - span) < 1e-3 * span]
+    raise RecordingError(
+        f"time of '{stream.key}' goes back by {by * 1e-9:.6g} s at sample {number + 1}, and goes on from there: "
+        + (near[0] if near else "the clock was set back, or the logger started again"),
+        where=str(table.path),
+        remedy="split the file there (of a text file, skip_rows and rows in the mapping's [text] take one part), and "
+        "import each part as a recording of its own; or give rate_Hz",
+    )
 
 
 def _why_empty(findings: Findings) -> str:
@@ -118,8 +167,9 @@ def _pieces(table: Table, mapping: Mapping, streams: Sequence[StreamMap], findin
     if time is None:
         clocks = [column.clock for column in columns]
         if not all(clocks):
+            why = "; ".join(one for one in table.left_out if ": time: " in one)
             raise RecordingError(
-                f"'{columns[clocks.index('')].name}' comes without a time of its own",
+                f"'{columns[clocks.index('')].name}' comes without a time of its own" + (f" ({why})" if why else ""),
                 where=str(table.path),
                 remedy="say in the mapping's [time] which column holds it, or give rate_Hz",
             )

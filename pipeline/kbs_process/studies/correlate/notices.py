@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from itertools import zip_longest
 
 import numpy as np
 
@@ -12,7 +13,9 @@ from kbs_process.reduction.analysis import Analysis, bands_of
 from kbs_process.reduction.judging import band_of, coverage_below
 from kbs_process.reduction.losses import lost
 from kbs_process.report.prose import Prose
+from kbs_process.results.judged import Requirement
 from kbs_process.results.records import Notice, Severity
+from kbs_process.signals.records import SPIKE, Run
 from kbs_process.stages.align.clocks import UNKNOWN_OFFSET_S
 from kbs_process.stages.conventions import SignCheck
 from kbs_process.stages.gravity.model import GravityModel
@@ -38,7 +41,7 @@ def notices(campaign: Campaign, analyses: Sequence[Analysis], model: GravityMode
     """Yield everything worth a notice, worst first."""
     yield from _conventions(found.conventions)
     for analysis in analyses:
-        yield from lost(analysis.entry, analysis.run.losses)
+        yield from lost(analysis.entry, [loss for loss in analysis.run.losses if loss.kind != SPIKE])
     yield from _unjudged(analyses)
     yield from _static_load(campaign, analyses, model)
     for check in model.fit.checks:
@@ -52,6 +55,24 @@ def notices(campaign: Campaign, analyses: Sequence[Analysis], model: GravityMode
     yield from _phases(campaign, analyses)
     yield from _edges(found)
     yield from _clocks(analyses)
+
+
+def has_spikes(run: Run) -> bool:
+    """Whether single samples of a recording were taken for bad ones."""
+    return any(loss.kind == SPIKE for loss in run.losses)
+
+
+def spikes(
+    analyses: Sequence[Analysis], without: Sequence[Requirement], with_them: Callable[[], Sequence[Requirement]]
+) -> Iterable[Notice]:
+    """Single samples off their neighbours, by channel and time, and what is judged with and without them."""
+    spiky = [one for one in analyses if has_spikes(one.run)]
+    if not spiky:
+        return
+    figures = list(zip_longest(without, with_them() if without else ()))
+    for analysis in spiky:
+        named = [loss for loss in analysis.run.losses if loss.kind == SPIKE]
+        yield _notice("warning", "spikes", analysis.entry.name, named=named, figures=figures)
 
 
 def _notice(severity: Severity, name: str, where: str = "", **facts: object) -> Notice:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import msgspec
 
 from kbs_process.campaign.config import Campaign
+from kbs_process.errors import FitError, RecordingError
 from kbs_process.progress import Progress
 from kbs_process.reduction.analysis import Analysis, analyse
 from kbs_process.reduction.measurable import check_requirements
@@ -14,12 +16,16 @@ from kbs_process.reduction.preparing import Prepared, fit_gravity, prepare
 from kbs_process.reduction.relief import relieved
 from kbs_process.report.build import publish
 from kbs_process.report.text import count
+from kbs_process.results.judged import Requirement
 from kbs_process.results.outcome import Outcome
 from kbs_process.results.store import writing
 from kbs_process.stages import decouple
+from kbs_process.stages.decouple import Decoupling
 from kbs_process.stages.gravity.model import GravityModel
 from kbs_process.studies.correlate.earlier_diagnosis import keep_diagnosis
+from kbs_process.studies.correlate.notices import has_spikes, spikes
 from kbs_process.studies.correlate.output import write_tables
+from kbs_process.studies.correlate.results import Results
 from kbs_process.studies.correlate.summary import summarise
 from kbs_process.studies.correlate.transducer import study
 
@@ -36,10 +42,9 @@ def process(
     with writing(target) as folder:
         decoupling = decouple.fit(campaign.rig)
         prepared = [prepare(campaign, entry, decoupling, progress) for entry in campaign.recordings]
-        model = fit_gravity(campaign, prepared, progress)
-        analyses = [_analyse(campaign, one, model, progress) for one in prepared]
-        with progress.task("Comparing, summing up uncertainties"):
-            found = summarise(campaign, analyses, model, decoupling)
+        found, analyses, model = _found(campaign, prepared, decoupling, progress)
+        told = spikes(analyses, found.requirements, lambda: _with_spikes(campaign, prepared, decoupling, progress))
+        found = msgspec.structs.replace(found, warnings=(*told, *found.warnings))
         with progress.task("Following the transducer's resonance") as task:
             on_transducer = study(campaign, analyses, model.rig, task.update)
         with progress.task("Writing the report"):
@@ -51,6 +56,33 @@ def process(
             serious = sum(notice.severity != "info" for notice in found.warnings)
             more = [f"{count(serious, 'warning')}: see the top of the report"] if serious else []
             return publish(folder, target, found, DOCUMENT if page else None, pdf, *more)
+
+
+def _found(
+    campaign: Campaign, prepared: Sequence[Prepared], decoupling: Decoupling, progress: Progress
+) -> tuple[Results, Sequence[Analysis], GravityModel]:
+    """Return what results.json holds, and what it was made from."""
+    model = fit_gravity(campaign, prepared, progress)
+    analyses = [_analyse(campaign, one, model, progress) for one in prepared]
+    with progress.task("Comparing, summing up uncertainties"):
+        return summarise(campaign, analyses, model, decoupling), analyses, model
+
+
+def _with_spikes(
+    campaign: Campaign, prepared: Sequence[Prepared], decoupling: Decoupling, progress: Progress
+) -> tuple[Requirement, ...]:
+    """Judge the requirements again, with the single samples that were interpolated: one of them may be a blow.
+
+    None where nothing can be judged with them.
+    """
+    try:
+        with_them = [
+            prepare(campaign, one.entry, decoupling, progress, keep_spikes=True) if has_spikes(one.run) else one
+            for one in prepared
+        ]
+        return _found(campaign, with_them, decoupling, progress)[0].requirements
+    except (FitError, RecordingError):
+        return ()
 
 
 def _analyse(campaign: Campaign, one: Prepared, model: GravityModel, progress: Progress) -> Analysis:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from datetime import UTC, datetime
 
-from kbs_process.recordings.inspection import Inspection, TopicInspection
+from kbs_process.reduction.inspection import Inspection, TopicInspection
 from kbs_process.studies.validate.run import in_words
 
 
@@ -16,7 +16,7 @@ def describe_inspection(inspection: Inspection) -> Iterator[str]:
     for topic in inspection.topics:
         yield from _topic(topic)
     for loss in inspection.losses:
-        yield f"  lost: {in_words(loss)}"
+        yield f"  {'lost' if loss.real else 'told'}: {in_words(loss)}"
 
 
 def _topic(topic: TopicInspection) -> Iterator[str]:
@@ -27,10 +27,6 @@ def _topic(topic: TopicInspection) -> Iterator[str]:
     if topic.start_ns is not None and topic.end_ns is not None:
         line += f", {(topic.end_ns - topic.start_ns) * 1e-9:.3f} s from {_clock(topic.start_ns)}"
     yield line
-    if topic.gaps:
-        yield f"    {topic.gaps} gaps, the longest {topic.longest_interval_s:.4g} s"
-    if topic.repeats or topic.out_of_order:
-        yield f"    {topic.repeats} repeated stamps, {topic.out_of_order} out of order"
     if topic.note:
         yield f"    {topic.note}"
     width = max((len(entry.field) for entry in topic.ranges), default=0)

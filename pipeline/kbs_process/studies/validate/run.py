@@ -140,4 +140,5 @@ def in_words(loss: Loss) -> str:
         else f", {start:.4f} to {end:.4f} s"
     )
     detail = f" ({loss.detail})" if loss.detail else ""
-    return f"{loss.count} x {loss.kind}{when}, {loss.where}{detail}"
+    count = f"{loss.count} x " if loss.count else ""
+    return f"{count}{loss.kind}{when}, {loss.where}{detail}"

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Protocol
 
 from kbs_process.errors import RecordingError
-from kbs_process.recordings.mcap.framing import Channel, MalformedError, Schema
+from kbs_process.recordings.mcap.framing import MalformedError, Schema
 from kbs_process.recordings.mcap.kernels import Bytes, Words
 from kbs_process.recordings.mcap.messages.fields import Elements, Field, Step
 from kbs_process.recordings.mcap.messages.jsontext import JsonMessage
@@ -41,13 +41,13 @@ FACTORIES: Mapping[tuple[str, str | None], Factory] = {  # message encoding, sch
 }
 
 
-def message_type(channel: Channel, schema: Schema, samples: Iterable[bytes], where: str) -> MessageType:
-    """Return the type of the channel's messages; `samples` are some of them, for encodings without schema."""
-    factory = FACTORIES.get((channel.encoding, schema.encoding)) or FACTORIES.get((channel.encoding, None))
+def message_type(encoding: str, schema: Schema, samples: Iterable[bytes], where: str) -> MessageType:
+    """Return the type of a channel's messages; `samples` are some of them, for encodings without schema."""
+    factory = FACTORIES.get((encoding, schema.encoding)) or FACTORIES.get((encoding, None))
     if factory is None:
         known = ", ".join(f"{message} with {schema or 'any'} schema" for message, schema in FACTORIES)
         raise RecordingError(
-            f"its encoding '{channel.encoding}' with schema '{schema.encoding}' cannot be read",
+            f"its encoding '{encoding}' with schema '{schema.encoding}' cannot be read",
             where=where,
             remedy=f"record it as {known}",
         )

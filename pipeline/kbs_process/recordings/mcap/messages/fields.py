@@ -51,7 +51,8 @@ def parse_path(path: str) -> Step:
             f"'{path}' is no field path", remedy="write it like wrench.force.x, position[az] or data[3]"
         )
     key = match["key"]
-    return Step(match["path"], int(key) if key is not None and key.isdecimal() else key)
+    # No message has 10^18 elements; what is longer is a name.
+    return Step(match["path"], int(key) if key is not None and key.isdecimal() and len(key) < 19 else key)
 
 
 def resolve(paths: Sequence[str], fields: Sequence[Field], where: str) -> tuple[Step, ...]:

@@ -7,20 +7,19 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from itertools import chain
-from keyword import iskeyword
 from operator import attrgetter
 from typing import Annotated, Any
 
 import msgspec
 import numpy as np
 
-from kbs_process.recordings.mcap.kernels import Bytes, Words
+from kbs_process.recordings.mcap.kernels import MOST_SECONDS, NO_STAMP, Bytes, Words
 from kbs_process.recordings.mcap.messages.fields import Elements, Field, Key, Step, find_stamp, sibling
 from kbs_process.recordings.mcap.messages.layout import Decoded
 from kbs_process.signals.records import Array, Mask, Stamps
 
 DEPTH = 16  # of objects within objects
-SECONDS = Annotated[int, msgspec.Meta(ge=-(2**33), le=2**33)]  # so that nanoseconds fit 64 bits
+SECONDS = Annotated[int, msgspec.Meta(ge=-(2**63), le=2**63 - 1)]  # a part of a stamp
 
 
 class JsonMessage:
@@ -30,7 +29,12 @@ class JsonMessage:
         found: dict[str, Field] = {}
         for sample in samples:
             _visit(_plain(sample), "", False, DEPTH, found)
-        self.fields = tuple(found.values())
+        # What is a number or null in some messages is none where others have an object there, or names.
+        objects = {outer for path in found for outer in _outer(path)}
+        names = {sibling(field.path) for field in found.values() if field.named}
+        self.fields = tuple(
+            field for path, field in found.items() if path not in objects and names.isdisjoint([path, *_outer(path)])
+        )
 
     def decoder(self, steps: tuple[Step, ...]) -> JsonDecoder:
         """Return a decoder of the numbers at `steps`."""
@@ -44,8 +48,7 @@ class JsonMessage:
             node = node.get(key) if isinstance(node, dict) else None
         if not isinstance(node, dict) or not isinstance(node.get(last), list):
             return Elements((), 0)
-        names = node.get("name")
-        return Elements(tuple(map(str, names)) if isinstance(names, list) else (), len(node[last]))
+        return Elements(_names(node), len(node[last]))
 
 
 def _plain(payload: bytes) -> object:
@@ -55,11 +58,23 @@ def _plain(payload: bytes) -> object:
         return None
 
 
+def _outer(path: str) -> list[str]:
+    """Return the paths of the objects that a path lies in."""
+    parts = path.split(".")
+    return [".".join(parts[:count]) for count in range(1, len(parts))]
+
+
+def _names(node: dict[str, Any]) -> tuple[str, ...]:
+    """Return the names that an object gives to the elements of its lists, none where it has no such list."""
+    names = node.get("name")
+    return tuple(names) if isinstance(names, list) and all(isinstance(name, str) for name in names) else ()
+
+
 def _visit(node: object, path: str, named: bool, depth: int, found: dict[str, Field]) -> None:
     if isinstance(node, dict) and depth:
-        named = isinstance(node.get("name"), list)
+        named = bool(_names(node))
         for key, value in node.items():
-            if key.isidentifier() and not iskeyword(key):
+            if key.isidentifier():
                 _visit(value, f"{path}.{key}" if path else key, named, depth - 1, found)
     elif not path:
         return
@@ -85,13 +100,13 @@ class JsonDecoder:
         types: dict[str, Any] = dict.fromkeys(scalars, float | None)
         types |= dict.fromkeys(lists, list[float | None]) | dict.fromkeys(named, list[str])
         types |= dict.fromkeys(stamp, SECONDS)
-        self._decode = msgspec.json.Decoder(_struct("Message", types)).decode
+        self._decode = msgspec.json.Decoder(_struct(types)).decode
         self._scalars = [i for i, step in enumerate(steps) if step.key is None]
         self._lists = [i for i, step in enumerate(steps) if step.key is not None]
         # Two paths or more, so that attrgetter returns a tuple.
-        self._get_scalars = attrgetter(*scalars, *scalars[:1]) if scalars else None
-        self._get_stamp = attrgetter(*stamp) if stamp else None
-        self._get_list = {path: attrgetter(path) for path in lists | named}
+        self._get_scalars = attrgetter(*map(_attribute, (*scalars, *scalars[:1]))) if scalars else None
+        self._get_stamp = attrgetter(*map(_attribute, stamp)) if stamp else None
+        self._get_list = {path: attrgetter(_attribute(path)) for path in lists | named}
 
     def __call__(self, buffer: Bytes, at: Words, size: Words, log: Stamps) -> Decoded:
         n, c = len(at), len(self._steps)
@@ -119,14 +134,17 @@ class JsonDecoder:
             present |= ~absent.all(axis=0)
         lacking: Mask = np.logical_or.reduce(missing, axis=1)
         flawless = bool(good.all() and not lacking.any() and np.isfinite(values).all())
-        return Decoded(stamp, values, good, present, lacking, flawless)
+        return Decoded(stamp, values, good, present, lacking, flawless, "" if good.all() else "no such JSON object")
 
     def _stamps(self, messages: list[Any]) -> Stamps:
         assert self._get_stamp is not None
         flat = chain.from_iterable(map(self._get_stamp, messages))
         parts = np.fromiter(flat, dtype=np.int64, count=2 * len(messages)).reshape(-1, 2)
-        stamps: Stamps = parts[:, 0] * 1_000_000_000 + parts[:, 1]
-        return stamps
+        seconds, nanoseconds = parts.T
+        known = (
+            (seconds >= -MOST_SECONDS) & (seconds <= MOST_SECONDS) & (nanoseconds >= 0) & (nanoseconds < 1_000_000_000)
+        )
+        return np.where(known, seconds * 1_000_000_000 + nanoseconds, NO_STAMP)
 
     def _read_scalars(self, messages: list[Any], values: Array, absent: Mask) -> None:
         if self._get_scalars is None:
@@ -174,7 +192,12 @@ def _pick(row: list[float | None], place: int | None) -> float | None:
     return None if place is None or place >= len(row) else row[place]
 
 
-def _struct(name: str, types: dict[str, Any]) -> Any:
+def _attribute(path: str) -> str:
+    """Return the attribute that holds what is at a path: never a name that means something to Python."""
+    return ".".join(f"at_{part}" for part in path.split("."))
+
+
+def _struct(types: dict[str, Any]) -> Any:
     """Return a msgspec structure with fields at the dotted paths of `types`; only the stamp is required."""
     groups: dict[str, dict[str, Any]] = {}
     members: list[Any] = []
@@ -183,13 +206,14 @@ def _struct(name: str, types: dict[str, Any]) -> Any:
         if rest:
             groups.setdefault(head, {})[rest] = kind
         elif kind is SECONDS:
-            members.append((head, kind))
+            members.append((_attribute(head), kind, msgspec.field(name=head)))
         elif kind == float | None:
-            members.append((head, kind, None))
+            members.append((_attribute(head), kind, msgspec.field(name=head, default=None)))
         else:
-            members.append((head, kind, msgspec.field(default_factory=list)))
+            members.append((_attribute(head), kind, msgspec.field(name=head, default_factory=list)))
     for head, inner in groups.items():
-        nested = _struct(f"{name}_{head}", inner)
+        nested = _struct(inner)
         required = any(field.required for field in msgspec.structs.fields(nested))
-        members.append((head, nested) if required else (head, nested, msgspec.field(default_factory=nested)))
-    return msgspec.defstruct(name, members, gc=False, kw_only=True)
+        default = {} if required else {"default_factory": nested}
+        members.append((_attribute(head), nested, msgspec.field(name=head, **default)))
+    return msgspec.defstruct("Message", members, gc=False, kw_only=True)

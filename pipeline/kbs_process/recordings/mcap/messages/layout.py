@@ -93,6 +93,7 @@ class Decoded:
     present: Mask  # (c,), fields that at least one message has
     lacking: Mask  # (n,), messages that lack a field
     flawless: bool  # all are good, lack nothing, and every number is finite
+    reason: str = ""  # why the first of those that are not good is undecodable
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -157,7 +158,7 @@ class LayoutDecoder:
             present = np.logical_or.reduce(~packed.lacks[used], axis=0)
             lacking = job.good & np.logical_or.reduce(packed.lacks, axis=1)[job.which]
         flawless = job.finite and not lack and bool(job.good.all())
-        return Decoded(job.stamp, job.values, job.good, present, lacking, flawless)
+        return Decoded(job.stamp, job.values, job.good, present, lacking, flawless, job.reason)
 
     def _trace_others(self, job: _Job, known: int) -> list[tuple[Layout, int]]:
         """Trace the messages that no known layout fits, and try each new layout on those that follow."""
@@ -167,8 +168,9 @@ class LayoutDecoder:
                 continue
             try:
                 traced = self._trace(job.payload(first))
-            except MalformedError:
+            except MalformedError as error:
                 job.good[first] = False
+                job.reason = job.reason or str(error)
                 continue
             # With too many layouts in a segment, comparing all messages with each would cost more than tracing.
             part = slice(first, None if len(fresh) < KNOWN_LAYOUTS else first + 1)
@@ -196,6 +198,7 @@ class _Job:
     values: Array
     good: Mask
     finite: bool = True
+    reason: str = ""
 
     @classmethod
     def of(cls, buffer: Bytes, at: Words, size: Words, log: Stamps, columns: int) -> _Job:

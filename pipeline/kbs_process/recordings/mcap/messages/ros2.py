@@ -34,11 +34,13 @@ BUILTIN = {
     "builtin_interfaces/Time": "int32 sec\nuint32 nanosec",
     "builtin_interfaces/Duration": "int32 sec\nuint32 nanosec",
 }
+ZSTD = b"\x28\xb5\x2f\xfd"  # how its frames begin
 SEPARATOR = re.compile(r"^=+\s*$", re.MULTILINE)
 FIELD = re.compile(
     r"(?P<base>[\w/]+)(?:<=\d+)?(?P<array>\[(?:(?P<bound><=)?(?P<size>\d*))\])?\s+(?P<name>\w+)\s*(?P<rest>.*)"
 )
 LARGEST_EXTENT = 10_000  # scalars of one message; sequences count once
+DEPTH = 64  # of messages within messages
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,18 +94,22 @@ def _members(body: str, package: str, blocks: dict[str, str]) -> tuple[Member, .
             base = next((choice for choice in choices if choice in blocks), "")
             if not base:
                 raise MalformedError(f"the definition of {match['base']} is missing")
-        count = None if not match["array"] else -1 if match["bound"] or not match["size"] else int(match["size"])
+        size = match["size"] or ""
+        count = None if not match["array"] else -1 if match["bound"] or not size else int(size[-19:])
+        # Elements take a byte at least, so that a payload's size bounds how often one loops over them.
+        if count == 0 or len(size) > 19:
+            raise MalformedError(f"an array of {size[:19]} elements")
         members.append(Member(match["name"], base, count))
     return tuple(members)
 
 
-def _extent(definitions: Definitions, name: str, known: dict[str, int]) -> int:
+def _extent(definitions: Definitions, name: str, known: dict[str, int], depth: int = 0) -> int:
     """Return how many scalars a message nests; 0 in `known` marks a message whose count is under way."""
-    if name not in known:
+    if name not in known and depth < DEPTH:
         known[name] = 0
         inner = [m.base for m in definitions[name] if m.base in definitions]
-        known[name] = 1 + len(definitions[name]) + sum(_extent(definitions, base, known) for base in inner)
-    if not 0 < known[name] <= LARGEST_EXTENT:
+        known[name] = 1 + len(definitions[name]) + sum(_extent(definitions, m, known, depth + 1) for m in inner)
+    if not 0 < known.get(name, 0) <= LARGEST_EXTENT:
         raise MalformedError(f"{name} contains itself, or too much")
     return known[name]
 
@@ -160,8 +166,10 @@ class _Walk:
     """One pass over one payload."""
 
     def __init__(self, payload: bytes, definitions: Definitions) -> None:
+        if payload.startswith(ZSTD):
+            raise MalformedError("compressed one by one, as by rosbag2's --compression-mode message: use file, or none")
         if len(payload) < 4 or payload[0] != 0 or payload[1] not in (0, 1):
-            raise MalformedError("the payload is not plain CDR")
+            raise MalformedError("no plain CDR" + (" but XCDR2 or a parameter list" if payload[:1] == b"\0" else ""))
         self.form = LITTLE if payload[1] else BIG
         self.payload = payload
         self.definitions = definitions

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from kbs_process.recordings.inspection import inspect_recording
 from kbs_process.recordings.mcap.messages.encoding import OutStream
 from kbs_process.recordings.mcap.writer import write_mcap
+from kbs_process.reduction.inspection import inspect_recording
 from recordings.mcap.mcap_files import build
 from recordings.mcap.message_encodings import Encoding, write_encoded
 
@@ -19,8 +19,8 @@ def test_rates_gaps_repeats_and_ranges(tmp_path: Path, encoding: Encoding) -> No
     rng = np.random.default_rng(4)
     n = 20_000
     log = 1_000_000 * np.arange(n)
+    log[5000:] += 20_000_000  # a gap
     stamp = log + rng.integers(-1000, 1000, n)
-    stamp[5000:] += 20_000_000  # a gap
     stamp[700] = stamp[699]  # a repeat
     stamp[[900, 901]] = stamp[[901, 900]]  # two in the wrong order
     wrench = rng.uniform(-2, 3, (n, 6))
@@ -36,8 +36,9 @@ def test_rates_gaps_repeats_and_ranges(tmp_path: Path, encoding: Encoding) -> No
     encoder, topic = found.topics
     assert (topic.topic, topic.count) == ("/wrench", n)
     assert topic.rate_Hz == pytest.approx(1000, rel=0.01)
-    assert topic.longest_interval_s == pytest.approx(0.021, abs=1e-5)
-    assert (topic.gaps, topic.repeats, topic.out_of_order) == (1 + 1 + 2, 1, 1)
+    told = {loss.kind: loss for loss in found.losses if loss.where == "/wrench"}
+    assert {kind: loss.count for kind, loss in told.items()} == {"gap": 20, "repeat": 1, "put in order": 1}
+    assert told["gap"].start_s == pytest.approx(4.999, abs=1e-3) and told["gap"].end_s == pytest.approx(5.02, abs=1e-3)
     assert (topic.start_ns, topic.end_ns) == (stamp.min(), stamp.max())
     limits = {entry.field: entry for entry in topic.ranges}
     assert limits["wrench.torque.z"].low == wrench[:, 5].min()
@@ -47,6 +48,22 @@ def test_rates_gaps_repeats_and_ranges(tmp_path: Path, encoding: Encoding) -> No
     assert [(e.field, e.low, e.high) for e in encoder.ranges][:2] == [("position[az]", 0, 1), ("position[el]", 2, 3)]
 
 
+def test_a_clock_that_was_set_is_told_as_processing_tells_it(tmp_path: Path) -> None:
+    t = np.arange(6000) * 10_000_000
+    rng = np.random.default_rng(1)
+    force, angle = rng.normal(0.0, 1.0, (6000, 6)), np.cumsum(rng.normal(0.0, 1e-4, (6000, 1)), axis=0)
+    log = t + 200_000 + rng.exponential(1e5, 6000).astype(np.int64)
+    streams = [
+        OutStream("/wrench", "wrench", t, log, force),
+        OutStream("/encoder", "joints", np.where(t < 30 * 10**9, t, t + 400_000_000), log, angle, ("arm",)),
+    ]
+    write_mcap(tmp_path / "a.mcap", streams)
+    found = inspect_recording(tmp_path / "a.mcap")
+    (refused,) = [loss for loss in found.losses if loss.kind == "unusable"]
+    assert found.state == "lossy" and refused.where == "/encoder"
+    assert "step by -0.4 s, 30" in refused.detail and refused.detail.endswith("a clock was set")
+
+
 def test_clean(tmp_path: Path) -> None:
     t = np.arange(50) * 10**8
     write_mcap(tmp_path / "a.mcap", [OutStream("/t", "temperature", t, t, np.full((50, 1), 21.5))])
@@ -54,7 +71,6 @@ def test_clean(tmp_path: Path) -> None:
     assert (found.state, found.losses, found.reason) == ("clean", (), "")
     (topic,) = found.topics
     assert topic.rate_Hz == 10
-    assert (topic.gaps, topic.repeats, topic.out_of_order) == (0, 0, 0)
 
 
 def test_true_and_false_are_no_numbers_and_lose_no_message(tmp_path: Path) -> None:

@@ -1,9 +1,12 @@
-"""What is in a recording: topics, rates, gaps, ranges, losses; one pass, in constant memory."""
+"""What is in a recording: topics, rates, ranges, losses; one pass, in constant memory.
+
+What is wrong with a stream is judged by the steps that processing goes through as well.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 from typing import Literal
@@ -12,13 +15,16 @@ import numpy as np
 
 from kbs_process.errors import RecordingError
 from kbs_process.recordings.mcap.messages.fields import STAMPS
-from kbs_process.recordings.mcap.source import TopicSummary, open_recording
+from kbs_process.recordings.mcap.source import Source, TopicSummary, open_recording
 from kbs_process.recordings.mcap.streams import Sample, Stream
-from kbs_process.signals.records import Array, Block, Loss, Stamps
+from kbs_process.signals.records import Block, Loss
+from kbs_process.stages.align.condense import CondenseSettings, set_clock
+from kbs_process.stages.align.grid import longest_bridged
+from kbs_process.stages.align.stream import Timeline
 
 LONGEST_ARRAY = 64  # elements of a sequence whose ranges are given
-GAP = 1.5  # of the median interval
-BINS_PER_OCTAVE = 64  # of the intervals' histogram: the gap's limit is exact to 1.1 %
+# Of these readings the single samples are judged; of others the stamps alone, as steps of them may be meant.
+READINGS = ("wrench.", "position[")
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,11 +47,7 @@ class TopicInspection:
     count: int
     start_ns: int | None
     end_ns: int | None
-    rate_Hz: float | None  # of the mean interval that is no gap
-    gaps: int  # intervals above 1.5 medians
-    longest_interval_s: float
-    repeats: int  # messages with the stamp of the one before
-    out_of_order: int  # messages older than the one before
+    rate_Hz: float | None
     ranges: tuple[FieldRange, ...]
     names: tuple[str, ...]  # of joints
     note: str = ""  # why the numbers could not be read
@@ -62,86 +64,6 @@ class Inspection:
     reason: str = ""  # why it is unreadable
 
 
-@dataclass(slots=True, eq=False)
-class Intervals:
-    """Intervals between successive stamps: a histogram with logarithmic bins, exact counts of what is amiss."""
-
-    counts: Stamps = field(default_factory=lambda: np.zeros(64 * BINS_PER_OCTAVE, dtype=np.int64))
-    sums: Array = field(default_factory=lambda: np.zeros(64 * BINS_PER_OCTAVE))  # ns
-    last: int | None = None
-    repeats: int = 0
-    out_of_order: int = 0
-    longest: int = 0  # ns
-
-    def add(self, stamp: Stamps) -> None:
-        """Add the stamps that follow those added before."""
-        steps = np.diff(stamp, prepend=stamp[0] if self.last is None else self.last)
-        steps = steps[1:] if self.last is None else steps
-        self.last = int(stamp[-1])
-        self.repeats += int((steps == 0).sum())
-        self.out_of_order += int((steps < 0).sum())
-        steps = steps[steps > 0]
-        if len(steps):
-            self.longest = max(self.longest, int(steps.max()))
-            bins = (np.log2(steps) * BINS_PER_OCTAVE).astype(np.int64)
-            self.counts += np.bincount(bins, minlength=len(self.counts))
-            self.sums += np.bincount(bins, weights=steps.astype(np.float64), minlength=len(self.sums))
-
-    def median(self) -> float | None:
-        """Return the median interval, ns: the mean of the bin that it lies in."""
-        total = int(self.counts.sum())
-        if not total:
-            return None
-        middle = int(np.searchsorted(np.cumsum(self.counts), (total + 1) // 2))
-        return float(self.sums[middle] / self.counts[middle])
-
-    def usual(self) -> float | None:
-        """Return the mean of intervals of half to one and a half medians, ns: no gaps, and jitter is averaged."""
-        median = self.median()
-        if median is None:
-            return None
-        low, high = (int(np.log2(share * median) * BINS_PER_OCTAVE) for share in (2.0 - GAP, GAP))
-        inside = slice(max(low, 0), high + 1)
-        return float(self.sums[inside].sum() / self.counts[inside].sum())
-
-    def gaps(self) -> int:
-        """Return how many intervals exceed `GAP` medians."""
-        median = self.median()
-        if median is None:
-            return 0
-        return int(self.counts[int(np.log2(GAP * median) * BINS_PER_OCTAVE) + 1 :].sum())
-
-
-class _Gathered:
-    """What a pass learns about one topic."""
-
-    def __init__(self, columns: int) -> None:
-        self.count = 0
-        self.start: int | None = None
-        self.end: int | None = None
-        self.intervals = Intervals()
-        self.low = np.full(columns, np.inf)
-        self.high = np.full(columns, -np.inf)
-        self.not_finite = np.zeros(columns, dtype=np.int64)
-
-    def add(self, block: Block) -> None:
-        first, last = int(block.stamp.min()), int(block.stamp.max())
-        self.start = first if self.start is None else min(self.start, first)
-        self.end = last if self.end is None else max(self.end, last)
-        self.count += len(block)
-        self.intervals.add(block.stamp)
-        if block.values.shape[1]:
-            finite = np.isfinite(block.values)
-            self.not_finite += len(block) - finite.sum(axis=0)
-            self.low = np.minimum(self.low, np.where(finite, block.values, np.inf).min(axis=0))
-            self.high = np.maximum(self.high, np.where(finite, block.values, -np.inf).max(axis=0))
-
-    def ranges(self, fields: Iterable[str]) -> tuple[FieldRange, ...]:
-        low = np.where(self.low <= self.high, self.low, np.nan)
-        high = np.where(self.low <= self.high, self.high, np.nan)
-        return tuple(map(FieldRange, fields, low.tolist(), high.tolist(), self.not_finite.tolist()))
-
-
 @dataclass(frozen=True, slots=True)
 class _Plan:
     """The numbers to be read of one topic."""
@@ -149,6 +71,77 @@ class _Plan:
     fields: tuple[str, ...] = ()
     names: tuple[str, ...] = ()
     note: str = ""
+    damaged: bool = False  # none of its first messages can be decoded
+
+
+class _Gathered:
+    """What a pass learns about one topic."""
+
+    def __init__(self, topic: str, plan: _Plan) -> None:
+        columns = len(plan.fields)
+        self.count = 0
+        self.start: int | None = None
+        self.end: int | None = None
+        self.refused = plan.note if plan.damaged else ""  # why processing refuses it
+        self.low = np.full(columns, np.inf)
+        self.high = np.full(columns, -np.inf)
+        self.not_finite = np.zeros(columns, dtype=np.int64)
+        self._read = [at for at, name in enumerate(plan.fields) if name.startswith(READINGS)]
+        names = tuple(plan.fields[at] for at in self._read)
+        angles = np.array([name.startswith("position") for name in names], dtype=np.float64)
+        self.line = Timeline(
+            topic,
+            names,
+            bridged=longest_bridged(0.5 * CondenseSettings().working_rate_Hz),
+            file=topic,
+            filled=bool(names),
+            turning=angles,
+        )
+
+    def add(self, block: Block) -> None:
+        first, last = int(block.stamp.min()), int(block.stamp.max())
+        self.start = first if self.start is None else min(self.start, first)
+        self.end = last if self.end is None else max(self.end, last)
+        self.count += len(block)
+        self._judge(Block(block.stamp, block.log, block.values[:, self._read]))
+        if block.values.shape[1]:
+            finite = np.isfinite(block.values)
+            self.not_finite += len(block) - finite.sum(axis=0)
+            self.low = np.minimum(self.low, np.where(finite, block.values, np.inf).min(axis=0))
+            self.high = np.maximum(self.high, np.where(finite, block.values, -np.inf).max(axis=0))
+
+    def _judge(self, block: Block | None) -> None:
+        """Take the next block, or end with None."""
+        try:
+            if not self.refused:
+                for ready in self.line.flush() if block is None else self.line.push(block):
+                    if self._read:
+                        self.line.clean(ready)
+                if block is None and self._read:
+                    self.line.end()
+        except RecordingError as error:
+            self.refused = error.what
+
+    def finish(self) -> Timeline | None:
+        """Take what was held back; return the timeline of readings whose clock can be judged."""
+        self._judge(None)
+        return self.line if self._read and self.line.samples and not self.refused else None
+
+    def losses(self, origin: int | None) -> Iterator[Loss]:
+        """Yield what is wrong with the stream, in s from `origin` of the recorder's clock."""
+        if self.refused:
+            yield Loss("unusable", self.line.where, self.count, detail=self.refused)
+        if self.line.samples:
+            start = (self.line.clock().first_log - (origin or 0)) * 1e-9
+            for loss in self.line.losses(start, 1.0):
+                # What is sent now and then has no gaps; numbers that are none are told by the reader.
+                if loss.kind != "non-finite" and (self.line.regular or loss.kind not in ("gap", "short gap")):
+                    yield loss
+
+    def ranges(self, fields: Iterable[str]) -> tuple[FieldRange, ...]:
+        low = np.where(self.low <= self.high, self.low, np.nan)
+        high = np.where(self.low <= self.high, self.high, np.nan)
+        return tuple(map(FieldRange, fields, low.tolist(), high.tolist(), self.not_finite.tolist()))
 
 
 def inspect_recording(path: Path) -> Inspection:
@@ -158,21 +151,34 @@ def inspect_recording(path: Path) -> Inspection:
         topics = source.topics
         samples = source.samples()
         plans = {topic.topic: _plan(samples.get(topic.topic)) for topic in topics}
-        gathered = {topic: _Gathered(len(plan.fields)) for topic, plan in plans.items()}
+        gathered = {topic: _Gathered(topic, plan) for topic, plan in plans.items()}
         for topic, block in source.read([Stream(topic, topic, plan.fields) for topic, plan in plans.items()]):
             gathered[topic].add(block)
     except RecordingError as error:
         return Inspection(path, "unreadable", (), (), str(error))
+    lines = {topic: one.finish() for topic, one in gathered.items()}
+    if (found_set := set_clock({topic: line for topic, line in lines.items() if line is not None})) is not None:
+        gathered[found_set[0]].refused = found_set[1]
+    losses = [*source.losses, *_by_turns(source)]
+    losses += [loss for one in gathered.values() for loss in one.losses(source.start_ns)]
     found = tuple(_conclude(topic, plans[topic.topic], gathered[topic.topic]) for topic in topics)
     if source.losses and not any(topic.count for topic in found):
-        return Inspection(path, "unreadable", found, source.losses, "no message could be read")
-    return Inspection(path, "lossy" if source.losses else "clean", found, source.losses)
+        return Inspection(path, "unreadable", found, tuple(losses), "no message could be read")
+    return Inspection(path, "lossy" if any(loss.real for loss in losses) else "clean", found, tuple(losses))
+
+
+def _by_turns(source: Source) -> Iterator[Loss]:
+    for topic, channels in source.publishers.items():
+        detail = f"channels {', '.join(map(str, channels))} bring it by turns"
+        yield Loss("publishers", topic, len(channels), detail=detail)
 
 
 def _plan(sample: Sample | str | None) -> _Plan:
     """Plan for every number of a topic, and the elements of its sequences that one message has."""
     if sample is None or isinstance(sample, str):
         return _Plan(note=sample or "no messages")
+    if fault := sample.fault():
+        return _Plan(note=fault, damaged=True)
     fields: list[str] = []
     names: tuple[str, ...] = ()
     for entry in sample.type.fields:
@@ -181,7 +187,7 @@ def _plan(sample: Sample | str | None) -> _Plan:
         if entry.count is None:
             fields.append(entry.path)
             continue
-        elements = sample.type.elements(sample.payload, entry.path)
+        elements = sample.elements(entry.path)
         named = entry.named and len(elements.names) >= elements.count
         keys = elements.names if named else map(str, range(elements.count))
         if elements.count <= LONGEST_ARRAY:
@@ -191,8 +197,6 @@ def _plan(sample: Sample | str | None) -> _Plan:
 
 
 def _conclude(topic: TopicSummary, plan: _Plan, gathered: _Gathered) -> TopicInspection:
-    intervals = gathered.intervals
-    usual = intervals.usual()
     return TopicInspection(
         topic.topic,
         topic.type,
@@ -200,12 +204,8 @@ def _conclude(topic: TopicSummary, plan: _Plan, gathered: _Gathered) -> TopicIns
         gathered.count,
         gathered.start,
         gathered.end,
-        None if usual is None else 1e9 / usual,
-        intervals.gaps(),
-        intervals.longest / 1e9,
-        intervals.repeats,
-        intervals.out_of_order,
-        gathered.ranges(plan.fields),
+        gathered.line.grid.rate if gathered.line.grid is not None else None,
+        gathered.ranges(plan.fields) if gathered.count else (),
         plan.names,
         plan.note,
     )

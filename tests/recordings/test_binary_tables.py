@@ -1,0 +1,293 @@
+"""Binary formats against what their own libraries and conventions say; what has no columns is named, never guessed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from kbs_process.recordings.formats import Text, format_named
+from kbs_process.recordings.tables import Table
+from kbs_process.studies.convert.clock import numbers
+
+# Readers leave their files open until the child process that they are made for ends.
+pytestmark = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning", "ignore::ResourceWarning")
+
+T = np.arange(20) * 0.5
+NAN = float("nan")
+
+
+def read(path: Path, name: str) -> Table:
+    return format_named(name).read(path, Text())
+
+
+def column(table: Table, name: str) -> np.ndarray:
+    return np.concatenate([numbers(cells) for (cells,) in table.chunks([name])])
+
+
+def cells(table: Table, name: str) -> np.ndarray:
+    return np.concatenate([one for (one,) in table.chunks([name])])
+
+
+def names(table: Table) -> list[str]:
+    return [one.name for one in table.columns]
+
+
+def told(table: Table, name: str) -> str:
+    return next((one for one in table.left_out if one.startswith(f"{name}: ")), "")
+
+
+PACKED = np.array([5, -32768, 7, -99, 2000, -3], dtype="<i2")
+
+
+@pytest.mark.parametrize(
+    ("attributes", "right"),
+    [
+        ({"scale_factor": 0.01, "add_offset": 1.0}, PACKED * 0.01 + 1.0),
+        ({"scale_factor": [0.01]}, PACKED * 0.01),
+        ({"_FillValue": np.int16(-32768)}, [5, NAN, 7, -99, 2000, -3]),
+        ({"_FillValue": np.int16(-32768), "missing_value": np.int16([-99, -3])}, [5, NAN, 7, NAN, 2000, NAN]),
+        ({"valid_range": np.int16([-100, 100]), "add_offset": 1.0}, [6, NAN, 8, -98, NAN, -2]),
+        ({"valid_min": np.int16(0)}, [5, NAN, 7, NAN, 2000, NAN]),
+        ({"valid_max": np.int16(6), "scale_factor": 2.0}, [10, -65536, NAN, -198, NAN, -6]),
+        ({"_Unsigned": "true"}, [5, 32768, 7, 65437, 2000, 65533]),
+    ],
+)
+@pytest.mark.parametrize("order", ["<", ">"])
+def test_hdf5_packed_and_missing(tmp_path: Path, attributes: dict[str, Any], right: Any, order: str) -> None:
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["x"] = PACKED.astype(f"{order}i2")
+        file["x"].attrs.update(attributes)
+        file["m"] = np.column_stack([PACKED, PACKED])
+        file["m"].attrs.update(attributes)
+    table = read(tmp_path / "a.h5", "hdf5")
+    np.testing.assert_array_equal(column(table, "x"), right)
+    np.testing.assert_array_equal(column(table, "m[2]"), right)
+
+
+def test_hdf5_records_of_several_numbers_and_words(tmp_path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    rows = np.zeros(20, np.dtype([("index", "i8"), ("values_block_0", "f8", (3,)), ("deep", "f8", (2, 2))]))
+    rows["index"], rows["values_block_0"][:, 1] = np.arange(20), T
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["df/table"] = rows
+        file["when"] = [f"2026-01-31T12:00:{i:02d}" for i in range(20)]
+        file["z"] = np.ones(20, complex)
+        file["cube"] = np.ones((2, 2, 2))
+    table = read(tmp_path / "a.h5", "hdf5")
+    np.testing.assert_array_equal(column(table, "df/table[values_block_0][2]"), T)
+    np.testing.assert_array_equal(column(table, "df/table[index]"), np.arange(20))
+    assert cells(table, "when")[-1] == "2026-01-31T12:00:19"
+    assert "complex" in told(table, "z")
+    assert "3 dimensions" in told(table, "cube")
+    assert "dimensions" in told(table, "df/table[deep]")
+
+
+def test_hdf5_reads_no_other_file(tmp_path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    (tmp_path / "secret").write_bytes(b"root:x:0:0" * 8)
+    with h5py.File(tmp_path / "other.h5", "w") as file:
+        file["x"] = T
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file.create_dataset("e", (10,), "f8", external=[(str(tmp_path / "secret"), 0, 80)])
+        layout = h5py.VirtualLayout((20,), "f8")
+        layout[:] = h5py.VirtualSource(tmp_path / "other.h5", "x", shape=(20,))
+        file.create_virtual_dataset("v", layout)
+        file["link"] = h5py.ExternalLink(tmp_path / "other.h5", "x")
+        file["own"] = T
+    table = read(tmp_path / "a.h5", "hdf5")
+    assert names(table) == ["own"]
+    assert "other files" in told(table, "e")
+    assert "other files" in told(table, "v")
+
+
+def test_wide_matrices_are_read_once(tmp_path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    matrix = np.arange(2000.0 * 500).reshape(2000, 500)
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file.create_dataset("m", data=matrix, chunks=(2000, 500), compression="gzip")
+        file.create_dataset("w", data=matrix.T, chunks=(500, 2000), compression="gzip")
+    table = read(tmp_path / "a.h5", "hdf5")
+    (all_of_them,) = table.chunks(names(table))
+    np.testing.assert_array_equal(np.column_stack(all_of_them[:500]), matrix)
+    np.testing.assert_array_equal(np.column_stack(all_of_them[500:]), matrix)
+
+
+@pytest.mark.parametrize("version", ["4", "5"])
+def test_matlab_kinds(tmp_path: Path, version: str) -> None:
+    from scipy.io import savemat
+    from scipy.sparse import csc_matrix
+
+    plain = {"x": T, "big": T.astype(">f8"), "n": T.astype("i2"), "c": "text", "z": T + 1j}
+    others = {
+        "Joint": {"angle": np.vstack([T, 2 * T]), "in": {"t": T}},
+        "many": np.array([(1.0,), (2.0,)], dtype=[("a", "O")]),
+        "cell": np.array([T, "a"], dtype=object),
+        "flag": T > 2,
+        "empty": np.empty((0, 0)),
+    }
+    savemat(
+        tmp_path / "a.mat", plain | {"s": csc_matrix(np.eye(20))} | (others if version == "5" else {}), format=version
+    )
+    table = read(tmp_path / "a.mat", "matlab")
+    for name in ("x", "big", "n"):
+        np.testing.assert_array_equal(column(table, name), plain[name])
+    assert all(told(table, name) for name in ("c", "z", "s"))
+    if version == "5":
+        np.testing.assert_array_equal(column(table, "Joint.angle[2]"), 2 * T)
+        np.testing.assert_array_equal(column(table, "Joint.in.t"), T)
+        np.testing.assert_array_equal(column(table, "flag"), T > 2)
+        assert "structures" in told(table, "many")
+        assert "cells" in told(table, "cell")
+        assert not told(table, "empty")
+
+
+def test_matlab_7_3_kinds(tmp_path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "a.mat", "w", userblock_size=512) as file:
+        for name, data, kind in (
+            ("t", T[None, :], "double"),
+            ("Joint/angle", np.column_stack([T, 2 * T]), "double"),
+            ("word", np.frombuffer("Ada Lovelace".encode("utf-16-le"), "u2")[:, None], "char"),
+            ("none", np.array([0, 0], dtype="u8"), "double"),
+            ("s/data", T, "double"),
+            ("#refs#/a", T, "double"),
+        ):
+            file[name] = data
+            file[name].attrs["MATLAB_class"] = np.bytes_(kind)
+        file["none"].attrs["MATLAB_empty"] = np.uint8(1)
+        file["s"].attrs["MATLAB_sparse"] = np.uint64(20)
+    table = read(tmp_path / "a.mat", "matlab")
+    assert names(table) == ["Joint.angle[1]", "Joint.angle[2]", "t"]
+    np.testing.assert_array_equal(column(table, "Joint.angle[2]"), 2 * T)
+    assert told(table, "word")
+    assert "sparse" in told(table, "s.data")
+
+
+def test_numpy_kinds(tmp_path: Path) -> None:
+    rows = np.zeros(20, np.dtype([("t", "M8[ms]"), ("F", ">f4", (3,)), ("z", "c16")]))
+    rows["t"], rows["F"][:, 2] = np.arange(20).astype("M8[ms]"), T
+    np.save(tmp_path / "a.npy", rows)
+    table = read(tmp_path / "a.npy", "numpy")
+    np.testing.assert_array_equal(column(table, "F[3]"), T)
+    assert cells(table, "t").dtype.kind == "M"
+    assert "complex" in told(table, "z")
+    np.save(tmp_path / "f.npy", np.asfortranarray(np.column_stack([T, 2 * T]).astype(">f8")))
+    np.testing.assert_array_equal(column(read(tmp_path / "f.npy", "numpy"), "[2]"), 2 * T)
+    np.savez_compressed(tmp_path / "a.npz", t=T, run=rows)
+    packed = read(tmp_path / "a.npz", "numpy")
+    np.testing.assert_array_equal(column(packed, "run[F][3]"), T)
+    np.save(tmp_path / "o.npy", np.array([1, "a"], dtype=object))
+    with pytest.raises(ValueError, match="Python objects"):
+        read(tmp_path / "o.npy", "numpy")
+
+
+def test_parquet_kinds(tmp_path: Path) -> None:
+    import decimal
+
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    absent = [None, *T[1:].tolist()]
+    stamps = np.datetime64("2026-01-31T12:00:00", "us") + np.arange(20)
+    arrays = {
+        "null": pa.array(absent),
+        "whole": pa.array([None, *range(1, 20)], pa.int32()),
+        "kind": pa.array(T.tolist()).dictionary_encode(),
+        "dec": pa.array([decimal.Decimal("0.1")] * 20, pa.decimal128(30, 20)),
+        "flag": pa.array((T > 2).tolist()),
+        "zone": pa.array(stamps, pa.timestamp("us", "America/New_York")),
+        "lasts": pa.array((T * 1e9).astype("i8"), pa.duration("ns")),
+        "half": pa.array([None, *(T[1:] + 1e5)], pa.float32()),
+        "list": pa.array([[1.0]] * 20),
+        "struct": pa.array([{"a": 1.0}] * 20),
+    }
+    pq.write_table(pa.table(arrays), tmp_path / "a.parquet")
+    table = read(tmp_path / "a.parquet", "parquet")
+    np.testing.assert_array_equal(column(table, "null"), [NAN, *T[1:]])
+    np.testing.assert_array_equal(column(table, "whole"), [NAN, *range(1, 20)])
+    np.testing.assert_array_equal(column(table, "kind"), T)
+    np.testing.assert_array_equal(column(table, "dec"), [0.1] * 20)
+    np.testing.assert_array_equal(column(table, "flag"), T > 2)
+    np.testing.assert_array_equal(column(table, "lasts"), T)
+    np.testing.assert_array_equal(cells(table, "zone"), stamps.astype("M8[ns]"))
+    assert cells(table, "half").dtype == np.float32  # which tells how coarse times are
+    assert all(told(table, name) for name in ("list", "struct"))
+    twice = pa.Table.from_arrays([pa.array(T), pa.array(T), pa.array(T)], names=["a", "a", "b"])
+    pq.write_table(twice, tmp_path / "b.parquet")
+    table = read(tmp_path / "b.parquet", "parquet")
+    assert names(table) == ["b"]
+    assert "several" in told(table, "a")
+
+
+def tdms(path: Path, *segments: dict[str, Any]) -> Table:
+    nptdms = pytest.importorskip("nptdms")
+    with nptdms.TdmsWriter(path) as writer:
+        for properties in segments:
+            writer.write_segment([nptdms.ChannelObject("g", "a", T, properties=properties)])
+    return read(path, "tdms")
+
+
+def test_tdms_clocks(tmp_path: Path) -> None:
+    noon = np.datetime64("2026-01-31T12:00:00")
+    whole = {"wf_start_time": noon, "wf_increment": 0.25, "wf_start_offset": 2.0}
+    table = tdms(tmp_path / "a.tdms", whole, {})
+    np.testing.assert_array_equal(column(table, "g/a"), [*T, *T])
+    assert cells(table, "g/a: time")[-1] == noon + np.timedelta64(2000 + 39 * 250, "ms")
+    assert names(tdms(tmp_path / "b.tdms", whole | {"wf_increment": 0.0})) == ["g/a"]
+    later = tdms(tmp_path / "c.tdms", whole, whole | {"wf_start_time": noon + np.timedelta64(5, "m")})
+    assert names(later) == ["g/a"]
+    assert "within the file" in told(later, "g/a")
+
+
+def test_tdms_that_breaks_off_and_an_index_of_another_file(tmp_path: Path) -> None:
+    tdms(tmp_path / "a.tdms", {})
+    data = (tmp_path / "a.tdms").read_bytes()
+    (tmp_path / "a.tdms").write_bytes(data[:-40])
+    (tmp_path / "a.tdms_index").write_bytes(b"nonsense")
+    table = read(tmp_path / "a.tdms", "tdms")
+    np.testing.assert_array_equal(column(table, "g/a"), T[:15])
+    assert "breaks off" in next(iter(table.odd))
+
+
+def mdf(path: Path, times: Any = T, **options: Any) -> Table:
+    asammdf = pytest.importorskip("asammdf")
+    invalid = np.zeros(20, bool)
+    invalid[3:5] = True
+    with asammdf.MDF(version="4.10") as file:
+        file.append(
+            [
+                asammdf.Signal(T, times, name="a", **options),
+                asammdf.Signal(T, times, name="b", invalidation_bits=invalid),
+            ]
+        )
+        file.start_time = np.datetime64("2026-01-31T12:00:00").astype(object)
+        file.save(path, overwrite=True)
+    return read(path, "mdf")
+
+
+@pytest.mark.slow
+def test_mdf_masters_and_invalid_samples(tmp_path: Path) -> None:
+    table = mdf(tmp_path / "a.mf4")
+    np.testing.assert_array_equal(column(table, "b"), np.where((T == 1.5) | (T == 2.0), NAN, T))
+    assert cells(table, "0: time")[1] == np.datetime64("2026-01-31T12:00:00.5")
+    assert "taken for UTC: it begins at 2026-01-31 12:00:00" in next(iter(table.odd))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", [("angle", 2), ("distance", 3), ("index", 4)])
+def test_mdf_masters_that_are_no_time(tmp_path: Path, kind: tuple[str, int]) -> None:
+    table = mdf(tmp_path / "a.mf4", master_metadata=kind)
+    assert all(not one.clock for one in table.columns)
+    assert kind[0] in told(table, "0: time")
+
+
+@pytest.mark.slow
+def test_mdf_masters_of_half_size_that_are_too_coarse(tmp_path: Path) -> None:
+    assert not told(mdf(tmp_path / "a.mf4", times=T.astype(np.float32)), "0: time")
+    table = mdf(tmp_path / "b.mf4", times=(T + 4e6).astype(np.float32))
+    assert "floats of 32 bits know these times to 0.25 s only; rows come every 0.5" in told(table, "0: time")
+    assert all(not one.clock for one in table.columns)

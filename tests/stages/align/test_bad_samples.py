@@ -1,0 +1,276 @@
+"""Single bad samples, odd stamps, lost counts and clocks set back: named, and left out or refused; all else stays."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kbs_process.errors import RecordingError
+from kbs_process.signals.records import Block, Loss, Run
+from kbs_process.stages.align.condense import CondenseSettings, condense
+from stages.recordings import EPOCH, rows, stream
+
+CHANNELS = {"wrench": ("Fz", "Ty"), "angle": ("arm",)}
+LATENCY = 2e-4  # s
+NOISE = 2e-3
+HOUR = 3_600_000_000_000
+
+
+def truth(t: np.ndarray) -> np.ndarray:
+    return np.column_stack((-50.0 + 2.0 * np.sin(0.4 * t), 6.0 * np.cos(0.4 * t)))
+
+
+def turn(t: np.ndarray) -> np.ndarray:
+    return 0.6 - 0.6 * np.cos(0.4 * t)[:, None]
+
+
+def recording(rate: float = 100.0) -> dict[str, Block]:
+    wrench = stream(truth, rate, 60.0, seed=1, latency=LATENCY)
+    wrench.values[:] += np.random.default_rng(3).normal(0.0, NOISE, wrench.values.shape)
+    return {"wrench": wrench, "angle": stream(turn, rate, 60.0, seed=2, latency=LATENCY)}
+
+
+def run_of(streams: dict[str, Block]) -> Run:
+    return condense("test", streams.items(), {key: CHANNELS[key] for key in streams}, CondenseSettings())
+
+
+def told(run: Run, kind: str) -> list[Loss]:
+    return [loss for loss in run.losses if loss.kind == kind]
+
+
+def error(run: Run) -> tuple[float, float]:
+    """Largest error of the wrench and of the angle, where they are valid: most of the time."""
+    assert run.wrench is not None and run.angle is not None
+    assert run.wrench.valid.mean() > 0.9 and run.angle.valid.mean() > 0.9
+    late = (run.epoch_ns - EPOCH) * 1e-9
+    wrench = np.abs(run.wrench.values - truth(run.wrench.t + late))[run.wrench.valid].max()
+    angle = np.abs(run.angle.values - turn(run.angle.t + late))[run.angle.valid].max()
+    return float(wrench), float(angle)
+
+
+def test_a_sound_recording_gives_no_notice() -> None:
+    run = run_of(recording())
+    assert run.losses == ()
+    assert error(run)[0] < 4.0 * NOISE
+
+
+@pytest.mark.parametrize(
+    ("channel", "rows_", "value", "count"),
+    [
+        (0, slice(3000, 3001), 0.0, 1),
+        (1, slice(3000, 3001), 1.0, 1),  # N m more than there is
+        (1, slice(2000, 2007), 32.767, 1),
+        (1, [1000, 3001, 4990], 32.767, 3),
+    ],
+)
+def test_spikes_are_named_with_channel_and_time_and_interpolated(
+    channel: int, rows_: slice | list[int], value: float, count: int
+) -> None:
+    streams = recording()
+    values = streams["wrench"].values
+    values[rows_, channel] = values[rows_, channel] + 1.0 if value == 1.0 else value
+    run = run_of(streams)
+    (spike,) = told(run, "spike")
+    first = rows_.start if isinstance(rows_, slice) else rows_[0]
+    assert spike.count == count and spike.where.endswith(CHANNELS["wrench"][channel])
+    assert spike.start_s == pytest.approx(0.01 * first, abs=1e-6)
+    assert error(run)[0] < 6.0 * NOISE
+
+
+def test_a_reading_lost_in_all_channels_is_left_out() -> None:
+    streams = recording()
+    streams["wrench"].values[3000] = 0.0
+    run = run_of(streams)
+    assert [loss.where[-2:] for loss in told(run, "spike")] == ["Fz", "Ty"]
+    assert error(run)[0] < 4.0 * NOISE
+
+
+def test_zeros_of_an_encoder_that_turns_through_half_a_turn_are_left_out() -> None:
+    streams = recording()
+    angle = streams["angle"].values
+    angle[:] = np.mod(angle + np.pi - 0.3, 2.0 * np.pi)
+    angle[[1000, 1180, 4000]] = 0.0
+    run = run_of(streams)
+    assert run.angle is not None
+    found = run.angle.values[:, 0] - turn(run.angle.t)[:, 0]
+    assert sum(loss.count for loss in told(run, "spike")) == 3
+    assert np.ptp(found[run.angle.valid]) < 1e-3
+
+
+@pytest.mark.parametrize("by", [1.79, -0.01])
+def test_an_encoder_that_loses_its_count_is_refused(by: float) -> None:
+    streams = recording()
+    streams["angle"].values[4000:] += by
+    with pytest.raises(RecordingError, match=r"arm steps by .* 40(\.\d*)? s after the first, and stays") as found:
+        run_of(streams)
+    assert "start_s" in str(found.value)
+
+
+def test_a_zero_that_is_set_on_the_way_is_refused() -> None:
+    streams = recording()
+    streams["wrench"].values[3000:, 0] += 50.0
+    with pytest.raises(RecordingError, match="Fz steps by 5"):
+        run_of(streams)
+
+
+def test_a_blow_that_rings_stays_as_it_is() -> None:
+    streams = recording(1000.0)
+    wrench = streams["wrench"].values
+    t = np.arange(500) * 1e-3
+    wrench[20_000:20_500] += 20.0 * np.exp(-t / 0.05)[:, None] * np.sin(2.0 * np.pi * 240.0 * t)[:, None]
+    run, as_it_was = run_of(streams), run_of(recording(1000.0))
+    assert run.losses == ()
+    assert run.envelope is not None and as_it_was.envelope is not None
+    assert run.envelope.high[:, 1].max() > 15.0
+
+
+@pytest.mark.parametrize("off", [5.0003, 5.0, -3.0, 0.05, 7200.0])
+@pytest.mark.parametrize("key", ["wrench", "angle"])
+def test_odd_stamps_are_left_out_and_named(off: float, key: str) -> None:
+    streams = recording()
+    streams[key].stamp[[1000, 3100, 4800]] += round(off * 1e9)
+    run = run_of(streams)
+    (odd,) = told(run, "odd stamp")
+    assert (odd.count, odd.where) == (3, f"test: {key}")
+    assert odd.start_s == pytest.approx(9.99, abs=2e-3) and odd.end_s == pytest.approx(47.99, abs=2e-3)
+    assert told(run, "put in order") == [] and error(run)[0] < 4.0 * NOISE
+
+
+@pytest.mark.parametrize("which", [slice(0, 1), slice(0, 50), slice(-1, None)])
+@pytest.mark.parametrize("by", [-EPOCH, -24 * HOUR, 24 * HOUR])
+def test_a_few_samples_far_from_all_others_are_left_out(which: slice, by: int) -> None:
+    streams = recording()
+    for one in streams.values():
+        one.stamp[which] += by
+        one.log[which] += by
+    run = run_of(streams)
+    assert sum(loss.count for loss in run.losses if loss.kind in ("far stamp", "odd stamp", "out of order")) > 0
+    assert run.wrench is not None and len(run.wrench) <= 1200
+    assert error(run)[0] < 4.0 * NOISE
+
+
+@pytest.mark.parametrize("by", [0.0437, 0.4037, 20.0])
+def test_a_clock_that_is_set_back_is_refused(by: float) -> None:
+    streams = recording()
+    streams["angle"].stamp[3000:] -= round(by * 1e9)
+    with pytest.raises(RecordingError, match=f"time goes back by {by:.6g}"):
+        run_of(streams)
+
+
+def test_a_logger_that_started_again_is_refused() -> None:
+    streams = recording()
+    streams = {key: rows(one, np.tile(np.arange(len(one)), 2)) for key, one in streams.items()}
+    for one in streams.values():
+        one.log[:] = one.stamp
+        one.values[6000:] *= 0.9
+    with pytest.raises(RecordingError, match="time goes back by 60 s"):
+        run_of(streams)
+
+
+def test_a_gap_longer_than_the_recording_is_refused_at_once() -> None:
+    streams = recording()
+    for one in streams.values():
+        one.stamp[3000:] += 1000 * HOUR
+        one.log[3000:] += 1000 * HOUR
+    with pytest.raises(RecordingError, match=r"a gap of 3.6e\+06 s among samples that cover") as found:
+        run_of(streams)
+    assert "start_s" in str(found.value)
+
+
+def test_streams_without_common_time_are_refused() -> None:
+    streams = recording()
+    angle = streams["angle"]
+    streams["angle"] = replace(angle, stamp=angle.stamp + HOUR, log=angle.log + HOUR)
+    with pytest.raises(RecordingError, match="3600 s after that of wrench"):
+        run_of(streams)
+
+
+@pytest.mark.parametrize("every", [1, 2, 3, 10])
+def test_two_sources_in_one_stream_are_refused(every: int) -> None:
+    streams = recording()
+    wrench = streams["wrench"]
+    other = rows(wrench, slice(None, None, every))
+    late = Block(other.stamp + 5_000_000, other.log + 5_000_000, np.zeros_like(other.values))
+    both = [np.concatenate(pair) for pair in ((wrench.stamp, late.stamp), (wrench.log, late.log))]
+    order = np.argsort(both[1])
+    values = np.concatenate((wrench.values, late.values))
+    streams["wrench"] = Block(both[0][order], both[1][order], values[order])
+    with pytest.raises(RecordingError, match="two sources are in one stream"):
+        run_of(streams)
+
+
+@pytest.mark.parametrize("by", [-0.4037, -0.0437, -0.01, 0.004, 0.01, 0.02])
+def test_a_clock_that_is_set_by_little_is_refused(by: float) -> None:
+    streams = recording()
+    streams["angle"].stamp[3000:] -= round(by * 1e9)
+    with pytest.raises(RecordingError, match=r"encoder: log times less stamps step by .*a clock was set"):
+        run_of(streams)
+
+
+def test_a_recorder_s_clock_that_is_set_is_refused() -> None:
+    streams = recording()
+    streams["angle"].stamp[3000:] += 500_000_000
+    for one in streams.values():
+        one.log[3000:] += 500_000_000
+    with pytest.raises(RecordingError, match=r"wrench: log times less stamps step by \+0.5 s.*stamps of encoder jump"):
+        run_of(streams)
+
+
+@pytest.mark.parametrize("growth", [3e-3, 25e-3, -1e-3])
+def test_a_latency_that_grows_is_no_skew(growth: float) -> None:
+    streams = recording()
+    wrench = streams["wrench"]
+    wrench.log[:] += (growth * (wrench.stamp - EPOCH)).astype(np.int64)
+    run = run_of(streams)
+    (clock,) = told(run, "clock")
+    assert clock.where == "test: wrench" and f"by {1e3 * abs(growth):.3g} ms each second" in clock.detail
+    assert run.clocks["angle"].skew == 0.0 and abs(run.clocks["angle"].offset_s) < 1e-6
+    assert error(run)[1] < 1e-3
+
+
+def test_a_latency_that_comes_and_goes_or_steps_moves_no_clock() -> None:
+    t = np.arange(6000) * 0.01
+    for late in (np.interp(t, [0, 20, 30, 40, 60], [0, 0, 2, 0, 0]), 0.02 * (t > 30.0), 3e-6 * t**2):
+        streams = recording()
+        streams["wrench"].log[:] += np.rint(1e9 * late).astype(np.int64)
+        run = run_of(streams)
+        assert error(run)[1] < 1e-3 and error(run)[0] < 4.0 * NOISE
+        assert abs(run.clocks["angle"].offset_s) < 1e-3
+
+
+@pytest.mark.parametrize("rate", [999.7, 1000.6, 800.0, 333.3])
+@pytest.mark.parametrize("logged", [True, False])
+def test_stamps_rounded_to_a_period_hide_a_regular_rate_and_lose_nothing(rate: float, logged: bool) -> None:
+    streams = recording(rate)
+    for one in streams.values():
+        one.stamp[:] = EPOCH + 1_000_000 * np.rint((one.stamp - EPOCH) / 1e6).astype(np.int64)
+        if not logged:
+            one.log[:] = one.stamp
+    if rate > 1000.0:  # what shares its stamp with another is a repeat
+        streams = {key: rows(one, np.unique(one.stamp, return_index=True)[1]) for key, one in streams.items()}
+    run = run_of(streams)
+    if rate < 1000.0:
+        assert {loss.kind for loss in run.losses} == {"rounded stamps"} and not any(loss.real for loss in run.losses)
+        assert run.rates["wrench"] == pytest.approx(rate, rel=2e-4)
+    assert error(run)[0] < 4.0 * NOISE and error(run)[1] < 1e-3
+
+
+def test_samples_lost_of_rounded_stamps_are_gaps() -> None:
+    streams = recording(1000.0)
+    keep = np.delete(np.arange(60_000), [7000, 7500, 9000, *range(30_000, 30_040)])
+    streams["wrench"] = rows(streams["wrench"], keep)
+    run = run_of(streams)
+    assert sum(loss.count for loss in run.losses if loss.kind in ("gap", "short gap")) == 43
+
+
+def test_bursts_that_were_stamped_on_arrival_are_refused_by_name() -> None:
+    streams = recording()
+    k = np.arange(6000)
+    for one in streams.values():
+        one.stamp[:] = EPOCH + (k // 5 * 5 + 4) * 10_000_000 + k % 5 * 100_000
+    with pytest.raises(
+        RecordingError, match=r"bursts of about 5, 0.1 ms apart, every 49.6 ms: they are times of arrival"
+    ):
+        run_of(streams)
