@@ -260,6 +260,7 @@ class Container:
         end, table = self._walk(buffer, head.size, chunk=True)
         if end != head.size:
             self.lose("undecodable", f"chunk: its last {head.size - end} bytes are no records", **span)
+            table = table[:, :-1]  # whose end nothing confirms: what damaged the next may have begun in it
         others = np.flatnonzero(table[OPCODE] != mcap.MESSAGE_OP)
         if len(others) > MOST_ENTRIES:
             self.lose("undecodable", f"chunk: {len(others)} schemas and channels", **span)

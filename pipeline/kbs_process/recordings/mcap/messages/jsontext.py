@@ -54,7 +54,7 @@ class JsonMessage:
 def _plain(payload: bytes) -> object:
     try:
         return msgspec.json.decode(payload)
-    except (msgspec.DecodeError, RecursionError):
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
         return None
 
 
@@ -119,7 +119,7 @@ class JsonDecoder:
         for i, (first, last) in enumerate(zip(at.tolist(), ends.tolist(), strict=True)):
             try:
                 messages.append(decode(view[first:last]))
-            except (msgspec.DecodeError, RecursionError):
+            except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
                 good[i] = False
         missing: Mask = np.zeros(values.shape, dtype=np.bool_)
         present: Mask = np.zeros(c, dtype=np.bool_)
