@@ -115,9 +115,10 @@ class Arrival:
                 if inner and not missing and len(self.doubled) < LISTED:
                     self.doubled.append(int(begin))
             elif self.set_back is None:
-                by = begin + period - first if place[run[0]] > 0 and first < begin else last + period - after
-                number = self._passed - before + int(index[run[0]])
-                since = int(begin if first < begin else last) - (self._first if before else int(line[0]))
+                behind = place[run[0]] > 0 and first < begin  # or ahead of those that follow it
+                by = begin + period - first if behind else last + period - after
+                number = self._passed - before + int(index[run[0]] if behind else index[run[-1]] + 1)
+                since = int(begin if behind else last) - (self._first if before else int(stamp[0]))
                 self.set_back = (number, since, int(by))
         return gone
 
