@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from kbs_process.errors import RecordingError
-from kbs_process.signals.records import PUT_IN_ORDER, ROUNDED, SPIKE, Array, Block, Loss, Mask, Stamps
+from kbs_process.signals.records import DROPOUT, PUT_IN_ORDER, ROUNDED, SPIKE, Array, Block, Loss, Mask, Stamps
 from kbs_process.stages.align.arrival import REGULAR, Arrival
 from kbs_process.stages.align.clocks import ClockData, FloorStep, LatencyFloor
 from kbs_process.stages.align.envelope import MinMax
@@ -35,6 +35,7 @@ BURST = 5.0  # times the usual step: what lies between bursts
 UNEVEN = 64  # steps that are told apart from what jitters
 FAR_SLOW_NS = 3_600_000_000_000  # what is sent now and then may have one sample long before the others
 # What to do about a recording that is not one.
+STAMP_EACH = "stamp each sample where it is taken; where a file is imported, give rate_Hz and no time column"
 ONE_PART = "use one part of it: start_s and end_s of its [[recording]] in campaign.toml, or those of the import"
 
 
@@ -69,6 +70,7 @@ class Timeline:
     filled: bool = False  # whether gaps are filled with samples
     turning: Array = field(default_factory=lambda: np.zeros(0))  # (c,) 1 for angles, of a fast stream
     keep_spikes: bool = False
+    lively: bool = True  # no reading is held by a brake or a command
     regular: bool = True  # whether most steps are like their median
     spikes: Spikes | None = None
     _non_finite_in: dict[str, int] = field(default_factory=dict)  # by channel
@@ -99,6 +101,8 @@ class Timeline:
         last = self._orderer.flush() if self._orderer else None
         if last is not None:
             ready.append(self._timed(last))
+        if scattered := self._arrival.scattered:
+            raise RecordingError(scattered, where=self.file or self.where, remedy=STAMP_EACH)
         if self.grid is not None:
             self._find_gaps(self._near[:0], self.grid, held_back=0)
             self._check_gaps(self.grid, at_end=True)
@@ -185,7 +189,7 @@ class Timeline:
                 f"{1e-6 * float(np.median(steps[long])):.3g} ms: they are times of arrival and not of sampling, or "
                 "parts of a second in a wrong unit",
                 where=self.file or self.where,
-                remedy="stamp each sample where it is taken; where a file is imported, give rate_Hz and no time column",
+                remedy=STAMP_EACH,
             )
 
     def _check_gaps(self, grid: Grid, *, at_end: bool) -> None:
@@ -202,7 +206,7 @@ class Timeline:
     def clean(self, block: Block) -> tuple[Stamps, Array]:
         """Return stamps and values of a fast stream's samples that are numbers, their spikes interpolated."""
         if self.spikes is None and self.grid is not None:
-            self.spikes = Spikes(self.turning, self.grid.period_ns * 1e-9, self.keep_spikes)
+            self.spikes = Spikes(self.turning, self.grid.period_ns * 1e-9, self.keep_spikes, self.lively)
         stamp, values = self.finite(block)
         return self.spikes.push(stamp, values) if self.spikes is not None and len(stamp) else (stamp, values)
 
@@ -220,6 +224,13 @@ class Timeline:
                 "sources are in one stream",
                 where=self.file or self.where,
                 remedy="record each source under a topic of its own",
+            )
+        if self.spikes is not None and (noisy := self.spikes.noisy()) is not None:
+            raise RecordingError(
+                f"{self.channels[noisy[0]]} is off its neighbours in {noisy[1]} single samples of {self.samples}: "
+                "that is no signal",
+                where=self.file or self.where,
+                remedy="look for a bad contact, a second source, or a driver that fills in what it has lost",
             )
         lasting: list[Oddity] = self.spikes.lasting() if self.spikes else []
         if lasting:
@@ -310,6 +321,11 @@ class Timeline:
         if self.by_recorder:
             detail = "the sensor's stamps do not advance: the recorder's clock is used"
             found.append(Loss("clock", self.where, self.samples, detail=detail))
+        for channel, name in enumerate(self.channels):
+            if own := [one for one in (self.spikes.lost if self.spikes else []) if one.channel == channel]:
+                start, end = (offset + rate * self.own_one(one) for one in (own[0].first, own[-1].last))
+                what = f"stands still at {own[0].by:.6g}, off all others, {len(own)} times: left out"
+                found.append(Loss(DROPOUT, f"{self.where}, {name}", sum(one.count for one in own), start, end, what))
         for kind, oddities, detail in (
             (SPIKE, self.spikes.spikes if self.spikes else [], "interpolated"),
             ("blow", self.spikes.blows if self.spikes else [], "several channels at once: kept"),
@@ -400,6 +416,7 @@ class Uniform:
         keep_below: float = 0.0,
         file: str = "",
         keep_spikes: bool = False,
+        lively: bool = True,
     ) -> None:
         """`turning` channels are angles, which go on through full turns; `spectrum`: (resolution, limit), Hz; below a
         rate of `keep_below`, Hz, samples are kept as such.
@@ -411,6 +428,7 @@ class Uniform:
             file=file,
             filled=True,
             keep_spikes=keep_spikes,
+            lively=lively,
         )
         self.welch: Welch | None = None
         self.envelope = MinMax(len(channels), stretches) if stretches else None
