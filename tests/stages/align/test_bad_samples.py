@@ -10,6 +10,7 @@ import pytest
 from kbs_process.errors import RecordingError
 from kbs_process.signals.records import Block, Loss, Run
 from kbs_process.stages.align.condense import CondenseSettings, condense
+from kbs_process.stages.align.stream import Timeline
 from stages.recordings import EPOCH, rows, stream
 
 CHANNELS = {"wrench": ("Fz", "Ty"), "angle": ("arm",)}
@@ -359,3 +360,16 @@ def test_parts_of_a_second_without_their_leading_zeros_are_refused() -> None:
         one.log[:] = one.stamp
     with pytest.raises(RecordingError, match="without their leading zeros"):
         run_of(streams)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_many_gaps_among_jitter_are_one_line_and_none_of_them_is_of_no_sample(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    line = Timeline("test: camera", ("x",), bridged=0.0)
+    t = (np.arange(600) + rng.normal(0.0, 0.1, 600))[rng.random(600) > 0.03]
+    stamp = EPOCH + np.sort((t * 1e9).astype(np.int64))
+    line.push(Block(stamp, stamp, np.zeros((len(stamp), 1))))
+    line.flush()
+    (gaps,) = [loss for loss in line.losses(0.0, 1.0) if loss.kind == "gap"]
+    assert abs(gaps.count - (600 - len(stamp))) <= 3
+    assert gaps.detail.startswith(f"{line.gap_count} gaps, the longest ") and all(gap.missing for gap in line.gaps)

@@ -134,7 +134,7 @@ def counted(u: Array) -> Array:
         around[before, after, known] = apart - (before + after + 2)
     judged = np.isfinite(around).any(axis=(0, 1))
     # Other gaps nearby make it more, nothing makes it less.
-    most = np.nanmedian(around[:, :, judged].reshape(AROUND**2, -1), axis=0)
+    most = np.floor(np.nanmedian(around[:, :, judged].reshape(AROUND**2, -1), axis=0))
     count[k[judged]] = np.maximum(np.minimum(count[k[judged]], most), 1.0)
     return count
 

@@ -28,7 +28,8 @@ from kbs_process.stages.align.spectrum import Welch
 from kbs_process.stages.align.spikes import Oddity, Spikes
 
 TIMES = 10  # of single bad samples, one by one
-GAPS_LISTED = 20  # one by one; the others in one line
+GAPS_LISTED = 5  # one by one; more of them in one line
+GAPS_KEPT = 1000
 # Samples that may be made up for missing ones: so many, and so many for each that is there.
 MADE_UP, MADE_UP_EACH = 1 << 20, 10
 BURST = 5.0  # times the usual step: what lies between bursts
@@ -59,8 +60,8 @@ class Timeline:
     gaps: list[Gap] = field(default_factory=list)
     bridged: float = 0.0  # s, the longest gap that is drawn over, as nothing in the band is so fast
     missing_bridged: int = 0  # samples in such gaps
-    gaps_unlisted: int = 0
-    missing_unlisted: int = 0
+    gap_count: int = 0
+    missing_in_gaps: int = 0
     non_finite: int = 0  # samples that are NaN or infinite in some channel: all of each is left out
     samples: int = 0
     missing: int = 0
@@ -83,6 +84,7 @@ class Timeline:
     _last: int = 0
     _uneven: list[float] = field(default_factory=list)  # s, steps that are no whole number of periods
     _near: Stamps = field(default_factory=lambda: np.empty(0, dtype=np.int64))  # of steps that are not judged yet
+    _last_gap: Gap | None = None
     _judged: int = 0  # steps between these that are
 
     def push(self, chunk: Block) -> list[Block]:
@@ -171,11 +173,12 @@ class Timeline:
             self.longest = max(self.longest, end - start)
             if end - start <= self.bridged:
                 self.missing_bridged += missing
-            elif len(self.gaps) < GAPS_LISTED:
-                self.gaps.append(Gap(start, end, missing))
             else:
-                self.gaps_unlisted += 1
-                self.missing_unlisted += missing
+                self.gap_count += 1
+                self.missing_in_gaps += missing
+                self._last_gap = Gap(start, end, missing)
+                if len(self.gaps) < GAPS_KEPT:
+                    self.gaps.append(self._last_gap)
         kept = max(judged - AROUND, 0)
         self._near, self._judged = stamp[kept:].copy(), judged - kept
 
@@ -309,9 +312,10 @@ class Timeline:
             Loss("gap", self.where, gap.missing, offset + rate * gap.start, offset + rate * gap.end)
             for gap in self.gaps
         ]
-        if self.gaps_unlisted:
-            detail = f"{self.gaps_unlisted} more gaps"
-            found.append(Loss("gap", self.where, self.missing_unlisted, detail=detail))
+        if self.gap_count > GAPS_LISTED and self._last_gap is not None:
+            start, end = (offset + rate * one for one in (self.gaps[0].start, self._last_gap.end))
+            detail = f"{self.gap_count} gaps, the longest {self.longest:.4g} s"
+            found = [Loss("gap", self.where, self.missing_in_gaps, start, end, detail)]
         if self.missing_bridged:
             detail = f"up to {1e3 * self.bridged:.2g} ms each, which is nothing in the band: bridged"
             found.append(Loss("short gap", self.where, self.missing_bridged, detail=detail))
