@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from kbs_process.errors import RecordingError
-from kbs_process.signals.records import PUT_IN_ORDER, ROUNDED, SPIKE, Array, Block, Loss, Mask, Stamps
+from kbs_process.signals.records import DROPOUT, PUT_IN_ORDER, ROUNDED, SPIKE, Array, Block, Loss, Mask, Stamps
 from kbs_process.stages.align.arrival import REGULAR, Arrival
 from kbs_process.stages.align.clocks import ClockData, FloorStep, LatencyFloor
 from kbs_process.stages.align.envelope import MinMax
@@ -28,13 +28,15 @@ from kbs_process.stages.align.spectrum import Welch
 from kbs_process.stages.align.spikes import Oddity, Spikes
 
 TIMES = 10  # of single bad samples, one by one
-GAPS_LISTED = 20  # one by one; the others in one line
+GAPS_LISTED = 5  # one by one; more of them in one line
+GAPS_KEPT = 1000
 # Samples that may be made up for missing ones: so many, and so many for each that is there.
 MADE_UP, MADE_UP_EACH = 1 << 20, 10
 BURST = 5.0  # times the usual step: what lies between bursts
 UNEVEN = 64  # steps that are told apart from what jitters
 FAR_SLOW_NS = 3_600_000_000_000  # what is sent now and then may have one sample long before the others
 # What to do about a recording that is not one.
+STAMP_EACH = "stamp each sample where it is taken; where a file is imported, give rate_Hz and no time column"
 ONE_PART = "use one part of it: start_s and end_s of its [[recording]] in campaign.toml, or those of the import"
 
 
@@ -58,8 +60,8 @@ class Timeline:
     gaps: list[Gap] = field(default_factory=list)
     bridged: float = 0.0  # s, the longest gap that is drawn over, as nothing in the band is so fast
     missing_bridged: int = 0  # samples in such gaps
-    gaps_unlisted: int = 0
-    missing_unlisted: int = 0
+    gap_count: int = 0
+    missing_in_gaps: int = 0
     non_finite: int = 0  # samples that are NaN or infinite in some channel: all of each is left out
     samples: int = 0
     missing: int = 0
@@ -69,6 +71,7 @@ class Timeline:
     filled: bool = False  # whether gaps are filled with samples
     turning: Array = field(default_factory=lambda: np.zeros(0))  # (c,) 1 for angles, of a fast stream
     keep_spikes: bool = False
+    lively: bool = True  # no reading is held by a brake or a command
     regular: bool = True  # whether most steps are like their median
     spikes: Spikes | None = None
     _non_finite_in: dict[str, int] = field(default_factory=dict)  # by channel
@@ -81,6 +84,7 @@ class Timeline:
     _last: int = 0
     _uneven: list[float] = field(default_factory=list)  # s, steps that are no whole number of periods
     _near: Stamps = field(default_factory=lambda: np.empty(0, dtype=np.int64))  # of steps that are not judged yet
+    _last_gap: Gap | None = None
     _judged: int = 0  # steps between these that are
 
     def push(self, chunk: Block) -> list[Block]:
@@ -99,6 +103,8 @@ class Timeline:
         last = self._orderer.flush() if self._orderer else None
         if last is not None:
             ready.append(self._timed(last))
+        if scattered := self._arrival.scattered:
+            raise RecordingError(scattered, where=self.file or self.where, remedy=STAMP_EACH)
         if self.grid is not None:
             self._find_gaps(self._near[:0], self.grid, held_back=0)
             self._check_gaps(self.grid, at_end=True)
@@ -167,11 +173,12 @@ class Timeline:
             self.longest = max(self.longest, end - start)
             if end - start <= self.bridged:
                 self.missing_bridged += missing
-            elif len(self.gaps) < GAPS_LISTED:
-                self.gaps.append(Gap(start, end, missing))
             else:
-                self.gaps_unlisted += 1
-                self.missing_unlisted += missing
+                self.gap_count += 1
+                self.missing_in_gaps += missing
+                self._last_gap = Gap(start, end, missing)
+                if len(self.gaps) < GAPS_KEPT:
+                    self.gaps.append(self._last_gap)
         kept = max(judged - AROUND, 0)
         self._near, self._judged = stamp[kept:].copy(), judged - kept
 
@@ -185,7 +192,7 @@ class Timeline:
                 f"{1e-6 * float(np.median(steps[long])):.3g} ms: they are times of arrival and not of sampling, or "
                 "parts of a second in a wrong unit",
                 where=self.file or self.where,
-                remedy="stamp each sample where it is taken; where a file is imported, give rate_Hz and no time column",
+                remedy=STAMP_EACH,
             )
 
     def _check_gaps(self, grid: Grid, *, at_end: bool) -> None:
@@ -202,7 +209,7 @@ class Timeline:
     def clean(self, block: Block) -> tuple[Stamps, Array]:
         """Return stamps and values of a fast stream's samples that are numbers, their spikes interpolated."""
         if self.spikes is None and self.grid is not None:
-            self.spikes = Spikes(self.turning, self.grid.period_ns * 1e-9, self.keep_spikes)
+            self.spikes = Spikes(self.turning, self.grid.period_ns * 1e-9, self.keep_spikes, self.lively)
         stamp, values = self.finite(block)
         return self.spikes.push(stamp, values) if self.spikes is not None and len(stamp) else (stamp, values)
 
@@ -220,6 +227,13 @@ class Timeline:
                 "sources are in one stream",
                 where=self.file or self.where,
                 remedy="record each source under a topic of its own",
+            )
+        if self.spikes is not None and (noisy := self.spikes.noisy()) is not None:
+            raise RecordingError(
+                f"{self.channels[noisy[0]]} is off its neighbours in {noisy[1]} single samples of {self.samples}: "
+                "that is no signal",
+                where=self.file or self.where,
+                remedy="look for a bad contact, a second source, or a driver that fills in what it has lost",
             )
         lasting: list[Oddity] = self.spikes.lasting() if self.spikes else []
         if lasting:
@@ -298,9 +312,10 @@ class Timeline:
             Loss("gap", self.where, gap.missing, offset + rate * gap.start, offset + rate * gap.end)
             for gap in self.gaps
         ]
-        if self.gaps_unlisted:
-            detail = f"{self.gaps_unlisted} more gaps"
-            found.append(Loss("gap", self.where, self.missing_unlisted, detail=detail))
+        if self.gap_count > GAPS_LISTED and self._last_gap is not None:
+            start, end = (offset + rate * one for one in (self.gaps[0].start, self._last_gap.end))
+            detail = f"{self.gap_count} gaps, the longest {self.longest:.4g} s"
+            found = [Loss("gap", self.where, self.missing_in_gaps, start, end, detail)]
         if self.missing_bridged:
             detail = f"up to {1e3 * self.bridged:.2g} ms each, which is nothing in the band: bridged"
             found.append(Loss("short gap", self.where, self.missing_bridged, detail=detail))
@@ -310,6 +325,11 @@ class Timeline:
         if self.by_recorder:
             detail = "the sensor's stamps do not advance: the recorder's clock is used"
             found.append(Loss("clock", self.where, self.samples, detail=detail))
+        for channel, name in enumerate(self.channels):
+            if own := [one for one in (self.spikes.lost if self.spikes else []) if one.channel == channel]:
+                start, end = (offset + rate * self.own_one(one) for one in (own[0].first, own[-1].last))
+                what = f"stands still at {own[0].by:.6g}, off all others, {len(own)} times: left out"
+                found.append(Loss(DROPOUT, f"{self.where}, {name}", sum(one.count for one in own), start, end, what))
         for kind, oddities, detail in (
             (SPIKE, self.spikes.spikes if self.spikes else [], "interpolated"),
             ("blow", self.spikes.blows if self.spikes else [], "several channels at once: kept"),
@@ -400,6 +420,7 @@ class Uniform:
         keep_below: float = 0.0,
         file: str = "",
         keep_spikes: bool = False,
+        lively: bool = True,
     ) -> None:
         """`turning` channels are angles, which go on through full turns; `spectrum`: (resolution, limit), Hz; below a
         rate of `keep_below`, Hz, samples are kept as such.
@@ -411,6 +432,7 @@ class Uniform:
             file=file,
             filled=True,
             keep_spikes=keep_spikes,
+            lively=lively,
         )
         self.welch: Welch | None = None
         self.envelope = MinMax(len(channels), stretches) if stretches else None

@@ -14,7 +14,7 @@ from kbs_process.recordings.tables import Cells, Table, find_column
 from kbs_process.signals.records import Array, Block, Mask, Stamps
 from kbs_process.stages.align.arrival import Arrival
 from kbs_process.stages.align.condense import SLOW
-from kbs_process.stages.align.stream import FAR_SLOW_NS
+from kbs_process.stages.align.stream import FAR_SLOW_NS, STAMP_EACH
 from kbs_process.studies.convert.clock import nanoseconds, numbers
 from kbs_process.studies.convert.mapping import Channel, Mapping, StreamMap
 from kbs_process.studies.convert.mapping_file import Part, Time, Turn
@@ -90,6 +90,8 @@ def read_part(table: Table, mapping: Mapping, part: Part, findings: Findings) ->
     for what, count in table.odd.items():
         findings.counts[what] = count
     for key, arrival in arrivals.items():
+        if scattered := arrival.scattered:
+            raise RecordingError(f"time of '{key}': {scattered}", where=str(table.path), remedy=STAMP_EACH)
         findings.counts[f"time stamps of '{key}' do not fit where they stand, rows left out"] += arrival.odd
         findings.counts[f"time stamps of '{key}' lie far from all others, rows left out"] += arrival.lone
     for key in streams:
