@@ -5,6 +5,7 @@ What is wrong with a stream is judged by the steps that processing goes through 
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import islice
@@ -115,9 +116,9 @@ class _Gathered:
             if not self.refused:
                 for ready in self.line.flush() if block is None else self.line.push(block):
                     if self._read:
-                        self.line.clean(ready)
+                        deque(self.line.clean(ready), maxlen=0)
                 if block is None and self._read:
-                    self.line.end()
+                    deque(self.line.end(), maxlen=0)
         except RecordingError as error:
             self.refused = error.what
 

@@ -372,4 +372,25 @@ def test_many_gaps_among_jitter_are_one_line_and_none_of_them_is_of_no_sample(se
     line.flush()
     (gaps,) = [loss for loss in line.losses(0.0, 1.0) if loss.kind == "gap"]
     assert abs(gaps.count - (600 - len(stamp))) <= 3
-    assert gaps.detail.startswith(f"{line.gap_count} gaps, the longest ") and all(gap.missing for gap in line.gaps)
+    assert gaps.detail == f"{line.gap_count} gaps" and all(gap.missing for gap in line.gaps)
+
+
+def jitter(streams: dict[str, Block], late: np.ndarray) -> dict[str, Block]:
+    for one in streams.values():
+        one.stamp[:] = np.maximum.accumulate(one.stamp + np.rint(1e9 * late).astype(np.int64))
+        one.log[:] = one.stamp
+    return streams
+
+
+def test_stamps_that_jitter_make_no_bad_samples() -> None:
+    rng = np.random.default_rng(11)
+    for late in (rng.normal(0.0, 1e-3, 6000), rng.uniform(0.0, 1e-2, 6000)):
+        found = {loss.kind for loss in run_of(jitter(recording(), late)).losses}
+        assert found <= {"gap"}
+
+
+@pytest.mark.parametrize("mean", [4e-3, 1e-2])
+def test_times_of_arrival_are_refused_by_name(mean: float) -> None:
+    streams = jitter(recording(), np.random.default_rng(11).exponential(mean, 6000))
+    with pytest.raises(RecordingError, match=r"off a regular rate: they are times of arrival and not of sampling"):
+        run_of(streams)
