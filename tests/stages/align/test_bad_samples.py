@@ -394,3 +394,28 @@ def test_times_of_arrival_are_refused_by_name(mean: float) -> None:
     streams = jitter(recording(), np.random.default_rng(11).exponential(mean, 6000))
     with pytest.raises(RecordingError, match=r"off a regular rate: they are times of arrival and not of sampling"):
         run_of(streams)
+
+
+@pytest.mark.parametrize("noise", [0.02, 0.1, 0.3, 1.0])
+def test_readings_undecided_between_neighbouring_codes_are_sound(noise: float) -> None:
+    streams = recording()
+    values = streams["wrench"].values
+    rng = np.random.default_rng(3)
+    values[:] = 0.05 * np.rint((0.1 * values + 0.025 + rng.normal(0.0, 0.05 * noise, values.shape)) / 0.05)
+    angle = streams["angle"].values
+    angle[:] = 1e-3 * np.rint((angle + rng.normal(0.0, 1e-3 * noise, angle.shape)) / 1e-3)
+    assert run_of(streams).losses == ()
+
+
+@pytest.mark.parametrize("by_chance", [True, False])
+def test_two_sources_that_stamp_alike_are_refused(by_chance: bool) -> None:
+    streams = recording()
+    wrench = streams["wrench"]
+    order = np.argsort(np.repeat(np.arange(6000.0), 2) + 0.1 * np.random.default_rng(1).random(12_000) * by_chance)
+    both = [
+        np.stack([one, other], axis=1).reshape(12_000, -1)[order]
+        for one, other in ((wrench.stamp, wrench.stamp), (wrench.log, wrench.log), (wrench.values, 0.0 * wrench.values))
+    ]
+    streams["wrench"] = Block(both[0][:, 0], both[1][:, 0], both[2].reshape(12_000, 2))
+    with pytest.raises(RecordingError, match="two sources are in one stream"):
+        run_of(streams)

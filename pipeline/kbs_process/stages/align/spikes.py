@@ -48,12 +48,14 @@ def by_turns(x: Array) -> bool:
     by chance.
 
     A tone next to half the sampling rate does that as well, but its phase drifts: what was up comes to be down.
+    Nor are these readings that are undecided between neighbouring codes.
     """
     if len(x) < 2 * TURNS:
         return False
     d = np.diff(x)
+    floor = CODES * float(np.abs(d)[d != 0.0].min(initial=np.inf))
     usual, large = np.quantile(np.abs(x[2:] - x[:-2]), 0.25), np.quantile(np.abs(d), 0.95)
-    jump = np.flatnonzero(np.abs(d) > max(APART * usual, 0.2 * large, 1e-300))
+    jump = np.flatnonzero(np.abs(d) > max(APART * usual, 0.2 * large, floor, 1e-300))
     if len(jump) < max(TURNS, TURNS_SHARE * len(x)):
         return False
     pieces = np.array_split(jump, len(jump) // TURNS)  # what the two differ by may change its sign

@@ -38,6 +38,7 @@ SCATTERED, PHANTOMS = 0.3, 0.005  # shares of uneven steps and of gaps, beyond w
 UNEVEN = 64  # steps that are told apart from what jitters
 FAR_SLOW_NS = 3_600_000_000_000  # what is sent now and then may have one sample long before the others
 # What to do about a recording that is not one.
+TWO_SOURCES = "record each source under a topic of its own"
 STAMP_EACH = "stamp each sample where it is taken; where a file is imported, give rate_Hz and no time column"
 ONE_PART = "use one part of it: start_s and end_s of its [[recording]] in campaign.toml, or those of the import"
 
@@ -136,6 +137,12 @@ class Timeline:
     def _order(self, block: Block) -> list[Block]:
         assert self._orderer is not None
         released = self._orderer.push(block)
+        if self._orderer.mixed and self.filled:
+            raise RecordingError(
+                "readings that differ have one stamp, by turns: two sources are in one stream",
+                where=self.file or self.where,
+                remedy=TWO_SOURCES,
+            )
         return [] if released is None else [self._timed(released)]
 
     def _timed(self, block: Block) -> Block:
@@ -239,7 +246,7 @@ class Timeline:
                 f"{self.channels[mixed.channel]} changes to and fro by {mixed.by:.4g} from sample to sample: two "
                 "sources are in one stream",
                 where=self.file or self.where,
-                remedy="record each source under a topic of its own",
+                remedy=TWO_SOURCES,
             )
         if self.spikes is not None and (noisy := self.spikes.noisy()) is not None:
             raise RecordingError(
