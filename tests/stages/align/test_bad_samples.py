@@ -419,3 +419,19 @@ def test_two_sources_that_stamp_alike_are_refused(by_chance: bool) -> None:
     streams["wrench"] = Block(both[0][:, 0], both[1][:, 0], both[2].reshape(12_000, 2))
     with pytest.raises(RecordingError, match="two sources are in one stream"):
         run_of(streams)
+
+
+def test_a_temperature_s_bad_sample_is_interpolated_and_its_steps_stay() -> None:
+    streams = recording()
+    t = np.arange(600) * 0.1
+    stamp = EPOCH + np.rint(1e9 * t).astype(np.int64)
+    true = 0.0625 * np.rint((20.0 + 0.02 * t + 3.0 * (t > 40.0)) / 0.0625)
+    values = true.copy()
+    values[200] = 85.0  # what a sensor says that has not measured yet
+    channels = {**CHANNELS, "temperature": ("bearing",)}
+    streams["temperature"] = Block(stamp, stamp + 1000, values[:, None])
+    run = condense("test", streams.items(), channels, CondenseSettings())
+    (spike,) = told(run, "spike")
+    assert spike.where == "test: temperature, bearing" and spike.start_s == pytest.approx(20.0, abs=1e-3)
+    assert run.temperature is not None
+    np.testing.assert_allclose(run.temperature.values[::2, 0], true[: len(run.temperature.values[::2])], atol=0.1)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -230,7 +230,9 @@ class Timeline:
         if self.spikes is None and self.grid is not None:
             self.spikes = Spikes(self.turning, self.grid.period_ns * 1e-9, self.keep_spikes, self.lively)
         stamp, values = self.finite(block)
-        if self.spikes is not None and len(stamp):
+        if self.spikes is None:
+            yield stamp, values
+        elif len(stamp):
             yield from self.spikes.push(stamp, values)
 
     def end(self) -> Iterator[tuple[Stamps, Array]]:
@@ -404,10 +406,16 @@ class Timeline:
 
 
 class Collected:
-    """A slow stream, kept sample by sample."""
+    """A slow stream, kept sample by sample; a `smooth` one without its spikes, as what is commanded may jump."""
 
-    def __init__(self, where: str, channels: tuple[str, ...], file: str = "") -> None:
-        self.line = Timeline(where, channels, file=file, _arrival=Arrival(FAR_SLOW_NS))
+    def __init__(
+        self, where: str, channels: tuple[str, ...], file: str = "", *, smooth: bool = False, keep_spikes: bool = False
+    ) -> None:
+        self.line = Timeline(
+            where, channels, file=file, keep_spikes=keep_spikes, lively=False, _arrival=Arrival(FAR_SLOW_NS)
+        )
+        self.line.turning = np.zeros(len(channels))
+        self._smooth = smooth
         self._own: list[Array] = []
         self._values: list[Array] = []
 
@@ -417,13 +425,18 @@ class Collected:
     def finish(self) -> tuple[Array, Array]:
         """Return times (n,), s from the stream's first sample, and values (n, c)."""
         self._take(self.line.flush())
+        if self.line.spikes is not None:
+            self._keep(self.line.spikes.flush())
         if not self._own:
             return np.empty(0), np.empty((0, len(self.line.channels)))
         return np.concatenate(self._own), np.concatenate(self._values)
 
     def _take(self, blocks: list[Block]) -> None:
         for block in blocks:
-            stamp, values = self.line.finite(block)
+            self._keep(self.line.clean(block) if self._smooth else [self.line.finite(block)])
+
+    def _keep(self, pieces: Iterable[tuple[Stamps, Array]]) -> None:
+        for stamp, values in pieces:
             self._own.append(self.line.own(stamp))
             self._values.append(values)
 
