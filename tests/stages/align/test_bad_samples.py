@@ -435,3 +435,16 @@ def test_a_temperature_s_bad_sample_is_interpolated_and_its_steps_stay() -> None
     assert spike.where == "test: temperature, bearing" and spike.start_s == pytest.approx(20.0, abs=1e-3)
     assert run.temperature is not None
     np.testing.assert_allclose(run.temperature.values[::2, 0], true[: len(run.temperature.values[::2])], atol=0.1)
+
+
+@pytest.mark.parametrize("lasts", [1.0, 3.0, 10.0, 30.0])  # samples
+@pytest.mark.parametrize("frequency", [0.0, 0.1, 1.0 / 3.0, 0.47])  # of the sampling rate
+def test_a_blow_that_dies_away_stays(lasts: float, frequency: float) -> None:
+    streams = recording()
+    k = np.arange(300)
+    blow = 20.0 * np.exp(-k / lasts) * np.cos(2.0 * np.pi * frequency * k)
+    streams["wrench"].values[3000:3300] += blow[:, None] * np.array([1.0, 0.5])
+    run = run_of(streams)
+    cut = sum(loss.count for loss in run.losses if loss.kind in ("spike", "dropout"))
+    assert cut == 0 or lasts < 2.0
+    assert {loss.kind for loss in run.losses} <= {"spike", "blow"}

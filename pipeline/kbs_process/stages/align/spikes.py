@@ -157,7 +157,7 @@ class Spikes:
                 self._note_lost(channel, stamp, column, dead, done, end)
                 still[channel] = column[end - 1] if dead[end - 1] else np.nan
                 gone |= dead
-            *places, largest, fastest = _find(column, steps, slack, turn, done, end, floor, dead)
+            *places, largest, fastest = _find(column, steps, slack, turn, done, end, floor, self._held, dead)
             self._largest[channel] = max(self._largest[channel], largest)
             self._fastest[channel] = max(self._fastest[channel], fastest)
             self._note_gaps(channel, stamp, column, turn, 1 + np.flatnonzero(gap[1:]), (done, end))
@@ -338,7 +338,7 @@ def find_dead(
 
 @numba.njit(cache=True, error_model="numpy")
 def _find(
-    x: Array, steps: Array, slack: Array, period: float, begin: int, end: int, floor: float, dead: Mask
+    x: Array, steps: Array, slack: Array, period: float, begin: int, end: int, floor: float, held: int, dead: Mask
 ) -> tuple[Stamps, Stamps, Array, float, float]:
     """Find spikes and steps that start in [begin, end), and interpolate spikes in x.
 
@@ -415,14 +415,14 @@ def _find(
                 odd[a - 1 : b + 2] = True
                 i = b + 2
                 continue
-        if i >= 2 + NEAR // 2 and i + 3 + NEAR // 2 < n and i >= begin and steps[i + 1] < GAP:
+        if i >= NEAR and i + 3 + NEAR // 2 < n and i >= begin and steps[i + 1] < GAP:
             # A step from i to i + 1: dd is large at both, and nowhere near.
             near = max(_most(dd, i - NEAR // 2, i), _most(dd, i + 2, i + 2 + NEAR // 2))
             by = d[i + 1] - 0.5 * (d[i] + d[i + 2])
             still = x[i] == x[i - 1] and x[i - 1] == x[i - 2]
             still_after = x[i + 1] == x[i + 2] and x[i + 2] == x[i + 3]
             if abs(by) > max(2.0 * SCALES * s, 2.0 * LARGEST * near, floor) and not (
-                period == 0.0 and s > 0.0 and (still or still_after)  # is held
+                period == 0.0 and ((s > 0.0 and (still or still_after)) or not _stays(x, i, by, held))
             ):
                 odd[i] = odd[i + 1] = True
                 starts.append(i + 1)
@@ -436,6 +436,16 @@ def _find(
             if not odd[k - 1] and not dead[k - 1] and steps[k] < GAP:
                 fastest = max(fastest, abs(d[k]))
     return np.array(starts, dtype=np.int64), np.array(stops, dtype=np.int64), np.array(off), largest, fastest
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _stays(x: Array, i: int, by: float, held: int) -> bool:
+    """Whether a load is still off by so much a while after sample i, going on as before: a blow dies away."""
+    few = NEAR // 2
+    at = min(i + held, len(x) - few)
+    before, earlier = np.mean(x[i + 1 - few : i + 1]), np.mean(x[i + 1 - 2 * few : i + 1 - few])
+    going = before + (before - earlier) / few * (at - i + few - 1)
+    return bool(abs(np.mean(x[at : at + few]) - going - by) < 0.5 * abs(by))
 
 
 @numba.njit(cache=True, error_model="numpy")
