@@ -152,7 +152,9 @@ def inspect_recording(path: Path) -> Inspection:
         samples = source.samples()
         plans = {topic.topic: _plan(samples.get(topic.topic)) for topic in topics}
         gathered = {topic: _Gathered(topic, plan) for topic, plan in plans.items()}
-        for topic, block in source.read([Stream(topic, topic, plan.fields) for topic, plan in plans.items()]):
+        for topic, block in source.read(
+            [Stream(topic, topic, plan.fields, lenient=True) for topic, plan in plans.items()]
+        ):
             gathered[topic].add(block)
     except RecordingError as error:
         return Inspection(path, "unreadable", (), (), str(error))

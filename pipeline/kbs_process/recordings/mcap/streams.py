@@ -16,6 +16,7 @@ from kbs_process.recordings.mcap.messages.decoders import Decoder, MessageType, 
 from kbs_process.recordings.mcap.messages.fields import Step, resolve
 from kbs_process.signals.records import Block, Loss, Stamps
 
+CHOOSE = "several publishers bring the topic: choose one by its `channel` in campaign.toml"
 RETURNS = 2  # to a channel that was left for another of the same topic: there are two publishers
 SAMPLES = 64  # messages from which the numbers of a type without schema are learnt
 
@@ -29,6 +30,7 @@ class Stream:
     fields: tuple[str, ...]
     otherwise: str = ""  # what to do where no message has one of the elements that fields name
     channel: int | None = None  # number of the one channel of the topic that is wanted; None: all
+    lenient: bool = False  # a message without an element that fields name is a loss, and never an error
 
 
 @dataclass(slots=True, eq=False)
@@ -152,9 +154,11 @@ class Reading:
         plan = self._plans[number]
         decoded = plan.decode(segment.buffer, at, size, log)
         good = decoded.good
-        if fresh and good.any():
+        if fresh and good.any() and not self.stream.lenient:
             payload = next(payloads(segment.buffer, at[good], size[good]))
-            _require_names(plan, decoded.present.tolist(), payload, self._where, self.stream.otherwise)
+            several = sum(one.topic == self.stream.topic for one in segment.dictionary.channels.values()) > 1
+            otherwise = CHOOSE if several else self.stream.otherwise
+            _require_names(plan, decoded.present.tolist(), payload, self._where, otherwise)
         if decoded.flawless:
             return places, Block(decoded.stamp, log, decoded.values)
         self._tally.add("missing field", log[decoded.lacking])

@@ -53,9 +53,10 @@ def by_turns(x: Array) -> bool:
     if len(x) < 2 * TURNS:
         return False
     d = np.diff(x)
-    floor = CODES * float(np.abs(d)[d != 0.0].min(initial=np.inf))
-    usual, large = np.quantile(np.abs(x[2:] - x[:-2]), 0.25), np.quantile(np.abs(d), 0.95)
-    jump = np.flatnonzero(np.abs(d) > max(APART * usual, 0.2 * large, floor, 1e-300))
+    size, second = np.abs(d), np.abs(x[2:] - x[:-2])
+    floor = CODES * min(float(one[one > 0.0].min(initial=np.inf)) for one in (size, second))
+    usual, large = np.quantile(second, 0.25), np.quantile(size, 0.95)
+    jump = np.flatnonzero(size > max(APART * usual, 0.2 * large, floor, 1e-300))
     if len(jump) < max(TURNS, TURNS_SHARE * len(x)):
         return False
     pieces = np.array_split(jump, len(jump) // TURNS)  # what the two differ by may change its sign
