@@ -201,7 +201,7 @@ def _stream(
 ) -> Uniform | Collected:
     where = f"{name}: {key}"
     if key in SLOW:
-        return Collected(where, columns, _place(file, key))
+        return Collected(where, columns, _place(file, key), smooth=key == "temperature", keep_spikes=keep)
     if key not in SAMPLED:
         raise KeyError(f"no stream is called {key!r}")
     if is_load:

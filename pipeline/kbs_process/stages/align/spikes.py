@@ -10,12 +10,14 @@ difference between neighbours that is so much off those around it, and lasts.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 import numba
 import numpy as np
 
 from kbs_process.signals.records import Array, Mask, Stamps
+from kbs_process.stages.align.grid import counted
 
 AROUND = 64  # samples on either side that give the scale; the nearest 16 give M
 NEAR = 16
@@ -46,12 +48,15 @@ def by_turns(x: Array) -> bool:
     by chance.
 
     A tone next to half the sampling rate does that as well, but its phase drifts: what was up comes to be down.
+    Nor are these readings that are undecided between neighbouring codes.
     """
     if len(x) < 2 * TURNS:
         return False
     d = np.diff(x)
-    usual, large = np.quantile(np.abs(x[2:] - x[:-2]), 0.25), np.quantile(np.abs(d), 0.95)
-    jump = np.flatnonzero(np.abs(d) > max(APART * usual, 0.2 * large, 1e-300))
+    size, second = np.abs(d), np.abs(x[2:] - x[:-2])
+    floor = CODES * min(float(one[one > 0.0].min(initial=np.inf)) for one in (size, second))
+    usual, large = np.quantile(second, 0.25), np.quantile(size, 0.95)
+    jump = np.flatnonzero(size > max(APART * usual, 0.2 * large, floor, 1e-300))
     if len(jump) < max(TURNS, TURNS_SHARE * len(x)):
         return False
     pieces = np.array_split(jump, len(jump) // TURNS)  # what the two differ by may change its sign
@@ -104,19 +109,23 @@ class Spikes:
     _stamp: Stamps | None = None
     _x: Array | None = None
     _done: int = 0  # rows of them that were passed on
+    _ends: list[int] = field(default_factory=list)  # lengths of the blocks of the others
 
-    def push(self, stamp: Stamps, values: Array) -> tuple[Stamps, Array]:
-        """Take samples (n,), (n, c); return those that what follows cannot change."""
+    def push(self, stamp: Stamps, values: Array) -> Iterator[tuple[Stamps, Array]]:
+        """Take samples (n,), (n, c); yield those that what follows cannot change, in the blocks in which they came."""
+        self._ends.append(len(stamp))
         if self._stamp is None or self._x is None:
             self._stamp, self._x = stamp, values.copy()
         else:
             self._stamp = np.concatenate([self._stamp, stamp])
             self._x = np.concatenate([self._x, values])
-        return self._pass(max(len(self._stamp) - self._held - NEAR, self._done), last=False)
+        while self._done + self._ends[0] <= len(self._stamp) - self._held - NEAR:
+            yield self._pass(self._done + self._ends.pop(0), last=False)
 
-    def flush(self) -> tuple[Stamps, Array] | None:
-        """Return what was held back."""
-        return None if self._stamp is None else self._pass(len(self._stamp), last=True)
+    def flush(self) -> Iterator[tuple[Stamps, Array]]:
+        """Yield what was held back."""
+        while self._ends:
+            yield self._pass(self._done + self._ends.pop(0), last=True)
 
     @property
     def _held(self) -> int:
@@ -130,7 +139,9 @@ class Spikes:
             self._code, self._bad = np.full(channels, np.inf), np.zeros(channels, dtype=np.int64)
             self._largest, self._fastest = np.zeros(channels), np.zeros(channels)
         still = np.full(channels, np.nan) if self._last is None else self._last
-        steps = np.concatenate([[0.0], np.maximum(np.rint(np.diff(stamp) / (1e9 * self.period)), 1.0)])
+        u = (stamp - stamp[0]) / (1e9 * self.period)
+        steps = np.concatenate([[0.0], counted(u)])
+        slack = np.abs(np.diff(u, prepend=0.0) - steps)
         gap = steps > GAP
         found: list[tuple[int, int, int, float]] = []
         before, gone = x, np.zeros(len(x), dtype=np.bool_)
@@ -147,7 +158,7 @@ class Spikes:
                 self._note_lost(channel, stamp, column, dead, done, end)
                 still[channel] = column[end - 1] if dead[end - 1] else np.nan
                 gone |= dead
-            *places, largest, fastest = _find(column, steps, turn, done, end, floor, dead)
+            *places, largest, fastest = _find(column, steps, slack, turn, done, end, floor, self._held, dead)
             self._largest[channel] = max(self._largest[channel], largest)
             self._fastest[channel] = max(self._fastest[channel], fastest)
             self._note_gaps(channel, stamp, column, turn, 1 + np.flatnonzero(gap[1:]), (done, end))
@@ -328,12 +339,13 @@ def find_dead(
 
 @numba.njit(cache=True, error_model="numpy")
 def _find(
-    x: Array, steps: Array, period: float, begin: int, end: int, floor: float, dead: Mask
+    x: Array, steps: Array, slack: Array, period: float, begin: int, end: int, floor: float, held: int, dead: Mask
 ) -> tuple[Stamps, Stamps, Array, float, float]:
     """Find spikes and steps that start in [begin, end), and interpolate spikes in x.
 
     Returns where each starts and stops (a step: less than zero), by how much it is off, and the largest second and
-    first difference beside them. `steps` are periods between samples, `dead` says which are none.
+    first difference beside them. `steps` are periods between samples and `slack` by how much their stamps
+    are off these; `dead` says which are no readings.
     """
     n = len(x)
     d, dd = _differences(x, steps, period)
@@ -346,7 +358,8 @@ def _find(
     for i in range(1, n - 1):
         if dd[i] > max(SCALES * scale, floor) / 2.0:
             s = _scale(dd, i - AROUND, i + AROUND)
-            suspect[i] = dd[i] > max(SCALES * s, floor) / 2.0
+            timing = (slack[i] + slack[i + 1]) * max(abs(d[i]), abs(d[i + 1]))
+            suspect[i] = dd[i] > max(SCALES * s, floor) / 2.0 + timing
     odd = np.zeros(n, dtype=np.bool_)
     dev, at = np.zeros(n), np.cumsum(steps)
     i = max(begin - 1, 1)
@@ -372,6 +385,8 @@ def _find(
         if 1 <= m <= CLUSTER and a >= begin and a >= 2 and b + 2 < n:
             l1, r0 = -d[a - 1] * steps[a - 1], _turned(x[b + 1] - x[a - 1], period)
             r1 = r0 + d[b + 2] * steps[b + 2]
+            for k in range(a - 1, b + 3):
+                limit = max(limit, 3.0 * slack[k] * max(abs(d[a - 1]), abs(d[b + 2])))
             places = (-steps[a - 1], at[b + 1] - at[a - 1], at[b + 2] - at[a - 1])
             least = np.inf
             for k in range(a, b + 1):
@@ -401,14 +416,14 @@ def _find(
                 odd[a - 1 : b + 2] = True
                 i = b + 2
                 continue
-        if i >= 2 + NEAR // 2 and i + 3 + NEAR // 2 < n and i >= begin and steps[i + 1] < GAP:
+        if i >= NEAR and i + 3 + NEAR // 2 < n and i >= begin and steps[i + 1] < GAP:
             # A step from i to i + 1: dd is large at both, and nowhere near.
             near = max(_most(dd, i - NEAR // 2, i), _most(dd, i + 2, i + 2 + NEAR // 2))
             by = d[i + 1] - 0.5 * (d[i] + d[i + 2])
             still = x[i] == x[i - 1] and x[i - 1] == x[i - 2]
             still_after = x[i + 1] == x[i + 2] and x[i + 2] == x[i + 3]
             if abs(by) > max(2.0 * SCALES * s, 2.0 * LARGEST * near, floor) and not (
-                period == 0.0 and s > 0.0 and (still or still_after)  # is held
+                period == 0.0 and ((s > 0.0 and (still or still_after)) or not _stays(x, i, by, held))
             ):
                 odd[i] = odd[i + 1] = True
                 starts.append(i + 1)
@@ -422,6 +437,16 @@ def _find(
             if not odd[k - 1] and not dead[k - 1] and steps[k] < GAP:
                 fastest = max(fastest, abs(d[k]))
     return np.array(starts, dtype=np.int64), np.array(stops, dtype=np.int64), np.array(off), largest, fastest
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _stays(x: Array, i: int, by: float, held: int) -> bool:
+    """Whether a load is still off by so much a while after sample i, going on as before: a blow dies away."""
+    few = NEAR // 2
+    at = min(i + held, len(x) - few)
+    before, earlier = np.mean(x[i + 1 - few : i + 1]), np.mean(x[i + 1 - 2 * few : i + 1 - few])
+    going = before + (before - earlier) / few * (at - i + few - 1)
+    return bool(abs(np.mean(x[at : at + few]) - going - by) < 0.5 * abs(by))
 
 
 @numba.njit(cache=True, error_model="numpy")
