@@ -129,11 +129,11 @@ def test_samples_that_are_no_numbers(damaged: Damaged) -> None:
 
 
 def test_a_clock_that_jumps_back(damaged: Damaged) -> None:
-    """What is stamped twice is taken once, and what is left out by that is a gap, with its time."""
+    """What is stamped with a time that was before is left out, and is a gap, with its time."""
     count = damaged.set_back
     assert count > 25
     what = damaged.warning("EL089P00_3")
-    assert f"put in order: {count}" in what
+    assert f"odd stamp: {count}, at {BACK[0]:.1f} s" in what
     assert f"gap: {count}, between {BACK[0]:.1f} s and {BACK[1]:.1f} s" in what
 
 

@@ -53,6 +53,7 @@ PACKED = np.array([5, -32768, 7, -99, 2000, -3], dtype="<i2")
         ({"valid_min": np.int16(0)}, [5, NAN, 7, NAN, 2000, NAN]),
         ({"valid_max": np.int16(6), "scale_factor": 2.0}, [10, -65536, NAN, -198, NAN, -6]),
         ({"_Unsigned": "true"}, [5, 32768, 7, 65437, 2000, 65533]),
+        ({"_Unsigned": "true", "_FillValue": np.int16(-99)}, [5, 32768, 7, NAN, 2000, 65533]),
     ],
 )
 @pytest.mark.parametrize("order", ["<", ">"])
@@ -66,6 +67,23 @@ def test_hdf5_packed_and_missing(tmp_path: Path, attributes: dict[str, Any], rig
     table = read(tmp_path / "a.h5", "hdf5")
     np.testing.assert_array_equal(column(table, "x"), right)
     np.testing.assert_array_equal(column(table, "m[2]"), right)
+
+
+def test_hdf5_numbers_never_written_and_odd_attributes(tmp_path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        for name, fill in (("said", -9999.0), ("zero", 0.0), ("half", 1e20)):
+            file.create_dataset(name, (6,), "f4" if name == "half" else "f8", fillvalue=fill)[:3] = [1, 2, 3]
+        file["half"].attrs["_FillValue"] = 1e20  # not as the cells have it
+        for name, value in (("each", [1.0, 2.0]), ("range", [1.0])):
+            file[name] = np.column_stack([PACKED, PACKED])
+            file[name].attrs["scale_factor" if name == "each" else "valid_range"] = value
+    table = read(tmp_path / "a.h5", "hdf5")
+    np.testing.assert_array_equal(column(table, "said"), [1, 2, 3, NAN, NAN, NAN])
+    np.testing.assert_array_equal(column(table, "half"), [1, 2, 3, NAN, NAN, NAN])
+    np.testing.assert_array_equal(column(table, "zero"), [1, 2, 3, 0, 0, 0])
+    assert "scale_factor has 2 values, not 1" in told(table, "each")
+    assert "valid_range has 1 values, not 2" in told(table, "range")
 
 
 def test_hdf5_records_of_several_numbers_and_words(tmp_path: Path) -> None:

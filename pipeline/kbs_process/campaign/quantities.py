@@ -15,9 +15,9 @@ from kbs_process.errors import ConfigError
 from kbs_process.rig.model import Quantity
 from kbs_process.signals.records import WRENCH_CHANNELS, WRENCH_UNITS, Array
 
-_NEAREST = 1e-6  # of the distance from its bound: what a number is that must not reach it
 # Of what is measured or made, in SI. Beyond them, squares and ratios of numbers are none that can be computed with.
 MOST, LEAST = 1e12, 1e-15
+_NEAREST = 1e-6  # of the distance from its bound: what a number is that must not reach it
 
 
 def read_quantity(name: str, table: QuantityTable | PlainQuantity, kind: Kind, folder: Path) -> Quantity:

@@ -5,6 +5,7 @@ What is wrong with a stream is judged by the steps that processing goes through 
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import islice
@@ -116,9 +117,9 @@ class _Gathered:
             if not self.refused:
                 for ready in self.line.flush() if block is None else self.line.push(block):
                     if self._read:
-                        self.line.clean(ready)
+                        deque(self.line.clean(ready), maxlen=0)
                 if block is None and self._read:
-                    self.line.end()
+                    deque(self.line.end(), maxlen=0)
         except RecordingError as error:
             self.refused = error.what
 
@@ -152,7 +153,9 @@ def inspect_recording(path: Path) -> Inspection:
         samples = source.samples()
         plans = {topic.topic: _plan(samples.get(topic.topic)) for topic in topics}
         gathered = {topic: _Gathered(topic, plan) for topic, plan in plans.items()}
-        for topic, block in source.read([Stream(topic, topic, plan.fields) for topic, plan in plans.items()]):
+        for topic, block in source.read(
+            [Stream(topic, topic, plan.fields, lenient=True) for topic, plan in plans.items()]
+        ):
             gathered[topic].add(block)
     except RecordingError as error:
         return Inspection(path, "unreadable", (), (), str(error))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from kbs_process.campaign.config import Campaign, RecordingEntry
 from kbs_process.errors import RecordingError
@@ -11,13 +11,14 @@ from kbs_process.progress import Progress
 from kbs_process.reduction.held import read_alive
 from kbs_process.reduction.relief import forces_in, relieved, without_effects
 from kbs_process.reduction.settings import gravity_settings, motion_settings
-from kbs_process.signals.records import Run, Signal
+from kbs_process.signals.records import COPY, Loss, Run, Signal
 from kbs_process.stages import decouple, motion
 from kbs_process.stages.decouple import Decoupling
 from kbs_process.stages.gravity import model as gravity
 from kbs_process.stages.gravity.model import GravityModel, Sample
 from kbs_process.stages.gravity.taring import Taring
 from kbs_process.stages.motion import Motion
+from kbs_process.stages.repeats import copies
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,6 +45,16 @@ def prepare(
             decouple.apply(run, decoupling),
             motion.estimate(run, campaign.rig, motion_settings(campaign)),
         )
+
+
+def told_copies(prepared: Sequence[Prepared]) -> list[Prepared]:
+    """Return recordings, with a loss in those that have the same readings as another before them: none repeats it."""
+    found = list(prepared)
+    for place, first in copies([one.run for one in prepared]).items():
+        one = prepared[place]
+        loss = Loss(COPY, one.entry.name, 0, detail=f"the same readings as {prepared[first].entry.name}: no repeat")
+        found[place] = replace(one, run=replace(one.run, losses=(*one.run.losses, loss)))
+    return found
 
 
 def fit_gravity(campaign: Campaign, prepared: Sequence[Prepared], progress: Progress) -> GravityModel:

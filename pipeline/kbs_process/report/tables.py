@@ -44,7 +44,7 @@ class Table:
 
 @dataclass(frozen=True, slots=True)
 class Tables:
-    """`tables/` of a results folder; a table that is not there is None."""
+    """`tables/` of a results folder; a table that is not there, or has no rows, is None."""
 
     folder: Path
 
@@ -68,6 +68,8 @@ class Tables:
         if not directory.is_dir() or name not in {entry.name for entry in directory.iterdir()}:
             return None
         content, about = read_columns(directory / name)
+        if not content.num_rows:
+            return None
         columns = {
             name: np.asarray(column.to_numpy(), dtype=np.float64)
             for name, column in zip(content.column_names, content.columns, strict=True)

@@ -129,11 +129,19 @@ def read_table(path: Path | str) -> DataFrame:
     return frame
 
 
+def _is_number(kind: pa.DataType) -> bool:
+    return bool(pa.types.is_floating(kind) or pa.types.is_integer(kind) or pa.types.is_boolean(kind))
+
+
 def read_columns(path: Path) -> tuple[pa.Table, dict[str, Any]]:
     """Read one table as it is stored, and what its metadata say of it."""
     try:
         content = pq.read_table(path)
-        return content, json.loads((content.schema.metadata or {}).get(b"kbs", b"{}"))
+        about = json.loads((content.schema.metadata or {}).get(b"kbs", b"{}"))
+        kinds = content.schema.types
+        if not kinds or not all(map(_is_number, kinds)) or not isinstance(about, dict):
+            raise ValueError("its columns are no numbers")
+        return content, about
     except (OSError, ValueError, pa.ArrowException) as error:
         raise OutputError(
             f"not a readable table: {error}", where=str(path), remedy="process the campaign again: kbs-process CAMPAIGN"

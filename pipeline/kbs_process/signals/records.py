@@ -105,6 +105,8 @@ class Events:
 
 PUT_IN_ORDER = "put in order"  # messages that came after younger ones: told, although nothing is lost by that
 ROUNDED = "rounded stamps"  # behind which a regular rate was found: likewise
+COPY = "copy"  # of another recording, whose readings it has
+DROPOUT = "dropout"  # a channel that stood still off all its other readings: left out, likewise
 SPIKE = "spike"  # single samples off their neighbours: interpolated, and the figures with them are told as well
 TRUNCATED = "truncated"  # the loss of a file that breaks off: all that would have followed
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Sequence
+
 import numpy as np
 from scipy.signal import fftconvolve
 
@@ -35,6 +38,16 @@ def commanded(run: Run) -> Signal | None:
         frame="joint",
         valid=grid.valid,
     )
+
+
+def copies(runs: Sequence[Run]) -> dict[int, int]:
+    """Return which of the runs have the same readings as one before them, and as which."""
+    found: dict[int, int] = {}
+    for (first, one), (second, other) in itertools.combinations(enumerate(runs), 2):
+        a, b = one.loads, other.loads
+        if a is not None and b is not None and np.array_equal(a.values, b.values):
+            found.setdefault(second, first)
+    return found
 
 
 def lag(reference: Signal, other: Signal) -> float | None:

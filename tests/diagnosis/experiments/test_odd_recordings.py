@@ -27,10 +27,13 @@ from kbs_process.progress import SilentProgress
 from kbs_process.recordings.mcap.messages.encoding import OutStream
 from kbs_process.recordings.mcap.writer import write_mcap
 from kbs_process.reduction.held import Alive
+from kbs_process.reduction.preparing import Prepared, told_copies
 from kbs_process.reduction.reading import read_run
 from kbs_process.rig.model import Rig
 from kbs_process.signals.records import Array, Block, Events, Loss, Mask, Run
 from kbs_process.stages.motion import Motion
+from kbs_process.stages.repeats import copies
+from kbs_process.studies.correlate.findings import _lags
 from kbs_process.studies.diagnose import reading
 from kbs_process.studies.diagnose.diagnosable import LEAST_S, check_copies, check_length, check_noise, check_signs
 from kbs_process.studies.diagnose.reading import LONGEST_S, busiest, passed_over, read_stretch
@@ -322,6 +325,22 @@ def test_a_copy_is_no_repeat() -> None:
     check_copies([(ENTRY, first), (copied, second)])
     with pytest.raises(RecordingError, match=r"b\.mcap: it has the same readings as a\.mcap"):
         check_copies([(ENTRY, first), (copied, replace(first, name="b"))])
+
+
+def test_a_copy_is_told_and_repeats_nothing() -> None:
+    first, second = recording("a", 0.0).run, recording("b", 0.3).run
+    runs = [first, second, replace(first, name="c")]
+    assert copies(runs) == {2: 0}
+    prepared = [
+        Prepared(replace(ENTRY, path=Path(f"recordings/{run.name}.mcap"), name=run.name), run.loads, run, None)  # type: ignore[arg-type]
+        for run in runs
+    ]
+    told = told_copies(prepared)
+    (loss,) = told[2].run.losses
+    assert (loss.kind, loss.where, loss.real) == ("copy", "c", True)
+    assert loss.detail == "the same readings as a: no repeat"
+    assert [one.run.losses for one in told[:2]] == [(), ()]
+    assert list(_lags(told)) == [0, 1]  # type: ignore[arg-type]
 
 
 def test_a_law_whose_coefficients_have_no_covariance_does_not_pass() -> None:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from mcap.writer import Writer
 
+from kbs_process.errors import RecordingError
 from kbs_process.recordings.mcap.source import open_recording
 from kbs_process.recordings.mcap.streams import Stream
 from kbs_process.reduction.inspection import inspect_recording
@@ -60,3 +61,25 @@ def test_messages_that_came_twice_are_one_publisher_s(tmp_path: Path) -> None:
     path = tmp_path / "a.mcap"
     write(path, [(channel, k * STEP, 1.0 + k) for k in range(N) for channel in (0, 1)])
     assert by_turns(path) == {}
+
+
+def test_publishers_of_different_joints_are_told_and_one_can_be_chosen(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file, chunk_size=4096)
+        writer.start()
+        channels = [writer.register_channel("/joints", "json", 0) for _ in range(2)]
+        for k in range(N):
+            for channel, name in zip(channels, ("arm", "hand"), strict=True):
+                message = {"name": [name], "position": [1.0 + k]}
+                writer.add_message(channel, k * STEP, json.dumps(message).encode(), k * STEP)
+        writer.finish()
+    found = inspect_recording(path)
+    assert found.state == "lossy"
+    assert [loss.where for loss in found.losses if loss.kind == "publishers"] == ["/joints"]
+    arm = ("position[arm]",)
+    with pytest.raises(RecordingError, match="no message names an element 'arm'") as refused:
+        list(open_recording(path).read([Stream("x", "/joints", arm)]))
+    assert "choose one by its `channel`" in refused.value.remedy
+    blocks = [block for _, block in open_recording(path).read([Stream("x", "/joints", arm, channel=channels[0])])]
+    np.testing.assert_array_equal(np.concatenate([one.values[:, 0] for one in blocks]), 1.0 + np.arange(N))

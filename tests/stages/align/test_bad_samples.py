@@ -10,6 +10,7 @@ import pytest
 from kbs_process.errors import RecordingError
 from kbs_process.signals.records import Block, Loss, Run
 from kbs_process.stages.align.condense import CondenseSettings, condense
+from kbs_process.stages.align.stream import Timeline
 from stages.recordings import EPOCH, rows, stream
 
 CHANNELS = {"wrench": ("Fz", "Ty"), "angle": ("arm",)}
@@ -61,7 +62,9 @@ def test_a_sound_recording_gives_no_notice() -> None:
     [
         (0, slice(3000, 3001), 0.0, 1),
         (1, slice(3000, 3001), 1.0, 1),  # N m more than there is
-        (1, slice(2000, 2007), 32.767, 1),
+        (1, slice(2000, 2003), 32.767, 1),
+        (0, [2000, 2003], 32.767, 2),
+        (0, [1990, 2000, 2004, 2011], 0.0, 4),
         (1, [1000, 3001, 4990], 32.767, 3),
     ],
 )
@@ -155,7 +158,7 @@ def test_a_few_samples_far_from_all_others_are_left_out(which: slice, by: int) -
 def test_a_clock_that_is_set_back_is_refused(by: float) -> None:
     streams = recording()
     streams["angle"].stamp[3000:] -= round(by * 1e9)
-    with pytest.raises(RecordingError, match=f"time goes back by {by:.6g}"):
+    with pytest.raises(RecordingError, match=f"time goes back by {by:.6g} s at sample 3001, 29.99 s after the first"):
         run_of(streams)
 
 
@@ -165,7 +168,7 @@ def test_a_logger_that_started_again_is_refused() -> None:
     for one in streams.values():
         one.log[:] = one.stamp
         one.values[6000:] *= 0.9
-    with pytest.raises(RecordingError, match="time goes back by 60 s"):
+    with pytest.raises(RecordingError, match=r"time goes back by 60 s at sample 6001, 59.99 s after the first"):
         run_of(streams)
 
 
@@ -257,6 +260,14 @@ def test_stamps_rounded_to_a_period_hide_a_regular_rate_and_lose_nothing(rate: f
     assert error(run)[0] < 4.0 * NOISE and error(run)[1] < 1e-3
 
 
+def test_stamps_that_are_regular_as_they_are_were_not_rounded() -> None:
+    for rate in (20.0, 50.0, 1000.0):
+        streams = recording(rate)
+        for one in streams.values():
+            one.log[:] = one.stamp
+        assert run_of(streams).losses == ()
+
+
 def test_samples_lost_of_rounded_stamps_are_gaps() -> None:
     streams = recording(1000.0)
     keep = np.delete(np.arange(60_000), [7000, 7500, 9000, *range(30_000, 30_040)])
@@ -274,3 +285,166 @@ def test_bursts_that_were_stamped_on_arrival_are_refused_by_name() -> None:
         RecordingError, match=r"bursts of about 5, 0.1 ms apart, every 49.6 ms: they are times of arrival"
     ):
         run_of(streams)
+
+
+@pytest.mark.parametrize(
+    "which", [slice(0, 200), slice(3000, 3008), slice(3000, 3045), slice(2000, 2300), slice(5700, None)]
+)
+@pytest.mark.parametrize("channel", [0, slice(None)])
+def test_a_channel_that_is_lost_for_a_while_is_left_out_and_named(which: slice, channel: int | slice) -> None:
+    streams = recording()
+    streams["wrench"].values[which, channel] = 0.0
+    run = run_of(streams)
+    lost = told(run, "dropout")
+    assert [loss.where[-2:] for loss in lost] == (["Fz"] if channel == 0 else ["Fz", "Ty"])
+    first, stop, _ = which.indices(6000)
+    assert lost[0].count == stop - first and lost[0].real
+    assert (lost[0].start_s, lost[0].end_s) == pytest.approx((0.01 * first, 0.01 * (stop - 1)), abs=1e-6)
+    assert error(run)[0] < 4.0 * NOISE
+    kept = condense("test", streams.items(), CHANNELS, CondenseSettings(), keep_spikes=True)
+    assert error(kept)[0] > 3.0 or first == 0 or stop == 6000
+    assert told(kept, "dropout") == lost
+
+
+def test_an_encoder_s_reading_that_is_lost_for_a_while_is_left_out() -> None:
+    streams = recording()
+    streams["angle"].values[3000:3040] = 3.0
+    run = run_of(streams)
+    assert [loss.count for loss in told(run, "dropout")] == [40]
+    assert error(run)[1] < 1e-4
+
+
+@pytest.mark.parametrize("key", ["wrench", "angle"])
+@pytest.mark.parametrize("share", [0.05, 0.15, 0.5])
+def test_readings_that_are_lost_all_the_time_are_no_signal(key: str, share: float) -> None:
+    streams = recording()
+    streams[key].values[np.random.default_rng(5).random(6000) < share] = 0.0 if key == "wrench" else 3.0
+    with pytest.raises(RecordingError, match=r"that is no signal|two sources are in one stream"):
+        run_of(streams)
+
+
+@pytest.mark.parametrize(("key", "by"), [("wrench", 20.0), ("angle", -0.7)])
+def test_a_count_that_is_lost_behind_a_short_gap_is_refused(key: str, by: float) -> None:
+    streams = recording()
+    streams[key].values[4000:, 0] += by
+    streams[key] = rows(streams[key], np.delete(np.arange(6000), np.arange(3990, 4005)))
+    with pytest.raises(RecordingError, match=r"steps by .* 39\.89 s after the first, and stays there"):
+        run_of(streams)
+
+
+@pytest.mark.parametrize("missing", [1, 29])
+def test_a_bad_sample_beside_a_gap_is_interpolated(missing: int) -> None:
+    streams = recording()
+    streams["wrench"].values[3000] = 0.0
+    streams["wrench"] = rows(streams["wrench"], np.delete(np.arange(6000), np.arange(3001, 3001 + missing)))
+    run = run_of(streams)
+    assert [loss.count for loss in told(run, "spike")] == [1, 1]
+    assert error(run)[0] < 4.0 * NOISE
+
+
+def test_a_push_of_a_moment_stays() -> None:
+    streams = recording()
+    streams["wrench"].values[3000:3020] += np.random.default_rng(1).normal(20.0, 1.0, (20, 1))
+    run = run_of(streams)
+    assert run.losses == () and run.wrench is not None
+    assert np.abs(run.wrench.values - truth(run.wrench.t))[run.wrench.valid].max() > 10.0
+
+
+def test_parts_of_a_second_without_their_leading_zeros_are_refused() -> None:
+    streams = recording()
+    for one in streams.values():
+        part = np.arange(6000) % 100 * 10  # ms
+        one.stamp[:] = (
+            EPOCH + np.arange(6000) // 100 * 1_000_000_000 + np.where(part < 100, 10 * part, part) * 1_000_000
+        )
+        one.log[:] = one.stamp
+    with pytest.raises(RecordingError, match="without their leading zeros"):
+        run_of(streams)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_many_gaps_among_jitter_are_one_line_and_none_of_them_is_of_no_sample(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    line = Timeline("test: camera", ("x",), bridged=0.0)
+    t = (np.arange(600) + rng.normal(0.0, 0.1, 600))[rng.random(600) > 0.03]
+    stamp = EPOCH + np.sort((t * 1e9).astype(np.int64))
+    line.push(Block(stamp, stamp, np.zeros((len(stamp), 1))))
+    line.flush()
+    (gaps,) = [loss for loss in line.losses(0.0, 1.0) if loss.kind == "gap"]
+    assert abs(gaps.count - (600 - len(stamp))) <= 3
+    assert gaps.detail == f"{line.gap_count} gaps" and all(gap.missing for gap in line.gaps)
+
+
+def jitter(streams: dict[str, Block], late: np.ndarray) -> dict[str, Block]:
+    for one in streams.values():
+        one.stamp[:] = np.maximum.accumulate(one.stamp + np.rint(1e9 * late).astype(np.int64))
+        one.log[:] = one.stamp
+    return streams
+
+
+def test_stamps_that_jitter_make_no_bad_samples() -> None:
+    rng = np.random.default_rng(11)
+    for late in (rng.normal(0.0, 1e-3, 6000), rng.uniform(0.0, 1e-2, 6000)):
+        found = {loss.kind for loss in run_of(jitter(recording(), late)).losses}
+        assert found <= {"gap"}
+
+
+@pytest.mark.parametrize("mean", [4e-3, 1e-2])
+def test_times_of_arrival_are_refused_by_name(mean: float) -> None:
+    streams = jitter(recording(), np.random.default_rng(11).exponential(mean, 6000))
+    with pytest.raises(RecordingError, match=r"off a regular rate: they are times of arrival and not of sampling"):
+        run_of(streams)
+
+
+@pytest.mark.parametrize("noise", [0.02, 0.1, 0.3, 1.0])
+def test_readings_undecided_between_neighbouring_codes_are_sound(noise: float) -> None:
+    streams = recording()
+    values = streams["wrench"].values
+    rng = np.random.default_rng(3)
+    values[:] = 0.05 * np.rint((0.1 * values + 0.025 + rng.normal(0.0, 0.05 * noise, values.shape)) / 0.05)
+    angle = streams["angle"].values
+    angle[:] = 1e-3 * np.rint((angle + rng.normal(0.0, 1e-3 * noise, angle.shape)) / 1e-3)
+    assert run_of(streams).losses == ()
+
+
+@pytest.mark.parametrize("by_chance", [True, False])
+def test_two_sources_that_stamp_alike_are_refused(by_chance: bool) -> None:
+    streams = recording()
+    wrench = streams["wrench"]
+    order = np.argsort(np.repeat(np.arange(6000.0), 2) + 0.1 * np.random.default_rng(1).random(12_000) * by_chance)
+    both = [
+        np.stack([one, other], axis=1).reshape(12_000, -1)[order]
+        for one, other in ((wrench.stamp, wrench.stamp), (wrench.log, wrench.log), (wrench.values, 0.0 * wrench.values))
+    ]
+    streams["wrench"] = Block(both[0][:, 0], both[1][:, 0], both[2].reshape(12_000, 2))
+    with pytest.raises(RecordingError, match="two sources are in one stream"):
+        run_of(streams)
+
+
+def test_a_temperature_s_bad_sample_is_interpolated_and_its_steps_stay() -> None:
+    streams = recording()
+    t = np.arange(600) * 0.1
+    stamp = EPOCH + np.rint(1e9 * t).astype(np.int64)
+    true = 0.0625 * np.rint((20.0 + 0.02 * t + 3.0 * (t > 40.0)) / 0.0625)
+    values = true.copy()
+    values[200] = 85.0  # what a sensor says that has not measured yet
+    channels = {**CHANNELS, "temperature": ("bearing",)}
+    streams["temperature"] = Block(stamp, stamp + 1000, values[:, None])
+    run = condense("test", streams.items(), channels, CondenseSettings())
+    (spike,) = told(run, "spike")
+    assert spike.where == "test: temperature, bearing" and spike.start_s == pytest.approx(20.0, abs=1e-3)
+    assert run.temperature is not None
+    np.testing.assert_allclose(run.temperature.values[::2, 0], true[: len(run.temperature.values[::2])], atol=0.1)
+
+
+@pytest.mark.parametrize("lasts", [1.0, 3.0, 10.0, 30.0])  # samples
+@pytest.mark.parametrize("frequency", [0.0, 0.1, 1.0 / 3.0, 0.47])  # of the sampling rate
+def test_a_blow_that_dies_away_stays(lasts: float, frequency: float) -> None:
+    streams = recording()
+    k = np.arange(300)
+    blow = 20.0 * np.exp(-k / lasts) * np.cos(2.0 * np.pi * frequency * k)
+    streams["wrench"].values[3000:3300] += blow[:, None] * np.array([1.0, 0.5])
+    run = run_of(streams)
+    cut = sum(loss.count for loss in run.losses if loss.kind in ("spike", "dropout"))
+    assert cut == 0 or lasts < 2.0
+    assert {loss.kind for loss in run.losses} <= {"spike", "blow"}

@@ -124,6 +124,23 @@ def test_why_time_goes_back_is_told_by_how_far(tmp_path: Path, by: float, said: 
     assert said in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    ("before", "after", "said"),
+    [
+        ("SOURCE", "x" * 5000, "there is no 'xxx"),
+        ("SOURCE", "../run.csv", "is no file of the source folder"),
+        ("SOURCE", "/etc/passwd", "is no file of the source folder"),
+        ("repeat = 1", "repeat = 1\nstart_s = 1e308", "no sample of"),
+        ("repeat = 1", 'repeat = 1\n[text]\nencoding = "\\u0000"', "embedded null"),
+    ],
+)
+def test_odd_values_of_a_mapping_are_told(tmp_path: Path, before: str, after: str, said: str) -> None:
+    write_csv(tmp_path / "run.csv", signals(20))
+    plan = write_mapping(tmp_path, "run.csv", MAPPING.replace(before, after))
+    with pytest.raises(KbsError, match=said):
+        import_recordings(plan, tmp_path, tmp_path / "campaign")
+
+
 @pytest.mark.parametrize(("digits", "rows"), [(0, 1998), (1, 1980), (2, 1800)])
 def test_times_coarser_than_the_rows_are_refused(tmp_path: Path, digits: int, rows: int) -> None:
     t = np.floor(np.arange(2000) * 0.001 * 10**digits) / 10**digits

@@ -17,6 +17,7 @@ from kbs_process.recordings.formats import Format, Text
 from kbs_process.recordings.tables import Cells, Column, Item, Series, SeriesTable, Slice, matrix_of, series_of, texts
 
 _NO_VARIABLE = "This is a netCDF dimension but not a netCDF variable"
+_VALUES = {"scale_factor": 1, "add_offset": 1, "valid_min": 1, "valid_max": 1, "valid_range": 2}  # that attributes have
 _BLOCK_CELLS = 1 << 22  # of a matrix, read together for its columns
 
 
@@ -73,7 +74,11 @@ def _columns(data: Any, name: str) -> Iterator[Item]:
     if data.dtype.kind in "OS" and data.ndim == 1:
         yield Series(Column(name, unit), len(data), _words(data))
         return
-    packing = _Packing.of(data.attrs) if data.dtype.kind in "iuf" else None
+    odd = [one for one, count in _VALUES.items() if one in data.attrs and np.size(data.attrs[one]) != count]
+    if odd:
+        yield f"{name}: its attribute {odd[0]} has {np.size(data.attrs[odd[0]])} values, not {_VALUES[odd[0]]}"
+        return
+    packing = _Packing.of(data) if data.dtype.kind in "iuf" else None
     yield from series_of(
         _Cached(data) if data.ndim == 2 else data, name, unit, None if packing is None else packing.unpacked
     )
@@ -152,11 +157,20 @@ class _Packing:
     packed: bool = field(default=False)
 
     @classmethod
-    def of(cls, attributes: Mapping[str, Any]) -> _Packing | None:
-        """Return the packing that attributes state, None where they state none."""
+    def of(cls, data: Any) -> _Packing | None:
+        """Return the packing that a data set's attributes state, None where they state none.
+
+        What was never written is missing too, where the file says what stands for it, and that is not 0.
+        """
+        import h5py
+
+        attributes: Mapping[str, Any] = data.attrs
         names = ("scale_factor", "add_offset", "_FillValue", "missing_value", "valid_min", "valid_max", "valid_range")
         given = {name: np.ravel(attributes[name]).astype(np.float64) for name in names if name in attributes}
         unsigned = _text(attributes.get("_Unsigned", "")).lower() == "true"
+        chosen = data.id.get_create_plist().fill_value_defined() == h5py.h5d.FILL_VALUE_USER_DEFINED
+        if chosen and data.fillvalue:
+            given.setdefault("_FillValue", np.array([data.fillvalue], dtype=np.float64))
         if not given and not unsigned:
             return None
         lowest, highest = given.get("valid_range", np.array([-np.inf, np.inf]))
@@ -175,7 +189,12 @@ class _Packing:
         """Return the numbers that were packed, NaN where there is none."""
         if self.unsigned and cells.dtype.kind == "i":
             cells = cells.view(cells.dtype.str.replace("i", "u"))
-        lacking = np.isin(cells, self.missing) | (cells < self.low) | (cells > self.high)
+        # As the cells have them: of fewer digits, or without a sign.
+        kind = cells.dtype if cells.dtype.kind == "f" else np.float64
+        missing = (
+            np.array(self.missing) % 2.0 ** (8 * cells.itemsize) if self.unsigned else np.array(self.missing, kind)
+        )
+        lacking = np.isin(cells, missing) | (cells < self.low) | (cells > self.high)
         if not self.packed and not lacking.any():
             return cells
         values = cells.astype(np.float64)

@@ -145,7 +145,7 @@ class TextTable:
                     line = line.partition(comment)[0] if comment else line
                     if place >= skipped and line.strip():
                         yield place, line.rstrip("\n")
-        except (UnicodeError, LookupError) as error:
+        except (ValueError, LookupError) as error:
             raise RecordingError(
                 f"not text in {self._encoding}: {error}", where=str(self.path), remedy=_NO_TEXT
             ) from error

@@ -16,6 +16,7 @@ from kbs_process.recordings.mcap.messages.decoders import Decoder, MessageType, 
 from kbs_process.recordings.mcap.messages.fields import Elements, Step, resolve
 from kbs_process.signals.records import Block, Loss, Stamps
 
+CHOOSE = "several publishers bring the topic: choose one by its `channel` in campaign.toml"
 RETURNS = 2  # to a channel that was left for another of the same topic: there are two publishers
 SAMPLES = 64  # messages from which the numbers of a type without schema are learnt
 _NO_STAMP = "seconds beyond 2^33, or nanoseconds outside 0 to 999999999: mend the driver, or leave its stamp out"
@@ -30,6 +31,7 @@ class Stream:
     fields: tuple[str, ...]
     otherwise: str = ""  # what to do where no message has one of the elements that fields name
     channel: int | None = None  # number of the one channel of the topic that is wanted; None: all
+    lenient: bool = False  # a message without an element that fields name is a loss, and never an error
 
 
 @dataclass(slots=True, eq=False)
@@ -173,9 +175,12 @@ class Reading:
         plan = self._plans[channel.number]
         decoded = plan.decode(segment.buffer, at, size, log)
         values, stamp, lacking, good = decoded.values, decoded.stamp, decoded.lacking, decoded.good
-        if fresh and good.any():
+        if fresh and good.any() and not self.stream.lenient:
             payload = next(payloads(segment.buffer, at[good], size[good]))
-            _require_names(plan, decoded.present.tolist(), payload, self._where, self.stream.otherwise)
+            known = self._container.dictionary.channels.values()
+            several = sum(one.topic == self.stream.topic for one in known) > 1
+            otherwise = CHOOSE if several else self.stream.otherwise
+            _require_names(plan, decoded.present.tolist(), payload, self._where, otherwise)
         stamped = stamp != NO_STAMP
         if decoded.flawless and stamped.all():
             return places, Block(stamp, log, values)

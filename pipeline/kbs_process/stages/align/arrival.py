@@ -19,6 +19,7 @@ LONE = 64  # samples that are left out where they lie far from all others, at ei
 SET_BACK = 3  # samples that come by times that have been, without a hole that they fill: fewer are odd stamps
 REGULAR = 0.6  # share of steps within half a period of their median, without which nothing is judged
 LISTED = 64
+MOST_ODD, LEAST_ODD = 0.005, 10  # share of samples, and number of places, in which stamps may be odd
 OFF = 2.5  # periods off its neighbours in the file, from which on a stamp may be odd
 
 
@@ -31,6 +32,7 @@ class Arrival:
 
     far_ns: int = 10_000_000_000  # at least so far from all others are the lone ones
     odd: int = 0  # samples with odd stamps, left out
+    places: int = 0  # where these stood together
     odd_span: tuple[int, int] = (0, 0)  # ns, between which they arrived
     lone: int = 0  # samples far from all others, left out
     lone_by: int = 0  # ns, how far
@@ -40,6 +42,16 @@ class Arrival:
     _held: Block | None = None
     _first: int = 0  # ns
     _passed: int = 0  # samples that were judged
+
+    @property
+    def scattered(self) -> str:
+        """Why stamps are no times of samples, where odd ones are everywhere; or nothing."""
+        if self.places <= max(MOST_ODD * self._passed, LEAST_ODD):
+            return ""
+        return (
+            f"{self.odd} of {self._passed} stamps do not fit where they stand, in {self.places} places: parts of a "
+            "second without their leading zeros or in a wrong unit, or a clock that jumps"
+        )
 
     def push(self, block: Block) -> Block:
         """Take the next samples; return those that can be judged, without odd ones."""
@@ -60,6 +72,7 @@ class Arrival:
             at = known[before:end][gone[before:end]]
             self.odd_span = (self.odd_span[0] if self.odd else int(at[0]), int(at[-1]))
             self.odd += len(at)
+            self.places += int(np.count_nonzero(np.diff(gone[before:end].astype(np.int8), prepend=0) > 0))
         far, apart = _far(whole.stamp, ~gone, self.far_ns, first=before == 0, last=ahead == 0)
         if far[before:end].any():
             self.lone, self.lone_by = self.lone + int(np.count_nonzero(far[before:end])), max(self.lone_by, apart)
@@ -115,10 +128,10 @@ class Arrival:
                 if inner and not missing and len(self.doubled) < LISTED:
                     self.doubled.append(int(begin))
             elif self.set_back is None:
-                behind = place[run[0]] > 0 and first < begin  # else what follows the run is
+                behind = place[run[0]] > 0 and first < begin  # or ahead of those that follow it
                 by = begin + period - first if behind else last + period - after
                 number = self._passed - before + int(index[run[0]] if behind else index[run[-1]] + 1)
-                since = int(begin if first < begin else last) - (self._first if before else int(line[0]))
+                since = int(begin if behind else last) - (self._first if before else int(stamp[0]))
                 self.set_back = (number, since, int(by))
         return gone
 

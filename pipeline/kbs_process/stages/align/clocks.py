@@ -64,6 +64,7 @@ class LatencyFloor:
         self._floor: dict[int, tuple[int, int]] = {}  # stretch -> own time, latency (ns, from the first)
         self._sum = 0.0
         self._count = 0
+        self._known: tuple[int, ClockLine | None, str] | None = None
 
     def push(self, stamp: Stamps, log: Stamps) -> None:
         """Take stamps in increasing order with their recorder times."""
@@ -88,14 +89,21 @@ class LatencyFloor:
 
     def line(self) -> ClockLine | None:
         """Fit the floor; None where it is too short, or does not run like a clock (`trouble`)."""
-        line = self._fitted()
-        return None if line is None or self.trouble() else line
+        line, trouble = self._judged()
+        return None if trouble else line
 
     def trouble(self) -> str:
         """Why the floor is no line of two clocks, or nothing."""
-        line = self._fitted()
-        if line is None:
-            return ""
+        return self._judged()[1]
+
+    def _judged(self) -> tuple[ClockLine | None, str]:
+        """Line and trouble, fitted once for all messages so far."""
+        if self._known is None or self._known[0] != self._count:
+            line = self._fitted()
+            self._known = (self._count, line, "" if line is None else self._trouble(line))
+        return self._known[1:]
+
+    def _trouble(self, line: ClockLine) -> str:
         own, floor = self._pairs()
         if abs(line.skew) >= LARGEST_SKEW:
             ways = f"{'later' if line.skew > 0.0 else 'earlier'} by {1e3 * abs(line.skew):.3g} ms each second"

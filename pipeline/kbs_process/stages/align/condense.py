@@ -201,7 +201,7 @@ def _stream(
 ) -> Uniform | Collected:
     where = f"{name}: {key}"
     if key in SLOW:
-        return Collected(where, columns, _place(file, key))
+        return Collected(where, columns, _place(file, key), smooth=key == "temperature", keep_spikes=keep)
     if key not in SAMPLED:
         raise KeyError(f"no stream is called {key!r}")
     if is_load:
@@ -213,6 +213,7 @@ def _stream(
             stretches=settings.envelope_stretches,
             file=_place(file, key),
             keep_spikes=keep,
+            lively=key == "wrench",
         )
     angle = key == "angle"
     return Uniform(
@@ -223,6 +224,7 @@ def _stream(
         keep_below=settings.encoder_limit_Hz if angle else 0.0,
         file=_place(file, key),
         keep_spikes=keep,
+        lively=key in TURNING,
     )
 
 

@@ -15,6 +15,7 @@ LEFT, RIGHT = 3, 3  # neighbours that the six-point interpolation needs on eithe
 AROUND = 4  # stamps on either side that a long step is held against
 BRIDGED = 1e-3  # error, in the band, up to which a straight line across a gap is no invention
 COARSE = 0.2  # of a period: stamps rounded to less are taken as they are
+EXACT = 1e-3  # of the step: what lies so close to a regular grid was not rounded
 AROUND_LOG = 16  # log times on either side of a long step, whose mean tells whether the recorder saw it
 MOST_MISSING = 32  # samples that are looked for one by one in a block of stamps that are rounded
 PIECE = 65536  # grid points made at a time, which bounds what a long gap costs in memory
@@ -83,6 +84,8 @@ def evened(stamp: Stamps, log: Stamps, *, known: bool = False) -> Stamps:
         x = k - k.mean()
         slope = float(x @ (y - y.mean()) / (x @ x))
         left = y - y.mean() - slope * x
+        if np.ptp(left) <= EXACT * step:
+            return stamp
         if np.ptp(left) <= 1.1 * step:
             even: Stamps = stamp[0] + np.rint(y.mean() + slope * x).astype(np.int64)
             return even
@@ -131,7 +134,7 @@ def counted(u: Array) -> Array:
         around[before, after, known] = apart - (before + after + 2)
     judged = np.isfinite(around).any(axis=(0, 1))
     # Other gaps nearby make it more, nothing makes it less.
-    most = np.nanmedian(around[:, :, judged].reshape(AROUND**2, -1), axis=0)
+    most = np.floor(np.nanmedian(around[:, :, judged].reshape(AROUND**2, -1), axis=0))
     count[k[judged]] = np.maximum(np.minimum(count[k[judged]], most), 1.0)
     return count
 

@@ -12,8 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from kbs_process.signals.records import Array, Block, Mask, Stamps
+from kbs_process.stages.align.spikes import by_turns
 
 BLOCK = 8192  # samples; also the window within which a late sample is still put in its place
+TWICE = 0.3  # share of repeated stamps, beyond which two sources may bring them
 STRAY_NS = 10_000_000_000  # a stamp that disagrees by more with the recorder's clock is no time of this run
 
 
@@ -93,6 +95,7 @@ class Orderer:
         self.repeats = 0
         self.displaced = 0  # arrived after a younger sample
         self.late = 0  # of these, too late to be put in place: dropped
+        self.mixed = False  # two sources bring readings with one stamp
         self.stray = 0  # stamps far from any time of the run: dropped
 
     def push(self, block: Block) -> Block | None:
@@ -113,7 +116,10 @@ class Orderer:
         late = merged.stamp < self._last
         self.late += int(np.count_nonzero(late))
         fresh &= merged.stamp > self._last
-        self.repeats += int(np.count_nonzero(~fresh & ~late))
+        repeats = ~fresh & ~late
+        self.repeats += int(np.count_nonzero(repeats))
+        if np.mean(repeats) > TWICE:
+            self.mixed |= any(by_turns(column) for column in merged.values.T)
         merged = select(merged, fresh)
         cut = len(merged) - BLOCK
         if cut < BLOCK // 2:  # the first block released must be long enough to find the nominal rate in

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from kbs_process.errors import RecordingError
-from kbs_process.signals.records import PUT_IN_ORDER, ROUNDED, SPIKE, Array, Block, Loss, Mask, Stamps
+from kbs_process.signals.records import DROPOUT, PUT_IN_ORDER, ROUNDED, SPIKE, Array, Block, Loss, Mask, Stamps
 from kbs_process.stages.align.arrival import REGULAR, Arrival
 from kbs_process.stages.align.clocks import ClockData, FloorStep, LatencyFloor
 from kbs_process.stages.align.envelope import MinMax
@@ -28,13 +28,18 @@ from kbs_process.stages.align.spectrum import Welch
 from kbs_process.stages.align.spikes import Oddity, Spikes
 
 TIMES = 10  # of single bad samples, one by one
-GAPS_LISTED = 20  # one by one; the others in one line
+GAPS_LISTED = 5  # one by one; more of them in one line
+GAPS_KEPT = 1000
+LONG_GAP = 3  # samples
 # Samples that may be made up for missing ones: so many, and so many for each that is there.
 MADE_UP, MADE_UP_EACH = 1 << 20, 10
 BURST = 5.0  # times the usual step: what lies between bursts
+SCATTERED, PHANTOMS = 0.3, 0.005  # shares of uneven steps and of gaps, beyond which stamps are no times of samples
 UNEVEN = 64  # steps that are told apart from what jitters
 FAR_SLOW_NS = 3_600_000_000_000  # what is sent now and then may have one sample long before the others
 # What to do about a recording that is not one.
+TWO_SOURCES = "record each source under a topic of its own"
+STAMP_EACH = "stamp each sample where it is taken; where a file is imported, give rate_Hz and no time column"
 ONE_PART = "use one part of it: start_s and end_s of its [[recording]] in campaign.toml, or those of the import"
 
 
@@ -58,8 +63,8 @@ class Timeline:
     gaps: list[Gap] = field(default_factory=list)
     bridged: float = 0.0  # s, the longest gap that is drawn over, as nothing in the band is so fast
     missing_bridged: int = 0  # samples in such gaps
-    gaps_unlisted: int = 0
-    missing_unlisted: int = 0
+    gap_count: int = 0
+    missing_in_gaps: int = 0
     non_finite: int = 0  # samples that are NaN or infinite in some channel: all of each is left out
     samples: int = 0
     missing: int = 0
@@ -69,6 +74,7 @@ class Timeline:
     filled: bool = False  # whether gaps are filled with samples
     turning: Array = field(default_factory=lambda: np.zeros(0))  # (c,) 1 for angles, of a fast stream
     keep_spikes: bool = False
+    lively: bool = True  # no reading is held by a brake or a command
     regular: bool = True  # whether most steps are like their median
     spikes: Spikes | None = None
     _non_finite_in: dict[str, int] = field(default_factory=dict)  # by channel
@@ -80,7 +86,9 @@ class Timeline:
     _first: int = 0
     _last: int = 0
     _uneven: list[float] = field(default_factory=list)  # s, steps that are no whole number of periods
+    _scattered: int = 0  # how many these are
     _near: Stamps = field(default_factory=lambda: np.empty(0, dtype=np.int64))  # of steps that are not judged yet
+    _last_gap: Gap | None = None
     _judged: int = 0  # steps between these that are
 
     def push(self, chunk: Block) -> list[Block]:
@@ -99,6 +107,8 @@ class Timeline:
         last = self._orderer.flush() if self._orderer else None
         if last is not None:
             ready.append(self._timed(last))
+        if scattered := self._arrival.scattered:
+            raise RecordingError(scattered, where=self.file or self.where, remedy=STAMP_EACH)
         if self.grid is not None:
             self._find_gaps(self._near[:0], self.grid, held_back=0)
             self._check_gaps(self.grid, at_end=True)
@@ -127,6 +137,12 @@ class Timeline:
     def _order(self, block: Block) -> list[Block]:
         assert self._orderer is not None
         released = self._orderer.push(block)
+        if self._orderer.mixed and self.filled:
+            raise RecordingError(
+                "readings that differ have one stamp, by turns: two sources are in one stream",
+                where=self.file or self.where,
+                remedy=TWO_SOURCES,
+            )
         return [] if released is None else [self._timed(released)]
 
     def _timed(self, block: Block) -> Block:
@@ -147,9 +163,10 @@ class Timeline:
         if self.grid is not None:
             self._find_gaps(block.stamp, self.grid, held_back=AROUND)
             self._check_gaps(self.grid, at_end=False)
+            periods = np.diff(block.stamp, prepend=self._last) / self.grid.period_ns
+            uneven = np.abs(periods - np.maximum(np.rint(periods), 1.0)) > 0.2
+            self._scattered += int(np.count_nonzero(uneven))
             if len(self._uneven) < UNEVEN:
-                periods = np.diff(block.stamp, prepend=self._last) / self.grid.period_ns
-                uneven = np.abs(periods - np.maximum(np.rint(periods), 1.0)) > 0.2
                 self._uneven += [self.own_one(int(one)) for one in block.stamp[uneven][:UNEVEN]]
         self._last = int(block.stamp[-1])
         self.samples += len(block)
@@ -167,11 +184,12 @@ class Timeline:
             self.longest = max(self.longest, end - start)
             if end - start <= self.bridged:
                 self.missing_bridged += missing
-            elif len(self.gaps) < GAPS_LISTED:
-                self.gaps.append(Gap(start, end, missing))
             else:
-                self.gaps_unlisted += 1
-                self.missing_unlisted += missing
+                self.gap_count += 1
+                self.missing_in_gaps += missing
+                self._last_gap = Gap(start, end, missing)
+                if len(self.gaps) < GAPS_KEPT:
+                    self.gaps.append(self._last_gap)
         kept = max(judged - AROUND, 0)
         self._near, self._judged = stamp[kept:].copy(), judged - kept
 
@@ -185,12 +203,20 @@ class Timeline:
                 f"{1e-6 * float(np.median(steps[long])):.3g} ms: they are times of arrival and not of sampling, or "
                 "parts of a second in a wrong unit",
                 where=self.file or self.where,
-                remedy="stamp each sample where it is taken; where a file is imported, give rate_Hz and no time column",
+                remedy=STAMP_EACH,
             )
 
     def _check_gaps(self, grid: Grid, *, at_end: bool) -> None:
         """Raise RecordingError where more was made up than is worth it: work follows the samples, not their span."""
         there = self.samples * grid.period_ns * 1e-9
+        scattered = self._scattered > SCATTERED * self.samples and self.gap_count > PHANTOMS * self.samples
+        if at_end and self.filled and scattered:
+            raise RecordingError(
+                f"{self._scattered} of {self.samples} stamps are over a fifth of {1e-6 * grid.period_ns:.4g} ms off "
+                "a regular rate: they are times of arrival and not of sampling",
+                where=self.file or self.where,
+                remedy=STAMP_EACH,
+            )
         too_many = self.missing > MADE_UP + MADE_UP_EACH * self.samples
         if self.filled and (too_many or (at_end and self.longest > there)):
             raise RecordingError(
@@ -199,18 +225,21 @@ class Timeline:
                 remedy=ONE_PART,
             )
 
-    def clean(self, block: Block) -> tuple[Stamps, Array]:
-        """Return stamps and values of a fast stream's samples that are numbers, their spikes interpolated."""
+    def clean(self, block: Block) -> Iterator[tuple[Stamps, Array]]:
+        """Yield stamps and values of a fast stream's samples that are numbers, their spikes interpolated."""
         if self.spikes is None and self.grid is not None:
-            self.spikes = Spikes(self.turning, self.grid.period_ns * 1e-9, self.keep_spikes)
+            self.spikes = Spikes(self.turning, self.grid.period_ns * 1e-9, self.keep_spikes, self.lively)
         stamp, values = self.finite(block)
-        return self.spikes.push(stamp, values) if self.spikes is not None and len(stamp) else (stamp, values)
+        if self.spikes is None:
+            yield stamp, values
+        elif len(stamp):
+            yield from self.spikes.push(stamp, values)
 
-    def end(self) -> tuple[Stamps, Array] | None:
-        """Return what `clean` held back; raises RecordingError where two sources bring a channel, or it steps."""
-        last = self.spikes.flush() if self.spikes is not None else None
+    def end(self) -> Iterator[tuple[Stamps, Array]]:
+        """Yield what `clean` held back; raises RecordingError where two sources bring a channel, or it steps."""
+        if self.spikes is not None:
+            yield from self.spikes.flush()
         self.check_sources()
-        return last
 
     def check_sources(self) -> None:
         """Raise RecordingError where two sources bring a channel, or where it steps and stays there."""
@@ -219,7 +248,14 @@ class Timeline:
                 f"{self.channels[mixed.channel]} changes to and fro by {mixed.by:.4g} from sample to sample: two "
                 "sources are in one stream",
                 where=self.file or self.where,
-                remedy="record each source under a topic of its own",
+                remedy=TWO_SOURCES,
+            )
+        if self.spikes is not None and (noisy := self.spikes.noisy()) is not None:
+            raise RecordingError(
+                f"{self.channels[noisy[0]]} is off its neighbours in {noisy[1]} single samples of {self.samples}: "
+                "that is no signal",
+                where=self.file or self.where,
+                remedy="look for a bad contact, a second source, or a driver that fills in what it has lost",
             )
         lasting: list[Oddity] = self.spikes.lasting() if self.spikes else []
         if lasting:
@@ -294,13 +330,17 @@ class Timeline:
 
     def losses(self, offset: float, rate: float) -> list[Loss]:
         """Everything that was wrong, on the run's time axis t = offset + rate own."""
+        listed = self.gaps
+        if self.gap_count > GAPS_LISTED:  # the longest by themselves, and all others in one line
+            longest = sorted(self.gaps, key=lambda gap: -gap.missing)[:GAPS_LISTED]
+            listed = [gap for gap in self.gaps if gap in longest and gap.missing >= LONG_GAP]
         found = [
-            Loss("gap", self.where, gap.missing, offset + rate * gap.start, offset + rate * gap.end)
-            for gap in self.gaps
+            Loss("gap", self.where, gap.missing, offset + rate * gap.start, offset + rate * gap.end) for gap in listed
         ]
-        if self.gaps_unlisted:
-            detail = f"{self.gaps_unlisted} more gaps"
-            found.append(Loss("gap", self.where, self.missing_unlisted, detail=detail))
+        if (more := self.gap_count - len(listed)) and self._last_gap is not None:
+            start, end = (offset + rate * one for one in (self.gaps[0].start, self._last_gap.end))
+            count = self.missing_in_gaps - sum(gap.missing for gap in listed)
+            found.append(Loss("gap", self.where, count, start, end, f"{more} {'more ' if listed else ''}gaps"))
         if self.missing_bridged:
             detail = f"up to {1e3 * self.bridged:.2g} ms each, which is nothing in the band: bridged"
             found.append(Loss("short gap", self.where, self.missing_bridged, detail=detail))
@@ -310,6 +350,11 @@ class Timeline:
         if self.by_recorder:
             detail = "the sensor's stamps do not advance: the recorder's clock is used"
             found.append(Loss("clock", self.where, self.samples, detail=detail))
+        for channel, name in enumerate(self.channels):
+            if own := [one for one in (self.spikes.lost if self.spikes else []) if one.channel == channel]:
+                start, end = (offset + rate * self.own_one(one) for one in (own[0].first, own[-1].last))
+                what = f"stands still at {own[0].by:.6g}, off all others, {len(own)} times: left out"
+                found.append(Loss(DROPOUT, f"{self.where}, {name}", sum(one.count for one in own), start, end, what))
         for kind, oddities, detail in (
             (SPIKE, self.spikes.spikes if self.spikes else [], "interpolated"),
             ("blow", self.spikes.blows if self.spikes else [], "several channels at once: kept"),
@@ -361,10 +406,16 @@ class Timeline:
 
 
 class Collected:
-    """A slow stream, kept sample by sample."""
+    """A slow stream, kept sample by sample; a `smooth` one without its spikes, as what is commanded may jump."""
 
-    def __init__(self, where: str, channels: tuple[str, ...], file: str = "") -> None:
-        self.line = Timeline(where, channels, file=file, _arrival=Arrival(FAR_SLOW_NS))
+    def __init__(
+        self, where: str, channels: tuple[str, ...], file: str = "", *, smooth: bool = False, keep_spikes: bool = False
+    ) -> None:
+        self.line = Timeline(
+            where, channels, file=file, keep_spikes=keep_spikes, lively=False, _arrival=Arrival(FAR_SLOW_NS)
+        )
+        self.line.turning = np.zeros(len(channels))
+        self._smooth = smooth
         self._own: list[Array] = []
         self._values: list[Array] = []
 
@@ -374,13 +425,18 @@ class Collected:
     def finish(self) -> tuple[Array, Array]:
         """Return times (n,), s from the stream's first sample, and values (n, c)."""
         self._take(self.line.flush())
+        if self.line.spikes is not None:
+            self._keep(self.line.spikes.flush())
         if not self._own:
             return np.empty(0), np.empty((0, len(self.line.channels)))
         return np.concatenate(self._own), np.concatenate(self._values)
 
     def _take(self, blocks: list[Block]) -> None:
         for block in blocks:
-            stamp, values = self.line.finite(block)
+            self._keep(self.line.clean(block) if self._smooth else [self.line.finite(block)])
+
+    def _keep(self, pieces: Iterable[tuple[Stamps, Array]]) -> None:
+        for stamp, values in pieces:
             self._own.append(self.line.own(stamp))
             self._values.append(values)
 
@@ -400,6 +456,7 @@ class Uniform:
         keep_below: float = 0.0,
         file: str = "",
         keep_spikes: bool = False,
+        lively: bool = True,
     ) -> None:
         """`turning` channels are angles, which go on through full turns; `spectrum`: (resolution, limit), Hz; below a
         rate of `keep_below`, Hz, samples are kept as such.
@@ -411,6 +468,7 @@ class Uniform:
             file=file,
             filled=True,
             keep_spikes=keep_spikes,
+            lively=lively,
         )
         self.welch: Welch | None = None
         self.envelope = MinMax(len(channels), stretches) if stretches else None
@@ -433,8 +491,8 @@ class Uniform:
         """Return the reduced stream, or None where it is too short for the filters."""
         for block in self.line.flush():
             self._take(block)
-        if (last := self.line.end()) is not None:
-            self._lay(*last)
+        for piece in self.line.end():
+            self._lay(*piece)
         if self._regrid is None or self._reduce is None:
             return None
         for rows, invented in self._regrid.flush():
@@ -454,7 +512,8 @@ class Uniform:
             self._reduce = Reducer(design(grid.rate, self._working_rate))
             if self._spectrum:
                 self.welch = Welch(grid.rate, *self._spectrum, self.line.channels)
-        self._lay(*self.line.clean(block))
+        for piece in self.line.clean(block):
+            self._lay(*piece)
 
     def _lay(self, stamp: Stamps, values: Array) -> None:
         """Lay samples on the grid, and reduce them."""

@@ -87,7 +87,7 @@ def _source_files(mapping: Mapping, source: Path) -> dict[str, Path]:
         )
     found = [path.name for path in source.iterdir() if not path.name.startswith(".")]
     for name in names:
-        if not (source / name).is_file():
+        if not _is_file(source / name):
             origin = f" (published: {mapping.source.origin})" if mapping.source.origin else ""
             raise RecordingError(
                 f"there is no '{name}', which the mapping names",
@@ -95,6 +95,13 @@ def _source_files(mapping: Mapping, source: Path) -> dict[str, Path]:
                 remedy=did_you_mean(name, found) + origin,
             )
     return {name: source / name for name in names}
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except OSError:  # no disk can hold a file of that name
+        return False
 
 
 def _refuse_occupied(target: Path) -> None:

@@ -14,7 +14,7 @@ from kbs_process.recordings.tables import Cells, Table, find_column
 from kbs_process.signals.records import Array, Block, Mask, Stamps
 from kbs_process.stages.align.arrival import Arrival
 from kbs_process.stages.align.condense import SLOW
-from kbs_process.stages.align.stream import FAR_SLOW_NS
+from kbs_process.stages.align.stream import FAR_SLOW_NS, STAMP_EACH
 from kbs_process.studies.convert.clock import nanoseconds, numbers
 from kbs_process.studies.convert.mapping import Channel, Mapping, StreamMap
 from kbs_process.studies.convert.mapping_file import Part, Time, Turn
@@ -22,6 +22,7 @@ from kbs_process.studies.convert.mapping_file import Part, Time, Turn
 _NO_STAMPS = np.empty(0, dtype=np.int64)
 _SET_BACK = {3600.0: "clocks went from summer to winter time", 43200.0: "it has twelve hours, without a.m. and p.m."}
 _FEWEST = 16  # rows that show how fine times are
+_LONGEST_S = 3e9  # of a recording: beyond it there is nothing to leave out
 _TIMELESS = "rows have no time, left out"
 Piece = dict[str, Block]  # by stream key; the streams of one pass over the file
 
@@ -69,8 +70,7 @@ def read_part(table: Table, mapping: Mapping, part: Part, findings: Findings) ->
         passes = [chain([head], pieces) for head, pieces in zip(heads, passes, strict=True)]
         stamps = [int(block.stamp[0]) for head in heads for block in head.values() if len(block)]
         first = min(stamps, default=0)
-        start = first + round(part.start_s * 1e9)
-        end = first + round(part.end_s * 1e9) if np.isfinite(part.end_s) else end
+        start, end = (first + round(min(after, _LONGEST_S) * 1e9) for after in (part.start_s, part.end_s))
 
     empty = set(streams)
     arrivals = {key: Arrival(FAR_SLOW_NS) if key in SLOW else Arrival() for key in streams}
@@ -90,6 +90,8 @@ def read_part(table: Table, mapping: Mapping, part: Part, findings: Findings) ->
     for what, count in table.odd.items():
         findings.counts[what] = count
     for key, arrival in arrivals.items():
+        if scattered := arrival.scattered:
+            raise RecordingError(f"time of '{key}': {scattered}", where=str(table.path), remedy=STAMP_EACH)
         findings.counts[f"time stamps of '{key}' do not fit where they stand, rows left out"] += arrival.odd
         findings.counts[f"time stamps of '{key}' lie far from all others, rows left out"] += arrival.lone
     for key in streams:

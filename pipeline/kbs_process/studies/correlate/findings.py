@@ -13,6 +13,7 @@ from kbs_process.plant.laws import select
 from kbs_process.plant.linear.modes import modes
 from kbs_process.reduction.analysis import Analysis, bands_of, passband
 from kbs_process.results.judged import Budget, Frame
+from kbs_process.signals.records import COPY
 from kbs_process.stages import repeatability, repeats
 from kbs_process.stages.bandpass import Band, BandStatement, statement
 from kbs_process.stages.compare import compare
@@ -77,6 +78,8 @@ def _lags(group: Sequence[Analysis]) -> dict[int, float]:
     reference = repeats.motion_of(group[0].run)
     lags = {0: 0.0}
     for index, analysis in enumerate(group[1:], start=1):
+        if any(loss.kind == COPY for loss in analysis.run.losses):
+            continue
         motion = repeats.motion_of(analysis.run)
         late = None if reference is None or motion is None else repeats.lag(reference, motion)
         if late is not None:

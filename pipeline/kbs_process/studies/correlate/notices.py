@@ -15,7 +15,7 @@ from kbs_process.reduction.losses import lost
 from kbs_process.report.prose import Prose
 from kbs_process.results.judged import Requirement
 from kbs_process.results.records import Notice, Severity
-from kbs_process.signals.records import SPIKE, Run
+from kbs_process.signals.records import DROPOUT, SPIKE, Run
 from kbs_process.stages.align.clocks import UNKNOWN_OFFSET_S
 from kbs_process.stages.conventions import SignCheck
 from kbs_process.stages.gravity.model import GravityModel
@@ -32,6 +32,7 @@ NOISY = 1.0
 UNJUDGED = 40
 # rad, standard deviation: a phase that may lie anywhere in a turn has 1.8.
 UNKNOWN_PHASE = 1.0
+LEFT_OUT = (SPIKE, DROPOUT)
 QUANTITY = {"torque": "T", "force": "F"}  # first letter of its channels
 
 _SAYS = Prose("kbs_process.studies.correlate", "notices")
@@ -41,7 +42,7 @@ def notices(campaign: Campaign, analyses: Sequence[Analysis], model: GravityMode
     """Yield everything worth a notice, worst first."""
     yield from _conventions(found.conventions)
     for analysis in analyses:
-        yield from lost(analysis.entry, [loss for loss in analysis.run.losses if loss.kind != SPIKE])
+        yield from lost(analysis.entry, [loss for loss in analysis.run.losses if loss.kind not in LEFT_OUT])
     yield from _unjudged(analyses)
     yield from _static_load(campaign, analyses, model)
     for check in model.fit.checks:
@@ -58,20 +59,20 @@ def notices(campaign: Campaign, analyses: Sequence[Analysis], model: GravityMode
 
 
 def has_spikes(run: Run) -> bool:
-    """Whether single samples of a recording were taken for bad ones."""
-    return any(loss.kind == SPIKE for loss in run.losses)
+    """Whether readings of a recording were taken for bad ones, and left out."""
+    return any(loss.kind in LEFT_OUT for loss in run.losses)
 
 
 def spikes(
     analyses: Sequence[Analysis], without: Sequence[Requirement], with_them: Callable[[], Sequence[Requirement]]
 ) -> Iterable[Notice]:
-    """Single samples off their neighbours, by channel and time, and what is judged with and without them."""
+    """Readings off all others, by channel and time, and what is judged with and without them."""
     spiky = [one for one in analyses if has_spikes(one.run)]
     if not spiky:
         return
     figures = list(zip_longest(without, with_them() if without else ()))
     for analysis in spiky:
-        named = [loss for loss in analysis.run.losses if loss.kind == SPIKE]
+        named = [loss for loss in analysis.run.losses if loss.kind in LEFT_OUT]
         yield _notice("warning", "spikes", analysis.entry.name, named=named, figures=figures)
 
 

@@ -12,7 +12,7 @@ from kbs_process.errors import FitError, RecordingError
 from kbs_process.progress import Progress
 from kbs_process.reduction.analysis import Analysis, analyse
 from kbs_process.reduction.measurable import check_requirements
-from kbs_process.reduction.preparing import Prepared, fit_gravity, prepare
+from kbs_process.reduction.preparing import Prepared, fit_gravity, prepare, told_copies
 from kbs_process.reduction.relief import relieved
 from kbs_process.report.build import publish
 from kbs_process.report.text import count
@@ -41,7 +41,7 @@ def process(
     check_requirements(campaign)
     with writing(target) as folder:
         decoupling = decouple.fit(campaign.rig)
-        prepared = [prepare(campaign, entry, decoupling, progress) for entry in campaign.recordings]
+        prepared = told_copies([prepare(campaign, entry, decoupling, progress) for entry in campaign.recordings])
         found, analyses, model = _found(campaign, prepared, decoupling, progress)
         told = spikes(analyses, found.requirements, lambda: _with_spikes(campaign, prepared, decoupling, progress))
         found = msgspec.structs.replace(found, warnings=(*told, *found.warnings))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -14,7 +13,7 @@ from kbs_process.rig.model import Rig
 from kbs_process.signals.records import Mask, Run
 from kbs_process.stages.conventions import SignCheck, check_encoder_sense, check_gravity_sign
 from kbs_process.stages.motion import Motion
-from kbs_process.stages.repeats import commanded
+from kbs_process.stages.repeats import commanded, copies
 
 LEAST_S = 5.0  # of a recording that can be compared: less has fewer frequencies than a floor has channels
 _REVERSED = 0.5  # a slope of what is read against what is computed is one of the other sign below minus this
@@ -53,14 +52,12 @@ def check_signs(run: Run, moved: Motion, campaign: Campaign, entry: RecordingEnt
 
 def check_copies(runs: Sequence[tuple[RecordingEntry, Run]]) -> None:
     """Raise RecordingError for a recording that holds the readings of another: it would be a repeat without noise."""
-    for (first, one), (second, other) in itertools.combinations(runs, 2):
-        a, b = one.loads, other.loads
-        if a is not None and b is not None and np.array_equal(a.values, b.values):
-            raise RecordingError(
-                f"it has the same readings as {first.path.name}: a copy is no repeat",
-                where=str(second.path),
-                remedy="leave one of them out of campaign.toml",
-            )
+    for place, first in copies([run for _, run in runs]).items():
+        raise RecordingError(
+            f"it has the same readings as {runs[first][0].path.name}: a copy is no repeat",
+            where=str(runs[place][0].path),
+            remedy="leave one of them out of campaign.toml",
+        )
 
 
 def check_length(name: str, valid: Mask, dt: float, where: str) -> None:

@@ -9,7 +9,7 @@ from kbs_process.campaign.config import Campaign, RecordingEntry
 from kbs_process.errors import KbsError, RecordingError
 from kbs_process.progress import Progress
 from kbs_process.reduction.measurable import check_requirements
-from kbs_process.reduction.preparing import Prepared, check_taring, fit_gravity, prepare
+from kbs_process.reduction.preparing import Prepared, check_taring, fit_gravity, prepare, told_copies
 from kbs_process.signals.records import TRUNCATED, Loss
 from kbs_process.stages import decouple
 from kbs_process.stages.gravity.model import GravityModel
@@ -54,7 +54,9 @@ def validate(campaign: Campaign, progress: Progress) -> Validation:
             findings.append(Finding(entry.name, entry.role, error=str(error)))
         else:
             prepared.append(one)
-            findings.append(Finding(entry.name, entry.role, dict(one.run.rates), one.run.losses))
+            findings.append(Finding(entry.name, entry.role, dict(one.run.rates)))
+    losses = {one.entry.name: one.run.losses for one in told_copies(prepared)}
+    findings = [replace(finding, losses=losses.get(finding.name, ())) for finding in findings]
     try:
         check_requirements(campaign)
         if len(prepared) == len(findings):
