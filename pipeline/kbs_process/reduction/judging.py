@@ -42,7 +42,11 @@ class _Candidate:
 
 
 def judged(
-    campaign: Campaign, requirement: Requirement, runs: Sequence[Analysis], budgets: Sequence[results.Budget]
+    campaign: Campaign,
+    requirement: Requirement,
+    runs: Sequence[Analysis],
+    budgets: Sequence[results.Budget],
+    soundness: results.Soundness,
 ) -> results.Requirement:
     """Judge a requirement by the channel and recording that are closest to failing it."""
     band = band_of(requirement, bands_of(campaign.bands))
@@ -66,6 +70,7 @@ def judged(
         [(name, pair.predicted) for name, pair in pairs if pair.predicted is not None], channels, requirement.statistic
     )
     worst = max(measured, key=_Candidate.severity)
+    doubt = soundness.doubt(worst.verdict)
     return results.Requirement(
         name=requirement.name,
         quantity=requirement.quantity,
@@ -80,7 +85,8 @@ def judged(
         low=worst.interval[0],
         high=worst.interval[1],
         margin=requirement.limit - worst.extreme.value,
-        verdict=worst.verdict,
+        verdict="undecided" if doubt else worst.verdict,
+        doubt=doubt,
         recording=worst.extreme.recording,
         channel=worst.extreme.channel,
         time_s=worst.extreme.time_s,

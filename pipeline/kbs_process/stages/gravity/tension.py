@@ -15,6 +15,7 @@ from scipy.stats import chi2
 
 from kbs_process.signals.records import Array
 from kbs_process.stages.gravity.model import GravityModel, taring_error
+from kbs_process.stages.gravity.solve import ZERO
 from kbs_process.stages.gravity.taring import Taring
 
 BEYOND = 4.0  # sigma
@@ -57,9 +58,12 @@ class Tension:
 
 
 def tension(model: GravityModel, tarings: Mapping[str, Taring]) -> Tension:
-    """Compare a fit with its priors, and the zeros of recordings that were not fitted with that of the bias."""
+    """Compare a fit with its priors, and the zeros of recordings that were not fitted with that of the bias.
+
+    How a zero drifts is assumed rather than known: it is not compared.
+    """
     fit = model.fit
-    known = np.isfinite(fit.prior_sigma)
+    known = np.array([not name.startswith(ZERO[1]) for name in fit.names], dtype=np.bool_)
     scale = fit.prior_sigma[known]
     C = fit.moved_covariance[np.ix_(known, known)] / np.outer(scale, scale)
     names = [name for name, prior in zip(fit.names, known, strict=True) if prior]

@@ -14,7 +14,6 @@ from kbs_process.reduction.losses import lost
 from kbs_process.report.prose import Prose
 from kbs_process.results.records import Notice, Severity
 from kbs_process.stages.align.clocks import UNKNOWN_OFFSET_S
-from kbs_process.stages.conventions import SignCheck
 from kbs_process.stages.gravity.model import GravityModel
 from kbs_process.stages.verdict import COVERAGE
 from kbs_process.studies.correlate.results import Repeatability, Results
@@ -36,7 +35,6 @@ _SAYS = Prose("kbs_process.studies.correlate", "notices")
 
 def notices(campaign: Campaign, analyses: Sequence[Analysis], model: GravityModel, found: Results) -> Iterable[Notice]:
     """Yield everything worth a notice, worst first."""
-    yield from _conventions(found.conventions)
     for analysis in analyses:
         yield from lost(analysis.entry, analysis.run.losses)
     yield from _unjudged(analyses)
@@ -57,12 +55,6 @@ def notices(campaign: Campaign, analyses: Sequence[Analysis], model: GravityMode
 def _notice(severity: Severity, name: str, where: str = "", **facts: object) -> Notice:
     """A notice in the words of its template."""
     return Notice(severity=severity, what=_SAYS(name, **facts), where=where, remedy=_SAYS(f"{name}_remedy"))
-
-
-def _conventions(conventions: Sequence[SignCheck]) -> Iterable[Notice]:
-    for check in conventions:
-        if not check.ok:
-            yield _notice("error", "convention", check=check)
 
 
 def _unjudged(analyses: Sequence[Analysis]) -> Iterable[Notice]:

@@ -12,6 +12,7 @@ from kbs_process.reduction.analysis import Analysis, analyse
 from kbs_process.reduction.measurable import check_requirements
 from kbs_process.reduction.preparing import Prepared, fit_gravity, prepare
 from kbs_process.reduction.relief import relieved
+from kbs_process.reduction.soundness import check_model
 from kbs_process.report.build import publish
 from kbs_process.report.text import count
 from kbs_process.results.outcome import Outcome
@@ -37,9 +38,10 @@ def process(
         decoupling = decouple.fit(campaign.rig)
         prepared = [prepare(campaign, entry, decoupling, progress) for entry in campaign.recordings]
         model = fit_gravity(campaign, prepared, progress)
+        checked = check_model(campaign, prepared, model, progress)
         analyses = [_analyse(campaign, one, model, progress) for one in prepared]
         with progress.task("Comparing, summing up uncertainties"):
-            found = summarise(campaign, analyses, model, decoupling)
+            found = summarise(campaign, analyses, model, decoupling, checked)
         with progress.task("Following the transducer's resonance") as task:
             on_transducer = study(campaign, analyses, model.rig, task.update)
         with progress.task("Writing the report"):
