@@ -83,7 +83,7 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
         found = tension(model, {sample.name: taring for sample, taring in tared})
         most = _most(equation)
         reasons = (
-            *_doubled(recordings),
+            *repeated(recordings),
             *_far(found.beyond, found.probability),
             *(f"{one.check} is {one.found}, expected {one.expected}" for one in conventions if not one.ok),
             *_left(model, most),
@@ -120,7 +120,7 @@ def _conventions(
             yield msgspec.structs.replace(check, check=f"{check.check}, {one.entry.name}")
 
 
-def _doubled(recordings: Sequence[Prepared]) -> Iterator[str]:
+def repeated(recordings: Sequence[Prepared]) -> Iterator[str]:
     """Channels that repeat another one, reading by reading."""
     for one in recordings:
         values, names = one.raw.values[one.raw.valid], one.raw.channels
@@ -174,8 +174,12 @@ def _calibrated(campaign: Campaign, samples: Sequence[Sample], model: GravityMod
     if not alone:
         return False
     equation = model.equation
-    by_these = gravity.fit(
-        alone, equation.elements.rig, include_inertia=equation.include_inertia, settings=model.settings
+    by_these = (
+        model
+        if names == set(model.taring)
+        else gravity.fit(
+            alone, equation.elements.rig, include_inertia=equation.include_inertia, settings=model.settings
+        )
     )
     return tension(by_these, {}).sound and not any(_left(by_these, most))
 

@@ -256,7 +256,13 @@ def _solve(data: _Data, fault: Fault, most: Array, *, anew: bool) -> Explained:
         count = 2.0 * len(at) * sum(len(p.q) for p in data.prepared)
         solved = replace(solved, cost=solved.cost + count * float(np.log(abs(open_[0]))))
     free = list(fault.free)
-    return replace(solved, found=numbers[free] if free else open_, stated=data.prior[free])
+    lower = np.concatenate([data.equation.lower(), np.full(len(data.names) - data.equation.size, -np.inf)])
+    return replace(
+        solved,
+        found=numbers[free] if free else open_,
+        stated=data.prior[free],
+        sound=solved.sound and bool(np.all(numbers[free] >= lower[free])),
+    )
 
 
 def _first_gain(data: _Data, at: list[int]) -> float:

@@ -147,14 +147,19 @@ def least_sigma(p: Prepared, rig: Rig) -> Array:
     return floor
 
 
-def refuse_uninformed(equation: Equation, prepared: Sequence[Prepared], sigmas: Sequence[Array], theta: Array) -> None:
-    """Refuse data whose strongest message about the rig, zero and drift aside, is weaker than the prior."""
+def refuse_uninformed(equation: Equation, prepared: Sequence[Prepared]) -> None:
+    """Refuse data whose strongest message about the rig, zero and drift aside, is weaker than the prior.
+
+    What they could say is asked, with the sensor's noise alone: what else is in them is no reason to move more.
+    """
     if equation.size == 0:
         return  # the files know the rig exactly
     blocks = []
-    for p, sigma in zip(prepared, sigmas, strict=True):
-        J = equation.jacobian(theta, p).reshape(len(p.q), len(equation.channels), -1)
-        blocks.append((_without_zero(J, p) / sigma[:, None]).reshape(-1, equation.size))
+    for p in prepared:
+        J = equation.jacobian(equation.start(), p).reshape(len(p.q), len(equation.channels), -1)
+        blocks.append(
+            (_without_zero(J, p) / (10.0 * least_sigma(p, equation.elements.rig))[:, None]).reshape(-1, equation.size)
+        )
     _, s, Vt = np.linalg.svd(np.concatenate(blocks) * equation.sigma(), full_matrices=False)
     if s[0] < 1.0:
         direction = combination(Vt[0], equation.names)
