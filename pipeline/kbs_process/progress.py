@@ -10,6 +10,7 @@ from time import monotonic
 from typing import Protocol, TextIO
 
 from kbs_process import interruption
+from kbs_process.terminal import printable
 
 
 class Task(Protocol):
@@ -51,7 +52,7 @@ class PlainProgress:
 
     @contextmanager
     def task(self, label: str) -> Iterator[Task]:
-        print(label, file=self.stream, flush=True)
+        print(printable(label), file=self.stream, flush=True)
         yield _Task(lambda fraction: None)
 
 
@@ -70,6 +71,9 @@ class TerminalProgress:
 
     @contextmanager
     def task(self, label: str) -> Iterator[Task]:
+        from rich.markup import escape
+
+        label = escape(printable(label))
         bar = self._bars.add_task("  " * self._depth + label, total=1.0)
         begin = monotonic()
         if self._depth == 0:

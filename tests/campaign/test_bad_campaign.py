@@ -217,3 +217,24 @@ def test_error_is_a_bad_input(folder: CampaignFolder) -> None:
     (folder.path / CAMPAIGN).unlink()
     assert ConfigError.exit_status == 2
     assert folder.refusal().exit_status == 2
+
+
+@pytest.mark.parametrize("way", ["../../secret.csv", "absolute", "link"])
+@pytest.mark.parametrize("place", ["value", "parameters", "modal", "mission"])
+def test_no_file_outside_the_campaign_is_read(folder: CampaignFolder, place: str, way: str) -> None:
+    secret = folder.path.parents[1] / "secret.csv"
+    secret.write_text("root:x:0\n")
+    if way == "link":
+        (folder.path / "inside.csv").symlink_to(secret)
+    name = {"absolute": str(secret), "link": "inside.csv"}.get(way, way)
+    if place == "value":
+        folder.replace(RIG, "tilt = { value = [0.0, 0.0]", f'tilt = {{ value = "{name}"')
+    elif place == "parameters":
+        folder.replace(CAMPAIGN, '"parameters/rig.toml"', f'"parameters/rig.toml", "{name}"')
+    elif place == "modal":
+        folder.replace(CAMPAIGN, "[model]", f'[model]\nmodal = "{name}"')
+    else:
+        folder.append(CAMPAIGN, f'[mission]\nfile = "{name}"\n')
+    message = str(folder.refusal())
+    assert f"the file '{name}' lies outside the campaign's folder" in message
+    assert message.endswith("copy it into the folder") and "root:x" not in message

@@ -24,6 +24,7 @@ from kbs_process.errors import RecordingError
 from kbs_process.recordings.mcap.messages.encoding import OutStream
 from kbs_process.recordings.mcap.writer import write_mcap
 from kbs_process.results.outcome import Outcome
+from kbs_process.results.store import writing
 from kbs_process.studies.convert import preset_names
 
 VERBS = ("process", "validate", "inspect", "simulate", "predict", "import", "report", "prove")
@@ -369,8 +370,8 @@ def test_simulate_a_command_file(folder: CampaignFolder, tmp_path: Path) -> None
 @pytest.mark.slow
 def test_an_interrupted_simulation_leaves_the_old_one(folder: CampaignFolder, tmp_path: Path) -> None:
     target = tmp_path / "simulated"
-    target.mkdir()
-    (target / "provenance.json").write_text("old")
+    with writing(target) as private:
+        (private / "provenance.json").write_text("old")
     (tmp_path / "long.csv").write_text("t,az,el\n0,0,1.3\n1,0,1.3\n20000,0,1.31\n")
     command = [sys.executable, "-m", "kbs_process", "simulate", str(folder.path), "-o", str(target)]
     process = subprocess.Popen(
@@ -378,7 +379,7 @@ def test_an_interrupted_simulation_leaves_the_old_one(folder: CampaignFolder, tm
     )
     assert process.stderr is not None
     assert process.stderr.readline() == "Simulating long.csv\n"
-    while not list(tmp_path.glob(".simulated.new-*")):
+    while process.poll() is None and not list(tmp_path.glob(".simulated.new-*")):
         time.sleep(0.01)
     process.send_signal(signal.SIGINT)
     _, message = process.communicate(timeout=120)

@@ -17,6 +17,7 @@ from kbs_process.campaign.load import load_campaign
 from kbs_process.errors import OutputError, RecordingError
 from kbs_process.progress import SilentProgress
 from kbs_process.results.records import encode
+from kbs_process.results.store import LIST
 from kbs_process.studies.correlate.run import Outcome
 from kbs_process.studies.diagnose import diagnosing
 from report import sample
@@ -76,7 +77,7 @@ def test_a_mismatch_is_diagnosed_and_linked(
     page = (finished / "index.html").read_text()
     assert LINK in page
     assert "Why do prediction and recordings differ?" in page
-    assert not list(finished.glob(".*"))
+    assert [path.name for path in finished.glob(".*")] == [LIST]
 
 
 def test_what_the_floor_explains_is_not_diagnosed(

@@ -13,6 +13,7 @@ from kbs_process import cli
 from kbs_process.campaign.load import load_campaign
 from kbs_process.results import provenance
 from kbs_process.results.records import encode
+from kbs_process.results.store import writing
 from kbs_process.studies.correlate.earlier_diagnosis import earlier_diagnosis
 from studies.diagnose.test_report_diagnosis import results
 
@@ -43,8 +44,8 @@ def test_a_diagnosis_of_the_same_inputs_is_kept_and_linked_and_one_of_others_is_
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     folder, out = short_campaign(tmp_path / "campaigns" / "EL089"), tmp_path / "out"
-    diagnose(folder.path, out)
-    (out / "results.json").write_text("{}")  # what tells a folder of results
+    with writing(out) as private:
+        diagnose(folder.path, private)
 
     assert run(folder.path, "-o", out) == 0
     told = capsys.readouterr()

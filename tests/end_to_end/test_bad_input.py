@@ -16,6 +16,7 @@ import pytest
 from campaign.campaign_folder import CampaignFolder
 from end_to_end.command import kbs_process
 from end_to_end.short_campaign import record
+from kbs_process.results.store import LIST, writing
 
 pytestmark = pytest.mark.slow
 
@@ -27,9 +28,9 @@ FIRST = "AZPS_ATA.mcap"
 def refused(folder: CampaignFolder, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Callable[[], str]:
     """Processes the folder, which must be refused, and returns the message."""
     target = tmp_path / "results"
-    target.mkdir()
-    (target / "results.json").write_text("old")
-    (target / "index.html").write_text("old page")
+    with writing(target) as folder_of_before:
+        (folder_of_before / "results.json").write_text("old")
+        (folder_of_before / "index.html").write_text("old page")
 
     def run() -> str:
         ended = kbs_process(capsys, folder.path, "-o", target, "-q")
@@ -38,7 +39,7 @@ def refused(folder: CampaignFolder, tmp_path: Path, capsys: pytest.CaptureFixtur
         assert ended.err.startswith("error: ")
         assert "Traceback" not in ended.err
         assert "\n  -> " in ended.err
-        assert {path.name: path.read_text() for path in target.iterdir()} == {
+        assert {path.name: path.read_text() for path in target.iterdir() if path.name != LIST} == {
             "results.json": "old",
             "index.html": "old page",
         }

@@ -13,6 +13,7 @@ import pytest
 
 from campaign.campaign_folder import CampaignFolder
 from end_to_end.command import kbs_process
+from kbs_process.results.store import LIST, writing
 
 pytestmark = pytest.mark.slow
 
@@ -25,9 +26,9 @@ PATIENCE = 120.0  # s
 def target(tmp_path: Path) -> Path:
     """A folder with results of before."""
     folder = tmp_path / "results"
-    folder.mkdir()
-    for name, text in OLD.items():
-        (folder / name).write_text(text)
+    with writing(folder) as new:
+        for name, text in OLD.items():
+            (new / name).write_text(text)
     return folder
 
 
@@ -73,7 +74,7 @@ def wait_for(found: Callable[[], object], process: subprocess.Popen[str]) -> Non
 
 
 def content(folder: Path) -> dict[str, str]:
-    return {path.name: path.read_text() for path in folder.iterdir()}
+    return {path.name: path.read_text() for path in folder.iterdir() if path.name != LIST}
 
 
 def state(folder: Path) -> dict[Path, tuple[int, int]]:

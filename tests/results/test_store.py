@@ -11,6 +11,7 @@ import sys
 import tempfile
 import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -30,7 +31,8 @@ def write(target: Path, text: str) -> None:
 
 
 def content(target: Path) -> dict[str, str]:
-    return {str(path.relative_to(target)): path.read_text() for path in target.rglob("*") if path.is_file()}
+    files = (path for path in target.rglob("*") if path.is_file() and path.name != store.LIST)
+    return {str(path.relative_to(target)): path.read_text() for path in files}
 
 
 def whole(text: str) -> dict[str, str]:
@@ -323,15 +325,18 @@ def test_a_folder_with_something_else_is_not_replaced(tmp_path: Path) -> None:
     target = tmp_path / "thesis"
     target.mkdir()
     (target / "chapter1.tex").write_text("years of work")
-    with pytest.raises(OutputError, match="holds no results"):
+    with pytest.raises(OutputError, match="kbs-process did not make it"):
         write(target, "new")
     assert (target / "chapter1.tex").read_text() == "years of work"
 
 
 def test_revising_keeps_what_it_does_not_replace(tmp_path: Path) -> None:
     target = tmp_path / "A"
-    write(target, "old")
-    (target / "index.html").write_text("old page")
+    with writing(target) as folder:
+        (folder / MARKER).write_text("old")
+        (folder / "tables").mkdir()
+        (folder / "tables" / "a.parquet").write_text("old")
+        (folder / "index.html").write_text("old page")
     with revising(target, without=("index.html",)) as folder:
         assert not (folder / "index.html").exists()
         (folder / "index.html").write_text("new page")
@@ -349,3 +354,118 @@ def test_results_are_as_readable_as_any_folder(tmp_path: Path) -> None:
 def test_a_place_where_no_folder_can_be() -> None:
     with pytest.raises(OutputError, match="cannot be written"):
         write(Path("/proc/no-such-folder"), "new")
+
+
+def test_files_of_the_user_stay(tmp_path: Path) -> None:
+    target, elsewhere = tmp_path / "A", tmp_path / "elsewhere"
+    write(target, "old")
+    elsewhere.mkdir()
+    (elsewhere / "thesis.tex").write_text("years of work")
+    (target / "tables" / "notes.txt").write_text("seen by me")
+    (target / "linked").symlink_to(elsewhere)
+    for text in ("new", "newer"):
+        write(target, text)
+        assert content(target) == whole(text) | {"tables/notes.txt": "seen by me"}
+        assert (target / "linked").readlink() == elsewhere
+    with revising(target) as folder:
+        (folder / "index.html").write_text("page")
+    write(target, "newest")
+    assert content(target) == whole("newest") | {"tables/notes.txt": "seen by me"}
+    assert (elsewhere / "thesis.tex").read_text() == "years of work"
+
+
+def test_a_file_that_the_user_changed_is_not_lost(tmp_path: Path) -> None:
+    target = tmp_path / "A"
+    write(target, "old")
+    (target / "tables" / "a.parquet").write_text("corrected by hand")
+    for change in (lambda: write(target, "new"), lambda: revising(target).__enter__()):
+        with pytest.raises(OutputError, match=r"a\.parquet: was changed since"):
+            change()
+    assert content(target) == whole("old") | {"tables/a.parquet": "corrected by hand"}
+
+
+def test_a_file_of_the_user_in_the_place_of_a_result_is_not_lost(tmp_path: Path) -> None:
+    target = tmp_path / "A"
+    write(target, "old")
+    (target / "index.html").write_text("mine")
+    with pytest.raises(OutputError, match="stands where a result has to be"), writing(target) as folder:
+        (folder / "index.html").write_text("page")
+    assert content(target) == whole("old") | {"index.html": "mine"}
+
+
+def test_a_folder_with_results_of_something_else_is_not_replaced(tmp_path: Path) -> None:
+    target = tmp_path / "p"
+    (target / "src").mkdir(parents=True)
+    (target / MARKER).write_text('{"other": 1}')
+    (target / "src" / "a.py").write_text("x")
+    with pytest.raises(OutputError, match="kbs-process did not make it"):
+        write(target, "new")
+    assert content(target) == {MARKER: '{"other": 1}', "src/a.py": "x"}
+
+
+def test_what_stands_beside_the_results_and_is_the_users_stays(tmp_path: Path) -> None:
+    target = tmp_path / "A"
+    for name in (".A.old", ".A.new-photos", ".A.new-abcdefgh"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "mine").write_text("mine")
+    write(target, "first")
+    write(target, "second")
+    assert content(target) == whole("second")
+    assert leftovers(target) == [".A.new-abcdefgh", ".A.new-photos", ".A.old"]
+
+
+@pytest.mark.parametrize("kind", ["link", "dangling", "hard link", "file", "folder", "pipe"])
+def test_a_lock_that_is_not_one_is_not_touched(tmp_path: Path, kind: str) -> None:
+    target, lock, victim = tmp_path / "out" / "A", tmp_path / "out" / ".A.lock", tmp_path / "keys"
+    target.parent.mkdir()
+    victim.write_text("ssh-ed25519 AAAA")
+    makers: dict[str, Callable[[], object]] = {
+        "link": lambda: lock.symlink_to(victim),
+        "dangling": lambda: lock.symlink_to(tmp_path / "nothing"),
+        "hard link": lambda: lock.hardlink_to(victim),
+        "file": lambda: lock.write_text("my notes"),
+        "folder": lock.mkdir,
+        "pipe": lambda: os.mkfifo(lock),
+    }
+    makers[kind]()
+    with pytest.raises(OutputError, match="no lock of kbs-process"):
+        write(target, "new")
+    assert victim.read_text() == "ssh-ed25519 AAAA"
+    assert os.path.lexists(lock) and not target.exists() and not (tmp_path / "nothing").exists()
+    assert kind != "file" or lock.read_text() == "my notes"
+
+
+def test_results_go_where_a_link_leads_and_the_link_stays(tmp_path: Path) -> None:
+    disk, target = tmp_path / "disk", tmp_path / "results"
+    disk.mkdir()
+    target.symlink_to(disk)
+    write(target, "first")
+    write(target, "second")
+    assert target.readlink() == disk
+    assert content(disk) == whole("second")
+
+
+@pytest.mark.parametrize("name", ["n" * 243, "n" * 300, "/".join(["n" * 200] * 30)])
+def test_a_name_that_is_too_long(tmp_path: Path, name: str) -> None:
+    with pytest.raises(OutputError, match="cannot be written: File name too long"):
+        write(tmp_path / name, "new")
+
+
+def test_the_list_of_results_is_one_that_others_can_check(tmp_path: Path) -> None:
+    target = tmp_path / "A"
+    write(target, "new")
+    told = subprocess.check_output(["sha256sum", "-c", "--strict", store.LIST], cwd=target, text=True)
+    assert told == "results.json: OK\ntables/a.parquet: OK\n"
+
+
+def test_results_of_before_such_lists_are_revised_but_not_replaced(tmp_path: Path) -> None:
+    target = tmp_path / "A"
+    target.mkdir()
+    for name in (MARKER, "index.html", "notes.txt"):
+        (target / name).write_text("old")
+    with revising(target, without=("index.html",)) as folder:
+        (folder / "index.html").write_text("new page")
+    assert content(target) == {MARKER: "old", "index.html": "new page", "notes.txt": "old"}
+    with pytest.raises(OutputError, match="stands where a result has to be"):
+        write(target, "new")
+    assert content(target) == {MARKER: "old", "index.html": "new page", "notes.txt": "old"}

@@ -53,6 +53,23 @@ def dotted(key: Key) -> str:
     return text
 
 
+def within(folder: Path, name: str, *, where: str) -> Path:
+    """Return the path of a file that a campaign names, below its folder `folder`, wherever links lead.
+
+    Raises ConfigError if it lies outside: a description from elsewhere shall not show what else is on a disk.
+    """
+    path = folder / name
+    try:
+        inside = path.resolve().is_relative_to(folder.resolve())
+    except (OSError, ValueError, RuntimeError):  # no name of a file: who reads it says so
+        return path
+    if not inside:
+        raise ConfigError(
+            f"the file '{name}' lies outside the campaign's folder", where=where, remedy="copy it into the folder"
+        )
+    return path
+
+
 def read(path: Path, *, role: str, remedy: str) -> Document:
     """Read one TOML file; `role` says what it is for in the message when it is missing."""
     try:

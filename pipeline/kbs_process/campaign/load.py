@@ -8,7 +8,7 @@ from pathlib import Path
 
 from kbs_process.campaign.checks import check_campaign
 from kbs_process.campaign.config import Bands, Campaign, RecordingEntry, SensingLaw, Topic, Topics
-from kbs_process.campaign.documents import Document, Merged, merge, read, substituted
+from kbs_process.campaign.documents import Document, Merged, merge, read, shown, substituted, within
 from kbs_process.campaign.formats.campaign_file import (
     CampaignFile,
     EncoderTable,
@@ -83,13 +83,16 @@ def _substitute_flight(
 
 def _read_each(folder: Path, files: Iterable[str], key: str) -> list[Document]:
     remedy = f"correct {key} in {CAMPAIGN_FILE}, or add the file"
-    return [read(folder / name, role="the parameter file", remedy=remedy) for name in files]
+    where = shown(folder / CAMPAIGN_FILE)
+    paths = [within(folder, name, where=f"{where}: {key}") for name in files]
+    return [read(path, role="the parameter file", remedy=remedy) for path in paths]
 
 
 def _campaign(
     folder: Path, file: CampaignFile, document: Document, tables: Merged, rig: Rig, problems: Problems
 ) -> Campaign:
-    modal = folder / file.model.modal if file.model and file.model.modal else None
+    where = shown(document.path)
+    modal = within(folder, file.model.modal, where=where) if file.model and file.model.modal else None
     requirements = (
         disturbance(table, ("requirement", index), document, problems) for index, table in enumerate(file.requirement)
     )
@@ -117,7 +120,7 @@ def _campaign(
             *_matrices(folder, tables.tree),
             *(() if modal is None else (modal,)),
         ),
-        mission=folder / file.mission.file if file.mission else None,
+        mission=within(folder, file.mission.file, where=where) if file.mission else None,
         flight_pointing=tuple(
             pointing(table, ("flight", "pointing", index), document, problems)
             for index, table in enumerate(flight_pointing)

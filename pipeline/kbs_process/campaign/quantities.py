@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from kbs_process.campaign.documents import within
 from kbs_process.campaign.formats.kind import CHANNELWISE, PAIRWISE, Kind
 from kbs_process.campaign.formats.tables import PlainQuantity, QuantityTable
 from kbs_process.campaign.units import UnitMismatchError, factor
@@ -49,7 +50,7 @@ def quantity_or_fault(
 
 def _array(given: Any, key: str, folder: Path) -> Array:
     if isinstance(given, str):
-        return from_csv(folder / given, key)
+        return from_csv(within(folder, given, where=key), key)
     try:
         array = np.asarray(given, dtype=np.float64)
     except ValueError as error:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 
 import click
 
@@ -26,6 +27,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
     os.environ["OPENBLAS_NUM_THREADS"] = "1"
     words = list(sys.argv[1:] if arguments is None else arguments)
     debug = "--debug" in words
+    try:
+        Path.cwd()
+    except FileNotFoundError:
+        complain("error: the folder that this terminal is in was removed\n  -> change to another one: cd")
+        sys.exit(BAD_INPUT)
     try:
         with interruption.heeded():
             cli.main([word for word in words if word != "--debug"], prog_name="kbs-process", standalone_mode=False)

@@ -21,6 +21,7 @@ from kbs_process.cli.shared import (
     pdf_option,
     progress,
     quiet_option,
+    say,
 )
 from kbs_process.errors import ConfigError, FitError, RecordingError, SimulationError
 
@@ -65,7 +66,7 @@ def process(campaign: str, output: Path | None, pdf: bool | None, check: bool, w
     try:
         conclude(outcome)
         if why is False and before is not None and not before.outdated:
-            click.echo(f"Diagnosis, of the same inputs, kept from before: {before.folder}")
+            say(f"Diagnosis, of the same inputs, kept from before: {before.folder}")
         if why is not False:
             _diagnose(loaded, target, progress=progress(quiet), pdf=pdf, wanted=why is True)
     except KeyboardInterrupt:
@@ -82,11 +83,11 @@ def _diagnose(campaign: Campaign, results: Path, *, progress: Progress, pdf: boo
 
     try:
         for line in diagnose_results(campaign, results, render=render, progress=progress, pdf=pdf):
-            click.echo(line)
+            say(line)
     except (ConfigError, RecordingError, FitError, SimulationError) as error:
         if wanted:
             raise
-        click.echo(f"Not diagnosed: {error}")
+        say(f"Not diagnosed: {error}")
     except Exception:
         complain("the report is written, but the diagnosis failed")
         raise
@@ -108,7 +109,7 @@ def validate(campaign: str, check: bool, quiet: bool) -> None:
 
     loaded = load_campaign(find_campaign(campaign))
     found = run(loaded, progress(quiet))
-    click.echo("\n".join(describe(loaded, found)))
+    say(*describe(loaded, found))
     if found.refused:
         sys.exit(BAD_INPUT)
     if check and (found.notices or any(finding.lossy for finding in found.findings)):
@@ -127,5 +128,5 @@ def report(results: Path, pdf: bool | None) -> None:
         page = render(folder, pdf)
         stale = (results / "report.pdf").is_file() and not (folder / "report.pdf").is_file()
     if stale:
-        click.echo(f"{results / 'report.pdf'} showed the report of before, and is gone: --pdf makes it again")
-    click.echo(f"Report: {results / page.name}")
+        say(f"{results / 'report.pdf'} showed the report of before, and is gone: --pdf makes it again")
+    say(f"Report: {results / page.name}")

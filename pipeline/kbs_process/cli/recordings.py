@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import sys
 from pathlib import Path
 
@@ -14,9 +13,11 @@ from kbs_process.cli.shared import (
     FOLDER,
     NOT_MET,
     check_option,
+    complain,
     examples,
     progress,
     quiet_option,
+    say,
 )
 from kbs_process.studies.convert import preset_names
 
@@ -36,7 +37,7 @@ def inspect(files: tuple[Path, ...], check: bool) -> None:
     for path in files:
         inspection = inspect_recording(path)
         states.add(inspection.state)
-        click.echo("\n".join(describe_inspection(inspection)))
+        say(*(line.replace("\n", r"\n") for line in describe_inspection(inspection)))
     if "unreadable" in states:
         sys.exit(BAD_INPUT)
     if check and "lossy" in states:
@@ -71,6 +72,5 @@ def import_(mapping: str | None, source: Path | None, campaign: Path | None, fil
         )
     from kbs_process.studies.convert.run import import_recordings
 
-    notice = functools.partial(click.echo, err=True)
-    made = import_recordings(mapping, source, campaign, progress=progress(quiet), notice=notice)
-    click.echo(f"Campaign: {made}")
+    made = import_recordings(mapping, source, campaign, progress=progress(quiet), notice=complain)
+    say(f"Campaign: {made}")

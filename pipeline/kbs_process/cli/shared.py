@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from kbs_process.terminal import printable
+
 if TYPE_CHECKING:
     from kbs_process.progress import Progress
     from kbs_process.results.outcome import Outcome
@@ -78,9 +80,15 @@ def progress(quiet: bool) -> Progress:
     return SilentProgress() if quiet else progress_for_terminal()
 
 
+def say(*lines: str) -> None:
+    """Print lines."""
+    for line in lines:
+        click.echo(printable(line))
+
+
 def complain(message: str) -> None:
     """Say what went wrong, beside the output."""
-    click.echo(message, err=True)
+    click.echo(printable(message), err=True)
 
 
 def verb(
@@ -136,7 +144,6 @@ def conclude(outcome: Outcome | Iterable[str], *, check: bool = False) -> None:
     """Print what a study tells, and end with the status of a requirement that is not met if `check` asks for it."""
     from kbs_process.results.outcome import Outcome
 
-    for line in outcome.lines if isinstance(outcome, Outcome) else outcome:
-        click.echo(line)
+    say(*(outcome.lines if isinstance(outcome, Outcome) else outcome))
     if check and isinstance(outcome, Outcome) and outcome.requirement_met is False:
         sys.exit(NOT_MET)

@@ -123,7 +123,7 @@ def along_text(effect: Effect) -> str:
     signals = [line for name, line in lines_of.items() if name in wired]
     lines = [
         f'"""Generated: {effect.name} along signals."""',
-        "from numba import njit",
+        "from kbs_process.machine_code import njit",
         "from kbs_process.plant.compiled.elementary import linked",
         f"from {effect.equation.__module__} import {effect.equation.__qualname__} as _equation",
         "",

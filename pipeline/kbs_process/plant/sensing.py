@@ -82,7 +82,7 @@ def recursion(function: Callable[[Array, float], Array]) -> Callable[[Array, flo
 
     @cache
     def compiled() -> Callable[[Array, float], Array]:
-        from numba import njit
+        from kbs_process.machine_code import njit
 
         made: Callable[[Array, float], Array] = njit(cache=True, error_model="numpy")(function)
         return made

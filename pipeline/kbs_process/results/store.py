@@ -1,4 +1,4 @@
-"""Results on disk: written aside, then put in place in one step, by one process at a time.
+"""Results on disk: written aside, then put in place in one step, by one process at a time; nothing else is touched.
 
 Beside the target T lie, while its results are written,
     .T.lock      locked (flock) by the process that writes, which removes it at its end
@@ -6,6 +6,10 @@ Beside the target T lie, while its results are written,
     .T.old       the old results, where the system cannot exchange two folders in one step
 A process that is killed leaves some of them behind; the next one that holds the lock, for which a file that nobody has
 locked is none, cleans up.
+
+In every folder of results lies a list of the files that were written, each with its SHA-256 (`sha256sum -c` reads it).
+What it does not prove to be of this program is the user's: it is kept, or nothing is written. No link is followed,
+save that T itself may be one: then all of this happens where it leads.
 """
 
 from __future__ import annotations
@@ -13,8 +17,11 @@ from __future__ import annotations
 import ctypes
 import errno
 import fcntl
+import hashlib
 import os
+import re
 import shutil
+import stat
 import sys
 import tempfile
 from collections.abc import Collection, Iterator
@@ -24,13 +31,17 @@ from pathlib import Path
 from kbs_process import interruption
 from kbs_process.errors import OutputError
 
-RESULTS = "results.json"  # a folder that holds this file is one that may be replaced
+RESULTS = "results.json"  # a folder that holds this file holds results
+LIST = ".kbs-process.sha256"  # the list of what was written, in a folder of results
 
+_HOLDER = re.compile(rb"(process \d+ on [^\n]*)?")  # what a lock may say
 _FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
 _REFUSED = {
     errno.EACCES,
     errno.EPERM,
     errno.EROFS,
+    errno.ENAMETOOLONG,
+    errno.ELOOP,
     errno.EEXIST,
     errno.ENOTDIR,
     errno.ENOENT,
@@ -38,41 +49,54 @@ _REFUSED = {
 
 
 @contextmanager
-def writing(target: Path, *, marker: str = RESULTS) -> Iterator[Path]:
+def writing(target: Path) -> Iterator[Path]:
     """Yield an empty private folder that replaces `target`, whole, when the block ends well.
 
-    Until then, and whenever the block fails or the process dies, `target` stays as it was. A folder that is
-    not empty is replaced only if it holds `marker`, which every set of results has to contain.
+    Until then, and whenever the block fails or the process dies, `target` stays as it was. Files in it that this
+    program did not write move into the new folder.
 
-    Raises OutputError if the place cannot be written, is full, holds something else, or is being written.
+    Raises OutputError if the place cannot be written, is full, holds something else, or is being written; or if a file
+    was changed since it was written here.
     """
-    target = target.absolute()
-    with _explaining(target), _locked(target):
-        _recover(target)
-        _refuse_foreign(target, marker)
-        private = _private_folder(target)
-        try:
-            yield private
-            if not (private / marker).is_file():
-                raise RuntimeError(f"results without {marker}")
-            _flush(private)
-            interruption.check()
-            _put_in_place(private, target)
-        finally:
-            shutil.rmtree(private, ignore_errors=True)
+    with _replacing(target) as private:
+        yield private
 
 
 @contextmanager
-def revising(target: Path, *, without: Collection[str] = (), marker: str = RESULTS) -> Iterator[Path]:
+def revising(target: Path, *, without: Collection[str] = ()) -> Iterator[Path]:
     """Yield a private folder with the files of `target`, save those `without`, that replaces it like `writing`.
 
     The files are links to the old ones: the block may add files, and must not write into those it finds.
     """
-    if not (target / marker).is_file():
-        raise OutputError(f"holds no results (no {marker})", where=str(target), remedy="process the campaign first")
-    with writing(target, marker=marker) as private:
-        link_tree(target, private, without=without)
+    if not (target / RESULTS).is_file():
+        raise OutputError(f"holds no results (no {RESULTS})", where=str(target), remedy="process the campaign first")
+    with _replacing(target, revised=without) as private:
+        link_tree(target, private, without={*without, LIST})
         yield private
+
+
+@contextmanager
+def _replacing(target: Path, *, revised: Collection[str] | None = None) -> Iterator[Path]:
+    """Yield the private folder of `target`, which, where it is `revised`, may be of before such lists.
+
+    Then those entries of it are taken for this program's.
+    """
+    with _explaining(target):
+        target = Path(os.path.realpath(target))
+        with _locked(target):
+            _recover(target)
+            users = _files_of_the_user(target, revised=revised)
+            private = _private_folder(target)
+            try:
+                yield private
+                for name in users:
+                    _keep(target / name, private / name)
+                _list_files(private, save=users)
+                _flush(private)
+                interruption.check()
+                _put_in_place(private, target)
+            finally:
+                shutil.rmtree(private, ignore_errors=True)
 
 
 def link_tree(source: Path, target: Path, *, without: Collection[str] = ()) -> None:
@@ -80,6 +104,7 @@ def link_tree(source: Path, target: Path, *, without: Collection[str] = ()) -> N
     shutil.copytree(
         source,
         target,
+        symlinks=True,
         copy_function=_link,
         dirs_exist_ok=True,
         ignore=lambda folder, names: [name for name in names if name in without and Path(folder) == source],
@@ -89,9 +114,9 @@ def link_tree(source: Path, target: Path, *, without: Collection[str] = ()) -> N
 def _link(source: str, target: str) -> None:
     """Link a file where the file system can, copy it elsewhere."""
     try:
-        os.link(source, target)
+        os.link(source, target, follow_symlinks=False)
     except OSError:
-        shutil.copy2(source, target)
+        shutil.copy2(source, target, follow_symlinks=False)
 
 
 @contextmanager
@@ -114,17 +139,33 @@ def _locked(target: Path) -> Iterator[None]:
 
 def _lock(path: Path, target: Path) -> int | None:
     """Return a descriptor of the file, locked and empty; None where its holder has removed it meanwhile."""
-    descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+    foreign = OutputError(
+        "is no lock of kbs-process, and stands where that has to be",
+        where=str(path),
+        remedy="move it, or name another folder with --output",
+    )
     try:
+        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK, 0o644)
+    except OSError as error:
+        if error.errno in (errno.ELOOP, errno.EISDIR, errno.ENXIO) and os.path.lexists(path):
+            raise foreign from None
+        raise
+    try:
+        status = os.fstat(descriptor)
+        if not stat.S_ISREG(status.st_mode) or status.st_nlink > 1:
+            raise foreign
+        said = os.read(descriptor, 300)
+        if not _HOLDER.fullmatch(said):
+            raise foreign
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         if _is_at(descriptor, path):
             os.ftruncate(descriptor, 0)
+            os.lseek(descriptor, 0, os.SEEK_SET)
             return descriptor
     except BlockingIOError as error:
-        holder = os.read(descriptor, 200).decode(errors="replace").strip() or "another process"
         os.close(descriptor)
         raise OutputError(
-            f"{holder} is writing results there",
+            f"{said.decode(errors='replace') or 'another process'} is writing results there",
             where=str(target),
             remedy="wait until it is done, or name another folder with --output",
         ) from error
@@ -150,27 +191,93 @@ def _beside(target: Path, suffix: str) -> Path:
 def _recover(target: Path) -> None:
     """Undo or finish what a process that died has left; only for the holder of the lock."""
     old = _beside(target, "old")
-    if old.is_dir() and not target.exists():
+    if _is_ours(old) and not target.exists():
         old.rename(target)
-    private = _beside(target, "new-").name
+    made = re.compile(re.escape(_beside(target, "new-").name) + r"\w{8}")
     for path in target.parent.iterdir():
-        if path == old or path.name.startswith(private):
+        if (path == old or made.fullmatch(path.name)) and _is_ours(path):
             shutil.rmtree(path, ignore_errors=True)
 
 
-def _refuse_foreign(target: Path, marker: str) -> None:
-    if not target.exists() or (target / marker).is_file():
-        return
-    if not target.is_dir() or any(target.iterdir()):
+def _is_ours(folder: Path) -> bool:
+    """Whether this program made a folder."""
+    return folder.is_dir() and not folder.is_symlink() and (folder / LIST).is_file()
+
+
+def _files_of_the_user(target: Path, *, revised: Collection[str] | None) -> list[str]:
+    """Return the files in the folder that this program did not write; refuse one that it cannot replace."""
+    if not target.exists():
+        return []
+    if not target.is_dir() or (any(target.iterdir()) and not _is_ours(target) and revised is None):
         raise OutputError(
-            f"is there already, and holds no results (no {marker})",
+            f"is there already, and kbs-process did not make it (no {LIST})",
             where=str(target),
             remedy="name a new or an empty folder with --output",
         )
+    written = {name: digest for digest, name in _listed(target)}
+    users = []
+    for name in _files(target):
+        if name not in written:
+            if written or name.partition("/")[0] not in (revised or ()):
+                users.append(name)
+        elif _digest(target / name) != written[name]:
+            raise OutputError(
+                "was changed since kbs-process wrote it, and would be lost",
+                where=str(target / name),
+                remedy="move it out of the folder, or name another folder with --output",
+            )
+    return users
+
+
+def _files(folder: Path) -> list[str]:
+    """Return the names of all files and links below a folder, save the list of them, in order."""
+    names = []
+    for root, folders, files in os.walk(folder):
+        links = [name for name in folders if (Path(root) / name).is_symlink()]
+        names += [(Path(root) / name).relative_to(folder).as_posix() for name in (*files, *links)]
+    return sorted(name for name in names if name != LIST)
+
+
+def _digest(path: Path) -> str:
+    """Return the SHA-256 of a file; of a link, of where it leads."""
+    if path.is_symlink():
+        return hashlib.sha256(os.fsencode(path.readlink())).hexdigest()
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def _list_files(folder: Path, *, save: Collection[str]) -> None:
+    """Write the list of a folder's files, `save` those of the user, as `sha256sum` does."""
+    names = [name for name in _files(folder) if name not in set(save)]
+    (folder / LIST).write_text("".join(f"{_digest(folder / name)}  {name}\n" for name in names), encoding="utf-8")
+
+
+def _listed(folder: Path) -> list[tuple[str, str]]:
+    """Return digest and name of each file in a folder's list."""
+    try:
+        lines = (folder / LIST).read_text(encoding="utf-8", errors="replace").splitlines()
+    except FileNotFoundError:
+        return []
+    return [(digest, name) for digest, _, name in (line.partition("  ") for line in lines)]
+
+
+def _keep(source: Path, target: Path) -> None:
+    """Let a file of the user be in the new results, too."""
+    if os.path.lexists(target):
+        if _digest(source) == _digest(target):
+            return
+        raise OutputError(
+            "is not of kbs-process, and stands where a result has to be",
+            where=str(source),
+            remedy="move it, or name another folder with --output",
+        )
+    target.parent.mkdir(parents=True, exist_ok=True)
+    _link(str(source), str(target))
 
 
 def _private_folder(target: Path) -> Path:
     private = Path(tempfile.mkdtemp(prefix=f".{target.name}.new-", dir=target.parent))
+    (private / LIST).touch()
     # mkdtemp is for secrets; results are as readable as any folder made here.
     umask = os.umask(0)
     os.umask(umask)
@@ -182,7 +289,8 @@ def _flush(folder: Path) -> None:
     """Make the system write every file to the disk, and the folders that name them."""
     for root, _, files in os.walk(folder):
         for path in (*(Path(root) / name for name in files), Path(root)):
-            _fsync(path)
+            if not path.is_symlink():
+                _fsync(path)
 
 
 def _fsync(path: Path) -> None:

@@ -20,9 +20,9 @@ References: Pollock, J. Econometrics 99 (2000) 317-334; Gomez, J. Bus. Econ. Sta
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
+from kbs_process.machine_code import njit
 from kbs_process.signals.records import Array
 
 METHOD = "penalised second-difference trend (zero-phase Butterworth, order 2 x 2, without padding)"
@@ -53,7 +53,7 @@ def high_pass(x: Array, f0: float, dt: float) -> Array:
     return y
 
 
-@numba.njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def _solve(z: Array, diagonal: float) -> None:
     """Replace z (n, c) by A^-1 z, A having `diagonal`, then -4 and 1 beside it: A = L D L', L of two subdiagonals.
 

@@ -62,6 +62,15 @@ def test_file_is_written_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     assert [path.name for path in tmp_path.iterdir()] == ["plant_x.py"]
 
 
+def test_a_damaged_file_is_written_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("KBS_CACHE", str(tmp_path))
+    path = Path(str(compiling.compiled_module("test", "WHOLE = 42\n", []).__file__))
+    for damage in (b"", b"\xff\xfe\0" * 100):
+        path.write_bytes(damage)
+        del sys.modules[path.stem]
+        assert compiling.compiled_module("test", "WHOLE = 42\n", []).WHOLE == 42
+
+
 def test_a_folder_that_cannot_be_written_is_done_without(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "file").write_text("not a folder")
     monkeypatch.setenv("KBS_CACHE", str(tmp_path / "file" / "below"))

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from kbs_process.campaign.config import Campaign
-from kbs_process.campaign.documents import Tree, read
+from kbs_process.campaign.documents import Tree, read, within
 from kbs_process.campaign.quantities import from_csv
 from kbs_process.rig.model import Quantity
 
@@ -42,7 +42,9 @@ def whole(tree: Tree, folder: Path) -> Tree:
             new[key] = child
         elif "value" in child:
             named = (part for part in ("value", "sigma") if isinstance(child.get(part), str))
-            new[key] = child | {part: _numbers(from_csv(folder / child[part], part)) for part in named}
+            new[key] = child | {
+                part: _numbers(from_csv(within(folder, child[part], where=part), part)) for part in named
+            }
         else:
             new[key] = whole(child, folder)
     return new

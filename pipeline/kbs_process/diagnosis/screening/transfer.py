@@ -14,13 +14,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 from scipy.linalg import expm
 
 from kbs_process.diagnosis.screening.inlets import Inlet, generalised, inlets_of
+from kbs_process.machine_code import njit
 from kbs_process.plant.effect import CROSSED, SIGNALS, Effect, Port
 from kbs_process.plant.linear.linearise import Linear, drive_damping, drive_stiffness, linearise
 from kbs_process.plant.structure import other_joint
@@ -230,7 +230,7 @@ def _equilibrium(path: Path, forces: Array, column_of: Index, columns: int) -> A
     return state
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=True)
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=True)
 def _along(
     knots: Array,
     step: Array,

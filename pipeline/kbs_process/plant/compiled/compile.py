@@ -114,7 +114,7 @@ def _write(folder: Path, name: str, text: str) -> Path:
     folder.mkdir(parents=True, exist_ok=True)
     if not os.access(folder, os.W_OK):
         raise PermissionError(f"{folder} cannot be written, and machine code belongs beside its source")
-    if path.is_file() and path.read_text(encoding="utf-8") == text:
+    if path.is_file() and path.read_bytes() == text.encode():
         return path  # a new time of modification would void the machine code beside it
     handle, aside = tempfile.mkstemp(dir=folder, prefix=name, suffix=".tmp")
     with os.fdopen(handle, "w", encoding="utf-8") as file:

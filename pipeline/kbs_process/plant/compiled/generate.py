@@ -38,7 +38,7 @@ def _head(structure: Structure) -> list[str]:
     return [
         f'"""Generated: plant with {shape}, effects {", ".join(e.name for e in every)}."""',
         "import numpy as np",
-        "from numba import njit",
+        "from kbs_process.machine_code import njit",
         "from kbs_process.plant.compiled.kernels import (",
         "    add3, add6, add_inertia, chain, compiled, compiled_effect, cross3, cross_force, cross_motion, dot3, dot6,",
         "    drift, floor, force_at, from_plate, in_plate, inertia, joint_rotation, mean_rounded, momentum, placed,",

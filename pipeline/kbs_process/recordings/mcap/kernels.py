@@ -13,11 +13,12 @@ from typing import Any
 
 import numpy as np
 from llvmlite import ir  # type: ignore[import-untyped]
-from numba import njit, types
+from numba import types
 from numba.extending import intrinsic
 from numba.np.arrayobj import make_array
 from numpy.typing import NDArray
 
+from kbs_process.machine_code import njit
 from kbs_process.signals.records import Array, Mask, Stamps
 
 Bytes = NDArray[np.uint8]

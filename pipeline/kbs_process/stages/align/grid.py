@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 
+from kbs_process.machine_code import njit
 from kbs_process.signals.records import Array, Mask, Stamps
 
 GAP = 1.5  # nominal periods: a longer step is a gap, if the stamps around it do not say that it is jitter
@@ -132,7 +132,7 @@ class Regridder:
             yield rows, invented if invented.any() else None
 
 
-@numba.njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def _interpolate(u: Array, x: Array, gap: Mask, first: int, on_grid: float, rows: Array, invented: Mask) -> None:
     last = len(u) - 1
     weight = np.empty(6)

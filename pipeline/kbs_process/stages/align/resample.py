@@ -16,11 +16,11 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 
-import numba
 import numpy as np
 from scipy.signal import kaiser_beta
 from scipy.special import i0
 
+from kbs_process.machine_code import njit
 from kbs_process.signals.records import Array, Mask
 
 ATTENUATION_DB = 140.0  # of the design; 20 dB in hand for two stages
@@ -189,7 +189,7 @@ class Decimator:
 
 
 # Slices below, because an index that may be negative keeps the compiler from vectorising: a factor of four.
-@numba.njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract"})
+@njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract"})
 def _dot(a: Array, b: Array) -> float:
     total = 0.0
     for j in range(len(a)):
@@ -197,7 +197,7 @@ def _dot(a: Array, b: Array) -> float:
     return total
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract"})
+@njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract"})
 def _every(x: Array, taps: Array, factor: int, count: int) -> Array:
     """y[c, k] = sum_j taps[j] x[c, k factor + j]; four outputs at a time, which share the loads of the taps."""
     n = len(taps)
@@ -224,7 +224,7 @@ def _every(x: Array, taps: Array, factor: int, count: int) -> Array:
     return y
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract"})
+@njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract"})
 def _at(x: Array, weight: Array, position: Array, table: Array) -> tuple[Array, Array]:
     """Interpolate x (c, k) and the weights of invented samples at fractional positions (n,): (n, c), (n,)."""
     phases, width = table.shape[0] - 1, table.shape[1]

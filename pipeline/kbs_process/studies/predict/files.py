@@ -20,7 +20,6 @@ from kbs_process.results.store import writing
 from kbs_process.signals.records import WRENCH_UNITS, Block
 from kbs_process.studies.predict.reading_laws import columns, laws_on
 
-MARKER = "provenance.json"  # what makes a folder one of ours
 ROWS = 1 << 16  # of a row group
 HISTORY = {
     "wrench": "true wrench behind the amplifier, without cross-coupling, bias, noise and resolution",
@@ -42,7 +41,7 @@ def write_prediction(
 
     `kind` is "simulated" or "predicted", `name` says what of; `epoch_ns` is the sensor clock at time zero.
     """
-    with writing(target, marker=MARKER) as folder:
+    with writing(target) as folder:
         tables: dict[str, _Table] = {}
         with ExitStack() as open_tables:
 
@@ -64,7 +63,7 @@ def write_prediction(
             "parameters": provenance.parameters(campaign.rig),
             "software": provenance.software(),
         }
-        (folder / MARKER).write_text(json.dumps(about, indent=2) + "\n", encoding="utf-8")
+        (folder / "provenance.json").write_text(json.dumps(about, indent=2) + "\n", encoding="utf-8")
     return target
 
 

@@ -1,0 +1,30 @@
+"""numba's `njit`, with a cache of machine code that is made anew where it does not load.
+
+A cache is damaged by a full disk, a copy that ends early or a kill at the wrong time; numba raises whatever unpickling
+raises then, at every later start. Whoever compiles takes `njit` from here.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from numba import njit
+from numba.core import dispatcher
+from numba.core.caching import FunctionCache
+
+__all__ = ["njit"]
+
+
+class _RenewedCache(FunctionCache):
+    """The cache of one function."""
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Return what is kept for a signature, or None: then it is compiled, and kept."""
+        try:
+            return super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
+        except Exception:  # noqa: BLE001 - unpickling damaged bytes raises anything at all
+            self.flush()  # type: ignore[no-untyped-call]
+            return None
+
+
+dispatcher.FunctionCache = _RenewedCache  # type: ignore[attr-defined]

@@ -1,0 +1,45 @@
+"""A cache of machine code that is damaged is made anew."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+KERNEL = """from kbs_process.machine_code import njit
+
+
+@njit(cache=True)
+def double(x):
+    return 2.0 * x
+
+
+@njit("float64(float64)", cache=True)
+def treble(x):
+    return 3.0 * x
+
+
+print(double(21.0), treble(14.0), sum(double.stats.cache_hits.values()), sum(treble.stats.cache_hits.values()))
+"""
+
+
+def run(folder: Path) -> list[str]:
+    environment = os.environ | {"PYTHONPATH": str(folder)}
+    environment.pop("NUMBA_CACHE_DIR", None)
+    return subprocess.check_output([sys.executable, "-c", "import kernel"], env=environment, text=True).split()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("suffix", ["nbi", "nbc"])
+@pytest.mark.parametrize("damage", [b"", b"\0" * 4000, b"\x80\x04halved"], ids=["empty", "zeros", "cut"])
+def test_a_damaged_cache_is_made_anew(tmp_path: Path, suffix: str, damage: bytes) -> None:
+    (tmp_path / "kernel.py").write_text(KERNEL)
+    assert run(tmp_path) == ["42.0", "42.0", "0", "0"]
+    assert run(tmp_path) == ["42.0", "42.0", "1", "1"]
+    for path in (tmp_path / "__pycache__").glob(f"*.{suffix}"):
+        path.write_bytes(damage)
+    assert run(tmp_path) == ["42.0", "42.0", "0", "0"]
+    assert run(tmp_path) == ["42.0", "42.0", "1", "1"]
