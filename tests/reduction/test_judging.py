@@ -11,11 +11,10 @@ import pytest
 import archived
 from kbs_process.reduction.analysis import Pair
 from kbs_process.reduction.judging import coverage_below, judged
-from kbs_process.results.judged import Budget, Requirement, Soundness
+from kbs_process.results.judged import Budget, Doubt, Requirement
 from kbs_process.signals.records import WRENCH_CHANNELS, WRENCH_UNITS, Signal
 from kbs_process.stages.bandpass import Band
 
-SOUND = Soundness()
 BAND = Band("lt1Hz", 0.01, 1.0)
 
 
@@ -34,13 +33,13 @@ def stated(name: str, sigma: float) -> list[Budget]:
     ]
 
 
-def verdict(quiet: tuple[float, float], noisy: tuple[float, float], soundness: Soundness = SOUND) -> Requirement:
+def verdict(quiet: tuple[float, float], noisy: tuple[float, float], doubts: tuple[Doubt, ...] = ()) -> Requirement:
     """Judge two recordings, each with a peak and a sigma in N m, against 0.06 N m."""
     campaign = archived.campaign("EL089")
     requirement = replace(campaign.requirements[0], limit=0.06)
     runs = [recorded("quiet", quiet[0]), recorded("noisy", noisy[0])]
     budgets = [*stated("quiet", quiet[1]), *stated("noisy", noisy[1])]
-    return judged(campaign, requirement, runs, budgets, soundness)
+    return judged(campaign, requirement, runs, budgets, doubts)
 
 
 def test_a_lower_peak_that_is_less_well_known_decides() -> None:
@@ -65,12 +64,9 @@ def test_others_noise_does_not_widen_a_well_known_recording() -> None:
     assert (channel.low, channel.high, channel.sigma) == (found.low, found.high, found.sigma)
 
 
-def test_nothing_is_met_on_a_rig_whose_model_is_wrong() -> None:
-    found = verdict((0.05, 0.001), (0.01, 0.01), Soundness(sound=False, calibrated=False))
-    assert (found.verdict, found.doubt) == ("undecided", "the model of this rig is wrong")
-
-
-def test_what_a_calibrated_transducer_reads_beyond_the_limit_is_not_met_whatever_pulls() -> None:
-    wrong = Soundness(sound=False, calibrated=True)
-    assert verdict((0.07, 0.0005), (0.05, 0.02), wrong).verdict == "fail"
-    assert verdict((0.07, 0.0005), (0.05, 0.02), Soundness(sound=False, calibrated=False)).verdict == "undecided"
+def test_a_doubt_forbids_met_and_may_forbid_not_met() -> None:
+    small, large = ((0.05, 0.001), (0.01, 0.01)), ((0.07, 0.0005), (0.05, 0.02))
+    found = verdict(*small, (Doubt("so", of_failed=False),))
+    assert (found.verdict, found.doubt) == ("undecided", "so")
+    assert verdict(*large, (Doubt("so", of_failed=False),)).verdict == "fail"
+    assert verdict(*large, (Doubt("so"),)).verdict == "undecided"

@@ -7,17 +7,20 @@ no requirement is met; what a simple fault would explain is said first.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import msgspec
 import numpy as np
 
-from kbs_process.campaign.config import Campaign
+from kbs_process.campaign.config import Campaign, Requirement
+from kbs_process.plant.laws import select
+from kbs_process.plant.linear.modes import modes
 from kbs_process.progress import Progress
+from kbs_process.reduction import shown
 from kbs_process.reduction.preparing import Prepared, tare
 from kbs_process.reduction.relief import relieved
-from kbs_process.results.judged import WRONG, Beyond, Soundness
+from kbs_process.results.judged import WRONG, Beyond, Doubt, Soundness
 from kbs_process.results.records import Notice
 from kbs_process.signals.records import WRENCH_CHANNELS, Array
 from kbs_process.stages.conventions import SignCheck, check_encoder_sense, check_gravity_sign, check_weight
@@ -49,6 +52,16 @@ class Checked:
 
     soundness: Soundness
     conventions: tuple[SignCheck, ...]
+    hidden: Mapping[str, tuple[Doubt, ...]]  # by requirement, what the samples cannot show
+    rounding: Mapping[str, float]  # by channel, of readings that are coarser than stated
+
+    def doubts(self, requirement: Requirement) -> tuple[Doubt, ...]:
+        """Why a requirement is not judged, worst first.
+
+        What a calibrated transducer reads beyond the limit it has read, whatever pulls.
+        """
+        wrong = () if self.soundness.sound else (Doubt(WRONG, of_failed=not self.soundness.calibrated),)
+        return (*wrong, *self.hidden[requirement.name])
 
     def notices(self) -> Iterator[Notice]:
         """What comes first in every report, if the model is wrong."""
@@ -58,6 +71,14 @@ class Checked:
                 what=f"{WRONG}: {'; '.join(self.soundness.reasons)}",
                 remedy=_remedy(self.soundness.suggestions),
             )
+        for name, doubts in self.hidden.items():
+            if doubts:
+                yield Notice(
+                    severity="warning",
+                    what="; ".join(one.why for one in doubts),
+                    where=name,
+                    remedy="what lies there is not judged: record anew, faster or without gaps, or judge a lower band",
+                )
 
 
 def _remedy(suggestions: Sequence[str]) -> str:
@@ -82,6 +103,8 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
         conventions = (*check_weight(campaign.rig), *_conventions(recordings[:2], instants[:2], equation))
         found = tension(model, {sample.name: taring for sample, taring in tared})
         most = _most(equation)
+        rounding = {key: x for one in recordings for key, x in shown.rounding(campaign, one.readings).items()}
+        hidden = {one.name: tuple(_hidden(campaign, one, recordings, model)) for one in campaign.requirements}
         reasons = (
             *repeated(recordings),
             *_far(found.beyond, found.probability),
@@ -89,7 +112,7 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
             *_left(model, most),
         )
         if not reasons:
-            return Checked(Soundness(probability=found.probability), conventions)
+            return Checked(Soundness(probability=found.probability), conventions, hidden, rounding)
         explained = explanations(equation, instants, most)
         return Checked(
             Soundness(
@@ -101,7 +124,24 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
                 calibrated=_calibrated(campaign, samples, model, most),
             ),
             conventions,
+            hidden,
+            rounding,
         )
+
+
+def _hidden(
+    campaign: Campaign, requirement: Requirement, recordings: Sequence[Prepared], model: GravityModel
+) -> Iterator[Doubt]:
+    """What the samples cannot show of a requirement."""
+    judged = [one for one in recordings if one.entry.role != "calibration"]
+    for one in judged:
+        yield from shown.hidden(campaign, requirement, one.entry.name, one.run, one.motion.valid, one.readings)
+    if campaign.rig.transducer.channels:
+        edge = requirement.band[1]
+        yield from shown.attenuated(campaign.rig.transducer.amplifier, edge)
+        poses = [one.motion.q[at] for one in judged[:1] for at in (0, -1)]
+        every = [mode.frequency for pose in poses for mode in modes(model.rig, select(campaign.effects), pose)]
+        yield from shown.amplified(every, edge)
 
 
 def _conventions(

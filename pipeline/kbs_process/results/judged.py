@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Literal
 
 from kbs_process.results.records import Record
@@ -63,6 +64,14 @@ class Beyond(Record, frozen=True, kw_only=True):
     distance: float  # value less prior, in standard deviations of such differences
 
 
+@dataclass(frozen=True, slots=True)
+class Doubt:
+    """Why a requirement cannot be judged, and whether "not met" is in doubt as well as "met"."""
+
+    why: str
+    of_failed: bool = True
+
+
 class Soundness(Record, frozen=True, kw_only=True):
     """Is the model of the rig right? What was fitted against what was known."""
 
@@ -72,13 +81,6 @@ class Soundness(Record, frozen=True, kw_only=True):
     reasons: tuple[str, ...] = ()
     suggestions: tuple[str, ...] = ()  # simple faults, each of which explains the data alone
     calibrated: bool = True  # the calibrations by themselves agree with what was known
-
-    def doubt(self, verdict: Verdict) -> str:
-        """Why this verdict does not stand; empty if it does.
-
-        A calibrated transducer that reads too much has read it, whatever pulls: "not met" stands.
-        """
-        return "" if self.sound or (verdict == "fail" and self.calibrated) else WRONG
 
 
 class BudgetItem(Record, frozen=True, kw_only=True):

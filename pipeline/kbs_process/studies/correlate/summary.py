@@ -40,7 +40,8 @@ def summarise(
     modes = resonances(campaign, runs, model)
     budget = tuple(budgets(campaign, runs, model, decoupling, stated, repeated, modes))
     requirements = tuple(
-        judged(campaign, requirement, runs, budget, checked.soundness) for requirement in campaign.requirements
+        judged(campaign, requirement, runs, budget, checked.doubts(requirement), checked.rounding)
+        for requirement in campaign.requirements
     )
     found = results.Results(
         campaign=results.CampaignSummary(
@@ -202,8 +203,10 @@ def _cross_coupling(analyses: Sequence[Analysis], decoupling: Decoupling) -> res
     raw = np.concatenate([wrench.values[wrench.valid] for wrench in wrenches])
     decoupled = (raw - decoupling.bias) @ decoupling.matrix.T
     removed = raw - decoupling.bias - decoupled
-    share = np.abs(X) * np.std(decoupled, axis=0)
-    row, column = np.unravel_index(int(np.argmax(share / np.std(decoupled, axis=0)[:, None])), share.shape)
+    varies = np.std(decoupled, axis=0)
+    share = np.abs(X) * varies
+    relative = np.divide(share, varies[:, None], out=np.zeros_like(share), where=varies[:, None] > 0.0)
+    row, column = np.unravel_index(int(np.argmax(relative)), share.shape)
     units = wrenches[0].units
     largest = (
         f"Relative to what varies on the channel itself, {channels[column]} leaks most into {channels[row]}: "
