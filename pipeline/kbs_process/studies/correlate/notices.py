@@ -13,8 +13,10 @@ from kbs_process.reduction.judging import band_of, coverage_below
 from kbs_process.reduction.losses import lost
 from kbs_process.report.prose import Prose
 from kbs_process.results.records import Notice, Severity
+from kbs_process.signals.smoothing import smooth
 from kbs_process.stages.align.clocks import UNKNOWN_OFFSET_S
 from kbs_process.stages.gravity.model import GravityModel
+from kbs_process.stages.leftover import description
 from kbs_process.stages.verdict import COVERAGE
 from kbs_process.studies.correlate.results import Repeatability, Results
 
@@ -88,8 +90,16 @@ def _static_load(campaign: Campaign, analyses: Sequence[Analysis], model: Gravit
                 low_pass=model.settings.low_pass_Hz,
                 worst=max(misfit.ratio for misfit in large),
                 large=large,
+                shown=_shown(analysis, max(large, key=lambda misfit: misfit.ratio).channel, model),
                 judged=bool(campaign.requirements),
             )
+
+
+def _shown(analysis: Analysis, channel: str, model: GravityModel) -> str:
+    """What the data show of what a channel leaves below the fit's low-pass."""
+    residual, joints = analysis.residual, [joint.name for joint in model.rig.joints]
+    slow = smooth(residual.column(channel)[:, None], residual.dt, model.settings.low_pass_Hz)[:, 0]
+    return f"{channel}: {description(slow, residual.valid, residual.dt, analysis.motion.q, joints)}"
 
 
 def _taring(analyses: Sequence[Analysis]) -> Iterable[Notice]:
