@@ -15,6 +15,8 @@ from kbs_process.errors import ConfigError
 from kbs_process.rig.model import Quantity
 from kbs_process.signals.records import WRENCH_CHANNELS, WRENCH_UNITS, Array
 
+_NEAREST = 1e-6  # of the distance from its bound: what a number is that must not reach it
+
 
 def read_quantity(name: str, table: QuantityTable | PlainQuantity, kind: Kind, folder: Path) -> Quantity:
     """Return the quantity in SI; CSV files are looked for in `folder`.
@@ -34,7 +36,14 @@ def read_quantity(name: str, table: QuantityTable | PlainQuantity, kind: Kind, f
         raise ConfigError("a standard deviation is negative", where="sigma", remedy="give 0 or more")
     if kind.low is not None and ((value <= kind.low) if kind.strict else (value < kind.low)).any():
         raise ConfigError(f"{table.value} is out of bounds", where="value", remedy=f"give {kind.bound}")
-    return Quantity(name, value, kind.unit, sigma, table.source)
+    return Quantity(name, value, kind.unit, sigma, table.source, _least(value, kind))
+
+
+def _least(value: Array, kind: Kind) -> Array | float:
+    """Return the least that a fit may make of a value: where the bound itself is refused, close to it."""
+    if kind.low is None:
+        return -np.inf
+    return kind.low + _NEAREST * (value - kind.low) if kind.strict else kind.low
 
 
 def quantity_or_fault(

@@ -133,7 +133,7 @@ class RigBuilder:
             self._unknown(("body", name, "on"), table.on, "link", links)
         body = Body(name=name, on=table.on, **self._quantities(table, "body", name))
         self._check_inertia(body.inertia)
-        return body
+        return replace(body, inertia=replace(body.inertia, low=np.array([0.0] * 3 + [-np.inf] * 3)))
 
     def _check_inertia(self, inertia: Quantity) -> None:
         greatest = float(np.abs(inertia.value).max()) or 1.0

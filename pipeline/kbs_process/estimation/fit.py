@@ -8,13 +8,14 @@ with S the long-run covariance of the scores, which holds for residuals of any c
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.linalg import lstsq
 
 from kbs_process.errors import FitError
 from kbs_process.estimation.longrun import longrun_covariance
+from kbs_process.estimation.tensors import Tensors
 from kbs_process.signals.records import Array
 
 Residual = Callable[[Array], Array]
@@ -37,6 +38,7 @@ class Parameters:
     sigma: Array  # (p,) > 0
     lower: Array = field(default_factory=lambda: np.array(-np.inf))  # (p,), or one for all
     upper: Array = field(default_factory=lambda: np.array(np.inf))
+    tensors: Tensors | None = None  # of bodies' inertia, among them
 
     def __post_init__(self) -> None:
         for side in ("lower", "upper"):
@@ -50,25 +52,39 @@ class Parameters:
         return scale
 
     def clipped(self, theta: Array) -> Array:
-        """The nearest numbers (p,) within bounds."""
-        return np.asarray(np.clip(theta, self.lower, self.upper), dtype=np.float64)
+        """The nearest numbers (p,) within bounds, which are those of bodies."""
+        near = np.asarray(np.clip(theta, self.lower, self.upper), dtype=np.float64)
+        return near if self.tensors is None else self.tensors.bodily(near)
 
     def stuck(self, theta: Array) -> list[str]:
         """Names of those that are at a bound."""
-        entries = zip(self.names, theta, self.lower, self.upper, strict=True)
-        return [name for name, value, low, high in entries if value <= low or value >= high]
+        edge = set[int]() if self.tensors is None else self.tensors.at_edge(theta)
+        beyond = (theta <= self.lower) | (theta >= self.upper)
+        return [name for place, name in enumerate(self.names) if beyond[place] or place in edge]
+
+    def chosen(self, places: Sequence[int]) -> Parameters:
+        """Those at some places alone."""
+        return Parameters(
+            tuple(self.names[i] for i in places),
+            self.value[places],
+            self.sigma[places],
+            self.lower[places],
+            self.upper[places],
+            None if self.tensors is None else self.tensors.chosen(places),
+        )
 
     def extended(
         self, names: Sequence[str], value: Array, sigma: Array, lower: Array | float, upper: Array | float
     ) -> Parameters:
         """These, and more of them."""
         more = np.broadcast_to(lower, value.shape), np.broadcast_to(upper, value.shape)
-        return Parameters(
-            (*self.names, *names),
-            np.concatenate([self.value, value]),
-            np.concatenate([self.sigma, sigma]),
-            np.concatenate([self.lower, more[0]]),
-            np.concatenate([self.upper, more[1]]),
+        return replace(
+            self,
+            names=(*self.names, *names),
+            value=np.concatenate([self.value, value]),
+            sigma=np.concatenate([self.sigma, sigma]),
+            lower=np.concatenate([self.lower, more[0]]),
+            upper=np.concatenate([self.upper, more[1]]),
         )
 
 

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from kbs_process.estimation.fit import Parameters
+from kbs_process.estimation.tensors import Tensors
 from kbs_process.identification.output_error import Experiment, Scalar
 from kbs_process.identification.screening import LEAST, contacts, phases
 from kbs_process.plant.effect import Effect, Uniform
@@ -74,9 +75,9 @@ def prior(experiment: Experiment) -> Parameters:
         parameter = declared.get(scalar.name)
         phase = parameter is not None and isinstance(parameter.prior, Uniform)
         low, high = (-np.inf, np.inf) if parameter is None or phase else parameter.bounds
-        if scalar.quantity in ("transducer.stiffness", "transducer.damping"):
-            low = 0.0
-        sigma.append(np.inf if phase else float(quantities[scalar.quantity].sigma[scalar.element]))
+        quantity = quantities[scalar.quantity]
+        low = max(low, float(np.asarray(quantity.low)[scalar.element]))
+        sigma.append(np.inf if phase else float(quantity.sigma[scalar.element]))
         lower.append(low)
         upper.append(high)
     names = tuple(scalar.name for scalar in experiment.free)
@@ -86,7 +87,8 @@ def prior(experiment: Experiment) -> Parameters:
     needed += [contact.width for contact in contacts(experiment.rig, experiment.effects, experiment.free)]
     for index in needed:
         lower[index] = max(lower[index], LEAST * nominal[index])
-    return Parameters(names, nominal, np.array(sigma), np.array(lower), np.array(upper))
+    tensors = Tensors.among(names, experiment.rig.inertias)
+    return Parameters(names, nominal, np.array(sigma), np.array(lower), np.array(upper), tensors)
 
 
 def frictions(experiment: Experiment) -> tuple[int, ...]:

@@ -12,7 +12,7 @@ transducer; the effort of a joint is what its drive puts into it.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -39,11 +39,13 @@ class Quantity:
     unit: str  # SI
     sigma: Array  # same shape, one standard deviation; 0 is exact by definition
     source: str
+    low: Array | float = -np.inf  # least that a fit may make of it, for all elements or each: a mass is never negative
 
     def __post_init__(self) -> None:
         # Arithmetic on an array without dimensions leaves a scalar, which cannot be indexed by a mask.
         object.__setattr__(self, "value", np.asarray(self.value, dtype=np.float64))
         object.__setattr__(self, "sigma", np.asarray(self.sigma, dtype=np.float64))
+        object.__setattr__(self, "low", np.broadcast_to(np.asarray(self.low, dtype=np.float64), self.value.shape))
 
     def __float__(self) -> float:
         return float(self.value)
@@ -269,6 +271,11 @@ class Rig:
         """Return the frame of the recorded loads: the transducer's, or the joints' own where there is none."""
         return TRANSDUCER if self.transducer.channels else "joint"
 
+    @property
+    def inertias(self) -> dict[str, Array]:
+        """Return every body's inertia tensor (6,) by its dotted name."""
+        return {body.inertia.name: body.inertia.value for body in self.bodies}
+
     def quantities(self) -> dict[str, Quantity]:
         """Return every quantity of the rig by its dotted name; a transducer that is not there has none."""
         absent = () if self.transducer.channels else ("transducer",)
@@ -311,7 +318,7 @@ def _substitute(node: object, values: dict[str, Array | float], sigmas: dict[str
         sigma = np.asarray(sigmas.get(node.name, node.sigma), dtype=float)
         if value.shape != node.shape or sigma.shape != node.shape:
             raise ValueError(f"{node.name} has shape {node.shape}, not {value.shape}")
-        return Quantity(node.name, value, node.unit, sigma, node.source)
+        return replace(node, value=value, sigma=sigma)
     if isinstance(node, dict):
         return {key: _substitute(value, values, sigmas) for key, value in node.items()}
     if isinstance(node, tuple):

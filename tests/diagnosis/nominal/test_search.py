@@ -19,6 +19,7 @@ from kbs_process.diagnosis.nominal.known import refit
 from kbs_process.diagnosis.nominal.parameters import known_parameters, prior
 from kbs_process.diagnosis.nominal.search import Search
 from kbs_process.diagnosis.nominal.tangents import Step
+from kbs_process.identification.output_error import rig_at
 from kbs_process.rig.model import substitute
 
 pytestmark = pytest.mark.slow
@@ -29,6 +30,19 @@ def searching(made: Experiment) -> Search:
     free = known_parameters(made.rig, made.effects)
     metric = metrics(made, declared(made), dict(enumerate(simulate([(0, begin)]))), begin)
     return Search(made, metric, simulate, begin, free, prior(made.rig, made.rig, made.effects, free))
+
+
+def test_no_refit_leaves_what_bodies_and_joints_may_have() -> None:
+    rig = bench.rig()
+    free = known_parameters(rig, ())
+    limits = prior(rig, rig, (), free)
+    lower, body = dict(zip(limits.names, limits.lower, strict=True)), rig.bodies[0].name
+    assert lower[f"body.{body}.mass"] == 0.0
+    assert [lower[f"body.{body}.inertia[{k}]"] for k in range(6)] == [0.0] * 3 + [-np.inf] * 3
+    assert 0.0 < lower["transducer.stiffness[0]"] < 1e-5 * rig.quantities()["transducer.stiffness"].value[0]
+    wild = limits.clipped(limits.value - 1e3 * np.where(np.isfinite(limits.sigma), limits.sigma, 0.0))
+    for xx, yy, zz, xy, xz, yz in rig_at(rig, free, wild).inertias.values():
+        assert np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]).min() >= -1e-9
 
 
 def test_differences_span_what_a_step_has_moved_within_their_bounds() -> None:

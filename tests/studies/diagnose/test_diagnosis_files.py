@@ -31,6 +31,7 @@ from kbs_process.studies.diagnose.corrected import write_corrected
 from kbs_process.studies.diagnose.output import write_diagnosis
 from kbs_process.studies.diagnose.prose import answer, law_in_words
 from kbs_process.studies.diagnose.results import DiagnosisResults, Trial
+from kbs_process.studies.diagnose.written import shown_by
 
 pytestmark = pytest.mark.slow
 
@@ -186,6 +187,18 @@ def written(outcome: Outcome, tmp_path_factory: pytest.TempPathFactory) -> Path:
     assert told.verdict_lines[1] == f"Corrected model: {target / 'corrected'}"
     assert told.verdict_lines[-1] == f"Next test: {target / 'next-test.csv'}"
     return target
+
+
+def test_what_is_told_of_the_corrected_model_is_what_its_folder_predicts(written: Path, outcome: Outcome) -> None:
+    known = outcome.standing.known
+    shown = shown_by(written / "corrected", known)
+    each = np.sqrt(shown.known.chi2 / shown.known.rows)
+    assert [trial.corrected for trial in load(written, DiagnosisResults).trials] == pytest.approx(each)
+    discs, channel = shown_by(written.parent / "discs", known), known.experiment.channels.index("el")
+    angle = shown.values[0][:, channel]
+    added = 1e-4 * np.sin(angle) + 2e-4 * np.sin(2.0 * angle)
+    assert discs.values[0][:, channel] - angle == pytest.approx(added, abs=1e-9)
+    assert np.all(discs.known.chi2 > shown.known.chi2)
 
 
 def test_results_read_back_and_the_page_tells_them(written: Path) -> None:

@@ -21,10 +21,10 @@ from kbs_process.errors import ConfigError
 from kbs_process.identification.output_error import Scalar
 from kbs_process.plant.attach import attach
 from kbs_process.plant.laws import select
+from kbs_process.reduction.reading_laws import readings
 from kbs_process.rig.model import Quantity, substitute
 from kbs_process.signals.records import WRENCH_CHANNELS
 from kbs_process.studies.diagnose.corrected import write_corrected
-from kbs_process.studies.predict.reading_laws import readings
 
 CAMPAIGN = Path(__file__).parents[3] / "campaigns" / "EL089"
 

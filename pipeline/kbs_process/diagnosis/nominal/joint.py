@@ -16,7 +16,6 @@ from kbs_process.diagnosis.experiments.hypothesis import Hypothesis, Prediction,
 from kbs_process.diagnosis.nominal.costs import GEARS, Found, Laws, added
 from kbs_process.diagnosis.nominal.known import Known, as_it_is, known_of, resumed, settled
 from kbs_process.diagnosis.nominal.search import Search
-from kbs_process.estimation.fit import Parameters
 from kbs_process.identification.output_error import Scalar
 from kbs_process.plant.attach import detach, idle
 from kbs_process.plant.laws import select
@@ -170,7 +169,7 @@ def _stripped(standing: Standing, own: Own) -> tuple[Known, Laws]:
         known,
         hypothesis=_less(still, known.experiment.effects, free),
         free=free,
-        parameters=_chosen(known.parameters, others),
+        parameters=known.parameters.chosen(others),
         scale=known.scale[others],
         value=known.value[others],
         shown={},
@@ -205,13 +204,3 @@ def standing_of(known: Known, laws: Laws) -> Standing:
         for drive, shown in known.shown.items()
     }
     return Standing(known, own, laws)
-
-
-def _chosen(parameters: Parameters, index: Sequence[int]) -> Parameters:
-    return Parameters(
-        tuple(parameters.names[i] for i in index),
-        parameters.value[index],
-        parameters.sigma[index],
-        parameters.lower[index],
-        parameters.upper[index],
-    )

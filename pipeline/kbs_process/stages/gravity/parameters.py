@@ -42,10 +42,8 @@ class RigElements:
 
     @property
     def lower(self) -> Array:
-        """Masses, stiffnesses and gains stay positive."""
-        positive = (".mass", ".stiffness", ".gain")
-        bounds = [np.full(q.shape, 1e-6 if q.name.endswith(positive) else -np.inf) for q in self.quantities]
-        return self._gather(bounds)
+        """Least that each may be."""
+        return self._gather([np.asarray(quantity.low) for quantity in self.quantities])
 
     def _gather(self, arrays: list[Array]) -> Array:
         parts = [array[mask] for array, mask in zip(arrays, self.masks, strict=True)]

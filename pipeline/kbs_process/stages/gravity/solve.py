@@ -18,6 +18,7 @@ from kbs_process.errors import FitError
 from kbs_process.estimation.fit import Fit, Parameters, combination, fit_map
 from kbs_process.estimation.flicker import flicker_scores
 from kbs_process.estimation.longrun import variance_inflation
+from kbs_process.estimation.tensors import Tensors
 from kbs_process.rig.model import Rig
 from kbs_process.signals.records import Array
 from kbs_process.stages.gravity.angles import rounding_scores
@@ -72,6 +73,7 @@ def solve(
         value=np.concatenate([equation.start(), np.zeros(len(names))]),
         sigma=np.concatenate([equation.sigma(), *(zero_sigma(equation, p)[:, loose].ravel() for p in prepared)]),
         lower=np.concatenate([equation.lower(), np.full(len(names), -np.inf)]),
+        tensors=Tensors.among(equation.names, equation.elements.rig.inertias),
     )
     first = [
         np.linalg.lstsq(basis, (p.wrench - equation.predict(theta, p))[:, loose])[0].ravel()

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
 from kbs_process.campaign.config import Campaign
 from kbs_process.diagnosis.acceptance.outcome import Location, Outcome
-from kbs_process.diagnosis.experiments.experiment import Experiment
 from kbs_process.diagnosis.experiments.floor import Floor
-from kbs_process.diagnosis.experiments.hypothesis import Prediction
 from kbs_process.diagnosis.experiments.nuisance import unknown_terms
-from kbs_process.diagnosis.nominal.joint import Standing
 from kbs_process.diagnosis.nominal.known import Known
 from kbs_process.diagnosis.selection.next_test import Proposal
 from kbs_process.report.build import build
@@ -25,6 +21,7 @@ from kbs_process.rig.model import Rig
 from kbs_process.signals.records import Array
 from kbs_process.studies.diagnose.corrected import CORRECTED, write_corrected
 from kbs_process.studies.diagnose.records import COMMANDS, results_of, seen_channels
+from kbs_process.studies.diagnose.written import Shown, shown_by
 
 MAPS = "residual_map"
 
@@ -45,15 +42,15 @@ def write_diagnosis(
     known = outcome.known
     with writing(target) as folder:
         files = write_corrected(campaign, outcome, folder / CORRECTED)
+        corrected = shown_by(folder / CORRECTED, outcome.standing.known)
         if proposal is not None:
             (folder / COMMANDS).write_text(commands_of(proposal, campaign.rig), encoding="utf-8")
         _maps(folder, outcome)
         for k in range(len(known.experiment.trials)):
-            _spectra(folder, known, outcome.standing.known, k)
-            _histories(folder, known.experiment, known.shown, outcome.standing, k)
-        results = results_of(
-            campaign, floor, outcome, [path.relative_to(folder).as_posix() for path in files], proposal, verb
-        )
+            _spectra(folder, known, corrected.known, k)
+            _histories(folder, known, corrected, k)
+        names = [path.relative_to(folder).as_posix() for path in files]
+        results = results_of(campaign, floor, outcome, corrected, names, proposal, verb)
         (folder / "results.json").write_bytes(encode(results))
         from kbs_process.studies.diagnose.report import DOCUMENT  # draws: takes its time to import
 
@@ -79,22 +76,21 @@ def _spectra(folder: Path, before: Known, after: Known, k: int) -> None:
     write_table(path, columns, units, frame="T", recording=name)
 
 
-def _histories(
-    folder: Path, experiment: Experiment, predicted: Mapping[int, Prediction], standing: Standing, k: int
-) -> None:
+def _histories(folder: Path, known: Known, corrected: Shown, k: int) -> None:
     """Measured less predicted in the channels' units, before and after, without what no recording knows.
 
     As where they are judged (`diagnosis/experiments/nuisance.py`), that is a constant and a slope of each load
     channel with a bias, and a constant of each angle, whose slope would be a mismatch.
     """
+    experiment = known.experiment
     trial = experiment.trials[k]
     t: Array = experiment.dt * np.flatnonzero(trial.valid).astype(np.float64)
     columns: dict[str, Array] = {"t": t}
     units = {"t": "s"}
     A, own = np.stack([np.ones(len(t)), t], axis=1), unknown_terms(experiment)
-    for side, model in (("before", predicted[trial.drive].values), ("after", standing.shown(k))):
+    for side, model in (("before", known.shown[trial.drive].values), ("after", corrected.values[k])):
         left = (trial.measured - model)[trial.valid]
-        for c in seen_channels(standing.known, k):
+        for c in seen_channels(known, k):
             x, terms = left[:, c], A[:, : own[c]]
             columns[f"{experiment.channels[c]}.{side}"] = x - terms @ np.linalg.lstsq(terms, x, rcond=None)[0]
             units[f"{experiment.channels[c]}.{side}"] = experiment.units[c]

@@ -12,7 +12,6 @@ from kbs_process.campaign.config import Campaign
 from kbs_process.diagnosis.acceptance.outcome import Curve, Find, Outcome
 from kbs_process.diagnosis.experiments.experiment import Experiment
 from kbs_process.diagnosis.experiments.floor import Floor
-from kbs_process.diagnosis.nominal.joint import Standing
 from kbs_process.diagnosis.nominal.known import Known
 from kbs_process.diagnosis.selection.next_test import Proposal
 from kbs_process.plant.effect import Port
@@ -24,6 +23,7 @@ from kbs_process.rig.model import Joint, Rig
 from kbs_process.studies.diagnose import results as records
 from kbs_process.studies.diagnose.prose import answer, notes, notices, paragraph, rms
 from kbs_process.studies.diagnose.unexplained import unexplained
+from kbs_process.studies.diagnose.written import Shown
 
 COMMANDS = "next-test.csv"  # file of the next test's commands, in the results' folder
 _SHOWN = 25  # suspects in the table
@@ -34,15 +34,17 @@ def results_of(
     campaign: Campaign,
     floor: Floor,
     outcome: Outcome,
+    corrected: Shown,
     files: Sequence[str],
     proposal: Proposal | None,
     verb: str = "diagnose",
 ) -> records.DiagnosisResults:
-    """What a diagnosis says; `verb` is that of the command that was given, none of processing."""
+    """What a diagnosis says, and what its `corrected` model shows; `verb` is the command's, none of processing."""
     known = outcome.known
     finds = tuple(_find(find, known.experiment) for find in outcome.finds)
-    trials = tuple(_trials(known, outcome.standing.known))
-    requirements = tuple(unexplained(campaign, Standing(known, known.shown, {}), outcome.standing))
+    trials = tuple(_trials(known, corrected.known))
+    before = [known.shown[trial.drive].values for trial in known.experiment.trials]
+    requirements = tuple(unexplained(campaign, known.experiment, before, corrected.values))
     return records.DiagnosisResults(
         name=campaign.name,
         title=campaign.title,

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from kbs_process.campaign.config import Campaign, Requirement
-from kbs_process.diagnosis.nominal.joint import Standing
+from kbs_process.diagnosis.experiments.experiment import Experiment
 from kbs_process.errors import ConfigError
 from kbs_process.reduction.analysis import bands_of, select
 from kbs_process.reduction.judging import band_of
@@ -19,9 +19,12 @@ from kbs_process.stages.verdict import Extreme, extremes
 from kbs_process.studies.diagnose import results as records
 
 
-def unexplained(campaign: Campaign, known: Standing, corrected: Standing) -> Iterator[records.Unexplained]:
+def unexplained(
+    campaign: Campaign, experiment: Experiment, known: Sequence[Array], corrected: Sequence[Array]
+) -> Iterator[records.Unexplained]:
     """Each requirement's statistic of what is left, noise included, at its worst channel and recording.
 
+    `known` and `corrected` are what two models predict of each trial, (n, c).
     Calibrations are judged by none. Of a requirement on what was not recorded nothing is said.
     """
     for requirement in campaign.requirements:
@@ -29,7 +32,7 @@ def unexplained(campaign: Campaign, known: Standing, corrected: Standing) -> Ite
             channels = judged_channels(requirement, campaign.rig)
         except ConfigError:
             continue
-        worst, before = (_worst(campaign, requirement, channels, one) for one in (corrected, known))
+        worst, before = (_worst(campaign, experiment, requirement, channels, one) for one in (corrected, known))
         if worst is not None and before is not None:
             yield records.Unexplained(
                 name=requirement.name,
@@ -44,9 +47,14 @@ def unexplained(campaign: Campaign, known: Standing, corrected: Standing) -> Ite
             )
 
 
-def _worst(campaign: Campaign, requirement: Requirement, channels: Sequence[str], standing: Standing) -> Extreme | None:
+def _worst(
+    campaign: Campaign,
+    experiment: Experiment,
+    requirement: Requirement,
+    channels: Sequence[str],
+    predicted: Sequence[Array],
+) -> Extreme | None:
     """The greatest statistic of measured less predicted; None where no sample of the band is known."""
-    experiment = standing.known.experiment
     band = band_of(requirement, bands_of(campaign.bands))
     left = []
     for k, trial in enumerate(experiment.trials):
@@ -55,7 +63,7 @@ def _worst(campaign: Campaign, requirement: Requirement, channels: Sequence[str]
         signal = Signal(
             t0=0.0,
             dt=experiment.dt,
-            values=_level((trial.measured - standing.shown(k))[:, : experiment.loads], trial.valid),
+            values=_level((trial.measured - predicted[k])[:, : experiment.loads], trial.valid),
             channels=experiment.channels[: experiment.loads],
             units=experiment.units[: experiment.loads],
             frame=campaign.rig.frame,

@@ -15,10 +15,10 @@ from kbs_process.campaign.config import Campaign
 from kbs_process.campaign.documents import shown
 from kbs_process.recordings.mcap.messages.encoding import OutStream
 from kbs_process.recordings.mcap.writer import write_pieces
+from kbs_process.reduction.reading_laws import columns, laws_on
 from kbs_process.results import provenance
 from kbs_process.results.store import writing
 from kbs_process.signals.records import WRENCH_UNITS, Block
-from kbs_process.studies.predict.reading_laws import columns, laws_on
 
 ROWS = 1 << 16  # of a row group
 HISTORY = {

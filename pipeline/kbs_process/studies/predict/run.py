@@ -17,11 +17,11 @@ from kbs_process.progress import Progress
 from kbs_process.reduction.commands import of_table, of_trajectory
 from kbs_process.reduction.predicting import approached, schedule_of
 from kbs_process.reduction.reading import read_run
+from kbs_process.reduction.reading_laws import read_through
 from kbs_process.reduction.settings import motion_settings
 from kbs_process.signals.records import Block, Run
 from kbs_process.stages.motion import estimate
 from kbs_process.studies.predict.files import write_prediction
-from kbs_process.studies.predict.reading_laws import read_through
 
 TABLES = (".csv", ".parquet")  # of commands, by the file's name
 
