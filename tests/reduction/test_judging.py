@@ -11,7 +11,7 @@ import pytest
 import archived
 from kbs_process.reduction.analysis import Pair
 from kbs_process.reduction.judging import coverage_below, judged
-from kbs_process.results.judged import Budget, Requirement
+from kbs_process.results.judged import Budget, Doubt, Requirement
 from kbs_process.signals.records import WRENCH_CHANNELS, WRENCH_UNITS, Signal
 from kbs_process.stages.bandpass import Band
 
@@ -33,12 +33,13 @@ def stated(name: str, sigma: float) -> list[Budget]:
     ]
 
 
-def verdict(quiet: tuple[float, float], noisy: tuple[float, float]) -> Requirement:
+def verdict(quiet: tuple[float, float], noisy: tuple[float, float], doubts: tuple[Doubt, ...] = ()) -> Requirement:
     """Judge two recordings, each with a peak and a sigma in N m, against 0.06 N m."""
     campaign = archived.campaign("EL089")
     requirement = replace(campaign.requirements[0], limit=0.06)
     runs = [recorded("quiet", quiet[0]), recorded("noisy", noisy[0])]
-    return judged(campaign, requirement, runs, [*stated("quiet", quiet[1]), *stated("noisy", noisy[1])])
+    budgets = [*stated("quiet", quiet[1]), *stated("noisy", noisy[1])]
+    return judged(campaign, requirement, runs, budgets, doubts)
 
 
 def test_a_lower_peak_that_is_less_well_known_decides() -> None:
@@ -61,3 +62,11 @@ def test_others_noise_does_not_widen_a_well_known_recording() -> None:
     assert (found.low, found.high) == pytest.approx((0.05 - 0.001 * below, 0.052))
     (channel,) = [one for one in found.channels if one.channel == "Ty"]
     assert (channel.low, channel.high, channel.sigma) == (found.low, found.high, found.sigma)
+
+
+def test_a_doubt_forbids_met_and_may_forbid_not_met() -> None:
+    small, large = ((0.05, 0.001), (0.01, 0.01)), ((0.07, 0.0005), (0.05, 0.02))
+    found = verdict(*small, (Doubt("so", of_failed=False),))
+    assert (found.verdict, found.doubt) == ("undecided", "so")
+    assert verdict(*large, (Doubt("so", of_failed=False),)).verdict == "fail"
+    assert verdict(*large, (Doubt("so"),)).verdict == "undecided"

@@ -8,15 +8,11 @@ import pytest
 
 import archived
 from kbs_process.plant.rigid import static_wrench
-from kbs_process.signals.records import WRENCH_CHANNELS, WRENCH_UNITS, Signal
+from kbs_process.signals.records import WRENCH_CHANNELS, Signal
 from kbs_process.stages.conventions import check_encoder_sense, check_gravity_sign, check_weight
 
 T = np.linspace(0.0, 1.0, 500)
 Q = np.stack([np.radians(150 * np.sin(6 * T)), np.radians(70 + 17 * T)], axis=1)
-
-
-def wrench(values: np.ndarray) -> Signal:
-    return Signal(0.0, 0.05, values, WRENCH_CHANNELS, WRENCH_UNITS, "T", np.ones(len(values), dtype=bool))
 
 
 def angles(values: np.ndarray) -> Signal:
@@ -24,18 +20,19 @@ def angles(values: np.ndarray) -> Signal:
 
 
 @cache
-def computed() -> Signal:
+def computed() -> np.ndarray:
     """Gravity's wrench on the swing."""
-    return wrench(static_wrench(archived.rig(), Q))
+    return static_wrench(archived.rig(), Q)
 
 
-def tared() -> Signal:
+def tared() -> np.ndarray:
     """The same as a transducer shows it that was tared at the start."""
-    return wrench(computed().values - computed().values[0] + 0.01)
+    return computed() - computed()[0] + 0.01
 
 
-def verdicts(measured: Signal) -> dict[str, bool]:
-    checks = check_gravity_sign(measured, computed(), archived.rig().transducer.noise.value)
+def verdicts(measured: np.ndarray, errors: np.ndarray | None = None) -> dict[str, bool]:
+    noise = archived.rig().transducer.noise.value
+    checks = check_gravity_sign(WRENCH_CHANNELS, measured, computed(), noise, errors)
     return {check.check.split()[3]: check.ok for check in checks}
 
 
@@ -45,15 +42,24 @@ def test_a_tared_transducer_passes_on_the_channels_that_gravity_moves():
 
 @pytest.mark.parametrize("channel", ["Tx", "Ty"])
 def test_a_reversed_channel_is_caught(channel: str):
-    values = tared().values.copy()
+    values = tared()
     values[:, WRENCH_CHANNELS.index(channel)] *= -1.0
-    assert verdicts(wrench(values))[channel] is False
+    assert verdicts(values)[channel] is False
+
+
+def test_a_slope_is_judged_by_what_the_files_do_not_know():
+    values = tared()
+    values[:, 4] *= 1.05
+    assert verdicts(values)["Ty"] is False
+    errors = np.zeros((*values.shape, 1))
+    errors[:, 4, 0] = 0.02 * computed()[:, 4]
+    assert verdicts(values, errors)["Ty"] is True
 
 
 def test_swapped_channels_are_caught():
-    values = tared().values.copy()
+    values = tared()
     values[:, [3, 4]] = values[:, [4, 3]]
-    assert verdicts(wrench(values))["Tx"] is False
+    assert verdicts(values)["Tx"] is False
 
 
 def test_an_encoder_that_counts_the_other_way_is_caught():

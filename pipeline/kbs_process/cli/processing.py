@@ -95,7 +95,7 @@ def _diagnose(campaign: Campaign, results: Path, *, progress: Progress, pdf: boo
 
 @click.command(epilog=examples("validate campaign/EL089", "validate campaign/EL089 --check"))
 @campaign_argument
-@check_option("a recording has losses")
+@check_option("a recording has losses, or the model of the rig is wrong")
 @quiet_option
 def validate(campaign: str, check: bool, quiet: bool) -> None:
     """Check CAMPAIGN's description, read all its recordings through, and fit gravity to them.
@@ -112,7 +112,7 @@ def validate(campaign: str, check: bool, quiet: bool) -> None:
     say(*describe(loaded, found))
     if found.refused:
         sys.exit(BAD_INPUT)
-    if check and any(finding.lossy for finding in found.findings):
+    if check and (found.notices or any(finding.lossy for finding in found.findings)):
         sys.exit(NOT_MET)
 
 

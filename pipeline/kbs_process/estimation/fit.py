@@ -109,6 +109,8 @@ class Fit:
     checks: tuple[Check, ...]
     residual_rms: float  # of the whitened residual: 1 where the weights are right
     dof: int  # samples less parameters
+    moved: Array  # (p,) estimate less the prior's mean
+    moved_covariance: Array  # (p, p) of `moved`, where model and priors are right; infinite without a prior
 
     @property
     def ok(self) -> bool:
@@ -150,6 +152,8 @@ def fit_map(
         S = scores(r, J) + np.diag(precision)
         covariance = _at_least(H_inverse @ S @ H_inverse, covariance)
     sigma = np.sqrt(np.diag(covariance))
+    # moved = (I - H^-1 P) d + H^-1 J^T e, d the prior's own error: (I - H^-1 P) P^-1 (I - P H^-1) + H^-1 S H^-1.
+    moved_covariance = np.diag(parameters.sigma**2) - 2.0 * H_inverse + covariance
     checks = (
         Check("converged", converged, f"{taken} iterations"),
         _bounds_check(theta, parameters),
@@ -164,6 +168,8 @@ def fit_map(
         checks=checks,
         residual_rms=float(np.sqrt(np.mean(r**2))),
         dof=len(r) - len(theta),
+        moved=theta - parameters.value,
+        moved_covariance=moved_covariance,
     )
 
 

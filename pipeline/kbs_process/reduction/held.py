@@ -13,7 +13,7 @@ import numpy as np
 
 from kbs_process.campaign.config import Campaign, RecordingEntry
 from kbs_process.errors import RecordingError
-from kbs_process.reduction.reading import read_run
+from kbs_process.reduction.reading import Through, read_run
 from kbs_process.rig.model import Rig
 from kbs_process.signals.records import Array, Block, Loss, Mask, Run
 from kbs_process.stages.align.ordering import concatenate, select
@@ -58,13 +58,16 @@ class Alive:
         return tuple(self._stream.losses())
 
 
-def read_alive(campaign: Campaign, entry: RecordingEntry, *, keep: bool = False, keep_spikes: bool = False) -> Run:
+def read_alive(
+    campaign: Campaign, entry: RecordingEntry, *, keep: bool = False, keep_spikes: bool = False, watch: Through = iter
+) -> Run:
     """Read a recording without what its channels were held in, or with it (`keep`); its losses tell of that.
 
-    Raises RecordingError where a channel was held most of the time, and that is not kept.
+    All that is read goes through `watch` first. Raises RecordingError where a channel was held most of the time, and
+    that is not kept.
     """
     alive = Alive(campaign.rig, entry, keep=keep)
-    run = read_run(campaign, entry, alive, keep_spikes=keep_spikes)
+    run = read_run(campaign, entry, lambda blocks: alive(watch(blocks)), keep_spikes=keep_spikes)
     return replace(run, losses=(*run.losses, *alive.losses))
 
 

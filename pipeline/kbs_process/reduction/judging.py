@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +16,7 @@ from kbs_process.signals.records import Signal
 from kbs_process.stages.bandpass import Band, crossing_rate
 from kbs_process.stages.verdict import COVERAGE, Extreme, Judgement, extremes, interval, judge, peak_coverage
 
+_NONE: Mapping[str, float] = {}
 SEVERITY: dict[Judgement, int] = {"pass": 0, "undecided": 1, "fail": 2}
 
 
@@ -42,15 +43,27 @@ class _Candidate:
 
 
 def judged(
-    campaign: Campaign, requirement: Requirement, runs: Sequence[Analysis], budgets: Sequence[results.Budget]
+    campaign: Campaign,
+    requirement: Requirement,
+    runs: Sequence[Analysis],
+    budgets: Sequence[results.Budget],
+    doubts: Sequence[results.Doubt] = (),
+    rounding: Mapping[str, float] = _NONE,
 ) -> results.Requirement:
-    """Judge a requirement by the channel and recording that are closest to failing it."""
+    """Judge a requirement by the channel and recording that are closest to failing it, if no doubt forbids it.
+
+    `rounding`: standard deviation, by channel, of readings that are rounded more coarsely than is stated.
+    """
     band = band_of(requirement, bands_of(campaign.bands))
     key = (requirement.frame, band.name)
     channels = judged_channels(requirement, campaign.rig)
     pairs = [(analysis.entry.name, analysis.pairs[key]) for analysis in runs]
     below = coverage_below(requirement.statistic, [pair.measured for _, pair in pairs], band)
-    sigmas = {(entry.recording, entry.channel): entry.total for entry in budgets if (entry.frame, entry.band) == key}
+    sigmas = {
+        (entry.recording, entry.channel): float(np.hypot(entry.total, rounding.get(entry.channel, 0.0)))
+        for entry in budgets
+        if (entry.frame, entry.band) == key
+    }
     measured = [
         _Candidate(extreme, sigmas[extreme.recording, extreme.channel], requirement.limit, below)
         for extreme in extremes([(name, pair.measured) for name, pair in pairs], channels, requirement.statistic)
@@ -66,6 +79,7 @@ def judged(
         [(name, pair.predicted) for name, pair in pairs if pair.predicted is not None], channels, requirement.statistic
     )
     worst = max(measured, key=_Candidate.severity)
+    doubt = next((one.why for one in doubts if one.of_failed or worst.verdict != "fail"), "")
     return results.Requirement(
         name=requirement.name,
         quantity=requirement.quantity,
@@ -80,7 +94,8 @@ def judged(
         low=worst.interval[0],
         high=worst.interval[1],
         margin=requirement.limit - worst.extreme.value,
-        verdict=worst.verdict,
+        verdict="undecided" if doubt else worst.verdict,
+        doubt=doubt,
         recording=worst.extreme.recording,
         channel=worst.extreme.channel,
         time_s=worst.extreme.time_s,

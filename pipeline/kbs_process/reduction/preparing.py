@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 from kbs_process.campaign.config import Campaign, RecordingEntry
 from kbs_process.errors import RecordingError
@@ -11,6 +11,7 @@ from kbs_process.progress import Progress
 from kbs_process.reduction.held import read_alive
 from kbs_process.reduction.relief import forces_in, relieved, without_effects
 from kbs_process.reduction.settings import gravity_settings, motion_settings
+from kbs_process.reduction.shown import Readings, Watch
 from kbs_process.signals.records import COPY, Loss, Run, Signal
 from kbs_process.stages import decouple, motion
 from kbs_process.stages.decouple import Decoupling
@@ -29,6 +30,7 @@ class Prepared:
     raw: Signal
     run: Run
     motion: Motion
+    readings: Mapping[str, Readings] = field(default_factory=dict)  # by stream
 
 
 def prepare(
@@ -36,7 +38,8 @@ def prepare(
 ) -> Prepared:
     """Read a recording as processing needs it; `keep_spikes`: with its single bad samples."""
     with progress.task(f"Reading {entry.name}"):
-        run = read_alive(campaign, entry, keep=True, keep_spikes=keep_spikes)
+        watch = Watch()
+        run = read_alive(campaign, entry, keep=True, keep_spikes=keep_spikes, watch=watch)
         if run.loads is None:
             raise RecordingError("there is neither wrench nor effort in this recording", where=str(entry.path))
         return Prepared(
@@ -44,6 +47,7 @@ def prepare(
             run.loads,
             decouple.apply(run, decoupling),
             motion.estimate(run, campaign.rig, motion_settings(campaign)),
+            watch.streams,
         )
 
 

@@ -22,11 +22,10 @@ _OTHERWISE = {
 
 
 Blocks = Iterator[tuple[str, Block]]
+Through = Callable[[Blocks], Blocks]
 
 
-def read_run(
-    campaign: Campaign, entry: RecordingEntry, through: Callable[[Blocks], Blocks] = iter, *, keep_spikes: bool = False
-) -> Run:
+def read_run(campaign: Campaign, entry: RecordingEntry, through: Through = iter, *, keep_spikes: bool = False) -> Run:
     """Read one recording chunk by chunk and reduce it; what it lost is listed in the run's losses.
 
     What is read goes `through` whatever may leave some of it out. Single bad samples are interpolated, but for

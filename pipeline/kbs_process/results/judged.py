@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Literal
 
 from kbs_process.results.records import Record
@@ -9,6 +10,7 @@ from kbs_process.results.records import Record
 Verdict = Literal["pass", "fail", "undecided"]
 Frame = Literal["T", "S", "joint"]  # the transducer's, the spacecraft's, or the joints' own, of their efforts
 Statistic = Literal["peak", "rms"]
+WRONG = "the model of this rig is wrong"
 
 
 class ChannelResult(Record, frozen=True, kw_only=True):
@@ -48,6 +50,37 @@ class Requirement(Record, frozen=True, kw_only=True):
     source: str = ""
     low: float | None = None  # the true value lies between low and high, at 95 %
     high: float | None = None
+    doubt: str = ""  # why it is undecided, whatever the figures are
+
+
+class Beyond(Record, frozen=True, kw_only=True):
+    """A fitted number that is further from what was known of it than chance allows."""
+
+    name: str
+    unit: str
+    prior: float
+    prior_sigma: float
+    value: float
+    distance: float  # value less prior, in standard deviations of such differences
+
+
+@dataclass(frozen=True, slots=True)
+class Doubt:
+    """Why a requirement cannot be judged, and whether "not met" is in doubt as well as "met"."""
+
+    why: str
+    of_failed: bool = True
+
+
+class Soundness(Record, frozen=True, kw_only=True):
+    """Is the model of the rig right? What was fitted against what was known."""
+
+    sound: bool = True
+    probability: float = 1.0  # that chance alone moves all fitted numbers so far
+    beyond: tuple[Beyond, ...] = ()  # the farthest first
+    reasons: tuple[str, ...] = ()
+    suggestions: tuple[str, ...] = ()  # simple faults, each of which explains the data alone
+    calibrated: bool = True  # the calibrations by themselves agree with what was known
 
 
 class BudgetItem(Record, frozen=True, kw_only=True):

@@ -2,28 +2,35 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
+from kbs_process.estimation.longrun import longrun_covariance
 from kbs_process.plant.rigid import static_wrench
 from kbs_process.results.records import Record
 from kbs_process.rig.model import LAB, Rig
 from kbs_process.signals.records import Array, Signal
 
-# A slope is called right within this much of +1: the nominal CoG need not be good, only its sign.
-SLOPE_TOLERANCE = 0.5
+# A slope is called right within this many of its own standard deviations.
+BEYOND = 4.0
+# No calibration promises less; and whatever disturbs it, a channel that is off by more does not follow gravity.
+_EXACT, _HALF = 1e-3, 0.5
 # Channels on which the computed static wrench varies less than this many times its error say nothing.
 MIN_VARIATION = 10.0
 # A plate that is inclined by less than this (rad) is called level.
 LEVEL = 0.1
 
 
-class SignCheck(Record, frozen=True):
+class SignCheck(Record, frozen=True, kw_only=True):
     """What was expected, what was found."""
 
     check: str
     expected: str
     found: str
     ok: bool
+    slope: float | None = None
+    sigma: float | None = None  # of the slope: by what the files do not know exactly, and by what else varies
 
 
 def check_weight(rig: Rig) -> tuple[SignCheck, ...]:
@@ -37,34 +44,43 @@ def check_weight(rig: Rig) -> tuple[SignCheck, ...]:
     force = static_wrench(rig, np.zeros((1, len(rig.joints))))[0, :3]
     return (
         SignCheck(
-            "computed force at rest, all joints at zero",
-            "Fz < 0: the wrench is what the unit exerts on the transducer, z up",
-            f"F = ({force[0]:.2f}, {force[1]:.2f}, {force[2]:.2f}) N",
-            bool(force[2] < 0.0 and abs(force[2]) > np.hypot(force[0], force[1])),
+            check="computed force at rest, all joints at zero",
+            expected="Fz < 0: the wrench is what the unit exerts on the transducer, z up",
+            found=f"F = ({force[0]:.2f}, {force[1]:.2f}, {force[2]:.2f}) N",
+            ok=bool(force[2] < 0.0 and abs(force[2]) > np.hypot(force[0], force[1])),
         ),
     )
 
 
-def check_gravity_sign(measured: Signal, static: Signal, noise: Array) -> tuple[SignCheck, ...]:
-    """Slope of the measured against the computed static wrench, channel by channel: +1 where signs agree.
+def check_gravity_sign(
+    channels: Sequence[str], measured: Array, computed: Array, noise: Array, errors: Array | None = None
+) -> tuple[SignCheck, ...]:
+    """Slope of measured against computed static loads (n, c): +1 where signs, gains and axes agree.
 
-    `static` comes from nominal parameters, `noise` (c,) is the channels' rms noise. A channel that reads the
-    reaction, or is swapped with another, shows a slope of -1 or near 0. Taring moves only the offset.
+    `computed` comes from nominal parameters; `errors` (n, c, k) are its independent one-sigma errors by what the files
+    state: masses, CoGs, the calibration. `noise` (c,) is the channels' rms noise. A channel that reads the reaction, or
+    is swapped with another, shows a slope of -1 or near 0. Taring moves only the offset. The slope's sigma holds the
+    errors, and what does not follow the computed loads, of any colour.
     """
     tests = []
-    for index, channel in enumerate(measured.channels):
-        x = static.values[measured.valid, index]
-        y = measured.values[measured.valid, index]
-        x, y = x - x.mean(), y - y.mean()
+    for index, channel in enumerate(channels):
+        x, y = (values[:, index] - values[:, index].mean() for values in (computed, measured))
         if np.std(x) <= MIN_VARIATION * noise[index]:
             continue
-        slope = float(x @ y / (x @ x))
+        power = float(x @ x)
+        slope = float(x @ y) / power
+        seen = float(longrun_covariance(((y - slope * x) * x)[:, None], [(len(x), 1)])[0, 0])
+        chance = max(seen, power * float(noise[index]) ** 2)
+        stated = 0.0 if errors is None else float(np.sum((x @ errors[:, index]) ** 2))
+        sigma = float(np.sqrt(chance + stated)) / power
         tests.append(
             SignCheck(
-                f"slope of measured {channel} against computed gravity",
-                "+1",
-                f"{slope:+.3f}",
-                abs(slope - 1.0) < SLOPE_TOLERANCE,
+                check=f"slope of measured {channel} against computed gravity",
+                expected="+1",
+                found=f"{slope:+.3f} ± {sigma:.2g}",
+                ok=bool(abs(slope - 1.0) < np.clip(BEYOND * sigma, _EXACT, _HALF)),
+                slope=slope,
+                sigma=sigma,
             )
         )
     return tuple(tests)
@@ -80,6 +96,12 @@ def check_encoder_sense(encoder: Signal, command: Signal) -> tuple[SignCheck, ..
             continue
         slope = float(x @ y / (x @ x))
         tests.append(
-            SignCheck(f"slope of encoder {joint} against its command", "+1", f"{slope:+.4f}", abs(slope - 1.0) < 0.1)
+            SignCheck(
+                check=f"slope of encoder {joint} against its command",
+                expected="+1",
+                found=f"{slope:+.4f}",
+                ok=abs(slope - 1.0) < 0.1,
+                slope=slope,
+            )
         )
     return tuple(tests)

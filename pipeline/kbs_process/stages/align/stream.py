@@ -353,7 +353,8 @@ class Timeline:
         for channel, name in enumerate(self.channels):
             if own := [one for one in (self.spikes.lost if self.spikes else []) if one.channel == channel]:
                 start, end = (offset + rate * self.own_one(one) for one in (own[0].first, own[-1].last))
-                what = f"stands still at {own[0].by:.6g}, off all others, {len(own)} times: left out"
+                times = f", {len(own)} times" if len(own) > 1 else ""
+                what = f"stands still at {own[0].by:.6g}, off all others{times}: left out"
                 found.append(Loss(DROPOUT, f"{self.where}, {name}", sum(one.count for one in own), start, end, what))
         for kind, oddities, detail in (
             (SPIKE, self.spikes.spikes if self.spikes else [], "interpolated"),

@@ -73,9 +73,11 @@ def _sparse(motion: Motion) -> Index:
 
 
 def _shapes(motion: Motion, model: GravityModel, taring: Taring) -> list[Array]:
-    """One-sigma error histories (n, c) of independent directions of the rig's fitted parameters."""
+    """One-sigma error histories (n, c) of independent directions of the rig's fitted parameters; none fitted: zero."""
     at = _sparse(motion)
     size = model.equation.size
+    if size == 0:
+        return [np.zeros((len(motion), len(model.channels)))]
     J = derivatives(motion, model, at) + taring.slope
     variance, directions = np.linalg.eigh(model.fit.covariance[:size, :size])
     t = np.arange(len(motion))

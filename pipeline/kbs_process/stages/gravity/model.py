@@ -138,7 +138,7 @@ def fit(
         result = solve(equation, used, sigmas, theta, settings.low_pass_Hz)
         theta = result.value[: equation.size]
         sigmas = [residual_sigma(equation, theta, p, rig) for p in used]
-    refuse_uninformed(equation, data, sigmas, theta)
+    refuse_uninformed(equation, data)
     biases = zeros(equation, result, len(data))[:, 0]
     taring = {
         p.name: of_fit(equation, theta, p, bias, sigma) for p, bias, sigma in zip(data, biases, weighed, strict=True)

@@ -1,9 +1,10 @@
 """The gravity equation solved for the rig and every recording's zero at once, with the weights it takes.
 
 A recording's zero is a constant (its taring) and a slow drift: the first and second Legendre polynomial over its
-length, which hold a transducer's warming up. Each has the prior that the rig file gives the bias; a channel whose
-bias is exact has none of them. Drift is thus told
-from gravity where the motion repeats; where it does not, it widens the parameters' uncertainty.
+length, which hold a transducer's warming up. The constant has the prior that the rig file gives the bias. Drift has
+one of its own, which grows with time: from end to end, the rms noise of a sample for every minute, and no more than
+the bias. A channel whose bias is exact has neither. Drift is thus told from gravity where the motion repeats; where it
+does not, it widens the parameters' uncertainty.
 """
 
 from __future__ import annotations
@@ -24,8 +25,9 @@ from kbs_process.stages.gravity.angles import rounding_scores
 from kbs_process.stages.gravity.equation import Equation, Prepared
 from kbs_process.stages.gravity.parameters import Index
 
-_ZERO = ("bias", "drift", "drift curvature")
-_TERMS = len(_ZERO)
+ZERO = ("bias", "drift", "drift curvature")
+_TERMS = len(ZERO)
+DRIFT_S = 60.0  # in which a zero drifts by the noise of a sample, one sigma
 
 
 def solve(
@@ -65,11 +67,11 @@ def solve(
         noise = flicker_scores(r, J, series, intervals, low_pass_Hz)
         return noise + rounding_scores(equation, theta, prepared, sigmas, J)
 
-    names = tuple(f"{term}[{p.name}].{equation.channels[index]}" for p in prepared for term in _ZERO for index in loose)
+    names = tuple(f"{term}[{p.name}].{equation.channels[index]}" for p in prepared for term in ZERO for index in loose)
     parameters = Parameters(
         names=equation.names + names,
         value=np.concatenate([equation.start(), np.zeros(len(names))]),
-        sigma=np.concatenate([equation.sigma(), np.tile(equation.bias_sigma[loose], _TERMS * len(prepared))]),
+        sigma=np.concatenate([equation.sigma(), *(zero_sigma(equation, p)[:, loose].ravel() for p in prepared)]),
         lower=np.concatenate([equation.lower(), np.full(len(names), -np.inf)]),
         tensors=Tensors.among(equation.names, equation.elements.rig.inertias),
     )
@@ -92,6 +94,15 @@ def _zeros(values: Array, recordings: int, equation: Equation) -> Array:
     every = np.zeros((recordings, _TERMS, len(equation.channels)))
     every[:, :, loose] = values.reshape(recordings, _TERMS, len(loose))
     return every
+
+
+def zero_sigma(equation: Equation, p: Prepared) -> Array:
+    """Priors (terms, c) of a recording's zero: the constant's, and of what drifts half of it from end to end."""
+    rig = equation.elements.rig
+    noise = rig.loads.noise[rig.loads.index(rig.channels)]
+    across = np.minimum(noise * (p.t[-1] - p.t[0]) / DRIFT_S, equation.bias_sigma)
+    drift = np.maximum(0.5 * across, 1e-9 * equation.bias_sigma)
+    return np.stack([equation.bias_sigma, drift, drift])
 
 
 def _loose(equation: Equation) -> Index:
@@ -138,14 +149,19 @@ def least_sigma(p: Prepared, rig: Rig) -> Array:
     return floor
 
 
-def refuse_uninformed(equation: Equation, prepared: Sequence[Prepared], sigmas: Sequence[Array], theta: Array) -> None:
-    """Refuse data whose strongest message about the rig, zero and drift aside, is weaker than the prior."""
+def refuse_uninformed(equation: Equation, prepared: Sequence[Prepared]) -> None:
+    """Refuse data whose strongest message about the rig, zero and drift aside, is weaker than the prior.
+
+    What they could say is asked, with the sensor's noise alone: what else is in them is no reason to move more.
+    """
     if equation.size == 0:
         return  # the files know the rig exactly
     blocks = []
-    for p, sigma in zip(prepared, sigmas, strict=True):
-        J = equation.jacobian(theta, p).reshape(len(p.q), len(equation.channels), -1)
-        blocks.append((_without_zero(J, p) / sigma[:, None]).reshape(-1, equation.size))
+    for p in prepared:
+        J = equation.jacobian(equation.start(), p).reshape(len(p.q), len(equation.channels), -1)
+        blocks.append(
+            (_without_zero(J, p) / (10.0 * least_sigma(p, equation.elements.rig))[:, None]).reshape(-1, equation.size)
+        )
     _, s, Vt = np.linalg.svd(np.concatenate(blocks) * equation.sigma(), full_matrices=False)
     if s[0] < 1.0:
         direction = combination(Vt[0], equation.names)

@@ -16,9 +16,10 @@ from kbs_process.report.prose import Prose
 from kbs_process.results.judged import Requirement
 from kbs_process.results.records import Notice, Severity
 from kbs_process.signals.records import DROPOUT, SPIKE, Run
+from kbs_process.signals.smoothing import smooth
 from kbs_process.stages.align.clocks import UNKNOWN_OFFSET_S
-from kbs_process.stages.conventions import SignCheck
 from kbs_process.stages.gravity.model import GravityModel
+from kbs_process.stages.leftover import description
 from kbs_process.stages.verdict import COVERAGE
 from kbs_process.studies.correlate.results import Repeatability, Results
 
@@ -40,7 +41,6 @@ _SAYS = Prose("kbs_process.studies.correlate", "notices")
 
 def notices(campaign: Campaign, analyses: Sequence[Analysis], model: GravityModel, found: Results) -> Iterable[Notice]:
     """Yield everything worth a notice, worst first."""
-    yield from _conventions(found.conventions)
     for analysis in analyses:
         yield from lost(analysis.entry, [loss for loss in analysis.run.losses if loss.kind not in LEFT_OUT])
     yield from _unjudged(analyses)
@@ -81,12 +81,6 @@ def _notice(severity: Severity, name: str, where: str = "", **facts: object) -> 
     return Notice(severity=severity, what=_SAYS(name, **facts), where=where, remedy=_SAYS(f"{name}_remedy"))
 
 
-def _conventions(conventions: Sequence[SignCheck]) -> Iterable[Notice]:
-    for check in conventions:
-        if not check.ok:
-            yield _notice("error", "convention", check=check)
-
-
 def _unjudged(analyses: Sequence[Analysis]) -> Iterable[Notice]:
     """Stretches of a recording in which the disturbance is not known, and so in no figure."""
     for analysis in analyses:
@@ -118,8 +112,16 @@ def _static_load(campaign: Campaign, analyses: Sequence[Analysis], model: Gravit
                 low_pass=model.settings.low_pass_Hz,
                 worst=max(misfit.ratio for misfit in large),
                 large=large,
+                shown=_shown(analysis, max(large, key=lambda misfit: misfit.ratio).channel, model),
                 judged=bool(campaign.requirements),
             )
+
+
+def _shown(analysis: Analysis, channel: str, model: GravityModel) -> str:
+    """What the data show of what a channel leaves below the fit's low-pass."""
+    residual, joints = analysis.residual, [joint.name for joint in model.rig.joints]
+    slow = smooth(residual.column(channel)[:, None], residual.dt, model.settings.low_pass_Hz)[:, 0]
+    return f"{channel}: {description(slow, residual.valid, residual.dt, analysis.motion.q, joints)}"
 
 
 def _taring(analyses: Sequence[Analysis]) -> Iterable[Notice]:

@@ -10,7 +10,7 @@ from typing import Literal
 
 import msgspec
 
-from kbs_process.results.judged import Budget, Frame, Requirement
+from kbs_process.results.judged import Budget, Frame, Requirement, Soundness
 from kbs_process.results.pointing import RecordedPointing
 from kbs_process.results.records import Check, Constant, Record, ResultsFile
 from kbs_process.signals.records import Loss
@@ -257,6 +257,7 @@ class Results(ResultsFile, frozen=True, kw_only=True):
     requirements: tuple[Requirement, ...] = ()
     recordings: tuple[Recording, ...] = ()
     conventions: tuple[SignCheck, ...] = ()
+    soundness: Soundness = Soundness()
     gravity: Gravity | None = None
     cross_coupling: CrossCoupling | None = None
     bands: tuple[Band, ...] = ()

@@ -14,6 +14,7 @@ from kbs_process.reduction.analysis import Analysis, analyse
 from kbs_process.reduction.measurable import check_requirements
 from kbs_process.reduction.preparing import Prepared, fit_gravity, prepare, told_copies
 from kbs_process.reduction.relief import relieved
+from kbs_process.reduction.soundness import check_model
 from kbs_process.report.build import publish
 from kbs_process.report.text import count
 from kbs_process.results.judged import Requirement
@@ -63,9 +64,10 @@ def _found(
 ) -> tuple[Results, Sequence[Analysis], GravityModel]:
     """Return what results.json holds, and what it was made from."""
     model = fit_gravity(campaign, prepared, progress)
+    checked = check_model(campaign, prepared, model, progress)
     analyses = [_analyse(campaign, one, model, progress) for one in prepared]
     with progress.task("Comparing, summing up uncertainties"):
-        return summarise(campaign, analyses, model, decoupling), analyses, model
+        return summarise(campaign, analyses, model, decoupling, checked), analyses, model
 
 
 def _with_spikes(

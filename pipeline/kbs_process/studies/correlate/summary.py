@@ -8,20 +8,18 @@ import msgspec
 import numpy as np
 
 from kbs_process.campaign.config import Campaign
-from kbs_process.plant.rigid import loads
 from kbs_process.reduction.analysis import Analysis, bands_of, select
 from kbs_process.reduction.judging import judged
 from kbs_process.reduction.pointing import recorded_pointing
+from kbs_process.reduction.soundness import Checked
 from kbs_process.results import provenance
 from kbs_process.results.judged import Requirement
 from kbs_process.results.records import Check, Conclusion
 from kbs_process.signals.records import Signal
-from kbs_process.stages.conventions import SignCheck, check_encoder_sense, check_gravity_sign, check_weight
 from kbs_process.stages.decouple import Decoupling
 from kbs_process.stages.gravity.equation import RESPONSE
 from kbs_process.stages.gravity.model import GravityModel, taring_error
 from kbs_process.stages.gravity.quality import feasibility
-from kbs_process.stages.repeats import commanded
 from kbs_process.stages.to_cog import ASSUMPTION
 from kbs_process.studies.correlate import results
 from kbs_process.studies.correlate.findings import band, merits, repeatabilities, resonances, statements
@@ -33,7 +31,7 @@ RESPONSE_UNITS = dict(zip(RESPONSE, ("s", "s^2"), strict=True))
 
 
 def summarise(
-    campaign: Campaign, analyses: Sequence[Analysis], model: GravityModel, decoupling: Decoupling
+    campaign: Campaign, analyses: Sequence[Analysis], model: GravityModel, decoupling: Decoupling, checked: Checked
 ) -> results.Results:
     """Return the contents of results.json; calibrations serve the fit and are judged by its residual alone."""
     runs = [analysis for analysis in analyses if analysis.entry.role != "calibration"]
@@ -41,7 +39,10 @@ def summarise(
     repeated = tuple(repeatabilities(runs))
     modes = resonances(campaign, runs, model)
     budget = tuple(budgets(campaign, runs, model, decoupling, stated, repeated, modes))
-    requirements = tuple(judged(campaign, requirement, runs, budget) for requirement in campaign.requirements)
+    requirements = tuple(
+        judged(campaign, requirement, runs, budget, checked.doubts(requirement), checked.rounding)
+        for requirement in campaign.requirements
+    )
     found = results.Results(
         campaign=results.CampaignSummary(
             name=campaign.name,
@@ -55,7 +56,8 @@ def summarise(
         provenance=provenance.made("", campaign.folder, campaign.files),
         requirements=requirements,
         recordings=tuple(_recording(analysis) for analysis in analyses),
-        conventions=tuple(_conventions(campaign, analyses)),
+        conventions=checked.conventions,
+        soundness=checked.soundness,
         gravity=_gravity(campaign, analyses, model),
         cross_coupling=_cross_coupling(analyses, decoupling) if decoupling.channels else None,
         bands=tuple(map(band, stated.values())),
@@ -67,7 +69,7 @@ def summarise(
         parameters=tuple(provenance.constants(campaign.rig)),
         notes=(ASSUMPTION,) if campaign.rig.spacecraft is not None else (),
     )
-    warnings = tuple(notices(campaign, analyses, model, found))
+    warnings = (*checked.notices(), *notices(campaign, analyses, model, found))
     return msgspec.structs.replace(found, warnings=warnings, methods=methods(campaign, analyses, found))
 
 
@@ -76,6 +78,7 @@ def _conclusion(requirements: Sequence[Requirement]) -> Conclusion:
         return Conclusion(status="none", sentence="The campaign states no requirement.")
     worst = max(requirements, key=lambda one: ("pass", "undecided", "fail").index(one.verdict))
     words = {"pass": "met", "fail": "not met", "undecided": "neither met nor broken within the uncertainty"}
+    words["undecided"] = f"undecided: {worst.doubt}" if worst.doubt else words["undecided"]
     value, low, high = (figure or 0.0 for figure in (worst.value, worst.low, worst.high))
     least = f"{low:.4f}" if low > 0.0 else "0"
     sentence = (
@@ -108,23 +111,6 @@ def _recording(analysis: Analysis) -> results.Recording:
             for stream, clock in run.clocks.items()
         ),
     )
-
-
-def _conventions(campaign: Campaign, analyses: Sequence[Analysis]) -> Iterable[SignCheck]:
-    yield from check_weight(campaign.rig)
-    for analysis in analyses[:2]:  # the calibration and the first run: signs do not change within a campaign
-        measured, rest = analysis.run.loads, np.zeros_like(analysis.motion.q)
-        assert measured is not None
-        every = campaign.rig.loads
-        index = every.index(measured.channels)
-        static = loads(campaign.rig, analysis.motion.q, rest, rest)[:, index]
-        nominal = measured.derive(static, "nominal static loads")
-        found = [*check_gravity_sign(measured, nominal, every.noise[index])]
-        command, angle = commanded(analysis.run), analysis.run.angle
-        if command is not None and angle is not None:
-            found += check_encoder_sense(angle, command)
-        for check in found:
-            yield msgspec.structs.replace(check, check=f"{check.check}, {analysis.entry.name}")
 
 
 def _gravity(campaign: Campaign, analyses: Sequence[Analysis], model: GravityModel) -> results.Gravity:
@@ -217,8 +203,10 @@ def _cross_coupling(analyses: Sequence[Analysis], decoupling: Decoupling) -> res
     raw = np.concatenate([wrench.values[wrench.valid] for wrench in wrenches])
     decoupled = (raw - decoupling.bias) @ decoupling.matrix.T
     removed = raw - decoupling.bias - decoupled
-    share = np.abs(X) * np.std(decoupled, axis=0)
-    row, column = np.unravel_index(int(np.argmax(share / np.std(decoupled, axis=0)[:, None])), share.shape)
+    varies = np.std(decoupled, axis=0)
+    share = np.abs(X) * varies
+    relative = np.divide(share, varies[:, None], out=np.zeros_like(share), where=varies[:, None] > 0.0)
+    row, column = np.unravel_index(int(np.argmax(relative)), share.shape)
     units = wrenches[0].units
     largest = (
         f"Relative to what varies on the channel itself, {channels[column]} leaks most into {channels[row]}: "

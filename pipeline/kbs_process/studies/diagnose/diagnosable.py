@@ -41,7 +41,9 @@ def check_signs(run: Run, moved: Motion, campaign: Campaign, entry: RecordingEnt
     `run` is decoupled. No physics that was left out turns a channel round; a wrong sign would be taken for some.
     """
     for check in _signs(run, moved, campaign.rig):
-        slope = float(check.found)
+        slope = check.slope
+        if slope is None:
+            continue
         if slope < -_REVERSED or (check.check.startswith("slope of encoder") and slope < _REVERSED):
             raise RecordingError(
                 f"{check.check} is {check.found}, expected {check.expected}",
@@ -76,8 +78,8 @@ def _signs(run: Run, moved: Motion, rig: Rig) -> Iterator[SignCheck]:
     measured, rest = run.loads, np.zeros_like(moved.q)
     assert measured is not None
     index = rig.loads.index(measured.channels)
-    static = measured.derive(loads(rig, moved.q, rest, rest)[:, index], "nominal static loads")
-    yield from check_gravity_sign(measured, static, rig.loads.noise[index])
+    static, known = loads(rig, moved.q, rest, rest)[:, index], measured.valid
+    yield from check_gravity_sign(measured.channels, measured.values[known], static[known], rig.loads.noise[index])
     command = commanded(run)
     if command is not None and run.angle is not None:
         yield from check_encoder_sense(run.angle, command)

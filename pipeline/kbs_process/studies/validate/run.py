@@ -10,6 +10,8 @@ from kbs_process.errors import KbsError, RecordingError
 from kbs_process.progress import Progress
 from kbs_process.reduction.measurable import check_requirements
 from kbs_process.reduction.preparing import Prepared, check_taring, fit_gravity, prepare, told_copies
+from kbs_process.reduction.soundness import check_model
+from kbs_process.results.records import Notice
 from kbs_process.signals.records import TRUNCATED, Loss
 from kbs_process.stages import decouple
 from kbs_process.stages.gravity.model import GravityModel
@@ -36,6 +38,7 @@ class Validation:
 
     findings: tuple[Finding, ...]
     refusal: str = ""
+    notices: tuple[Notice, ...] = ()  # what is wrong with the model of the rig
 
     @property
     def refused(self) -> bool:
@@ -43,10 +46,11 @@ class Validation:
 
 
 def validate(campaign: Campaign, progress: Progress) -> Validation:
-    """Read every recording of the campaign to its end, and fit gravity to them if all can be read."""
+    """Read every recording of the campaign to its end; if all can, fit gravity and compare it with the files."""
     decoupling = decouple.fit(campaign.rig)
     findings: list[Finding] = []
     prepared: list[Prepared] = []
+    notices: tuple[Notice, ...] = ()
     for entry in campaign.recordings:
         try:
             one = prepare(campaign, entry, decoupling, progress)
@@ -65,9 +69,11 @@ def validate(campaign: Campaign, progress: Progress) -> Validation:
                 replace(finding, error=_untared(campaign, one, model))
                 for finding, one in zip(findings, prepared, strict=True)
             ]
+            if not any(finding.error for finding in findings):
+                notices = tuple(check_model(campaign, prepared, model, progress).notices())
     except KbsError as error:
         return Validation(tuple(findings), str(error))
-    return Validation(tuple(findings))
+    return Validation(tuple(findings), notices=notices)
 
 
 def _untared(campaign: Campaign, one: Prepared, model: GravityModel) -> str:
@@ -103,6 +109,8 @@ def describe(campaign: Campaign, validation: Validation) -> Iterator[str]:
     yield f"{len(findings)} {recordings}: {bad} unreadable, {lossy} with losses"
     if validation.refusal:
         yield f"cannot be processed: {validation.refusal}"
+    for notice in validation.notices:
+        yield f"{notice.severity}: {notice.what}\n  -> {notice.remedy}"
     if hint := repeatability_hint(campaign):
         yield f"hint: {hint}"
 

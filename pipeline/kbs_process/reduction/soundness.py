@@ -1,0 +1,278 @@
+"""Is the model of the rig right? What was fitted against what was known, before anything is judged by it.
+
+`validate` and processing ask the same here: every fitted number against its prior, each recording's zero, the slope of
+what is read against computed gravity, and what a calibration leaves. Where one of them is beyond what chance allows,
+no requirement is met; what a simple fault would explain is said first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import msgspec
+import numpy as np
+
+from kbs_process.campaign.config import Campaign, Requirement
+from kbs_process.plant.laws import select
+from kbs_process.plant.linear.modes import modes
+from kbs_process.progress import Progress
+from kbs_process.reduction import shown
+from kbs_process.reduction.preparing import Prepared, tare
+from kbs_process.reduction.relief import relieved
+from kbs_process.results.judged import WRONG, Beyond, Doubt, Soundness
+from kbs_process.results.records import Notice
+from kbs_process.signals.records import WRENCH_CHANNELS, Array
+from kbs_process.stages.conventions import SignCheck, check_encoder_sense, check_gravity_sign, check_weight
+from kbs_process.stages.gravity import model as gravity
+from kbs_process.stages.gravity.equation import Equation
+from kbs_process.stages.gravity.equation import Prepared as Instants
+from kbs_process.stages.gravity.hypotheses import Explained, explanations
+from kbs_process.stages.gravity.model import GravityModel, Sample, prepared
+from kbs_process.stages.gravity.tension import BY_CHANCE, Moved, tension
+from kbs_process.stages.repeats import commanded
+
+LEFT = 0.1  # of the weight, and of the torque that it can make: a calibration leaves less, whatever rubs or pulls
+_LIKE = 0.03  # relative: a gain this near to a unit's factor is that unit's
+_SHOWN = 6
+_FORCES = {"pound-force": 4.4482216, "kilogram-force": 9.80665, "gram-force": 9.80665e-3, "kN": 1e3, "mN": 1e-3}
+_TORQUES = {
+    "N mm": 1e-3,
+    "N cm": 1e-2,
+    "pound-force foot": 1.3558179,
+    "pound-force inch": 0.1129848,
+    "kilogram-force metre": 9.80665,
+    "kN m": 1e3,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Checked:
+    """What was found of the model of the rig, and the self-tests of signs behind it."""
+
+    soundness: Soundness
+    conventions: tuple[SignCheck, ...]
+    hidden: Mapping[str, tuple[Doubt, ...]]  # by requirement, what the samples cannot show
+    rounding: Mapping[str, float]  # by channel, of readings that are coarser than stated
+
+    def doubts(self, requirement: Requirement) -> tuple[Doubt, ...]:
+        """Why a requirement is not judged, worst first.
+
+        What a calibrated transducer reads beyond the limit it has read, whatever pulls.
+        """
+        wrong = () if self.soundness.sound else (Doubt(WRONG, of_failed=not self.soundness.calibrated),)
+        return (*wrong, *self.hidden[requirement.name])
+
+    def notices(self) -> Iterator[Notice]:
+        """What comes first in every report, if the model is wrong."""
+        if not self.soundness.sound:
+            yield Notice(
+                severity="error",
+                what=f"{WRONG}: {'; '.join(self.soundness.reasons)}",
+                remedy=_remedy(self.soundness.suggestions),
+            )
+        for name, doubts in self.hidden.items():
+            if doubts:
+                yield Notice(
+                    severity="warning",
+                    what="; ".join(one.why for one in doubts),
+                    where=name,
+                    remedy="what lies there is not judged: record anew, faster or without gaps, or judge a lower band",
+                )
+
+
+def _remedy(suggestions: Sequence[str]) -> str:
+    if not suggestions:
+        return (
+            "no single simple fault (gain, unit, sign, axis, zero, swapped channels, one number) explains it: look for "
+            "what else pulls or rubs, and compare the parameter files with the rig"
+        )
+    return f"this explains it: {'; or '.join(suggestions)}. Correct it and process again"
+
+
+def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: GravityModel, progress: Progress) -> Checked:
+    """Compare what was fitted with what was known, and look for what would explain a difference."""
+    with progress.task("Comparing the rig with what was known of it"):
+        tared = [
+            tare(campaign, one.entry, relieved(campaign, one.entry, one.run, one.motion), one.motion, model)
+            for one in recordings
+        ]
+        samples = [sample for sample, _ in tared]
+        equation = model.equation
+        instants = [prepared(sample, equation, model.settings, model.settings.low_pass_Hz) for sample in samples]
+        conventions = (*check_weight(campaign.rig), *_conventions(recordings[:2], instants[:2], equation))
+        found = tension(model, {sample.name: taring for sample, taring in tared})
+        most = _most(equation)
+        rounding = {key: x for one in recordings for key, x in shown.rounding(campaign, one.readings).items()}
+        hidden = {one.name: tuple(_hidden(campaign, one, recordings, model)) for one in campaign.requirements}
+        reasons = (
+            *repeated(recordings),
+            *_far(found.beyond, found.probability),
+            *(f"{one.check} is {one.found}, expected {one.expected}" for one in conventions if not one.ok),
+            *_left(model, most),
+        )
+        if not reasons:
+            return Checked(Soundness(probability=found.probability), conventions, hidden, rounding)
+        explained = explanations(equation, instants, most)
+        return Checked(
+            Soundness(
+                sound=False,
+                probability=found.probability,
+                beyond=tuple(_beyond(one, model) for one in found.beyond),
+                reasons=reasons,
+                suggestions=tuple(_in_words(one, equation) for one in explained),
+                calibrated=_calibrated(campaign, samples, model, most),
+            ),
+            conventions,
+            hidden,
+            rounding,
+        )
+
+
+def _hidden(
+    campaign: Campaign, requirement: Requirement, recordings: Sequence[Prepared], model: GravityModel
+) -> Iterator[Doubt]:
+    """What the samples cannot show of a requirement."""
+    judged = [one for one in recordings if one.entry.role != "calibration"]
+    for one in judged:
+        yield from shown.hidden(campaign, requirement, one.entry.name, one.run, one.motion.valid, one.readings)
+    if campaign.rig.transducer.channels:
+        edge = requirement.band[1]
+        yield from shown.attenuated(campaign.rig.transducer.amplifier, edge)
+        poses = [one.motion.q[at] for one in judged[:1] for at in (0, -1)]
+        every = [mode.frequency for pose in poses for mode in modes(model.rig, select(campaign.effects), pose)]
+        yield from shown.amplified(every, edge)
+
+
+def _conventions(
+    recordings: Sequence[Prepared], instants: Sequence[Instants], equation: Equation
+) -> Iterator[SignCheck]:
+    """Signs of the calibration and of the first run: they do not change within a campaign."""
+    rig, theta = equation.elements.rig, equation.start()
+    noise = rig.loads.noise[equation.index]
+    for one, data in zip(recordings, instants, strict=True):
+        errors = equation.jacobian(theta, data).reshape(*data.wrench.shape, equation.size) * equation.sigma()
+        found = [*check_gravity_sign(equation.channels, data.wrench, equation.predict(theta, data), noise, errors)]
+        command, angle = commanded(one.run), one.run.angle
+        if command is not None and angle is not None:
+            found += check_encoder_sense(angle, command)
+        for check in found:
+            yield msgspec.structs.replace(check, check=f"{check.check}, {one.entry.name}")
+
+
+def repeated(recordings: Sequence[Prepared]) -> Iterator[str]:
+    """Channels that repeat another one, reading by reading."""
+    for one in recordings:
+        values, names = one.raw.values[one.raw.valid], one.raw.channels
+        moving = [index for index in range(len(names)) if len(values) and np.ptp(values[:, index]) > 0.0]
+        for place, a in enumerate(moving):
+            for b in moving[place + 1 :]:
+                if np.array_equal(values[:, a], values[:, b]):
+                    yield f"{names[b]} repeats {names[a]} in {one.entry.name}: one stream is read twice"
+
+
+def _far(beyond: Sequence[Moved], probability: float) -> Iterator[str]:
+    for one in beyond[:_SHOWN]:
+        yield (
+            f"{one.name} is {one.value:.4g} by the fit, {one.prior:.4g} +- {one.prior_sigma:.2g} by what is stated: "
+            f"{abs(one.distance):.1f} sigma"
+        )
+    if len(beyond) > _SHOWN:
+        yield f"{len(beyond) - _SHOWN} other numbers are as far off"
+    if probability < BY_CHANCE and not beyond:
+        yield f"all fitted numbers together: chance moves them so far with a probability of {probability:.1g} only"
+
+
+def _left(model: GravityModel, most: Array) -> Iterator[str]:
+    """Channels of which gravity explains too little in the recordings that are there for it."""
+    for name in model.reference:
+        for channel, unit, rms, limit in zip(model.channels, model.units, model.residual_rms[name], most, strict=True):
+            if rms > limit:
+                yield f"gravity leaves {rms:.3g} {unit} rms of {channel} in {name}"
+
+
+def _most(equation: Equation) -> Array:
+    """What may be left (c,) of a calibration, rms: a part of the weight, and of the torque that it can make."""
+    rig = equation.elements.rig
+    weight = float(rig.gravity) * sum(float(body.mass) for body in rig.bodies)
+    arms = [float(np.linalg.norm(joint.origin.value)) for joint in rig.joints]
+    reach = sum(arms) + max((float(np.linalg.norm(body.cog.value)) for body in rig.bodies), default=0.0)
+    scale = np.array(
+        [
+            weight if channel[0] == "F" else weight * reach if channel in WRENCH_CHANNELS else 0.0
+            for channel in equation.channels
+        ]
+    )
+    most: Array = np.where(scale > 0.0, LEFT * scale, np.inf)
+    return most
+
+
+def _calibrated(campaign: Campaign, samples: Sequence[Sample], model: GravityModel, most: Array) -> bool:
+    """Whether there are calibrations, and they alone agree with what was known."""
+    names = {entry.name for entry in campaign.recordings if entry.role == "calibration"}
+    alone = [sample for sample in samples if sample.name in names]
+    if not alone:
+        return False
+    equation = model.equation
+    by_these = (
+        model
+        if names == set(model.taring)
+        else gravity.fit(
+            alone, equation.elements.rig, include_inertia=equation.include_inertia, settings=model.settings
+        )
+    )
+    return tension(by_these, {}).sound and not any(_left(by_these, most))
+
+
+def _beyond(one: Moved, model: GravityModel) -> Beyond:
+    quantity = model.equation.elements.rig.quantities().get(one.name.split("[")[0])
+    channel = one.name.rpartition("].")[2]
+    unit = dict(zip(model.channels, model.units, strict=True)).get(channel, "") if quantity is None else quantity.unit
+    return Beyond(
+        name=one.name, unit=unit, prior=one.prior, prior_sigma=one.prior_sigma, value=one.value, distance=one.distance
+    )
+
+
+def _in_words(one: Explained, equation: Equation) -> str:
+    fault, found = one.fault, one.found
+    match fault.kind:
+        case "gain":
+            return _gain(fault.what, fault.gained, float(found[0]))
+        case "swapped":
+            return f"swapped: {fault.what}"
+        case "axes":
+            return f"axes: the transducer's x, y, z are read as {fault.what}"
+        case "sense":
+            return f"sign: the angle of {fault.what} turns the other way, by its axis or its encoder's sign"
+        case "unit":
+            return f"unit: {fault.what}"
+        case "zero":
+            return f"zero: the angle of {fault.what} is {np.degrees(found[0]):.4g} degrees too large"
+        case "point":
+            return (
+                f"axis: torques are about another point than stated, off by ({', '.join(f'{x:.4g}' for x in found)}) m"
+            )
+        case "bias":
+            return f"zero: that of {fault.what} is not as stated ({_values(found)} for {_values(one.stated)})"
+        case _:
+            return f"{fault.what} is {_values(found)}, for {_values(one.stated)} as stated"
+
+
+def _values(numbers: Array) -> str:
+    return ", ".join(f"{x:.4g}" for x in numbers[:_SHOWN]) + (", ..." if len(numbers) > _SHOWN else "")
+
+
+def _gain(what: str, channels: Sequence[str], gain: float) -> str:
+    """A gain in words: as a sign, as a unit, or as it is."""
+    if abs(gain + 1.0) < _LIKE:
+        return f"sign: {what} negated"
+    units = _FORCES if all(name[0] == "F" for name in channels) else _TORQUES
+    if any(name[0] == "F" for name in channels) and any(name[0] == "T" for name in channels):
+        units = {}
+    for name, factor in units.items():
+        stated = "N m" if units is _TORQUES else "N"
+        if abs(gain * factor - 1.0) < _LIKE:
+            return f"unit: {what} in {name}, taken for {stated}"
+        if abs(gain / factor - 1.0) < _LIKE:
+            return f"unit: {what} in {stated}, taken for {name}"
+    return f"gain: {what} read {gain:.4g} of what acts"

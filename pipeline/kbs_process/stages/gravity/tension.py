@@ -1,0 +1,104 @@
+"""What was fitted against what was known: every fitted number, and each recording's zero, next to its prior.
+
+Where the model of the rig is right, an estimate differs from its prior by chance, with the covariance that the fit
+states (`Fit.moved_covariance`): not by the posterior's alone, which the prior is part of. What lies beyond says that
+the model, a unit or a sign is wrong, or a stated sigma too small.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2
+
+from kbs_process.signals.records import Array
+from kbs_process.stages.gravity.model import GravityModel, taring_error
+from kbs_process.stages.gravity.solve import ZERO
+from kbs_process.stages.gravity.taring import Taring
+
+BEYOND = 4.0  # sigma
+BY_CHANCE = 1e-4
+_INFORMED = 0.1  # part of the prior's variance that the data take away: less says nothing of the prior
+
+
+@dataclass(frozen=True, slots=True)
+class Moved:
+    """A number before and after the fit, and by how much it may move by chance."""
+
+    name: str
+    prior: float
+    prior_sigma: float
+    value: float
+    chance: float  # standard deviation of value - prior, where all is right
+
+    @property
+    def distance(self) -> float:
+        """How far it has moved, in standard deviations of such moves."""
+        return (self.value - self.prior) / self.chance
+
+
+@dataclass(frozen=True, slots=True)
+class Tension:
+    """Everything fitted next to what was known of it, and how likely chance moves it all so far together."""
+
+    moved: tuple[Moved, ...]
+    probability: float
+
+    @property
+    def beyond(self) -> tuple[Moved, ...]:
+        """What is further off than chance allows, the farthest first."""
+        far = [one for one in self.moved if abs(one.distance) > BEYOND]
+        return tuple(sorted(far, key=lambda one: -abs(one.distance)))
+
+    @property
+    def sound(self) -> bool:
+        return not self.beyond and self.probability >= BY_CHANCE
+
+
+def tension(model: GravityModel, tarings: Mapping[str, Taring]) -> Tension:
+    """Compare a fit with its priors, and the zeros of recordings that were not fitted with that of the bias.
+
+    How a zero drifts is assumed rather than known: it is not compared.
+    """
+    fit = model.fit
+    known = np.array([not name.startswith(ZERO[1]) for name in fit.names], dtype=np.bool_)
+    scale = fit.prior_sigma[known]
+    C = fit.moved_covariance[np.ix_(known, known)] / np.outer(scale, scale)
+    names = [name for name, prior in zip(fit.names, known, strict=True) if prior]
+    prior = (fit.value - fit.moved)[known]
+    moved = by_chance(names, prior, fit.value[known], scale, C)
+    return Tension((*moved, *_zeros(model, tarings)), together(fit.moved[known] / scale, C))
+
+
+def by_chance(names: Sequence[str], prior: Array, value: Array, sigma: Array, covariance: Array) -> tuple[Moved, ...]:
+    """Numbers that the data inform; `covariance` is that of their moves over their priors' sigmas."""
+    chance = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    return tuple(
+        Moved(name, float(a), float(scale), float(b), float(share * scale))
+        for name, a, b, scale, share in zip(names, prior, value, sigma, chance, strict=True)
+        if share**2 > _INFORMED
+    )
+
+
+def together(moved: Array, covariance: Array) -> float:
+    """Probability that chance moves all numbers as far, in the directions that the data inform; in prior sigmas."""
+    if len(moved) == 0:
+        return 1.0
+    variance, directions = np.linalg.eigh(covariance)
+    informed = variance > _INFORMED
+    squares = (directions.T @ moved)[informed] ** 2 / variance[informed]
+    return float(chi2.sf(squares.sum(), informed.sum())) if informed.any() else 1.0
+
+
+def _zeros(model: GravityModel, tarings: Mapping[str, Taring]) -> Iterator[Moved]:
+    """The constants of recordings that were tared by themselves."""
+    prior = model.equation.bias_sigma
+    for name, taring in tarings.items():
+        if taring.fitted:
+            continue
+        chance = np.hypot(prior, taring_error(model, taring))
+        for channel, value, sigma, own in zip(model.channels, taring.bias, prior, chance, strict=True):
+            if sigma > 0.0:
+                yield Moved(f"bias[{name}].{channel}", 0.0, float(sigma), float(value), float(own))

@@ -1,0 +1,86 @@
+"""What samples can show: distinct readings a second, steps, gaps, and bands next to an amplifier's corner."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from kbs_process.reduction.shown import Readings, amplified, attenuated
+from kbs_process.rig.model import Amplifier, Quantity
+from kbs_process.signals.records import Block
+
+NEEDED = 2.5  # Hz: a band up to 1 Hz
+
+
+def read(t: np.ndarray, values: np.ndarray, piece: int = 700) -> Readings:
+    """The readings of a stream at times t (n,) s, taken in by pieces."""
+    readings = Readings()
+    stamp = np.round(1e9 * t).astype(np.int64)
+    for at in range(0, len(t), piece):
+        rows = slice(at, at + piece)
+        readings.push(Block(stamp[rows], stamp[rows], values[rows]))
+    return readings
+
+
+def noise(n: int, seed: int = 1) -> np.ndarray:
+    return np.random.default_rng(seed).normal(0.0, 0.02, (n, 6)) + np.sin(np.arange(n) / 300.0)[:, None]
+
+
+def slow(readings: Readings) -> tuple[float, float]:
+    return readings.slow(NEEDED, at_rest=False)
+
+
+def test_a_fast_stream_shows_its_band():
+    t = np.arange(0.0, 120.0, 0.01)
+    assert slow(read(t, noise(len(t)))) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize("rate", [1.0, 1.5])
+def test_a_slow_stream_does_not(rate):
+    t = np.arange(0.0, 240.0, 1.0 / rate)
+    assert slow(read(t, noise(len(t)))) == pytest.approx((1.0, rate), rel=0.1)
+
+
+def test_rows_that_share_a_stamp_are_one_reading():
+    t = np.floor(np.arange(0.0, 120.0, 0.01))
+    assert slow(read(t, noise(len(t)))) == pytest.approx((1.0, 1.0), rel=0.2)
+
+
+def test_readings_that_a_logger_repeats_are_one():
+    t = np.arange(0.0, 120.0, 0.01)
+    held = noise(120)[(t + 1e-6).astype(int)]
+    assert slow(read(t, held)) == pytest.approx((1.0, 1.0), rel=0.2)
+
+
+def test_a_stretch_of_repeated_readings_is_found():
+    t = np.arange(0.0, 120.0, 0.01)
+    values = noise(len(t))
+    values[3000:6000] = values[3000:6000][np.arange(3000) // 100 * 100]
+    share, rate = slow(read(t, values))
+    assert (share, rate) == pytest.approx((0.25, 1.0), rel=0.3)
+
+
+def test_what_rounding_repeats_at_rest_is_no_repeat():
+    t = np.arange(0.0, 120.0, 0.01)
+    steps = np.round(noise(len(t)) * 0.3 / 0.02) * 0.02
+    assert slow(read(t, steps)) == (0.0, 0.0)
+
+
+def test_the_step_of_a_channel_is_read_from_its_readings():
+    values = noise(3000)
+    values[:, 4] = np.round(values[:, 4] / 0.05) * 0.05
+    steps = read(np.arange(3000) * 0.01, values).steps()
+    assert steps[4] == pytest.approx(0.05)
+    assert np.all(np.delete(steps, 4) == 0.0)
+
+
+def test_an_amplifier_that_takes_much_off_forbids_a_verdict():
+    amplifier = Amplifier(2, Quantity("corner", np.array(20.0), "Hz", np.array(0.2), "test"))
+    assert not list(attenuated(amplifier, 1.0)) and not list(attenuated(None, 50.0))
+    (doubt,) = attenuated(amplifier, 20.0)
+    assert "29 %" in doubt.why and not doubt.of_failed
+
+
+def test_a_resonance_next_to_a_band_forbids_a_verdict():
+    assert not list(amplified([6.0, 10.0], 1.0)) and not list(amplified([], 1.0))
+    assert len(list(amplified([6.0, 10.0], 5.0))) == 1

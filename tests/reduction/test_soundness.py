@@ -1,0 +1,72 @@
+"""What was fitted against what was known: sound rigs are called sound, and a simple fault is named."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from kbs_process.campaign.config import Campaign
+from kbs_process.reduction.soundness import repeated
+from reduction.arm import checked, described, drawn, recorded
+
+UNIT = np.eye(6)
+LBF = np.diag([1 / 4.4482216] * 3 + [1.0] * 3)
+FAULTS = {
+    "gain: all channels of the wrench read 0.5": {"reads": 0.55 * UNIT},
+    "sign: all channels of the wrench negated": {"reads": -UNIT},
+    "gain: all channels of the wrench read 1.": {"reads": 1.2 * UNIT},
+    "unit: all forces in pound-force, taken for N": {"reads": LBF},
+    "unit: all torques in N mm, taken for N m": {"reads": np.diag([1.0] * 3 + [1e3] * 3)},
+    "sign: Fz negated": {"reads": np.diag([1.0, 1.0, -1.0, 1.0, 1.0, 1.0])},
+    "swapped: Fx and Fz": {"reads": UNIT[[2, 1, 0, 3, 4, 5]]},
+    "swapped: Tx and Ty": {"reads": UNIT[[0, 1, 2, 4, 3, 5]]},
+    "unit: angles of arm": {"angle": np.degrees(1.0)},
+    "zero: the angle of arm": {"zero": 0.3},
+}
+
+
+def told(name: str, folder: Path) -> None:
+    campaign = described(folder)
+    found = checked(campaign, recorded(campaign, drawn(campaign, 1), 1, **FAULTS[name]))
+    (notice,) = found.notices()
+    assert (notice.severity, found.soundness.calibrated) == ("error", False)
+    assert any(one.startswith(name) for one in found.soundness.suggestions), found.soundness
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", list(FAULTS)[:2])
+def test_a_simple_fault_is_told_and_named(name, tmp_path):
+    told(name, tmp_path)
+
+
+@pytest.mark.validation
+@pytest.mark.parametrize("name", list(FAULTS)[2:])
+def test_other_faults_are_told_and_named(name, tmp_path):
+    told(name, tmp_path)
+
+
+def test_a_channel_that_repeats_another_is_told(tmp_path):
+    campaign = described(tmp_path)
+    doubled = UNIT.copy()
+    doubled[0] = UNIT[2]
+    recordings = recorded(campaign, drawn(campaign, 1), 1, reads=doubled)
+    assert "Fz repeats Fx in sweep: one stream is read twice" in list(repeated(recordings))
+    assert not list(repeated(recorded(campaign, drawn(campaign, 1), 1)))
+
+
+def share(campaign: Campaign, seeds: range) -> float:
+    """Of arms drawn from what is stated of them, the part that is judged."""
+    found = [checked(campaign, recorded(campaign, drawn(campaign, seed), seed)).soundness for seed in seeds]
+    return float(np.mean([one.sound for one in found]))
+
+
+@pytest.mark.slow
+def test_sound_arms_are_sound(tmp_path):
+    assert share(described(tmp_path), range(2)) == 1.0
+
+
+@pytest.mark.validation
+def test_at_least_95_percent_of_sound_arms_are_judged(tmp_path):
+    assert share(described(tmp_path), range(100, 160)) >= 0.95
