@@ -11,9 +11,9 @@ from kbs_process.progress import Progress
 from kbs_process.reduction.held import read_alive
 from kbs_process.reduction.relief import forces_in, relieved, without_effects
 from kbs_process.reduction.settings import gravity_settings, motion_settings
-from kbs_process.reduction.shown import Readings, Watch
 from kbs_process.signals.records import COPY, Loss, Run, Signal
 from kbs_process.stages import decouple, motion
+from kbs_process.stages.align.readings import Readings, Watch
 from kbs_process.stages.decouple import Decoupling
 from kbs_process.stages.gravity import model as gravity
 from kbs_process.stages.gravity.model import GravityModel, Sample

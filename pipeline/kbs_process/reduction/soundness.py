@@ -17,7 +17,7 @@ from kbs_process.campaign.config import Campaign, Requirement
 from kbs_process.plant.laws import select
 from kbs_process.plant.linear.modes import modes
 from kbs_process.progress import Progress
-from kbs_process.reduction import shown
+from kbs_process.reduction import measurable
 from kbs_process.reduction.preparing import Prepared, tare
 from kbs_process.reduction.relief import relieved
 from kbs_process.results.judged import WRONG, Beyond, Doubt, Soundness
@@ -103,7 +103,7 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
         conventions = (*check_weight(campaign.rig), *_conventions(recordings[:2], instants[:2], equation))
         found = tension(model, {sample.name: taring for sample, taring in tared})
         most = _most(equation)
-        rounding = {key: x for one in recordings for key, x in shown.rounding(campaign, one.readings).items()}
+        rounding = {key: x for one in recordings for key, x in measurable.rounding(campaign, one.readings).items()}
         hidden = {one.name: tuple(_hidden(campaign, one, recordings, model)) for one in campaign.requirements}
         reasons = (
             *repeated(recordings),
@@ -135,13 +135,13 @@ def _hidden(
     """What the samples cannot show of a requirement."""
     judged = [one for one in recordings if one.entry.role != "calibration"]
     for one in judged:
-        yield from shown.hidden(campaign, requirement, one.entry.name, one.run, one.motion.valid, one.readings)
+        yield from measurable.hidden(campaign, requirement, one.entry.name, one.run, one.motion.valid, one.readings)
     if campaign.rig.transducer.channels:
         edge = requirement.band[1]
-        yield from shown.attenuated(campaign.rig.transducer.amplifier, edge)
+        yield from measurable.attenuated(campaign.rig.transducer.amplifier, edge)
         poses = [one.motion.q[at] for one in judged[:1] for at in (0, -1)]
         every = [mode.frequency for pose in poses for mode in modes(model.rig, select(campaign.effects), pose)]
-        yield from shown.amplified(every, edge)
+        yield from measurable.amplified(every, edge)
 
 
 def _conventions(

@@ -1,22 +1,15 @@
-"""What the samples of a recording can show: how many distinct readings there are, where, and in what steps."""
+"""The readings of a stream: how many distinct ones there are, where, and in what steps."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from kbs_process.campaign.config import Campaign, Requirement
-from kbs_process.reduction.measurable import judged_channels
-from kbs_process.results.judged import Doubt
-from kbs_process.rig.model import Amplifier
-from kbs_process.signals.records import WRENCH_CHANNELS, Array, Block, Mask, Run
+from kbs_process.signals.records import Array, Block
 from kbs_process.stages.align.condense import LOADS
 
-SHOWN = 0.4  # of the rate of distinct readings: the highest frequency that they show
-UNSEEN = 0.05  # share of a recording that may be unknown: an interval at 95 % leaves out as much
-AMPLIFIED = 0.05  # part of a reading that an amplifier may take off at a band's upper edge
 _BIN = 0.25  # s
 _COUNTED = 20  # readings that tell a local rate
 _SHORT = 0.9  # of the readings that are needed: as many are enough, at the ends of a window some are missed
@@ -114,71 +107,3 @@ class Watch:
             if key in (*LOADS, "angle") and len(block):
                 self.streams.setdefault(key, Readings()).push(block)
             yield key, block
-
-
-def hidden(
-    campaign: Campaign, requirement: Requirement, name: str, run: Run, moving: Mask, streams: Mapping[str, Readings]
-) -> Iterator[Doubt]:
-    """Yield what a recording's samples cannot show of a requirement; `moving` (n,): where its angles are known."""
-    rig, edge = campaign.rig, requirement.band[1]
-    judged = judged_channels(requirement, rig)
-    channels = WRENCH_CHANNELS if requirement.frame == "S" else judged
-    needed = edge / SHOWN
-    for key, readings in streams.items():
-        share, rate = readings.slow(needed, at_rest=key == "angle")
-        if share > UNSEEN:
-            stream = "encoder" if key == "angle" else key
-            yield Doubt(
-                f"{stream} has {rate:.3g} distinct readings a second in {100.0 * share:.0f} % of {name}, and a band up "
-                f"to {edge:g} Hz needs {needed:.3g}"
-            )
-    loads = run.loads
-    assert loads is not None  # every recording that is judged has some
-    known = loads.valid & moving
-    inside = known[np.argmax(known) : len(known) - np.argmax(known[::-1])] if known.any() else known
-    if len(inside) and (missing := 1.0 - float(np.mean(inside))) > UNSEEN:
-        yield Doubt(f"in {100.0 * missing:.0f} % of {name} wrench or angles are missing", of_failed=False)
-    if coarse := [one for one in _coarse(campaign, streams) if one[0] in channels]:
-        steps = ", ".join(f"{channel} in steps of {step:.3g} {unit}" for channel, unit, step in coarse)
-        yield Doubt(f"{steps} in {name}: coarser than the resolution that is stated")
-    held = sorted({loss.where for loss in run.losses if loss.kind == "held" and loss.where in channels})
-    if held:
-        yield Doubt(f"{', '.join(held)} held one reading in {name}: what was beyond is not known", of_failed=False)
-
-
-def rounding(campaign: Campaign, streams: Mapping[str, Readings]) -> dict[str, float]:
-    """Standard deviation, by channel, of readings that are rounded more coarsely than is stated."""
-    return {channel: step / float(np.sqrt(12.0)) for channel, _, step in _coarse(campaign, streams)}
-
-
-def _coarse(campaign: Campaign, streams: Mapping[str, Readings]) -> Iterator[tuple[str, str, float]]:
-    """Channels of the wrench that read in greater steps than is stated, and than their noise hides."""
-    rig = campaign.rig
-    if "wrench" not in streams:
-        return
-    index = rig.loads.index(rig.transducer.channels)
-    noise, stated = rig.transducer.noise.value[index], rig.transducer.resolution.value[index]
-    for column, step in enumerate(streams["wrench"].steps()):
-        if step > max(2.0 * noise[column], 1.5 * stated[column]):
-            yield rig.transducer.channels[column], rig.loads.units[index[column]], float(step)
-
-
-def attenuated(amplifier: Amplifier | None, edge: float) -> Iterator[Doubt]:
-    """Yield a doubt where the amplifier takes more off at a band's upper edge than may be left uncorrected."""
-    if amplifier is None:
-        return
-    lost = 1.0 - 1.0 / np.sqrt(1.0 + (edge / float(amplifier.corner)) ** (2 * amplifier.order))
-    if lost > AMPLIFIED:
-        yield Doubt(
-            f"the amplifier takes {100.0 * lost:.0f} % off at {edge:g} Hz, the band's upper edge", of_failed=False
-        )
-
-
-def amplified(frequencies: Sequence[float], edge: float) -> Iterator[Doubt]:
-    """Yield a doubt where a resonance is so near to a band that what it amplifies is no error, but the signal.
-
-    `budget.resonance` holds for modes above the band's upper edge by half an octave.
-    """
-    lowest = min(frequencies, default=np.inf)
-    if 2.0 * edge**2 > lowest**2:
-        yield Doubt(f"the resonance at {lowest:.3g} Hz lies in or next to a band up to {edge:g} Hz")

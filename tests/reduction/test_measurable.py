@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kbs_process.reduction.shown import Readings, amplified, attenuated
+from kbs_process.reduction.measurable import amplified, attenuated
 from kbs_process.rig.model import Amplifier, Quantity
 from kbs_process.signals.records import Block
+from kbs_process.stages.align.readings import Readings
 
 NEEDED = 2.5  # Hz: a band up to 1 Hz
 
