@@ -75,11 +75,11 @@ def main(words: Sequence[str]) -> int:
     parser = argparse.ArgumentParser(prog="python -m mutations", description=__doc__)
     parser.add_argument("count", type=int, nargs="?", default=10_000)
     parser.add_argument("--seed", type=int, default=0, help="number of the first; inputs of one seed are the same")
-    parser.add_argument("--only", help="a subject: " + ", ".join(subject.name for subject in SUBJECTS))
+    parser.add_argument("--only", nargs="+", choices=[subject.name for subject in SUBJECTS], metavar="SUBJECT")
     given = parser.parse_args(words)
     for name in _LIBRARIES:
         import_module(name)
-    chosen = [subject for subject in SUBJECTS if given.only in (None, subject.name)]
+    chosen = [subject for subject in SUBJECTS if given.only is None or subject.name in given.only]
     begun, found = time.monotonic(), list[Tried]()
     for one in tried(chosen, given.count, given.seed, len(os.sched_getaffinity(0))):
         found.append(one)

@@ -105,7 +105,9 @@ def _numpy(path: Path) -> Columns:
     return dict(zip(NAMES, np.load(path, allow_pickle=False), strict=True))
 
 
-def _judge(file: str, read: Callable[[Path], Columns]) -> Callable[[Path, Tell], None]:
+def judged(file: str, read: Callable[[Path], Columns]) -> Callable[[Path, Tell], None]:
+    """Import a file, and hold it against the sound one, else against what `read` makes of it."""
+
     def judge(folder: Path, tell: Tell) -> None:
         notices: list[str] = []
         import_recordings(folder / "mapping.toml", folder, folder / "campaign", notice=notices.append)
@@ -169,7 +171,7 @@ def _subject(
         files.write_mapping(folder, file, mapping)
         write(folder / file, sound())
 
-    return Subject(name, share, make, _mutate(file, name == "csv"), _judge(file, read))
+    return Subject(name, share, make, _mutate(file, name == "csv"), judged(file, read))
 
 
 SUBJECTS = (

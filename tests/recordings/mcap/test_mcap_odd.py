@@ -207,3 +207,32 @@ def test_a_topic_of_sequences_that_cannot_be_decoded_is_told(tmp_path: Path, sta
     assert why in loss.detail
     assert why in topic.note
     assert not topic.ranges
+
+
+def test_json_that_is_no_utf8_is_lost_as_one_message(tmp_path: Path) -> None:
+    good = b'{"a": 1.5}'
+    path = put(
+        tmp_path / "a.mcap", [good, b'{"\xd1\x00": 2}', b'{"a": "\xff"}', good], ("x", "jsonschema", b"{}"), "json"
+    )
+    blocks, losses = read(path, Stream("s", "/topic", ("a",)))
+    assert blocks["s"].values[:, 0].tolist() == [1.5, 1.5]
+    assert [(loss.kind, loss.count) for loss in losses] == [("undecodable", 2)]
+
+
+def test_a_message_whose_end_nothing_confirms_is_not_read(tmp_path: Path) -> None:
+    """Eight bytes too many in a message of a chunk without a checksum: what follows is no record."""
+    payloads = [b"\0\1\0\0" + struct.pack("<IId", i, 0, float(i)) for i in range(1, 9)]
+    data = build(
+        [(10**9 * i, payload) for i, payload in enumerate(payloads, 1)],
+        STAMPED,
+        "cdr",
+        compression=CompressionType.NONE,
+        enable_crcs=False,
+        enable_data_crcs=False,
+    )
+    inside = data.index(payloads[4]) + 14  # within the number of the fifth
+    path = tmp_path / "a.mcap"
+    path.write_bytes(data[:inside] + bytes(8) + data[inside:])
+    blocks, losses = read(path, Stream("s", "/topic", ("x",)))
+    assert blocks["s"].values[:, 0].tolist() == [1.0, 2.0, 3.0, 4.0]
+    assert any("are no records" in loss.detail for loss in losses)
