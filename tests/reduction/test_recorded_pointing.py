@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -70,11 +71,10 @@ def test_without_an_instrument_or_a_command_there_is_nothing_to_say() -> None:
 def test_a_campaign_names_the_topic_of_the_instrument(tmp_path: Path) -> None:
     folder = tmp_path / "EL089"
     folder.mkdir()
-    for name in ("parameters", "recordings"):
-        (folder / name).symlink_to(ROOT / "campaigns" / "EL089" / name)
+    shutil.copytree(ROOT / "campaigns" / "EL089" / "parameters", folder / "parameters")
     text = (ROOT / "campaigns" / "EL089" / "campaign.toml").read_text()
     (folder / "campaign.toml").write_text(text.replace("[topics]\n", '[topics]\npointing = "/tracker"\n'))
-    topic = load_campaign(folder, checksums=False).topics.pointing
+    topic = load_campaign(folder, recordings=False).topics.pointing
     assert topic is not None
     assert (topic.topic, topic.channels) == ("/tracker", ("az", "el"))
     assert topic.fields == ("position[az]", "position[el]")

@@ -10,6 +10,7 @@ import pandas as pd
 import pytest
 
 from kbs_process.recordings.formats import Text, text
+from kbs_process.results.store import LIST
 from kbs_process.studies.convert.clock import numbers
 from kbs_process.studies.convert.run import import_recordings
 from studies.convert.importer_files import (
@@ -220,6 +221,6 @@ def test_campaign_keeps_the_template_and_says_where_it_comes_from(tmp_path: Path
     assert "old.mcap" not in written
     assert 'origin = "a \\"quoted\\" bench"' in written
     files = sorted(path.relative_to(one) for path in one.rglob("*") if path.is_file())
-    assert [str(path) for path in files] == ["campaign.toml", "parameters/rig.toml", "recordings/turn_1.mcap"]
+    assert [str(path) for path in files] == [LIST, "campaign.toml", "parameters/rig.toml", "recordings/turn_1.mcap"]
     for path in files:
         assert (one / path).read_bytes() == (two / path).read_bytes()
