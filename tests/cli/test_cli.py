@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from functools import cache
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from typing import Any
@@ -20,11 +21,13 @@ import pytest
 from campaign.campaign_folder import EXAMPLE, CampaignFolder, make_folder
 from end_to_end import short_campaign
 from kbs_process import cli
+from kbs_process.campaign.load import load_campaign
 from kbs_process.errors import RecordingError
 from kbs_process.recordings.mcap.messages.encoding import OutStream
 from kbs_process.recordings.mcap.writer import write_mcap
 from kbs_process.results.outcome import Outcome
 from kbs_process.results.store import writing
+from kbs_process.rig.model import Rig
 from kbs_process.studies.convert import preset_names
 
 VERBS = ("process", "validate", "inspect", "simulate", "predict", "import", "report", "prove")
@@ -209,11 +212,16 @@ def test_wrong_words_are_status_2(arguments: tuple[str, ...], words: str, capsys
 
 @pytest.fixture
 def processable(tmp_path: Path) -> CampaignFolder:
-    """The example's description with recordings that are long enough for the gravity fit."""
+    """The example's description with recordings of its rig that are long enough for the gravity fit."""
     folder = make_folder(tmp_path / "campaigns" / "EL089")
     for number, path in enumerate(sorted((folder.path / "recordings").iterdir())):
-        short_campaign.record(path, noise=0.01, seed=number)
+        short_campaign.record(path, noise=0.01, seed=number, rig=rig())
     return folder
+
+
+@cache
+def rig() -> Rig:
+    return load_campaign(EXAMPLE, checksums=False).rig
 
 
 @pytest.mark.slow
@@ -229,7 +237,7 @@ def test_validate_finds_sound_recordings_clean(processable: CampaignFolder, caps
 def test_validate_tells_losses_and_fails_only_when_asked(
     processable: CampaignFolder, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    short_campaign.record(processable.path / "recordings" / "EL089P00_2.mcap", noise=0.01, seed=5, nan=True)
+    short_campaign.record(processable.path / "recordings" / "EL089P00_2.mcap", noise=0.01, seed=5, nan=True, rig=rig())
     assert run("validate", str(processable.path)) == 0
     assert run("validate", str(processable.path), "--check") == 1
     out = capsys.readouterr().out
@@ -241,7 +249,9 @@ def test_validate_tells_losses_and_fails_only_when_asked(
 def test_validate_tells_what_was_put_in_order_and_counts_no_loss(
     processable: CampaignFolder, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    short_campaign.record(processable.path / "recordings" / "EL089P00_2.mcap", noise=0.01, seed=5, swapped=True)
+    short_campaign.record(
+        processable.path / "recordings" / "EL089P00_2.mcap", noise=0.01, seed=5, swapped=True, rig=rig()
+    )
     assert run("validate", str(processable.path), "--check") == 0
     out = capsys.readouterr().out
     assert "EL089P00_2  held-out     clean" in out
@@ -255,7 +265,7 @@ def test_validate_tells_a_recording_of_which_nothing_is_whole_long_enough(
 ) -> None:
     """Gravity is not fitted to a recording that is held out, and processing has to take it off all the same."""
     path = processable.path / "recordings" / "EL089P00_2.mcap"
-    short_campaign.record(path, noise=0.01, seed=5, nan=slice(0, None, 2))
+    short_campaign.record(path, noise=0.01, seed=5, nan=slice(0, None, 2), rig=rig())
     assert run("validate", str(processable.path), "-q") == 2
     out = capsys.readouterr().out
     assert "EL089P00_2: wrench (Fz in 1000: interpolated)" in out

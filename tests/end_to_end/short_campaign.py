@@ -7,8 +7,10 @@ from pathlib import Path
 import numpy as np
 
 from campaign.campaign_folder import CampaignFolder, make_folder
+from kbs_process.plant.rigid import loads
 from kbs_process.recordings.mcap.messages.encoding import OutStream
 from kbs_process.recordings.mcap.writer import write_mcap
+from kbs_process.rig.model import Rig
 
 JOINTS = ("az", "el")
 
@@ -30,8 +32,9 @@ def record(
     nan: bool | slice = False,
     swapped: bool = False,
     read: tuple[str, ...] = JOINTS,
+    rig: Rig | None = None,
 ) -> None:
-    """Write twenty seconds: elevation at rest, or swinging; a wrench that is constant, but for noise (N, N m).
+    """Write twenty seconds: elevation at rest, or swinging; the wrench of a `rig`, or a constant one, and noise (N, N m).
 
     With `nan` ten readings of Fz are no numbers, or a slice of them; if `swapped`, two messages are in the other's
     place. Encoders `read` some joints.
@@ -42,6 +45,9 @@ def record(
     angle = np.stack([np.zeros(len(stamp)), 1.3 + swing], axis=1)
     command = np.concatenate([angle[::10], np.gradient(angle[::10], 0.1, axis=0)], axis=1)
     wrench = np.tile([0.0, 0.0, -274.0, -6.0, 5.0, 0.0], (len(stamp), 1))
+    if rig is not None:
+        rest = np.zeros_like(angle)
+        wrench = loads(rig, angle, rest, rest)[:, :6] @ (np.eye(6) + rig.transducer.cross_coupling.value).T
     wrench += noise * np.random.default_rng(seed).standard_normal(wrench.shape)
     if nan:
         wrench[nan if isinstance(nan, slice) else slice(200, 210), 2] = np.nan
