@@ -103,12 +103,15 @@ DRUM_RADIUS = 0.1  # m, nominal: sets only the scale of the fitted inertia
 
 
 def treadmill_rig():
-    """Belt and drums as one body that turns about the pitch axis, its weight borne without a moment."""
+    """Belt and drums as one body that turns about the pitch axis, its weight borne without a moment.
+
+    No recording says which way it turns: the other way, its inertia would be negative.
+    """
     return Rig(
         quantity("gravity.magnitude", 9.80665),
         transducer(channels=("Ty",), s_bias=(0.0, 20.0)),
         (body("drums", "belt", 50.0, [0, 0, 0], [0, 0, 0, 0, 0, 0], 0.0, 0.0, [0, 2.0, 0, 0, 0, 0]),),
-        (joint("belt", "T", (0, 1, 0)),),
+        (joint("belt", "T", (0, -1, 0)),),
         None,
         None,
     )
