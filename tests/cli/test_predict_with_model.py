@@ -74,7 +74,8 @@ def test_a_recording_that_nobody_used(folder: Path) -> None:
     assert 1e-5 < np.abs(np.mean(angles[1] - angles[0])) < 1e-3
     about = json.loads(pq.read_schema(whole / "wrench.parquet").metadata[b"kbs"])
     assert "read through channel_gain at Fz" in about["history"]
-    assert inspect_recording(whole / "predicted.mcap").state == "clean"
+    inspected = inspect_recording(whole / "predicted.mcap")
+    assert inspected.state == "clean", inspected
 
 
 def test_commands_of_a_table(folder: Path) -> None:

@@ -34,7 +34,7 @@ def record(
     read: tuple[str, ...] = JOINTS,
     rig: Rig | None = None,
 ) -> None:
-    """Write twenty seconds: elevation at rest, or swinging; the wrench of a `rig`, or a constant one, and noise (N, N m).
+    """Write twenty seconds: elevation at rest, or swinging; a constant wrench, or that of a `rig`, and noise (N, N m).
 
     With `nan` ten readings of Fz are no numbers, or a slice of them; if `swapped`, two messages are in the other's
     place. Encoders `read` some joints.

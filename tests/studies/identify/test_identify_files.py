@@ -40,7 +40,18 @@ def test_folder(tmp_path: Path) -> None:
     at, phase = names.index("joint.el.drive.Ka"), names.index("joint.el.drive.phi_cog")
     value[at], value[phase] = 10321.0, 4.0
     sigma = np.where(np.isfinite(parameters.sigma), 0.1 * parameters.sigma, 0.01)
-    fit = Fit(names, value, sigma, np.diag(sigma**2), parameters.sigma, (Check("converged", True, "3"),), 1.0, 9)
+    fit = Fit(
+        names,
+        value,
+        sigma,
+        np.diag(sigma**2),
+        parameters.sigma,
+        (Check("converged", True, "3"),),
+        1.0,
+        9,
+        0 * value,
+        np.diag(sigma**2),
+    )
     noise = sensor_spectra(setting, recording)
     found = Identification(
         setting, fit, np.zeros((9, len(names))), (noise,), (), Unpredicted(np.zeros((9, 2))), (), parameters

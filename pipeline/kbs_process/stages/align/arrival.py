@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-import numba
 import numpy as np
 
+from kbs_process.machine_code import njit
 from kbs_process.signals.records import Block, Mask, Stamps
 from kbs_process.stages.align.ordering import BLOCK, concatenate, select
 
@@ -152,7 +152,7 @@ def _far(stamp: Stamps, good: Mask, least: int, *, first: bool, last: bool) -> t
     return far, most
 
 
-@numba.njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def in_order(stamp: Stamps) -> Mask:
     """Mark a longest increasing subsequence of stamps (n,): the samples that are in order."""
     n = len(stamp)

@@ -125,6 +125,9 @@ class LatencyFloor:
         if len(self._floor) < 2 * LEAST_PAIRS:
             return None
         own, floor = self._pairs()
+        # A skew is no step: of the slopes over a quarter of the whole, few have a step in them.
+        far = len(own) // 4
+        floor = floor - float(np.median((floor[far:] - floor[:-far]) / (own[far:] - own[:-far]))) * own
         change = np.diff(floor)
         scatter = 1.4826 * float(np.median(np.abs(change - np.median(change))))
         best: FloorStep | None = None

@@ -13,9 +13,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
-import numba
 import numpy as np
 
+from kbs_process.machine_code import njit
 from kbs_process.signals.records import Array, Mask, Stamps
 from kbs_process.stages.align.grid import counted
 
@@ -40,6 +40,7 @@ PAUSE_RATE = 1.0  # rad/s that no antenna is turned with where its readings are 
 MOST_BAD, LEAST_BAD = 0.01, 10  # share of samples, and number, that may be spikes
 MOST_TURNS = 1e4
 TURNS, TURNS_SHARE = 20, 0.1  # changes between two levels in a block, and their share of it
+SHAKEN = 20.0  # of the usual second difference
 APART = 30.0  # of what the next but one sample differs by
 
 
@@ -212,7 +213,10 @@ class Spikes:
             rows = before[first : max(stop, first), channel]
             if stop < 0:
                 kind = self.steps
-            elif len(rows) > 1 and several > 1 and not self.turning.any() and not (rows == rows[0]).all():
+            elif not self.turning.any() and (
+                (len(rows) > 1 and several > 1 and not (rows == rows[0]).all())
+                or _shaken(before, first, stop, {c for c, begin, _, _ in found if abs(begin - first) < NEAR})
+            ):
                 kind = self.blows
                 x[first:stop, channel] = rows
             else:
@@ -258,7 +262,16 @@ class Spikes:
         return found
 
 
-@numba.njit(cache=True, error_model="numpy")
+def _shaken(x: Array, first: int, stop: int, off: set[int]) -> bool:
+    """Whether channels other than those that are `off` move like nowhere around: what shook the rig is in all."""
+    others = [channel for channel in range(x.shape[1]) if channel not in off]
+    around = slice(max(first - AROUND, 0), stop + AROUND)
+    bent = np.abs(np.diff(x[around][:, others], n=2, axis=0))
+    begin = max(first - around.start - NEAR, 0)
+    return bool(np.any(bent[begin : begin + NEAR + stop - first + NEAR].max(0) > SHAKEN * np.median(bent, axis=0)))
+
+
+@njit(cache=True, error_model="numpy")
 def _differences(x: Array, steps: Array, period: float) -> tuple[Array, Array]:
     """Slopes (n,) before each sample, and by how much they change there; `steps` are periods between samples."""
     n = len(x)
@@ -270,7 +283,7 @@ def _differences(x: Array, steps: Array, period: float) -> tuple[Array, Array]:
     return d, dd
 
 
-@numba.njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def _turned(change: float, period: float) -> float:
     """A change without full turns, of which no joint makes that many between samples."""
     if period > 0.0 and abs(change) < MOST_TURNS * period:
@@ -278,14 +291,14 @@ def _turned(change: float, period: float) -> float:
     return change
 
 
-@numba.njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def _scale(dd: Array, low: int, high: int) -> float:
     """The robust scale of second differences, and zero where there are few."""
     low, high = max(low, 1), min(high, len(dd) - 1)
     return 1.4826 * float(np.median(dd[low:high])) if high - low >= NEAR else 0.0
 
 
-@numba.njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def _most(dd: Array, low: int, high: int) -> float:
     most = 0.0
     for k in range(max(low, 1), min(high, len(dd) - 1)):
@@ -293,7 +306,7 @@ def _most(dd: Array, low: int, high: int) -> float:
     return most
 
 
-@numba.njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def find_dead(
     x: Array,
     steps: Array,
@@ -337,7 +350,7 @@ def find_dead(
     return dead
 
 
-@numba.njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def _find(
     x: Array, steps: Array, slack: Array, period: float, begin: int, end: int, floor: float, held: int, dead: Mask
 ) -> tuple[Stamps, Stamps, Array, float, float]:
@@ -439,7 +452,7 @@ def _find(
     return np.array(starts, dtype=np.int64), np.array(stops, dtype=np.int64), np.array(off), largest, fastest
 
 
-@numba.njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def _stays(x: Array, i: int, by: float, held: int) -> bool:
     """Whether a load is still off by so much a while after sample i, going on as before: a blow dies away."""
     few = NEAR // 2
@@ -449,7 +462,7 @@ def _stays(x: Array, i: int, by: float, held: int) -> bool:
     return bool(abs(np.mean(x[at : at + few]) - going - by) < 0.5 * abs(by))
 
 
-@numba.njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def _cubic(at: float, places: tuple[float, float, float], values: tuple[float, float, float]) -> float:
     """The cubic through zero and three more points."""
     total = 0.0

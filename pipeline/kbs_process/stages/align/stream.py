@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from kbs_process.errors import RecordingError
-from kbs_process.signals.records import DROPOUT, PUT_IN_ORDER, ROUNDED, SPIKE, Array, Block, Loss, Mask, Stamps
+from kbs_process.signals.records import BLOW, DROPOUT, PUT_IN_ORDER, ROUNDED, SPIKE, Array, Block, Loss, Mask, Stamps
 from kbs_process.stages.align.arrival import REGULAR, Arrival
 from kbs_process.stages.align.clocks import ClockData, FloorStep, LatencyFloor
 from kbs_process.stages.align.envelope import MinMax
@@ -358,7 +358,7 @@ class Timeline:
                 found.append(Loss(DROPOUT, f"{self.where}, {name}", sum(one.count for one in own), start, end, what))
         for kind, oddities, detail in (
             (SPIKE, self.spikes.spikes if self.spikes else [], "interpolated"),
-            ("blow", self.spikes.blows if self.spikes else [], "several channels at once: kept"),
+            (BLOW, self.spikes.blows if self.spikes else [], "several channels at once: kept"),
         ):
             for channel, name in enumerate(self.channels):
                 if own := [one for one in oddities if one.channel == channel]:
