@@ -46,8 +46,9 @@ def record(
     command = np.concatenate([angle[::10], np.gradient(angle[::10], 0.1, axis=0)], axis=1)
     wrench = np.tile([0.0, 0.0, -274.0, -6.0, 5.0, 0.0], (len(stamp), 1))
     if rig is not None:
-        rest = np.zeros_like(angle)
-        wrench = loads(rig, angle, rest, rest)[:, :6] @ (np.eye(6) + rig.transducer.cross_coupling.value).T
+        turning = np.stack([np.zeros(len(stamp)), 0.05 * moving * np.cos(0.5 * stamp * 1e-9)], axis=1)
+        gaining = np.stack([np.zeros(len(stamp)), -0.25 * swing], axis=1)
+        wrench = loads(rig, angle, turning, gaining)[:, :6] @ (np.eye(6) + rig.transducer.cross_coupling.value).T
     wrench += noise * np.random.default_rng(seed).standard_normal(wrench.shape)
     if nan:
         wrench[nan if isinstance(nan, slice) else slice(200, 210), 2] = np.nan
