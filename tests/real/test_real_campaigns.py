@@ -129,7 +129,7 @@ def test_held_out_recordings_of_the_wheel_are_tared_by_themselves_not_by_the_pus
 
 
 def test_the_hand_is_told_as_a_load_that_the_model_does_not_hold_and_nothing_else_is(wheel):
-    told = [notice for notice in wheel.results.warnings if "unmodelled static load" in notice.what]
+    told = [notice for notice in wheel.results.warnings if "unmodelled load" in notice.what]
     assert [notice.where for notice in told] == ["propulsion_1"]
     assert told[0].severity == "warning"
     assert "Tz" in told[0].what
