@@ -151,7 +151,9 @@ def test_what_is_read_with_the_other_sign_is_told() -> None:
     assert run.wrench is not None and run.angle is not None
     check_signs(run, moved, campaign(), ENTRY)
     reaction = replace(run, wrench=run.wrench.derive(-run.wrench.values, "reaction"))
-    with pytest.raises(RecordingError, match=r"slope of measured T. against computed gravity is -1\.000 ± .*, expected \+1"):
+    with pytest.raises(
+        RecordingError, match=r"slope of measured T. against computed gravity is -1\.000 ± .*, expected \+1"
+    ):
         check_signs(reaction, moved, campaign(), ENTRY)
     dead = replace(run, angle=run.angle.derive(np.ones((N, 2)), "dead"))
     with pytest.raises(RecordingError, match=r"slope of encoder el against its command is \+0\.0000, expected \+1"):
