@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from campaign.campaign_folder import CampaignFolder, make_folder
+from kbs_process.campaign.load import load_campaign
 from kbs_process.plant.rigid import loads
 from kbs_process.recordings.mcap.messages.encoding import OutStream
 from kbs_process.recordings.mcap.writer import write_mcap
@@ -16,10 +17,11 @@ JOINTS = ("az", "el")
 
 
 def short_campaign(target: Path) -> CampaignFolder:
-    """Make the campaign's folder."""
+    """Make the campaign's folder, with wrenches of its own rig: on another's, what is wrong would be looked for."""
     folder = make_folder(target)
+    rig = load_campaign(folder.path, checksums=False).rig
     for path in (folder.path / "recordings").iterdir():
-        record(path)
+        record(path, rig=rig)
     return folder
 
 
