@@ -74,3 +74,8 @@ def test_a_diagnosis_that_nobody_can_read_is_outdated(tmp_path: Path) -> None:
     (out / "diagnosis" / "results.json").write_text('{"kind": "diagnosis", "schema": 99}')
     found = earlier_diagnosis(campaign, out)
     assert found is not None and "another version" in found.warning
+
+
+def test_where_no_folder_can_be_there_is_no_diagnosis(tmp_path: Path) -> None:
+    folder = short_campaign(tmp_path / "campaigns" / "EL089")
+    assert earlier_diagnosis(load_campaign(folder.path), tmp_path / ("n" * 256)) is None

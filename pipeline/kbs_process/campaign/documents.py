@@ -18,7 +18,7 @@ Key = tuple[str | int, ...]  # ("recording", 2, "file")
 
 _HEADER = re.compile(r"^\s*(\[\[?)\s*([^\[\]]+?)\s*\]\]?\s*(?:#.*)?$")
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
-_ASSIGNMENT = re.compile(r"^\s*([A-Za-z0-9_.\-\"' ]+?)\s*=")
+_ASSIGNMENT = re.compile(r"^\s*+([A-Za-z0-9_.\-\"'](?:[A-Za-z0-9_.\-\"' ]*[A-Za-z0-9_.\-\"'])?)\s*+=")
 
 
 @dataclass(frozen=True, slots=True)
