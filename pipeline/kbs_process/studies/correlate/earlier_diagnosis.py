@@ -36,7 +36,7 @@ def earlier_diagnosis(campaign: Campaign, results: Path) -> EarlierDiagnosis | N
     Files count by name and SHA-256. The software does not: a diagnosis says itself what made it.
     """
     folder = results / FOLDER
-    if not os.path.isfile(folder / FILE):  # a name that is too long is no file
+    if not os.path.isfile(folder / FILE):  # noqa: PTH113 (a name that is too long is no file)
         return None
     try:
         before = {entry.file: entry.sha256 for entry in load(folder, DiagnosisAnswer).provenance.inputs}
