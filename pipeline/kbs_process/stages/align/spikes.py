@@ -265,10 +265,15 @@ class Spikes:
 def _shaken(x: Array, first: int, stop: int, off: set[int]) -> bool:
     """Whether channels other than those that are `off` move like nowhere around: what shook the rig is in all."""
     others = [channel for channel in range(x.shape[1]) if channel not in off]
+    if not others:
+        return False
     around = slice(max(first - AROUND, 0), stop + AROUND)
     bent = np.abs(np.diff(x[around][:, others], n=2, axis=0))
     begin = max(first - around.start - NEAR, 0)
-    return bool(np.any(bent[begin : begin + NEAR + stop - first + NEAR].max(0) > SHAKEN * np.median(bent, axis=0)))
+    most = bent[begin : begin + NEAR + stop - first + NEAR].max(0)
+    # Of coarse readings, which mostly bend by nothing, those count that do.
+    usual = [np.median(own[own > 0.0]) if own.any() else np.inf for own in bent.T]
+    return bool(np.any(most > SHAKEN * np.asarray(usual)))
 
 
 @njit(cache=True, error_model="numpy")
