@@ -142,8 +142,9 @@ def _left(outcome: Outcome, trials: Sequence[records.Trial]) -> dict[str, object
     total = sum(power.values())
     channel = next((name for name, own in power.items() if own > 0.5 * total), None)
     most = max(one.ratio for one in (outcome.after, *(outcome.held_out or ())[1:]))
+    shown = not any(left_out(find) for find in outcome.finds)  # by the corrected model, all that was found
     return {
-        "ratio": rms(most),
+        "ratio": max(rms(most), *(trial.corrected for trial in trials if shown and trial.role != "calibration"), 0.0),
         "channel": channel,
         "percent": None if channel is None else 100.0 * power[channel] / total,
     }
