@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
@@ -29,8 +30,8 @@ from kbs_process.reduction.commands import read_commands
 from kbs_process.results.records import load
 from kbs_process.studies.diagnose.corrected import write_corrected
 from kbs_process.studies.diagnose.output import write_diagnosis
-from kbs_process.studies.diagnose.prose import answer, law_in_words
-from kbs_process.studies.diagnose.results import DiagnosisResults, Trial
+from kbs_process.studies.diagnose.prose import answer, law_in_words, paragraph
+from kbs_process.studies.diagnose.results import DiagnosisResults, Fitted, Trial
 from kbs_process.studies.diagnose.written import shown_by
 
 pytestmark = pytest.mark.slow
@@ -101,6 +102,9 @@ def outcome() -> Outcome:
         known=known,
         standing=standing_of(found, before.laws),
     )
+
+
+TRIAL = Trial(recording="r", trajectory="0", role="fit", nominal=9.0, known=3.0, corrected=1.2, channels={})
 
 
 @pytest.fixture(scope="module")
@@ -295,11 +299,24 @@ def test_a_number_that_went_as_far_as_it_was_let_go_is_told(outcome: Outcome, si
     assert (f"{name} went as far as chance may have it" in answer(nothing, (), (), FLOOR)) == told
 
 
+def test_numbers_that_are_known_to_differ_from_zero_are_told_first(outcome: Outcome, written: Path) -> None:
+    (find,) = load(written, DiagnosisResults).finds
+    numbers = [
+        Fitted(name=f"n{k}", unit="N", value=1.0, sigma=0.5, low=-1.0 if k != 4 else 0.5, high=3.0) for k in range(6)
+    ]
+
+    def told(*parameters: Fitted) -> str:
+        with_numbers = msgspec.structs.replace(find, parameters=parameters, curve=None)
+        return paragraph(outcome, (with_numbers,), (TRIAL,), (), FLOOR)
+
+    assert "): n4 = 1 (0.5 to 3) N, n0 = 1 (-1 to 3) N, n1" in told(*numbers)
+    assert "n3 = " not in told(*numbers) and "none of which" not in told(*numbers)
+    assert "none of which is known to differ from zero" in told(*numbers[:3])
+
+
 def test_the_channel_that_shows_most_of_what_is_left_is_told(outcome: Outcome) -> None:
     def trial(**channels: float) -> Trial:
-        return Trial(
-            recording="r", trajectory="0", role="fit", nominal=9.0, known=3.0, corrected=1.2, channels=channels
-        )
+        return msgspec.structs.replace(TRIAL, channels=channels)
 
     def told(*trials: Trial) -> str:
         return answer(replace(outcome, after=Detection((), -80.0, 1.44)), trials, (), FLOOR)

@@ -183,9 +183,11 @@ def _words(name: str) -> str:
 
 
 def _numbers_in_words(numbers: Sequence[records.Fitted]) -> str:
-    return ", ".join(
-        f"{one.name} = {one.value:.4g} ({one.low:.4g} to {one.high:.4g}) {one.unit}" for one in numbers[:4]
-    )
+    """The first four, beginning with those that are known to differ from zero."""
+    open_yet = {one.name: one.low <= 0.0 <= one.high for one in numbers}
+    first = sorted(numbers, key=lambda one: open_yet[one.name])[:4]
+    words = ", ".join(f"{one.name} = {one.value:.4g} ({one.low:.4g} to {one.high:.4g}) {one.unit}" for one in first)
+    return words + (", none of which is known to differ from zero" if all(open_yet.values()) else "")
 
 
 def _curve_in_words(curve: records.Curve) -> str:

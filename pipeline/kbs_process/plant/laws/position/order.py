@@ -37,7 +37,7 @@ MOTOR_ORDER = Effect(
     Port.MOTOR_TORQUE,
     of_rotor,
     (
-        *sine_and_cosine("order", "N m", Normal(0.0, 5e-3), "of the order", 1.0, dry=True),
+        *sine_and_cosine("order", "N m", Normal(0.0, 5e-3), "of the order", 100.0, dry=True),
         Parameter(
             "order",
             "1",
