@@ -98,6 +98,13 @@ def test_stamps_out_of_order_are_put_in_order_within_reach(tmp_path: Path) -> No
     assert np.array_equal(block.stamp, temperature(0, 100).stamp)
 
 
+def test_what_a_clock_that_starts_at_zero_reads_before_it_is_left_out(tmp_path: Path) -> None:
+    stamp = np.array([-7, 0, 5])  # ns; a stream that is put on another's clock may begin a moment earlier
+    write_mcap(tmp_path / "a.mcap", [OutStream("/t", "temperature", stamp, stamp + 1, np.array([[1.0], [2.0], [3.0]]))])
+    ((_, block),) = open_recording(tmp_path / "a.mcap").read([Stream("t", "/t", ("temperature",))])
+    assert block.stamp.tolist() == [0, 5] and block.values[:, 0].tolist() == [2.0, 3.0]
+
+
 def test_a_source_that_fails_leaves_nothing(tmp_path: Path) -> None:
     def failing() -> Iterator[OutStream]:
         yield temperature(0, 10)

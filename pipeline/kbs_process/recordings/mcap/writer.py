@@ -86,12 +86,13 @@ class _Topic:
         self._pieces: list[OutStream] = []
 
     def add(self, piece: OutStream) -> None:
-        like = replace(self.head, stamp=piece.stamp, log=piece.log, values=piece.values)
+        known = np.minimum(piece.stamp, piece.log) >= 0  # before 1970 a message has no time
+        like = replace(self.head, stamp=piece.stamp[known], log=piece.log[known], values=piece.values[known])
         if like.fields != self.head.fields:
             raise ValueError(f"{piece.topic}: pieces of different kinds")
-        if len(piece.log):
+        if len(like.log):
             self._pieces.append(like)
-            self.latest = max(self.latest, int(piece.log.max()))
+            self.latest = max(self.latest, int(like.log.max()))
 
     def logs(self) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
         """Return the log times of the messages that wait."""
