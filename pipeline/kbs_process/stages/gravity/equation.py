@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -61,6 +62,33 @@ class Prepared:
 
 def _pick(angles: Angles, which: slice | Index) -> Angles:
     return angles[0][which], angles[1][which], angles[2][which]
+
+
+def joined(prepared: Sequence[Prepared]) -> Prepared:
+    """All instants in one, of which to predict costs less than of one recording after the other."""
+
+    def along(angles: Sequence[Angles | None]) -> Angles | None:
+        known = [one for one in angles if one is not None]
+        if not known:
+            return None
+        q, qd, qdd = (np.concatenate(each) for each in zip(*known, strict=True))
+        return q, qd, qdd
+
+    def of(name: str) -> Array:
+        return np.concatenate([getattr(p, name) for p in prepared])
+
+    return replace(
+        prepared[0],
+        t=of("t"),
+        q=of("q"),
+        qd=of("qd"),
+        qdd=of("qdd"),
+        before=along([p.before for p in prepared]),
+        after=along([p.after for p in prepared]),
+        sigma_q=of("sigma_q"),
+        rounding=of("rounding"),
+        wrench=of("wrench"),
+    )
 
 
 def prepare(name: str, motion: Motion, wrench: Signal, low_pass: float, *, with_neighbours: bool) -> Prepared:

@@ -16,7 +16,7 @@ import numpy as np
 
 from kbs_process.estimation.longrun import variance_inflation
 from kbs_process.signals.records import WRENCH_CHANNELS, Array
-from kbs_process.stages.gravity.equation import Angles, Equation, Prepared
+from kbs_process.stages.gravity.equation import Angles, Equation, Prepared, joined
 from kbs_process.stages.gravity.parameters import CROSS_COUPLING, Index
 from kbs_process.stages.gravity.solve import ZERO, least_sigma, zero_basis, zero_sigma
 from kbs_process.stages.gravity.tension import BEYOND, BY_CHANCE, by_chance, together
@@ -184,7 +184,7 @@ def _linear(equation: Equation, prepared: Sequence[Prepared], about: Array | Non
     prior = np.concatenate([equation.start(), np.zeros(len(zeros))])
     about = prior if about is None else about
     base, slopes = [], []
-    every = _joined(prepared)
+    every = joined(prepared)
     whole, static = equation.jacobian(about[:size], every).reshape(-1, c, size), equation.predict(about[:size], every)
     ends = np.cumsum([0, *(len(p.q) for p in prepared)])
     for index, p in enumerate(prepared):
@@ -197,33 +197,6 @@ def _linear(equation: Equation, prepared: Sequence[Prepared], about: Array | Non
         slopes.append(J)
     sigma = np.concatenate([equation.sigma(), *(zero_sigma(equation, p)[:, loose].ravel() for p in prepared)])
     return _Data(equation, equation.names + zeros, prior, sigma, about, tuple(prepared), tuple(base), tuple(slopes))
-
-
-def _joined(prepared: Sequence[Prepared]) -> Prepared:
-    """All instants in one, which costs less than one recording after the other."""
-
-    def along(angles: Sequence[Angles | None]) -> Angles | None:
-        known = [one for one in angles if one is not None]
-        if not known:
-            return None
-        q, qd, qdd = (np.concatenate(each) for each in zip(*known, strict=True))
-        return q, qd, qdd
-
-    def of(name: str) -> Array:
-        return np.concatenate([getattr(p, name) for p in prepared])
-
-    return replace(
-        prepared[0],
-        t=of("t"),
-        q=of("q"),
-        qd=of("qd"),
-        qdd=of("qdd"),
-        before=along([p.before for p in prepared]),
-        after=along([p.after for p in prepared]),
-        sigma_q=of("sigma_q"),
-        rounding=of("rounding"),
-        wrench=of("wrench"),
-    )
 
 
 def _solve(data: _Data, fault: Fault, most: Array, *, anew: bool) -> Explained:

@@ -22,7 +22,7 @@ from kbs_process.estimation.tensors import Tensors
 from kbs_process.rig.model import Rig
 from kbs_process.signals.records import Array
 from kbs_process.stages.gravity.angles import rounding_scores
-from kbs_process.stages.gravity.equation import Equation, Prepared
+from kbs_process.stages.gravity.equation import Equation, Prepared, joined
 from kbs_process.stages.gravity.parameters import Index
 
 ZERO = ("bias", "drift", "drift curvature")
@@ -37,22 +37,25 @@ def solve(
     loose = _loose(equation)
     width = _TERMS * len(loose)  # zeros of a recording
     bases = [zero_basis(p) for p in prepared]
+    every, ends = joined(prepared), np.cumsum([len(p.q) for p in prepared])[:-1]
 
     def drifting(full: Array) -> Array:
         return _zeros(full[size:], len(prepared), equation)
 
     def residual(full: Array) -> Array:
+        predicted = np.split(equation.predict(full[:size], every), ends)
         parts = [
-            (equation.predict(full[:size], p) + basis @ zero - p.wrench) / sigma
-            for p, basis, zero, sigma in zip(prepared, bases, drifting(full), sigmas, strict=True)
+            (own + basis @ zero - p.wrench) / sigma
+            for own, p, basis, zero, sigma in zip(predicted, prepared, bases, drifting(full), sigmas, strict=True)
         ]
         return np.concatenate([part.ravel() for part in parts])
 
     def jacobian(full: Array) -> Array:
         blocks = []
-        for index, (p, basis, sigma) in enumerate(zip(prepared, bases, sigmas, strict=True)):
+        slopes = np.split(equation.jacobian(full[:size], every).reshape(len(every.q), c, size), ends)
+        for index, (p, own, basis, sigma) in enumerate(zip(prepared, slopes, bases, sigmas, strict=True)):
             block = np.zeros((len(p.q), c, len(full)))
-            block[:, :, :size] = equation.jacobian(full[:size], p).reshape(len(p.q), c, -1)
+            block[:, :, :size] = own
             at = size + index * width
             block[:, :, at : at + width] = np.einsum("nk,cd->nckd", basis, np.eye(c)[:, loose]).reshape(
                 len(p.q), c, width
