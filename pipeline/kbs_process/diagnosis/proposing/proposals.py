@@ -46,8 +46,7 @@ def proposed(known: Known, scene: Scene) -> dict[str, tuple[float, ...]]:
         found |= {("swept tone", ""): (*lines, tone[0]), ("sweep", ""): (tone[1],)}
     of_joints = _of_joints(known, scene)
     for joint, orders in _orders(known, scene).items():
-        beside = _in_turns_of_the_motor(known, joint, of_joints.get(joint, ()))
-        found["motor order", joint] = (*orders, *beside)
+        found["motor order", joint] = _in_turns_of_the_motor(known, joint, orders, of_joints.get(joint, ()))
         found["cycle order", joint] = _of_cycles(known, joint, orders)
     found |= _between_lines(known, _of_discs(known))
     found |= {("period", joint): values for joint, values in periods(known, scene).items()}
@@ -164,15 +163,18 @@ def _orders(known: Known, scene: Scene) -> dict[str, tuple[float, ...]]:
     return {joint: _apart([value for _, value in sorted(lines, reverse=True)], 0.5) for joint, lines in found.items()}
 
 
-def _in_turns_of_the_motor(known: Known, joint: str, lines: tuple[float, ...]) -> tuple[float, ...]:
-    """Orders of a joint as those of its motor: what is periodic in the motor's turns may be so in the output's, too.
+def _in_turns_of_the_motor(
+    known: Known, joint: str, orders: tuple[float, ...], lines: tuple[float, ...]
+) -> tuple[float, ...]:
+    """Orders of a motor, and its joint's: what is periodic in the motor's turns may be so in the output's, too.
 
-    A ripple whose depth changes as the output turns has lines beside its own. Without a gear both are one.
+    A ripple whose depth changes as the output turns has lines beside its own. Without a gear both are one, and the
+    joint's are found in less than a turn, but not so exactly that a whole number would be told.
     """
     drive = known.experiment.rig.joint(joint).drive
     if drive is None or not float(drive.ratio) > 1.0:
-        return ()
-    return tuple(line / float(drive.ratio) for line in lines)
+        return orders or tuple(dict.fromkeys(order for line in lines for order in (float(round(line)), line)))
+    return (*orders, *(line / float(drive.ratio) for line in lines))
 
 
 def _of_cycles(known: Known, joint: str, orders: tuple[float, ...]) -> tuple[float, ...]:
