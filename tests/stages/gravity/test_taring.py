@@ -132,3 +132,15 @@ def test_location_has_the_stated_variance_for_white_and_for_coloured_noise():
             location, variance, _ = locate(0.7 + x, float(np.std(x)))
             scores.append((location - 0.7) / np.sqrt(variance))
         assert 0.75 < np.std(scores) < 1.35
+
+
+def test_a_location_that_no_sample_is_near_errs_by_the_range_of_all() -> None:
+    t = np.arange(61)
+    swing = 1000.0 * np.cos(2.2 * t + 0.96)
+    location, variance, weight = locate(swing, 1e-3)
+    assert abs(location) <= 1000.0 and np.isfinite(weight).all()
+    assert 0.0 < variance <= np.ptp(swing) ** 2
+    rng = np.random.default_rng(0)
+    for _ in range(300):
+        swing = 1000.0 * np.sin(rng.uniform(0.01, 3.0) * t + rng.uniform(0.0, 6.0))
+        assert 0.0 < locate(swing, 1.0)[1] <= np.ptp(swing) ** 2

@@ -70,7 +70,8 @@ def locate(x: Array, scale: float) -> tuple[float, float, Array]:
     """Location of correlated samples x (n,) under Student's t of `scale`, its variance, and the weights (n,) used.
 
     Iteratively reweighted from several starts, the likeliest taken. Variance: long-run variance of the scores over
-    the squared curvature of the likelihood (sandwich).
+    the squared curvature of the likelihood (sandwich), and the samples' range squared at most: where all samples lie
+    farther than `scale` from the location, the likelihood has no such curvature.
     """
     location = np.quantile(x, _STARTS)
     for _ in range(_ROUNDS):
@@ -82,8 +83,9 @@ def locate(x: Array, scale: float) -> tuple[float, float, Array]:
     weight = _weight(z)
     curvature = float(np.sum(weight * (_FREEDOM - z**2) / (_FREEDOM + z**2))) / scale
     scores = weight * z
-    variance = float(longrun_covariance(scores[:, None], [(len(x), 1)])[0, 0]) / max(curvature, 1e-300) ** 2
-    return float(location[best]), variance, weight
+    spread, most = float(longrun_covariance(scores[:, None], [(len(x), 1)])[0, 0]), float(np.ptp(x)) ** 2
+    told = curvature > 0.0 and spread < most * curvature**2
+    return float(location[best]), spread / curvature**2 if told else most, weight
 
 
 def _weight(z: Array) -> Array:
