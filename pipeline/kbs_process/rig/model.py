@@ -11,6 +11,7 @@ transducer; the effort of a joint is what its drive puts into it.
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Literal
@@ -302,29 +303,34 @@ def substitute(rig: Rig, values: dict[str, Array | float], sigmas: dict[str, Arr
 
     Raises KeyError for a name that the rig does not have and ValueError for a value of another shape.
     """
-    unknown = set(values) - set(rig.quantities())
-    if unknown:
-        raise KeyError(f"the rig has no {sorted(unknown)}")
-    replaced = _substitute(rig, values, sigmas or {})
+    met = set[str]()
+    replaced = _substitute(rig, values, sigmas or {}, met)
+    if met != values.keys():
+        raise KeyError(f"the rig has no {sorted(values.keys() - met)}")
     assert isinstance(replaced, Rig)
     return replaced
 
 
-def _substitute(node: object, values: dict[str, Array | float], sigmas: dict[str, Array | float]) -> object:
+def _substitute(
+    node: object, values: dict[str, Array | float], sigmas: dict[str, Array | float], met: set[str]
+) -> object:
+    """Return the node itself where nothing of it changes; add the names that were `met`."""
     if isinstance(node, Quantity):
         if node.name not in values:
             return node
+        met.add(node.name)
         value = np.asarray(values[node.name], dtype=float)
         sigma = np.asarray(sigmas.get(node.name, node.sigma), dtype=float)
         if value.shape != node.shape or sigma.shape != node.shape:
             raise ValueError(f"{node.name} has shape {node.shape}, not {value.shape}")
         return replace(node, value=value, sigma=sigma)
     if isinstance(node, dict):
-        return {key: _substitute(value, values, sigmas) for key, value in node.items()}
+        return {key: _substitute(value, values, sigmas, met) for key, value in node.items()}
     if isinstance(node, tuple):
-        return tuple(_substitute(value, values, sigmas) for value in node)
+        changed = tuple(_substitute(value, values, sigmas, met) for value in node)
+        return node if all(map(operator.is_, changed, node)) else changed
     if is_dataclass(node) and not isinstance(node, type):
-        return type(node)(
-            **{entry.name: _substitute(getattr(node, entry.name), values, sigmas) for entry in fields(node)}
-        )
+        old = {entry.name: getattr(node, entry.name) for entry in fields(node)}
+        new = {name: _substitute(value, values, sigmas, met) for name, value in old.items()}
+        return node if all(map(operator.is_, new.values(), old.values())) else type(node)(**new)
     return node

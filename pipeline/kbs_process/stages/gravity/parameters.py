@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,7 @@ CROSS_COUPLING = "transducer.cross_coupling"
 Index = NDArray[np.intp]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class RigElements:
     """Free elements of the rig's quantities, in a vector."""
 
@@ -24,7 +25,7 @@ class RigElements:
     quantities: tuple[Quantity, ...]
     masks: tuple[Mask, ...]  # of each quantity's shape
 
-    @property
+    @cached_property
     def names(self) -> tuple[str, ...]:
         return tuple(
             element_name(quantity.name, tuple(int(i) for i in index))
@@ -32,15 +33,15 @@ class RigElements:
             for index in np.argwhere(mask)
         )
 
-    @property
+    @cached_property
     def value(self) -> Array:
         return self._gather([quantity.value for quantity in self.quantities])
 
-    @property
+    @cached_property
     def sigma(self) -> Array:
         return self._gather([quantity.sigma for quantity in self.quantities])
 
-    @property
+    @cached_property
     def lower(self) -> Array:
         """Least that each may be."""
         return self._gather([np.asarray(quantity.low) for quantity in self.quantities])
