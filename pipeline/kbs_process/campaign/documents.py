@@ -12,6 +12,7 @@ from typing import Any
 
 from kbs_process.campaign.problems import Problems
 from kbs_process.errors import ConfigError
+from kbs_process.terminal import printable
 
 Tree = dict[str, Any]
 Key = tuple[str | int, ...]  # ("recording", 2, "file")
@@ -49,8 +50,14 @@ def dotted(key: Key) -> str:
         if isinstance(part, int):
             text += f"[{part + 1}]"
         else:
-            text += ("." if text else "") + (part if _BARE.fullmatch(part) else json.dumps(part, ensure_ascii=False))
+            text += ("." if text else "") + (part if _BARE.fullmatch(part) else quoted(part))
     return text
+
+
+def quoted(text: str) -> str:
+    """Return a text as TOML writes it: in quotes, on one line, what is not printable as escapes."""
+    written = json.dumps(text.encode(errors="replace").decode(), ensure_ascii=False)
+    return "".join(sign if printable(sign) == sign else f"\\U{ord(sign):08X}" for sign in written)
 
 
 def within(folder: Path, name: str, *, where: str) -> Path:

@@ -28,7 +28,7 @@ class Problems:
             return
         if len(self.found) == 1:
             raise self.found[0]
-        lines = [f"{len(self.found)} things are wrong", *map(str, self.found[:SHOWN])]
-        if len(self.found) > SHOWN:
-            lines.append(f"and {len(self.found) - SHOWN} more")
-        raise ConfigError("\n".join(lines), where=self.subject)
+        more = len(self.found) - SHOWN
+        rest = [ConfigError(f"and {more} more")] if more > 0 else []
+        what = f"{len(self.found)} things are wrong"
+        raise ConfigError(what, where=self.subject, each=[*self.found[:SHOWN], *rest])

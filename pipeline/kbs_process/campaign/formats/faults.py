@@ -153,7 +153,6 @@ def _shown(value: Any) -> str:
     if isinstance(value, int) and abs(value) > 10**18:
         return f"{value:#x}"[:20] + "..."  # Python writes no number of very many digits
     text = f"'{value}'" if isinstance(value, str) else str(value).lower() if isinstance(value, bool) else str(value)
-    text = text.replace("\n", "\\n")
     return text if len(text) <= 60 else text[:57] + "..."
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 import shutil
 import tomllib
@@ -17,7 +16,8 @@ from kbs_process.campaign.config import Campaign
 from kbs_process.campaign.documents import Document, read, shown
 from kbs_process.campaign.load import load_campaign
 from kbs_process.campaign.locate import CAMPAIGN_FILE
-from kbs_process.errors import ConfigError, did_you_mean
+from kbs_process.campaign.writing.parameter_files import value_text
+from kbs_process.errors import ConfigError, KbsError, did_you_mean
 from kbs_process.reduction.reading import OPTIONAL_STREAMS
 from kbs_process.studies.convert.mapping import Mapping
 
@@ -63,12 +63,16 @@ def prepare(mapping: Mapping, folder: Path) -> Campaign:
         campaign = load_campaign(folder, checksums=False)
     except ConfigError as error:
         # The user knows the template, whose lines are the same, not our private folder.
-        here, there = shown(folder), shown(mapping.template.parent)
-        raise ConfigError(
-            error.what.replace(here, there), where=error.where.replace(here, there), remedy=error.remedy
-        ) from error
+        raise _elsewhere(error, shown(folder), shown(mapping.template.parent)) from error
     _check_streams(mapping, campaign)
     return campaign
+
+
+def _elsewhere(error: KbsError, here: str, there: str) -> ConfigError:
+    """Return an error that speaks of another folder."""
+    what, where = (text.replace(here, there) for text in (error.what, error.where))
+    each = [_elsewhere(one, here, there) for one in error.each]
+    return ConfigError(what, where=where, remedy=error.remedy, each=each)
 
 
 def write_campaign(mapping: Mapping, folder: Path, checksums: MappingOf[str, str], origins: tuple[Origin, ...]) -> None:
@@ -151,8 +155,8 @@ def _without_recordings(template: Document) -> str:
 
 
 def _lines(table: MappingOf[str, Any]) -> str:
-    """Return `key = value` lines. What JSON writes of texts, whole numbers and lists of texts is TOML."""
-    return "".join(f"{name} = {json.dumps(value, ensure_ascii=False)}\n" for name, value in table.items())
+    """Return `key = value` lines."""
+    return "".join(f"{name} = {value_text(value)}\n" for name, value in table.items())
 
 
 def _check_streams(mapping: Mapping, campaign: Campaign) -> None:
