@@ -40,6 +40,10 @@ class RecordingError(KbsError):
     """A recording cannot be read, or lacks what the campaign needs from it."""
 
 
+class SchemaError(RecordingError):
+    """A recording's schema is damaged, so that no message of it can be read."""
+
+
 class FitError(KbsError):
     """The recordings do not determine what a fit is asked for."""
 

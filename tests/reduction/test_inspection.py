@@ -83,6 +83,29 @@ def test_true_and_false_are_no_numbers_and_lose_no_message(tmp_path: Path) -> No
     assert [one.field for one in topic.ranges] == ["temp"]
 
 
+@pytest.mark.parametrize(
+    ("encoding", "schema", "why"),
+    [
+        ("cdr", ("p/M", "ros2msg", f"float64[{2**70}] x".encode()), "an array of 1180591620717411303... elements"),
+        ("cdr", ("p/M", "ros2msg", b"float64[0] x"), "an array of 0 elements"),
+        ("cdr", ("p/M", "ros2msg", b"float64 x\nnoise"), "the definition's line 'noise' cannot be read"),
+        ("cdr", ("p/M", "ros2msg", b"q/N x"), "the definition of q/N is missing"),
+        ("cdr", ("p/M", "ros2msg", b"float64 \xff"), "decode byte 0xff"),
+        ("protobuf", ("p.M", "protobuf", b"\x0a\xff\xff"), ""),
+    ],
+)
+def test_a_damaged_schema_is_told_and_not_clean(
+    tmp_path: Path, encoding: str, schema: tuple[str, str, bytes], why: str
+) -> None:
+    path = tmp_path / "a.mcap"
+    path.write_bytes(build([(i, bytes(100)) for i in range(30)], schema, encoding))
+    found = inspect_recording(path)
+    (loss,) = found.losses
+    assert (found.state, found.topics[0].count) == ("lossy", 30)
+    assert (loss.kind, loss.where, loss.count) == ("unusable", "/topic", 30)
+    assert loss.detail.startswith(f"the schema of {schema[0]} is damaged: ") and why in loss.detail
+
+
 def test_messages_of_any_type_are_counted(tmp_path: Path) -> None:
     path = tmp_path / "a.mcap"
     path.write_bytes(build([(i, bytes(100)) for i in range(30)], ("a/Image", "ros1msg", b""), "ros1"))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from typing import Protocol
 
-from kbs_process.errors import RecordingError
+from kbs_process.errors import RecordingError, SchemaError
 from kbs_process.recordings.mcap.framing import MalformedError, Schema
 from kbs_process.recordings.mcap.kernels import Bytes, Words
 from kbs_process.recordings.mcap.messages.fields import Elements, Field, Step
@@ -54,6 +54,4 @@ def message_type(encoding: str, schema: Schema, samples: Iterable[bytes], where:
     try:
         return factory(schema, samples)
     except (MalformedError, UnicodeDecodeError) as error:
-        raise RecordingError(
-            f"the schema of {schema.name or 'its messages'} is damaged: {error}", where=where
-        ) from error
+        raise SchemaError(f"the schema of {schema.name or 'its messages'} is damaged: {error}", where=where) from error

@@ -98,7 +98,7 @@ def _members(body: str, package: str, blocks: dict[str, str]) -> tuple[Member, .
         count = None if not match["array"] else -1 if match["bound"] or not size else int(size[-19:])
         # Elements take a byte at least, so that a payload's size bounds how often one loops over them.
         if count == 0 or len(size) > 19:
-            raise MalformedError(f"an array of {size[:19]} elements")
+            raise MalformedError(f"an array of {size[:19]}{'...' * (len(size) > 19)} elements")
         members.append(Member(match["name"], base, count))
     return tuple(members)
 
