@@ -13,6 +13,7 @@ from kbs_process.campaign.documents import Document, Key, Merged, shown
 from kbs_process.campaign.formats.campaign_file import CampaignFile, EncoderTable
 from kbs_process.campaign.problems import Problems
 from kbs_process.errors import did_you_mean
+from kbs_process.files import regular
 from kbs_process.plant.effect import Effect, Port
 from kbs_process.plant.laws import CATALOGUE, MEASURED, catalogue_with, find
 from kbs_process.results.provenance import sha256
@@ -250,12 +251,14 @@ class _Checks:
                 remedy = did_you_mean(name, effects) if effects else "leave it out"
                 self._note((*key, "without", position), f"the model has no '{name}'", remedy)
         try:
-            if not entry.path.is_file():
-                taken = {other.path.resolve() for other in self.campaign.recordings}
-                what = f"the recording '{shown(entry.path)}' does not exist"
-                self._note((*key, "file"), what, _neighbour(entry.path, taken))
-        except (OSError, ValueError):
-            self._note((*key, "file"), "no disk can hold a file of that name", "give its name")
+            regular(entry.path)
+        except (FileNotFoundError, NotADirectoryError):
+            taken = {other.path.resolve() for other in self.campaign.recordings}
+            what = f"the recording '{shown(entry.path)}' does not exist"
+            self._note((*key, "file"), what, _neighbour(entry.path, taken))
+        except (OSError, ValueError) as error:
+            reason = error.strerror if isinstance(error, OSError) else error  # a name with a NUL in it
+            self._note((*key, "file"), f"the recording cannot be read: {reason}", "give the name of an MCAP file")
         if entry.start is not None and entry.end is not None and entry.end <= entry.start:
             what = f"{entry.end:g} is not after start_s, {entry.start:g}"
             self._note((*key, "end_s"), what, "give a later end")

@@ -12,6 +12,7 @@ from typing import Any
 
 from kbs_process.campaign.problems import Problems
 from kbs_process.errors import ConfigError
+from kbs_process.files import regular
 from kbs_process.terminal import printable
 
 Tree = dict[str, Any]
@@ -80,7 +81,7 @@ def within(folder: Path, name: str, *, where: str) -> Path:
 def read(path: Path, *, role: str, remedy: str) -> Document:
     """Read one TOML file; `role` says what it is for in the message when it is missing."""
     try:
-        text = path.read_text(encoding="utf-8")
+        text = regular(path).read_text(encoding="utf-8")
     except (FileNotFoundError, NotADirectoryError) as error:
         raise ConfigError(f"{role} does not exist", where=shown(path), remedy=remedy) from error
     except UnicodeDecodeError as error:
@@ -90,7 +91,7 @@ def read(path: Path, *, role: str, remedy: str) -> Document:
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else error  # a name with a NUL in it
         raise ConfigError(
-            f"cannot be read: {reason}", where=shown(path), remedy="check the file and its permissions"
+            f"{role} cannot be read: {reason}", where=shown(path), remedy=f"{remedy}; check its permissions"
         ) from error
     try:
         return Document(path, text, tomllib.loads(text))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import socket
 import tomllib
 from importlib.machinery import ModuleSpec
 from pathlib import Path
@@ -12,6 +14,7 @@ import pytest
 from kbs_process.campaign.load import load_campaign
 from kbs_process.errors import ConfigError, KbsError, OutputError, RecordingError
 from kbs_process.recordings import isolated
+from kbs_process.reduction.commands import read_commands
 from kbs_process.studies.convert.clock import nanoseconds
 from kbs_process.studies.convert.describe import describe
 from kbs_process.studies.convert.mapping_file import Time
@@ -245,6 +248,22 @@ def test_missing_library_names_the_extra(tmp_path: Path, monkeypatch: pytest.Mon
     monkeypatch.setattr(isolated, "find_spec", absent)
     with pytest.raises(KbsError, match=r"pip install 'kbs-process\[formats\]'"):
         describe(tmp_path / "run.mf4")
+
+
+def test_what_is_no_file_is_told_as_what_it_is(tmp_path: Path) -> None:
+    """And without waiting for what it may send."""
+    os.mkfifo(tmp_path / "pipe.csv")
+    (tmp_path / "zero.h5").symlink_to("/dev/zero")
+    with socket.socket(socket.AF_UNIX) as one:
+        one.bind(str(tmp_path / "socket.csv"))
+        for name, what in {"pipe.csv": "a pipe", "zero.h5": "a device", "socket.csv": "a socket"}.items():
+            with pytest.raises(RecordingError, match=f"{name}: cannot be read: it is {what}"):
+                describe(tmp_path / name)
+            for source in (tmp_path, tmp_path / name):
+                with pytest.raises(RecordingError, match=f"{name}: cannot be read: it is {what}"):
+                    import_recordings(write_mapping(tmp_path, name), source, tmp_path / "campaign")
+            with pytest.raises(RecordingError, match=f"{name}: is not a table of commands: .*it is {what}"):
+                read_commands(tmp_path / name, ("az",))
 
 
 def test_description_is_a_mapping_to_start_from(tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from kbs_process.errors import RecordingError, did_you_mean
+from kbs_process.files import regular
 from kbs_process.recordings.mcap import framing as mcap
 from kbs_process.recordings.mcap.ahead import ahead
 from kbs_process.recordings.mcap.container import AT, SIZE, Container, Described
@@ -38,7 +39,7 @@ class Source:
         self._summary: mcap.Summary | None = None
         self._damage = ""  # of the summary
         try:
-            with path.open("rb") as file:
+            with regular(path).open("rb") as file:
                 self._open(file, path.stat().st_size)
         except OSError as error:
             raise RecordingError(f"cannot be opened: {error.strerror}", where=str(path)) from error

@@ -18,6 +18,7 @@ from kbs_process.campaign.load import load_campaign
 from kbs_process.campaign.locate import CAMPAIGN_FILE
 from kbs_process.campaign.writing.parameter_files import value_text
 from kbs_process.errors import ConfigError, KbsError, did_you_mean
+from kbs_process.files import regular
 from kbs_process.reduction.reading import OPTIONAL_STREAMS
 from kbs_process.studies.convert.mapping import Mapping
 
@@ -124,14 +125,18 @@ def _copy(template: Document, name: str, folder: Path) -> None:
         )
     target.parent.mkdir(parents=True, exist_ok=True)
     try:
-        shutil.copyfile(source, target)
-    except (FileNotFoundError, IsADirectoryError) as error:
+        shutil.copyfile(regular(source), target)
+    except FileNotFoundError as error:
         beside = [path.name for path in source.parent.iterdir()] if source.parent.is_dir() else []
         raise ConfigError(
             f"the campaign's file '{name}' does not exist",
             where=shown(template.path),
             remedy=did_you_mean(source.name, beside),
         ) from error
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else error  # a name with a NUL in it
+        what = f"the campaign's file '{name}' cannot be read: {reason}"
+        raise ConfigError(what, where=shown(template.path), remedy="name a file that can be read") from error
 
 
 def _without_recordings(template: Document) -> str:
