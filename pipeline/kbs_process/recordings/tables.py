@@ -189,6 +189,9 @@ def find_column(table: Table, wanted: int | str) -> Column:
     named = {column.name: column for column in columns}
     if wanted not in named:
         single = len(columns) == 1
+        start = f"{wanted.partition('[')[0]}: "
+        if why := next((one for one in table.left_out if one.startswith(start)), ""):
+            raise RecordingError(f"no column '{wanted}'; {why}", where=str(table.path), remedy="write the file anew")
         raise RecordingError(
             f"no column '{wanted}'",
             where=str(table.path),
