@@ -5,8 +5,10 @@ from __future__ import annotations
 import json
 import re
 import tomllib
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +20,11 @@ from kbs_process.terminal import printable
 Tree = dict[str, Any]
 Key = tuple[str | int, ...]  # ("recording", 2, "file")
 
-_HEADER = re.compile(r"^\s*(\[\[?)\s*([^\[\]]+?)\s*\]\]?\s*(?:#.*)?$")
+# Possessive, so that a line of blanks takes no longer than another.
+_HEADER = re.compile(r"^\s*+(\[\[?+)([^\[\]]++)\]\]?+\s*+(?:#.*)?$")
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 _ASSIGNMENT = re.compile(r"^\s*+([A-Za-z0-9_.\-\"'](?:[A-Za-z0-9_.\-\"' ]*[A-Za-z0-9_.\-\"'])?)\s*+=")
+_AT = re.compile(r"\(at (?:line (\d+), column (\d+)|end of document)\)$")  # where tomllib found a fault
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +37,8 @@ class Document:
 
     def place(self, key: Key) -> str:
         """Return "file:line: dotted key", the line being that of the key's nearest ancestor that has one."""
-        line = _line_of(self.text, key)
+        lines = _lines(self.text)
+        line = next((lines[key[:depth]] for depth in range(len(key), 0, -1) if key[:depth] in lines), None)
         file = f"{shown(self.path)}:{line}" if line else shown(self.path)
         return f"{file}: {dotted(key)}" if key else file
 
@@ -111,10 +116,10 @@ def read(path: Path, *, role: str, remedy: str) -> Document:
 
 def _decode_error(message: str, text: str) -> tuple[str, int]:
     """Split "Invalid value (at line 3, column 5)" into the message and the line."""
-    match = re.search(r"\s*\(at (?:line (\d+), column (\d+)|end of document)\)$", message)
+    match = _AT.search(message)
     if match is None:
         return message, 1
-    bare = message[: match.start()]
+    bare = message[: match.start()].rstrip()
     if match.group(1) is None:
         return f"{bare} at the end of the file", text.count("\n") + 1
     return f"{bare} (column {match.group(2)})", int(match.group(1))
@@ -193,25 +198,23 @@ def _depth(node: Any, key: Key) -> int:
     return len(key)
 
 
-def _line_of(text: str, key: Key) -> int | None:
-    """Return the line of the longest leading part of `key` that a header or an assignment spells out."""
-    best, best_line = 0, None
+@lru_cache(maxsize=16)
+def _lines(text: str) -> dict[Key, int]:
+    """Return the first line that spells out each key, in a header or an assignment."""
+    found: dict[Key, int] = {}
     table: Key = ()
-    counts: dict[Key, int] = {}
+    counts = Counter[Key]()
     for number, line in enumerate(text.splitlines(), start=1):
         if header := _HEADER.match(line):
             table = _split(header.group(2))
             if header.group(1) == "[[":
-                index = counts[table] = counts.get(table, -1) + 1
-                table = (*table, index)
-            candidate = table[:-1] if table[-1:] == (0,) and key == table[:-1] else table
+                found.setdefault(table, number)
+                counts[table] += 1
+                table = (*table, counts[table] - 1)
+            found.setdefault(table, number)
         elif assignment := _ASSIGNMENT.match(line):
-            candidate = (*table, *_split(assignment.group(1)))
-        else:
-            continue
-        if len(candidate) > best and key[: len(candidate)] == candidate:
-            best, best_line = len(candidate), number
-    return best_line
+            found.setdefault((*table, *_split(assignment.group(1))), number)
+    return found
 
 
 def _split(name: str) -> Key:
