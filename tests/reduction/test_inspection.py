@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
 import pytest
+from mcap.writer import Writer
 
 from kbs_process.recordings.mcap.messages.encoding import OutStream
 from kbs_process.recordings.mcap.writer import write_mcap
@@ -104,6 +106,30 @@ def test_a_damaged_schema_is_told_and_not_clean(
     assert (found.state, found.topics[0].count) == ("lossy", 30)
     assert (loss.kind, loss.where, loss.count) == ("unusable", "/topic", 30)
     assert loss.detail.startswith(f"the schema of {schema[0]} is damaged: ") and why in loss.detail
+
+
+@pytest.mark.slow
+def test_topics_of_one_type_share_it(tmp_path: Path) -> None:
+    """What thousands of topics take in memory is what each has of its own."""
+
+    def peak(topics: int) -> int:
+        path = tmp_path / f"{topics}.mcap"
+        with path.open("wb") as file:
+            writer = Writer(file)
+            writer.start()
+            schema = writer.register_schema("p/M", "ros2msg", b"float64 x\n" + b"float64[3] y\n" * 20)
+            for number in range(topics):
+                channel = writer.register_channel(f"/t{number}", "cdr", schema)
+                writer.add_message(channel, number, b"\0\1\0\0" + bytes(8 * 61), number)
+            writer.finish()
+        tracemalloc.start()
+        assert len(inspect_recording(path).topics) == topics
+        most = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        return most
+
+    peak(10)
+    assert (peak(1100) - peak(100)) / 1000 < 35_000  # bytes a topic; 42,000 where each has its type
 
 
 def test_messages_of_any_type_are_counted(tmp_path: Path) -> None:

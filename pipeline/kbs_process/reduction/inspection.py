@@ -151,7 +151,7 @@ def inspect_recording(path: Path) -> Inspection:
         source = open_recording(path)
         topics = source.topics
         samples = source.samples()
-        plans = {topic.topic: _plan(samples.get(topic.topic)) for topic in topics}
+        plans = {topic.topic: _plan(samples.pop(topic.topic, None)) for topic in topics}
         gathered = {topic: _Gathered(topic, plan) for topic, plan in plans.items()}
         for topic, block in source.read(
             [Stream(topic, topic, plan.fields, lenient=True) for topic, plan in plans.items()]

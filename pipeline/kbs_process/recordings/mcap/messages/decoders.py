@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from functools import lru_cache
 from typing import Protocol
 
 from kbs_process.errors import RecordingError, SchemaError
@@ -34,9 +35,22 @@ class MessageType(Protocol):
 
 Factory = Callable[[Schema, Iterable[bytes]], MessageType]
 
+_TYPES = 64  # that are kept, as thousands of channels may have one
+
+
+@lru_cache(_TYPES)
+def _ros2(schema: Schema) -> MessageType:
+    return Ros2Message(schema.name, schema.data.decode())
+
+
+@lru_cache(_TYPES)
+def _protobuf(schema: Schema) -> MessageType:
+    return ProtobufMessage(schema.name, schema.data)
+
+
 FACTORIES: Mapping[tuple[str, str | None], Factory] = {  # message encoding, schema encoding
-    ("cdr", "ros2msg"): lambda schema, _: Ros2Message(schema.name, schema.data.decode()),
-    ("protobuf", "protobuf"): lambda schema, _: ProtobufMessage(schema.name, schema.data),
+    ("cdr", "ros2msg"): lambda schema, _: _ros2(schema),
+    ("protobuf", "protobuf"): lambda schema, _: _protobuf(schema),
     ("json", None): lambda _, samples: JsonMessage(samples),
 }
 
