@@ -92,6 +92,16 @@ def test_true_and_false_are_no_numbers_and_lose_no_message(tmp_path: Path) -> No
         ("cdr", ("p/M", "ros2msg", b"float64[0] x"), "an array of 0 elements"),
         ("cdr", ("p/M", "ros2msg", b"float64 x\nnoise"), "the definition's line 'noise' cannot be read"),
         ("cdr", ("p/M", "ros2msg", b"q/N x"), "the definition of q/N is missing"),
+        ("cdr", ("p/M", "ros2msg", b"float64 x:"), "the definition's line 'float64 x:' cannot be read"),
+        (
+            "cdr",
+            (
+                "p/M",
+                "ros2msg",
+                b"builtin_interfaces/Time t\n=\nMSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosek",
+            ),
+            "builtin_interfaces/Time is not as ROS 2 defines it",
+        ),
         ("cdr", ("p/M", "ros2msg", b"float64 \xff"), "decode byte 0xff"),
         ("protobuf", ("p.M", "protobuf", b"\x0a\xff\xff"), ""),
     ],
