@@ -86,6 +86,7 @@ def test_faults_of_the_mapping(tmp_path: Path, old: str, new: str, said: str) ->
         ("t,Fx,Fx,Fx (2),Fy,Fz,angle\n0,1,9,5,2,3,0\n", "known: Fx .1., Fx .2., Fx .3."),
         ("t,Fx,Fy,Fz,angle\n-1,1,2,3,4\n", "give the date of time zero"),
         ("t,Fx,Fy,Fz,angle\n\xff", "not text in utf-8"),
+        ("t,Fx,Fy,Fz,angle\n0,a,b,c,4\n1,a,b,,5\n", "no number of 'wrench' for recording 'turn_1': 2 rows"),
     ],
 )
 def test_faults_of_a_text_file(tmp_path: Path, text: str, said: str) -> None:
