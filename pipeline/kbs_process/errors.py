@@ -2,28 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Sequence
 from difflib import get_close_matches
+
+from kbs_process.terminal import printable
 
 _LISTED = 40  # names that an error tells
 _COMPARED = 2000  # names that one may be meant by
 
 
 class KbsError(Exception):
-    """An error that ends the command with one clear message and `exit_status`."""
+    """An error that ends the command with one clear message and `exit_status`; `each` is what it consists of.
+
+    Names in it are from files, so what they hold of line ends and commands to a terminal is escaped.
+    """
 
     exit_status = 2
 
-    def __init__(self, what: str, *, where: str = "", remedy: str = "") -> None:
+    def __init__(self, what: str, *, where: str = "", remedy: str = "", each: Sequence[KbsError] = ()) -> None:
         super().__init__(what)
-        self.what = what
-        self.where = where
-        self.remedy = remedy
+        self.what = printable(what)
+        self.where = printable(where)
+        self.remedy = printable(remedy)
+        self.each = each
 
     def __str__(self) -> str:
         place = f"{self.where}: " if self.where else ""
         remedy = f"\n  -> {self.remedy}" if self.remedy else ""
-        return f"{place}{self.what}{remedy}"
+        return "\n".join([f"{place}{self.what}{remedy}", *map(str, self.each)])
 
 
 class ConfigError(KbsError):
@@ -32,6 +38,10 @@ class ConfigError(KbsError):
 
 class RecordingError(KbsError):
     """A recording cannot be read, or lacks what the campaign needs from it."""
+
+
+class SchemaError(RecordingError):
+    """A recording's schema is damaged, so that no message of it can be read."""
 
 
 class FitError(KbsError):

@@ -6,6 +6,7 @@ raises then, at every later start. Whoever compiles takes `njit` from here.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import Any
 
 from numba import njit
@@ -23,8 +24,14 @@ class _RenewedCache(FunctionCache):
         try:
             return super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
         except Exception:  # noqa: BLE001 - unpickling damaged bytes raises anything at all
-            self.flush()  # type: ignore[no-untyped-call]
+            with suppress(OSError):
+                self.flush()  # type: ignore[no-untyped-call]
             return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep what is compiled, if there is room: else it is compiled at each start."""
+        with suppress(OSError):
+            super().save_overload(sig, data)  # type: ignore[no-untyped-call]
 
 
 dispatcher.FunctionCache = _RenewedCache  # type: ignore[attr-defined]

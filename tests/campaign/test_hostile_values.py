@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import shutil
+import time
 import tomllib
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -36,6 +37,15 @@ from plant.plant_rigs import NOMINAL, two_axis
 
 Key = tuple[str | int, ...]
 Load = Callable[[], object]
+
+# By what is there very often: what one of it is.
+MANY = {
+    "keys": "x{} = 1\n",
+    "tables": "[y{}]\nx = 1\n",
+    "broken recordings": "[[recording]]\nfile = 3\n",
+    "recordings": '[[recording]]\nfile = "r{}.mcap"\nrole = "fit"\ntrajectory = "t{}"\n',
+    "brackets in a text": "[    \n",
+}
 
 # As TOML.
 VALUES = (
@@ -158,3 +168,22 @@ def judged(load: Load) -> None:
         assert error.where or "things are wrong" in error.what
         for word in ("pydantic", "Input should", "see the format's schema", "Traceback"):
             assert word not in str(error)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("many", MANY)
+def test_time_grows_as_the_description_does(many: str, tmp_path: Path) -> None:
+    folder = make_folder(tmp_path / "a").path
+    text = (folder / "campaign.toml").read_text()
+
+    def refused(count: int) -> float:
+        lines = "".join(MANY[many].replace("{}", str(number)) for number in range(count))
+        lines = f'text = """\n{lines}"""\n' if "text" in many else lines
+        (folder / "campaign.toml").write_text(lines + text if "[" not in lines or "text" in many else text + lines)
+        start = time.perf_counter()
+        with pytest.raises(ConfigError):
+            load_campaign(folder)
+        return time.perf_counter() - start
+
+    refused(10)
+    assert min(refused(4000) for _ in range(2)) < 16.0 * max(min(refused(500) for _ in range(2)), 0.1)

@@ -73,7 +73,7 @@ def test_a_diagnosis_that_nobody_can_read_is_outdated(tmp_path: Path) -> None:
     assert found is not None and not found.outdated
     (out / "diagnosis" / "results.json").write_text('{"kind": "diagnosis", "schema": 99}')
     found = earlier_diagnosis(campaign, out)
-    assert found is not None and "another version" in found.warning
+    assert found is not None and "another version" in found.warning[0]
 
 
 def test_where_no_folder_can_be_there_is_no_diagnosis(tmp_path: Path) -> None:

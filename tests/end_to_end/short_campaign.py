@@ -35,11 +35,12 @@ def record(
     swapped: bool = False,
     read: tuple[str, ...] = JOINTS,
     rig: Rig | None = None,
+    degrees: bool = False,
 ) -> None:
     """Write twenty seconds: elevation at rest, or swinging; a constant wrench, or that of a `rig`, and noise (N, N m).
 
     With `nan` ten readings of Fz are no numbers, or a slice of them; if `swapped`, two messages are in the other's
-    place. Encoders `read` some joints.
+    place. Encoders `read` some joints, as `degrees` if that is asked for.
     """
     stamp = np.arange(2000) * 10_000_000
     cycle = stamp[::10]
@@ -62,7 +63,14 @@ def record(
         path,
         [
             OutStream("/transducer/wrench", "wrench", sensed, stamp, wrench),
-            OutStream("/encoder", "joints", stamp, stamp, angle[:, columns], read),
+            OutStream(
+                "/encoder",
+                "joints",
+                stamp,
+                stamp,
+                np.degrees(angle[:, columns]) if degrees else angle[:, columns],
+                read,
+            ),
             OutStream("/command", "joints", cycle, cycle, command, JOINTS),
         ],
     )

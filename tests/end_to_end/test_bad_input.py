@@ -16,6 +16,7 @@ import pytest
 from campaign.campaign_folder import CampaignFolder
 from end_to_end.command import kbs_process
 from end_to_end.short_campaign import record
+from kbs_process.campaign.load import load_campaign
 from kbs_process.results.store import LIST, writing
 
 pytestmark = pytest.mark.slow
@@ -127,3 +128,15 @@ def test_recordings_without_motion(folder: CampaignFolder, refused: Callable[[],
     assert "no joint moves in AZPS_ATA, EL089P00_1" in message
     assert "body.antenna.cog" in message
     assert "bias" in message
+
+
+def test_angles_in_degrees_are_told_where_the_plant_has_no_solution_for_them(
+    folder: CampaignFolder, refused: Callable[[], str]
+) -> None:
+    rig = load_campaign(folder.path, checksums=False).rig
+    for path in (folder.path / "recordings").iterdir():
+        record(path, rig=rig, degrees=True)
+    message = refused()
+    assert "the model of this rig is wrong" in message
+    assert "unit: angles of az, el are degrees" in message
+    assert "no static equilibrium" in message

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from kbs_process.errors import RecordingError
 from kbs_process.recordings.formats import Text, format_named
-from kbs_process.recordings.tables import Table
+from kbs_process.recordings.tables import Table, find_column
 from kbs_process.studies.convert.clock import numbers
 
 # Readers leave their files open until the child process that they are made for ends.
@@ -84,6 +85,32 @@ def test_hdf5_numbers_never_written_and_odd_attributes(tmp_path: Path) -> None:
     np.testing.assert_array_equal(column(table, "zero"), [1, 2, 3, 0, 0, 0])
     assert "scale_factor has 2 values, not 1" in told(table, "each")
     assert "valid_range has 1 values, not 2" in told(table, "range")
+
+
+@pytest.mark.parametrize(
+    ("attribute", "value", "why"),
+    [
+        ("scale_factor", "0.1 N", "scale_factor is no number"),
+        ("scale_factor", 0.0, "scale_factor is 0.0"),
+        ("scale_factor", NAN, "scale_factor is nan"),
+        ("add_offset", np.array([]), "add_offset has 0 values, not 1"),
+        ("_FillValue", b"none", "_FillValue is no number"),
+        ("valid_min", None, "valid_min is no number"),
+    ],
+)
+def test_an_odd_hdf5_attribute_costs_its_data_set_alone(tmp_path: Path, attribute: str, value: Any, why: str) -> None:
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["run/good"], file["run/bad"] = T, T
+        file["run/bad"].attrs[attribute] = h5py.Empty("f8") if value is None else value
+        kind = h5py.h5t.UNIX_D32LE  # of times, which NumPy has not
+        h5py.h5d.create(file.id, b"times", kind, h5py.h5s.create_simple((3,)))
+    table = read(tmp_path / "a.h5", "hdf5")
+    assert names(table) == ["run/good"]
+    assert told(table, "run/bad") == f"run/bad: its attribute {why}"
+    assert "cannot be read" in told(table, "times")
+    with pytest.raises(RecordingError, match=f"no column 'run/bad'; run/bad: its attribute {why}"):
+        find_column(table, "run/bad")
 
 
 def test_hdf5_records_of_several_numbers_and_words(tmp_path: Path) -> None:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
 import pytest
+from mcap.writer import Writer
 
 from kbs_process.recordings.mcap.messages.encoding import OutStream
 from kbs_process.recordings.mcap.writer import write_mcap
@@ -81,6 +83,63 @@ def test_true_and_false_are_no_numbers_and_lose_no_message(tmp_path: Path) -> No
     (topic,) = found.topics
     assert (found.state, topic.count) == ("clean", 30)
     assert [one.field for one in topic.ranges] == ["temp"]
+
+
+@pytest.mark.parametrize(
+    ("encoding", "schema", "why"),
+    [
+        ("cdr", ("p/M", "ros2msg", f"float64[{2**70}] x".encode()), "an array of 1180591620717411303... elements"),
+        ("cdr", ("p/M", "ros2msg", b"float64[0] x"), "an array of 0 elements"),
+        ("cdr", ("p/M", "ros2msg", b"float64 x\nnoise"), "the definition's line 'noise' cannot be read"),
+        ("cdr", ("p/M", "ros2msg", b"q/N x"), "the definition of q/N is missing"),
+        ("cdr", ("p/M", "ros2msg", b"float64 x:"), "the definition's line 'float64 x:' cannot be read"),
+        (
+            "cdr",
+            (
+                "p/M",
+                "ros2msg",
+                b"builtin_interfaces/Time t\n=\nMSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosek",
+            ),
+            "builtin_interfaces/Time is not as ROS 2 defines it",
+        ),
+        ("cdr", ("p/M", "ros2msg", b"float64 \xff"), "decode byte 0xff"),
+        ("protobuf", ("p.M", "protobuf", b"\x0a\xff\xff"), ""),
+    ],
+)
+def test_a_damaged_schema_is_told_and_not_clean(
+    tmp_path: Path, encoding: str, schema: tuple[str, str, bytes], why: str
+) -> None:
+    path = tmp_path / "a.mcap"
+    path.write_bytes(build([(i, bytes(100)) for i in range(30)], schema, encoding))
+    found = inspect_recording(path)
+    (loss,) = found.losses
+    assert (found.state, found.topics[0].count) == ("lossy", 30)
+    assert (loss.kind, loss.where, loss.count) == ("unusable", "/topic", 30)
+    assert loss.detail.startswith(f"the schema of {schema[0]} is damaged: ") and why in loss.detail
+
+
+@pytest.mark.slow
+def test_topics_of_one_type_share_it(tmp_path: Path) -> None:
+    """What thousands of topics take in memory is what each has of its own."""
+
+    def peak(topics: int) -> int:
+        path = tmp_path / f"{topics}.mcap"
+        with path.open("wb") as file:
+            writer = Writer(file)
+            writer.start()
+            schema = writer.register_schema("p/M", "ros2msg", b"float64 x\n" + b"float64[3] y\n" * 20)
+            for number in range(topics):
+                channel = writer.register_channel(f"/t{number}", "cdr", schema)
+                writer.add_message(channel, number, b"\0\1\0\0" + bytes(8 * 61), number)
+            writer.finish()
+        tracemalloc.start()
+        assert len(inspect_recording(path).topics) == topics
+        most = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        return most
+
+    peak(10)
+    assert (peak(1100) - peak(100)) / 1000 < 35_000  # bytes a topic; 42,000 where each has its type
 
 
 def test_messages_of_any_type_are_counted(tmp_path: Path) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from math import isclose
@@ -13,6 +13,7 @@ from kbs_process.campaign.documents import Document, Key, Merged, shown
 from kbs_process.campaign.formats.campaign_file import CampaignFile, EncoderTable
 from kbs_process.campaign.problems import Problems
 from kbs_process.errors import did_you_mean
+from kbs_process.files import regular
 from kbs_process.plant.effect import Effect, Port
 from kbs_process.plant.laws import CATALOGUE, MEASURED, catalogue_with, find
 from kbs_process.results.provenance import sha256
@@ -239,8 +240,19 @@ class _Checks:
                 self._note(("requirement", index, "frame"), what, remedy)
 
     def recordings(self) -> None:
+        names: set[str] = set()
+        runs: dict[tuple[str, int], str] = {}
         for index, entry in enumerate(self.campaign.recordings):
             self._recording(index, entry)
+            run = entry.trajectory, entry.repeat
+            if entry.name in names:
+                what = f"a recording before it is called '{entry.name}' too, and results are named by it"
+                self._note(("recording", index, "file"), what, "rename one of the files, or list it once")
+            if runs.get(run, entry.name) != entry.name:
+                what = f"run {entry.repeat} of {entry.trajectory} is '{runs[run]}' already"
+                self._note(("recording", index, "repeat"), what, "number the repeats 1, 2, 3")
+            names.add(entry.name)
+            runs.setdefault(run, entry.name)
 
     def _recording(self, index: int, entry: RecordingEntry) -> None:
         key: Key = ("recording", index)
@@ -250,22 +262,17 @@ class _Checks:
                 remedy = did_you_mean(name, effects) if effects else "leave it out"
                 self._note((*key, "without", position), f"the model has no '{name}'", remedy)
         try:
-            if not entry.path.is_file():
-                taken = {other.path.resolve() for other in self.campaign.recordings}
-                what = f"the recording '{shown(entry.path)}' does not exist"
-                self._note((*key, "file"), what, _neighbour(entry.path, taken))
-        except (OSError, ValueError):
-            self._note((*key, "file"), "no disk can hold a file of that name", "give its name")
+            regular(entry.path)
+        except (FileNotFoundError, NotADirectoryError):
+            what = f"the recording '{shown(entry.path)}' does not exist"
+            remedy = "" if self.problems.enough else _neighbour(entry.path, self.campaign.recordings)
+            self._note((*key, "file"), what, remedy)
+        except (OSError, ValueError) as error:
+            reason = error.strerror if isinstance(error, OSError) else error  # a name with a NUL in it
+            self._note((*key, "file"), f"the recording cannot be read: {reason}", "give the name of an MCAP file")
         if entry.start is not None and entry.end is not None and entry.end <= entry.start:
             what = f"{entry.end:g} is not after start_s, {entry.start:g}"
             self._note((*key, "end_s"), what, "give a later end")
-        for other in self.campaign.recordings[:index]:
-            if other.name == entry.name:
-                what = f"a recording before it is called '{entry.name}' too, and results are named by it"
-                self._note((*key, "file"), what, "rename one of the files, or list it once")
-            elif (other.trajectory, other.repeat) == (entry.trajectory, entry.repeat):
-                what = f"run {entry.repeat} of {entry.trajectory} is '{other.name}' already"
-                self._note((*key, "repeat"), what, "number the repeats 1, 2, 3")
 
     def checksums(self) -> None:
         for index, entry in enumerate(self.campaign.recordings):
@@ -275,11 +282,12 @@ class _Checks:
                 self._note(("recording", index, "sha256"), what, remedy)
 
 
-def _neighbour(missing: Path, taken: Collection[Path]) -> str:
+def _neighbour(missing: Path, recordings: Iterable[RecordingEntry]) -> str:
     """Return a remedy for a file that is missing: one in its folder with a like name, not taken; or where to put it."""
     if not missing.parent.is_dir():
         return f"the folder '{shown(missing.parent)}' does not exist either: put the recordings there"
     others = [path for path in missing.parent.iterdir() if path.is_file()]
+    taken = {entry.path.resolve() for entry in recordings}
     listed = [path.name for path in others if path.resolve() in taken]
     names = [path.name for path in others]
     return did_you_mean(missing.name, names, listed) if names else "its folder is empty: put the recordings there"

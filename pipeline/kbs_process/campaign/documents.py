@@ -5,20 +5,26 @@ from __future__ import annotations
 import json
 import re
 import tomllib
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 from kbs_process.campaign.problems import Problems
 from kbs_process.errors import ConfigError
+from kbs_process.files import regular
+from kbs_process.terminal import printable
 
 Tree = dict[str, Any]
 Key = tuple[str | int, ...]  # ("recording", 2, "file")
 
-_HEADER = re.compile(r"^\s*(\[\[?)\s*([^\[\]]+?)\s*\]\]?\s*(?:#.*)?$")
+# Possessive, so that a line of blanks takes no longer than another.
+_HEADER = re.compile(r"^\s*+(\[\[?+)([^\[\]]++)\]\]?+\s*+(?:#.*)?$")
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 _ASSIGNMENT = re.compile(r"^\s*+([A-Za-z0-9_.\-\"'](?:[A-Za-z0-9_.\-\"' ]*[A-Za-z0-9_.\-\"'])?)\s*+=")
+_AT = re.compile(r"\(at (?:line (\d+), column (\d+)|end of document)\)$")  # where tomllib found a fault
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +37,8 @@ class Document:
 
     def place(self, key: Key) -> str:
         """Return "file:line: dotted key", the line being that of the key's nearest ancestor that has one."""
-        line = _line_of(self.text, key)
+        lines = _lines(self.text)
+        line = next((lines[key[:depth]] for depth in range(len(key), 0, -1) if key[:depth] in lines), None)
         file = f"{shown(self.path)}:{line}" if line else shown(self.path)
         return f"{file}: {dotted(key)}" if key else file
 
@@ -49,8 +56,14 @@ def dotted(key: Key) -> str:
         if isinstance(part, int):
             text += f"[{part + 1}]"
         else:
-            text += ("." if text else "") + (part if _BARE.fullmatch(part) else json.dumps(part, ensure_ascii=False))
+            text += ("." if text else "") + (part if _BARE.fullmatch(part) else quoted(part))
     return text
+
+
+def quoted(text: str) -> str:
+    """Return a text as TOML writes it: in quotes, on one line, what is not printable as escapes."""
+    written = json.dumps(text.encode(errors="replace").decode(), ensure_ascii=False)
+    return "".join(sign if printable(sign) == sign else f"\\U{ord(sign):08X}" for sign in written)
 
 
 def within(folder: Path, name: str, *, where: str) -> Path:
@@ -73,7 +86,7 @@ def within(folder: Path, name: str, *, where: str) -> Path:
 def read(path: Path, *, role: str, remedy: str) -> Document:
     """Read one TOML file; `role` says what it is for in the message when it is missing."""
     try:
-        text = path.read_text(encoding="utf-8")
+        text = regular(path).read_text(encoding="utf-8")
     except (FileNotFoundError, NotADirectoryError) as error:
         raise ConfigError(f"{role} does not exist", where=shown(path), remedy=remedy) from error
     except UnicodeDecodeError as error:
@@ -83,7 +96,7 @@ def read(path: Path, *, role: str, remedy: str) -> Document:
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else error  # a name with a NUL in it
         raise ConfigError(
-            f"cannot be read: {reason}", where=shown(path), remedy="check the file and its permissions"
+            f"{role} cannot be read: {reason}", where=shown(path), remedy=f"{remedy}; check its permissions"
         ) from error
     try:
         return Document(path, text, tomllib.loads(text))
@@ -103,10 +116,10 @@ def read(path: Path, *, role: str, remedy: str) -> Document:
 
 def _decode_error(message: str, text: str) -> tuple[str, int]:
     """Split "Invalid value (at line 3, column 5)" into the message and the line."""
-    match = re.search(r"\s*\(at (?:line (\d+), column (\d+)|end of document)\)$", message)
+    match = _AT.search(message)
     if match is None:
         return message, 1
-    bare = message[: match.start()]
+    bare = message[: match.start()].rstrip()
     if match.group(1) is None:
         return f"{bare} at the end of the file", text.count("\n") + 1
     return f"{bare} (column {match.group(2)})", int(match.group(1))
@@ -185,25 +198,23 @@ def _depth(node: Any, key: Key) -> int:
     return len(key)
 
 
-def _line_of(text: str, key: Key) -> int | None:
-    """Return the line of the longest leading part of `key` that a header or an assignment spells out."""
-    best, best_line = 0, None
+@lru_cache(maxsize=16)
+def _lines(text: str) -> dict[Key, int]:
+    """Return the first line that spells out each key, in a header or an assignment."""
+    found: dict[Key, int] = {}
     table: Key = ()
-    counts: dict[Key, int] = {}
+    counts = Counter[Key]()
     for number, line in enumerate(text.splitlines(), start=1):
         if header := _HEADER.match(line):
             table = _split(header.group(2))
             if header.group(1) == "[[":
-                index = counts[table] = counts.get(table, -1) + 1
-                table = (*table, index)
-            candidate = table[:-1] if table[-1:] == (0,) and key == table[:-1] else table
+                found.setdefault(table, number)
+                counts[table] += 1
+                table = (*table, counts[table] - 1)
+            found.setdefault(table, number)
         elif assignment := _ASSIGNMENT.match(line):
-            candidate = (*table, *_split(assignment.group(1)))
-        else:
-            continue
-        if len(candidate) > best and key[: len(candidate)] == candidate:
-            best, best_line = len(candidate), number
-    return best_line
+            found.setdefault((*table, *_split(assignment.group(1))), number)
+    return found
 
 
 def _split(name: str) -> Key:

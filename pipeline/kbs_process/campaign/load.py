@@ -91,8 +91,8 @@ def _read_each(folder: Path, files: Iterable[str], key: str) -> list[Document]:
 def _campaign(
     folder: Path, file: CampaignFile, document: Document, tables: Merged, rig: Rig, problems: Problems
 ) -> Campaign:
-    where = shown(document.path)
-    modal = within(folder, file.model.modal, where=where) if file.model and file.model.modal else None
+    given = file.model.modal if file.model else None
+    modal = within(folder, given, where=document.place(("model", "modal"))) if given else None
     requirements = (
         disturbance(table, ("requirement", index), document, problems) for index, table in enumerate(file.requirement)
     )
@@ -120,7 +120,7 @@ def _campaign(
             *_matrices(folder, tables.tree),
             *(() if modal is None else (modal,)),
         ),
-        mission=within(folder, file.mission.file, where=where) if file.mission else None,
+        mission=within(folder, file.mission.file, where=document.place(("mission", "file"))) if file.mission else None,
         flight_pointing=tuple(
             pointing(table, ("flight", "pointing", index), document, problems)
             for index, table in enumerate(flight_pointing)

@@ -12,6 +12,7 @@ from kbs_process.campaign.formats.kind import CHANNELWISE, PAIRWISE, Kind
 from kbs_process.campaign.formats.tables import PlainQuantity, QuantityTable
 from kbs_process.campaign.units import UnitMismatchError, factor
 from kbs_process.errors import ConfigError
+from kbs_process.files import regular
 from kbs_process.rig.model import Quantity
 from kbs_process.signals.records import WRENCH_CHANNELS, WRENCH_UNITS, Array
 
@@ -82,7 +83,8 @@ def _array(given: Any, key: str, folder: Path) -> Array:
 def from_csv(path: Path, key: str) -> Array:
     """Read a matrix of numbers from a comma-separated file; '#' begins a comment. One row is an array."""
     try:
-        array = np.loadtxt(path, delimiter=",", ndmin=2)
+        with regular(path).open(encoding="utf-8") as file:  # of a name, loadtxt would unpack .gz, however large
+            array = np.loadtxt(file, delimiter=",", ndmin=2)
     except FileNotFoundError as error:
         raise ConfigError(f"the CSV file '{path}' does not exist", where=key, remedy="check its name") from error
     except OSError as error:

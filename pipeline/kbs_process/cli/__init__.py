@@ -17,6 +17,7 @@ from kbs_process import interruption
 from kbs_process.cli.group import cli
 from kbs_process.cli.shared import BAD_INPUT, INTERNAL, INTERRUPTED, NOT_MET, complain
 from kbs_process.errors import KbsError
+from kbs_process.terminal import printable
 
 __all__ = ["BAD_INPUT", "INTERNAL", "INTERRUPTED", "NOT_MET", "cli", "main"]
 
@@ -36,17 +37,18 @@ def main(arguments: Sequence[str] | None = None) -> None:
     debug = "--debug" in words
     for word in (*words, os.environ.get("PWD", "")):
         if any("\ud800" <= letter <= "\udfff" for letter in word):  # bytes that are no UTF-8
-            complain(f"error: '{word}' is no name in UTF-8\n  -> rename the file or folder")
+            complain(f"error: '{word}' is no name in UTF-8", "  -> rename the file or folder")
             sys.exit(BAD_INPUT)
     try:
         Path.cwd()
     except FileNotFoundError:
-        complain("error: the folder that this terminal is in was removed\n  -> change to another one: cd")
+        complain("error: the folder that this terminal is in was removed", "  -> change to another one: cd")
         sys.exit(BAD_INPUT)
     try:
         with interruption.heeded():
             cli.main([word for word in words if word != "--debug"], prog_name="kbs-process", standalone_mode=False)
     except click.ClickException as error:
+        error.message = printable(error.message)  # type: ignore[misc]
         error.show()
         sys.exit(error.exit_code)
     except click.Abort:
@@ -55,13 +57,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except KbsError as error:
         if debug:
             raise
-        complain(f"error: {error}")
+        complain(*f"error: {error}".split("\n"))
         sys.exit(error.exit_status)
     except Exception as error:  # the last one to speak: a user gets words, not a traceback
         if debug:
             raise
         complain(
-            f"error: {type(error).__name__}: {error}\n"
-            "  -> this is a fault of kbs-process: please report it with what the same command prints with --debug"
+            f"error: {type(error).__name__}: {error}",
+            "  -> this is a fault of kbs-process: please report it with what the same command prints with --debug",
         )
         sys.exit(INTERNAL)

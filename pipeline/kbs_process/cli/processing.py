@@ -58,7 +58,7 @@ def process(campaign: str, output: Path | None, pdf: bool | None, check: bool, w
     loaded = load_campaign(folder)
     before = earlier_diagnosis(loaded, target)
     if before is not None and before.outdated:
-        complain(before.warning)  # now, as long as it is there
+        complain(*before.warning)  # now, as long as it is there
     # Bad input is told before all that computes is imported.
     from kbs_process.studies.correlate.run import process as run
 
@@ -87,7 +87,7 @@ def _diagnose(campaign: Campaign, results: Path, *, progress: Progress, pdf: boo
     except (ConfigError, RecordingError, FitError, SimulationError) as error:
         if wanted:
             raise
-        say(f"Not diagnosed: {error}")
+        say(*f"Not diagnosed: {error}".split("\n"))
     except Exception:
         complain("the report is written, but the diagnosis failed")
         raise

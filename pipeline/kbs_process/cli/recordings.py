@@ -37,7 +37,7 @@ def inspect(files: tuple[Path, ...], check: bool) -> None:
     for path in files:
         inspection = inspect_recording(path)
         states.add(inspection.state)
-        say(*(line.replace("\n", r"\n") for line in describe_inspection(inspection)))
+        say(*describe_inspection(inspection))
     if "unreadable" in states:
         sys.exit(BAD_INPUT)
     if check and "lossy" in states:

@@ -86,9 +86,10 @@ def say(*lines: str) -> None:
         click.echo(printable(line))
 
 
-def complain(message: str) -> None:
+def complain(*lines: str) -> None:
     """Say what went wrong, beside the output."""
-    click.echo(printable(message), err=True)
+    for line in lines:
+        click.echo(printable(line), err=True)
 
 
 def verb(

@@ -34,6 +34,7 @@ BYTES_A_CPU_S = 1 << 18  # and a second for so many bytes more
 DATA_FLOOR = 1 << 30  # bytes that a file of any size may expand to
 DATA_BY_SIZE = 1000  # and so many times its size: the best that compression makes of constants
 MEMORY_FLOOR = 1 << 29  # bytes of private memory; the libraries themselves take less than half of it
+SAID = 3  # status of a child that says why
 MEMORY_BY_SIZE = 64  # and so many times the file's size
 
 
@@ -128,7 +129,7 @@ class IsolatedTable:
 def _cause(status: int, words: str) -> str:
     if status < 0:
         return f"its reader was killed by {signal.Signals(-status).name}, as damaged files do"
-    return words or f"its reader ended with status {status}"
+    return words if status == SAID else f"its reader ended with status {status}, as damaged files make it do"
 
 
 @contextmanager
@@ -177,5 +178,23 @@ def main(name: str, path: Path, names: Sequence[str]) -> None:
         out.write(json.dumps(table.odd).encode() + b"\n")
 
 
+# What Python raises where a library takes for granted what a damaged file has not: its words mean nothing to a user.
+_STUMBLES = (ArithmeticError, AssertionError, AttributeError, LookupError, NameError, TypeError)
+
+
+def _reason(error: Exception) -> str:
+    """Why a file cannot be read, in one line, as its library says it where it does, and not Python."""
+    if isinstance(error, MemoryError):
+        return "it asks for far more memory than a file of its size needs"
+    said = error.what if isinstance(error, KbsError) else getattr(error, "strerror", None) or str(error)
+    words = "" if isinstance(error, _STUMBLES) else " ".join(said.split())
+    return words or "what it holds does not fit together: it is damaged, or of another format"
+
+
 if __name__ == "__main__":
-    main(sys.argv[1], Path(sys.argv[2]), json.loads(sys.argv[3]))
+    try:
+        main(sys.argv[1], Path(sys.argv[2]), json.loads(sys.argv[3]))
+    except Exception as error:  # noqa: BLE001 - the last one to speak for a library, which may raise anything at all
+        sys.stderr.write(f"\n{_reason(error)}\n")
+        sys.stderr.flush()
+        os._exit(SAID)  # at once: what is left of a library would complain on

@@ -22,7 +22,7 @@ CHUNK_ROWS = 65536
 CHUNK_CELLS = 64 * CHUNK_ROWS
 LONGEST_TEXT = 100  # characters of a cell: what is longer is no number, and no date
 _COARSE = 0.2  # of the step of times: what they may be rounded to
-_NUMBER = re.compile(r"\s*[+-]?((\d+\.?\d*|\.\d+)(e[+-]?\d+)?|inf|infinity|nan)\s*", re.IGNORECASE | re.ASCII)
+_NUMBER = re.compile(r"\s*+[+-]?((\d++(\.\d*+)?|\.\d++)(e[+-]?\d++)?|inf|infinity|nan)\s*+", re.IGNORECASE | re.ASCII)
 
 
 def stamps_after(start: Any, seconds: Any) -> Cells:
@@ -189,6 +189,9 @@ def find_column(table: Table, wanted: int | str) -> Column:
     named = {column.name: column for column in columns}
     if wanted not in named:
         single = len(columns) == 1
+        start = f"{wanted.partition('[')[0]}: "
+        if why := next((one for one in table.left_out if one.startswith(start)), ""):
+            raise RecordingError(f"no column '{wanted}'; {why}", where=str(table.path), remedy="write the file anew")
         raise RecordingError(
             f"no column '{wanted}'",
             where=str(table.path),

@@ -12,6 +12,7 @@ import pyarrow.parquet as pq
 
 from kbs_process.campaign.config import Campaign
 from kbs_process.errors import ConfigError, RecordingError, did_you_mean
+from kbs_process.files import regular
 from kbs_process.plant.predict import Schedule
 from kbs_process.progress import Progress
 from kbs_process.reduction.predicting import approached, schedule_of
@@ -93,6 +94,7 @@ def _angle(table: pa.Table, joint: str, path: Path) -> Array:
 
 def _read(path: Path) -> pa.Table:
     try:
+        regular(path)
         return pq.read_table(path) if path.suffix == ".parquet" else csv.read_csv(path)
     except (pa.ArrowInvalid, OSError) as error:
         raise RecordingError(

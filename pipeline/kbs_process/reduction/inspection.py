@@ -14,7 +14,7 @@ from typing import Literal
 
 import numpy as np
 
-from kbs_process.errors import RecordingError
+from kbs_process.errors import RecordingError, SchemaError
 from kbs_process.recordings.mcap.messages.fields import STAMPS
 from kbs_process.recordings.mcap.source import Source, TopicSummary, open_recording
 from kbs_process.recordings.mcap.streams import Sample, Stream
@@ -72,7 +72,7 @@ class _Plan:
     fields: tuple[str, ...] = ()
     names: tuple[str, ...] = ()
     note: str = ""
-    damaged: bool = False  # none of its first messages can be decoded
+    damaged: bool = False  # its schema is, or none of its first messages can be decoded
 
 
 class _Gathered:
@@ -151,7 +151,7 @@ def inspect_recording(path: Path) -> Inspection:
         source = open_recording(path)
         topics = source.topics
         samples = source.samples()
-        plans = {topic.topic: _plan(samples.get(topic.topic)) for topic in topics}
+        plans = {topic.topic: _plan(samples.pop(topic.topic, None)) for topic in topics}
         gathered = {topic: _Gathered(topic, plan) for topic, plan in plans.items()}
         for topic, block in source.read(
             [Stream(topic, topic, plan.fields, lenient=True) for topic, plan in plans.items()]
@@ -176,10 +176,12 @@ def _by_turns(source: Source) -> Iterator[Loss]:
         yield Loss("publishers", topic, len(channels), detail=detail)
 
 
-def _plan(sample: Sample | str | None) -> _Plan:
+def _plan(sample: Sample | RecordingError | None) -> _Plan:
     """Plan for every number of a topic, and the elements of its sequences that one message has."""
-    if sample is None or isinstance(sample, str):
-        return _Plan(note=sample or "no messages")
+    if sample is None:
+        return _Plan(note="no messages")
+    if isinstance(sample, RecordingError):
+        return _Plan(note=sample.what, damaged=isinstance(sample, SchemaError))
     if fault := sample.fault():
         return _Plan(note=fault, damaged=True)
     fields: list[str] = []

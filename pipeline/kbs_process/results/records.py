@@ -12,6 +12,7 @@ from typing import Any, Literal, TypeVar
 import msgspec
 
 from kbs_process.errors import OutputError
+from kbs_process.files import regular
 from kbs_process.results.versions import VERSION, upgraded
 
 FILE = "results.json"
@@ -137,7 +138,7 @@ def schema_of(record: type[Record], title: str) -> dict[str, Any]:
 def _content(folder: Path) -> bytes:
     path = folder / FILE
     try:
-        return path.read_bytes()
+        return regular(path).read_bytes()
     except FileNotFoundError:
         raise OutputError(
             "no results here",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import struct
 import time
 import tracemalloc
@@ -300,9 +301,11 @@ def test_files_that_are_no_recordings(tmp_path: Path, content: bytes) -> None:
     with pytest.raises(RecordingError, match=r"a\.mcap: (the file is empty|this is not an MCAP file)"):
         open_recording(path)
     assert inspect_recording(path).state == "unreadable"
-    for missing in (tmp_path / "nowhere.mcap", tmp_path):
-        with pytest.raises(RecordingError, match="cannot be opened"):
-            open_recording(missing)
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "zero.mcap").symlink_to("/dev/zero")
+    for name, what in {"none": "No such file", ".": "a folder", "pipe": "a pipe", "zero.mcap": "a device"}.items():
+        with pytest.raises(RecordingError, match=f"cannot be opened: .*{what}"):
+            open_recording(tmp_path / name)
 
 
 def test_an_attachment_is_checked(tmp_path: Path, whole: Path) -> None:

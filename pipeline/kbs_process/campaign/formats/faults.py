@@ -84,6 +84,11 @@ def _other_type(allowed: list[Any], key: Key, found: Any) -> tuple[str, str]:
         return "is a list of tables, not one table", f"write [{key[-1]}], in single brackets"
     if type(found) is int and float in allowed:
         return f"{_shown(found)} is beyond all numbers that can be computed with", "give less than 1e308"
+    if isinstance(found, float) and int in allowed and found.is_integer():
+        return (
+            f"{_shown(found)} is no whole number as TOML writes one",
+            f"write {_shown(int(found))}, without a point",
+        )
     wanted = " or ".join(dict.fromkeys(_TYPES.get(get_origin(one) or one, "a table") for one in allowed))
     needed = [
         name for one in allowed if _is_table(one) for name in one.model_fields if one.model_fields[name].is_required()
@@ -153,7 +158,6 @@ def _shown(value: Any) -> str:
     if isinstance(value, int) and abs(value) > 10**18:
         return f"{value:#x}"[:20] + "..."  # Python writes no number of very many digits
     text = f"'{value}'" if isinstance(value, str) else str(value).lower() if isinstance(value, bool) else str(value)
-    text = text.replace("\n", "\\n")
     return text if len(text) <= 60 else text[:57] + "..."
 
 

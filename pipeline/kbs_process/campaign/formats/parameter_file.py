@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import ConfigDict, Field
 
 from kbs_process.campaign.formats.kind import CHANNELWISE, PAIRWISE, Kind
-from kbs_process.campaign.formats.tables import WHOLE, LinkName, QuantityTable, SomeDistinct, Table
+from kbs_process.campaign.formats.tables import LinkName, QuantityTable, SomeDistinct, Table
 from kbs_process.rig.model import JointType
 
 Lengths = Annotated[QuantityTable, Kind("m", (3,))]
@@ -29,7 +29,7 @@ class GravityTable(SpreadTable):
 class AmplifierTable(Table):
     """The transducer's low-pass before sampling: Butterworth."""
 
-    order: Annotated[int, Field(ge=1, le=8), WHOLE]
+    order: Annotated[int, Field(ge=1, le=8)]
     corner: Annotated[QuantityTable, Kind("Hz", low=0.0, strict=True)] = Field(
         description="Butterworth low-pass before sampling"
     )
@@ -65,7 +65,7 @@ class ControllerTable(SpreadTable):
     loop: Literal["open", "closed"]
     Kp: Annotated[QuantityTable, Kind("1", each_joint=True)]
     Ki: Annotated[QuantityTable, Kind("1/s", each_joint=True)]
-    latency: Annotated[int, Field(ge=0, le=1_000_000), WHOLE] = Field(description="of the encoder in the loop, cycles")
+    latency: Annotated[int, Field(ge=0, le=1_000_000)] = Field(description="of the encoder in the loop, cycles")
 
 
 class SpacecraftTable(SpreadTable):

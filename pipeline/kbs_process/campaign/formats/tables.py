@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Annotated, Any, ClassVar, Self, TypeVar
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Discriminator, Field, Tag, model_validator
 from pydantic_core import PydanticCustomError
 
 from kbs_process.campaign.formats.kind import Kind
@@ -28,13 +28,7 @@ Positive = Annotated[float, Field(gt=0.0)]
 NotNegative = Annotated[float, Field(ge=0.0)]
 
 
-def _whole(value: Any) -> Any:
-    """Return an integer where a number is one: JSON Schema takes 1.0 for one too."""
-    return int(value) if isinstance(value, float) and value.is_integer() and abs(value) < 2.0**53 else value
-
-
-WHOLE = BeforeValidator(_whole)
-Count = Annotated[int, Field(ge=1, le=1_000_000), WHOLE]
+Count = Annotated[int, Field(ge=1, le=1_000_000)]
 
 T = TypeVar("T")
 
@@ -57,7 +51,7 @@ Distinct = Annotated[list[T], AfterValidator(_distinct), Field(json_schema_extra
 SomeDistinct = Annotated[
     list[T], Field(min_length=1), AfterValidator(_distinct), Field(json_schema_extra={"uniqueItems": True})
 ]
-Version = Annotated[int, WHOLE, AfterValidator(_first_version), Field(json_schema_extra={"const": 1})]
+Version = Annotated[int, AfterValidator(_first_version), Field(json_schema_extra={"const": 1})]
 
 # Alternatives are told apart by what TOML has; their tags stand in a fault's place, and are no keys.
 TABLE, ARRAY, TEXT, TRUTH, NUMBER = (Tag(f"\0{kind}") for kind in ("table", "array", "text", "boolean", "number"))

@@ -18,6 +18,7 @@ from kbs_process.campaign.documents import Tree, read
 from kbs_process.campaign.locate import CAMPAIGN_FILE
 from kbs_process.campaign.writing.parameter_files import corrected, entry, text_of, whole, write_parameters
 from kbs_process.rig.model import Quantity, Rig
+from kbs_process.terminal import printable
 
 FOUND = "found.toml"  # numbers that the campaign's parameter files do not have
 FLIGHT = "flight"  # folder of those of the flight model, in that of the parameter files
@@ -47,13 +48,13 @@ def write_model(
     added = _added(campaign.rig, rig, changed, source)
     if added:
         path = folder / "parameters" / FOUND
-        path.write_text(f"# Physics that was left out, {source}.\n" + text_of(added), encoding="utf-8")
+        path.write_text(f"# Physics that was left out, {printable(source)}.\n" + text_of(added), encoding="utf-8")
         written = (*written, path)
     description = folder / CAMPAIGN_FILE
     every = (*campaign.sensing, *sensing)
     tree = _description(campaign, effects, every, written, folder)
     others = tuple(_brought(campaign, tree, folder))
-    text = f"# {campaign.name}, its model corrected, {source}.\n" + text_of(tree)
+    text = f"# {printable(campaign.name)}, its model corrected, {printable(source)}.\n" + text_of(tree)
     description.write_text(text, encoding="utf-8")
     return (description, *written, *others)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from kbs_process.campaign.documents import quoted
 from kbs_process.campaign.modal_file import SIX
 from kbs_process.plant.linear.modal import ModalTable
 
@@ -14,8 +15,8 @@ def modal_text(table: ModalTable) -> str:
         "# 3 x rad kg^-1/2 m^-1); participation: momentum about T's origin for unit modal velocity (3 x kg^1/2,",
         "# 3 x kg^1/2 m), its squares the effective masses; gravity: change of the weight's wrench. Axes of T.",
         "schema = 1",
-        f'joint = "{table.joint}"',
-        f'source = "{table.source}"',
+        f"joint = {quoted(table.joint)}",
+        f"source = {quoted(table.source)}",
     ]
     for model in table.models:
         lines += ["", "[[pose]]", f'angle = {{ value = {model.angle!r}, unit = "rad" }}']

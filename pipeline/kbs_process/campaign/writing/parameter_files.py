@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping
 from datetime import date, datetime, time
 from pathlib import Path
@@ -11,9 +10,10 @@ from typing import Any
 import numpy as np
 
 from kbs_process.campaign.config import Campaign
-from kbs_process.campaign.documents import Tree, read, within
+from kbs_process.campaign.documents import Tree, quoted, read, within
 from kbs_process.campaign.quantities import from_csv
 from kbs_process.rig.model import Quantity
+from kbs_process.terminal import printable
 
 _HEAD = "# {name}, with numbers identified from {source}.\n# Everything else is as it was; comments were left out.\n"
 
@@ -29,7 +29,7 @@ def corrected(campaign: Campaign, changed: Mapping[str, Quantity], source: str) 
             document = read(path, role="the parameter file", remedy="keep the campaign as it is meanwhile")
             yield (
                 path.name,
-                _HEAD.format(name=path.name, source=source)
+                _HEAD.format(name=printable(path.name), source=printable(source))
                 + text_of(_replaced(whole(document.tree, campaign.folder), changed)),
             )
 
@@ -94,25 +94,28 @@ def _table(node: Tree, path: tuple[str, ...]) -> Iterator[str]:
         yield ""
         yield f"[{'.'.join(map(_key, path))}]"
     for key, child in leaves.items():
-        yield f"{_key(key)} = {_value(child)}"
+        yield f"{_key(key)} = {value_text(child)}"
     for key, child in node.items():
         if key not in leaves:
             yield from _table(child, (*path, key))
 
 
 def _key(key: str) -> str:
-    return key if key.replace("_", "").replace("-", "").isalnum() and key.isascii() else json.dumps(key)
+    return key if key.replace("_", "").replace("-", "").isalnum() and key.isascii() else quoted(key)
 
 
-def _value(value: Any) -> str:
+def value_text(value: Any) -> str:
+    """TOML of one value."""
     if isinstance(value, dict):
-        return "{ " + ", ".join(f"{_key(key)} = {_value(child)}" for key, child in value.items()) + " }"
+        return "{ " + ", ".join(f"{_key(key)} = {value_text(child)}" for key, child in value.items()) + " }"
     if isinstance(value, list):
-        return "[" + ", ".join(map(_value, value)) + "]"
+        return "[" + ", ".join(map(value_text, value)) + "]"
     if isinstance(value, datetime | date | time):
         return value.isoformat()
-    if isinstance(value, bool | str | int):
-        return json.dumps(value, ensure_ascii=False)
+    if isinstance(value, str):
+        return quoted(value)
+    if isinstance(value, bool | int):
+        return str(value).lower()
     return repr(float(value))
 
 

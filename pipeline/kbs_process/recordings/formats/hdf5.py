@@ -17,7 +17,9 @@ from kbs_process.recordings.formats import Format, Text
 from kbs_process.recordings.tables import Cells, Column, Item, Series, SeriesTable, Slice, matrix_of, series_of, texts
 
 _NO_VARIABLE = "This is a netCDF dimension but not a netCDF variable"
-_VALUES = {"scale_factor": 1, "add_offset": 1, "valid_min": 1, "valid_max": 1, "valid_range": 2}  # that attributes have
+# How many numbers attributes have, 0 for any.
+_VALUES = {"scale_factor": 1, "add_offset": 1, "valid_min": 1, "valid_max": 1, "valid_range": 2}
+_VALUES |= {"_FillValue": 0, "missing_value": 0}
 _BLOCK_CELLS = 1 << 22  # of a matrix, read together for its columns
 
 
@@ -38,13 +40,16 @@ def datasets(path: Path, separator: str = "/", classes: bool = False) -> Iterato
         if not isinstance(data, h5py.Dataset) or (classes and name.startswith("#")):
             continue
         label = name.replace("/", separator)
-        if why := _why_not(data, path, classes) or ("it is a sparse matrix" if name.startswith(sparse) else ""):
-            yield f"{label}: {why}"
-        elif not data.attrs.get("MATLAB_empty"):
-            yield from _columns(data, label)
+        try:
+            if why := _why_not(data, classes) or ("it is a sparse matrix" if name.startswith(sparse) else ""):
+                yield f"{label}: {why}"
+            elif not data.attrs.get("MATLAB_empty"):
+                yield from _columns(data, label)
+        except (LookupError, OSError, RuntimeError, TypeError, ValueError):  # what h5py raises for odd types and damage
+            yield f"{label}: its type, or an attribute of it, cannot be read: write it anew as numbers"
 
 
-def _why_not(data: Any, path: Path, classes: bool) -> str:
+def _why_not(data: Any, classes: bool) -> str:
     import h5py
 
     kind = data.attrs.get("MATLAB_class", b"") if classes else b""
@@ -74,14 +79,26 @@ def _columns(data: Any, name: str) -> Iterator[Item]:
     if data.dtype.kind in "OS" and data.ndim == 1:
         yield Series(Column(name, unit), len(data), _words(data))
         return
-    odd = [one for one, count in _VALUES.items() if one in data.attrs and np.size(data.attrs[one]) != count]
-    if odd:
-        yield f"{name}: its attribute {odd[0]} has {np.size(data.attrs[odd[0]])} values, not {_VALUES[odd[0]]}"
+    if odd := next(filter(None, (_odd(data, *one) for one in _VALUES.items())), ""):
+        yield f"{name}: its attribute {odd}"
         return
     packing = _Packing.of(data) if data.dtype.kind in "iuf" else None
     yield from series_of(
         _Cached(data) if data.ndim == 2 else data, name, unit, None if packing is None else packing.unpacked
     )
+
+
+def _odd(data: Any, attribute: str, count: int) -> str:
+    """Say what is wrong with an attribute that means numbers, nothing where it is absent or well."""
+    if attribute not in data.attrs:
+        return ""
+    values = np.asarray(data.attrs[attribute])
+    if values.dtype.kind not in "iufb":
+        return f"{attribute} is no number"
+    if count and values.size != count:
+        return f"{attribute} has {values.size} values, not {count}"
+    spoiled = attribute in ("scale_factor", "add_offset") and not np.isfinite(values).all()
+    return f"{attribute} is {values.item()}" if spoiled or (attribute == "scale_factor" and not values.all()) else ""
 
 
 def _words(data: Any) -> Slice:

@@ -52,7 +52,13 @@ class TextTable:
         named = not all(map(self._is_number, cells[0])) if options.header is None else options.header
         # What is read later counts every line of the file, comments and blank ones too.
         told = named + options.units_row
-        self._first_data_row = head[told][0] if told < len(head) else head[-1][0] + 1
+        if len(head) < 2 or told >= len(head):
+            raise RecordingError(
+                f"line {head[-1][0] + 1} is the last one, and no table is there: it has a row a line, below the names",
+                where=str(path),
+                remedy="export it again; " + _NO_TEXT,
+            )
+        self._first_data_row = head[told][0]
         rows = cells[told:]
         usual = Counter(map(len, rows or cells)).most_common(1)[0][0]
         names = self._fitted(cells[0], rows) if named else [""] * usual

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from kbs_process.errors import RecordingError, did_you_mean
+from kbs_process.files import regular
 from kbs_process.recordings.mcap import framing as mcap
 from kbs_process.recordings.mcap.ahead import ahead
 from kbs_process.recordings.mcap.container import AT, SIZE, Container, Described
@@ -38,7 +39,7 @@ class Source:
         self._summary: mcap.Summary | None = None
         self._damage = ""  # of the summary
         try:
-            with path.open("rb") as file:
+            with regular(path).open("rb") as file:
                 self._open(file, path.stat().st_size)
         except OSError as error:
             raise RecordingError(f"cannot be opened: {error.strerror}", where=str(path)) from error
@@ -111,9 +112,9 @@ class Source:
         self._losses = (*container.losses, *(loss for reading in readings for loss in reading.losses()))
         self._require_topics(streams, container.dictionary)
 
-    def samples(self) -> dict[str, Sample | str]:
+    def samples(self) -> dict[str, Sample | RecordingError]:
         """Return a message of every topic that has any, or why its messages cannot be read."""
-        found: dict[str, Sample | str] = {}
+        found: dict[str, Sample | RecordingError] = {}
         tried = Counter[str]()
         wanted = {topic.topic for topic in self.topics if topic.count != 0}
         for segment in self._container().segments():
@@ -122,7 +123,7 @@ class Source:
                     places = segment.places(channel.number)[:SAMPLES]
                     rows = segment.table[AT, places], segment.table[SIZE, places]
                     for sample in _samples(channel, payloads(segment.buffer, *rows), payloads(segment.buffer, *rows)):
-                        tells = isinstance(sample, str) or sample.tells()
+                        tells = isinstance(sample, RecordingError) or sample.tells()
                         before = found.get(channel.topic)
                         if tells or before is None or (isinstance(before, Sample) and before.fault()):
                             found[channel.topic] = sample
@@ -179,12 +180,12 @@ class Source:
                 container.lose("missing", detail, count=count - found.get(number, 0))
 
 
-def _samples(channel: Described, first: Iterator[bytes], texts: Iterator[bytes]) -> Iterator[Sample | str]:
+def _samples(channel: Described, first: Iterator[bytes], texts: Iterator[bytes]) -> Iterator[Sample | RecordingError]:
     """Yield messages of a channel, whose type the `first` of them may tell, or why they cannot be read."""
     try:
         kind = type_of(channel, first, channel.topic)
     except RecordingError as error:
-        yield error.what
+        yield error
         return
     for text in texts:
         yield Sample(kind, text)

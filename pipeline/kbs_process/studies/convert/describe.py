@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,9 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
+from kbs_process.campaign.documents import quoted
 from kbs_process.recordings.open_table import open_table
 from kbs_process.recordings.tables import Cells, Column, Table
 from kbs_process.studies.convert.clock import numbers
+from kbs_process.terminal import printable
 
 
 @dataclass(slots=True)
@@ -46,9 +47,9 @@ class Range:
         elif self.low <= self.high:
             low, high = f"{self.low:.7g}", f"{self.high:.7g}"
         else:
-            low, high = self.text[:20] or "no number", ""
+            low, high = printable(self.text[:20]) or "no number", ""
         counts = f"{number:>4}  {self.rows:>9}  {self.absent:>7}"
-        return f"# {counts}  {low:>12}  {high:>12}  {self.column.unit:<8}  {self.column.name}"
+        return f"# {counts}  {low:>12}  {high:>12}  {printable(self.column.unit):<8}  {printable(self.column.name)}"
 
 
 def describe(source: Path) -> str:
@@ -61,8 +62,9 @@ def describe(source: Path) -> str:
     header = f"# {'no.':>4}  {'rows':>9}  {'no num.':>7}  {'least':>12}  {'greatest':>12}  {'unit':<8}  column"
     listing = "\n".join([header, *(entry.line(1 + index) for index, entry in enumerate(ranges))])
     told = [f"left out: {one}" for one in table.left_out] + [f"{count} {what}" for what, count in table.odd.items()]
-    notes = "".join(f"# {' '.join(one.split())}\n" for one in told)
-    return f"#:schema import.schema.json\n# Columns of {source.name}\n{listing}\n{notes}\n{_skeleton(source, ranges)}"
+    notes = "".join(f"# {printable(' '.join(one.split()))}\n" for one in told)
+    head = f"#:schema import.schema.json\n# Columns of {printable(source.name)}\n"
+    return f"{head}{listing}\n{notes}\n{_skeleton(source, ranges)}"
 
 
 def _ranges(table: Table) -> list[Range]:
@@ -82,10 +84,10 @@ def _skeleton(source: Path, ranges: Sequence[Range]) -> str:
     if clocked:
         clock = "# [time]: left out, the file has its own"
     elif time is not None:
-        clock = f'[time]\ncolumn = {_quoted(time)}\nunit = "s"'
+        clock = f'[time]\ncolumn = {quoted(time)}\nunit = "s"'
     else:
         clock = "[time]\nrate_Hz = 1000.0  # rows a second; or give column and unit"
-    example = _quoted(next((name for name in named if name != time), named[0]))
+    example = quoted(next((name for name in named if name != time), named[0]))
     return f"""schema = 1
 campaign = "campaign.toml"  # its description: copy one, such as that of campaigns/EL089, with its parameter files
 
@@ -98,12 +100,8 @@ Fx = {{ column = {example}, unit = "N", scale = 1.0 }}
 az = {{ column = "...", unit = "deg", unwrap = false }}
 
 [[recording]]
-source = {_quoted(source.name)}
+source = {quoted(source.name)}
 trajectory = "..."
 role = "fit"  # "calibration", "fit" or "held-out"
 repeat = 1
 """
-
-
-def _quoted(text: str) -> str:
-    return json.dumps(text, ensure_ascii=False)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 import shutil
 import tomllib
@@ -17,7 +16,9 @@ from kbs_process.campaign.config import Campaign
 from kbs_process.campaign.documents import Document, read, shown
 from kbs_process.campaign.load import load_campaign
 from kbs_process.campaign.locate import CAMPAIGN_FILE
-from kbs_process.errors import ConfigError, did_you_mean
+from kbs_process.campaign.writing.parameter_files import value_text
+from kbs_process.errors import ConfigError, KbsError, did_you_mean
+from kbs_process.files import regular
 from kbs_process.reduction.reading import OPTIONAL_STREAMS
 from kbs_process.studies.convert.mapping import Mapping
 
@@ -63,12 +64,16 @@ def prepare(mapping: Mapping, folder: Path) -> Campaign:
         campaign = load_campaign(folder, checksums=False)
     except ConfigError as error:
         # The user knows the template, whose lines are the same, not our private folder.
-        here, there = shown(folder), shown(mapping.template.parent)
-        raise ConfigError(
-            error.what.replace(here, there), where=error.where.replace(here, there), remedy=error.remedy
-        ) from error
+        raise _elsewhere(error, shown(folder), shown(mapping.template.parent)) from error
     _check_streams(mapping, campaign)
     return campaign
+
+
+def _elsewhere(error: KbsError, here: str, there: str) -> ConfigError:
+    """Return an error that speaks of another folder."""
+    what, where = (text.replace(here, there) for text in (error.what, error.where))
+    each = [_elsewhere(one, here, there) for one in error.each]
+    return ConfigError(what, where=where, remedy=error.remedy, each=each)
 
 
 def write_campaign(mapping: Mapping, folder: Path, checksums: MappingOf[str, str], origins: tuple[Origin, ...]) -> None:
@@ -120,14 +125,18 @@ def _copy(template: Document, name: str, folder: Path) -> None:
         )
     target.parent.mkdir(parents=True, exist_ok=True)
     try:
-        shutil.copyfile(source, target)
-    except (FileNotFoundError, IsADirectoryError) as error:
+        shutil.copyfile(regular(source), target)
+    except FileNotFoundError as error:
         beside = [path.name for path in source.parent.iterdir()] if source.parent.is_dir() else []
         raise ConfigError(
             f"the campaign's file '{name}' does not exist",
             where=shown(template.path),
             remedy=did_you_mean(source.name, beside),
         ) from error
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else error  # a name with a NUL in it
+        what = f"the campaign's file '{name}' cannot be read: {reason}"
+        raise ConfigError(what, where=shown(template.path), remedy="name a file that can be read") from error
 
 
 def _without_recordings(template: Document) -> str:
@@ -151,8 +160,8 @@ def _without_recordings(template: Document) -> str:
 
 
 def _lines(table: MappingOf[str, Any]) -> str:
-    """Return `key = value` lines. What JSON writes of texts, whole numbers and lists of texts is TOML."""
-    return "".join(f"{name} = {json.dumps(value, ensure_ascii=False)}\n" for name, value in table.items())
+    """Return `key = value` lines."""
+    return "".join(f"{name} = {value_text(value)}\n" for name, value in table.items())
 
 
 def _check_streams(mapping: Mapping, campaign: Campaign) -> None:

@@ -12,7 +12,6 @@ from kbs_process.campaign.formats.tables import (
     NUMBER,
     TEXT,
     TRUTH,
-    WHOLE,
     Count,
     LinkName,
     Name,
@@ -35,8 +34,8 @@ class TextTable(Table):
     delimiter: OneCharacter | None = Field(None, description='" ": any number of blanks')
     header: bool | None = Field(None, description="is there a line with the names of the columns?")
     units_row: bool | None = Field(None, description="is there a line with their units below it?")
-    skip_rows: Annotated[int, Field(ge=0, le=1_000_000), WHOLE] | None = Field(None, description="lines above all that")
-    rows: Annotated[int, Field(ge=1), WHOLE] | None = Field(None, description="rows that are read, of more")
+    skip_rows: Annotated[int, Field(ge=0, le=1_000_000)] | None = Field(None, description="lines above all that")
+    rows: Annotated[int, Field(ge=1)] | None = Field(None, description="rows that are read, of more")
     decimal: Literal[".", ","] | None = None
     thousands: Literal[".", ",", " ", "'"] | None = Field(None, description="what parts thousands")
     comment: Annotated[str, Field(min_length=1, max_length=20)] | None = Field(

@@ -71,7 +71,7 @@ def import_recordings(
 def _source_files(mapping: Mapping, source: Path) -> dict[str, Path]:
     """Return the source files by the names that the mapping gives them."""
     names = list(dict.fromkeys(part.source for part in mapping.parts))
-    if source.is_file():
+    if not source.is_dir() and source.exists():
         if len(names) > 1:
             raise RecordingError(
                 f"is one file, where the mapping names {len(names)}: {', '.join(names)}",
@@ -87,7 +87,7 @@ def _source_files(mapping: Mapping, source: Path) -> dict[str, Path]:
         )
     found = [path.name for path in source.iterdir() if not path.name.startswith(".")]
     for name in names:
-        if not _is_file(source / name):
+        if not _is_there(source / name):
             origin = f" (published: {mapping.source.origin})" if mapping.source.origin else ""
             raise RecordingError(
                 f"there is no '{name}', which the mapping names",
@@ -97,9 +97,9 @@ def _source_files(mapping: Mapping, source: Path) -> dict[str, Path]:
     return {name: source / name for name in names}
 
 
-def _is_file(path: Path) -> bool:
+def _is_there(path: Path) -> bool:
     try:
-        return path.is_file()
+        return path.exists()
     except OSError:  # no disk can hold a file of that name
         return False
 

@@ -35,10 +35,12 @@ class Findings:
     last: dict[str, int] = field(default_factory=dict)  # stream -> its last stamp
     rows: Counter[str] = field(default_factory=Counter)  # by stream
     repeats: Counter[str] = field(default_factory=Counter)  # stamps as the one before, by stream
+    finite: Counter[str] = field(default_factory=Counter)  # values that are numbers, by stream
 
     def check(self, key: str, block: Block) -> None:
         """Count cells without a number and stamps that do not grow."""
         self.counts[f"cells of '{key}' hold no number, kept as NaN"] += int(np.isnan(block.values).sum())
+        self.finite[key] += int(np.isfinite(block.values).sum())
         self.counts[f"values of '{key}' are infinite, kept"] += int(np.isinf(block.values).sum())
         if len(block):
             steps = np.diff(block.stamp, prepend=self.last.get(key, int(block.stamp[0]) - 1))
@@ -105,6 +107,12 @@ def read_part(table: Table, mapping: Mapping, part: Part, findings: Findings) ->
         if key in empty:
             raise RecordingError(
                 f"no sample of '{key}' for recording '{part.stem}'", where=str(table.path), remedy=_why_empty(findings)
+            )
+        if not findings.finite[key]:
+            raise RecordingError(
+                f"no number of '{key}' for recording '{part.stem}': {findings.rows[key]} rows hold something else",
+                where=str(table.path),
+                remedy="check its columns, and, of a text file, delimiter, decimal and skip_rows in [text]",
             )
 
 

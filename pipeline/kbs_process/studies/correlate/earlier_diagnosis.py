@@ -22,11 +22,11 @@ class EarlierDiagnosis:
     outdated: str  # empty: it is of the same description, parameters and recordings, and is kept
 
     @property
-    def warning(self) -> str:
+    def warning(self) -> tuple[str, str]:
         """What a user has to know before it is gone."""
         return (
-            f"warning: the diagnosis in {self.folder} {self.outdated}: it will be removed with the results of before\n"
-            "  -> to keep it, interrupt now, and name another folder with --output"
+            f"warning: the diagnosis in {self.folder} {self.outdated}: it will be removed with the results of before",
+            "  -> to keep it, interrupt now, and name another folder with --output",
         )
 
 

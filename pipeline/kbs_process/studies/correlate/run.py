@@ -8,7 +8,7 @@ from pathlib import Path
 import msgspec
 
 from kbs_process.campaign.config import Campaign
-from kbs_process.errors import FitError, RecordingError
+from kbs_process.errors import FitError, RecordingError, SimulationError
 from kbs_process.progress import Progress
 from kbs_process.reduction.analysis import Analysis, analyse
 from kbs_process.reduction.measurable import check_requirements
@@ -65,7 +65,13 @@ def _found(
     """Return what results.json holds, and what it was made from."""
     model = fit_gravity(campaign, prepared, progress)
     checked = check_model(campaign, prepared, model, progress)
-    analyses = [_analyse(campaign, one, model, progress) for one in prepared]
+    try:
+        analyses = [_analyse(campaign, one, model, progress) for one in prepared]
+    except SimulationError as error:
+        for notice in checked.notices():
+            if notice.severity == "error":  # which is why the plant has no solution
+                raise SimulationError(f"{notice.what}; {error.what}", remedy=notice.remedy) from error
+        raise
     with progress.task("Comparing, summing up uncertainties"):
         return summarise(campaign, analyses, model, decoupling, checked), analyses, model
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from kbs_process.campaign.documents import shown
 from kbs_process.errors import RecordingError
+from kbs_process.files import regular
 from kbs_process.plant.linear.modal import ModalModel
 from kbs_process.signals.records import Array
 
@@ -70,7 +71,7 @@ def read_f06(
 def _tables(path: Path) -> tuple[Array, dict[tuple[str, int], list[Array]]]:
     """Return (eigenvalue, Hz, generalised mass) of each mode, and the rows of every grid point, table by table."""
     try:
-        text = path.read_text(encoding="latin-1")
+        text = regular(path).read_text(encoding="latin-1")
     except OSError as error:
         raise RecordingError(
             f"cannot be read: {error.strerror}", where=shown(path), remedy="check the file's name and permissions"

@@ -80,7 +80,7 @@ def predict_recording(campaign: Campaign, recording: str, target: Path, *, progr
 def predict_with(model: Campaign, recording: str, target: Path, *, rate_Hz: float = 100.0, progress: Progress) -> Path:
     """Predict a recording, or commands of a CSV or Parquet file, with a model; return `target`."""
     path = Path(recording)
-    if path.suffix.lower() in TABLES and path.is_file():
+    if path.suffix.lower() in TABLES and path.exists():
         return simulate_commands(model, path, target, rate_Hz=rate_Hz, progress=progress)
     return predict_recording(model, recording, target, progress=progress)
 
@@ -136,7 +136,7 @@ def _entry(campaign: Campaign, recording: str) -> RecordingEntry:
     if recording in names:
         return campaign.recording(recording)
     path = Path(recording)
-    if path.is_file():
+    if path.exists():
         return RecordingEntry(path.stem, path.absolute(), path.stem, "held-out", 1, None, None, None)
     raise ConfigError(
         f"there is no recording '{recording}', and no such file",

@@ -102,17 +102,18 @@ def describe(campaign: Campaign, validation: Validation) -> Iterator[str]:
     for finding in findings:
         yield from (f"  {finding.name}: {in_words(loss)}" for loss in finding.losses)
         if finding.error:
-            yield f"  {finding.error}"
+            yield from f"  {finding.error}".split("\n")
     bad = sum(bool(finding.error) for finding in findings)
     lossy = sum(finding.lossy for finding in findings)
     recordings = "recording" if len(findings) == 1 else "recordings"
     yield f"{len(findings)} {recordings}: {bad} unreadable, {lossy} with losses"
     if validation.refusal:
-        yield f"cannot be processed: {validation.refusal}"
+        yield from f"cannot be processed: {validation.refusal}".split("\n")
     for notice in validation.notices:
-        yield f"{notice.severity}: {notice.what}\n  -> {notice.remedy}"
+        yield f"{notice.severity}: {notice.what}"
+        yield f"  -> {notice.remedy}"
     if hint := repeatability_hint(campaign):
-        yield f"hint: {hint}"
+        yield from f"hint: {hint}".split("\n")
 
 
 def repeatability_hint(campaign: Campaign) -> str:

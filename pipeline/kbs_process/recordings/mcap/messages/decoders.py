@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from functools import lru_cache
 from typing import Protocol
 
-from kbs_process.errors import RecordingError
+from kbs_process.errors import RecordingError, SchemaError
 from kbs_process.recordings.mcap.framing import MalformedError, Schema
 from kbs_process.recordings.mcap.kernels import Bytes, Words
 from kbs_process.recordings.mcap.messages.fields import Elements, Field, Step
@@ -34,9 +35,22 @@ class MessageType(Protocol):
 
 Factory = Callable[[Schema, Iterable[bytes]], MessageType]
 
+_TYPES = 64  # that are kept, as thousands of channels may have one
+
+
+@lru_cache(_TYPES)
+def _ros2(schema: Schema) -> MessageType:
+    return Ros2Message(schema.name, schema.data.decode())
+
+
+@lru_cache(_TYPES)
+def _protobuf(schema: Schema) -> MessageType:
+    return ProtobufMessage(schema.name, schema.data)
+
+
 FACTORIES: Mapping[tuple[str, str | None], Factory] = {  # message encoding, schema encoding
-    ("cdr", "ros2msg"): lambda schema, _: Ros2Message(schema.name, schema.data.decode()),
-    ("protobuf", "protobuf"): lambda schema, _: ProtobufMessage(schema.name, schema.data),
+    ("cdr", "ros2msg"): lambda schema, _: _ros2(schema),
+    ("protobuf", "protobuf"): lambda schema, _: _protobuf(schema),
     ("json", None): lambda _, samples: JsonMessage(samples),
 }
 
@@ -54,6 +68,4 @@ def message_type(encoding: str, schema: Schema, samples: Iterable[bytes], where:
     try:
         return factory(schema, samples)
     except (MalformedError, UnicodeDecodeError) as error:
-        raise RecordingError(
-            f"the schema of {schema.name or 'its messages'} is damaged: {error}", where=where
-        ) from error
+        raise SchemaError(f"the schema of {schema.name or 'its messages'} is damaged: {error}", where=where) from error

@@ -37,7 +37,7 @@ BUILTIN = {
 ZSTD = b"\x28\xb5\x2f\xfd"  # how its frames begin
 SEPARATOR = re.compile(r"^=+\s*$", re.MULTILINE)
 FIELD = re.compile(
-    r"(?P<base>[\w/]+)(?:<=\d+)?(?P<array>\[(?:(?P<bound><=)?(?P<size>\d*))\])?\s+(?P<name>\w+)\s*(?P<rest>.*)"
+    r"(?P<base>[\w/]+)(?:<=\d+)?(?P<array>\[(?:(?P<bound><=)?(?P<size>\d*))\])?\s+(?P<name>\w+)(?P<rest>\s*=.*|\s+.*)?"
 )
 LARGEST_EXTENT = 10_000  # scalars of one message; sequences count once
 DEPTH = 64  # of messages within messages
@@ -67,6 +67,9 @@ def parse_schema(name: str, text: str) -> tuple[str, Definitions]:
             raise MalformedError(f"a definition that begins with {head[:40]!r} instead of 'MSG: '")
         blocks[_short(head[4:].strip())] = body
     definitions = {key: _members(body, key.partition("/")[0], blocks) for key, body in blocks.items()}
+    for key, body in BUILTIN.items():  # or a stamp would be read as something else, unsaid
+        if definitions[key] != _members(body, "", {}):
+            raise MalformedError(f"{key} is not as ROS 2 defines it")
     _extent(definitions, root, {})
     return root, definitions
 
@@ -86,7 +89,7 @@ def _members(body: str, package: str, blocks: dict[str, str]) -> tuple[Member, .
         match = FIELD.fullmatch(line)
         if match is None:
             raise MalformedError(f"the definition's line {line!r} cannot be read")
-        if match["rest"].startswith("="):
+        if (match["rest"] or "").lstrip().startswith("="):
             continue  # a constant
         base = match["base"]
         if base not in PRIMITIVES and base not in ("string", "wstring"):
@@ -98,7 +101,7 @@ def _members(body: str, package: str, blocks: dict[str, str]) -> tuple[Member, .
         count = None if not match["array"] else -1 if match["bound"] or not size else int(size[-19:])
         # Elements take a byte at least, so that a payload's size bounds how often one loops over them.
         if count == 0 or len(size) > 19:
-            raise MalformedError(f"an array of {size[:19]} elements")
+            raise MalformedError(f"an array of {size[:19]}{'...' * (len(size) > 19)} elements")
         members.append(Member(match["name"], base, count))
     return tuple(members)
 
