@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -27,10 +28,10 @@ def turn(t: np.ndarray) -> np.ndarray:
     return 0.6 - 0.6 * np.cos(0.4 * t)[:, None]
 
 
-def recording(rate: float = 100.0) -> dict[str, Block]:
-    wrench = stream(truth, rate, 60.0, seed=1, latency=LATENCY)
+def recording(rate: float = 100.0, duration: float = 60.0) -> dict[str, Block]:
+    wrench = stream(truth, rate, duration, seed=1, latency=LATENCY)
     wrench.values[:] += np.random.default_rng(3).normal(0.0, NOISE, wrench.values.shape)
-    return {"wrench": wrench, "angle": stream(turn, rate, 60.0, seed=2, latency=LATENCY)}
+    return {"wrench": wrench, "angle": stream(turn, rate, duration, seed=2, latency=LATENCY)}
 
 
 def run_of(streams: dict[str, Block]) -> Run:
@@ -283,6 +284,20 @@ def test_samples_lost_of_rounded_stamps_are_gaps() -> None:
     streams["wrench"] = rows(streams["wrench"], keep)
     run = run_of(streams)
     assert sum(loss.count for loss in run.losses if loss.kind in ("gap", "short gap")) == 43
+
+
+@pytest.mark.parametrize(
+    "lost", [(1500, 5010), (1500, 5010, 9000), (900, 4000, 7100), (5000,), (3000, 3100), range(60, 12_000, 60)]
+)
+def test_rows_that_are_missing_among_stamps_of_whole_periods_are_gaps(lost: Sequence[int]) -> None:
+    streams = {key: rows(one, np.delete(np.arange(12_000), lost)) for key, one in recording(100.0, 120.0).items()}
+    for one in streams.values():
+        one.log[:] = one.stamp
+    run = run_of(streams)
+    assert run.rates == {"wrench": pytest.approx(100.0, rel=1e-9), "angle": pytest.approx(100.0, rel=1e-9)}
+    assert {loss.kind for loss in run.losses} <= {"gap", "short gap"}
+    assert sum(loss.count for loss in run.losses) == 2 * len(lost)
+    assert error(run)[0] < 4.0 * NOISE
 
 
 def test_bursts_that_were_stamped_on_arrival_are_refused_by_name() -> None:

@@ -22,7 +22,7 @@ from kbs_process.stages.align.grid import (
     nominal_grid,
     quantum,
 )
-from kbs_process.stages.align.ordering import Orderer, Reblock, finite_rows, judge
+from kbs_process.stages.align.ordering import Orderer, Reblock, concatenate, finite_rows, judge
 from kbs_process.stages.align.resample import Kept, Reducer, design
 from kbs_process.stages.align.spectrum import Welch
 from kbs_process.stages.align.spikes import Oddity, Spikes
@@ -83,6 +83,7 @@ class Timeline:
     _ready: Reblock = field(default_factory=Reblock)
     _orderer: Orderer | None = None
     _floor: LatencyFloor | None = None
+    _open: Block | None = None  # the first one, of which the next will tell whether its stamps are rounded
     _first: int = 0
     _last: int = 0
     _uneven: list[float] = field(default_factory=list)  # s, steps that are no whole number of periods
@@ -105,8 +106,9 @@ class Timeline:
             ready += self._arrived(held)
         ready += [ready for block in self._ready.flush() for ready in self._order(block)]
         last = self._orderer.flush() if self._orderer else None
-        if last is not None:
-            ready.append(self._timed(last))
+        if left := [one for one in (self._open, last) if one is not None]:
+            self._open = None
+            ready += self._timed(concatenate(left), more=False)
         if scattered := self._arrival.scattered:
             raise RecordingError(scattered, where=self.file or self.where, remedy=STAMP_EACH)
         if self.grid is not None:
@@ -143,10 +145,19 @@ class Timeline:
                 where=self.file or self.where,
                 remedy=TWO_SOURCES,
             )
-        return [] if released is None else [self._timed(released)]
+        if released is None:
+            return []
+        begun, self._open = self._open, None
+        return self._timed(
+            released if begun is None else concatenate([begun, released]), more=self._floor is None and begun is None
+        )
 
-    def _timed(self, block: Block) -> Block:
-        stamp = evened(block.stamp, block.log, known=self.rounded > 0.0)
+    def _timed(self, block: Block, *, more: bool) -> list[Block]:
+        """Give a block its times; the first waits for a second, if `more` stamps tell whether they are rounded."""
+        stamp = evened(block, known=self.rounded > 0.0, more=more)
+        if stamp is None:
+            self._open = block
+            return []
         if stamp is not block.stamp:
             self.rounded = max(self.rounded, quantum(block.stamp) * 1e-9)
             later = 0 if self._floor is None else max(self._last + 1 - int(stamp[0]), 0)
@@ -170,7 +181,7 @@ class Timeline:
                 self._uneven += [self.own_one(int(one)) for one in block.stamp[uneven][:UNEVEN]]
         self._last = int(block.stamp[-1])
         self.samples += len(block)
-        return block
+        return [block]
 
     def _find_gaps(self, stamp: Stamps, grid: Grid, held_back: int) -> None:
         """Judge steps by the stamps around them; the last `held_back` wait for those that follow."""
