@@ -338,6 +338,15 @@ def test_an_encoder_s_reading_that_is_lost_for_a_while_is_left_out() -> None:
     assert error(run)[1] < 1e-4
 
 
+def test_what_is_predicted_is_nobody_s_reading_and_is_not_refused_for_what_no_reading_does() -> None:
+    streams = recording()
+    streams["wrench"].values[::2, 1] += 40.0
+    with pytest.raises(RecordingError, match="two sources"):
+        run_of(streams)
+    predicted = condense("test", streams.items(), CHANNELS, CondenseSettings(), keep_spikes=True)
+    assert predicted.wrench is not None and np.ptp(predicted.wrench.values[500:-500, 1]) > 11.0
+
+
 @pytest.mark.parametrize("key", ["wrench", "angle"])
 @pytest.mark.parametrize("share", [0.05, 0.15, 0.5])
 def test_readings_that_are_lost_all_the_time_are_no_signal(key: str, share: float) -> None:

@@ -247,10 +247,11 @@ class Timeline:
             yield from self.spikes.push(stamp, values)
 
     def end(self) -> Iterator[tuple[Stamps, Array]]:
-        """Yield what `clean` held back; raises RecordingError where two sources bring a channel, or it steps."""
+        """Yield what `clean` held back; raises RecordingError of readings in which two sources are, or that step."""
         if self.spikes is not None:
             yield from self.spikes.flush()
-        self.check_sources()
+        if not self.keep_spikes:
+            self.check_sources()
 
     def check_sources(self) -> None:
         """Raise RecordingError where two sources bring a channel, or where it steps and stays there."""
