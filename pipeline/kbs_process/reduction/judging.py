@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import zip_longest
 
+import msgspec
 import numpy as np
 
 from kbs_process.campaign.config import Campaign, Requirement
@@ -13,7 +15,7 @@ from kbs_process.reduction.analysis import Analysis, bands_of
 from kbs_process.reduction.measurable import judged_channels
 from kbs_process.results import judged as results
 from kbs_process.signals.records import Signal
-from kbs_process.stages.bandpass import Band, crossing_rate
+from kbs_process.stages.bandpass import Band, bridging_error, crossing_rate
 from kbs_process.stages.verdict import COVERAGE, Extreme, Judgement, extremes, interval, judge, peak_coverage
 
 _NONE: Mapping[str, float] = {}
@@ -64,8 +66,14 @@ def judged(
         for entry in budgets
         if (entry.frame, entry.band) == key
     }
+    hides = {analysis.entry.name: bridging_error(analysis.run.gaps, band) for analysis in runs}
     measured = [
-        _Candidate(extreme, sigmas[extreme.recording, extreme.channel], requirement.limit, below)
+        _Candidate(
+            extreme,
+            float(np.hypot(sigmas[extreme.recording, extreme.channel], hides[extreme.recording] * extreme.value)),
+            requirement.limit,
+            below,
+        )
         for extreme in extremes([(name, pair.measured) for name, pair in pairs], channels, requirement.statistic)
     ]
     if not measured:
@@ -107,6 +115,27 @@ def judged(
         ),
         source=requirement.source,
     )
+
+
+def decided(
+    without: Sequence[results.Requirement], kept: Sequence[results.Requirement], longest: float
+) -> tuple[results.Requirement, ...]:
+    """Choose between requirements judged `without` what looks like bad readings, and with it `kept`, if that can be.
+
+    What lasts for a quarter of a band's shortest period, `longest` in s, may be what the band shows: the worse decides.
+    """
+    found = []
+    for one, other in zip_longest(without, kept):
+        if 4.0 * longest * (one.band_Hz[1] or np.inf) < 1.0:
+            found.append(one)
+        elif other is not None:
+            found.append(max(one, other, key=lambda each: SEVERITY[each.verdict]))
+        elif one.verdict == "pass":
+            doubt = f"readings off all others for {longest:.3g} s are as long as the band shows"
+            found.append(msgspec.structs.replace(one, verdict="undecided", doubt=doubt))
+        else:
+            found.append(one)
+    return tuple(found)
 
 
 def _channel(channel: str, measured: Sequence[_Candidate], predicted: Sequence[Extreme]) -> results.ChannelResult:

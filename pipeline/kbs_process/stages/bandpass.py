@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -12,6 +12,7 @@ from kbs_process.signals.records import Array, Mask, Signal
 from kbs_process.stages.lowfrequency import METHOD, high_pass, high_pass_gain
 
 ORDER = 4  # of the low-pass, run forwards and backwards
+BRIDGED = 0.125  # of the shortest period of a band: across so long a gap a line errs by 8 % of a tone of that period
 TOLERANCE = 1e-3  # an edge ends where the error is this part of the signal's rms
 NEAR = 1.0  # s on either side of invalid samples, whose means a straight line joins
 
@@ -91,6 +92,32 @@ def apply(signal: Signal, band: Band) -> Signal:
         values = _low_pass(values, band.low_pass_Hz, signal.dt)
         valid = _known(valid, band.low_pass_Hz, signal.dt)
     return signal.derive(values, _step(band), valid=valid)
+
+
+def too_long(gaps: Array, band: Band) -> Array:
+    """Return those of gaps (k, 2), s from when to when, in which a band's signal is not known."""
+    return gaps[np.diff(gaps)[:, 0] > BRIDGED / (band.low_pass_Hz or np.inf)]
+
+
+def bridged(signal: Signal, gaps: Array, band: Band) -> Signal:
+    """Take samples in gaps (k, 2), s, that are short in a band as they were interpolated; those at the ends are not."""
+    valid = signal.valid.copy()
+    edges = np.flatnonzero(np.diff(np.concatenate(([True], valid, [True])).astype(np.int8))).reshape(-1, 2)
+    for start, stop in edges[(edges[:, 0] > 0) & (edges[:, 1] < len(valid))]:
+        after, before = (signal.t0 + signal.dt * place for place in (start - 1, stop))
+        within = gaps[(gaps[:, 0] < before) & (gaps[:, 1] > after)]
+        valid[start:stop] = len(within) > 0 and len(too_long(within, band)) == 0
+    return replace(signal, valid=valid)
+
+
+def bridging_error(gaps: Array, band: Band) -> float:
+    """Return by how much of a band's largest tone its short gaps (k, 2), s, may let it err, most of them alone.
+
+    A line across T is (2 pi f T)^2 / 8 off a tone at its crest, of which as much is in the band as T is of half its
+    shortest period.
+    """
+    lengths = np.setdiff1d(np.diff(gaps), np.diff(too_long(gaps, band))) * (band.low_pass_Hz or 0.0)
+    return float(np.max((2.0 * np.pi * lengths) ** 2 / 8.0 * 2.0 * lengths, initial=0.0))
 
 
 def _bridged(values: Array, valid: Mask, dt: float) -> Array:

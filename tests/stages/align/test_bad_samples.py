@@ -300,6 +300,20 @@ def test_rows_that_are_missing_among_stamps_of_whole_periods_are_gaps(lost: Sequ
     assert error(run)[0] < 4.0 * NOISE
 
 
+def test_when_samples_were_made_up_is_known() -> None:
+    streams = recording()
+    lost = [2000, *range(3000, 3050)]
+    streams["wrench"] = rows(streams["wrench"], np.delete(np.arange(6000), lost))
+    streams["angle"].values[4000:4010] = np.nan
+    run = run_of(streams)
+    expected = [(19.99, 20.01), (29.99, 30.5), (39.99, 40.1)]
+    assert run.gaps == pytest.approx(np.array(expected), abs=2e-3)
+    streams = recording(5.0)
+    streams["wrench"].values[150:153, 0] += 10.0
+    run = run_of(streams)
+    assert [loss.count for loss in told(run, "spike")] == [1] and run.longest_spike == pytest.approx(0.6)
+
+
 def test_bursts_that_were_stamped_on_arrival_are_refused_by_name() -> None:
     streams = recording()
     k = np.arange(6000)

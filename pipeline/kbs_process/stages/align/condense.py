@@ -148,6 +148,8 @@ def condense(
         clocks=clocks,
         pointing=signals.get("pointing"),
         effort=signals.get("effort"),
+        longest_spike=max(sampled[key].line.longest_spike for key in kept if key != "pointing"),
+        gaps=np.concatenate([_on_axis(sampled[key].gaps(), clocks[key]) for key in kept if key != "pointing"]),
     )
 
 

@@ -14,6 +14,7 @@ from kbs_process.stages.align.clocks import ClockData, FloorStep, LatencyFloor
 from kbs_process.stages.align.envelope import MinMax
 from kbs_process.stages.align.grid import (
     AROUND,
+    GAP,
     Grid,
     Regridder,
     counted,
@@ -294,6 +295,12 @@ class Timeline:
         return block.stamp[good], block.values[good]
 
     @property
+    def longest_spike(self) -> float:
+        """How long the longest of the bad readings lasts, s."""
+        found = self.spikes.spikes if self.spikes else []
+        return max((1e-9 * (one.last - one.first) + self._period / GAP for one in found), default=0.0)
+
+    @property
     def non_finite_channels(self) -> str:
         """In which channels how many samples are NaN or infinite: "Fz in 2000, Tx in 3"."""
         return ", ".join(
@@ -333,7 +340,7 @@ class Timeline:
 
     @property
     def _period(self) -> float:
-        return 1.5e-9 * self.grid.period_ns if self.grid is not None else 0.0
+        return GAP * 1e-9 * self.grid.period_ns if self.grid is not None else 0.0
 
     def clock(self) -> ClockData:
         """What the stream tells about its clock."""
@@ -495,6 +502,8 @@ class Uniform:
         self._reduce: Reducer | None = None
         self._own: list[Array] = []
         self._values: list[Array] = []
+        self._made_up: list[Stamps] = []  # rows of the grid
+        self._rows = 0
 
     def push(self, chunk: Block) -> None:
         for block in self.line.push(chunk):
@@ -515,6 +524,13 @@ class Uniform:
     def samples(self) -> tuple[Array, Array] | None:
         """Return times (n,) and values (n, c) of a stream slow enough to be kept."""
         return (np.concatenate(self._own), np.concatenate(self._values)) if self._own else None
+
+    def gaps(self) -> Array:
+        """Return from when to when samples are made up (k, 2), s from the stream's first: the samples beside them."""
+        at = np.concatenate([np.zeros(0), *self._made_up])
+        pieces = np.split(at, 1 + np.flatnonzero(np.diff(at) > 1.0))
+        period = 1e-9 * self.line.grid.period_ns if self.line.grid is not None else 0.0
+        return np.array([(piece[0] - 1.0, piece[-1] + 1.0) for piece in pieces if len(piece)]).reshape(-1, 2) * period
 
     def _take(self, block: Block) -> None:
         grid = self.line.grid
@@ -543,6 +559,9 @@ class Uniform:
     def _pass_on(self, rows: Array, invented: Mask | None) -> None:
         assert self._reduce is not None
         self._reduce.push(rows, invented)
+        if invented is not None:
+            self._made_up.append(self._rows + np.flatnonzero(invented))
+        self._rows += len(rows)
         if self.welch is not None:
             self.welch.push(rows, invented)
         if self.envelope is not None:
