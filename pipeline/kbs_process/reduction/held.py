@@ -122,12 +122,12 @@ class _Stream:
 
     def _held(self, column: int, x: Array, least: int) -> Mask:
         """(n,) where a channel holds what it reads."""
-        size = np.abs(np.diff(x))
+        size = np.abs(np.diff(x[np.isfinite(x)]))
         step = min(self.step.get(column, np.inf), float(size[size > 0.0].min(initial=np.inf)))
         held = _same(x, least)
         if np.isfinite(step):
             self.step[column] = step
-            free = x[~held]
+            free = x[~held & np.isfinite(x)]
             noise = self.noise[column]
             if held.any() and len(free) >= FREE:
                 own = 1.4826 * float(np.median(np.abs(np.diff(free, n=3)))) / np.sqrt(20.0)
