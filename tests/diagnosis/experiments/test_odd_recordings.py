@@ -364,6 +364,11 @@ def test_a_copy_is_told_and_repeats_nothing() -> None:
     first, second = recording("a", 0.0).run, recording("b", 0.3).run
     runs = [first, second, replace(first, name="c")]
     assert copies(runs) == {2: 0}
+    assert first.wrench is not None
+    values = first.wrench.values[:-100].copy()
+    values[-20:] += 1e-3  # where the recording goes on, and its part does not
+    part = replace(first, wrench=replace(first.wrench, values=values, valid=first.wrench.valid[:-100]))
+    assert copies([first, second, part]) == {2: 0}
     prepared = [
         Prepared(replace(ENTRY, path=Path(f"recordings/{run.name}.mcap"), name=run.name), run.loads, run, None)  # type: ignore[arg-type]
         for run in runs
