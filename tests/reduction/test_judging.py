@@ -25,7 +25,8 @@ def recorded(name: str, peak: float, gaps: Sequence[tuple[float, float]] = ()) -
     valid = np.ones(100, dtype=bool)
     signal = Signal(0.0, 0.05, values, WRENCH_CHANNELS, WRENCH_UNITS, "S", valid)
     run = SimpleNamespace(gaps=np.array(gaps).reshape(-1, 2))
-    return SimpleNamespace(entry=SimpleNamespace(name=name), pairs={("S", "lt1Hz"): Pair(signal, None)}, run=run)
+    pairs = {("S", "lt1Hz"): Pair(signal, None)}
+    return SimpleNamespace(entry=SimpleNamespace(name=name), pairs=pairs, run=run, residual=signal)
 
 
 def stated(name: str, sigma: float) -> list[Budget]:
@@ -92,3 +93,22 @@ def test_what_lasts_as_long_as_the_band_shows_is_judged_as_it_was_read() -> None
     assert decided([broken], [met], longest=0.6) == (broken,)
     (left,) = decided([met], (), longest=0.6)
     assert left.verdict == "undecided" and "0.6 s" in left.doubt
+
+
+@pytest.mark.parametrize(("at", "told"), [(95, True), (60, True), (30, False)])
+def test_what_was_recorded_next_to_an_end_or_a_gap_forbids_met_and_is_in_no_figure(at: int, told: bool) -> None:
+    """Of five seconds the first ones are known; at 1.5 s there is nothing, and beside it the band is not known."""
+    campaign = archived.campaign("EL089")
+    one = recorded("a", 0.01)
+    signal = one.pairs["S", "lt1Hz"].measured
+    signal.values[at, 4] = 0.2
+    recorded_at = np.ones(100, dtype=bool)
+    recorded_at[[*range(25, 35), *range(90, 100)]] = False
+    known = np.arange(100) < 20
+    known[40:55] = True
+    one.pairs["S", "lt1Hz"] = Pair(replace(signal, valid=known), None)
+    one.residual = replace(signal, valid=recorded_at)
+    found = judged(campaign, campaign.requirements[0], [one], stated("a", 1e-4))
+    assert found.value == 0.01
+    assert found.verdict == ("undecided" if told else "pass")
+    assert not told or f"Ty of a is about 0.2000 N m at {0.05 * at:.2f} s" in found.doubt

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import zip_longest
 
 import msgspec
@@ -14,7 +14,9 @@ from kbs_process.errors import ConfigError
 from kbs_process.reduction.analysis import Analysis, bands_of
 from kbs_process.reduction.measurable import judged_channels
 from kbs_process.results import judged as results
+from kbs_process.results.judged import Doubt
 from kbs_process.signals.records import Signal
+from kbs_process.stages import bandpass
 from kbs_process.stages.bandpass import Band, bridging_error, crossing_rate
 from kbs_process.stages.verdict import COVERAGE, Extreme, Judgement, extremes, interval, judge, peak_coverage
 
@@ -49,7 +51,7 @@ def judged(
     requirement: Requirement,
     runs: Sequence[Analysis],
     budgets: Sequence[results.Budget],
-    doubts: Sequence[results.Doubt] = (),
+    doubts: Sequence[Doubt] = (),
     rounding: Mapping[str, float] = _NONE,
 ) -> results.Requirement:
     """Judge a requirement by the channel and recording that are closest to failing it, if no doubt forbids it.
@@ -87,6 +89,14 @@ def judged(
         [(name, pair.predicted) for name, pair in pairs if pair.predicted is not None], channels, requirement.statistic
     )
     worst = max(measured, key=_Candidate.severity)
+    beside = [
+        _Candidate(extreme, sigmas[extreme.recording, extreme.channel], requirement.limit, below)
+        for extreme in extremes(
+            [(one.entry.name, _beside(one, one.pairs[key].measured)) for one in runs], channels, requirement.statistic
+        )
+        if requirement.statistic == "peak" and (extreme.recording, extreme.channel) in sigmas
+    ]
+    doubts = (*doubts, *(_unsure(one, requirement.unit) for one in beside if one.verdict != "pass"))
     doubt = next((one.why for one in doubts if one.of_failed or worst.verdict != "fail"), "")
     return results.Requirement(
         name=requirement.name,
@@ -115,6 +125,22 @@ def judged(
         ),
         source=requirement.source,
     )
+
+
+def _beside(analysis: Analysis, measured: Signal) -> Signal:
+    """A band's signal where it was recorded and leans on what was not: beside gaps, and at the ends."""
+    there = analysis.residual.valid.copy()
+    short = round(bandpass.NEAR / measured.dt)
+    there[:short] |= there[:short].any()
+    there[-short:] |= there[-short:].any()
+    return replace(measured, valid=there & ~measured.valid)
+
+
+def _unsure(one: _Candidate, unit: str) -> Doubt:
+    """What was recorded beside a gap or at an end, and may be beyond the limit."""
+    at = one.extreme
+    where = f"{at.channel} of {at.recording} is about {at.value:.4f} {unit} at {at.time_s or 0.0:.2f} s"
+    return Doubt(f"{where}, next to a gap or an end: the band's filter would need what lies beyond", of_failed=False)
 
 
 def decided(
