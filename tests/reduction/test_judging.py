@@ -95,7 +95,7 @@ def test_what_lasts_as_long_as_the_band_shows_is_judged_as_it_was_read() -> None
     assert left.verdict == "undecided" and "0.6 s" in left.doubt
 
 
-@pytest.mark.parametrize(("at", "told"), [(95, True), (60, True), (30, False)])
+@pytest.mark.parametrize(("at", "told"), [(92, True), (60, True), (30, False), (99, False)])
 def test_what_was_recorded_next_to_an_end_or_a_gap_forbids_met_and_is_in_no_figure(at: int, told: bool) -> None:
     """Of five seconds the first ones are known; at 1.5 s there is nothing, and beside it the band is not known."""
     campaign = archived.campaign("EL089")

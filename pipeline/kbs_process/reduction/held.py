@@ -133,7 +133,7 @@ class _Stream:
                 own = 1.4826 * float(np.median(np.abs(np.diff(free, n=3)))) / np.sqrt(20.0)
                 noise = min(noise, float(np.sqrt(max(own**2 - step**2 / 12.0, 0.0))))
             if held.any():
-                chance = erf(step / (np.sqrt(8.0) * max(noise, 0.5 * step)))
+                chance = max(erf(step / (np.sqrt(8.0) * max(noise, 0.5 * step))), CHANCE)
                 held = _same(x, max(least, 1 + int(np.ceil(np.log(CHANCE) / np.log(chance)))))
                 held &= noise >= 0.5 * step
         return held

@@ -21,6 +21,7 @@ from kbs_process.stages.bandpass import Band, bridging_error, crossing_rate
 from kbs_process.stages.verdict import COVERAGE, Extreme, Judgement, extremes, interval, judge, peak_coverage
 
 _NONE: Mapping[str, float] = {}
+MOSTLY = 0.25  # of a band's filter may lean on what is not known, where a value still tells that something was there
 SEVERITY: dict[Judgement, int] = {"pass": 0, "undecided": 1, "fail": 2}
 
 
@@ -92,7 +93,9 @@ def judged(
     beside = [
         _Candidate(extreme, sigmas[extreme.recording, extreme.channel], requirement.limit, below)
         for extreme in extremes(
-            [(one.entry.name, _beside(one, one.pairs[key].measured)) for one in runs], channels, requirement.statistic
+            [(one.entry.name, _beside(one, one.pairs[key].measured, band)) for one in runs],
+            channels,
+            requirement.statistic,
         )
         if requirement.statistic == "peak" and (extreme.recording, extreme.channel) in sigmas
     ]
@@ -127,13 +130,15 @@ def judged(
     )
 
 
-def _beside(analysis: Analysis, measured: Signal) -> Signal:
+def _beside(analysis: Analysis, measured: Signal, band: Band) -> Signal:
     """A band's signal where it was recorded and leans on what was not: beside gaps, and at the ends."""
     there = analysis.residual.valid.copy()
     short = round(bandpass.NEAR / measured.dt)
     there[:short] |= there[:short].any()
     there[-short:] |= there[-short:].any()
-    return replace(measured, valid=there & ~measured.valid)
+    edge = band.low_pass_Hz
+    mostly = there if edge is None else there & bandpass.known_within(there, edge, measured.dt, MOSTLY)
+    return replace(measured, valid=mostly & ~measured.valid)
 
 
 def _unsure(one: _Candidate, unit: str) -> Doubt:

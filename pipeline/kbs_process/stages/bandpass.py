@@ -90,7 +90,7 @@ def apply(signal: Signal, band: Band) -> Signal:
         values = high_pass(values, band.high_pass_Hz, signal.dt)
     if band.low_pass_Hz is not None:
         values = _low_pass(values, band.low_pass_Hz, signal.dt)
-        valid = _known(valid, band.low_pass_Hz, signal.dt)
+        valid = known_within(valid, band.low_pass_Hz, signal.dt)
     return signal.derive(values, _step(band), valid=valid)
 
 
@@ -168,8 +168,8 @@ def _low_pass_kernel(f1: float, dt: float) -> Array:
     return h[cut : len(h) - cut]
 
 
-def _known(valid: Mask, f1: float, dt: float) -> Mask:
-    """Flag samples in which invalid ones, and those beyond the ends, weigh more than `TOLERANCE`."""
+def known_within(valid: Mask, f1: float, dt: float, tolerance: float = TOLERANCE) -> Mask:
+    """Flag samples in which invalid ones, and those beyond the ends, weigh more than `tolerance`."""
     h = np.abs(_low_pass_kernel(f1, dt))
     beyond = np.cumsum(h)[: len(h) // 2][::-1][: len(valid)]  # weight of what lies before sample 0, 1, ...
     doubt = np.zeros(len(valid))
@@ -177,7 +177,7 @@ def _known(valid: Mask, f1: float, dt: float) -> Mask:
     doubt[len(valid) - len(beyond) :] += beyond[::-1]
     if not valid.all():
         doubt += fftconvolve((~valid).astype(np.float64), h)[len(h) // 2 :][: len(valid)]
-    known: Mask = doubt <= TOLERANCE
+    known: Mask = doubt <= tolerance
     return known
 
 
@@ -213,7 +213,7 @@ def statement(band: Band, dt: float, n: int) -> BandStatement:
     edge = at[min(over[-1] + 1, len(at) - 1)] * dt if len(over) else 0.0
     flagged = 0.0
     if band.low_pass_Hz is not None:
-        known = _known(np.ones(n, dtype=np.bool_), band.low_pass_Hz, dt)
+        known = known_within(np.ones(n, dtype=np.bool_), band.low_pass_Hz, dt)
         flagged = float(np.argmax(known)) if known.any() else float(n)
     valid = at >= min(flagged, float(at[-1]))
     return BandStatement(
