@@ -270,6 +270,15 @@ def test_stamps_rounded_to_a_period_hide_a_regular_rate_and_lose_nothing(rate: f
     assert error(run)[0] < 4.0 * NOISE and error(run)[1] < 1e-3
 
 
+def test_log_times_that_are_the_rounded_stamps_tell_of_no_clock() -> None:
+    streams = recording(99.97, 120.0)
+    for one in streams.values():
+        one.stamp[:] = EPOCH + 10_000_000 * np.rint((one.stamp - EPOCH) / 1e7).astype(np.int64)
+        one.log[:] = one.stamp
+    run = run_of(streams)
+    assert told(run, "rounded stamps") and not told(run, "clock")
+
+
 def test_stamps_that_are_regular_as_they_are_were_not_rounded() -> None:
     for rate in (20.0, 50.0, 1000.0):
         streams = recording(rate)

@@ -162,7 +162,9 @@ class Timeline:
         if stamp is not block.stamp:
             self.rounded = max(self.rounded, quantum(block.stamp) * 1e-9)
             later = 0 if self._floor is None else max(self._last + 1 - int(stamp[0]), 0)
-            block = Block(stamp + later, block.log, block.values)
+            own = np.array_equal(np.diff(block.log), np.diff(block.stamp))  # stamps as log times, rounded likewise
+            stamp = stamp + later
+            block = Block(stamp, stamp + (block.log[0] - block.stamp[0]) if own else block.log, block.values)
         if self._floor is None:
             self._floor = LatencyFloor(int(block.stamp[0]), int(block.log[0]))
             self._first = self._last = int(block.stamp[0])
