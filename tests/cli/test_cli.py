@@ -270,7 +270,7 @@ def test_validate_tells_a_recording_of_which_nothing_is_whole_long_enough(
     out = capsys.readouterr().out
     assert "EL089P00_2: wrench (Fz in 1000: interpolated)" in out
     assert "EL089P00_2: too short or too damaged" in out
-    assert "wrench and angles are whole for 0 s of 20 s" in out
+    assert "wrench and angles are whole for 0 s of 20 s, by 1000 x non-finite" in out
 
 
 @pytest.mark.slow

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -10,7 +11,7 @@ import pytest
 
 import archived
 from kbs_process.reduction.analysis import Pair
-from kbs_process.reduction.judging import coverage_below, judged
+from kbs_process.reduction.judging import coverage_below, decided, judged
 from kbs_process.results.judged import Budget, Doubt, Requirement
 from kbs_process.signals.records import WRENCH_CHANNELS, WRENCH_UNITS, Signal
 from kbs_process.stages.bandpass import Band
@@ -18,12 +19,14 @@ from kbs_process.stages.bandpass import Band
 BAND = Band("lt1Hz", 0.01, 1.0)
 
 
-def recorded(name: str, peak: float) -> SimpleNamespace:
+def recorded(name: str, peak: float, gaps: Sequence[tuple[float, float]] = ()) -> SimpleNamespace:
     values = np.zeros((100, 6))
     values[40, 4] = -peak
     valid = np.ones(100, dtype=bool)
     signal = Signal(0.0, 0.05, values, WRENCH_CHANNELS, WRENCH_UNITS, "S", valid)
-    return SimpleNamespace(entry=SimpleNamespace(name=name), pairs={("S", "lt1Hz"): Pair(signal, None)})
+    run = SimpleNamespace(gaps=np.array(gaps).reshape(-1, 2))
+    pairs = {("S", "lt1Hz"): Pair(signal, None)}
+    return SimpleNamespace(entry=SimpleNamespace(name=name), pairs=pairs, run=run, residual=signal)
 
 
 def stated(name: str, sigma: float) -> list[Budget]:
@@ -70,3 +73,42 @@ def test_a_doubt_forbids_met_and_may_forbid_not_met() -> None:
     assert (found.verdict, found.doubt) == ("undecided", "so")
     assert verdict(*large, (Doubt("so", of_failed=False),)).verdict == "fail"
     assert verdict(*large, (Doubt("so"),)).verdict == "undecided"
+
+
+def test_short_gaps_widen_the_interval_of_their_recording_by_what_a_line_may_err() -> None:
+    campaign = archived.campaign("EL089")
+    plain, wide = (
+        judged(campaign, campaign.requirements[0], [recorded("a", 0.05, gaps)], stated("a", 1e-4))
+        for gaps in ((), [(1.0, 1.1), (3.0, 5.0)])
+    )
+    assert plain.value == wide.value
+    error = (2.0 * np.pi * 0.1) ** 2 / 8.0 * 0.2
+    assert plain.sigma == pytest.approx(1e-4) and wide.sigma == pytest.approx(np.hypot(1e-4, error * 0.05))
+
+
+def test_what_lasts_as_long_as_the_band_shows_is_judged_as_it_was_read() -> None:
+    met, broken = verdict((0.02, 0.001), (0.02, 0.001)), verdict((0.08, 0.001), (0.02, 0.001))
+    assert decided([met], [broken], longest=0.03) == (met,)  # three samples at 100 Hz, of a band up to 1 Hz
+    assert decided([met], [broken], longest=0.6) == (broken,)  # at 5 Hz
+    assert decided([broken], [met], longest=0.6) == (broken,)
+    (left,) = decided([met], (), longest=0.6)
+    assert left.verdict == "undecided" and "0.6 s" in left.doubt
+
+
+@pytest.mark.parametrize(("at", "told"), [(92, True), (60, True), (30, False), (99, False)])
+def test_what_was_recorded_next_to_an_end_or_a_gap_forbids_met_and_is_in_no_figure(at: int, told: bool) -> None:
+    """Of five seconds the first ones are known; at 1.5 s there is nothing, and beside it the band is not known."""
+    campaign = archived.campaign("EL089")
+    one = recorded("a", 0.01)
+    signal = one.pairs["S", "lt1Hz"].measured
+    signal.values[at, 4] = 0.2
+    recorded_at = np.ones(100, dtype=bool)
+    recorded_at[[*range(25, 35), *range(90, 100)]] = False
+    known = np.arange(100) < 20
+    known[40:55] = True
+    one.pairs["S", "lt1Hz"] = Pair(replace(signal, valid=known), None)
+    one.residual = replace(signal, valid=recorded_at)
+    found = judged(campaign, campaign.requirements[0], [one], stated("a", 1e-4))
+    assert found.value == 0.01
+    assert found.verdict == ("undecided" if told else "pass")
+    assert not told or f"Ty of a is about 0.2000 N m at {0.05 * at:.2f} s" in found.doubt

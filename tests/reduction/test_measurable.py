@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
-from kbs_process.reduction.measurable import amplified, attenuated
+import archived
+from kbs_process.reduction.measurable import amplified, attenuated, hidden
 from kbs_process.rig.model import Amplifier, Quantity
-from kbs_process.signals.records import Block
+from kbs_process.signals.records import WRENCH_CHANNELS, WRENCH_UNITS, Block, Signal
 from kbs_process.stages.align.readings import Readings
 
 NEEDED = 2.5  # Hz: a band up to 1 Hz
@@ -85,3 +88,24 @@ def test_an_amplifier_that_takes_much_off_forbids_a_verdict():
 def test_a_resonance_next_to_a_band_forbids_a_verdict():
     assert not list(amplified([6.0, 10.0], 1.0)) and not list(amplified([], 1.0))
     assert len(list(amplified([6.0, 10.0], 5.0))) == 1
+
+
+def doubts(gaps: list[tuple[float, float]], known: slice = slice(20, -20)) -> list[str]:
+    """Why EL089's requirement, up to 1 Hz, is not judged by two minutes with gaps, s, known in a slice of them."""
+    campaign = archived.campaign("EL089", recordings=False)
+    valid = np.zeros(2400, dtype=bool)
+    valid[known] = True
+    values = noise(2400)
+    loads = Signal(0.0, 0.05, values, WRENCH_CHANNELS, WRENCH_UNITS, "T", valid)
+    run = SimpleNamespace(loads=loads, gaps=np.array(gaps).reshape(-1, 2), losses=())
+    return [one.why for one in hidden(campaign, campaign.requirements[0], "test", run, valid, {}) if not one.of_failed]
+
+
+def test_what_a_gap_may_hide_is_not_judged_and_a_few_lost_samples_are():
+    assert doubts([]) == [] and doubts([(20.0, 20.02), (80.0, 80.12)]) == []
+    assert doubts([(0.0, 0.5), (119.5, 119.9)]) == []  # before what is known, and after
+    (why,) = doubts([(20.0, 20.02), (60.0, 60.2), (70.0, 72.0)])
+    assert why.startswith("wrench or angles are missing in test, from 70.00 s to 72.00 s at the longest")
+    assert len(doubts([(60.0, 60.2)])) == 1
+    (why,) = doubts([], slice(20, 1440))
+    assert why == "in 41 % of test wrench or angles are missing"

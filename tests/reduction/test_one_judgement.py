@@ -13,8 +13,11 @@ from end_to_end.damage import alter, with_earlier_stamp, with_last_number
 from end_to_end.short_campaign import record
 from kbs_process.campaign.load import load_campaign
 from kbs_process.errors import RecordingError
+from kbs_process.progress import SilentProgress
 from kbs_process.reduction.inspection import inspect_recording
 from kbs_process.reduction.reading import read_run
+from kbs_process.studies.correlate.run import process
+from kbs_process.studies.validate.run import describe, validate
 
 NAME = "EL089P00_1"
 TOPICS = {"wrench": "/transducer/wrench", "angle": "/encoder"}
@@ -65,3 +68,24 @@ def test_one_judgement(folder: CampaignFolder, fault: str) -> None:
     losses = read_run(campaign, campaign.recording(NAME)).losses
     assert {(loss.kind, loss.count) for loss in losses} == inspected
     assert kind in {loss.kind for loss in losses} or not kind
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("good", [lambda k: k * k % 23 < 4, lambda k: k % 50 < 10], ids=["scattered", "ten in a row"])
+def test_a_refusal_names_what_most_of_the_recording_was_lost_by_as_its_inspection_does(
+    folder: CampaignFolder, good: Callable[[int], bool]
+) -> None:
+    """Nanoseconds that are none in most messages."""
+    rig = load_campaign(folder.path, checksums=False).rig
+    for number, path in enumerate(sorted((folder.path / "recordings").iterdir())):
+        record(path, noise=0.002, seed=number, rig=rig)
+    bad = folder.path / "recordings" / f"{NAME}.mcap"
+    alter(bad, TOPICS["wrench"], lambda t, p: p if good(round(100 * t)) else p[:8] + b"\xff" * 4 + p[12:])
+    campaign = load_campaign(folder.path, checksums=False)
+    first = next(loss for loss in inspect_recording(bad).losses if loss.real)
+    assert first.kind == "no valid stamp" and first.count > 1000
+    with pytest.raises(RecordingError) as error:
+        process(campaign, folder.path / "results", progress=SilentProgress(), page=False)
+    assert f"{first.count} x no valid stamp" in str(error.value) and first.detail in str(error.value)
+    told = "\n".join(describe(campaign, validate(campaign, SilentProgress())))
+    assert str(error.value) in told

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from kbs_process.campaign.config import Campaign
 from kbs_process.reduction.soundness import repeated
+from kbs_process.signals.records import Signal
 from reduction.arm import checked, described, drawn, recorded
 
 UNIT = np.eye(6)
@@ -54,6 +57,16 @@ def test_a_channel_that_repeats_another_is_told(tmp_path):
     recordings = recorded(campaign, drawn(campaign, 1), 1, reads=doubled)
     assert "Fz repeats Fx in sweep: one stream is read twice" in list(repeated(recordings))
     assert not list(repeated(recorded(campaign, drawn(campaign, 1), 1)))
+
+
+def test_an_encoder_that_is_wired_to_two_joints_is_told():
+    az = 0.3 * np.sin(np.arange(2000) * 0.01) + 1e-6 * np.random.default_rng(1).standard_normal(2000)
+    for el, told in ((az, 1), (0.7 - az, 1), (az + 1e-6 * np.random.default_rng(2).standard_normal(2000), 0)):
+        angle = Signal(0.0, 0.05, np.column_stack((az, el)), ("az", "el"), ("rad",) * 2, "joint", np.ones(2000, bool))
+        one = SimpleNamespace(entry=SimpleNamespace(name="test"), raw=None, run=SimpleNamespace(angle=angle))
+        assert list(repeated([one])) == told * ["el repeats az in test: one stream is read twice"]
+        still = replace(angle, values=np.ones((2000, 2)))
+        assert not list(repeated([SimpleNamespace(**{**vars(one), "run": SimpleNamespace(angle=still)})]))
 
 
 def share(campaign: Campaign, seeds: range) -> float:

@@ -9,7 +9,7 @@ from scipy.signal import butter, sosfiltfilt
 
 from kbs_process.signals.records import Signal
 from kbs_process.stages.align.resample import resample
-from kbs_process.stages.bandpass import UNFILTERED, Band, apply, gain, statement
+from kbs_process.stages.bandpass import UNFILTERED, Band, apply, bridged, bridging_error, gain, statement
 from kbs_process.stages.lowfrequency import high_pass
 
 DT = 0.05
@@ -157,3 +157,28 @@ def test_what_was_invented_in_a_gap_leaks_nowhere():
     np.testing.assert_allclose(y.values[y.valid], clean.values[clean.valid], atol=1e-9)
     whole = apply(signal(x), BELOW_1)
     assert np.abs(y.values - whole.values)[y.valid].max() < 0.3 * whole.values.std()
+
+
+def test_a_line_across_a_gap_that_is_short_in_the_band_is_what_was_there() -> None:
+    """A sample in 50 ms is lost each 10 s, two seconds once; flags are as wide as the filter to this rate reaches."""
+    t = DT * np.arange(2400)
+    x = np.column_stack((np.sin(2.0 * np.pi * 0.4 * t), np.cos(2.0 * np.pi * 0.9 * t)))
+    lost, valid = x.copy(), np.ones(2400, dtype=bool)
+    gaps = np.array([*((at - DT, at + DT) for at in np.arange(10.0, 110.0, 10.0)), (73.0, 75.0)])
+    for start, end in gaps:
+        inside = (t > start + 1e-9) & (t < end - 1e-9)
+        lost[inside] = np.column_stack([np.interp(t[inside], t[~inside], column[~inside]) for column in x.T])
+        valid[(t > start - 0.7) & (t < end + 0.7)] = False
+    valid[[0, -1]] = False
+    known = bridged(signal(lost, valid), gaps, BELOW_1)
+    unknown = (t > 73.0 - 0.7) & (t < 75.0 + 0.7)
+    unknown[[0, -1]] = True
+    assert np.array_equal(known.valid, ~unknown)
+    assert np.array_equal(bridged(signal(lost, valid), gaps, UNFILTERED).valid, valid)
+    short = (t < 60.0)[:, None]
+    filtered, truth = (
+        apply(signal(np.where(short, lost, x), known.valid | ~short[:, 0]), BELOW_1),
+        apply(signal(x), BELOW_1),
+    )
+    assert filtered.valid[100:-100].all()
+    assert np.abs(filtered.values - truth.values)[100:-100].max() < 1.5 * bridging_error(gaps, BELOW_1) < 0.015

@@ -88,7 +88,7 @@ def analyse(
         misfits=misfits(sample, model, taring, _cords(campaign, entry, wrench, motion)),
         residual=residual,
         predicted=predicted,
-        pairs=_pairs(campaign, residual, disturbance),
+        pairs=_pairs(campaign, residual, disturbance, run.gaps),
     )
 
 
@@ -121,11 +121,13 @@ def _predict(
     return predicted, select(left, _loads(run).channels)
 
 
-def _pairs(campaign: Campaign, residual: Signal, disturbance: Signal | None) -> dict[tuple[str, str], Pair]:
+def _pairs(
+    campaign: Campaign, residual: Signal, disturbance: Signal | None, gaps: Array
+) -> dict[tuple[str, str], Pair]:
     spacecraft = campaign.rig.spacecraft
     pairs = {}
     for band in bands_of(campaign.bands):
-        measured = bandpass.apply(residual, band)
+        measured = bandpass.apply(bandpass.bridged(residual, gaps, band), band)
         predicted = None if disturbance is None else bandpass.apply(disturbance, band)
         pairs[campaign.rig.frame, band.name] = Pair(measured, predicted)
         if spacecraft is not None and set(WRENCH_CHANNELS) <= set(measured.channels):

@@ -1,13 +1,16 @@
 """Readings that a transducer's channel holds although it has noise: saturated, cut off or dead.
 
-They are left out as if they were missing. A joint's effort may be what was commanded, or zero behind a brake, and is
-not looked at.
+A channel holds a reading for longer than half a second, and than chance would have it: readings with noise sigma in
+steps of D are the same with a probability of up to erf(D / (sqrt(8) sigma)). Where the noise is less than half a step,
+as stated or as readings around show, they are coarse, and none is held. What is held is left out as if it were missing.
+A joint's effort may be what was commanded, or zero behind a brake, and is not looked at.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from math import erf
 
 import numpy as np
 
@@ -19,14 +22,17 @@ from kbs_process.signals.records import Array, Block, Loss, Mask, Run
 from kbs_process.stages.align.ordering import concatenate, select
 
 HELD_S = 0.5  # longer than any channel with noise shows one and the same reading, whatever its amplifier passes
+CHANCE = 1e-9  # of a sample, that as many readings as are held are the same by it
+FREE = 64  # readings that tell a channel's noise; as many are the same by chance at most
 DEAD = 0.5  # share of a recording beyond which a channel that is held is no channel
 
 
-def noisy(rig: Rig) -> dict[str, bool]:
-    """By recorded channel, whether its noise is greater than half its resolution: no reading stays the same then."""
+def noisy(rig: Rig) -> dict[str, float]:
+    """The noise of each recorded channel where it is greater than half its resolution: no reading stays the same."""
     index = rig.loads.index(rig.transducer.channels)
     noise, step = rig.transducer.noise.value[index], rig.transducer.resolution.value[index]
-    return dict(zip(rig.transducer.channels, (noise > 0.0) & (noise >= 0.5 * step), strict=True))
+    stated = zip(rig.transducer.channels, noise.tolist(), step.tolist(), strict=True)
+    return {name: sigma for name, sigma, least in stated if sigma > 0.0 and sigma >= 0.5 * least}
 
 
 class Alive:
@@ -36,9 +42,10 @@ class Alive:
     """
 
     def __init__(self, rig: Rig, entry: RecordingEntry, *, keep: bool = False) -> None:
-        able = noisy(rig)
+        noise = noisy(rig)
+        places = {place: name for place, name in enumerate(rig.transducer.channels) if name in noise}
         self._entry = entry
-        self._stream = _Stream({place: name for place, name in enumerate(rig.transducer.channels) if able[name]}, keep)
+        self._stream = _Stream(places, {place: noise[name] for place, name in places.items()}, keep)
 
     def __call__(self, blocks: Iterator[tuple[str, Block]]) -> Iterator[tuple[str, Block]]:
         """Yield the blocks; raises RecordingError at the end where a channel was held for most of the time.
@@ -76,12 +83,14 @@ class _Stream:
     """Rows wait until those of `HELD_S` behind them are there, and stay for as long to be looked at with later ones."""
 
     channels: Mapping[int, str]  # by column
+    noise: Mapping[int, float]  # as stated
     keep: bool = False
     rows: int = 0
     first: int = 0  # ns
     counts: dict[int, int] = field(default_factory=dict)
     spans: dict[int, tuple[int, int]] = field(default_factory=dict)  # ns
     reading: dict[int, float] = field(default_factory=dict)
+    step: dict[int, float] = field(default_factory=dict)  # the least that readings differed by
     _block: Block | None = None
     _done: int = 0  # rows of it that were passed on
 
@@ -89,7 +98,7 @@ class _Stream:
         if self._block is None and len(block):
             self.first = int(block.stamp[0])
         self._block = block if self._block is None else concatenate([self._block, block])
-        return self._release(_least(self._block))
+        return self._release(max(_least(self._block), FREE))
 
     def flush(self) -> Block | None:
         return None if self._block is None else self._release(0)
@@ -101,7 +110,7 @@ class _Stream:
         part = slice(self._done, end)
         gone = np.zeros(end - self._done, dtype=np.bool_)
         least = _least(block)
-        for column, held in ((c, _held(block.values[:, c], least)[part]) for c in self.channels):
+        for column, held in ((c, self._held(c, block.values[:, c], least)[part]) for c in self.channels):
             if held.any():
                 self._note(column, select(block, part), held)
                 gone |= held
@@ -111,6 +120,24 @@ class _Stream:
         self._block, self._done = select(block, slice(start, None)), end - start
         return select(ready, ~gone) if gone.any() and not self.keep else ready
 
+    def _held(self, column: int, x: Array, least: int) -> Mask:
+        """(n,) where a channel holds what it reads."""
+        size = np.abs(np.diff(x[np.isfinite(x)]))
+        step = min(self.step.get(column, np.inf), float(size[size > 0.0].min(initial=np.inf)))
+        held = _same(x, least)
+        if np.isfinite(step):
+            self.step[column] = step
+            free = x[~held & np.isfinite(x)]
+            noise = self.noise[column]
+            if held.any() and len(free) >= FREE:
+                own = 1.4826 * float(np.median(np.abs(np.diff(free, n=3)))) / np.sqrt(20.0)
+                noise = min(noise, float(np.sqrt(max(own**2 - step**2 / 12.0, 0.0))))
+            if held.any():
+                chance = max(erf(step / (np.sqrt(8.0) * max(noise, 0.5 * step))), CHANCE)
+                held = _same(x, max(least, 1 + int(np.ceil(np.log(CHANCE) / np.log(chance)))))
+                held &= noise >= 0.5 * step
+        return held
+
     def _note(self, column: int, block: Block, held: Mask) -> None:
         stamps = block.stamp[held]
         self.counts[column] = self.counts.get(column, 0) + len(stamps)
@@ -119,7 +146,7 @@ class _Stream:
         self.reading[column] = float(block.values[held, column][-1])
 
     def check(self, entry: RecordingEntry) -> None:
-        for column, count in self.counts.items():
+        for column, count in self._counted():
             if count > DEAD * self.rows:
                 raise RecordingError(
                     f"{self.channels[column]} reads {self.reading[column]:.6g} without any noise for "
@@ -128,10 +155,18 @@ class _Stream:
                     remedy="take it out of the channels in the parameter files, or the recording out of campaign.toml",
                 )
 
-    def losses(self) -> Iterator[Loss]:
-        detail = "one reading without noise: saturated or cut off"
+    def _counted(self) -> Iterator[tuple[int, int]]:
+        """Columns, and readings held in them; where all that was read later shows it coarse, nothing was held."""
         for column, count in self.counts.items():
+            if self.noise[column] >= 0.5 * self.step.get(column, 0.0):
+                yield column, count
+
+    def losses(self) -> Iterator[Loss]:
+        for column, count in self._counted():
             begin, end = ((stamp - self.first) * 1e-9 for stamp in self.spans[column])
+            detail = "one reading without noise: saturated or cut off"
+            if count == self.rows:
+                detail = "one reading throughout: not connected, or in steps that are greater than its noise"
             yield Loss("held", self.channels[column], count, begin, end, detail)
 
 
@@ -146,7 +181,7 @@ def _least(block: Block) -> int:
     return max(2, int(np.ceil(HELD_S / period))) if period > 0.0 else len(block)
 
 
-def _held(x: Array, least: int) -> Mask:
+def _same(x: Array, least: int) -> Mask:
     """(n,) where a reading is one of `least` or more in a row that are the same."""
     same = np.concatenate([[False], x[1:] == x[:-1], [False]])
     edges = np.flatnonzero(same[1:] != same[:-1]).reshape(-1, 2)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import zip_longest
 
+import msgspec
 import numpy as np
 
 from kbs_process.campaign.config import Campaign, Requirement
@@ -12,11 +14,14 @@ from kbs_process.errors import ConfigError
 from kbs_process.reduction.analysis import Analysis, bands_of
 from kbs_process.reduction.measurable import judged_channels
 from kbs_process.results import judged as results
+from kbs_process.results.judged import Doubt
 from kbs_process.signals.records import Signal
-from kbs_process.stages.bandpass import Band, crossing_rate
+from kbs_process.stages import bandpass
+from kbs_process.stages.bandpass import Band, bridging_error, crossing_rate
 from kbs_process.stages.verdict import COVERAGE, Extreme, Judgement, extremes, interval, judge, peak_coverage
 
 _NONE: Mapping[str, float] = {}
+MOSTLY = 0.25  # of a band's filter may lean on what is not known, where a value still tells that something was there
 SEVERITY: dict[Judgement, int] = {"pass": 0, "undecided": 1, "fail": 2}
 
 
@@ -47,7 +52,7 @@ def judged(
     requirement: Requirement,
     runs: Sequence[Analysis],
     budgets: Sequence[results.Budget],
-    doubts: Sequence[results.Doubt] = (),
+    doubts: Sequence[Doubt] = (),
     rounding: Mapping[str, float] = _NONE,
 ) -> results.Requirement:
     """Judge a requirement by the channel and recording that are closest to failing it, if no doubt forbids it.
@@ -64,8 +69,14 @@ def judged(
         for entry in budgets
         if (entry.frame, entry.band) == key
     }
+    hides = {analysis.entry.name: bridging_error(analysis.run.gaps, band) for analysis in runs}
     measured = [
-        _Candidate(extreme, sigmas[extreme.recording, extreme.channel], requirement.limit, below)
+        _Candidate(
+            extreme,
+            float(np.hypot(sigmas[extreme.recording, extreme.channel], hides[extreme.recording] * extreme.value)),
+            requirement.limit,
+            below,
+        )
         for extreme in extremes([(name, pair.measured) for name, pair in pairs], channels, requirement.statistic)
     ]
     if not measured:
@@ -79,6 +90,16 @@ def judged(
         [(name, pair.predicted) for name, pair in pairs if pair.predicted is not None], channels, requirement.statistic
     )
     worst = max(measured, key=_Candidate.severity)
+    beside = [
+        _Candidate(extreme, sigmas[extreme.recording, extreme.channel], requirement.limit, below)
+        for extreme in extremes(
+            [(one.entry.name, _beside(one, one.pairs[key].measured, band)) for one in runs],
+            channels,
+            requirement.statistic,
+        )
+        if requirement.statistic == "peak" and (extreme.recording, extreme.channel) in sigmas
+    ]
+    doubts = (*doubts, *(_unsure(one, requirement.unit) for one in beside if one.verdict != "pass"))
     doubt = next((one.why for one in doubts if one.of_failed or worst.verdict != "fail"), "")
     return results.Requirement(
         name=requirement.name,
@@ -107,6 +128,45 @@ def judged(
         ),
         source=requirement.source,
     )
+
+
+def _beside(analysis: Analysis, measured: Signal, band: Band) -> Signal:
+    """A band's signal where it was recorded and leans on what was not: beside gaps, and at the ends."""
+    there = analysis.residual.valid.copy()
+    short = round(bandpass.NEAR / measured.dt)
+    there[:short] |= there[:short].any()
+    there[-short:] |= there[-short:].any()
+    edge = band.low_pass_Hz
+    mostly = there if edge is None else there & bandpass.known_within(there, edge, measured.dt, MOSTLY)
+    return replace(measured, valid=mostly & ~measured.valid)
+
+
+def _unsure(one: _Candidate, unit: str) -> Doubt:
+    """What was recorded beside a gap or at an end, and may be beyond the limit."""
+    at = one.extreme
+    where = f"{at.channel} of {at.recording} is about {at.value:.4f} {unit} at {at.time_s or 0.0:.2f} s"
+    return Doubt(f"{where}, next to a gap or an end: the band's filter would need what lies beyond", of_failed=False)
+
+
+def decided(
+    without: Sequence[results.Requirement], kept: Sequence[results.Requirement], longest: float
+) -> tuple[results.Requirement, ...]:
+    """Choose between requirements judged `without` what looks like bad readings, and with it `kept`, if that can be.
+
+    What lasts for a quarter of a band's shortest period, `longest` in s, may be what the band shows: the worse decides.
+    """
+    found = []
+    for one, other in zip_longest(without, kept):
+        if 4.0 * longest * (one.band_Hz[1] or np.inf) < 1.0:
+            found.append(one)
+        elif other is not None:
+            found.append(max(one, other, key=lambda each: SEVERITY[each.verdict]))
+        elif one.verdict == "pass":
+            doubt = f"readings off all others for {longest:.3g} s are as long as the band shows"
+            found.append(msgspec.structs.replace(one, verdict="undecided", doubt=doubt))
+        else:
+            found.append(one)
+    return tuple(found)
 
 
 def _channel(channel: str, measured: Sequence[_Candidate], predicted: Sequence[Extreme]) -> results.ChannelResult:

@@ -42,3 +42,26 @@ def _extent(losses: Sequence[Loss], file: str) -> str:
     }:  # how long it would have been, a file that breaks off does not say
         return f"{count}, from {first:.1f} s on"
     return f"{count}, between {first:.1f} s and {last:.1f} s" if last > first else f"{count}, at {first:.1f} s"
+
+
+def in_words(loss: Loss) -> str:
+    """Return one line for a loss: what, how many, when, where."""
+    start, end = loss.start_s, loss.end_s
+    when = (
+        ""
+        if start is None
+        else f", from {start:.4f} s on"
+        if loss.kind == TRUNCATED
+        else f" at {start:.4f} s"
+        if end in (None, start)
+        else f", {start:.4f} to {end:.4f} s"
+    )
+    detail = f" ({loss.detail})" if loss.detail else ""
+    count = f"{loss.count} x " if loss.count else ""
+    return f"{count}{loss.kind}{when}, {loss.where}{detail}"
+
+
+def foremost(losses: Sequence[Loss]) -> str:
+    """What most of a recording was lost by, as its listing has it; nothing of one that lost nothing."""
+    real = [loss for loss in losses if loss.real]
+    return in_words(max(real, key=lambda loss: loss.count)) if real else ""

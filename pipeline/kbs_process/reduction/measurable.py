@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -12,9 +13,11 @@ from kbs_process.results.judged import Doubt
 from kbs_process.rig.model import Amplifier, Rig
 from kbs_process.signals.records import WRENCH_CHANNELS, Mask, Run
 from kbs_process.stages.align.readings import Readings
+from kbs_process.stages.bandpass import Band, bridged, too_long
 
 SHOWN = 0.4  # of the rate of distinct readings: the highest frequency that they show
 UNSEEN = 0.05  # share of a recording that may be unknown: an interval at 95 % leaves out as much
+ENDS_S = 4.0  # that filters and the beginning of streams may cost
 AMPLIFIED = 0.05  # part of a reading that an amplifier may take off at a band's upper edge
 
 
@@ -67,10 +70,18 @@ def hidden(
             )
     loads = run.loads
     assert loads is not None  # every recording that is judged has some
-    known = loads.valid & moving
-    inside = known[np.argmax(known) : len(known) - np.argmax(known[::-1])] if known.any() else known
-    if len(inside) and (missing := 1.0 - float(np.mean(inside))) > UNSEEN:
-        yield Doubt(f"in {100.0 * missing:.0f} % of {name} wrench or angles are missing", of_failed=False)
+    band = Band("", None, edge)
+    known = bridged(replace(loads, valid=loads.valid & moving), run.gaps, band).valid
+    missing = len(known) - int(np.count_nonzero(known))
+    if missing > UNSEEN * len(known) and missing * loads.dt > ENDS_S:
+        share = 100.0 * missing / len(known)
+        yield Doubt(f"in {share:.0f} % of {name} wrench or angles are missing", of_failed=False)
+    first, last = loads.t[known][[0, -1]] if known.any() else (0.0, 0.0)
+    inside = run.gaps[(run.gaps[:, 1] > first) & (run.gaps[:, 0] < last)]
+    if len(gaps := too_long(inside, band)):
+        start, end = gaps[np.argmax(np.diff(gaps)[:, 0])]
+        where = f"wrench or angles are missing in {name}, from {start:.2f} s to {end:.2f} s at the longest"
+        yield Doubt(f"{where}: what there was up to {edge:g} Hz is not known", of_failed=False)
     if coarse := [one for one in _coarse(campaign, streams) if one[0] in channels]:
         steps = ", ".join(f"{channel} in steps of {step:.3g} {unit}" for channel, unit, step in coarse)
         yield Doubt(f"{steps} in {name}: coarser than the resolution that is stated")

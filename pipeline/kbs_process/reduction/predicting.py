@@ -100,7 +100,7 @@ def predict_run(
         progress=progress,
     )
     channels = {"wrench": WRENCH_CHANNELS, "angle": rig.joint_names, "field": rig.joint_names}
-    predicted = condense(run.name, blocks, channels, settings)
+    predicted = condense(run.name, blocks, channels, settings, keep_spikes=True)
     start = commanded_from(run)
     return replace(predicted, wrench=_known(predicted.wrench, start), angle=_known(predicted.angle, start))
 

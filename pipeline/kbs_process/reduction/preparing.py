@@ -9,6 +9,7 @@ from kbs_process.campaign.config import Campaign, RecordingEntry
 from kbs_process.errors import RecordingError
 from kbs_process.progress import Progress
 from kbs_process.reduction.held import read_alive
+from kbs_process.reduction.losses import foremost
 from kbs_process.reduction.relief import forces_in, relieved, without_effects
 from kbs_process.reduction.settings import gravity_settings, motion_settings
 from kbs_process.signals.records import COPY, Loss, Run, Signal
@@ -77,6 +78,7 @@ def fit_gravity(campaign: Campaign, prepared: Sequence[Prepared], progress: Prog
                 one.motion,
                 without_effects(campaign, one.entry, one.motion, loads, campaign.rig),
                 calibration=one.entry.role == "calibration",
+                lost=foremost(one.run.losses),
             )
             for one in free or fitted
             if (loads := relieved(campaign, one.entry, one.run, one.motion).loads) is not None
@@ -94,7 +96,8 @@ def tare(
     Raises RecordingError where too little of it is whole for that.
     """
     assert run.loads is not None  # `prepare` demands them
-    sample = Sample(entry.name, motion, without_effects(campaign, entry, motion, run.loads, model.rig))
+    loads = without_effects(campaign, entry, motion, run.loads, model.rig)
+    sample = Sample(entry.name, motion, loads, lost=foremost(run.losses))
     return sample, gravity.tare(sample, model)
 
 

@@ -9,6 +9,7 @@ from kbs_process.campaign.config import Campaign, RecordingEntry
 from kbs_process.errors import RecordingError
 from kbs_process.recordings.mcap.source import Source, open_recording
 from kbs_process.recordings.mcap.streams import Stream
+from kbs_process.reduction.losses import foremost
 from kbs_process.signals.records import Block, Loss, Run
 from kbs_process.stages.align.condense import CondenseSettings, condense
 
@@ -37,15 +38,20 @@ def read_run(campaign: Campaign, entry: RecordingEntry, through: Through = iter,
     blocks = source.read(
         [Stream(topic.key, topic.topic, topic.fields, _OTHERWISE.get(topic.key, ""), topic.channel) for topic in topics]
     )
-    run = condense(
-        entry.name,
-        through(_within(_of_one_publisher(blocks, source), entry.start, entry.end)),
-        {topic.key: topic.channels for topic in topics},
-        CondenseSettings(working_rate_Hz=campaign.bands.working_rate),
-        units={topic.key: topic.units for topic in topics},
-        file=str(entry.path),
-        keep_spikes=keep_spikes,
-    )
+    try:
+        run = condense(
+            entry.name,
+            through(_within(_of_one_publisher(blocks, source), entry.start, entry.end)),
+            {topic.key: topic.channels for topic in topics},
+            CondenseSettings(working_rate_Hz=campaign.bands.working_rate),
+            units={topic.key: topic.units for topic in topics},
+            file=str(entry.path),
+            keep_spikes=keep_spikes,
+        )
+    except RecordingError as error:
+        if first := foremost(source.losses):
+            raise RecordingError(f"{first}; and {error.what}", where=error.where, remedy=error.remedy) from error
+        raise
     late = ((source.start_ns or run.log_epoch_ns) - run.log_epoch_ns) * 1e-9
     return replace(run, losses=(*(_later(loss, late) for loss in source.losses), *run.losses))
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
 import msgspec
 import numpy as np
@@ -35,6 +36,7 @@ from kbs_process.stages.repeats import commanded
 LEFT = 0.1  # of the weight, and of the torque that it can make: a calibration leaves less, whatever rubs or pulls
 _LIKE = 0.03  # relative: a gain this near to a unit's factor is that unit's
 _SHOWN = 6
+_SAME = 1e-12  # relative: what rounding makes of the same reading
 _FORCES = {"pound-force": 4.4482216, "kilogram-force": 9.80665, "gram-force": 9.80665e-3, "kN": 1e3, "mN": 1e-3}
 _TORQUES = {
     "N mm": 1e-3,
@@ -161,13 +163,17 @@ def _conventions(
 
 
 def repeated(recordings: Sequence[Prepared]) -> Iterator[str]:
-    """Channels that repeat another one, reading by reading."""
+    """Channels and joints that repeat another one, reading by reading: from another zero, or the other way."""
     for one in recordings:
-        values, names = one.raw.values[one.raw.valid], one.raw.channels
-        moving = [index for index in range(len(names)) if len(values) and np.ptp(values[:, index]) > 0.0]
-        for place, a in enumerate(moving):
-            for b in moving[place + 1 :]:
-                if np.array_equal(values[:, a], values[:, b]):
+        for signal in (one.raw, one.run.angle):
+            if signal is None or not signal.valid.any():
+                continue
+            values = signal.values[signal.valid] - signal.values[signal.valid][0]
+            least = _SAME * np.abs(signal.values[signal.valid]).max(0)
+            for (a, x), (b, y) in combinations(enumerate(values.T), 2):
+                apart = min(np.abs(x - y).max(), np.abs(x + y).max())
+                if apart <= max(least[a], least[b]) < min(np.ptp(x), np.ptp(y)):
+                    names = signal.channels
                     yield f"{names[b]} repeats {names[a]} in {one.entry.name}: one stream is read twice"
 
 

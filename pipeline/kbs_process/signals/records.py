@@ -184,6 +184,10 @@ class Run:
     clocks: dict[str, Clock] = dataclasses.field(default_factory=dict)  # by stream
     pointing: Signal | None = None  # angle of each joint by an external instrument, rad
     effort: Signal | None = None  # of each joint that has it measured, in the unit in which it is recorded
+    longest_spike: float = 0.0  # s, that was taken for bad readings in loads or angles
+    gaps: Array = dataclasses.field(
+        default_factory=lambda: np.zeros((0, 2))
+    )  # s, from when to when samples are made up
 
     @property
     def loads(self) -> Signal | None:

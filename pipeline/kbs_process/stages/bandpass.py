@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -12,6 +12,7 @@ from kbs_process.signals.records import Array, Mask, Signal
 from kbs_process.stages.lowfrequency import METHOD, high_pass, high_pass_gain
 
 ORDER = 4  # of the low-pass, run forwards and backwards
+BRIDGED = 0.125  # of the shortest period of a band: across so long a gap a line errs by 8 % of a tone of that period
 TOLERANCE = 1e-3  # an edge ends where the error is this part of the signal's rms
 NEAR = 1.0  # s on either side of invalid samples, whose means a straight line joins
 
@@ -89,8 +90,34 @@ def apply(signal: Signal, band: Band) -> Signal:
         values = high_pass(values, band.high_pass_Hz, signal.dt)
     if band.low_pass_Hz is not None:
         values = _low_pass(values, band.low_pass_Hz, signal.dt)
-        valid = _known(valid, band.low_pass_Hz, signal.dt)
+        valid = known_within(valid, band.low_pass_Hz, signal.dt)
     return signal.derive(values, _step(band), valid=valid)
+
+
+def too_long(gaps: Array, band: Band) -> Array:
+    """Return those of gaps (k, 2), s from when to when, in which a band's signal is not known."""
+    return gaps[np.diff(gaps)[:, 0] > BRIDGED / (band.low_pass_Hz or np.inf)]
+
+
+def bridged(signal: Signal, gaps: Array, band: Band) -> Signal:
+    """Take samples in gaps (k, 2), s, that are short in a band as they were interpolated; those at the ends are not."""
+    valid = signal.valid.copy()
+    edges = np.flatnonzero(np.diff(np.concatenate(([True], valid, [True])).astype(np.int8))).reshape(-1, 2)
+    for start, stop in edges[(edges[:, 0] > 0) & (edges[:, 1] < len(valid))]:
+        after, before = (signal.t0 + signal.dt * place for place in (start - 1, stop))
+        within = gaps[(gaps[:, 0] < before) & (gaps[:, 1] > after)]
+        valid[start:stop] = len(within) > 0 and len(too_long(within, band)) == 0
+    return replace(signal, valid=valid)
+
+
+def bridging_error(gaps: Array, band: Band) -> float:
+    """Return by how much of a band's largest tone its short gaps (k, 2), s, may let it err, most of them alone.
+
+    A line across T is (2 pi f T)^2 / 8 off a tone at its crest, of which as much is in the band as T is of half its
+    shortest period.
+    """
+    lengths = np.setdiff1d(np.diff(gaps), np.diff(too_long(gaps, band))) * (band.low_pass_Hz or 0.0)
+    return float(np.max((2.0 * np.pi * lengths) ** 2 / 8.0 * 2.0 * lengths, initial=0.0))
 
 
 def _bridged(values: Array, valid: Mask, dt: float) -> Array:
@@ -141,8 +168,8 @@ def _low_pass_kernel(f1: float, dt: float) -> Array:
     return h[cut : len(h) - cut]
 
 
-def _known(valid: Mask, f1: float, dt: float) -> Mask:
-    """Flag samples in which invalid ones, and those beyond the ends, weigh more than `TOLERANCE`."""
+def known_within(valid: Mask, f1: float, dt: float, tolerance: float = TOLERANCE) -> Mask:
+    """Flag samples in which invalid ones, and those beyond the ends, weigh more than `tolerance`."""
     h = np.abs(_low_pass_kernel(f1, dt))
     beyond = np.cumsum(h)[: len(h) // 2][::-1][: len(valid)]  # weight of what lies before sample 0, 1, ...
     doubt = np.zeros(len(valid))
@@ -150,7 +177,7 @@ def _known(valid: Mask, f1: float, dt: float) -> Mask:
     doubt[len(valid) - len(beyond) :] += beyond[::-1]
     if not valid.all():
         doubt += fftconvolve((~valid).astype(np.float64), h)[len(h) // 2 :][: len(valid)]
-    known: Mask = doubt <= TOLERANCE
+    known: Mask = doubt <= tolerance
     return known
 
 
@@ -186,7 +213,7 @@ def statement(band: Band, dt: float, n: int) -> BandStatement:
     edge = at[min(over[-1] + 1, len(at) - 1)] * dt if len(over) else 0.0
     flagged = 0.0
     if band.low_pass_Hz is not None:
-        known = _known(np.ones(n, dtype=np.bool_), band.low_pass_Hz, dt)
+        known = known_within(np.ones(n, dtype=np.bool_), band.low_pass_Hz, dt)
         flagged = float(np.argmax(known)) if known.any() else float(n)
     valid = at >= min(flagged, float(at[-1]))
     return BandStatement(

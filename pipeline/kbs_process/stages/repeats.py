@@ -12,6 +12,7 @@ from kbs_process.signals.records import Array, Run, Signal
 
 # Two runs repeat each other where their motions, shifted, differ by less than this part of the motion.
 SAME_MOTION = 0.01
+END = 40  # samples before the end of a part of a recording, which the filters to the working rate did not know
 REFINEMENTS = 12
 
 
@@ -41,11 +42,14 @@ def commanded(run: Run) -> Signal | None:
 
 
 def copies(runs: Sequence[Run]) -> dict[int, int]:
-    """Return which of the runs have the same readings as one before them, and as which."""
+    """Return which of the runs have the readings of one before them, or begin with them, and of which."""
     found: dict[int, int] = {}
     for (first, one), (second, other) in itertools.combinations(enumerate(runs), 2):
         a, b = one.loads, other.loads
-        if a is not None and b is not None and np.array_equal(a.values, b.values):
+        if a is None or b is None:
+            continue
+        both = min(len(a), len(b)) - (END if len(a) != len(b) else 0)
+        if both > 0 and np.array_equal(a.values[:both], b.values[:both]):
             found.setdefault(second, first)
     return found
 

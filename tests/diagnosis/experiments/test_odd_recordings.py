@@ -124,6 +124,37 @@ def test_a_channel_whose_resolution_hides_its_noise_may_stand_still() -> None:
     assert len(passed(values, replace(bench.rig(), transducer=coarse))[0]) == 2000
 
 
+def test_coarse_codes_that_stay_are_not_held_and_a_peak_that_is_cut_off_is() -> None:
+    """Torques of a slow swing in steps of many times their noise, at rest at the highest one in the end."""
+    values = wrench()
+    sweep = 0.3 * np.sin(np.arange(2000) / 300.0) * (np.arange(2000) < 1400)
+    values[:, 4] += sweep
+    coarse = values.copy()
+    coarse[:, 3:] = 0.1 * np.rint(values[:, 3:] / 0.1)
+    for chunk in (37, 2000):
+        assert [loss.where for loss in passed(coarse, chunk=chunk, keep=True)[1]] == ["Tx", "Tz"]  # nothing moves them
+        assert all("throughout" in loss.detail for loss in passed(coarse, chunk=chunk, keep=True)[1])
+        cut = values.copy()
+        cut[:, 4] = np.minimum(values[:, 4], 0.25)
+        (loss,) = passed(cut, chunk=chunk, keep=True)[1]
+        assert loss.where == "Ty" and "saturated" in loss.detail and loss.count > 100
+
+
+def test_slow_readings_of_a_few_codes_of_noise_are_the_same_by_chance_now_and_then() -> None:
+    rng = np.random.default_rng(7)
+    noise = bench.rig().transducer.noise.value
+    values = np.asarray(noise / 2.6 * np.rint(2.6 * rng.standard_normal((3000, 6))))
+    same = (values[2:] == values[1:-1]) & (values[1:-1] == values[:-2])
+    assert same.any()  # for half a second at 5 Hz
+    stamp = np.arange(3000) * 200_000_000
+    for held, told in ((2, 0), (40, 1)):
+        own = values.copy()
+        own[1000 : 1000 + held, 2] = own[1000, 2]
+        alive = Alive(bench.rig(), ENTRY, keep=True)
+        list(alive([("wrench", Block(stamp, stamp, own))]))
+        assert len(alive.losses) == told
+
+
 def test_sensors_without_stated_noise_are_told() -> None:
     silent = replace(
         bench.rig().transducer,
@@ -333,6 +364,11 @@ def test_a_copy_is_told_and_repeats_nothing() -> None:
     first, second = recording("a", 0.0).run, recording("b", 0.3).run
     runs = [first, second, replace(first, name="c")]
     assert copies(runs) == {2: 0}
+    assert first.wrench is not None
+    values = first.wrench.values[:-100].copy()
+    values[-20:] += 1e-3  # where the recording goes on, and its part does not
+    part = replace(first, wrench=replace(first.wrench, values=values, valid=first.wrench.valid[:-100]))
+    assert copies([first, second, part]) == {2: 0}
     prepared = [
         Prepared(replace(ENTRY, path=Path(f"recordings/{run.name}.mcap"), name=run.name), run.loads, run, None)  # type: ignore[arg-type]
         for run in runs

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -27,10 +28,10 @@ def turn(t: np.ndarray) -> np.ndarray:
     return 0.6 - 0.6 * np.cos(0.4 * t)[:, None]
 
 
-def recording(rate: float = 100.0) -> dict[str, Block]:
-    wrench = stream(truth, rate, 60.0, seed=1, latency=LATENCY)
+def recording(rate: float = 100.0, duration: float = 60.0) -> dict[str, Block]:
+    wrench = stream(truth, rate, duration, seed=1, latency=LATENCY)
     wrench.values[:] += np.random.default_rng(3).normal(0.0, NOISE, wrench.values.shape)
-    return {"wrench": wrench, "angle": stream(turn, rate, 60.0, seed=2, latency=LATENCY)}
+    return {"wrench": wrench, "angle": stream(turn, rate, duration, seed=2, latency=LATENCY)}
 
 
 def run_of(streams: dict[str, Block]) -> Run:
@@ -269,6 +270,15 @@ def test_stamps_rounded_to_a_period_hide_a_regular_rate_and_lose_nothing(rate: f
     assert error(run)[0] < 4.0 * NOISE and error(run)[1] < 1e-3
 
 
+def test_log_times_that_are_the_rounded_stamps_tell_of_no_clock() -> None:
+    streams = recording(99.97, 120.0)
+    for one in streams.values():
+        one.stamp[:] = EPOCH + 10_000_000 * np.rint((one.stamp - EPOCH) / 1e7).astype(np.int64)
+        one.log[:] = one.stamp
+    run = run_of(streams)
+    assert told(run, "rounded stamps") and not told(run, "clock")
+
+
 def test_stamps_that_are_regular_as_they_are_were_not_rounded() -> None:
     for rate in (20.0, 50.0, 1000.0):
         streams = recording(rate)
@@ -283,6 +293,34 @@ def test_samples_lost_of_rounded_stamps_are_gaps() -> None:
     streams["wrench"] = rows(streams["wrench"], keep)
     run = run_of(streams)
     assert sum(loss.count for loss in run.losses if loss.kind in ("gap", "short gap")) == 43
+
+
+@pytest.mark.parametrize(
+    "lost", [(1500, 5010), (1500, 5010, 9000), (900, 4000, 7100), (5000,), (3000, 3100), range(60, 12_000, 60)]
+)
+def test_rows_that_are_missing_among_stamps_of_whole_periods_are_gaps(lost: Sequence[int]) -> None:
+    streams = {key: rows(one, np.delete(np.arange(12_000), lost)) for key, one in recording(100.0, 120.0).items()}
+    for one in streams.values():
+        one.log[:] = one.stamp
+    run = run_of(streams)
+    assert run.rates == {"wrench": pytest.approx(100.0, rel=1e-9), "angle": pytest.approx(100.0, rel=1e-9)}
+    assert {loss.kind for loss in run.losses} <= {"gap", "short gap"}
+    assert sum(loss.count for loss in run.losses) == 2 * len(lost)
+    assert error(run)[0] < 4.0 * NOISE
+
+
+def test_when_samples_were_made_up_is_known() -> None:
+    streams = recording()
+    lost = [2000, *range(3000, 3050)]
+    streams["wrench"] = rows(streams["wrench"], np.delete(np.arange(6000), lost))
+    streams["angle"].values[4000:4010] = np.nan
+    run = run_of(streams)
+    expected = [(19.99, 20.01), (29.99, 30.5), (39.99, 40.1)]
+    assert run.gaps == pytest.approx(np.array(expected), abs=2e-3)
+    streams = recording(5.0)
+    streams["wrench"].values[150:153, 0] += 10.0
+    run = run_of(streams)
+    assert [loss.count for loss in told(run, "spike")] == [1] and run.longest_spike == pytest.approx(0.6)
 
 
 def test_bursts_that_were_stamped_on_arrival_are_refused_by_name() -> None:
@@ -321,6 +359,15 @@ def test_an_encoder_s_reading_that_is_lost_for_a_while_is_left_out() -> None:
     run = run_of(streams)
     assert [loss.count for loss in told(run, "dropout")] == [40]
     assert error(run)[1] < 1e-4
+
+
+def test_what_is_predicted_is_nobody_s_reading_and_is_not_refused_for_what_no_reading_does() -> None:
+    streams = recording()
+    streams["wrench"].values[::2, 1] += 40.0
+    with pytest.raises(RecordingError, match="two sources"):
+        run_of(streams)
+    predicted = condense("test", streams.items(), CHANNELS, CondenseSettings(), keep_spikes=True)
+    assert predicted.wrench is not None and np.ptp(predicted.wrench.values[500:-500, 1]) > 11.0
 
 
 @pytest.mark.parametrize("key", ["wrench", "angle"])

@@ -54,12 +54,12 @@ def test_single_bad_samples_are_told_with_the_figures_with_and_without_them() ->
         SimpleNamespace(name="Torque", statistic="peak", value=value, unit="N m", verdict=verdict)
         for value, verdict in ((0.002, "pass"), (0.07, "fail"))
     ]
-    (notice,) = spikes(analyses, judged[:1], lambda: judged[1:])  # type: ignore[arg-type]
+    (notice,) = spikes(analyses, judged[:1], judged[1:])  # type: ignore[arg-type]
     assert (
         "1 in Fz at 50.0000 s, off by 49.99: interpolated; 2 in Ty at 30.0000, 40.0000 s, off by up to 3: interpolated."
         in notice.what
     )
     assert notice.what.endswith("Torque: peak 0.0020 N m without them, 0.0700 N m with them (not met)")
-    (alone,) = spikes(analyses, judged[:1], tuple)  # type: ignore[arg-type]
+    (alone,) = spikes(analyses, judged[:1], ())  # type: ignore[arg-type]
     assert alone.what.endswith("without them, and nothing can be judged with them")
-    assert list(spikes(analyses[1:], judged[:1], tuple)) == []  # type: ignore[arg-type]
+    assert list(spikes(analyses[1:], judged[:1], ())) == []  # type: ignore[arg-type]

@@ -75,7 +75,8 @@ def condense(
     """Reduce a recording to a `Run`; `channels` names the columns of every stream that `blocks` brings.
 
     `units` are those of streams of the joints that are not rad or rad/s throughout; `file` is what errors call the
-    recording, its name without it. With `keep_spikes` single bad samples are told, and stay.
+    recording, its name without it. With `keep_spikes` single bad samples are told, and stay, as of a
+    prediction, which is nobody's reading.
 
     Time zero is the reference stream's first sample (the wrench's, where there is one), and the axis covers
     that stream. Samples that lean on invented input (gaps, the ends' continuation, times at which a stream
@@ -147,6 +148,8 @@ def condense(
         clocks=clocks,
         pointing=signals.get("pointing"),
         effort=signals.get("effort"),
+        longest_spike=max(sampled[key].line.longest_spike for key in kept if key != "pointing"),
+        gaps=np.concatenate([_on_axis(sampled[key].gaps(), clocks[key]) for key in kept if key != "pointing"]),
     )
 
 

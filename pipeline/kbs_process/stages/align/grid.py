@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kbs_process.machine_code import njit
-from kbs_process.signals.records import Array, Mask, Stamps
+from kbs_process.signals.records import Array, Block, Mask, Stamps
 
 GAP = 1.5  # nominal periods: a longer step is a gap, if the stamps around it do not say that it is jitter
 LEFT, RIGHT = 3, 3  # neighbours that the six-point interpolation needs on either side
@@ -16,6 +16,9 @@ AROUND = 4  # stamps on either side that a long step is held against
 BRIDGED = 1e-3  # error, in the band, up to which a straight line across a gap is no invention
 COARSE = 0.2  # of a period: stamps rounded to less are taken as they are
 EXACT = 1e-3  # of the step: what lies so close to a regular grid was not rounded
+EVEN = 3  # steps of two periods, at even intervals: of fewer nobody can say that they are
+SLOPE = 8  # samples on either side of a step that tell how readings go on
+CLEAR = 5.0  # sigma that lie between a step of one period and one of two
 AROUND_LOG = 16  # log times on either side of a long step, whose mean tells whether the recorder saw it
 MOST_MISSING = 32  # samples that are looked for one by one in a block of stamps that are rounded
 PIECE = 65536  # grid points made at a time, which bounds what a long gap costs in memory
@@ -62,19 +65,22 @@ def quantum(stamp: Stamps) -> int:
     return next((one for one in steps if (np.abs(apart - one * np.rint(apart / one)) <= 2).all()), 1)
 
 
-def evened(stamp: Stamps, log: Stamps, *, known: bool = False) -> Stamps:
-    """Stamps (n,), which increase, without their rounding, where that is coarse; else as they are.
+def evened(block: Block, *, known: bool = False, more: bool = False) -> Stamps | None:
+    """A block's stamps (n,), which increase, without their rounding, where that is coarse; else as they are.
+
+    None where `more` of them will tell which.
 
     A sensor at 999.7 Hz whose stamps are rounded to 1 ms shows a step of 2 ms every 3.3 s. Nothing is missing as long
     as a line through all stamps over their numbers leaves less than the rounding; where samples are missing, it leaves
     more, until each is counted. Times are uncertain by half the rounding at most.
     """
+    stamp = block.stamp
     usual = float(np.median(np.diff(stamp))) if len(stamp) > AROUND else np.inf
     step = quantum(stamp) if np.isfinite(usual) else 1
     if step < COARSE * usual:
         return stamp
-    if step > 0.75 * usual and not known and not _of_rounding(stamp, log):
-        return stamp
+    if step > 0.75 * usual and not known and not (rounded := _of_rounding(block)):
+        return None if more and rounded is None else stamp
     y = (stamp - stamp[0]).astype(np.float64)
     k = np.arange(len(y), dtype=np.float64)
     period = float(np.mean(np.diff(y)[np.diff(y) <= GAP * usual]))
@@ -98,8 +104,12 @@ def evened(stamp: Stamps, log: Stamps, *, known: bool = False) -> Stamps:
     return stamp
 
 
-def _of_rounding(stamp: Stamps, log: Stamps) -> bool:
-    """Whether steps of two periods are the rounding's: the recorder saw none, or else they come at even intervals."""
+def _of_rounding(block: Block) -> bool | None:
+    """Whether steps of two periods are the rounding's: the recorder saw none, or readings change as at other steps.
+
+    Where neither tells, such steps come at even intervals; None where there are too few to say so.
+    """
+    stamp, log = block.stamp, block.log
     steps = np.diff(stamp)
     usual, mean = float(np.median(steps)), float(steps.mean())
     double = np.flatnonzero(np.rint(steps / mean) == 2.0)
@@ -115,9 +125,32 @@ def _of_rounding(stamp: Stamps, log: Stamps) -> bool:
         # A clock that is set makes such a step as well; but then the recorder's time runs at the usual step.
         slow = (np.mean(log[-AROUND_LOG:]) - np.mean(log[:AROUND_LOG])) / (len(log) - AROUND_LOG) - usual
         return bool(np.median(rises) < 0.5 and slow > 0.5 * (mean - usual))
+    if np.isfinite(change := _change(block.values, double)):
+        return change < 1.5
     apart = np.diff(double)
     ends = max(int(double[0]), len(stamp) - 1 - int(double[-1]))
-    return int(np.ptp(apart)) <= 2 and ends <= int(apart.max()) + 2
+    even = int(np.ptp(apart)) <= 2 and ends <= int(apart.max()) + 2
+    return None if even and len(double) < EVEN else even
+
+
+def _change(x: Array, at: Stamps) -> float:
+    """By how much more readings (n, c) change at the steps `at` than at others, if they go on as around: 1 or 2.
+
+    NaN where they have too much noise, or too little motion, to tell.
+    """
+    d, at = np.diff(x, axis=0)[SLOPE:-SLOPE], at[(at >= SLOPE) & (at < len(x) - 1 - SLOPE)] - SLOPE
+    if not len(at) or len(d) < 2 * len(at) or not np.isfinite(x).all():
+        return np.nan
+    mean = (x[2 * SLOPE : -1] - x[SLOPE + 2 : 1 - SLOPE] + x[SLOPE - 1 : -SLOPE - 2] - x[: -2 * SLOPE - 1]) / (
+        2.0 * SLOPE - 3.0
+    )
+    variance = np.mean((d - mean) ** 2, axis=0)
+    weight = np.divide(1.0, variance, out=np.zeros_like(variance), where=variance > 0.0)
+    both, square = (d * mean) @ weight, mean**2 @ weight
+    others = np.delete(both, at).sum() / max(np.delete(square, at).sum(), 1e-300)
+    own = square[at].sum()
+    clear = others > 0.5 and own * others**2 > CLEAR**2
+    return float(both[at].sum() / own / others) if clear else np.nan
 
 
 def counted(u: Array) -> Array:

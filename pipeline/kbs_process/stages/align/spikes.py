@@ -40,7 +40,7 @@ PAUSE_RATE = 1.0  # rad/s that no antenna is turned with where its readings are 
 MOST_BAD, LEAST_BAD = 0.01, 10  # share of samples, and number, that may be spikes
 MOST_TURNS = 1e4
 TURNS, TURNS_SHARE = 20, 0.1  # changes between two levels in a block, and their share of it
-SHAKEN = 20.0  # of the usual second difference
+SHAKEN = 10.0  # of the usual second difference
 APART = 30.0  # of what the next but one sample differs by
 
 

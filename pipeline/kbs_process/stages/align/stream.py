@@ -14,6 +14,7 @@ from kbs_process.stages.align.clocks import ClockData, FloorStep, LatencyFloor
 from kbs_process.stages.align.envelope import MinMax
 from kbs_process.stages.align.grid import (
     AROUND,
+    GAP,
     Grid,
     Regridder,
     counted,
@@ -22,7 +23,7 @@ from kbs_process.stages.align.grid import (
     nominal_grid,
     quantum,
 )
-from kbs_process.stages.align.ordering import Orderer, Reblock, finite_rows, judge
+from kbs_process.stages.align.ordering import Orderer, Reblock, concatenate, finite_rows, judge
 from kbs_process.stages.align.resample import Kept, Reducer, design
 from kbs_process.stages.align.spectrum import Welch
 from kbs_process.stages.align.spikes import Oddity, Spikes
@@ -83,6 +84,7 @@ class Timeline:
     _ready: Reblock = field(default_factory=Reblock)
     _orderer: Orderer | None = None
     _floor: LatencyFloor | None = None
+    _open: Block | None = None  # the first one, of which the next will tell whether its stamps are rounded
     _first: int = 0
     _last: int = 0
     _uneven: list[float] = field(default_factory=list)  # s, steps that are no whole number of periods
@@ -105,8 +107,9 @@ class Timeline:
             ready += self._arrived(held)
         ready += [ready for block in self._ready.flush() for ready in self._order(block)]
         last = self._orderer.flush() if self._orderer else None
-        if last is not None:
-            ready.append(self._timed(last))
+        if left := [one for one in (self._open, last) if one is not None]:
+            self._open = None
+            ready += self._timed(concatenate(left), more=False)
         if scattered := self._arrival.scattered:
             raise RecordingError(scattered, where=self.file or self.where, remedy=STAMP_EACH)
         if self.grid is not None:
@@ -143,14 +146,25 @@ class Timeline:
                 where=self.file or self.where,
                 remedy=TWO_SOURCES,
             )
-        return [] if released is None else [self._timed(released)]
+        if released is None:
+            return []
+        begun, self._open = self._open, None
+        return self._timed(
+            released if begun is None else concatenate([begun, released]), more=self._floor is None and begun is None
+        )
 
-    def _timed(self, block: Block) -> Block:
-        stamp = evened(block.stamp, block.log, known=self.rounded > 0.0)
+    def _timed(self, block: Block, *, more: bool) -> list[Block]:
+        """Give a block its times; the first waits for a second, if `more` stamps tell whether they are rounded."""
+        stamp = evened(block, known=self.rounded > 0.0, more=more)
+        if stamp is None:
+            self._open = block
+            return []
         if stamp is not block.stamp:
             self.rounded = max(self.rounded, quantum(block.stamp) * 1e-9)
             later = 0 if self._floor is None else max(self._last + 1 - int(stamp[0]), 0)
-            block = Block(stamp + later, block.log, block.values)
+            own = np.array_equal(np.diff(block.log), np.diff(block.stamp))  # stamps as log times, rounded likewise
+            stamp = stamp + later
+            block = Block(stamp, stamp + (block.log[0] - block.stamp[0]) if own else block.log, block.values)
         if self._floor is None:
             self._floor = LatencyFloor(int(block.stamp[0]), int(block.log[0]))
             self._first = self._last = int(block.stamp[0])
@@ -170,7 +184,7 @@ class Timeline:
                 self._uneven += [self.own_one(int(one)) for one in block.stamp[uneven][:UNEVEN]]
         self._last = int(block.stamp[-1])
         self.samples += len(block)
-        return block
+        return [block]
 
     def _find_gaps(self, stamp: Stamps, grid: Grid, held_back: int) -> None:
         """Judge steps by the stamps around them; the last `held_back` wait for those that follow."""
@@ -236,10 +250,11 @@ class Timeline:
             yield from self.spikes.push(stamp, values)
 
     def end(self) -> Iterator[tuple[Stamps, Array]]:
-        """Yield what `clean` held back; raises RecordingError where two sources bring a channel, or it steps."""
+        """Yield what `clean` held back; raises RecordingError of readings in which two sources are, or that step."""
         if self.spikes is not None:
             yield from self.spikes.flush()
-        self.check_sources()
+        if not self.keep_spikes:
+            self.check_sources()
 
     def check_sources(self) -> None:
         """Raise RecordingError where two sources bring a channel, or where it steps and stays there."""
@@ -282,6 +297,12 @@ class Timeline:
         return block.stamp[good], block.values[good]
 
     @property
+    def longest_spike(self) -> float:
+        """How long the longest of the bad readings lasts, s."""
+        found = self.spikes.spikes if self.spikes else []
+        return max((1e-9 * (one.last - one.first) + self._period / GAP for one in found), default=0.0)
+
+    @property
     def non_finite_channels(self) -> str:
         """In which channels how many samples are NaN or infinite: "Fz in 2000, Tx in 3"."""
         return ", ".join(
@@ -321,7 +342,7 @@ class Timeline:
 
     @property
     def _period(self) -> float:
-        return 1.5e-9 * self.grid.period_ns if self.grid is not None else 0.0
+        return GAP * 1e-9 * self.grid.period_ns if self.grid is not None else 0.0
 
     def clock(self) -> ClockData:
         """What the stream tells about its clock."""
@@ -483,6 +504,8 @@ class Uniform:
         self._reduce: Reducer | None = None
         self._own: list[Array] = []
         self._values: list[Array] = []
+        self._made_up: list[Stamps] = []  # rows of the grid
+        self._rows = 0
 
     def push(self, chunk: Block) -> None:
         for block in self.line.push(chunk):
@@ -503,6 +526,13 @@ class Uniform:
     def samples(self) -> tuple[Array, Array] | None:
         """Return times (n,) and values (n, c) of a stream slow enough to be kept."""
         return (np.concatenate(self._own), np.concatenate(self._values)) if self._own else None
+
+    def gaps(self) -> Array:
+        """Return from when to when samples are made up (k, 2), s from the stream's first: the samples beside them."""
+        at = np.concatenate([np.zeros(0), *self._made_up])
+        pieces = np.split(at, 1 + np.flatnonzero(np.diff(at) > 1.0))
+        period = 1e-9 * self.line.grid.period_ns if self.line.grid is not None else 0.0
+        return np.array([(piece[0] - 1.0, piece[-1] + 1.0) for piece in pieces if len(piece)]).reshape(-1, 2) * period
 
     def _take(self, block: Block) -> None:
         grid = self.line.grid
@@ -531,6 +561,9 @@ class Uniform:
     def _pass_on(self, rows: Array, invented: Mask | None) -> None:
         assert self._reduce is not None
         self._reduce.push(rows, invented)
+        if invented is not None:
+            self._made_up.append(self._rows + np.flatnonzero(invented))
+        self._rows += len(rows)
         if self.welch is not None:
             self.welch.push(rows, invented)
         if self.envelope is not None:

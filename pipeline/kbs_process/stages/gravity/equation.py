@@ -91,7 +91,9 @@ def joined(prepared: Sequence[Prepared]) -> Prepared:
     )
 
 
-def prepare(name: str, motion: Motion, wrench: Signal, low_pass: float, *, with_neighbours: bool) -> Prepared:
+def prepare(
+    name: str, motion: Motion, wrench: Signal, low_pass: float, *, with_neighbours: bool, lost: str = ""
+) -> Prepared:
     """Low-pass motion and wrench alike, thin them, and drop what is invalid or near the ends."""
     if len(motion) != len(wrench) or abs(motion.t0 - wrench.t0) > 0.01 * motion.dt:
         raise RecordingError(f"{name}: motion and wrench do not lie on one grid")
@@ -103,7 +105,7 @@ def prepare(name: str, motion: Motion, wrench: Signal, low_pass: float, *, with_
         whole = motion.dt * np.count_nonzero(motion.valid & wrench.valid)
         raise RecordingError(
             f"{name}: too short or too damaged for a gravity fit below {low_pass:g} Hz: wrench and angles are whole "
-            f"for {whole:.3g} s of {motion.dt * len(motion):.3g} s",
+            f"for {whole:.3g} s of {motion.dt * len(motion):.3g} s{lost and f', by {lost}'}",
             remedy=f"`kbs-process validate` lists gaps and readings that are no numbers: record "
             f"{4 * edge * motion.dt:.0f} s without at least, or leave this recording out of campaign.toml",
         )

@@ -40,6 +40,7 @@ class Sample:
     motion: Motion
     wrench: Signal
     calibration: bool = False  # pseudo-static: fitted first, and sets the first weights
+    lost: str = ""  # what most of it was lost by
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,7 +174,8 @@ def _spread(
 
 def prepared(sample: Sample, equation: Equation, settings: GravitySettings, low_pass_Hz: float) -> Prepared:
     """The instants of a recording that the equation is compared with; see `at_rest` for a model without inertia."""
-    data = prepare(sample.name, sample.motion, sample.wrench, low_pass_Hz, with_neighbours=settings.response)
+    parts = sample.name, sample.motion, sample.wrench, low_pass_Hz
+    data = prepare(*parts, with_neighbours=settings.response, lost=sample.lost)
     return data if equation.include_inertia else at_rest(data, equation.elements.rig)
 
 

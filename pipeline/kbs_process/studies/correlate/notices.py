@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from itertools import zip_longest
 
 import numpy as np
@@ -64,14 +64,11 @@ def has_spikes(run: Run) -> bool:
 
 
 def spikes(
-    analyses: Sequence[Analysis], without: Sequence[Requirement], with_them: Callable[[], Sequence[Requirement]]
+    analyses: Sequence[Analysis], without: Sequence[Requirement], with_them: Sequence[Requirement]
 ) -> Iterable[Notice]:
     """Readings off all others, by channel and time, and what is judged with and without them."""
-    spiky = [one for one in analyses if has_spikes(one.run)]
-    if not spiky:
-        return
-    figures = list(zip_longest(without, with_them() if without else ()))
-    for analysis in spiky:
+    figures = list(zip_longest(without, with_them))
+    for analysis in (one for one in analyses if has_spikes(one.run)):
         named = [loss for loss in analysis.run.losses if loss.kind in LEFT_OUT]
         yield _notice("warning", "spikes", analysis.entry.name, named=named, figures=figures)
 

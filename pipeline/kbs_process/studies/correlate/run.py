@@ -11,6 +11,7 @@ from kbs_process.campaign.config import Campaign
 from kbs_process.errors import FitError, RecordingError, SimulationError
 from kbs_process.progress import Progress
 from kbs_process.reduction.analysis import Analysis, analyse
+from kbs_process.reduction.judging import decided
 from kbs_process.reduction.measurable import check_requirements
 from kbs_process.reduction.preparing import Prepared, fit_gravity, prepare, told_copies
 from kbs_process.reduction.relief import relieved
@@ -27,7 +28,7 @@ from kbs_process.studies.correlate.earlier_diagnosis import keep_diagnosis
 from kbs_process.studies.correlate.notices import has_spikes, spikes
 from kbs_process.studies.correlate.output import write_tables
 from kbs_process.studies.correlate.results import Results
-from kbs_process.studies.correlate.summary import summarise
+from kbs_process.studies.correlate.summary import conclusion, summarise
 from kbs_process.studies.correlate.transducer import study
 
 
@@ -44,8 +45,14 @@ def process(
         decoupling = decouple.fit(campaign.rig)
         prepared = told_copies([prepare(campaign, entry, decoupling, progress) for entry in campaign.recordings])
         found, analyses, model = _found(campaign, prepared, decoupling, progress)
-        told = spikes(analyses, found.requirements, lambda: _with_spikes(campaign, prepared, decoupling, progress))
-        found = msgspec.structs.replace(found, warnings=(*told, *found.warnings))
+        if any(has_spikes(one.run) for one in prepared):
+            kept = _with_spikes(campaign, prepared, decoupling, progress) if found.requirements else ()
+            told = spikes(analyses, found.requirements, kept)
+            longest = max(one.run.longest_spike for one in prepared)
+            judged = decided(found.requirements, kept, longest)
+            found = msgspec.structs.replace(
+                found, warnings=(*told, *found.warnings), requirements=judged, verdict=conclusion(judged)
+            )
         with progress.task("Following the transducer's resonance") as task:
             on_transducer = study(campaign, analyses, model.rig, task.update)
         with progress.task("Writing the report"):

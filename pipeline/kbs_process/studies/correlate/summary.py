@@ -52,7 +52,7 @@ def summarise(
             drive=campaign.drive,
             frame="joint" if campaign.rig.frame == "joint" else "T",
         ),
-        verdict=_conclusion(requirements),
+        verdict=conclusion(requirements),
         provenance=provenance.made("", campaign.folder, campaign.files),
         requirements=requirements,
         recordings=tuple(_recording(analysis) for analysis in analyses),
@@ -73,7 +73,8 @@ def summarise(
     return msgspec.structs.replace(found, warnings=warnings, methods=methods(campaign, analyses, found))
 
 
-def _conclusion(requirements: Sequence[Requirement]) -> Conclusion:
+def conclusion(requirements: Sequence[Requirement]) -> Conclusion:
+    """Return what the worst verdict says, in a sentence."""
     if not requirements:
         return Conclusion(status="none", sentence="The campaign states no requirement.")
     worst = max(requirements, key=lambda one: ("pass", "undecided", "fail").index(one.verdict))

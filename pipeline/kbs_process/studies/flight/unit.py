@@ -100,7 +100,9 @@ def fly(job: Job) -> Flown | None:
         )
         streams = ((key, block) for key, block in blocks if key != "field")
         channels = {"wrench": WRENCH_CHANNELS, "angle": job.rig.joint_names}
-        run = condense("flight", streams, channels, CondenseSettings(working_rate_Hz=job.working_rate_Hz))
+        run = condense(
+            "flight", streams, channels, CondenseSettings(working_rate_Hz=job.working_rate_Hz), keep_spikes=True
+        )
     except SimulationError:
         return None
     found = [_found(job, run, one) for one in job.judged]

@@ -57,7 +57,11 @@ def fly(campaign: Campaign, planned: Plan, duration: float, update: Callable[[fl
         progress=update,
     )
     run = condense(
-        campaign.name, _aside(blocks, angles), {"wrench": WRENCH_CHANNELS}, CondenseSettings(working_rate_Hz=rate)
+        campaign.name,
+        _aside(blocks, angles),
+        {"wrench": WRENCH_CHANNELS},
+        CondenseSettings(working_rate_Hz=rate),
+        keep_spikes=True,
     )
     assert run.wrench is not None  # the plant gives one
     q = np.concatenate(angles) - encoder_offsets(rig)

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from datetime import UTC, datetime
 
 from kbs_process.reduction.inspection import Inspection, TopicInspection
-from kbs_process.studies.validate.run import in_words
+from kbs_process.reduction.losses import in_words
 
 
 def describe_inspection(inspection: Inspection) -> Iterator[str]:

@@ -8,11 +8,12 @@ from dataclasses import dataclass, field, replace
 from kbs_process.campaign.config import Campaign, RecordingEntry
 from kbs_process.errors import KbsError, RecordingError
 from kbs_process.progress import Progress
+from kbs_process.reduction.losses import in_words
 from kbs_process.reduction.measurable import check_requirements
 from kbs_process.reduction.preparing import Prepared, check_taring, fit_gravity, prepare, told_copies
 from kbs_process.reduction.soundness import check_model
 from kbs_process.results.records import Notice
-from kbs_process.signals.records import TRUNCATED, Loss
+from kbs_process.signals.records import Loss
 from kbs_process.stages import decouple
 from kbs_process.stages.gravity.model import GravityModel
 
@@ -136,20 +137,3 @@ def repeatability_hint(campaign: Campaign) -> str:
 def _repeats(entries: Sequence[RecordingEntry]) -> bool:
     """Whether two recordings are runs of one trajectory."""
     return len({entry.trajectory for entry in entries}) < len(entries)
-
-
-def in_words(loss: Loss) -> str:
-    """Return one line for a loss: what, how many, when, where."""
-    start, end = loss.start_s, loss.end_s
-    when = (
-        ""
-        if start is None
-        else f", from {start:.4f} s on"
-        if loss.kind == TRUNCATED
-        else f" at {start:.4f} s"
-        if end in (None, start)
-        else f", {start:.4f} to {end:.4f} s"
-    )
-    detail = f" ({loss.detail})" if loss.detail else ""
-    count = f"{loss.count} x " if loss.count else ""
-    return f"{count}{loss.kind}{when}, {loss.where}{detail}"
