@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -54,6 +55,22 @@ def test_a_channel_that_repeats_another_is_told(tmp_path):
     recordings = recorded(campaign, drawn(campaign, 1), 1, reads=doubled)
     assert "Fz repeats Fx in sweep: one stream is read twice" in list(repeated(recordings))
     assert not list(repeated(recorded(campaign, drawn(campaign, 1), 1)))
+
+
+@pytest.mark.slow
+def test_a_channel_that_died_between_recordings_is_told(tmp_path):
+    campaign = described(tmp_path)
+    sweep, test = recorded(campaign, drawn(campaign, 1), 1)
+    mean = np.append(sweep.raw.values.mean(axis=0)[:5], 0.1)
+    zeroed = [one.raw.values - one.raw.values.mean(axis=0) + mean for one in (sweep, test)]
+    zeroed[1][:, 5] = 0.002 * np.random.default_rng(1).standard_normal(len(zeroed[1]))
+    read = [
+        replace(one, raw=one.raw.derive(x, "zeroed"), run=replace(one.run, wrench=one.raw.derive(x, "zeroed")))
+        for one, x in zip((sweep, test), zeroed, strict=True)
+    ]
+    found = checked(campaign, read).soundness
+    assert any("Tz does not respond" in one and "test" in one for one in found.reasons), found.reasons
+    assert not any("sweep" in one for one in found.reasons)
 
 
 def share(campaign: Campaign, seeds: range) -> float:

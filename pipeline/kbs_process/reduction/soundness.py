@@ -22,8 +22,16 @@ from kbs_process.reduction.preparing import Prepared, tare
 from kbs_process.reduction.relief import relieved
 from kbs_process.results.judged import WRONG, Beyond, Doubt, Soundness
 from kbs_process.results.records import Notice
-from kbs_process.signals.records import WRENCH_CHANNELS, Array
-from kbs_process.stages.conventions import SignCheck, check_encoder_sense, check_gravity_sign, check_weight
+from kbs_process.signals.records import WRENCH_CHANNELS, Array, Mask
+from kbs_process.signals.smoothing import smooth
+from kbs_process.stages.conventions import (
+    BEYOND,
+    SignCheck,
+    check_encoder_sense,
+    check_gravity_sign,
+    check_response,
+    check_weight,
+)
 from kbs_process.stages.gravity import model as gravity
 from kbs_process.stages.gravity.equation import Equation
 from kbs_process.stages.gravity.equation import Prepared as Instants
@@ -100,7 +108,8 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
         samples = [sample for sample, _ in tared]
         equation = model.equation
         instants = [prepared(sample, equation, model.settings, model.settings.low_pass_Hz) for sample in samples]
-        conventions = (*check_weight(campaign.rig), *_conventions(recordings[:2], instants[:2], equation))
+        zeros = np.stack([taring.bias for _, taring in tared])
+        conventions = (*check_weight(campaign.rig), *_conventions(recordings, instants, model, zeros))
         found = tension(model, {sample.name: taring for sample, taring in tared})
         most = _most(equation)
         rounding = {key: x for one in recordings for key, x in measurable.rounding(campaign, one.readings).items()}
@@ -145,19 +154,45 @@ def _hidden(
 
 
 def _conventions(
-    recordings: Sequence[Prepared], instants: Sequence[Instants], equation: Equation
+    recordings: Sequence[Prepared], instants: Sequence[Instants], model: GravityModel, zeros: Array
 ) -> Iterator[SignCheck]:
-    """Signs of the calibration and of the first run: they do not change within a campaign."""
-    rig, theta = equation.elements.rig, equation.start()
-    noise = rig.loads.noise[equation.index]
-    for one, data in zip(recordings, instants, strict=True):
+    """Signs and responses of every recording; `zeros` (recordings, c) are its channels' constants."""
+    equation = model.equation
+    theta = equation.start()
+    noise = equation.elements.rig.loads.noise[equation.index]
+    for one, data, alone in zip(recordings, instants, _moved_alone(equation, zeros), strict=True):
         errors = equation.jacobian(theta, data).reshape(*data.wrench.shape, equation.size) * equation.sigma()
         found = [*check_gravity_sign(equation.channels, data.wrench, equation.predict(theta, data), noise, errors)]
+        found += check_response(equation.channels, *_read_and_due(one, data, model), noise, alone)
         command, angle = commanded(one.run), one.run.angle
         if command is not None and angle is not None:
             found += check_encoder_sense(angle, command)
         for check in found:
             yield msgspec.structs.replace(check, check=f"{check.check}, {one.entry.name}")
+
+
+def _moved_alone(equation: Equation, zeros: Array) -> Mask:
+    """Which channel's zero (recordings, c) differs from another recording's far more than that of any other channel."""
+    stated = np.maximum(equation.bias_sigma, 1e-12)
+    moved = np.array([np.abs((zeros - own) / stated).max(axis=0) for own in zeros])
+    others = np.array([np.delete(moved, column, axis=1).max(axis=1, initial=0.0) for column in range(moved.shape[1])])
+    alone: Mask = (moved > BEYOND * others.T) & (others.T > 0.0)
+    return alone
+
+
+def _read_and_due(one: Prepared, data: Instants, model: GravityModel) -> tuple[Array, Array, Array]:
+    """Low-passed readings (n, c) as recorded, the same as the fitted rig has them, and the rms error (c,) of that."""
+    equation, rig = model.equation, model.equation.elements.rig
+    read = smooth(one.raw.values, one.raw.dt, model.settings.low_pass_Hz)[np.rint(data.t / data.dt).astype(np.intp)]
+    index = [WRENCH_CHANNELS.index(channel) for channel in rig.transducer.channels]
+    reads = np.eye(len(equation.channels))
+    reads[: len(index), : len(index)] += rig.transducer.cross_coupling.value[np.ix_(index, index)]
+    theta = model.fit.value[: equation.size]
+    slopes = reads @ equation.jacobian(theta, data).reshape(*data.wrench.shape, equation.size)
+    slopes -= slopes.mean(axis=0)
+    C = model.fit.covariance[: equation.size, : equation.size]
+    error = np.sqrt(np.maximum(np.einsum("nci,ij,ncj->c", slopes, C, slopes), 0.0) / len(slopes))
+    return read, read - (data.wrench - equation.predict(theta, data)) @ reads.T, error
 
 
 def repeated(recordings: Sequence[Prepared]) -> Iterator[str]:
