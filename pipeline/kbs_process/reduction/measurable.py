@@ -70,7 +70,7 @@ def hidden(
     known = loads.valid & moving
     inside = known[np.argmax(known) : len(known) - np.argmax(known[::-1])] if known.any() else known
     if len(inside) and (missing := 1.0 - float(np.mean(inside))) > UNSEEN:
-        yield Doubt(f"in {100.0 * missing:.0f} % of {name} wrench or angles are missing", of_failed=False)
+        yield Doubt(f"in {100.0 * missing:.0f} % of {name} readings or angles are missing", of_failed=False)
     if coarse := [one for one in _coarse(campaign, streams) if one[0] in channels]:
         steps = ", ".join(f"{channel} in steps of {step:.3g} {unit}" for channel, unit, step in coarse)
         yield Doubt(f"{steps} in {name}: coarser than the resolution that is stated")

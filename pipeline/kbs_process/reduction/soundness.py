@@ -22,6 +22,7 @@ from kbs_process.reduction.preparing import Prepared, tare
 from kbs_process.reduction.relief import relieved
 from kbs_process.results.judged import WRONG, Beyond, Doubt, Soundness
 from kbs_process.results.records import Notice
+from kbs_process.rig.model import Rig
 from kbs_process.signals.records import WRENCH_CHANNELS, Array, Mask
 from kbs_process.signals.smoothing import smooth
 from kbs_process.stages.conventions import (
@@ -226,12 +227,16 @@ def _left(model: GravityModel, most: Array) -> Iterator[str]:
                 yield f"gravity leaves {rms:.3g} {unit} rms of {channel} in {name}"
 
 
-def _most(equation: Equation) -> Array:
-    """What may be left (c,) of a calibration, rms: a part of the weight, and of the torque that it can make."""
-    rig = equation.elements.rig
+def extent(rig: Rig) -> tuple[float, float]:
+    """Weight (N) of all bodies, and how far from T's origin (m) the outermost centre of mass may be."""
     weight = float(rig.gravity) * sum(float(body.mass) for body in rig.bodies)
     arms = [float(np.linalg.norm(joint.origin.value)) for joint in rig.joints]
-    reach = sum(arms) + max((float(np.linalg.norm(body.cog.value)) for body in rig.bodies), default=0.0)
+    return weight, sum(arms) + max((float(np.linalg.norm(body.cog.value)) for body in rig.bodies), default=0.0)
+
+
+def _most(equation: Equation) -> Array:
+    """What may be left (c,) of a calibration, rms: a part of the weight, and of the torque that it can make."""
+    weight, reach = extent(equation.elements.rig)
     scale = np.array(
         [
             weight if channel[0] == "F" else weight * reach if channel in WRENCH_CHANNELS else 0.0
