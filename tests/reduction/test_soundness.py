@@ -73,6 +73,19 @@ def test_a_channel_that_died_between_recordings_is_told(tmp_path):
     assert not any("sweep" in one for one in found.reasons)
 
 
+@pytest.mark.slow
+def test_a_wrench_that_comes_later_than_known_is_told(tmp_path):
+    campaign = described(tmp_path)
+    sweep, test = recorded(campaign, drawn(campaign, 1), 1)
+    wrench = test.run.wrench
+    assert wrench is not None
+    late = wrench.derive(np.concatenate([wrench.values[:20], wrench.values[:-20]]), "a second late")
+    found = checked(campaign, [sweep, replace(test, raw=late, run=replace(test.run, wrench=late))]).soundness
+    (beyond,) = (one for one in found.beyond if "lag (s) behind the angles in test" in one.name)
+    assert beyond.value == pytest.approx(1.0, rel=0.1)
+    assert not any("behind the angles in sweep" in one.name for one in found.beyond)
+
+
 def share(campaign: Campaign, seeds: range) -> float:
     """Of arms drawn from what is stated of them, the part that is judged."""
     found = [checked(campaign, recorded(campaign, drawn(campaign, seed), seed)).soundness for seed in seeds]

@@ -25,6 +25,7 @@ from kbs_process.results.records import Notice
 from kbs_process.rig.model import Rig
 from kbs_process.signals.records import WRENCH_CHANNELS, Array, Mask
 from kbs_process.signals.smoothing import smooth
+from kbs_process.stages.align.clocks import late_sigma
 from kbs_process.stages.conventions import (
     BEYOND,
     SignCheck,
@@ -38,7 +39,7 @@ from kbs_process.stages.gravity.equation import Equation
 from kbs_process.stages.gravity.equation import Prepared as Instants
 from kbs_process.stages.gravity.hypotheses import Explained, explanations
 from kbs_process.stages.gravity.model import GravityModel, Sample, prepared
-from kbs_process.stages.gravity.tension import BY_CHANCE, Moved, tension
+from kbs_process.stages.gravity.tension import BY_CHANCE, Moved, lag, tension
 from kbs_process.stages.repeats import commanded
 
 LEFT = 0.1  # of the weight, and of the torque that it can make: a calibration leaves less, whatever rubs or pulls
@@ -111,7 +112,12 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
         instants = [prepared(sample, equation, model.settings, model.settings.low_pass_Hz) for sample in samples]
         zeros = np.stack([taring.bias for _, taring in tared])
         conventions = (*check_weight(campaign.rig), *_conventions(recordings, instants, model, zeros))
-        found = tension(model, {sample.name: taring for sample, taring in tared})
+        amplifier = campaign.rig.transducer.amplifier
+        lags = [
+            lag(model, data, late_sigma(one.run.clocks, amplifier))
+            for one, data in zip(recordings, instants, strict=True)
+        ]
+        found = tension(model, {sample.name: taring for sample, taring in tared}, lags)
         most = _most(equation)
         rounding = {key: x for one in recordings for key, x in measurable.rounding(campaign, one.readings).items()}
         hidden = {one.name: tuple(_hidden(campaign, one, recordings, model)) for one in campaign.requirements}
