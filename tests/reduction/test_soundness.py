@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from kbs_process.campaign.config import Campaign
-from kbs_process.reduction.soundness import repeated
+from kbs_process.reduction.soundness import extent, repeated
 from reduction.arm import checked, described, drawn, recorded
 
 UNIT = np.eye(6)
@@ -84,6 +84,14 @@ def test_a_wrench_that_comes_later_than_known_is_told(tmp_path):
     (beyond,) = (one for one in found.beyond if "lag (s) behind the angles in test" in one.name)
     assert beyond.value == pytest.approx(1.0, rel=0.1)
     assert not any("behind the angles in sweep" in one.name for one in found.beyond)
+
+
+def test_a_rig_may_weigh_what_its_files_allow(tmp_path):
+    body = described(tmp_path).rig.bodies[0]
+    light = replace(body, mass=replace(body.mass, value=np.array(0.7), sigma=np.array(0.3)))
+    weight, reach = extent(replace(described(tmp_path).rig, bodies=(light,)))
+    assert weight == pytest.approx(9.80665 * (0.7 + 4 * 0.3))
+    assert reach == pytest.approx(0.2 + np.linalg.norm([0.12 + 0.012, 0.012, 0.012]))
 
 
 def share(campaign: Campaign, seeds: range) -> float:

@@ -234,10 +234,11 @@ def _left(model: GravityModel, most: Array) -> Iterator[str]:
 
 
 def extent(rig: Rig) -> tuple[float, float]:
-    """Weight (N) of all bodies, and how far from T's origin (m) the outermost centre of mass may be."""
-    weight = float(rig.gravity) * sum(float(body.mass) for body in rig.bodies)
+    """Weight (N) of all bodies, and how far from T's origin (m) a centre of mass may be, at most by what is stated."""
+    most = [(body.mass.value + BEYOND * body.mass.sigma, body.cog.value, body.cog.sigma) for body in rig.bodies]
     arms = [float(np.linalg.norm(joint.origin.value)) for joint in rig.joints]
-    return weight, sum(arms) + max((float(np.linalg.norm(body.cog.value)) for body in rig.bodies), default=0.0)
+    reach = max((float(np.linalg.norm(np.abs(at) + BEYOND * sigma)) for _, at, sigma in most), default=0.0)
+    return float(rig.gravity) * float(sum(mass for mass, _, _ in most)), sum(arms) + reach
 
 
 def _most(equation: Equation) -> Array:
