@@ -27,7 +27,7 @@ from kbs_process.recordings.mcap.messages.encoding import OutStream
 from kbs_process.recordings.mcap.writer import write_mcap
 from kbs_process.results.outcome import Outcome
 from kbs_process.results.store import writing
-from kbs_process.rig.model import Rig
+from kbs_process.rig.model import Rig, substitute
 from kbs_process.studies.convert import preset_names
 
 VERBS = ("process", "validate", "inspect", "simulate", "predict", "import", "report", "prove")
@@ -246,6 +246,19 @@ def test_validate_tells_losses_and_fails_only_when_asked(
 
 
 @pytest.mark.slow
+def test_validate_of_a_wrong_model_fails_when_asked(
+    processable: CampaignFolder, capsys: pytest.CaptureFixture[str]
+) -> None:
+    heavy = substitute(rig(), {"body.base.mass": rig().quantities()["body.base.mass"].value + 20.0})
+    for seed, path in enumerate((processable.path / "recordings").iterdir()):
+        short_campaign.record(path, noise=0.01, seed=seed, rig=heavy)
+    assert run("validate", str(processable.path), "--check") == 1
+    out = capsys.readouterr().out
+    assert "error: the model of this rig is wrong" in out
+    assert "0 with losses" in out
+
+
+@pytest.mark.slow
 def test_validate_tells_what_was_put_in_order_and_counts_no_loss(
     processable: CampaignFolder, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -270,7 +283,7 @@ def test_validate_tells_a_recording_of_which_nothing_is_whole_long_enough(
     out = capsys.readouterr().out
     assert "EL089P00_2: wrench (Fz in 1000: interpolated)" in out
     assert "EL089P00_2: too short or too damaged" in out
-    assert "wrench and angles are whole for 0 s of 20 s, by 1000 x non-finite" in out
+    assert "readings and angles are whole for 0 s of 20 s, by 1000 x non-finite" in out
 
 
 @pytest.mark.slow

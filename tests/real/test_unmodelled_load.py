@@ -23,7 +23,9 @@ def test_recordings_with_a_bungee_are_named_with_channels_and_a_remedy(archived:
     for notice in told:
         assert "Tx" in notice["what"]
         assert "Ty" in notice["what"]
-        assert "The verdict is about that load" in notice["what"]
+        assert "The verdict holds that load as well as the article's own disturbance" in " ".join(
+            notice["what"].split()
+        )
         assert "bungee" in notice["remedy"]
 
 

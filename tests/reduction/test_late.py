@@ -5,8 +5,7 @@ import pytest
 
 from kbs_process.rig.model import Amplifier, Quantity
 from kbs_process.signals.records import Clock
-from kbs_process.stages.align.clocks import UNKNOWN_OFFSET_S, offset_sigma
-from kbs_process.studies.correlate.uncertainty import late_sigma
+from kbs_process.stages.align.clocks import UNKNOWN_OFFSET_S, late_sigma, offset_sigma
 
 
 def test_an_amplifier_whose_corner_is_not_known_delays_by_what_is_not_known():

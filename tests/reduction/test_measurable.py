@@ -105,7 +105,7 @@ def test_what_a_gap_may_hide_is_not_judged_and_a_few_lost_samples_are():
     assert doubts([]) == [] and doubts([(20.0, 20.02), (80.0, 80.12)]) == []
     assert doubts([(0.0, 0.5), (119.5, 119.9)]) == []  # before what is known, and after
     (why,) = doubts([(20.0, 20.02), (60.0, 60.2), (70.0, 72.0)])
-    assert why.startswith("wrench or angles are missing in test, from 70.00 s to 72.00 s at the longest")
+    assert why.startswith("readings or angles are missing in test, from 70.00 s to 72.00 s at the longest")
     assert len(doubts([(60.0, 60.2)])) == 1
     (why,) = doubts([], slice(20, 1440))
-    assert why == "in 41 % of test wrench or angles are missing"
+    assert why == "in 41 % of test readings or angles are missing"

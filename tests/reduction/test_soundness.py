@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from kbs_process.campaign.config import Campaign
-from kbs_process.reduction.soundness import repeated
+from kbs_process.reduction.soundness import extent, repeated
 from kbs_process.signals.records import Signal
 from reduction.arm import checked, described, drawn, recorded
 
@@ -67,6 +67,43 @@ def test_an_encoder_that_is_wired_to_two_joints_is_told():
         assert list(repeated([one])) == told * ["el repeats az in test: one stream is read twice"]
         still = replace(angle, values=np.ones((2000, 2)))
         assert not list(repeated([SimpleNamespace(**{**vars(one), "run": SimpleNamespace(angle=still)})]))
+
+
+@pytest.mark.slow
+def test_a_channel_that_died_between_recordings_is_told(tmp_path):
+    campaign = described(tmp_path)
+    sweep, test = recorded(campaign, drawn(campaign, 1), 1)
+    mean = np.append(sweep.raw.values.mean(axis=0)[:5], 0.1)
+    zeroed = [one.raw.values - one.raw.values.mean(axis=0) + mean for one in (sweep, test)]
+    zeroed[1][:, 5] = 0.002 * np.random.default_rng(1).standard_normal(len(zeroed[1]))
+    read = [
+        replace(one, raw=one.raw.derive(x, "zeroed"), run=replace(one.run, wrench=one.raw.derive(x, "zeroed")))
+        for one, x in zip((sweep, test), zeroed, strict=True)
+    ]
+    found = checked(campaign, read).soundness
+    assert any("Tz does not respond" in one and "test" in one for one in found.reasons), found.reasons
+    assert not any("sweep" in one for one in found.reasons)
+
+
+@pytest.mark.slow
+def test_a_wrench_that_comes_later_than_known_is_told(tmp_path):
+    campaign = described(tmp_path)
+    sweep, test = recorded(campaign, drawn(campaign, 1), 1)
+    wrench = test.run.wrench
+    assert wrench is not None
+    late = wrench.derive(np.concatenate([wrench.values[:20], wrench.values[:-20]]), "a second late")
+    found = checked(campaign, [sweep, replace(test, raw=late, run=replace(test.run, wrench=late))]).soundness
+    (beyond,) = (one for one in found.beyond if "lag (s) behind the angles in test" in one.name)
+    assert beyond.value == pytest.approx(1.0, rel=0.1)
+    assert not any("behind the angles in sweep" in one.name for one in found.beyond)
+
+
+def test_a_rig_may_weigh_what_its_files_allow(tmp_path):
+    body = described(tmp_path).rig.bodies[0]
+    light = replace(body, mass=replace(body.mass, value=np.array(0.7), sigma=np.array(0.3)))
+    weight, reach = extent(replace(described(tmp_path).rig, bodies=(light,)))
+    assert weight == pytest.approx(9.80665 * (0.7 + 4 * 0.3))
+    assert reach == pytest.approx(0.2 + np.linalg.norm([0.12 + 0.012, 0.012, 0.012]))
 
 
 def share(campaign: Campaign, seeds: range) -> float:

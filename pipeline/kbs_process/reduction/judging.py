@@ -127,6 +127,9 @@ def judged(
             if any(one.extreme.channel == channel for one in measured)
         ),
         source=requirement.source,
+        lever_m=None
+        if campaign.rig.spacecraft is None or requirement.frame != "S"
+        else float(np.linalg.norm(campaign.rig.spacecraft.position.value)),
     )
 
 

@@ -75,12 +75,12 @@ def hidden(
     missing = len(known) - int(np.count_nonzero(known))
     if missing > UNSEEN * len(known) and missing * loads.dt > ENDS_S:
         share = 100.0 * missing / len(known)
-        yield Doubt(f"in {share:.0f} % of {name} wrench or angles are missing", of_failed=False)
+        yield Doubt(f"in {share:.0f} % of {name} readings or angles are missing", of_failed=False)
     first, last = loads.t[known][[0, -1]] if known.any() else (0.0, 0.0)
     inside = run.gaps[(run.gaps[:, 1] > first) & (run.gaps[:, 0] < last)]
     if len(gaps := too_long(inside, band)):
         start, end = gaps[np.argmax(np.diff(gaps)[:, 0])]
-        where = f"wrench or angles are missing in {name}, from {start:.2f} s to {end:.2f} s at the longest"
+        where = f"readings or angles are missing in {name}, from {start:.2f} s to {end:.2f} s at the longest"
         yield Doubt(f"{where}: what there was up to {edge:g} Hz is not known", of_failed=False)
     if coarse := [one for one in _coarse(campaign, streams) if one[0] in channels]:
         steps = ", ".join(f"{channel} in steps of {step:.3g} {unit}" for channel, unit, step in coarse)

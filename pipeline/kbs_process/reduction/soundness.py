@@ -23,14 +23,24 @@ from kbs_process.reduction.preparing import Prepared, tare
 from kbs_process.reduction.relief import relieved
 from kbs_process.results.judged import WRONG, Beyond, Doubt, Soundness
 from kbs_process.results.records import Notice
-from kbs_process.signals.records import WRENCH_CHANNELS, Array
-from kbs_process.stages.conventions import SignCheck, check_encoder_sense, check_gravity_sign, check_weight
+from kbs_process.rig.model import Rig
+from kbs_process.signals.records import WRENCH_CHANNELS, Array, Mask
+from kbs_process.signals.smoothing import smooth
+from kbs_process.stages.align.clocks import late_sigma
+from kbs_process.stages.conventions import (
+    BEYOND,
+    SignCheck,
+    check_encoder_sense,
+    check_gravity_sign,
+    check_response,
+    check_weight,
+)
 from kbs_process.stages.gravity import model as gravity
 from kbs_process.stages.gravity.equation import Equation
 from kbs_process.stages.gravity.equation import Prepared as Instants
 from kbs_process.stages.gravity.hypotheses import Explained, explanations
 from kbs_process.stages.gravity.model import GravityModel, Sample, prepared
-from kbs_process.stages.gravity.tension import BY_CHANCE, Moved, tension
+from kbs_process.stages.gravity.tension import BY_CHANCE, Moved, lag, tension
 from kbs_process.stages.repeats import commanded
 
 LEFT = 0.1  # of the weight, and of the torque that it can make: a calibration leaves less, whatever rubs or pulls
@@ -102,8 +112,14 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
         samples = [sample for sample, _ in tared]
         equation = model.equation
         instants = [prepared(sample, equation, model.settings, model.settings.low_pass_Hz) for sample in samples]
-        conventions = (*check_weight(campaign.rig), *_conventions(recordings[:2], instants[:2], equation))
-        found = tension(model, {sample.name: taring for sample, taring in tared})
+        zeros = np.stack([taring.bias for _, taring in tared])
+        conventions = (*check_weight(campaign.rig), *_conventions(recordings, instants, model, zeros))
+        amplifier = campaign.rig.transducer.amplifier
+        lags = [
+            lag(model, data, late_sigma(one.run.clocks, amplifier))
+            for one, data in zip(recordings, instants, strict=True)
+        ]
+        found = tension(model, {sample.name: taring for sample, taring in tared}, lags)
         most = _most(equation)
         rounding = {key: x for one in recordings for key, x in measurable.rounding(campaign, one.readings).items()}
         hidden = {one.name: tuple(_hidden(campaign, one, recordings, model)) for one in campaign.requirements}
@@ -147,19 +163,45 @@ def _hidden(
 
 
 def _conventions(
-    recordings: Sequence[Prepared], instants: Sequence[Instants], equation: Equation
+    recordings: Sequence[Prepared], instants: Sequence[Instants], model: GravityModel, zeros: Array
 ) -> Iterator[SignCheck]:
-    """Signs of the calibration and of the first run: they do not change within a campaign."""
-    rig, theta = equation.elements.rig, equation.start()
-    noise = rig.loads.noise[equation.index]
-    for one, data in zip(recordings, instants, strict=True):
+    """Signs and responses of every recording; `zeros` (recordings, c) are its channels' constants."""
+    equation = model.equation
+    theta = equation.start()
+    noise = equation.elements.rig.loads.noise[equation.index]
+    for one, data, alone in zip(recordings, instants, _moved_alone(equation, zeros), strict=True):
         errors = equation.jacobian(theta, data).reshape(*data.wrench.shape, equation.size) * equation.sigma()
         found = [*check_gravity_sign(equation.channels, data.wrench, equation.predict(theta, data), noise, errors)]
+        found += check_response(equation.channels, *_read_and_due(one, data, model), noise, alone)
         command, angle = commanded(one.run), one.run.angle
         if command is not None and angle is not None:
             found += check_encoder_sense(angle, command)
         for check in found:
             yield msgspec.structs.replace(check, check=f"{check.check}, {one.entry.name}")
+
+
+def _moved_alone(equation: Equation, zeros: Array) -> Mask:
+    """Which channel's zero (recordings, c) differs from another recording's far more than that of any other channel."""
+    stated = np.maximum(equation.bias_sigma, 1e-12)
+    moved = np.array([np.abs((zeros - own) / stated).max(axis=0) for own in zeros])
+    others = np.array([np.delete(moved, column, axis=1).max(axis=1, initial=0.0) for column in range(moved.shape[1])])
+    alone: Mask = (moved > BEYOND * others.T) & (others.T > 0.0)
+    return alone
+
+
+def _read_and_due(one: Prepared, data: Instants, model: GravityModel) -> tuple[Array, Array, Array]:
+    """Low-passed readings (n, c) as recorded, the same as the fitted rig has them, and the rms error (c,) of that."""
+    equation, rig = model.equation, model.equation.elements.rig
+    read = smooth(one.raw.values, one.raw.dt, model.settings.low_pass_Hz)[np.rint(data.t / data.dt).astype(np.intp)]
+    index = [WRENCH_CHANNELS.index(channel) for channel in rig.transducer.channels]
+    reads = np.eye(len(equation.channels))
+    reads[: len(index), : len(index)] += rig.transducer.cross_coupling.value[np.ix_(index, index)]
+    theta = model.fit.value[: equation.size]
+    slopes = reads @ equation.jacobian(theta, data).reshape(*data.wrench.shape, equation.size)
+    slopes -= slopes.mean(axis=0)
+    C = model.fit.covariance[: equation.size, : equation.size]
+    error = np.sqrt(np.maximum(np.einsum("nci,ij,ncj->c", slopes, C, slopes), 0.0) / len(slopes))
+    return read, read - (data.wrench - equation.predict(theta, data)) @ reads.T, error
 
 
 def repeated(recordings: Sequence[Prepared]) -> Iterator[str]:
@@ -197,12 +239,17 @@ def _left(model: GravityModel, most: Array) -> Iterator[str]:
                 yield f"gravity leaves {rms:.3g} {unit} rms of {channel} in {name}"
 
 
+def extent(rig: Rig) -> tuple[float, float]:
+    """Weight (N) of all bodies, and how far from T's origin (m) a centre of mass may be, at most by what is stated."""
+    most = [(body.mass.value + BEYOND * body.mass.sigma, body.cog.value, body.cog.sigma) for body in rig.bodies]
+    arms = [float(np.linalg.norm(joint.origin.value)) for joint in rig.joints]
+    reach = max((float(np.linalg.norm(np.abs(at) + BEYOND * sigma)) for _, at, sigma in most), default=0.0)
+    return float(rig.gravity) * float(sum(mass for mass, _, _ in most)), sum(arms) + reach
+
+
 def _most(equation: Equation) -> Array:
     """What may be left (c,) of a calibration, rms: a part of the weight, and of the torque that it can make."""
-    rig = equation.elements.rig
-    weight = float(rig.gravity) * sum(float(body.mass) for body in rig.bodies)
-    arms = [float(np.linalg.norm(joint.origin.value)) for joint in rig.joints]
-    reach = sum(arms) + max((float(np.linalg.norm(body.cog.value)) for body in rig.bodies), default=0.0)
+    weight, reach = extent(equation.elements.rig)
     scale = np.array(
         [
             weight if channel[0] == "F" else weight * reach if channel in WRENCH_CHANNELS else 0.0

@@ -16,8 +16,6 @@ from kbs_process.signals.records import Array, Signal
 BEYOND = 4.0
 # No calibration promises less; and whatever disturbs it, a channel that is off by more does not follow gravity.
 _EXACT, _HALF = 1e-3, 0.5
-# Channels on which the computed static wrench varies less than this many times its error say nothing.
-MIN_VARIATION = 10.0
 # A plate that is inclined by less than this (rad) is called level.
 LEVEL = 0.1
 
@@ -60,29 +58,55 @@ def check_gravity_sign(
     `computed` comes from nominal parameters; `errors` (n, c, k) are its independent one-sigma errors by what the files
     state: masses, CoGs, the calibration. `noise` (c,) is the channels' rms noise. A channel that reads the reaction, or
     is swapped with another, shows a slope of -1 or near 0. Taring moves only the offset. The slope's sigma holds the
-    errors, and what does not follow the computed loads, of any colour.
+    errors, and what does not follow the computed loads, of any colour. One that noise
+    and files leave unknown by half is not testable.
     """
     tests = []
     for index, channel in enumerate(channels):
         x, y = (values[:, index] - values[:, index].mean() for values in (computed, measured))
-        if np.std(x) <= MIN_VARIATION * noise[index]:
-            continue
         power = float(x @ x)
+        if power == 0.0:
+            continue
         slope = float(x @ y) / power
         seen = float(longrun_covariance(((y - slope * x) * x)[:, None], [(len(x), 1)])[0, 0])
-        chance = max(seen, power * float(noise[index]) ** 2)
+        noisy = power * float(noise[index]) ** 2
         stated = 0.0 if errors is None else float(np.sum((x @ errors[:, index]) ** 2))
-        sigma = float(np.sqrt(chance + stated)) / power
+        sigma = float(np.sqrt(max(seen, noisy) + stated)) / power
+        testable = BEYOND * np.sqrt(noisy + stated) / power < _HALF
         tests.append(
             SignCheck(
                 check=f"slope of measured {channel} against computed gravity",
                 expected="+1",
-                found=f"{slope:+.3f} ± {sigma:.2g}",
-                ok=bool(abs(slope - 1.0) < np.clip(BEYOND * sigma, _EXACT, _HALF)),
+                found=f"{slope:+.3f} ± {sigma:.2g}" if testable else f"not testable here, ± {sigma:.2g}",
+                ok=bool(not testable or abs(slope - 1.0) < np.clip(BEYOND * sigma, _EXACT, _HALF)),
                 slope=slope,
                 sigma=sigma,
             )
         )
+    return tuple(tests)
+
+
+def check_response(
+    channels: Sequence[str], read: Array, due: Array, error: Array, noise: Array, alone: Sequence[bool]
+) -> tuple[SignCheck, ...]:
+    """Channels that show nothing but noise where they ought to show more.
+
+    `read` (n, c) is low-passed, as recorded; `due` (n, c) what the fitted rig makes of it, with an `error` (c,), rms;
+    `noise` (c,) the channels' stated rms; `alone` (c,) those whose zero has moved while that of no other has.
+    """
+    tests = []
+    for index, channel in enumerate(channels):
+        shown, expected = float(read[:, index].std()), float(due[:, index].std())
+        lost = alone[index] and abs(float(read[:, index].mean())) < noise[index]
+        if shown < noise[index] and (lost or expected > BEYOND * np.hypot(shown, error[index])):
+            tests.append(
+                SignCheck(
+                    check=f"reading of {channel}, rms about its mean",
+                    expected="its zero of before" if lost else f"{expected:.2g}",
+                    found=f"{shown:.2g}{' about nothing' if lost else ''}: {channel} does not respond",
+                    ok=False,
+                )
+            )
     return tuple(tests)
 
 

@@ -9,10 +9,12 @@ What no such method can see is a difference between the least latencies of two s
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
+from kbs_process.rig.model import Amplifier
 from kbs_process.signals.records import Array, Clock, Stamps
 
 STRETCHES = 256  # bound on the pairs kept, however long the recording
@@ -216,6 +218,15 @@ def align(streams: dict[str, ClockData], reference: str) -> dict[str, Clock]:
 def offset_sigma(clock: Clock) -> float:
     """Return the standard uncertainty of a clock's offset, s; a conventional one where nothing was there to tell."""
     return clock.sigma_offset_s if np.isfinite(clock.sigma_offset_s) else UNKNOWN_OFFSET_S
+
+
+def late_sigma(clocks: Mapping[str, Clock], amplifier: Amplifier | None) -> float:
+    """How well it is known when angles and wrench belong together, s: their clocks, and the amplifier's delay."""
+    clock = clocks.get("angle") or clocks.get("rate")
+    late = UNKNOWN_OFFSET_S if clock is None else float(np.hypot(offset_sigma(clock), np.nan_to_num(clock.latency_s)))
+    if amplifier is None:
+        return late
+    return float(np.hypot(late, amplifier.delay * float(amplifier.corner.sigma) / float(amplifier.corner)))
 
 
 def _own_source(data: ClockData, otherwise: str) -> str:

@@ -104,7 +104,7 @@ def prepare(
     if len(at) < 8:
         whole = motion.dt * np.count_nonzero(motion.valid & wrench.valid)
         raise RecordingError(
-            f"{name}: too short or too damaged for a gravity fit below {low_pass:g} Hz: wrench and angles are whole "
+            f"{name}: too short or too damaged for a gravity fit below {low_pass:g} Hz: readings and angles are whole "
             f"for {whole:.3g} s of {motion.dt * len(motion):.3g} s{lost and f', by {lost}'}",
             remedy=f"`kbs-process validate` lists gaps and readings that are no numbers: record "
             f"{4 * edge * motion.dt:.0f} s without at least, or leave this recording out of campaign.toml",

@@ -291,6 +291,6 @@ def _refuse_no_motion(samples: Sequence[Sample], rig: Rig) -> None:
     bodies = ", ".join(f"{body.cog.name}, {body.mass.name}" for body in rig.bodies)
     raise FitError(
         f"no joint moves in {', '.join(s.name for s in samples)}: {bodies} and the tilt "
-        "cannot be told apart from the transducer's bias",
+        "cannot be told apart from the zeros of the readings",
         remedy="add a recording that turns the joints, such as a pseudo-static calibration",
     )

@@ -170,6 +170,6 @@ def refuse_uninformed(equation: Equation, prepared: Sequence[Prepared]) -> None:
         direction = combination(Vt[0], equation.names)
         raise FitError(
             "the recordings say less about the rig than its parameter files do; the best that they hold, "
-            f"{direction} (in prior sigmas), cannot be told apart from the transducer's bias",
+            f"{direction} (in prior sigmas), cannot be told apart from the zeros of the readings",
             remedy="add a recording that turns the joints further",
         )

@@ -13,13 +13,15 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
-from kbs_process.signals.records import Array
+from kbs_process.signals.records import WRENCH_CHANNELS, Array
+from kbs_process.stages.gravity.equation import Prepared
 from kbs_process.stages.gravity.model import GravityModel, taring_error
-from kbs_process.stages.gravity.solve import ZERO
+from kbs_process.stages.gravity.solve import ZERO, least_sigma
 from kbs_process.stages.gravity.taring import Taring
 
 BEYOND = 4.0  # sigma
 BY_CHANCE = 1e-4
+_ROUNDS = 4  # of weights
 _INFORMED = 0.1  # part of the prior's variance that the data take away: less says nothing of the prior
 
 
@@ -57,8 +59,10 @@ class Tension:
         return not self.beyond and self.probability >= BY_CHANCE
 
 
-def tension(model: GravityModel, tarings: Mapping[str, Taring]) -> Tension:
+def tension(model: GravityModel, tarings: Mapping[str, Taring], lags: Sequence[Moved] = ()) -> Tension:
     """Compare a fit with its priors, and the zeros of recordings that were not fitted with that of the bias.
+
+    `lags` are numbers that were fitted to what the fit leaves, see `lag`.
 
     How a zero drifts is assumed rather than known: it is not compared.
     """
@@ -69,7 +73,29 @@ def tension(model: GravityModel, tarings: Mapping[str, Taring]) -> Tension:
     names = [name for name, prior in zip(fit.names, known, strict=True) if prior]
     prior = (fit.value - fit.moved)[known]
     moved = by_chance(names, prior, fit.value[known], scale, C)
-    return Tension((*moved, *_zeros(model, tarings)), together(fit.moved[known] / scale, C))
+    return Tension((*moved, *_zeros(model, tarings), *lags), together(fit.moved[known] / scale, C))
+
+
+def lag(model: GravityModel, data: Prepared, sigma: float) -> Moved:
+    """How late a recording's wrench is behind its angles (s), beyond what the model has, known to be 0 +- `sigma`.
+
+    What else is left may follow the angles' rates just as well: all of it counts for the chance.
+    """
+    equation = model.equation
+    wrench = [at for at, channel in enumerate(equation.channels) if channel in WRENCH_CHANNELS]
+    expected = equation.predict(model.fit.value[: equation.size], data)[:, wrench]
+    left = data.wrench[:, wrench] - expected
+    late = -np.gradient(expected, data.t, axis=0)
+    left, late = left - left.mean(axis=0), late - late.mean(axis=0)
+    floor = least_sigma(data, equation.elements.rig)[wrench]
+    value, chance = 0.0, np.inf
+    for _ in range(_ROUNDS):
+        weight = np.maximum((left - value * late).std(axis=0), floor) ** -2
+        power = max(float(np.sum(late**2 * weight)), 1e-300)
+        value, chance = float(np.sum(late * left * weight)) / power, float(np.sqrt(len(left) / power))
+    return Moved(
+        f"the wrench's lag (s) behind the angles in {data.name}", 0.0, sigma, value, float(np.hypot(sigma, chance))
+    )
 
 
 def by_chance(names: Sequence[str], prior: Array, value: Array, sigma: Array, covariance: Array) -> tuple[Moved, ...]:

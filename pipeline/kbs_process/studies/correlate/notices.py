@@ -12,6 +12,7 @@ from kbs_process.campaign.config import Campaign
 from kbs_process.reduction.analysis import Analysis, bands_of
 from kbs_process.reduction.judging import band_of, coverage_below
 from kbs_process.reduction.losses import lost
+from kbs_process.reduction.soundness import extent
 from kbs_process.report.prose import Prose
 from kbs_process.results.judged import Requirement
 from kbs_process.results.records import Notice, Severity
@@ -33,6 +34,10 @@ NOISY = 1.0
 UNJUDGED = 40
 # rad, standard deviation: a phase that may lie anywhere in a turn has 1.8.
 UNKNOWN_PHASE = 1.0
+# m: no spacecraft is longer.
+LONGEST = 100.0
+# A limit is seldom this many times above all that was measured, uncertainty included.
+FAR = 100.0
 LEFT_OUT = (SPIKE, DROPOUT)
 QUANTITY = {"torque": "T", "force": "F"}  # first letter of its channels
 
@@ -43,6 +48,7 @@ def notices(campaign: Campaign, analyses: Sequence[Analysis], model: GravityMode
     """Yield everything worth a notice, worst first."""
     for analysis in analyses:
         yield from lost(analysis.entry, [loss for loss in analysis.run.losses if loss.kind not in LEFT_OUT])
+    yield from implausible(campaign, found.requirements)
     yield from _unjudged(analyses)
     yield from _static_load(campaign, analyses, model)
     for check in model.fit.checks:
@@ -95,6 +101,19 @@ def _unjudged(analyses: Sequence[Analysis]) -> Iterable[Notice]:
                 start=residual.t[start],
                 end=residual.t[stop - 1],
             )
+
+
+def implausible(campaign: Campaign, requirements: Iterable[Requirement]) -> Iterable[Notice]:
+    """A spacecraft's centre of mass, or a limit, that is where it would be if its unit were another."""
+    weight, reach = extent(campaign.rig)
+    for one in requirements:
+        arm = one.lever_m
+        if arm is not None and not reach < arm < LONGEST:
+            yield _notice("warning", "lever", one.name, arm=arm, reach=reach, within=arm <= reach)
+        static = weight * {"torque": reach + (arm or 0.0), "force": 1.0}[one.quantity] if one.frame != "joint" else 0.0
+        beyond = 0.0 < static < one.limit
+        if beyond or one.limit > FAR * (one.high or np.inf):
+            yield _notice("warning", "limit", one.name, one=one, static=static if beyond else None, far=FAR)
 
 
 def _static_load(campaign: Campaign, analyses: Sequence[Analysis], model: GravityModel) -> Iterable[Notice]:

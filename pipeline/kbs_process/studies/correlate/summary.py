@@ -85,7 +85,8 @@ def conclusion(requirements: Sequence[Requirement]) -> Conclusion:
     sentence = (
         f"{worst.name}: {words[worst.verdict]}. {worst.statistic.capitalize()} {value:.4f} {worst.unit} "
         f"({least} to {high:.4f} at 95 %) on {worst.channel} in {worst.recording}, "
-        f"{worst.band_Hz[0] or 0:g} to {worst.band_Hz[1] or 0:g} Hz; limit {worst.limit:g} {worst.unit}."
+        f"{worst.band_Hz[0] or 0:g} to {worst.band_Hz[1] or 0:g} Hz; limit {worst.limit:g} {worst.unit}"
+        f"{'' if worst.lever_m is None else f', {worst.lever_m:.3g} m from the transducer'}."
     )
     return Conclusion(status=worst.verdict, sentence=sentence)
 

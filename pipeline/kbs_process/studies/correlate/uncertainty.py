@@ -10,10 +10,9 @@ from kbs_process.campaign.config import Campaign
 from kbs_process.reduction.analysis import Analysis, bands_of, passband, select
 from kbs_process.reduction.relief import errors, forces_in
 from kbs_process.results.judged import Budget, BudgetItem, Frame
-from kbs_process.rig.model import Amplifier
-from kbs_process.signals.records import WRENCH_CHANNELS, Array, Clock, Signal
+from kbs_process.signals.records import WRENCH_CHANNELS, Array, Signal
 from kbs_process.stages import bandpass, budget
-from kbs_process.stages.align.clocks import offset_sigma
+from kbs_process.stages.align.clocks import late_sigma
 from kbs_process.stages.bandpass import Band, BandStatement
 from kbs_process.stages.decouple import Decoupling
 from kbs_process.stages.gravity import error as gravity_error
@@ -115,15 +114,6 @@ def _cross_coupling(analysis: Analysis, model: GravityModel, decoupling: Decoupl
     index = model.equation.index
     fitted = model.equation.whole_coupling(model.fit.sigma[: model.equation.size])[np.ix_(index, index)]
     return budget.cross_coupling(measured, fitted)
-
-
-def late_sigma(clocks: Mapping[str, Clock], amplifier: Amplifier | None) -> float:
-    """How well it is known when angles and wrench belong together, s: their clocks, and the amplifier's delay."""
-    clock = clocks.get("angle") or clocks["rate"]
-    late = float(np.hypot(offset_sigma(clock), np.nan_to_num(clock.latency_s)))
-    if amplifier is None:
-        return late
-    return float(np.hypot(late, amplifier.delay * float(amplifier.corner.sigma) / float(amplifier.corner)))
 
 
 def _repeat_noise(of_band: Sequence[results.Repeatability], channels: Sequence[str], trajectory: str) -> Array | None:

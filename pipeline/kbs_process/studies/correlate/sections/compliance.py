@@ -48,7 +48,7 @@ def _table(results: Results) -> Grid:
             band_hz(*entry.band_Hz),
             f"{number(entry.value)} {unit(entry.unit)}",
             _interval(entry),
-            f"{exact(entry.limit)} {unit(entry.unit)}",
+            f"{exact(entry.limit)} {unit(entry.unit)}{_lever(entry)}",
             _margin(entry),
             _where(entry),
             _predicted(entry),
@@ -81,6 +81,10 @@ def _margin(entry: Requirement) -> str:
     if entry.margin is None:
         return MISSING
     return f"{number(entry.margin)} {unit(entry.unit)} ({percent(entry.margin / entry.limit, 2)})"
+
+
+def _lever(entry: Requirement) -> str:
+    return "" if entry.lever_m is None else f", {number(entry.lever_m)}\u00a0m from the transducer"
 
 
 def _where(entry: Requirement) -> str:
