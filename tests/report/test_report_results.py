@@ -12,6 +12,7 @@ import msgspec
 import pytest
 
 from kbs_process.errors import OutputError
+from kbs_process.report.build import publish
 from kbs_process.results.records import Conclusion, decode, encode, load, schema_of
 from kbs_process.results.versions import VERSION
 from kbs_process.studies.correlate import results as r
@@ -124,3 +125,11 @@ def test_an_unknown_kind_of_report_is_refused_with_a_remedy(tmp_path) -> None:
     with pytest.raises(OutputError, match="no report of kind 'correlatoin'") as caught:
         build(tmp_path)
     assert "correlation" in caught.value.remedy
+
+
+@pytest.mark.parametrize(("status", "met"), [("pass", True), ("fail", False), ("undecided", False), ("none", None)])
+def test_what_is_undecided_is_not_met(tmp_path: Path, status: str, met: bool | None) -> None:
+    found = load(sample.one_channel(tmp_path), r.Results)
+    verdict = msgspec.structs.replace(found.verdict, status=status)
+    told = publish(tmp_path, tmp_path, msgspec.structs.replace(found, verdict=verdict), None, None)
+    assert told.requirement_met is met

@@ -41,7 +41,7 @@ def flight(campaign: Campaign, trajectory: str | None, command: Path | None, **o
     example=("reference-day", "reference-day campaign/REFDAY --output /data/day --check"),
     output="results/NAME-reference-day",
     pdf=True,
-    check="a requirement is not met",
+    check="a requirement is not met, or undecided",
     recordings=False,
 )
 def reference_day(campaign: Campaign, **options: Any) -> Outcome:

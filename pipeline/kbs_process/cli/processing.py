@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 @campaign_argument
 @output_option("results/NAME")
 @pdf_option
-@check_option("a requirement is not met")
+@check_option("a requirement is not met, or undecided")
 @click.option(
     "--diagnose/--no-diagnose",
     "why",

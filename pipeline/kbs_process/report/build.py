@@ -51,7 +51,8 @@ def publish(
     page.write_bytes(encode(results))
     if document is not None:
         page = build(folder, document, pdf)
-    met = {"pass": True, "fail": False}.get(results.verdict.status)
+    status = results.verdict.status
+    met = None if status == "none" else status == "pass"
     return Outcome((results.verdict.sentence, *more), met, target / page.name)
 
 

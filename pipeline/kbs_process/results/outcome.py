@@ -11,7 +11,7 @@ class Outcome:
     """What the command line tells."""
 
     verdict_lines: tuple[str, ...]
-    requirement_met: bool | None  # None: there is no requirement, or it is undecided
+    requirement_met: bool | None  # None: there is no requirement; one that is undecided is not met
     report: Path
 
     @property
