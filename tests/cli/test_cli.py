@@ -152,12 +152,7 @@ def test_a_campaign_without_a_verb_is_processed(
 
 @pytest.mark.parametrize(
     ("met", "options", "status"),
-    [
-        (True, ["--check"], 0),
-        (False, [], 0),
-        (False, ["--check"], 1),
-        (None, ["--check"], 0),
-    ],  # none, or none that is met
+    [(True, ["--check"], 0), (False, [], 0), (False, ["--check"], 1), (None, ["--check"], 0)],
 )
 def test_a_requirement_not_met_is_a_status_only_when_asked(
     folder: CampaignFolder, processed: SimpleNamespace, met: bool | None, options: list[str], status: int

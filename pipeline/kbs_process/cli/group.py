@@ -37,9 +37,9 @@ class CampaignGroup(click.Group):
     commands=[verb for file in _FILES for verb in vars(file).values() if isinstance(verb, click.Command)],
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
     epilog=examples("campaign/EL089", "campaign/EL089 --check", "validate campaign/EL089", "VERB --help")
-    + "\n\nExit status: 0 done; 1 a requirement is not met or undecided, a recording has losses, or (validate) the model "
-    "of the rig is wrong (only with --check); 2 bad input; 70 a fault of kbs-process; 130 interrupted. With --debug, any error "
-    "shows its traceback.",
+    + "\n\nExit status: 0 done; 1 a requirement is not met or undecided, a recording has losses, or (validate) the "
+    "model of the rig is wrong (only with --check); 2 bad input; 70 a fault of kbs-process; 130 interrupted. With "
+    "--debug, any error shows its traceback.",
     subcommand_metavar="CAMPAIGN | VERB ...",
 )
 @click.version_option(__version__, prog_name="kbs-process")
