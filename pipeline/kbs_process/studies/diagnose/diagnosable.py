@@ -42,7 +42,7 @@ def check_signs(run: Run, moved: Motion, campaign: Campaign, entry: RecordingEnt
     """
     for check in _signs(run, moved, campaign.rig):
         slope = check.slope
-        if slope is None:
+        if slope is None or check.ok:
             continue
         if slope < -_REVERSED or (check.check.startswith("slope of encoder") and slope < _REVERSED):
             raise RecordingError(
