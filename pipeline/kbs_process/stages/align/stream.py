@@ -261,7 +261,7 @@ class Timeline:
         if self.spikes is not None and (mixed := self.spikes.mixed) is not None:
             raise RecordingError(
                 f"{self.channels[mixed.channel]} changes to and fro by {mixed.by:.4g} from sample to sample: two "
-                "sources are in one stream",
+                "sources are in one stream, unless a tone lies at just half the sampling rate",
                 where=self.file or self.where,
                 remedy=TWO_SOURCES,
             )
