@@ -111,7 +111,7 @@ def _follows(value: np.ndarray, before: np.ndarray, given_before: Sequence[Any],
     if old.shape != new.shape or old.shape != before.shape:
         return True
     scaled = np.divide(before * new, old, out=np.where(new == 0.0, 0.0, value), where=old != 0.0)
-    return np.allclose(value, scaled, rtol=1e-12, atol=0.0)
+    return np.allclose(value, scaled, rtol=1e-12, atol=1e-307)  # below it doubles lose their digits
 
 
 def _run(tell: Tell, *arguments: str) -> None:
