@@ -336,3 +336,15 @@ def test_mdf_masters_of_half_size_that_are_too_coarse(tmp_path: Path) -> None:
     table = mdf(tmp_path / "b.mf4", times=(T + 4e6).astype(np.float32))
     assert "floats of 32 bits know these times to 0.25 s only; rows come every 0.5" in told(table, "0: time")
     assert all(not one.clock for one in table.columns)
+
+
+def test_a_data_set_of_which_next_to_nothing_was_written_is_named_and_not_read(tmp_path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file.create_dataset("hollow", (10**10,), "f8", chunks=(1 << 16,))
+        file["hollow"][:3] = 1.0
+        file.create_dataset("flat", data=np.zeros(1 << 20), chunks=True, compression="gzip")
+        file["sound"] = np.arange(4.0)
+    table = read(tmp_path / "a.h5", "hdf5")
+    assert names(table) == ["flat", "sound"]
+    assert told(table, "hollow") == "hollow: next to none of its 10000000000 numbers was written"

@@ -11,7 +11,7 @@ import pytest
 
 from kbs_process.campaign.config import Campaign
 from kbs_process.reduction.soundness import extent, repeated
-from kbs_process.signals.records import Signal
+from kbs_process.signals.records import Events, Signal
 from reduction.arm import checked, described, drawn, recorded
 
 UNIT = np.eye(6)
@@ -33,7 +33,7 @@ FAULTS = {
 def told(name: str, folder: Path) -> None:
     campaign = described(folder)
     found = checked(campaign, recorded(campaign, drawn(campaign, 1), 1, **FAULTS[name]))
-    (notice,) = found.notices()
+    notice, *_ = found.notices()
     assert (notice.severity, found.soundness.calibrated) == ("error", False)
     assert any(one.startswith(name) for one in found.soundness.suggestions), found.soundness
 
@@ -96,6 +96,32 @@ def test_a_wrench_that_comes_later_than_known_is_told(tmp_path):
     (beyond,) = (one for one in found.beyond if "lag (s) behind the angles in test" in one.name)
     assert beyond.value == pytest.approx(1.0, rel=0.1)
     assert not any("behind the angles in sweep" in one.name for one in found.beyond)
+
+
+@pytest.mark.slow
+def test_a_channel_that_no_recording_shows_to_respond_is_told(tmp_path):
+    campaign = described(tmp_path)
+    (judged,) = campaign.requirements
+    recordings = recorded(campaign, drawn(campaign, 4), 4)
+    found = checked(campaign, recordings)
+    assert found.mute == ("Tz",) and found.soundness.sound, "an arm that turns about y has no torque about z"
+    (notice,) = found.notices()
+    assert notice.severity == "warning" and "only noise shows in Tz," in notice.what
+    assert not found.doubts(judged)
+
+
+@pytest.mark.slow
+def test_no_verdict_stands_on_an_encoder_that_does_not_follow_its_command(tmp_path):
+    campaign = described(tmp_path)
+    sweep, test = recorded(campaign, drawn(campaign, 1), 1)
+    angle = test.run.angle
+    assert angle is not None
+    t = 0.05 * np.arange(len(angle))
+    swing = Events(t, angle.values, angle.channels)
+    halved = replace(test.run, angle=angle.derive(0.5 * angle.values, "halved"), command=swing)
+    found = checked(campaign, [sweep, replace(test, run=halved)])
+    (wrong, *_) = found.doubts(campaign.requirements[0])
+    assert wrong.of_failed and any("slope of encoder arm" in one for one in found.soundness.reasons)
 
 
 def test_a_rig_may_weigh_what_its_files_allow(tmp_path):

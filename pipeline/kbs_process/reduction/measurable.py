@@ -17,7 +17,7 @@ from kbs_process.stages.bandpass import Band, bridged, too_long
 
 SHOWN = 0.4  # of the rate of distinct readings: the highest frequency that they show
 UNSEEN = 0.05  # share of a recording that may be unknown: an interval at 95 % leaves out as much
-ENDS_S = 4.0  # that filters and the beginning of streams may cost
+ENDS_S, ENDS = 4.0, 40  # that filters and the beginning of streams may cost: seconds, or samples
 AMPLIFIED = 0.05  # part of a reading that an amplifier may take off at a band's upper edge
 
 
@@ -73,7 +73,7 @@ def hidden(
     band = Band("", None, edge)
     known = bridged(replace(loads, valid=loads.valid & moving), run.gaps, band).valid
     missing = len(known) - int(np.count_nonzero(known))
-    if missing > UNSEEN * len(known) and missing * loads.dt > ENDS_S:
+    if missing > max(UNSEEN * len(known), ENDS_S / loads.dt, ENDS):
         share = 100.0 * missing / len(known)
         yield Doubt(f"in {share:.0f} % of {name} readings or angles are missing", of_failed=False)
     first, last = loads.t[known][[0, -1]] if known.any() else (0.0, 0.0)

@@ -29,6 +29,7 @@ from kbs_process.signals.smoothing import smooth
 from kbs_process.stages.align.clocks import late_sigma
 from kbs_process.stages.conventions import (
     BEYOND,
+    OF_ENCODER,
     SignCheck,
     check_encoder_sense,
     check_gravity_sign,
@@ -66,11 +67,12 @@ class Checked:
     conventions: tuple[SignCheck, ...]
     hidden: Mapping[str, tuple[Doubt, ...]]  # by requirement, what the samples cannot show
     rounding: Mapping[str, float]  # by channel, of readings that are coarser than stated
+    mute: tuple[str, ...]  # channels that are judged, and that no recording shows to respond
 
     def doubts(self, requirement: Requirement) -> tuple[Doubt, ...]:
         """Why a requirement is not judged, worst first.
 
-        What a calibrated transducer reads beyond the limit it has read, whatever pulls.
+        What a calibrated transducer reads beyond the limit it has read, whatever pulls: if its angles are right.
         """
         wrong = () if self.soundness.sound else (Doubt(WRONG, of_failed=not self.soundness.calibrated),)
         return (*wrong, *self.hidden[requirement.name])
@@ -82,6 +84,12 @@ class Checked:
                 severity="error",
                 what=f"{WRONG}: {'; '.join(self.soundness.reasons)}",
                 remedy=_remedy(self.soundness.suggestions),
+            )
+        if self.mute:
+            yield Notice(
+                severity="warning",
+                what=f"only noise shows in {', '.join(self.mute)}, in all recordings: that it responds is not known",
+                remedy="record a weight that is put on beside the axis, or a push, and look at this channel",
             )
         for name, doubts in self.hidden.items():
             if doubts:
@@ -113,7 +121,8 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
         equation = model.equation
         instants = [prepared(sample, equation, model.settings, model.settings.low_pass_Hz) for sample in samples]
         zeros = np.stack([taring.bias for _, taring in tared])
-        conventions = (*check_weight(campaign.rig), *_conventions(recordings, instants, model, zeros))
+        shown = [_read_and_due(one, data, model) for one, data in zip(recordings, instants, strict=True)]
+        conventions = (*check_weight(campaign.rig), *_conventions(recordings, instants, model, zeros, shown))
         amplifier = campaign.rig.transducer.amplifier
         lags = [
             lag(model, data, late_sigma(one.run.clocks, amplifier))
@@ -129,8 +138,10 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
             *(f"{one.check} is {one.found}, expected {one.expected}" for one in conventions if not one.ok),
             *_left(model, most),
         )
+        judged = {key for one in campaign.requirements for key in measurable.judged_channels(one, campaign.rig)}
+        mute = tuple(key for key in _mute(equation, [read for read, _, _ in shown]) if key in judged)
         if not reasons:
-            return Checked(Soundness(probability=found.probability), conventions, hidden, rounding)
+            return Checked(Soundness(probability=found.probability), conventions, hidden, rounding, mute)
         explained = explanations(equation, instants, most)
         return Checked(
             Soundness(
@@ -139,11 +150,13 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
                 beyond=tuple(_beyond(one, model) for one in found.beyond),
                 reasons=reasons,
                 suggestions=tuple(_in_words(one, equation) for one in explained),
-                calibrated=_calibrated(campaign, samples, model, most),
+                calibrated=_calibrated(campaign, samples, model, most)
+                and all(one.ok or not one.check.startswith(OF_ENCODER) for one in conventions),
             ),
             conventions,
             hidden,
             rounding,
+            mute,
         )
 
 
@@ -163,16 +176,21 @@ def _hidden(
 
 
 def _conventions(
-    recordings: Sequence[Prepared], instants: Sequence[Instants], model: GravityModel, zeros: Array
+    recordings: Sequence[Prepared],
+    instants: Sequence[Instants],
+    model: GravityModel,
+    zeros: Array,
+    shown: Sequence[tuple[Array, Array, Array]],
 ) -> Iterator[SignCheck]:
     """Signs and responses of every recording; `zeros` (recordings, c) are its channels' constants."""
     equation = model.equation
     theta = equation.start()
     noise = equation.elements.rig.loads.noise[equation.index]
-    for one, data, alone in zip(recordings, instants, _moved_alone(equation, zeros), strict=True):
+    every = zip(recordings, instants, _moved_alone(equation, zeros), shown, strict=True)
+    for one, data, alone, (read, due, error) in every:
         errors = equation.jacobian(theta, data).reshape(*data.wrench.shape, equation.size) * equation.sigma()
         found = [*check_gravity_sign(equation.channels, data.wrench, equation.predict(theta, data), noise, errors)]
-        found += check_response(equation.channels, *_read_and_due(one, data, model), noise, alone)
+        found += check_response(equation.channels, read, due, error, noise, alone)
         command, angle = commanded(one.run), one.run.angle
         if command is not None and angle is not None:
             found += check_encoder_sense(angle, command)
@@ -187,6 +205,13 @@ def _moved_alone(equation: Equation, zeros: Array) -> Mask:
     others = np.array([np.delete(moved, column, axis=1).max(axis=1, initial=0.0) for column in range(moved.shape[1])])
     alone: Mask = (moved > BEYOND * others.T) & (others.T > 0.0)
     return alone
+
+
+def _mute(equation: Equation, readings: Sequence[Array]) -> Iterator[str]:
+    """Channels whose low-passed `readings` (n, c) vary by less than their noise in every recording."""
+    noise = equation.elements.rig.loads.noise[equation.index]
+    spread = np.max([read.std(axis=0) for read in readings], axis=0)
+    yield from (key for key, size, least in zip(equation.channels, spread, noise, strict=True) if size < least)
 
 
 def _read_and_due(one: Prepared, data: Instants, model: GravityModel) -> tuple[Array, Array, Array]:

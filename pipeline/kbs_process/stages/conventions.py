@@ -16,6 +16,7 @@ from kbs_process.signals.records import Array, Signal
 BEYOND = 4.0
 # No calibration promises less; and whatever disturbs it, a channel that is off by more does not follow gravity.
 _EXACT, _HALF = 1e-3, 0.5
+OF_ENCODER = "slope of encoder"  # how its check begins
 # A plate that is inclined by less than this (rad) is called level.
 LEVEL = 0.1
 
@@ -121,7 +122,7 @@ def check_encoder_sense(encoder: Signal, command: Signal) -> tuple[SignCheck, ..
         slope = float(x @ y / (x @ x))
         tests.append(
             SignCheck(
-                check=f"slope of encoder {joint} against its command",
+                check=f"{OF_ENCODER} {joint} against its command",
                 expected="+1",
                 found=f"{slope:+.4f}",
                 ok=abs(slope - 1.0) < 0.1,

@@ -279,7 +279,7 @@ class Timeline:
             more = f", one of {len(lasting)} such steps" if len(lasting) > 1 else ""
             raise RecordingError(
                 f"{name} steps by {one.by:.4g} from one sample to the next, {self.own_one(one.first):.6g} s after the "
-                f"first, and stays there{more}: a count was lost, or a zero was set",
+                f"first, and stays there{more}: a count was lost, a zero was set, or a load came on at once",
                 where=self.file or self.where,
                 remedy=ONE_PART,
             )

@@ -11,7 +11,7 @@ from kbs_process.errors import ConfigError, RecordingError
 from kbs_process.plant.rigid import loads
 from kbs_process.rig.model import Rig
 from kbs_process.signals.records import Mask, Run
-from kbs_process.stages.conventions import SignCheck, check_encoder_sense, check_gravity_sign
+from kbs_process.stages.conventions import OF_ENCODER, SignCheck, check_encoder_sense, check_gravity_sign
 from kbs_process.stages.motion import Motion
 from kbs_process.stages.repeats import commanded, copies
 
@@ -44,7 +44,7 @@ def check_signs(run: Run, moved: Motion, campaign: Campaign, entry: RecordingEnt
         slope = check.slope
         if slope is None or check.ok:
             continue
-        if slope < -_REVERSED or (check.check.startswith("slope of encoder") and slope < _REVERSED):
+        if slope < -_REVERSED or (check.check.startswith(OF_ENCODER) and slope < _REVERSED):
             raise RecordingError(
                 f"{check.check} is {check.found}, expected {check.expected}",
                 where=str(entry.path),
