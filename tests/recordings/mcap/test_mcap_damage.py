@@ -160,6 +160,22 @@ def test_what_a_truncated_file_holds_is_read(
             assert found == N
 
 
+@pytest.mark.parametrize("chunked", [True, False])
+def test_zeros_over_the_end_of_what_no_checksum_confirms_are_no_numbers(
+    whole: Path, tmp_path: Path, chunked: bool
+) -> None:
+    path = tmp_path / "a.mcap"
+    crcs = {"enable_crcs": False, "enable_data_crcs": False}
+    rewrite(whole, path, compression=CompressionType.NONE, chunk_size=3000, use_chunking=chunked, **crcs)
+    data, truth = path.read_bytes(), rows(read(path, WRENCH)[0]["w"])
+    ends = [at + length for opcode, at, length in top_records(data) if opcode == (CHUNK if chunked else 5)]
+    for end in ends[2:8]:
+        damaged = bytearray(data)
+        damaged[end - 20 : end + 20] = bytes(40)
+        path.write_bytes(damaged)
+        assert N // 2 < check_honest(path, truth) < N
+
+
 def test_truncation_says_how_much_and_since_when(whole: Path, tmp_path: Path) -> None:
     data = whole.read_bytes()
     chunks = [(at, length) for opcode, at, length in top_records(data) if opcode == CHUNK]

@@ -94,7 +94,8 @@ class Container:
             while (stop := self._fill(file)) > 0:
                 end, table = self._walk(self._buffer, stop, chunk=False)
                 ends = np.flatnonzero((table[OPCODE] == mcap.DATA_END_OP) & (table[SIZE] >= 4))
-                yield from self._window(table[:, : ends[0]] if len(ends) else table)
+                sure = len(ends) > 0 or not self._breaks(self._buffer[end:stop][: mcap.RECORD_HEAD.size].tobytes(), end)
+                yield from self._window(table[:, : ends[0]] if len(ends) else table, sure=sure)
                 if len(ends):
                     self._check_data_section(int(table[AT, ends[0]]))
                     return
@@ -148,6 +149,15 @@ class Container:
         else:
             self._pass_over(file, opcode, length)
 
+    def _breaks(self, head: bytes, at: int) -> bool:
+        """Whether a head, so many bytes on, is of no record; one that is cut off, or not whole, may be."""
+        if len(head) < mcap.RECORD_HEAD.size:
+            return False
+        opcode, length = mcap.RECORD_HEAD.unpack_from(head)
+        huge = length > LARGEST and self._at + at + mcap.RECORD_HEAD.size + length > self.size
+        unknown = opcode == 0 or mcap.DATA_END_OP < opcode < mcap.PRIVATE_OP
+        return bool(unknown or huge or (opcode == mcap.MESSAGE_OP and length < 22))
+
     def _pass_over(self, file: BinaryIO, opcode: int, length: int) -> None:
         """Check an attachment that is too large for memory; anything else of that size is lost."""
         if opcode != mcap.ATTACHMENT_OP:
@@ -191,17 +201,21 @@ class Container:
 
     # Records
 
-    def _window(self, table: Words) -> Iterator[Segment]:
-        first = 0
+    def _window(self, table: Words, *, sure: bool) -> Iterator[Segment]:
+        """Yield the messages of records; unless `sure`, what broke the next one may have begun in the last."""
+        first, last = 0, table.shape[1] - 1
         for i in np.flatnonzero(table[OPCODE] != mcap.MESSAGE_OP).tolist():
             opcode, content = int(table[OPCODE, i]), self._content(self._buffer, table[:, i])
             if opcode == mcap.CHUNK_OP:
                 yield from self._loose_messages(table[:, first:i])
                 first = i
-                yield from self._chunk(content)
+                yield from self._chunk(content, sure=sure or i < last)
             else:
                 self._record(opcode, content, self._at + int(table[AT, i]))
-        yield from self._loose_messages(table[:, first:])
+        rest = table[:, first:]
+        yield from self._loose_messages(
+            rest if sure or not (rest[OPCODE, -1:] == mcap.MESSAGE_OP).any() else rest[:, :-1]
+        )
 
     def _loose_messages(self, table: Words) -> Iterator[Segment]:
         messages = table[OPCODE] == mcap.MESSAGE_OP
@@ -241,8 +255,8 @@ class Container:
         if expected not in (0, crc):
             self.lose("crc", "an attachment's CRC is wrong")
 
-    def _chunk(self, content: memoryview) -> Iterator[Segment]:
-        """Verify, decompress and walk a chunk; a bad one is lost as a whole."""
+    def _chunk(self, content: memoryview, *, sure: bool) -> Iterator[Segment]:
+        """Verify, decompress and walk a chunk; a bad one is lost as a whole, and if not `sure` what no CRC confirms."""
         try:
             head = mcap.parse_chunk_head(bytes(content[: mcap.CHUNK_HEAD_MAX]), len(content))
         except MalformedError as error:
@@ -260,6 +274,7 @@ class Container:
         end, table = self._walk(buffer, head.size, chunk=True)
         if end != head.size:
             self.lose("undecodable", f"chunk: its last {head.size - end} bytes are no records", **span)
+        if end != head.size or not (sure or head.crc):
             table = table[:, :-1]  # whose end nothing confirms: what damaged the next may have begun in it
         others = np.flatnonzero(table[OPCODE] != mcap.MESSAGE_OP)
         if len(others) > MOST_ENTRIES:
