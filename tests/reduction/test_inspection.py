@@ -102,6 +102,11 @@ def test_true_and_false_are_no_numbers_and_lose_no_message(tmp_path: Path) -> No
             ),
             "builtin_interfaces/Time is not as ROS 2 defines it",
         ),
+        (
+            "cdr",
+            ("p/M", "ros2msg", b"std_msgs/Header h\n=\nMSG: std_msgs/Header\nstring frame_id"),
+            "std_msgs/Header is not as ROS 2 defines it",
+        ),
         ("cdr", ("p/M", "ros2msg", b"float64 \xff"), "decode byte 0xff"),
         ("protobuf", ("p.M", "protobuf", b"\x0a\xff\xff"), ""),
     ],

@@ -236,3 +236,23 @@ def test_a_message_whose_end_nothing_confirms_is_not_read(tmp_path: Path) -> Non
     blocks, losses = read(path, Stream("s", "/topic", ("x",)))
     assert blocks["s"].values[:, 0].tolist() == [1.0, 2.0, 3.0, 4.0]
     assert any("are no records" in loss.detail for loss in losses)
+
+
+HEADER = "\n=\nMSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id"
+
+
+def test_the_stamp_is_a_header_s_by_whatever_name(tmp_path: Path) -> None:
+    schema = ("p/M", "ros2msg", f"std_msgs/Header hdr\nfloat64 x{HEADER}".encode())
+    payload = b"\0\1\0\0" + struct.pack("<iII", 5, 7, 1) + bytes(4) + struct.pack("<d", 2.5)
+    blocks, losses = read(put(tmp_path / "a.mcap", [payload], schema), Stream("x", "/topic", ("x",)))
+    assert (blocks["x"].stamp.tolist(), blocks["x"].values.tolist(), losses) == ([5_000_000_007], [[2.5]], ())
+
+
+def test_a_payload_that_goes_on_behind_its_schema_is_undecodable(tmp_path: Path) -> None:
+    schema = ("p/M", "ros2msg", b"float64 x")
+    whole = b"\0\1\0\0" + struct.pack("<d", 2.5)
+    padded, more = whole + bytes(4), whole + bytes(8)
+    blocks, losses = read(put(tmp_path / "a.mcap", [whole, padded, more], schema), Stream("x", "/topic", ("x",)))
+    (loss,) = losses
+    assert blocks["x"].values.tolist() == [[2.5], [2.5]]
+    assert loss.count == 1 and "goes on for 8 bytes that its schema does not have" in loss.detail

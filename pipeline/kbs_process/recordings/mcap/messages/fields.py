@@ -71,10 +71,10 @@ def resolve(paths: Sequence[str], fields: Sequence[Field], where: str) -> tuple[
     return tuple(steps)
 
 
-def find_stamp(fields: Sequence[Field]) -> tuple[str, ...]:
+def find_stamp(fields: Sequence[Field], *others: str) -> tuple[str, ...]:
     """Return the paths of seconds and nanoseconds of the message's own stamp, none where it has none."""
     paths = {field.path for field in fields}
-    for stamp in STAMPS:
+    for stamp in (*STAMPS, *others):
         seconds = [path for unit in ("sec", "secs", "seconds") if (path := f"{stamp}.{unit}") in paths]
         parts = [path for unit in NANOSECONDS if (path := f"{stamp}.{unit}") in paths]
         if seconds and parts:

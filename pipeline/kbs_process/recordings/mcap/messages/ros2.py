@@ -30,9 +30,11 @@ PRIMITIVES = {  # type -> kind of cell, bytes
     "float32": (FLOAT32, 4),
     "float64": (FLOAT64, 8),
 }
+HEADER = "std_msgs/Header"
 BUILTIN = {
     "builtin_interfaces/Time": "int32 sec\nuint32 nanosec",
     "builtin_interfaces/Duration": "int32 sec\nuint32 nanosec",
+    HEADER: "builtin_interfaces/Time stamp\nstring frame_id",
 }
 ZSTD = b"\x28\xb5\x2f\xfd"  # how its frames begin
 SEPARATOR = re.compile(r"^=+\s*$", re.MULTILINE)
@@ -40,6 +42,7 @@ FIELD = re.compile(
     r"(?P<base>[\w/]+)(?:<=\d+)?(?P<array>\[(?:(?P<bound><=)?(?P<size>\d*))\])?\s+(?P<name>\w+)(?P<rest>\s*=.*|\s+.*)?"
 )
 LARGEST_EXTENT = 10_000  # scalars of one message; sequences count once
+PADDING = 7  # bytes behind a message's last field
 DEPTH = 64  # of messages within messages
 
 
@@ -68,7 +71,7 @@ def parse_schema(name: str, text: str) -> tuple[str, Definitions]:
         blocks[_short(head[4:].strip())] = body
     definitions = {key: _members(body, key.partition("/")[0], blocks) for key, body in blocks.items()}
     for key, body in BUILTIN.items():  # or a stamp would be read as something else, unsaid
-        if definitions[key] != _members(body, "", {}):
+        if definitions[key] != _members(body, "", BUILTIN):
             raise MalformedError(f"{key} is not as ROS 2 defines it")
     _extent(definitions, root, {})
     return root, definitions
@@ -143,7 +146,10 @@ class Ros2Message:
 
     def decoder(self, steps: tuple[Step, ...]) -> LayoutDecoder:
         """Return a decoder of the numbers at `steps`."""
-        stamp = find_stamp(self.fields)
+        headers = (
+            member.name for member in self._definitions[self._root] if (member.base, member.count) == (HEADER, None)
+        )
+        stamp = find_stamp(self.fields, *(f"{name}.stamp" for name in headers))
 
         def trace(payload: bytes) -> Layout:
             walk = self._walk(payload)
@@ -162,6 +168,8 @@ class Ros2Message:
     def _walk(self, payload: bytes) -> _Walk:
         walk = _Walk(payload, self._definitions)
         walk.message(self._root, "")
+        if (more := len(payload) - walk.at) > PADDING:
+            raise MalformedError(f"the payload goes on for {more} bytes that its schema does not have")
         return walk
 
 
