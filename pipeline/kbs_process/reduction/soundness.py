@@ -87,7 +87,7 @@ class Checked:
             )
         if self.mute:
             yield Notice(
-                severity="warning",
+                severity="info",
                 what=f"only noise shows in {', '.join(self.mute)}, in all recordings: that it responds is not known",
                 remedy="record a weight that is put on beside the axis, or a push, and look at this channel",
             )
