@@ -25,14 +25,13 @@ import numpy as np
 
 from kbs_process.errors import KbsError, RecordingError
 from kbs_process.recordings.formats import Format, Text, format_named
-from kbs_process.recordings.tables import Cells, Column, LeftOut
+from kbs_process.recordings.tables import UNPACKED, Cells, Column, LeftOut
 
 MODULE = "kbs_process.recordings.isolated"
 SILENCE_S = 300.0  # a child that sends nothing for so long hangs
 CPU_FLOOR_S = 120  # that reading may take, whatever the size
 BYTES_A_CPU_S = 1 << 18  # and a second for so many bytes more
-DATA_FLOOR = 1 << 30  # bytes that a file of any size may expand to
-DATA_BY_SIZE = 1000  # and so many times its size: the best that compression makes of constants
+DATA_FLOOR = 1 << 30  # bytes that a file of any size may expand to, and `UNPACKED` times its size
 MEMORY_FLOOR = 1 << 29  # bytes of private memory; the libraries themselves take less than half of it
 SAID = 3  # status of a child that says why
 MEMORY_BY_SIZE = 64  # and so many times the file's size
@@ -61,7 +60,7 @@ class IsolatedTable:
             raise RecordingError("holds no column of numbers", where=str(path), remedy=remedy)
 
     def chunks(self, names: Sequence[str]) -> Iterator[tuple[Cells, ...]]:
-        left = DATA_FLOOR + DATA_BY_SIZE * self.path.stat().st_size
+        left = DATA_FLOOR + UNPACKED * self.path.stat().st_size
         with self._child(names) as child:
             while True:
                 received = [self._receive(child) for _ in names]

@@ -18,6 +18,7 @@ Cells = NDArray[Any]  # one column's cells as the file has them: numbers, dateti
 # Cells first .. first + count of one column; fewer at its end, none beyond.
 Slice = Callable[[int, int], Cells]
 
+UNPACKED = 1100  # times the bytes stored: the best that compression makes of constants
 CHUNK_ROWS = 65536
 CHUNK_CELLS = 64 * CHUNK_ROWS
 LONGEST_TEXT = 100  # characters of a cell: what is longer is no number, and no date

@@ -59,8 +59,8 @@ def check_gravity_sign(
     `computed` comes from nominal parameters; `errors` (n, c, k) are its independent one-sigma errors by what the files
     state: masses, CoGs, the calibration. `noise` (c,) is the channels' rms noise. A channel that reads the reaction, or
     is swapped with another, shows a slope of -1 or near 0. Taring moves only the offset. The slope's sigma holds the
-    errors, and what does not follow the computed loads, of any colour. One that noise
-    and files leave unknown by half is not testable.
+    errors, and what does not follow the computed loads, of any colour. A slope that noise and files leave unknown by
+    half is not testable.
     """
     tests = []
     for index, channel in enumerate(channels):

@@ -14,14 +14,24 @@ from typing import Any
 import numpy as np
 
 from kbs_process.recordings.formats import Format, Text
-from kbs_process.recordings.tables import Cells, Column, Item, Series, SeriesTable, Slice, matrix_of, series_of, texts
+from kbs_process.recordings.tables import (
+    UNPACKED,
+    Cells,
+    Column,
+    Item,
+    Series,
+    SeriesTable,
+    Slice,
+    matrix_of,
+    series_of,
+    texts,
+)
 
 _NO_VARIABLE = "This is a netCDF dimension but not a netCDF variable"
 # How many numbers attributes have, 0 for any.
 _VALUES = {"scale_factor": 1, "add_offset": 1, "valid_min": 1, "valid_max": 1, "valid_range": 2}
 _VALUES |= {"_FillValue": 0, "missing_value": 0}
 _BLOCK_CELLS = 1 << 22  # of a matrix, read together for its columns
-_PACKED = 1100  # bytes that a stored one may unpack to, at the best that deflate does
 _UNWRITTEN = 1 << 26  # bytes of a data set that may be fill values alone
 
 
@@ -62,7 +72,7 @@ def _why_not(data: Any, classes: bool) -> str:
         return "it is a dimension without values"
     if _text(kind) in ("char", "cell", "function_handle", "table", "string", "timetable", "datetime"):
         return f"it is a {_text(kind)}: save numbers"
-    if data.size * data.dtype.itemsize > _PACKED * data.id.get_storage_size() + _UNWRITTEN:
+    if data.size * data.dtype.itemsize > UNPACKED * data.id.get_storage_size() + _UNWRITTEN:
         return f"next to none of its {data.size} numbers was written"
     if data.dtype.kind == "O" and not (h5py.check_string_dtype(data.dtype) and data.ndim == 1):
         return "it has no numbers"
