@@ -186,6 +186,13 @@ def test_what_is_read_with_the_other_sign_is_told() -> None:
         RecordingError, match=r"slope of measured [FT]. against computed gravity is -1\.000 ± .*, expected \+1"
     ):
         check_signs(reaction, moved, campaign(), ENTRY)
+    noise = bench.rig().loads.noise[:6]
+    faint = run.wrench.derive(5.0 * noise / run.wrench.values.std(axis=0) * run.wrench.values, "faint")
+    quiet = moved.q.copy()
+    quiet[:, 1] = 1.2 + 1e-5 * (moved.q[:, 1] - 1.2)
+    check_signs(
+        replace(run, wrench=faint.derive(-faint.values, "reaction")), replace(moved, q=quiet), campaign(), ENTRY
+    )
     dead = replace(run, angle=run.angle.derive(np.ones((N, 2)), "dead"))
     with pytest.raises(RecordingError, match=r"slope of encoder el against its command is \+0\.0000, expected \+1"):
         check_signs(dead, moved, campaign(), ENTRY)

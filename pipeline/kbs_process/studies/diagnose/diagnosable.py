@@ -15,6 +15,7 @@ from kbs_process.stages.conventions import OF_ENCODER, SignCheck, check_encoder_
 from kbs_process.stages.motion import Motion
 from kbs_process.stages.repeats import commanded, copies
 
+LOUD = 10.0  # times its noise, a channel's computed load: less may be what the files err by
 LEAST_S = 5.0  # of a recording that can be compared: less has fewer frequencies than a floor has channels
 _REVERSED = 0.5  # a slope of what is read against what is computed is one of the other sign below minus this
 
@@ -78,8 +79,11 @@ def _signs(run: Run, moved: Motion, rig: Rig) -> Iterator[SignCheck]:
     measured, rest = run.loads, np.zeros_like(moved.q)
     assert measured is not None
     index = rig.loads.index(measured.channels)
-    static, known = loads(rig, moved.q, rest, rest)[:, index], measured.valid
-    yield from check_gravity_sign(measured.channels, measured.values[known], static[known], rig.loads.noise[index])
+    known, noise = measured.valid, rig.loads.noise[index]
+    static, read = loads(rig, moved.q, rest, rest)[known][:, index], measured.values[known]
+    loud = np.flatnonzero(static.std(axis=0) > LOUD * noise)
+    channels = [measured.channels[place] for place in loud]
+    yield from check_gravity_sign(channels, read[:, loud], static[:, loud], noise[loud])
     command = commanded(run)
     if command is not None and run.angle is not None:
         yield from check_encoder_sense(run.angle, command)
