@@ -44,11 +44,11 @@ def _predicted(entry: Requirement) -> str:
 def _table(results: Results) -> Grid:
     rows = tuple(
         (
-            f"{entry.name} ({entry.statistic}, {entry.frame})",
+            f"{entry.name} ({entry.statistic}, {entry.frame}{_lever(entry)})",
             band_hz(*entry.band_Hz),
             f"{number(entry.value)} {unit(entry.unit)}",
             _interval(entry),
-            f"{exact(entry.limit)} {unit(entry.unit)}{_lever(entry)}",
+            f"{exact(entry.limit)} {unit(entry.unit)}",
             _margin(entry),
             _where(entry),
             _predicted(entry),
