@@ -20,10 +20,10 @@ import fcntl
 import hashlib
 import os
 import re
+import secrets
 import shutil
 import stat
 import sys
-import tempfile
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -86,8 +86,11 @@ def _replacing(target: Path, *, revised: Collection[str] | None = None) -> Itera
         with _locked(target):
             _recover(target)
             users = _files_of_the_user(target, revised=revised)
-            private = _private_folder(target)
+            # Named before it is made: an interrupt while it is being made leaves nothing either.
+            private = target.parent / f".{target.name}.new-{secrets.token_hex(4)}"
             try:
+                private.mkdir()
+                (private / LIST).touch()
                 yield private
                 for name in users:
                     _keep(target / name, private / name)
@@ -273,16 +276,6 @@ def _keep(source: Path, target: Path) -> None:
         )
     target.parent.mkdir(parents=True, exist_ok=True)
     _link(str(source), str(target))
-
-
-def _private_folder(target: Path) -> Path:
-    private = Path(tempfile.mkdtemp(prefix=f".{target.name}.new-", dir=target.parent))
-    (private / LIST).touch()
-    # mkdtemp is for secrets; results are as readable as any folder made here.
-    umask = os.umask(0)
-    os.umask(umask)
-    private.chmod(0o777 & ~umask)
-    return private
 
 
 def _flush(folder: Path) -> None:
