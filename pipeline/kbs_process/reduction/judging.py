@@ -152,16 +152,19 @@ def _unsure(one: _Candidate, unit: str) -> Doubt:
 
 
 def decided(
-    without: Sequence[results.Requirement], kept: Sequence[results.Requirement], longest: float
+    without: Sequence[results.Requirement], kept: Sequence[results.Requirement], longest: float, unclear: str = ""
 ) -> tuple[results.Requirement, ...]:
     """Choose between requirements judged `without` what looks like bad readings, and with it `kept`, if that can be.
 
     What lasts for a quarter of a band's shortest period, `longest` in s, may be what the band shows: the worse decides.
+    Where some may be what happened, `unclear` says which: nothing is decided unless both agree.
     """
     found = []
     for one, other in zip_longest(without, kept):
         if 4.0 * longest * (one.band_Hz[1] or np.inf) < 1.0:
-            found.append(one)
+            agree = not unclear or (other is not None and one.verdict == other.verdict)
+            doubt = one.doubt or unclear
+            found.append(one if agree else msgspec.structs.replace(one, verdict="undecided", doubt=doubt))
         elif other is not None:
             found.append(max(one, other, key=lambda each: SEVERITY[each.verdict]))
         elif one.verdict == "pass":

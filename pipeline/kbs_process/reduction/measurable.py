@@ -4,20 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import permutations
 
 import numpy as np
 
-from kbs_process.campaign.config import Campaign, Requirement
+from kbs_process.campaign.config import Campaign, RecordingEntry, Requirement
 from kbs_process.errors import ConfigError
 from kbs_process.results.judged import Doubt
 from kbs_process.rig.model import Amplifier, Rig
-from kbs_process.signals.records import WRENCH_CHANNELS, Mask, Run
+from kbs_process.signals.records import SPIKE, WRENCH_CHANNELS, Mask, Run, Stretch
 from kbs_process.stages.align.readings import Readings
 from kbs_process.stages.bandpass import Band, bridged, too_long
+from kbs_process.stages.repeats import lag, motion_of
 
 SHOWN = 0.4  # of the rate of distinct readings: the highest frequency that they show
 UNSEEN = 0.05  # share of a recording that may be unknown: an interval at 95 % leaves out as much
 ENDS_S, ENDS = 4.0, 40  # that filters and the beginning of streams may cost: seconds, or samples
+SHORTEST = 0.25  # of an amplifier's corner's period: what it passes lasts for longer
+TOGETHER_S = 0.05  # what repeats have at the same instant, more often than by chance, has a cause
 AMPLIFIED = 0.05  # part of a reading that an amplifier may take off at a band's upper edge
 
 
@@ -53,9 +57,18 @@ def judged_channels(requirement: Requirement, rig: Rig) -> tuple[str, ...]:
 
 
 def hidden(
-    campaign: Campaign, requirement: Requirement, name: str, run: Run, moving: Mask, streams: Mapping[str, Readings]
+    campaign: Campaign,
+    requirement: Requirement,
+    name: str,
+    run: Run,
+    moving: Mask,
+    streams: Mapping[str, Readings],
+    unclear: Sequence[Stretch] = (),
 ) -> Iterator[Doubt]:
-    """Yield what a recording's samples cannot show of a requirement; `moving` (n,): where its angles are known."""
+    """Yield what a recording's samples cannot show of a requirement.
+
+    `moving` (n,): where its angles are known; `unclear`: what was bridged and may be what happened.
+    """
     rig, edge = campaign.rig, requirement.band[1]
     judged = judged_channels(requirement, rig)
     channels = WRENCH_CHANNELS if requirement.frame == "S" else judged
@@ -72,9 +85,9 @@ def hidden(
     assert loads is not None  # every recording that is judged has some
     band = Band("", None, edge)
     known = bridged(replace(loads, valid=loads.valid & moving), run.gaps, band).valid
-    missing = len(known) - int(np.count_nonzero(known))
-    if missing > max(UNSEEN * len(known), ENDS_S / loads.dt, ENDS):
-        share = 100.0 * missing / len(known)
+    lacking = len(known) - int(np.count_nonzero(known))
+    if lacking > max(UNSEEN * len(known), ENDS_S / loads.dt, ENDS):
+        share = 100.0 * lacking / len(known)
         yield Doubt(f"in {share:.0f} % of {name} readings or angles are missing", of_failed=False)
     first, last = loads.t[known][[0, -1]] if known.any() else (0.0, 0.0)
     inside = run.gaps[(run.gaps[:, 1] > first) & (run.gaps[:, 0] < last)]
@@ -82,12 +95,43 @@ def hidden(
         start, end = gaps[np.argmax(np.diff(gaps)[:, 0])]
         where = f"readings or angles are missing in {name}, from {start:.2f} s to {end:.2f} s at the longest"
         yield Doubt(f"{where}: what there was up to {edge:g} Hz is not known", of_failed=False)
+    if missing := [one for one in unclear if one.kind != SPIKE and first < one.start + one.length and one.start < last]:
+        longest = max(missing, key=lambda one: one.length)
+        times = f"{len(missing)} times, " if len(missing) > 1 else ""
+        where = f"readings are missing in {name}, {times}for {longest.length:.3g} s at {longest.start:.2f} s"
+        yield Doubt(f"{where}: what happened may be the cause, and is not known", of_failed=False)
     if coarse := [one for one in _coarse(campaign, streams) if one[0] in channels]:
         steps = ", ".join(f"{channel} in steps of {step:.3g} {unit}" for channel, unit, step in coarse)
         yield Doubt(f"{steps} in {name}: coarser than the resolution that is stated")
     held = sorted({loss.where for loss in run.losses if loss.kind == "held" and loss.where in channels})
     if held:
         yield Doubt(f"{', '.join(held)} held one reading in {name}: what was beyond is not known", of_failed=False)
+
+
+def doubtful(campaign: Campaign, recordings: Sequence[tuple[RecordingEntry, Run]]) -> dict[str, list[Stretch]]:
+    """What was bridged, by recording, and may be what happened: it is likely, or repeats have it at the same instant.
+
+    Nothing that is too short for the amplifier is; of one that passes a single sample, a bad one may be a blow.
+    """
+    amplifier = campaign.rig.transducer.amplifier
+    shortest = 0.0 if amplifier is None else SHORTEST / float(amplifier.corner)
+    long = {entry.name: [one for one in run.stretches if one.length > shortest] for entry, run in recordings}
+    found = {
+        name: [one for one in own if one.likely or (amplifier is not None and one.kind == SPIKE)]
+        for name, own in long.items()
+    }
+    for (entry, run), (other, repeat) in permutations(recordings, 2):
+        name, loads = entry.name, run.loads
+        if entry.trajectory != other.trajectory or loads is None or not (long[name] and long[other.name]):
+            continue
+        own, its = motion_of(run), motion_of(repeat)
+        late = (lag(own, its) if own and its else None) or 0.0
+        here, there = (np.array([one.start + 0.5 * one.length for one in long[key]]) for key in (name, other.name))
+        near = np.abs(here[:, None] + late - there).min(axis=1) < TOGETHER_S
+        chance = len(here) * len(there) * 2.0 * TOGETHER_S / (len(loads) * loads.dt)
+        if np.count_nonzero(near) > chance + 3.0 * np.sqrt(chance):
+            found[name] += [one for one, at_once in zip(long[name], near, strict=True) if at_once]
+    return found
 
 
 def rounding(campaign: Campaign, streams: Mapping[str, Readings]) -> dict[str, float]:

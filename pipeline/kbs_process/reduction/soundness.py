@@ -165,8 +165,12 @@ def _hidden(
 ) -> Iterator[Doubt]:
     """What the samples cannot show of a requirement."""
     judged = [one for one in recordings if one.entry.role != "calibration"]
+    unclear = measurable.doubtful(campaign, [(one.entry, one.run) for one in judged])
     for one in judged:
-        yield from measurable.hidden(campaign, requirement, one.entry.name, one.run, one.motion.valid, one.readings)
+        name = one.entry.name
+        yield from measurable.hidden(
+            campaign, requirement, name, one.run, one.motion.valid, one.readings, unclear[name]
+        )
     if campaign.rig.transducer.channels:
         edge = requirement.band[1]
         yield from measurable.attenuated(campaign.rig.transducer.amplifier, edge)

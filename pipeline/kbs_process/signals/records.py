@@ -129,6 +129,16 @@ class Loss:
         return self.kind not in (PUT_IN_ORDER, ROUNDED, BLOW)
 
 
+@dataclass(frozen=True, slots=True)
+class Stretch:
+    """Readings of a load that were bridged: left out as bad, not there, or no numbers."""
+
+    kind: str  # that of its `Loss`
+    start: float  # s, on the recording's own time axis
+    length: float  # s
+    likely: bool  # whether what happened may be the cause, by this recording alone
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Spectrum:
     """One-sided cross-spectral density matrix of a stream at its full rate (Welch)."""
@@ -185,6 +195,7 @@ class Run:
     pointing: Signal | None = None  # angle of each joint by an external instrument, rad
     effort: Signal | None = None  # of each joint that has it measured, in the unit in which it is recorded
     longest_spike: float = 0.0  # s, that was taken for bad readings in loads or angles
+    stretches: tuple[Stretch, ...] = ()  # of loads, that were bridged
     gaps: Array = dataclasses.field(
         default_factory=lambda: np.zeros((0, 2))
     )  # s, from when to when samples are made up

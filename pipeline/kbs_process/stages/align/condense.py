@@ -149,6 +149,12 @@ def condense(
         pointing=signals.get("pointing"),
         effort=signals.get("effort"),
         longest_spike=max(sampled[key].line.longest_spike for key in kept if key != "pointing"),
+        stretches=tuple(
+            one
+            for key in LOADS
+            if key in kept
+            for one in sampled[key].line.stretches(clocks[key].offset_s, 1.0 + clocks[key].skew)
+        ),
         gaps=np.concatenate([_on_axis(sampled[key].gaps(), clocks[key]) for key in kept if key != "pointing"]),
     )
 

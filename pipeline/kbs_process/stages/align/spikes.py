@@ -34,6 +34,7 @@ CROWDED = 10  # of the nearest, that are suspect as well: all that is near gives
 AGREE = 0.35  # of what spikes are off by, that all beside them agree within
 HELD_S = 0.5  # longer than any channel with noise shows one and the same reading
 GAP = 1.5  # periods
+SEVERAL = 2.5  # periods: more than one sample is missing
 PUSHED_S = 2.0
 PAUSE_S = 1.0  # a longer gap may be a pause, in which the rig moved
 PAUSE_RATE = 1.0  # rad/s that no antenna is turned with where its readings are missing
@@ -85,6 +86,8 @@ class Oddity:
     last: int  # ns
     by: float  # largest deviation; the reading that stands still
     count: int = 1  # samples
+    filled: bool = False  # all of them read the same: what a driver puts in for what it lost
+    alone: bool = True  # no other channel is off at that time
 
 
 @dataclass(slots=True)
@@ -99,6 +102,7 @@ class Spikes:
     blows: list[Oddity] = field(default_factory=list)  # of several channels and samples at once: kept
     steps: list[Oddity] = field(default_factory=list)
     lost: list[Oddity] = field(default_factory=list)  # stretches that stand still: left out
+    shaken: list[int] = field(default_factory=list)  # ns, where gaps of several samples begin while something shakes
     mixed: Oddity | None = None  # a channel that two sources bring by turns
     samples: int = 0
     _bad: Stamps | None = None  # (c,) samples in spikes
@@ -170,7 +174,10 @@ class Spikes:
             if len(places[0]):
                 before = x.copy() if before is x else before
                 x[:, channel] = column
-        self._note(found, stamp, x, before)
+        for at in (done + np.flatnonzero(steps[done:end] > SEVERAL)).tolist():
+            if len(self.shaken) < LISTED and at > 0 and _shaken(before, steps, at, at, set()):
+                self.shaken.append(int(stamp[at - 1]))
+        self._note(found, stamp, steps, x, before)
         self._last = still
         self.samples += end - done
         kept = slice(done, end) if self.keep else done + np.flatnonzero(~gone[done:end])
@@ -204,18 +211,23 @@ class Spikes:
             by -= turn * np.rint(by / turn) if turn else 0.0
             self._gaps.append(Oddity(channel, int(stamp[at - 1]), int(stamp[at]), by, missing))
 
-    def _note(self, found: list[tuple[int, int, int, float]], stamp: Stamps, x: Array, before: Array) -> None:
+    def _note(
+        self, found: list[tuple[int, int, int, float]], stamp: Stamps, steps: Array, x: Array, before: Array
+    ) -> None:
         """Note spikes and steps; give samples back that several channels are off in together, as after a blow."""
         assert self._bad is not None
         for channel, first, stop, by in found:
-            one = Oddity(channel, int(stamp[first]), int(stamp[abs(stop) - 1]), by)
-            several = sum(first < abs(end) and begin < stop for _, begin, end, _ in found)
+            several = {other for other, begin, end, _ in found if first < abs(end) and begin < stop}
             rows = before[first : max(stop, first), channel]
+            read = before[first : max(stop, first)][:, sorted(several)]
+            filled = read.size > 1 and bool((read == read.flat[0]).all())
+            last = int(stamp[abs(stop) - 1])
+            one = Oddity(channel, int(stamp[first]), last, by, abs(stop) - first, filled, len(several) == 1)
             if stop < 0:
                 kind = self.steps
             elif not self.turning.any() and (
-                (len(rows) > 1 and several > 1 and not (rows == rows[0]).all())
-                or _shaken(before, first, stop, {c for c, begin, _, _ in found if abs(begin - first) < NEAR})
+                (len(rows) > 1 and len(several) > 1 and not (rows == rows[0]).all())
+                or _shaken(before, steps, first, stop, {c for c, begin, _, _ in found if abs(begin - first) < NEAR})
             ):
                 kind = self.blows
                 x[first:stop, channel] = rows
@@ -262,13 +274,17 @@ class Spikes:
         return found
 
 
-def _shaken(x: Array, first: int, stop: int, off: set[int]) -> bool:
-    """Whether channels other than those that are `off` move like nowhere around: what shook the rig is in all."""
+def _shaken(x: Array, steps: Array, first: int, stop: int, off: set[int]) -> bool:
+    """Whether channels other than those that are `off` move like nowhere around: what shook the rig is in all.
+
+    `steps` (n,) are periods before each sample.
+    """
     others = [channel for channel in range(x.shape[1]) if channel not in off]
     if not others:
         return False
     around = slice(max(first - AROUND, 0), stop + AROUND)
-    bent = np.abs(np.diff(x[around][:, others], n=2, axis=0))
+    slopes = np.diff(x[around][:, others], axis=0) / steps[around][1:, None]
+    bent = np.abs(np.diff(slopes, axis=0))
     begin = max(first - around.start - NEAR, 0)
     most = bent[begin : begin + NEAR + stop - first + NEAR].max(0)
     # Of coarse readings, which mostly bend by nothing, those count that do.

@@ -8,7 +8,19 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from kbs_process.errors import RecordingError
-from kbs_process.signals.records import BLOW, DROPOUT, PUT_IN_ORDER, ROUNDED, SPIKE, Array, Block, Loss, Mask, Stamps
+from kbs_process.signals.records import (
+    BLOW,
+    DROPOUT,
+    PUT_IN_ORDER,
+    ROUNDED,
+    SPIKE,
+    Array,
+    Block,
+    Loss,
+    Mask,
+    Stamps,
+    Stretch,
+)
 from kbs_process.stages.align.arrival import REGULAR, Arrival
 from kbs_process.stages.align.clocks import ClockData, FloorStep, LatencyFloor
 from kbs_process.stages.align.envelope import MinMax
@@ -79,6 +91,7 @@ class Timeline:
     regular: bool = True  # whether most steps are like their median
     spikes: Spikes | None = None
     _non_finite_in: dict[str, int] = field(default_factory=dict)  # by channel
+    _non_finite_at: list[Stamps] = field(default_factory=list)
     _reblock: Reblock = field(default_factory=Reblock)
     _arrival: Arrival = field(default_factory=Arrival)
     _ready: Reblock = field(default_factory=Reblock)
@@ -290,6 +303,7 @@ class Timeline:
         if good is None:
             return block.stamp, block.values
         self.non_finite += len(good) - int(np.count_nonzero(good))
+        self._non_finite_at.append(block.stamp[~good])
         bad_in = (~np.isfinite(block.values)).sum(axis=0).tolist()
         for channel, bad in zip(self.channels, bad_in, strict=True):
             if bad:
@@ -301,6 +315,31 @@ class Timeline:
         """How long the longest of the bad readings lasts, s."""
         found = self.spikes.spikes if self.spikes else []
         return max((1e-9 * (one.last - one.first) + self._period / GAP for one in found), default=0.0)
+
+    def stretches(self, offset: float, rate: float) -> Iterator[Stretch]:
+        """Yield what was bridged and may be no fault of the reading, on the run's time axis t = offset + rate own.
+
+        One sample in one channel shows nothing that happened, nor does what a driver fills in. Where messages came and
+        several in a row lack a number, or several are lost while something shakes, what happened may be the cause.
+        """
+        if self.spikes is None or self.grid is None:
+            return
+        period = self.grid.period_ns
+        at = np.concatenate([np.empty(0, dtype=np.int64), *self._non_finite_at])
+        runs = [piece for piece in np.split(at, 1 + np.flatnonzero(np.diff(at) > GAP * period)) if len(piece)]
+        shaken = [self.own_one(first) for first in self.spikes.shaken]
+        found = [
+            (SPIKE, one.first, one.last, one.count > 1 or not one.alone) for one in self.spikes.spikes if not one.filled
+        ]
+        found += [(DROPOUT, one.first, one.last, True) for one in self.spikes.lost]
+        found += [("non-finite", int(run[0]), int(run[-1]), len(run) > 1) for run in runs]
+        for kind, first, last, likely in found:
+            length = rate * 1e-9 * (last - first + period)
+            yield Stretch(kind, offset + rate * self.own_one(first), length, likely)
+        for gap in self.gaps:
+            if gap.missing > 1:
+                length = gap.end - gap.start - 1e-9 * period
+                yield Stretch("gap", offset + rate * gap.start, rate * length, gap.start in shaken)
 
     @property
     def non_finite_channels(self) -> str:
@@ -386,9 +425,12 @@ class Timeline:
                     start, end = (offset + rate * self.own_one(one) for one in (own[0].first, own[-1].last))
                     by = max((one.by for one in own), key=abs)
                     times = ", ".join(f"{offset + rate * self.own_one(one.first):.4f}" for one in own[:TIMES])
-                    what = f"off by {by:.4g}: {detail}"
+                    samples = sum(one.count for one in own)
+                    many = f"{samples} samples, " if samples > len(own) else ""
+                    what = f"{many}off by {by:.4g}: {detail}"
                     if len(own) > 1:
-                        what = f"at {times}{'' if len(own) <= TIMES else ' ...'} s, off by up to {by:.4g}: {detail}"
+                        at = f"at {times}{'' if len(own) <= TIMES else ' ...'} s"
+                        what = f"{at}, {many}off by up to {by:.4g}: {detail}"
                     found.append(Loss(kind, f"{self.where}, {name}", len(own), start, end, what))
         if self.rounded and self.grid is not None:
             detail = (

@@ -9,9 +9,11 @@ from itertools import zip_longest
 import numpy as np
 
 from kbs_process.campaign.config import Campaign
+from kbs_process.reduction import measurable
 from kbs_process.reduction.analysis import Analysis, bands_of
 from kbs_process.reduction.judging import band_of, coverage_below
 from kbs_process.reduction.losses import lost
+from kbs_process.reduction.preparing import Prepared
 from kbs_process.reduction.soundness import extent
 from kbs_process.report.prose import Prose
 from kbs_process.results.judged import Requirement
@@ -77,6 +79,14 @@ def spikes(
     for analysis in (one for one in analyses if has_spikes(one.run)):
         named = [loss for loss in analysis.run.losses if loss.kind in LEFT_OUT]
         yield _notice("warning", "spikes", analysis.entry.name, named=named, figures=figures)
+
+
+def unclear(campaign: Campaign, prepared: Sequence[Prepared]) -> str:
+    """Which of the readings that were left out as bad may be what happened; empty if none may."""
+    found = measurable.doubtful(campaign, [(one.entry, one.run) for one in prepared])
+    one = {name: [each for each in own if each.kind in LEFT_OUT] for name, own in found.items()}
+    which = "; ".join(f"{name} at {own[0].start:.4f} s" for name, own in one.items() if own)
+    return f"the verdict hangs on readings that may be a knock, and may be bad ones: {which}" if which else ""
 
 
 def _notice(severity: Severity, name: str, where: str = "", **facts: object) -> Notice:

@@ -25,7 +25,7 @@ from kbs_process.stages import decouple
 from kbs_process.stages.decouple import Decoupling
 from kbs_process.stages.gravity.model import GravityModel
 from kbs_process.studies.correlate.earlier_diagnosis import keep_diagnosis
-from kbs_process.studies.correlate.notices import has_spikes, spikes
+from kbs_process.studies.correlate.notices import has_spikes, spikes, unclear
 from kbs_process.studies.correlate.output import write_tables
 from kbs_process.studies.correlate.results import Results
 from kbs_process.studies.correlate.summary import conclusion, summarise
@@ -49,7 +49,7 @@ def process(
             kept = _with_spikes(campaign, prepared, decoupling, progress) if found.requirements else ()
             told = spikes(analyses, found.requirements, kept)
             longest = max(one.run.longest_spike for one in prepared)
-            judged = decided(found.requirements, kept, longest)
+            judged = decided(found.requirements, kept, longest, unclear(campaign, prepared))
             found = msgspec.structs.replace(
                 found, warnings=(*told, *found.warnings), requirements=judged, verdict=conclusion(judged)
             )
