@@ -95,6 +95,16 @@ def test_what_lasts_as_long_as_the_band_shows_is_judged_as_it_was_read() -> None
     assert left.verdict == "undecided" and "0.6 s" in left.doubt
 
 
+def test_what_may_be_a_knock_is_judged_where_both_ways_agree() -> None:
+    met, broken = verdict((0.02, 0.001), (0.02, 0.001)), verdict((0.08, 0.001), (0.02, 0.001))
+    assert decided([met], [met], 0.03, "a knock") == (met,) and decided([broken], [broken], 0.03, "a knock") == (
+        broken,
+    )
+    for one, other in ((met, [broken]), (broken, [met]), (met, [])):
+        (found,) = decided([one], other, 0.03, "a knock")
+        assert (found.verdict, found.doubt) == ("undecided", "a knock")
+
+
 @pytest.mark.parametrize(("at", "told"), [(92, True), (60, True), (30, False), (99, False)])
 def test_what_was_recorded_next_to_an_end_or_a_gap_forbids_met_and_is_in_no_figure(at: int, told: bool) -> None:
     """Of five seconds the first ones are known; at 1.5 s there is nothing, and beside it the band is not known."""

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import archived
-from kbs_process.reduction.measurable import amplified, attenuated, hidden
+from kbs_process.reduction.measurable import amplified, attenuated, doubtful, hidden
 from kbs_process.rig.model import Amplifier, Quantity
-from kbs_process.signals.records import WRENCH_CHANNELS, WRENCH_UNITS, Block, Signal
+from kbs_process.signals.records import WRENCH_CHANNELS, WRENCH_UNITS, Block, Signal, Stretch
 from kbs_process.stages.align.readings import Readings
 
 NEEDED = 2.5  # Hz: a band up to 1 Hz
@@ -90,7 +91,9 @@ def test_a_resonance_next_to_a_band_forbids_a_verdict():
     assert len(list(amplified([6.0, 10.0], 5.0))) == 1
 
 
-def doubts(gaps: list[tuple[float, float]], known: slice = slice(20, -20)) -> list[str]:
+def doubts(
+    gaps: list[tuple[float, float]], known: slice = slice(20, -20), unclear: tuple[Stretch, ...] = ()
+) -> list[str]:
     """Why EL089's requirement, up to 1 Hz, is not judged by two minutes with gaps, s, known in a slice of them."""
     campaign = archived.campaign("EL089", recordings=False)
     valid = np.zeros(2400, dtype=bool)
@@ -98,7 +101,8 @@ def doubts(gaps: list[tuple[float, float]], known: slice = slice(20, -20)) -> li
     values = noise(2400)
     loads = Signal(0.0, 0.05, values, WRENCH_CHANNELS, WRENCH_UNITS, "T", valid)
     run = SimpleNamespace(loads=loads, gaps=np.array(gaps).reshape(-1, 2), losses=())
-    return [one.why for one in hidden(campaign, campaign.requirements[0], "test", run, valid, {}) if not one.of_failed]
+    found = hidden(campaign, campaign.requirements[0], "test", run, valid, {}, unclear)
+    return [one.why for one in found if not one.of_failed]
 
 
 def test_what_a_gap_may_hide_is_not_judged_and_a_few_lost_samples_are():
@@ -109,3 +113,43 @@ def test_what_a_gap_may_hide_is_not_judged_and_a_few_lost_samples_are():
     assert len(doubts([(60.0, 60.2)])) == 1
     (why,) = doubts([], slice(20, 1440))
     assert why == "in 41 % of test readings or angles are missing"
+
+
+def test_readings_that_are_missing_for_what_may_have_happened_forbid_met():
+    lost = [Stretch("non-finite", at, 0.03, likely=True) for at in (20.0, 50.0, 0.1)]  # the last before what is known
+    (why,) = doubts([(20.0, 20.04), (50.0, 50.04)], unclear=tuple(lost))
+    assert why.startswith(
+        "readings are missing in test, 2 times, for 0.03 s at 20.00 s: what happened may be the cause"
+    )
+    assert doubts([], unclear=(Stretch("spike", 20.0, 0.03, likely=True),)) == []  # judged with it and without it
+
+
+def unclear(amplifier: bool, *starts: list[float], length: float = 0.02, likely: bool = False, kind: str = "gap"):
+    """How many of the stretches that begin at `starts`, of each repeat, may be what happened."""
+    campaign = archived.campaign("EL089", recordings=False)
+    transducer = campaign.rig.transducer if amplifier else replace(campaign.rig.transducer, amplifier=None)
+    campaign = replace(campaign, rig=replace(campaign.rig, transducer=transducer))
+    loads = Signal(0.0, 0.05, np.zeros((2400, 1)), ("Ty",), ("N m",), "T", np.ones(2400, dtype=bool))
+    turn = np.cumsum(np.sin(np.arange(2400) / 300.0))[:, None]
+    recordings = []
+    for number, own in enumerate(starts):
+        late = 1.3 * number
+        moved = Signal(late, 0.05, turn, ("arm",), ("rad",), "joint", np.ones(2400, dtype=bool))
+        stretches = tuple(Stretch(kind, at + late, length, likely) for at in own)
+        run = SimpleNamespace(loads=loads, stretches=stretches, command=None, angle=moved, wrench=loads)
+        recordings.append((SimpleNamespace(name=str(number), trajectory="same"), run))
+    return [len(own) for own in doubtful(campaign, recordings).values()]
+
+
+def test_what_repeats_lack_at_the_same_instant_they_lack_for_a_reason():
+    assert unclear(False, [20.0, 30.0], [20.0, 70.0]) == [1, 1]
+    assert unclear(False, [20.0, 30.0], [21.3, 70.0]) == [0, 0]
+    often = [list(np.random.default_rng(seed).uniform(0.0, 120.0, 200)) for seed in (1, 2)]
+    assert unclear(False, *often) == [0, 0]  # no more than by chance
+    assert unclear(True, [20.0], [20.0], kind="spike", length=0.01) == [0, 0]  # nothing so short passes 20 Hz
+
+
+def test_a_bad_sample_that_an_amplifier_passes_may_be_a_blow():
+    assert unclear(False, [20.0], kind="spike") == [0]
+    assert unclear(True, [20.0], kind="spike") == [1] and unclear(True, [20.0]) == [0]
+    assert unclear(False, [20.0], likely=True) == [1] and unclear(True, [20.0], likely=True, length=0.01) == [0]

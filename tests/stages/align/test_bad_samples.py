@@ -214,6 +214,22 @@ def test_two_sources_in_one_stream_are_refused(every: int) -> None:
         run_of(streams)
 
 
+@pytest.mark.parametrize("frequency", [50.005, 50.013, 49.98, 50.3])
+def test_a_hum_that_beats_with_the_sampling_is_no_second_source(frequency: float) -> None:
+    streams = recording(100.0, 90.0)
+    hum = 0.2 * np.sin(2.0 * np.pi * frequency * np.arange(9000) * 0.01 + 0.3)
+    streams["wrench"].values[:] += hum[:, None]
+    run = run_of(streams)
+    assert run.losses == () and error(run)[0] < 4.0 * NOISE
+
+
+def test_a_source_that_reads_nothing_between_loads_that_swing_is_a_second_one() -> None:
+    streams = recording(100.0, 90.0)
+    streams["wrench"].values[::2, 1] = np.random.default_rng(8).normal(0.0, NOISE, 4500)
+    with pytest.raises(RecordingError, match="Ty changes to and fro"):
+        run_of(streams)
+
+
 @pytest.mark.parametrize("by", [-0.4037, -0.0437, -0.01, 0.004, 0.01, 0.02])
 def test_a_clock_that_is_set_by_little_is_refused(by: float) -> None:
     streams = recording()
@@ -321,6 +337,57 @@ def test_when_samples_were_made_up_is_known() -> None:
     streams["wrench"].values[150:153, 0] += 10.0
     run = run_of(streams)
     assert [loss.count for loss in told(run, "spike")] == [1] and run.longest_spike == pytest.approx(0.6)
+
+
+def bridged(run: Run) -> list[tuple[str, float, float, bool]]:
+    return [(one.kind, round(one.start, 3), round(one.length, 3), one.likely) for one in run.stretches]
+
+
+@pytest.mark.parametrize(("length", "likely"), [(1, False), (3, True)])
+def test_several_messages_in_a_row_without_a_number_may_lack_it_for_what_happened(length: int, likely: bool) -> None:
+    streams = recording()
+    streams["wrench"].values[4000 : 4000 + length, 0] = np.nan
+    streams["angle"].values[2000:2010] = np.nan  # which hides no load
+    assert bridged(run_of(streams)) == [("non-finite", 40.0, round(0.01 * length, 3), likely)]
+
+
+@pytest.mark.parametrize(
+    ("knock", "likely"),
+    [
+        ([[0.0, 5.0]], [False]),
+        ([[0.0, 2.0], [0.0, 3.0], [0.0, 2.1]], [True]),  # three samples of one channel
+        ([[4.0, 5.0]], [True, True]),  # one of two
+    ],
+)
+def test_a_bad_sample_is_one_of_one_channel_and_more_may_be_a_knock(
+    knock: list[list[float]], likely: list[bool]
+) -> None:
+    streams = recording()
+    streams["wrench"].values[3000 : 3000 + len(knock)] += knock
+    run = run_of(streams)
+    expected = [("spike", 30.0, round(0.01 * len(knock), 3), one) for one in likely]
+    assert bridged(run) == expected
+    told_of = told(run, "spike")[0]
+    assert told_of.count == 1 and ("3 samples" in told_of.detail) == (len(knock) == 3)
+
+
+def test_what_a_driver_fills_in_is_no_knock() -> None:
+    for which, value in ((slice(3000, 3001), 0.0), (slice(3000, 3003), 32.767)):
+        streams = recording()
+        streams["wrench"].values[which] = value
+        assert bridged(run_of(streams)) == []
+    streams["wrench"].values[3000:3008] = 0.0  # longer than a knock that is taken for bad samples
+    assert {one[0] for one in bridged(run_of(streams))} == {"dropout"}
+
+
+def test_messages_that_are_lost_while_something_shakes_may_be_lost_for_that() -> None:
+    t = np.arange(60) * 0.01
+    for size in (0.0, 3.0):
+        streams = recording()
+        ringing = size * np.exp(-t / 0.1) * np.sin(2.0 * np.pi * 18.0 * t)
+        streams["wrench"].values[3000:3060, 1] += ringing
+        streams["wrench"] = rows(streams["wrench"], np.delete(np.arange(6000), [1000, *range(2998, 3003)]))
+        assert bridged(run_of(streams)) == [("gap", 29.97, 0.05, size > 0.0)]
 
 
 def test_bursts_that_were_stamped_on_arrival_are_refused_by_name() -> None:

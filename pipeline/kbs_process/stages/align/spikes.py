@@ -77,6 +77,23 @@ def _to_and_fro(jump: Stamps, size: Array) -> bool:
     return by_chance or (short < 2.0 and (long > 1.5 * short or abs(even - 0.5) > 0.45))
 
 
+def beats(x: Array) -> bool:
+    """Whether samples (n,) differ from their neighbours by what swells and vanishes as |cos| does: a tone next to half
+    the sampling rate, and no second source, unless it follows what lies between the samples.
+    """
+    groups = len(x) // AROUND
+    if groups < NEAR:
+        return False
+    rows = x[: groups * AROUND].reshape(groups, AROUND)
+    size, between = np.median(np.abs(np.diff(rows)), axis=1), np.median(np.abs(rows[:, 1:] + rows[:, :-1]), axis=1)
+    large = np.quantile(size, 0.95)
+    share = float(np.mean(size < 0.5 * large))  # 1/3 of whole beats
+    again = np.quantile(np.abs(rows[:, 2:] - rows[:, :-2]), 0.9) < 0.5 * large
+    related = np.cov(size, between)
+    follows = related[0, 1] ** 2 > 0.25 * related[0, 0] * related[1, 1]
+    return bool(0.1 < share < 0.6 and again and not follows)
+
+
 @dataclass(frozen=True, slots=True)
 class Oddity:
     """One spike, step or lost stretch of one channel."""
@@ -103,7 +120,8 @@ class Spikes:
     steps: list[Oddity] = field(default_factory=list)
     lost: list[Oddity] = field(default_factory=list)  # stretches that stand still: left out
     shaken: list[int] = field(default_factory=list)  # ns, where gaps of several samples begin while something shakes
-    mixed: Oddity | None = None  # a channel that two sources bring by turns
+    by_turns: dict[int, Oddity] = field(default_factory=dict)  # channels whose samples change to and fro
+    beating: set[int] = field(default_factory=set)  # of these, tones
     samples: int = 0
     _bad: Stamps | None = None  # (c,) samples in spikes
     _code: Array | None = None  # (c,) least difference between readings
@@ -167,9 +185,10 @@ class Spikes:
             self._largest[channel] = max(self._largest[channel], largest)
             self._fastest[channel] = max(self._fastest[channel], fastest)
             self._note_gaps(channel, stamp, column, turn, 1 + np.flatnonzero(gap[1:]), (done, end))
-            if self.mixed is None and by_turns(x[done:end, channel]):
+            if channel not in self.beating and by_turns(x[done:end, channel]):
                 by = float(np.quantile(np.abs(np.diff(x[done:end, channel])), 0.95))
-                self.mixed = Oddity(channel, int(stamp[done]), int(stamp[end - 1]), by)
+                self.by_turns.setdefault(channel, Oddity(channel, int(stamp[done]), int(stamp[end - 1]), by))
+                self.beating |= {channel} if beats(x[done:end, channel]) else set()
             found += [(channel, *one) for one in zip(*(each.tolist() for each in places), strict=True)]
             if len(places[0]):
                 before = x.copy() if before is x else before
@@ -236,6 +255,11 @@ class Spikes:
                 self._bad[channel] += stop - first
             if len(kind) < LISTED:
                 kind.append(one)
+
+    @property
+    def mixed(self) -> Oddity | None:
+        """A channel that two sources bring by turns."""
+        return next((one for channel, one in self.by_turns.items() if channel not in self.beating), None)
 
     def noisy(self) -> tuple[int, int] | None:
         """A channel with more spikes than a signal has, and how many samples they are."""
