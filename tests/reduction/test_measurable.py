@@ -92,16 +92,19 @@ def test_a_resonance_next_to_a_band_forbids_a_verdict():
 
 
 def doubts(
-    gaps: list[tuple[float, float]], known: slice = slice(20, -20), unclear: tuple[Stretch, ...] = ()
+    gaps: list[tuple[float, float]],
+    known: slice | np.ndarray = slice(20, -20),
+    unclear: tuple[Stretch, ...] = (),
+    rate: float = 20.0,
 ) -> list[str]:
-    """Why EL089's requirement, up to 1 Hz, is not judged by two minutes with gaps, s, known in a slice of them."""
+    """Why EL089's requirement, up to 1 Hz, is not judged by two minutes with gaps, s, where they are `known`."""
     campaign = archived.campaign("EL089", recordings=False)
     valid = np.zeros(2400, dtype=bool)
     valid[known] = True
     values = noise(2400)
     loads = Signal(0.0, 0.05, values, WRENCH_CHANNELS, WRENCH_UNITS, "T", valid)
-    run = SimpleNamespace(loads=loads, gaps=np.array(gaps).reshape(-1, 2), losses=())
-    found = hidden(campaign, campaign.requirements[0], "test", run, valid, {}, unclear)
+    run = SimpleNamespace(loads=loads, gaps=np.array(gaps).reshape(-1, 2), losses=(), rates={"angle": rate})
+    found = hidden(campaign, campaign.requirements[0], "test", run, valid, {"angle": Readings()}, unclear)
     return [one.why for one in found if not one.of_failed]
 
 
@@ -113,6 +116,16 @@ def test_what_a_gap_may_hide_is_not_judged_and_a_few_lost_samples_are():
     assert len(doubts([(60.0, 60.2)])) == 1
     (why,) = doubts([], slice(20, 1440))
     assert why == "in 41 % of test readings or angles are missing"
+
+
+def test_ends_of_a_slow_stream_lack_nothing_where_each_of_its_readings_is_known():
+    known = np.arange(2400) % 4 == 0
+    known[100:-100] = True
+    assert doubts([], known, rate=5.0) == []
+    assert doubts([], known) == ["in 6 % of test readings or angles are missing"]
+    known[:200] = False
+    (why,) = doubts([], known, rate=5.0)
+    assert why == "in 8 % of test readings or angles are missing"
 
 
 def test_readings_that_are_missing_for_what_may_have_happened_forbid_met():

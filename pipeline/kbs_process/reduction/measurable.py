@@ -85,7 +85,11 @@ def hidden(
     assert loads is not None  # every recording that is judged has some
     band = Band("", None, edge)
     known = bridged(replace(loads, valid=loads.valid & moving), run.gaps, band).valid
-    lacking = len(known) - int(np.count_nonzero(known))
+    # Where filters lean on what lies beyond an end, samples of a slow stream are known, and not those between.
+    slowest = min((run.rates[key] for key in streams if key in run.rates), default=loads.rate)
+    edges = np.flatnonzero(np.diff(np.concatenate(([True], known, [True])).astype(np.int8)))
+    lengths = np.diff(edges.reshape(-1, 2))
+    lacking = int(lengths[lengths * slowest > loads.rate].sum())
     if lacking > max(UNSEEN * len(known), ENDS_S / loads.dt, ENDS):
         share = 100.0 * lacking / len(known)
         yield Doubt(f"in {share:.0f} % of {name} readings or angles are missing", of_failed=False)
