@@ -53,6 +53,7 @@ def notices(campaign: Campaign, analyses: Sequence[Analysis], model: GravityMode
     yield from implausible(campaign, found.requirements)
     yield from _unjudged(analyses)
     yield from _static_load(campaign, analyses, model)
+    yield from calibration(analyses, model)
     for check in model.fit.checks:
         if not check.passed:
             yield _notice("info", "fit", check=check)
@@ -141,6 +142,18 @@ def _static_load(campaign: Campaign, analyses: Sequence[Analysis], model: Gravit
                 shown=_shown(analysis, max(large, key=lambda misfit: misfit.ratio).channel, model),
                 judged=bool(campaign.requirements),
             )
+
+
+def calibration(analyses: Sequence[Analysis], model: GravityModel) -> Iterable[Notice]:
+    """A calibration that leaves more, slowly, than the noise of a sample: others are held against what it leaves."""
+    noise = model.equation.elements.rig.loads.noise[model.equation.index]
+    for analysis in (one for one in analyses if one.entry.role == "calibration"):
+        for misfit, unexplained, sigma in zip(analysis.misfits, model.unexplained, noise, strict=True):
+            most = np.sqrt(max(misfit.explained**2 - unexplained**2, 0.0) + sigma**2)
+            if misfit.left > most and sigma > 0.0:
+                shown = _shown(analysis, misfit.channel, model)
+                facts = {"low_pass": model.settings.low_pass_Hz, "one": misfit, "most": most, "shown": shown}
+                yield _notice("info", "calibration", analysis.entry.name, **facts)
 
 
 def _shown(analysis: Analysis, channel: str, model: GravityModel) -> str:
