@@ -86,23 +86,13 @@ def test_short_gaps_widen_the_interval_of_their_recording_by_what_a_line_may_err
     assert plain.sigma == pytest.approx(1e-4) and wide.sigma == pytest.approx(np.hypot(1e-4, error * 0.05))
 
 
-def test_what_lasts_as_long_as_the_band_shows_is_judged_as_it_was_read() -> None:
-    met, broken = verdict((0.02, 0.001), (0.02, 0.001)), verdict((0.08, 0.001), (0.02, 0.001))
-    assert decided([met], [broken], longest=0.03) == (met,)  # three samples at 100 Hz, of a band up to 1 Hz
-    assert decided([met], [broken], longest=0.6) == (broken,)  # at 5 Hz
-    assert decided([broken], [met], longest=0.6) == (broken,)
-    (left,) = decided([met], (), longest=0.6)
-    assert left.verdict == "undecided" and "0.6 s" in left.doubt
-
-
 def test_what_may_be_a_knock_is_judged_where_both_ways_agree() -> None:
     met, broken = verdict((0.02, 0.001), (0.02, 0.001)), verdict((0.08, 0.001), (0.02, 0.001))
-    assert decided([met], [met], 0.03, "a knock") == (met,) and decided([broken], [broken], 0.03, "a knock") == (
-        broken,
-    )
+    assert decided([met, broken], [broken, met], ["", ""]) == (met, broken)
+    assert decided([met], [met], ["a knock"]) == (met,) and decided([broken], [broken], ["a knock"]) == (broken,)
     for one, other in ((met, [broken]), (broken, [met]), (met, [])):
-        (found,) = decided([one], other, 0.03, "a knock")
-        assert (found.verdict, found.doubt) == ("undecided", "a knock")
+        (found,) = decided([one], other, ["a knock"])
+        assert (found.verdict, found.doubt, found.value) == ("undecided", "a knock", one.value)
 
 
 @pytest.mark.parametrize(("at", "told"), [(92, True), (60, True), (30, False), (99, False)])

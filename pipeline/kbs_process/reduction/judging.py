@@ -152,27 +152,18 @@ def _unsure(one: _Candidate, unit: str) -> Doubt:
 
 
 def decided(
-    without: Sequence[results.Requirement], kept: Sequence[results.Requirement], longest: float, unclear: str = ""
+    without: Sequence[results.Requirement], kept: Sequence[results.Requirement], doubts: Sequence[str]
 ) -> tuple[results.Requirement, ...]:
-    """Choose between requirements judged `without` what looks like bad readings, and with it `kept`, if that can be.
+    """Requirements judged `without` what looks like bad readings; of one with a doubt, if it is judged alike with them.
 
-    What lasts for a quarter of a band's shortest period, `longest` in s, may be what the band shows: the worse decides.
-    Where some may be what happened, `unclear` says which: nothing is decided unless both agree.
+    `kept` are those judged with them, none if that cannot be.
     """
-    found = []
-    for one, other in zip_longest(without, kept):
-        if 4.0 * longest * (one.band_Hz[1] or np.inf) < 1.0:
-            agree = not unclear or (other is not None and one.verdict == other.verdict)
-            doubt = one.doubt or unclear
-            found.append(one if agree else msgspec.structs.replace(one, verdict="undecided", doubt=doubt))
-        elif other is not None:
-            found.append(max(one, other, key=lambda each: SEVERITY[each.verdict]))
-        elif one.verdict == "pass":
-            doubt = f"readings off all others for {longest:.3g} s are as long as the band shows"
-            found.append(msgspec.structs.replace(one, verdict="undecided", doubt=doubt))
-        else:
-            found.append(one)
-    return tuple(found)
+    return tuple(
+        one
+        if not doubt or (other is not None and one.verdict == other.verdict)
+        else msgspec.structs.replace(one, verdict="undecided", doubt=one.doubt or doubt)
+        for one, other, doubt in zip_longest(without, kept, doubts)
+    )
 
 
 def _channel(channel: str, measured: Sequence[_Candidate], predicted: Sequence[Extreme]) -> results.ChannelResult:

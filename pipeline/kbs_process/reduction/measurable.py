@@ -20,6 +20,7 @@ from kbs_process.stages.repeats import lag, motion_of
 SHOWN = 0.4  # of the rate of distinct readings: the highest frequency that they show
 UNSEEN = 0.05  # share of a recording that may be unknown: an interval at 95 % leaves out as much
 ENDS_S, ENDS = 4.0, 40  # that filters and the beginning of streams may cost: seconds, or samples
+SEEN = 0.25  # of a band's shortest period: what lasts for as long shows in it
 SHORTEST = 0.25  # of an amplifier's corner's period: what it passes lasts for longer
 TOGETHER_S = 0.05  # what repeats have at the same instant, more often than by chance, has a cause
 AMPLIFIED = 0.05  # part of a reading that an amplifier may take off at a band's upper edge
@@ -57,17 +58,11 @@ def judged_channels(requirement: Requirement, rig: Rig) -> tuple[str, ...]:
 
 
 def hidden(
-    campaign: Campaign,
-    requirement: Requirement,
-    name: str,
-    run: Run,
-    moving: Mask,
-    streams: Mapping[str, Readings],
-    unclear: Sequence[Stretch] = (),
+    campaign: Campaign, requirement: Requirement, name: str, run: Run, moving: Mask, streams: Mapping[str, Readings]
 ) -> Iterator[Doubt]:
-    """Yield what a recording's samples cannot show of a requirement.
+    """Yield what a recording's samples cannot show of a requirement; `moving` (n,): where its angles are known.
 
-    `moving` (n,): where its angles are known; `unclear`: what was bridged and may be what happened.
+    Of what was bridged, the run has what may be what happened.
     """
     rig, edge = campaign.rig, requirement.band[1]
     judged = judged_channels(requirement, rig)
@@ -99,7 +94,8 @@ def hidden(
         start, end = gaps[np.argmax(np.diff(gaps)[:, 0])]
         where = f"readings or angles are missing in {name}, from {start:.2f} s to {end:.2f} s at the longest"
         yield Doubt(f"{where}: what there was up to {edge:g} Hz is not known", of_failed=False)
-    if missing := [one for one in unclear if one.kind != SPIKE and first < one.start + one.length and one.start < last]:
+    within = [one for one in run.stretches if first < one.start + one.length and one.start < last]
+    if missing := [one for one in within if one.kind != SPIKE]:
         longest = max(missing, key=lambda one: one.length)
         times = f"{len(missing)} times, " if len(missing) > 1 else ""
         where = f"readings are missing in {name}, {times}for {longest.length:.3g} s at {longest.start:.2f} s"
@@ -112,29 +108,30 @@ def hidden(
         yield Doubt(f"{', '.join(held)} held one reading in {name}: what was beyond is not known", of_failed=False)
 
 
-def doubtful(campaign: Campaign, recordings: Sequence[tuple[RecordingEntry, Run]]) -> dict[str, list[Stretch]]:
-    """What was bridged, by recording, and may be what happened: it is likely, or repeats have it at the same instant.
-
-    Nothing that is too short for the amplifier is; of one that passes a single sample, a bad one may be a blow.
+def doubtful(
+    campaign: Campaign, recordings: Sequence[tuple[RecordingEntry, Run]], edge: float
+) -> dict[str, list[Stretch]]:
+    """What was bridged, by recording, and may be what happened: it is likely, lasts as long as a band up to `edge`, Hz,
+    shows, or comes at the same instant of repeats. Nothing is that no amplifier passes.
     """
     amplifier = campaign.rig.transducer.amplifier
     shortest = 0.0 if amplifier is None else SHORTEST / float(amplifier.corner)
     long = {entry.name: [one for one in run.stretches if one.length > shortest] for entry, run in recordings}
     found = {
-        name: [one for one in own if one.likely or (amplifier is not None and one.kind == SPIKE)]
+        name: [one for one in own if one.likely or (one.kind == SPIKE and one.length * edge >= SEEN)]
         for name, own in long.items()
     }
     for (entry, run), (other, repeat) in permutations(recordings, 2):
-        name, loads = entry.name, run.loads
-        if entry.trajectory != other.trajectory or loads is None or not (long[name] and long[other.name]):
-            continue
         own, its = motion_of(run), motion_of(repeat)
-        late = (lag(own, its) if own and its else None) or 0.0
-        here, there = (np.array([one.start + 0.5 * one.length for one in long[key]]) for key in (name, other.name))
-        near = np.abs(here[:, None] + late - there).min(axis=1) < TOGETHER_S
-        chance = len(here) * len(there) * 2.0 * TOGETHER_S / (len(loads) * loads.dt)
-        if np.count_nonzero(near) > chance + 3.0 * np.sqrt(chance):
-            found[name] += [one for one, at_once in zip(long[name], near, strict=True) if at_once]
+        here, there = (np.array([one.start + 0.5 * one.length for one in long[key.name]]) for key in (entry, other))
+        if entry.trajectory == other.trajectory and own and its and len(here) and len(there):
+            here = here + (lag(own, its) or 0.0)
+            chance = len(here) * len(there) * 2.0 * TOGETHER_S / (len(own) * own.dt)
+            there = np.concatenate(([-np.inf], np.sort(there), [np.inf]))
+            after = np.searchsorted(there, here)
+            near = np.minimum(there[after] - here, here - there[after - 1]) < TOGETHER_S
+            if np.count_nonzero(near) > chance + 3.0 * np.sqrt(chance):
+                found[entry.name] += [one for one, at_once in zip(long[entry.name], near, strict=True) if at_once]
     return found
 
 

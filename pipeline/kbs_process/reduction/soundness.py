@@ -8,7 +8,7 @@ no requirement is met; what a simple fault would explain is said first.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import msgspec
@@ -165,12 +165,11 @@ def _hidden(
 ) -> Iterator[Doubt]:
     """What the samples cannot show of a requirement."""
     judged = [one for one in recordings if one.entry.role != "calibration"]
-    unclear = measurable.doubtful(campaign, [(one.entry, one.run) for one in judged])
+    unclear = measurable.doubtful(campaign, [(one.entry, one.run) for one in judged], requirement.band[1])
     for one in judged:
         name = one.entry.name
-        yield from measurable.hidden(
-            campaign, requirement, name, one.run, one.motion.valid, one.readings, unclear[name]
-        )
+        run = replace(one.run, stretches=tuple(unclear[name]))
+        yield from measurable.hidden(campaign, requirement, name, run, one.motion.valid, one.readings)
     if campaign.rig.transducer.channels:
         edge = requirement.band[1]
         yield from measurable.attenuated(campaign.rig.transducer.amplifier, edge)

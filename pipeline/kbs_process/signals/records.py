@@ -131,7 +131,7 @@ class Loss:
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
-    """Readings of a load that were bridged: left out as bad, not there, or no numbers."""
+    """Readings that were bridged: left out as bad, or of loads also those that are not there, or no numbers."""
 
     kind: str  # that of its `Loss`
     start: float  # s, on the recording's own time axis
@@ -194,8 +194,7 @@ class Run:
     clocks: dict[str, Clock] = dataclasses.field(default_factory=dict)  # by stream
     pointing: Signal | None = None  # angle of each joint by an external instrument, rad
     effort: Signal | None = None  # of each joint that has it measured, in the unit in which it is recorded
-    longest_spike: float = 0.0  # s, that was taken for bad readings in loads or angles
-    stretches: tuple[Stretch, ...] = ()  # of loads, that were bridged
+    stretches: tuple[Stretch, ...] = ()  # that were bridged
     gaps: Array = dataclasses.field(
         default_factory=lambda: np.zeros((0, 2))
     )  # s, from when to when samples are made up

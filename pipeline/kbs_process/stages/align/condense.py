@@ -15,6 +15,7 @@ import numpy as np
 
 from kbs_process.errors import RecordingError
 from kbs_process.signals.records import (
+    SPIKE,
     WRENCH_CHANNELS,
     WRENCH_UNITS,
     Array,
@@ -25,6 +26,7 @@ from kbs_process.signals.records import (
     Loss,
     Run,
     Signal,
+    Stretch,
 )
 from kbs_process.stages.align.clocks import align
 from kbs_process.stages.align.resample import Kept, design
@@ -148,12 +150,11 @@ def condense(
         clocks=clocks,
         pointing=signals.get("pointing"),
         effort=signals.get("effort"),
-        longest_spike=max(sampled[key].line.longest_spike for key in kept if key != "pointing"),
         stretches=tuple(
-            one
-            for key in LOADS
-            if key in kept
-            for one in sampled[key].line.stretches(clocks[key].offset_s, 1.0 + clocks[key].skew)
+            Stretch(kind, clocks[key].offset_s + (1.0 + clocks[key].skew) * own, length, likely and key in LOADS)
+            for key in kept
+            for kind, own, length, likely in sampled[key].line.stretches()
+            if key in LOADS or (kind == SPIKE and key != "pointing")
         ),
         gaps=np.concatenate([_on_axis(sampled[key].gaps(), clocks[key]) for key in kept if key != "pointing"]),
     )

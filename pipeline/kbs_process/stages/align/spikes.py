@@ -103,8 +103,7 @@ class Oddity:
     last: int  # ns
     by: float  # largest deviation; the reading that stands still
     count: int = 1  # samples
-    filled: bool = False  # all of them read the same: what a driver puts in for what it lost
-    alone: bool = True  # no other channel is off at that time
+    likely: bool = False  # several samples or channels that read differently: it may be what happened
 
 
 @dataclass(slots=True)
@@ -120,7 +119,7 @@ class Spikes:
     steps: list[Oddity] = field(default_factory=list)
     lost: list[Oddity] = field(default_factory=list)  # stretches that stand still: left out
     shaken: list[int] = field(default_factory=list)  # ns, where gaps of several samples begin while something shakes
-    by_turns: dict[int, Oddity] = field(default_factory=dict)  # channels whose samples change to and fro
+    changing: dict[int, Oddity] = field(default_factory=dict)  # channels whose samples change to and fro
     beating: set[int] = field(default_factory=set)  # of these, tones
     samples: int = 0
     _bad: Stamps | None = None  # (c,) samples in spikes
@@ -187,7 +186,7 @@ class Spikes:
             self._note_gaps(channel, stamp, column, turn, 1 + np.flatnonzero(gap[1:]), (done, end))
             if channel not in self.beating and by_turns(x[done:end, channel]):
                 by = float(np.quantile(np.abs(np.diff(x[done:end, channel])), 0.95))
-                self.by_turns.setdefault(channel, Oddity(channel, int(stamp[done]), int(stamp[end - 1]), by))
+                self.changing.setdefault(channel, Oddity(channel, int(stamp[done]), int(stamp[end - 1]), by))
                 self.beating |= {channel} if beats(x[done:end, channel]) else set()
             found += [(channel, *one) for one in zip(*(each.tolist() for each in places), strict=True)]
             if len(places[0]):
@@ -239,9 +238,8 @@ class Spikes:
             several = {other for other, begin, end, _ in found if first < abs(end) and begin < stop}
             rows = before[first : max(stop, first), channel]
             read = before[first : max(stop, first)][:, sorted(several)]
-            filled = read.size > 1 and bool((read == read.flat[0]).all())
-            last = int(stamp[abs(stop) - 1])
-            one = Oddity(channel, int(stamp[first]), last, by, abs(stop) - first, filled, len(several) == 1)
+            likely = bool((read != read[:1, :1]).any())  # what a driver fills in for what it lost is all the same
+            one = Oddity(channel, int(stamp[first]), int(stamp[abs(stop) - 1]), by, abs(stop) - first, likely)
             if stop < 0:
                 kind = self.steps
             elif not self.turning.any() and (
@@ -259,7 +257,7 @@ class Spikes:
     @property
     def mixed(self) -> Oddity | None:
         """A channel that two sources bring by turns."""
-        return next((one for channel, one in self.by_turns.items() if channel not in self.beating), None)
+        return next((one for channel, one in self.changing.items() if channel not in self.beating), None)
 
     def noisy(self) -> tuple[int, int] | None:
         """A channel with more spikes than a signal has, and how many samples they are."""
@@ -299,9 +297,8 @@ class Spikes:
 
 
 def _shaken(x: Array, steps: Array, first: int, stop: int, off: set[int]) -> bool:
-    """Whether channels other than those that are `off` move like nowhere around: what shook the rig is in all.
-
-    `steps` (n,) are periods before each sample.
+    """Whether channels other than those that are `off` move like nowhere around, periods `steps` (n,) between samples.
+    What shook the rig is in all.
     """
     others = [channel for channel in range(x.shape[1]) if channel not in off]
     if not others:

@@ -8,19 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from kbs_process.errors import RecordingError
-from kbs_process.signals.records import (
-    BLOW,
-    DROPOUT,
-    PUT_IN_ORDER,
-    ROUNDED,
-    SPIKE,
-    Array,
-    Block,
-    Loss,
-    Mask,
-    Stamps,
-    Stretch,
-)
+from kbs_process.signals.records import BLOW, DROPOUT, PUT_IN_ORDER, ROUNDED, SPIKE, Array, Block, Loss, Mask, Stamps
 from kbs_process.stages.align.arrival import REGULAR, Arrival
 from kbs_process.stages.align.clocks import ClockData, FloorStep, LatencyFloor
 from kbs_process.stages.align.envelope import MinMax
@@ -38,7 +26,7 @@ from kbs_process.stages.align.grid import (
 from kbs_process.stages.align.ordering import Orderer, Reblock, concatenate, finite_rows, judge
 from kbs_process.stages.align.resample import Kept, Reducer, design
 from kbs_process.stages.align.spectrum import Welch
-from kbs_process.stages.align.spikes import Oddity, Spikes
+from kbs_process.stages.align.spikes import LISTED, Oddity, Spikes
 
 TIMES = 10  # of single bad samples, one by one
 GAPS_LISTED = 5  # one by one; more of them in one line
@@ -310,36 +298,28 @@ class Timeline:
                 self._non_finite_in[channel] = self._non_finite_in.get(channel, 0) + bad
         return block.stamp[good], block.values[good]
 
-    @property
-    def longest_spike(self) -> float:
-        """How long the longest of the bad readings lasts, s."""
-        found = self.spikes.spikes if self.spikes else []
-        return max((1e-9 * (one.last - one.first) + self._period / GAP for one in found), default=0.0)
+    def stretches(self) -> Iterator[tuple[str, float, float, bool]]:
+        """Yield kind, start and length, s, of what was bridged, and whether what happened may be the cause.
 
-    def stretches(self, offset: float, rate: float) -> Iterator[Stretch]:
-        """Yield what was bridged and may be no fault of the reading, on the run's time axis t = offset + rate own.
-
-        One sample in one channel shows nothing that happened, nor does what a driver fills in. Where messages came and
-        several in a row lack a number, or several are lost while something shakes, what happened may be the cause.
+        One bad sample in one channel shows nothing that happened, nor does what a driver fills in. Where messages come,
+        and several in a row lack a number, or several are lost while something shakes, that may be the cause.
         """
         if self.spikes is None or self.grid is None:
             return
         period = self.grid.period_ns
         at = np.concatenate([np.empty(0, dtype=np.int64), *self._non_finite_at])
-        runs = [piece for piece in np.split(at, 1 + np.flatnonzero(np.diff(at) > GAP * period)) if len(piece)]
-        shaken = [self.own_one(first) for first in self.spikes.shaken]
-        found = [
-            (SPIKE, one.first, one.last, one.count > 1 or not one.alone) for one in self.spikes.spikes if not one.filled
-        ]
+        ends = np.flatnonzero(np.diff(at) > GAP * period)
+        runs = np.stack([at[np.append(0, ends + 1)], at[np.append(ends, -1)]]).T if len(at) else at.reshape(0, 2)
+        longest = np.argsort(runs[:, 0] - runs[:, 1], kind="stable")[:LISTED]
+        found = [(SPIKE, one.first, one.last, one.likely) for one in self.spikes.spikes]
         found += [(DROPOUT, one.first, one.last, True) for one in self.spikes.lost]
-        found += [("non-finite", int(run[0]), int(run[-1]), len(run) > 1) for run in runs]
+        found += [("non-finite", first, last, last > first) for first, last in runs[longest].tolist()]
         for kind, first, last, likely in found:
-            length = rate * 1e-9 * (last - first + period)
-            yield Stretch(kind, offset + rate * self.own_one(first), length, likely)
+            yield kind, self.own_one(first), 1e-9 * (last - first + period), likely
+        shaken = {self.own_one(first) for first in self.spikes.shaken}
         for gap in self.gaps:
             if gap.missing > 1:
-                length = gap.end - gap.start - 1e-9 * period
-                yield Stretch("gap", offset + rate * gap.start, rate * length, gap.start in shaken)
+                yield "gap", gap.start, gap.end - gap.start - 1e-9 * period, gap.start in shaken
 
     @property
     def non_finite_channels(self) -> str:

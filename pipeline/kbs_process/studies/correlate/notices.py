@@ -82,11 +82,12 @@ def spikes(
         yield _notice("warning", "spikes", analysis.entry.name, named=named, figures=figures)
 
 
-def unclear(campaign: Campaign, prepared: Sequence[Prepared]) -> str:
+def unclear(campaign: Campaign, prepared: Sequence[Prepared], requirement: Requirement) -> str:
     """Which of the readings that were left out as bad may be what happened; empty if none may."""
-    found = measurable.doubtful(campaign, [(one.entry, one.run) for one in prepared])
-    one = {name: [each for each in own if each.kind in LEFT_OUT] for name, own in found.items()}
-    which = "; ".join(f"{name} at {own[0].start:.4f} s" for name, own in one.items() if own)
+    recordings = [(one.entry, one.run) for one in prepared]
+    found = measurable.doubtful(campaign, recordings, requirement.band_Hz[1] or np.inf).items()
+    first = {name: [one.start for one in own if one.kind in LEFT_OUT] for name, own in found}
+    which = "; ".join(f"{name} at {min(starts):.4f} s" for name, starts in first.items() if starts)
     return f"the verdict hangs on readings that may be a knock, and may be bad ones: {which}" if which else ""
 
 

@@ -48,8 +48,7 @@ def process(
         if any(has_spikes(one.run) for one in prepared):
             kept = _with_spikes(campaign, prepared, decoupling, progress) if found.requirements else ()
             told = spikes(analyses, found.requirements, kept)
-            longest = max(one.run.longest_spike for one in prepared)
-            judged = decided(found.requirements, kept, longest, unclear(campaign, prepared))
+            judged = decided(found.requirements, kept, [unclear(campaign, prepared, one) for one in found.requirements])
             found = msgspec.structs.replace(
                 found, warnings=(*told, *found.warnings), requirements=judged, verdict=conclusion(judged)
             )
