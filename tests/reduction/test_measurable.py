@@ -11,7 +11,7 @@ import pytest
 import archived
 from kbs_process.reduction.measurable import amplified, attenuated, doubtful, hidden
 from kbs_process.rig.model import Amplifier, Quantity
-from kbs_process.signals.records import WRENCH_CHANNELS, WRENCH_UNITS, Block, Signal, Stretch
+from kbs_process.signals.records import COPY, WRENCH_CHANNELS, WRENCH_UNITS, Block, Loss, Signal, Stretch
 from kbs_process.stages.align.readings import Readings
 
 NEEDED = 2.5  # Hz: a band up to 1 Hz
@@ -139,7 +139,14 @@ def test_readings_that_are_missing_for_what_may_have_happened_forbid_met():
     assert doubts([], unclear=(Stretch("spike", 20.0, 0.03, likely=True),)) == []  # judged with it and without it
 
 
-def unclear(amplifier: bool, *starts: list[float], length: float = 0.02, likely: bool = False, kind: str = "gap"):
+def unclear(
+    amplifier: bool,
+    *starts: list[float],
+    length: float = 0.02,
+    likely: bool = False,
+    kind: str = "gap",
+    losses: tuple[Loss, ...] = (),
+) -> list[int]:
     """How many of the stretches that begin at `starts`, of each repeat, may be what happened."""
     campaign = archived.campaign("EL089", recordings=False)
     transducer = campaign.rig.transducer if amplifier else replace(campaign.rig.transducer, amplifier=None)
@@ -151,7 +158,9 @@ def unclear(amplifier: bool, *starts: list[float], length: float = 0.02, likely:
         late = 1.3 * number
         moved = Signal(late, 0.05, turn, ("arm",), ("rad",), "joint", np.ones(2400, dtype=bool))
         stretches = tuple(Stretch(kind, at + late, length, likely) for at in own)
-        run = SimpleNamespace(loads=loads, stretches=stretches, command=None, angle=moved, wrench=loads)
+        run = SimpleNamespace(
+            loads=loads, stretches=stretches, command=None, angle=moved, wrench=loads, losses=losses[:number]
+        )
         recordings.append((SimpleNamespace(name=str(number), trajectory="same"), run))
     return [len(own) for own in doubtful(campaign, recordings, 1.0).values()]
 
@@ -159,6 +168,7 @@ def unclear(amplifier: bool, *starts: list[float], length: float = 0.02, likely:
 def test_what_repeats_lack_at_the_same_instant_they_lack_for_a_reason():
     assert unclear(False, [20.0, 30.0], [20.0, 70.0]) == [1, 1]
     assert unclear(False, [20.0, 30.0], [21.3, 70.0]) == [0, 0]
+    assert unclear(False, [20.0], [20.0], losses=(Loss(COPY, "", 0),)) == [0, 0]  # which is no repeat
     often = [list(np.random.default_rng(seed).uniform(0.0, 120.0, 200)) for seed in (1, 2)]
     assert unclear(False, *often) == [0, 0]  # no more than by chance
     assert unclear(True, [20.0], [20.0], kind="spike", length=0.01) == [0, 0]  # nothing so short passes 20 Hz

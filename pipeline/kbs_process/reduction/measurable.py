@@ -12,7 +12,7 @@ from kbs_process.campaign.config import Campaign, RecordingEntry, Requirement
 from kbs_process.errors import ConfigError
 from kbs_process.results.judged import Doubt
 from kbs_process.rig.model import Amplifier, Rig
-from kbs_process.signals.records import SPIKE, WRENCH_CHANNELS, Mask, Run, Stretch
+from kbs_process.signals.records import COPY, SPIKE, WRENCH_CHANNELS, Mask, Run, Stretch
 from kbs_process.stages.align.readings import Readings
 from kbs_process.stages.bandpass import Band, bridged, too_long
 from kbs_process.stages.repeats import lag, motion_of
@@ -60,10 +60,7 @@ def judged_channels(requirement: Requirement, rig: Rig) -> tuple[str, ...]:
 def hidden(
     campaign: Campaign, requirement: Requirement, name: str, run: Run, moving: Mask, streams: Mapping[str, Readings]
 ) -> Iterator[Doubt]:
-    """Yield what a recording's samples cannot show of a requirement; `moving` (n,): where its angles are known.
-
-    Of what was bridged, the run has what may be what happened.
-    """
+    """Yield what a recording's samples cannot show of a requirement; `moving` (n,): where its angles are known."""
     rig, edge = campaign.rig, requirement.band[1]
     judged = judged_channels(requirement, rig)
     channels = WRENCH_CHANNELS if requirement.frame == "S" else judged
@@ -121,7 +118,8 @@ def doubtful(
         name: [one for one in own if one.likely or (one.kind == SPIKE and one.length * edge >= SEEN)]
         for name, own in long.items()
     }
-    for (entry, run), (other, repeat) in permutations(recordings, 2):
+    repeats = [one for one in recordings if all(loss.kind != COPY for loss in one[1].losses)]
+    for (entry, run), (other, repeat) in permutations(repeats, 2):
         own, its = motion_of(run), motion_of(repeat)
         here, there = (np.array([one.start + 0.5 * one.length for one in long[key.name]]) for key in (entry, other))
         if entry.trajectory == other.trajectory and own and its and len(here) and len(there):
