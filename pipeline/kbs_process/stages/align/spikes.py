@@ -118,7 +118,7 @@ class Spikes:
     blows: list[Oddity] = field(default_factory=list)  # of several channels and samples at once: kept
     steps: list[Oddity] = field(default_factory=list)
     lost: list[Oddity] = field(default_factory=list)  # stretches that stand still: left out
-    shaken: list[int] = field(default_factory=list)  # ns, where gaps of several samples begin while something shakes
+    shaken: dict[int, bool] = field(default_factory=dict)  # ns, where gaps of several samples begin, if it shakes there
     changing: dict[int, Oddity] = field(default_factory=dict)  # channels whose samples change to and fro
     beating: set[int] = field(default_factory=set)  # of these, tones
     samples: int = 0
@@ -193,8 +193,8 @@ class Spikes:
                 before = x.copy() if before is x else before
                 x[:, channel] = column
         for at in (done + np.flatnonzero(steps[done:end] > SEVERAL)).tolist():
-            if len(self.shaken) < LISTED and at > 0 and _shaken(before, steps, at, at, set()):
-                self.shaken.append(int(stamp[at - 1]))
+            if len(self.shaken) < LISTED and at > 0:
+                self.shaken[int(stamp[at - 1])] = _shaken(before, steps, at, at, set())
         self._note(found, stamp, steps, x, before)
         self._last = still
         self.samples += end - done

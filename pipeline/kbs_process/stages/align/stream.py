@@ -316,7 +316,7 @@ class Timeline:
         found += [("non-finite", first, last, last > first) for first, last in runs[longest].tolist()]
         for kind, first, last, likely in found:
             yield kind, self.own_one(first), 1e-9 * (last - first + period), likely
-        shaken = {self.own_one(first) for first in self.spikes.shaken}
+        shaken = {self.own_one(first) for first, shakes in self.spikes.shaken.items() if shakes}
         for gap in self.gaps:
             if gap.missing > 1:
                 yield "gap", gap.start, gap.end - gap.start - 1e-9 * period, gap.start in shaken
