@@ -1,20 +1,24 @@
-"""What acts or drifts in a calibration is told, as others are held against what it leaves."""
+"""What acts or drifts in a calibration is told, and so are readings that may be a knock."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+import archived
 from kbs_process.progress import SilentProgress
 from kbs_process.reduction.analysis import analyse
 from kbs_process.reduction.preparing import fit_gravity
-from kbs_process.studies.correlate.notices import calibration
+from kbs_process.signals.records import Stretch
+from kbs_process.studies.correlate.notices import calibration, unclear
 from reduction.arm import described, drawn, recorded
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("size", "channels"), [(0.0, []), (0.05, ["Ty"])])
 def test_a_disturbance_in_a_calibration_is_told(tmp_path: Path, size: float, channels: list[str]) -> None:
     campaign = described(tmp_path / "arm")
@@ -29,3 +33,16 @@ def test_a_disturbance_in_a_calibration_is_told(tmp_path: Path, size: float, cha
     found = list(calibration([analysis], model))
     assert [one.what.split(" it leaves ")[1][:2] for one in found] == channels
     assert all(one.severity == "info" and one.where == "sweep" for one in found)
+
+
+def test_readings_that_may_be_a_knock_are_named() -> None:
+    campaign = archived.campaign("EL089", recordings=False)
+    requirement = SimpleNamespace(band_Hz=(0.01, 1.0))
+
+    def told(*stretches: Stretch) -> str:
+        run = SimpleNamespace(stretches=stretches, losses=())
+        prepared = [SimpleNamespace(entry=SimpleNamespace(name="test", trajectory="a"), run=run)]
+        return unclear(campaign, prepared, requirement)
+
+    assert told(Stretch("spike", 20.0, 0.03, likely=False), Stretch("gap", 30.0, 0.05, likely=True)) == ""
+    assert told(Stretch("spike", 20.0, 0.03, likely=True)).endswith("may be bad ones: test at 20.0000 s")
