@@ -8,7 +8,7 @@ no requirement is met; what a simple fault would explain is said first.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import msgspec
@@ -19,6 +19,7 @@ from kbs_process.plant.laws import select
 from kbs_process.plant.linear.modes import modes
 from kbs_process.progress import Progress
 from kbs_process.reduction import measurable
+from kbs_process.reduction.held import noisy
 from kbs_process.reduction.preparing import Prepared, tare
 from kbs_process.reduction.relief import relieved
 from kbs_process.results.judged import WRONG, Beyond, Doubt, Soundness
@@ -27,6 +28,7 @@ from kbs_process.rig.model import Rig
 from kbs_process.signals.records import WRENCH_CHANNELS, Array, Mask
 from kbs_process.signals.smoothing import smooth
 from kbs_process.stages.align.clocks import late_sigma
+from kbs_process.stages.align.spectrum import OCTAVES, quietest
 from kbs_process.stages.conventions import (
     BEYOND,
     OF_ENCODER,
@@ -45,6 +47,7 @@ from kbs_process.stages.gravity.tension import BY_CHANCE, Moved, lag, tension
 from kbs_process.stages.repeats import commanded
 
 LEFT = 0.1  # of the weight, and of the torque that it can make: a calibration leaves less, whatever rubs or pulls
+UNLIKE = 3.0  # times less noise than is stated, or more, however well it is known
 _LIKE = 0.03  # relative: a gain this near to a unit's factor is that unit's
 _SHOWN = 6
 _SAME = 1e-12  # relative: what rounding makes of the same reading
@@ -97,7 +100,8 @@ class Checked:
                     severity="warning",
                     what="; ".join(one.why for one in doubts),
                     where=name,
-                    remedy="what lies there is not judged: record anew, faster or without gaps, or judge a lower band",
+                    remedy="what lies there is not judged: record anew, faster, without filter or gaps, correct what "
+                    "is stated, or judge a lower band",
                 )
 
 
@@ -169,10 +173,43 @@ def _hidden(
         yield from measurable.hidden(campaign, requirement, one.entry.name, one.run, one.motion.valid, one.readings)
     if campaign.rig.transducer.channels:
         edge = requirement.band[1]
+        yield from unlike_stated(requirement, campaign.rig, judged)
         yield from measurable.attenuated(campaign.rig.transducer.amplifier, edge)
         poses = [one.motion.q[at] for one in judged[:1] for at in (0, -1)]
         every = [mode.frequency for pose in poses for mode in modes(model.rig, select(campaign.effects), pose)]
         yield from measurable.amplified(every, edge)
+
+
+def unlike_stated(requirement: Requirement, rig: Rig, recordings: Sequence[Prepared]) -> Iterator[Doubt]:
+    """Channels with far less white noise than is stated, and those with far more.
+
+    What averages or filters readings takes noise off as it takes off peaks: next to the band, in the octaves above it.
+    Noise is more where it is so up to half the sampling rate, and from sample to sample.
+    Says nothing where no noise is stated, or rounding hides it (`noisy`).
+    """
+    own, stated, amplifier = rig.transducer.channels, noisy(rig), rig.transducer.amplifier
+    judged = own if requirement.frame == "S" else measurable.judged_channels(requirement, rig)
+    near = min(2.0**OCTAVES * requirement.band[1], np.inf if amplifier is None else float(amplifier.corner))
+    index = rig.loads.index(own)
+    reads = np.eye(len(index)) + rig.transducer.cross_coupling.value[np.ix_(index, index)]
+    noise = np.array([stated.get(channel, np.nan) if channel in judged else np.nan for channel in own])
+    sigma = rig.transducer.noise.sigma[index]
+    factor = np.maximum(UNLIKE, np.exp(BEYOND * sigma / noise))
+    for one in recordings:
+        if (spectrum := one.run.spectrum) is None:
+            continue
+        raw, rate = replace(spectrum, S=reads @ spectrum.S @ reads.T), one.run.rates["wrench"]
+        less, more = quietest(raw, rate, near), np.minimum(quietest(raw, rate, np.inf), one.readings["wrench"].noise())
+        for off, read, why in (
+            (factor * less < noise, less, "averaged or filtered before it was stored, or in another scale"),
+            (more > factor * noise, more, "disturbed, or in another scale"),
+        ):
+            told = [
+                f"{own[k]} has {read[k]:.2g} {rig.loads.units[index[k]]} rms, not {noise[k]:.2g} +- {sigma[k]:.2g}"
+                for k in np.flatnonzero(off)
+            ]
+            if told:
+                yield Doubt(f"the noise is not as stated in {one.entry.name}: {', '.join(told)}: {why}")
 
 
 def _conventions(

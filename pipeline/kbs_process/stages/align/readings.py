@@ -54,6 +54,11 @@ class Readings:
         rows = np.concatenate(self.head) if self.head else np.zeros((0, 0))
         return np.array([_step(column) for column in rows.T])
 
+    def noise(self) -> Array:
+        """White noise (c,) of the first readings, rms."""
+        rows = np.concatenate(self.head)
+        return white(rows[np.isfinite(rows).all(axis=1)])
+
     def slow(self, needed: float, *, at_rest: bool) -> tuple[float, float]:
         """Share of the time in which there are fewer than `needed` distinct readings a second, and the rate there.
 
@@ -81,6 +86,12 @@ class Readings:
             if len(change) and (step == 0.0 or np.median(change) > _STEPS * step):
                 return False
         return True
+
+
+def white(x: Array) -> Array:
+    """Standard deviation of the white noise in readings (n,) or (n, c), whatever else is slow or seldom."""
+    rms: Array = 1.4826 * np.median(np.abs(np.diff(x, n=3, axis=0)), axis=0) / np.sqrt(20.0)
+    return rms
 
 
 def _step(x: Array) -> float:
