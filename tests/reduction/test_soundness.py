@@ -99,6 +99,24 @@ def test_a_wrench_that_comes_later_than_known_is_told(tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("samples", [6, 20])
+def test_a_wrench_that_comes_later_in_all_recordings_is_told(samples, tmp_path):
+    campaign = described(tmp_path)
+    (judged,) = campaign.requirements
+    read = []
+    for one in recorded(campaign, drawn(campaign, 1), 1):
+        x = one.raw.values
+        late = one.raw.derive(np.concatenate([x[:samples], x[:-samples]]), "late")
+        read.append(replace(one, raw=late, run=replace(one.run, wrench=late)))
+    found = checked(campaign, read)
+    lags = {one.name: one.value for one in found.soundness.beyond if "lag (s) behind the angles" in one.name}
+    assert len(lags) == 2 and list(lags.values()) == pytest.approx([samples / 20.0] * 2, rel=0.15)
+    (suggestion,) = found.soundness.suggestions
+    assert suggestion.startswith("clock: the wrench comes ") and " s too late" in suggestion
+    assert found.doubts(judged)[0].of_failed, "what is late leaves gravity in the figures"
+
+
+@pytest.mark.slow
 def test_a_channel_that_no_recording_shows_to_respond_is_told(tmp_path):
     campaign = described(tmp_path)
     (judged,) = campaign.requirements

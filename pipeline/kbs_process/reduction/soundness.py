@@ -128,11 +128,9 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
         shown = [_read_and_due(one, data, model) for one, data in zip(recordings, instants, strict=True)]
         conventions = (*check_weight(campaign.rig), *_conventions(recordings, instants, model, zeros, shown))
         amplifier = campaign.rig.transducer.amplifier
-        lags = [
-            lag(model, data, late_sigma(one.run.clocks, amplifier))
-            for one, data in zip(recordings, instants, strict=True)
-        ]
-        found = tension(model, {sample.name: taring for sample, taring in tared}, lags)
+        each = zip(recordings, instants, strict=True)
+        lags = [lag(model, data, late_sigma(one.run.clocks, amplifier)) for one, data in each]
+        found = tension(model, {sample.name: taring for sample, taring in tared}, [one for one in lags if one])
         most = _most(equation)
         rounding = {key: x for one in recordings for key, x in measurable.rounding(campaign, one.readings).items()}
         hidden = {one.name: tuple(_hidden(campaign, one, recordings, model)) for one in campaign.requirements}
@@ -146,15 +144,19 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
         mute = tuple(key for key in _mute(equation, [read for read, _, _ in shown]) if key in judged)
         if not reasons:
             return Checked(Soundness(probability=found.probability), conventions, hidden, rounding, mute)
-        explained = explanations(equation, instants, most)
+        shifted = [one for one in found.beyond if one in lags]
+        told = [_shift(one.value) for one in shifted[:1]]
+        if reasons != tuple(_far(shifted, 1.0)):
+            told = [_in_words(one, equation) for one in explanations(equation, instants, most)]
         return Checked(
             Soundness(
                 sound=False,
                 probability=found.probability,
                 beyond=tuple(_beyond(one, model) for one in found.beyond),
                 reasons=reasons,
-                suggestions=tuple(_in_words(one, equation) for one in explained),
-                calibrated=_calibrated(campaign, samples, model, most)
+                suggestions=tuple(told),
+                calibrated=not shifted
+                and _calibrated(campaign, samples, model, most)
                 and all(one.ok or not one.check.startswith(OF_ENCODER) for one in conventions),
             ),
             conventions,
@@ -375,6 +377,11 @@ def _in_words(one: Explained, equation: Equation) -> str:
 
 def _values(numbers: Array) -> str:
     return ", ".join(f"{x:.4g}" for x in numbers[:_SHOWN]) + (", ..." if len(numbers) > _SHOWN else "")
+
+
+def _shift(late: float) -> str:
+    when = "late" if late > 0.0 else "early"
+    return f"clock: the wrench comes {abs(late):.2g} s too {when}, by its timestamps or a filter"
 
 
 def _gain(what: str, channels: Sequence[str], gain: float) -> str:
