@@ -25,7 +25,7 @@ from kbs_process.reduction.relief import relieved
 from kbs_process.results.judged import WRONG, Beyond, Doubt, Soundness
 from kbs_process.results.records import Notice
 from kbs_process.rig.model import Rig
-from kbs_process.signals.records import WRENCH_CHANNELS, Array, Mask
+from kbs_process.signals.records import WRENCH_CHANNELS, Array, Mask, Run
 from kbs_process.signals.smoothing import smooth
 from kbs_process.stages.align.clocks import late_sigma
 from kbs_process.stages.align.spectrum import OCTAVES, quietest
@@ -48,6 +48,8 @@ from kbs_process.stages.repeats import commanded
 
 LEFT = 0.1  # of the weight, and of the torque that it can make: a calibration leaves less, whatever rubs or pulls
 UNLIKE = 3.0  # times less noise than is stated, or more, however well it is known
+RATED = 1.1  # times: angles that change by more, or by less than its inverse, do not follow their rates
+_SCALE = "clock: the times of all streams run too fast or too slow, or rates are in another unit"
 _LIKE = 0.03  # relative: a gain this near to a unit's factor is that unit's
 _SHOWN = 6
 _SAME = 1e-12  # relative: what rounding makes of the same reading
@@ -134,7 +136,9 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
         most = _most(equation)
         rounding = {key: x for one in recordings for key, x in measurable.rounding(campaign, one.readings).items()}
         hidden = {one.name: tuple(_hidden(campaign, one, recordings, model)) for one in campaign.requirements}
+        timed = tuple(mistimed(campaign, recordings))
         reasons = (
+            *timed,
             *repeated(recordings),
             *_far(found.beyond, found.probability),
             *(f"{one.check} is {one.found}, expected {one.expected}" for one in conventions if not one.ok),
@@ -145,9 +149,9 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
         if not reasons:
             return Checked(Soundness(probability=found.probability), conventions, hidden, rounding, mute)
         shifted = [one for one in found.beyond if one in lags]
-        told = [_shift(one.value) for one in shifted[:1]]
-        if reasons != tuple(_far(shifted, 1.0)):
-            told = [_in_words(one, equation) for one in explanations(equation, instants, most)]
+        told = [*[_SCALE for _ in timed[:1]], *[_shift(one.value) for one in shifted[:1]]]
+        if reasons != (*timed, *_far(shifted, 1.0)):
+            told += [_in_words(one, equation) for one in explanations(equation, instants, most)]
         return Checked(
             Soundness(
                 sound=False,
@@ -155,7 +159,7 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
                 beyond=tuple(_beyond(one, model) for one in found.beyond),
                 reasons=reasons,
                 suggestions=tuple(told),
-                calibrated=not shifted
+                calibrated=not (timed or shifted)
                 and _calibrated(campaign, samples, model, most)
                 and all(one.ok or not one.check.startswith(OF_ENCODER) for one in conventions),
             ),
@@ -281,6 +285,38 @@ def repeated(recordings: Sequence[Prepared]) -> Iterator[str]:
                 if apart <= max(least[a], least[b]) < min(np.ptp(x), np.ptp(y)):
                     names = signal.channels
                     yield f"{names[b]} repeats {names[a]} in {one.entry.name}: one stream is read twice"
+
+
+def mistimed(campaign: Campaign, recordings: Sequence[Prepared]) -> Iterator[str]:
+    """Angles that change faster or slower than their rates say; commands without rates in another cycle than stated.
+
+    The true slope lies between both regressions, whatever noise is in either.
+    """
+    cycle = campaign.rig.controller.cycle if campaign.drive == "command" and campaign.rig.controller else 0.0
+    for one in recordings:
+        for what, moved, due in _paces(one.run, float(cycle)):
+            both = float(moved @ due)
+            if both > 0.0 and not both < RATED * min(due @ due, moved @ moved):
+                times = float(np.sqrt((moved @ moved) / (due @ due)))
+                yield f"{what} in {one.entry.name} is {times:.3g}, expected 1"
+
+
+def _paces(run: Run, cycle: float) -> Iterator[tuple[str, Array, Array]]:
+    """Steps (n,) by what changes from sample to sample, and as they are due by rates, or by the stated `cycle`, s."""
+    if run.command is not None and len(run.command.t) > 1:
+        step = np.diff(run.command.t)
+        column = dict(zip(run.command.channels, run.command.values.T, strict=True))
+        rates = {name.removesuffix(".rate"): x for name, x in column.items() if name.endswith(".rate") and x.any()}
+        for joint, x in rates.items():
+            yield f"slope of command {joint} against its rate", np.diff(column[joint]), x[:-1] * step
+        if cycle and not rates:
+            usual = np.full(len(step), np.median(step))
+            yield "interval of commands over controller.cycle", usual, np.full(len(step), cycle)
+    if run.angle is not None and run.rate is not None:
+        known = run.angle.valid & run.rate.valid
+        for joint in (name for name in run.angle.channels if name in run.rate.channels):
+            moved = np.gradient(run.angle.column(joint), run.angle.dt)[known]
+            yield f"slope of angle {joint} against its rate", moved, run.rate.column(joint)[known]
 
 
 def _far(beyond: Sequence[Moved], probability: float) -> Iterator[str]:
