@@ -113,7 +113,7 @@ def test_a_wrench_that_comes_later_in_all_recordings_is_told(samples, tmp_path):
     lags = {one.name: one.value for one in found.soundness.beyond if "lag (s) behind the angles" in one.name}
     assert len(lags) == 2 and list(lags.values()) == pytest.approx([samples / 20.0] * 2, rel=0.15)
     (suggestion,) = found.soundness.suggestions
-    assert suggestion.startswith("clock: the wrench comes ") and " s too late" in suggestion
+    assert suggestion.startswith("clock: the wrench is +") and " s late" in suggestion
     assert found.doubts(judged)[0].of_failed, "what is late leaves gravity in the figures"
 
 

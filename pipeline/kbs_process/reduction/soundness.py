@@ -28,6 +28,7 @@ from kbs_process.rig.model import Rig
 from kbs_process.signals.records import WRENCH_CHANNELS, Array, Mask, Run
 from kbs_process.signals.smoothing import smooth
 from kbs_process.stages.align.clocks import late_sigma
+from kbs_process.stages.align.readings import white
 from kbs_process.stages.align.spectrum import OCTAVES, quietest
 from kbs_process.stages.conventions import (
     BEYOND,
@@ -50,6 +51,7 @@ LEFT = 0.1  # of the weight, and of the torque that it can make: a calibration l
 UNLIKE = 3.0  # times less noise than is stated, or more, however well it is known
 RATED = 1.1  # times: angles that change by more, or by less than its inverse, do not follow their rates
 _SCALE = "clock: the times of all streams run too fast or too slow, or rates are in another unit"
+_LATE = "clock: the wrench is {:+.2g} s late, by its timestamps or a filter"
 _LIKE = 0.03  # relative: a gain this near to a unit's factor is that unit's
 _SHOWN = 6
 _SAME = 1e-12  # relative: what rounding makes of the same reading
@@ -146,14 +148,13 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
         )
         judged = {key for one in campaign.requirements for key in measurable.judged_channels(one, campaign.rig)}
         mute = tuple(key for key in _mute(equation, [read for read, _, _ in shown]) if key in judged)
-        if not reasons:
-            return Checked(Soundness(probability=found.probability), conventions, hidden, rounding, mute)
-        shifted = [one for one in found.beyond if one in lags]
-        told = [*[_SCALE for _ in timed[:1]], *[_shift(one.value) for one in shifted[:1]]]
-        if reasons != (*timed, *_far(shifted, 1.0)):
-            told += [_in_words(one, equation) for one in explanations(equation, instants, most)]
-        return Checked(
-            Soundness(
+        soundness = Soundness(probability=found.probability)
+        if reasons:
+            shifted = [one for one in found.beyond if one in lags]
+            told = [_SCALE for _ in timed[:1]] + [_LATE.format(one.value) for one in shifted[:1]]
+            if reasons != (*timed, *_far(shifted, 1.0)):
+                told += [_in_words(one, equation) for one in explanations(equation, instants, most)]
+            soundness = Soundness(
                 sound=False,
                 probability=found.probability,
                 beyond=tuple(_beyond(one, model) for one in found.beyond),
@@ -162,12 +163,8 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
                 calibrated=not (timed or shifted)
                 and _calibrated(campaign, samples, model, most)
                 and all(one.ok or not one.check.startswith(OF_ENCODER) for one in conventions),
-            ),
-            conventions,
-            hidden,
-            rounding,
-            mute,
-        )
+            )
+        return Checked(soundness, conventions, hidden, rounding, mute)
 
 
 def _hidden(
@@ -187,11 +184,10 @@ def _hidden(
 
 
 def unlike_stated(requirement: Requirement, rig: Rig, recordings: Sequence[Prepared]) -> Iterator[Doubt]:
-    """Channels with far less white noise than is stated, and those with far more.
+    """Channels with far less white noise than is stated, and those with far more, unless rounding hides it (`noisy`).
 
     What averages or filters readings takes noise off as it takes off peaks: next to the band, in the octaves above it.
     Noise is more where it is so up to half the sampling rate, and from sample to sample.
-    Says nothing where no noise is stated, or rounding hides it (`noisy`).
     """
     own, stated, amplifier = rig.transducer.channels, noisy(rig), rig.transducer.amplifier
     judged = own if requirement.frame == "S" else measurable.judged_channels(requirement, rig)
@@ -205,7 +201,8 @@ def unlike_stated(requirement: Requirement, rig: Rig, recordings: Sequence[Prepa
         if (spectrum := one.run.spectrum) is None:
             continue
         raw, rate = replace(spectrum, S=reads @ spectrum.S @ reads.T), one.run.rates["wrench"]
-        less, more = quietest(raw, rate, near), np.minimum(quietest(raw, rate, np.inf), one.readings["wrench"].noise())
+        first = white(np.concatenate(one.readings["wrench"].head))
+        less, more = quietest(raw, rate, near), np.minimum(quietest(raw, rate, np.inf), first)
         for off, read, why in (
             (factor * less < noise, less, "averaged or filtered before it was stored, or in another scale"),
             (more > factor * noise, more, "disturbed, or in another scale"),
@@ -310,8 +307,7 @@ def _paces(run: Run, cycle: float) -> Iterator[tuple[str, Array, Array]]:
         for joint, x in rates.items():
             yield f"slope of command {joint} against its rate", np.diff(column[joint]), x[:-1] * step
         if cycle and not rates:
-            usual = np.full(len(step), np.median(step))
-            yield "interval of commands over controller.cycle", usual, np.full(len(step), cycle)
+            yield "interval of commands over controller.cycle", np.atleast_1d(np.median(step)), np.array([cycle])
     if run.angle is not None and run.rate is not None:
         known = run.angle.valid & run.rate.valid
         for joint in (name for name in run.angle.channels if name in run.rate.channels):
@@ -350,12 +346,8 @@ def extent(rig: Rig) -> tuple[float, float]:
 def _most(equation: Equation) -> Array:
     """What may be left (c,) of a calibration, rms: a part of the weight, and of the torque that it can make."""
     weight, reach = extent(equation.elements.rig)
-    scale = np.array(
-        [
-            weight if channel[0] == "F" else weight * reach if channel in WRENCH_CHANNELS else 0.0
-            for channel in equation.channels
-        ]
-    )
+    by_kind = {"F": weight, "T": weight * reach}
+    scale = np.array([by_kind[key[0]] if key in WRENCH_CHANNELS else 0.0 for key in equation.channels])
     most: Array = np.where(scale > 0.0, LEFT * scale, np.inf)
     return most
 
@@ -366,14 +358,10 @@ def _calibrated(campaign: Campaign, samples: Sequence[Sample], model: GravityMod
     alone = [sample for sample in samples if sample.name in names]
     if not alone:
         return False
-    equation = model.equation
-    by_these = (
-        model
-        if names == set(model.taring)
-        else gravity.fit(
-            alone, equation.elements.rig, include_inertia=equation.include_inertia, settings=model.settings
-        )
-    )
+    by_these, equation = model, model.equation
+    if names != set(model.taring):
+        rig, inertia = equation.elements.rig, equation.include_inertia
+        by_these = gravity.fit(alone, rig, include_inertia=inertia, settings=model.settings)
     return tension(by_these, {}).sound and not any(_left(by_these, most))
 
 
@@ -413,11 +401,6 @@ def _in_words(one: Explained, equation: Equation) -> str:
 
 def _values(numbers: Array) -> str:
     return ", ".join(f"{x:.4g}" for x in numbers[:_SHOWN]) + (", ..." if len(numbers) > _SHOWN else "")
-
-
-def _shift(late: float) -> str:
-    when = "late" if late > 0.0 else "early"
-    return f"clock: the wrench comes {abs(late):.2g} s too {when}, by its timestamps or a filter"
 
 
 def _gain(what: str, channels: Sequence[str], gain: float) -> str:

@@ -54,11 +54,6 @@ class Readings:
         rows = np.concatenate(self.head) if self.head else np.zeros((0, 0))
         return np.array([_step(column) for column in rows.T])
 
-    def noise(self) -> Array:
-        """White noise (c,) of the first readings, rms."""
-        rows = np.concatenate(self.head)
-        return white(rows[np.isfinite(rows).all(axis=1)])
-
     def slow(self, needed: float, *, at_rest: bool) -> tuple[float, float]:
         """Share of the time in which there are fewer than `needed` distinct readings a second, and the rate there.
 
