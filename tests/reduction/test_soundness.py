@@ -9,8 +9,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+import archived
 from kbs_process.campaign.config import Campaign
-from kbs_process.reduction.soundness import extent, repeated
+from kbs_process.reduction.soundness import extent, mistimed, repeated
 from kbs_process.signals.records import Events, Signal
 from reduction.arm import checked, described, drawn, recorded
 
@@ -99,6 +100,24 @@ def test_a_wrench_that_comes_later_than_known_is_told(tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("samples", [6, 20])
+def test_a_wrench_that_comes_later_in_all_recordings_is_told(samples, tmp_path):
+    campaign = described(tmp_path)
+    (judged,) = campaign.requirements
+    read = []
+    for one in recorded(campaign, drawn(campaign, 1), 1):
+        x = one.raw.values
+        late = one.raw.derive(np.concatenate([x[:samples], x[:-samples]]), "late")
+        read.append(replace(one, raw=late, run=replace(one.run, wrench=late)))
+    found = checked(campaign, read)
+    lags = {one.name: one.value for one in found.soundness.beyond if "lag (s) behind the angles" in one.name}
+    assert len(lags) == 2 and list(lags.values()) == pytest.approx([samples / 20.0] * 2, rel=0.15)
+    (suggestion,) = found.soundness.suggestions
+    assert suggestion.startswith("clock: the wrench is +") and " s late" in suggestion
+    assert found.doubts(judged)[0].of_failed, "what is late leaves gravity in the figures"
+
+
+@pytest.mark.slow
 def test_a_channel_that_no_recording_shows_to_respond_is_told(tmp_path):
     campaign = described(tmp_path)
     (judged,) = campaign.requirements
@@ -146,3 +165,49 @@ def test_sound_arms_are_sound(tmp_path):
 @pytest.mark.validation
 def test_at_least_95_percent_of_sound_arms_are_judged(tmp_path):
     assert share(described(tmp_path), range(100, 160)) >= 0.95
+
+
+def timed(scale: float, *, rates: float = 1.0, noise: float = 0.0, measured: bool = False) -> list[str]:
+    """What is told of EL089's commands, or of angles and measured rates, where all times are `scale` times too long."""
+    campaign = archived.campaign("EL089", recordings=False)
+    rng = np.random.default_rng(1)
+    t = 0.1 * np.arange(2000)
+    el, rate = 1.3 + 0.1 * np.sin(0.2 * t), rates * 0.02 * np.cos(0.2 * t) + noise * rng.standard_normal(2000)
+    still = np.zeros(2000)
+    run = SimpleNamespace(angle=None, rate=None, command=None)
+    if measured:
+        names, valid, dt = ("az", "el"), np.ones(2000, dtype=bool), 0.1 * scale
+        run.angle = Signal(0.0, dt, np.column_stack((still, el)), names, ("rad",) * 2, "joint", valid)
+        run.rate = Signal(0.0, dt, np.column_stack((still, rate)), names, ("rad/s",) * 2, "joint", valid)
+    else:
+        values = np.column_stack((still, el, still, rate))
+        run.command = Events(scale * t, values, ("az", "el", "az.rate", "el.rate"))
+    return list(mistimed(campaign, [SimpleNamespace(entry=SimpleNamespace(name="test"), run=run)]))
+
+
+@pytest.mark.parametrize("measured", [False, True])
+def test_times_at_another_scale_are_told(measured):
+    what = "angle" if measured else "command"
+    assert timed(1.0, measured=measured) == timed(1.0, noise=0.02, measured=measured) == []
+    for scale, found in ((0.5, "2"), (2.0, "0.5")):
+        expected = [f"slope of {what} el against its rate in test is {found}, expected 1"]
+        assert timed(scale, measured=measured) == expected
+    assert timed(2.0, noise=0.005, measured=measured) != []
+
+
+def test_the_cycle_tells_the_times_of_commands_without_rates():
+    assert timed(1.0, rates=0.0) == []
+    assert timed(2.0, rates=0.0) == ["interval of commands over controller.cycle in test is 2, expected 1"]
+
+
+@pytest.mark.slow
+def test_nothing_is_judged_at_times_of_another_scale(tmp_path):
+    campaign = described(tmp_path)
+    sweep, test = recorded(campaign, drawn(campaign, 1), 1)
+    angle = test.run.angle
+    assert angle is not None
+    slopes = np.gradient(angle.values, 0.05, axis=0)
+    half = Events(angle.t, np.column_stack((angle.values, 0.5 * slopes)), ("arm", "arm.rate"))
+    found = checked(campaign, [sweep, replace(test, run=replace(test.run, command=half))])
+    assert found.soundness.suggestions[0].startswith("clock: the times of all streams")
+    assert found.doubts(campaign.requirements[0])[0].of_failed

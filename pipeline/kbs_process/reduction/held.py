@@ -20,6 +20,7 @@ from kbs_process.reduction.reading import Through, read_run
 from kbs_process.rig.model import Rig
 from kbs_process.signals.records import Array, Block, Loss, Mask, Run
 from kbs_process.stages.align.ordering import concatenate, select
+from kbs_process.stages.align.readings import white
 
 HELD_S = 0.5  # longer than any channel with noise shows one and the same reading, whatever its amplifier passes
 CHANCE = 1e-9  # of a sample, that as many readings as are held are the same by it
@@ -130,7 +131,7 @@ class _Stream:
             free = x[~held & np.isfinite(x)]
             noise = self.noise[column]
             if held.any() and len(free) >= FREE:
-                own = 1.4826 * float(np.median(np.abs(np.diff(free, n=3)))) / np.sqrt(20.0)
+                own = float(white(free))
                 noise = min(noise, float(np.sqrt(max(own**2 - step**2 / 12.0, 0.0))))
             if held.any():
                 chance = max(erf(step / (np.sqrt(8.0) * max(noise, 0.5 * step))), CHANCE)

@@ -147,8 +147,10 @@ def _beside(analysis: Analysis, measured: Signal, band: Band) -> Signal:
 def _unsure(one: _Candidate, unit: str) -> Doubt:
     """What was recorded beside a gap or at an end, and may be beyond the limit."""
     at = one.extreme
-    where = f"{at.channel} of {at.recording} is about {at.value:.4f} {unit} at {at.time_s or 0.0:.2f} s"
-    return Doubt(f"{where}, next to a gap or an end: the band's filter would need what lies beyond", of_failed=False)
+    what = f"whether {at.channel} of {at.recording} stays within {one.limit:g} {unit} at {at.time_s or 0.0:.2f} s"
+    found = f"about {at.value:.4f} +- {COVERAGE * one.sigma:.2g} {unit} by what was recorded"
+    why = f"{what} is not known: {found}, but next to a gap or an end the band's filter needs what lies beyond"
+    return Doubt(why, of_failed=False)
 
 
 def decided(

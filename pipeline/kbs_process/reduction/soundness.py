@@ -19,14 +19,17 @@ from kbs_process.plant.laws import select
 from kbs_process.plant.linear.modes import modes
 from kbs_process.progress import Progress
 from kbs_process.reduction import measurable
+from kbs_process.reduction.held import noisy
 from kbs_process.reduction.preparing import Prepared, tare
 from kbs_process.reduction.relief import relieved
 from kbs_process.results.judged import WRONG, Beyond, Doubt, Soundness
 from kbs_process.results.records import Notice
 from kbs_process.rig.model import Rig
-from kbs_process.signals.records import WRENCH_CHANNELS, Array, Mask
+from kbs_process.signals.records import WRENCH_CHANNELS, Array, Mask, Run
 from kbs_process.signals.smoothing import smooth
 from kbs_process.stages.align.clocks import late_sigma
+from kbs_process.stages.align.readings import white
+from kbs_process.stages.align.spectrum import OCTAVES, quietest
 from kbs_process.stages.conventions import (
     BEYOND,
     OF_ENCODER,
@@ -45,6 +48,10 @@ from kbs_process.stages.gravity.tension import BY_CHANCE, Moved, lag, tension
 from kbs_process.stages.repeats import commanded
 
 LEFT = 0.1  # of the weight, and of the torque that it can make: a calibration leaves less, whatever rubs or pulls
+UNLIKE = 3.0  # times less noise than is stated, or more, however well it is known
+RATED = 1.1  # times: angles that change by more, or by less than its inverse, do not follow their rates
+_SCALE = "clock: the times of all streams run too fast or too slow, or rates are in another unit"
+_LATE = "clock: the wrench is {:+.2g} s late, by its timestamps or a filter"
 _LIKE = 0.03  # relative: a gain this near to a unit's factor is that unit's
 _SHOWN = 6
 _SAME = 1e-12  # relative: what rounding makes of the same reading
@@ -97,7 +104,8 @@ class Checked:
                     severity="warning",
                     what="; ".join(one.why for one in doubts),
                     where=name,
-                    remedy="what lies there is not judged: record anew, faster or without gaps, or judge a lower band",
+                    remedy="what lies there is not judged: record anew, faster, without filter or gaps, correct what "
+                    "is stated, or judge a lower band",
                 )
 
 
@@ -124,15 +132,15 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
         shown = [_read_and_due(one, data, model) for one, data in zip(recordings, instants, strict=True)]
         conventions = (*check_weight(campaign.rig), *_conventions(recordings, instants, model, zeros, shown))
         amplifier = campaign.rig.transducer.amplifier
-        lags = [
-            lag(model, data, late_sigma(one.run.clocks, amplifier))
-            for one, data in zip(recordings, instants, strict=True)
-        ]
-        found = tension(model, {sample.name: taring for sample, taring in tared}, lags)
+        each = zip(recordings, instants, strict=True)
+        lags = [lag(model, data, late_sigma(one.run.clocks, amplifier)) for one, data in each]
+        found = tension(model, {sample.name: taring for sample, taring in tared}, [one for one in lags if one])
         most = _most(equation)
         rounding = {key: x for one in recordings for key, x in measurable.rounding(campaign, one.readings).items()}
         hidden = {one.name: tuple(_hidden(campaign, one, recordings, model)) for one in campaign.requirements}
+        timed = tuple(mistimed(campaign, recordings))
         reasons = (
+            *timed,
             *repeated(recordings),
             *_far(found.beyond, found.probability),
             *(f"{one.check} is {one.found}, expected {one.expected}" for one in conventions if not one.ok),
@@ -140,24 +148,23 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
         )
         judged = {key for one in campaign.requirements for key in measurable.judged_channels(one, campaign.rig)}
         mute = tuple(key for key in _mute(equation, [read for read, _, _ in shown]) if key in judged)
-        if not reasons:
-            return Checked(Soundness(probability=found.probability), conventions, hidden, rounding, mute)
-        explained = explanations(equation, instants, most)
-        return Checked(
-            Soundness(
+        soundness = Soundness(probability=found.probability)
+        if reasons:
+            shifted = [one for one in found.beyond if one in lags]
+            told = [_SCALE for _ in timed[:1]] + [_LATE.format(one.value) for one in shifted[:1]]
+            if reasons != (*timed, *_far(shifted, 1.0)):
+                told += [_in_words(one, equation) for one in explanations(equation, instants, most)]
+            soundness = Soundness(
                 sound=False,
                 probability=found.probability,
                 beyond=tuple(_beyond(one, model) for one in found.beyond),
                 reasons=reasons,
-                suggestions=tuple(_in_words(one, equation) for one in explained),
-                calibrated=_calibrated(campaign, samples, model, most)
+                suggestions=tuple(told),
+                calibrated=not (timed or shifted)
+                and _calibrated(campaign, samples, model, most)
                 and all(one.ok or not one.check.startswith(OF_ENCODER) for one in conventions),
-            ),
-            conventions,
-            hidden,
-            rounding,
-            mute,
-        )
+            )
+        return Checked(soundness, conventions, hidden, rounding, mute)
 
 
 def _hidden(
@@ -172,10 +179,43 @@ def _hidden(
         yield from measurable.hidden(campaign, requirement, name, run, one.motion.valid, one.readings)
     if campaign.rig.transducer.channels:
         edge = requirement.band[1]
+        yield from unlike_stated(requirement, campaign.rig, judged)
         yield from measurable.attenuated(campaign.rig.transducer.amplifier, edge)
         poses = [one.motion.q[at] for one in judged[:1] for at in (0, -1)]
         every = [mode.frequency for pose in poses for mode in modes(model.rig, select(campaign.effects), pose)]
         yield from measurable.amplified(every, edge)
+
+
+def unlike_stated(requirement: Requirement, rig: Rig, recordings: Sequence[Prepared]) -> Iterator[Doubt]:
+    """Channels with far less white noise than is stated, and those with far more, unless rounding hides it (`noisy`).
+
+    What averages or filters readings takes noise off as it takes off peaks: next to the band, in the octaves above it.
+    Noise is more where it is so up to half the sampling rate, and from sample to sample.
+    """
+    own, stated, amplifier = rig.transducer.channels, noisy(rig), rig.transducer.amplifier
+    judged = own if requirement.frame == "S" else measurable.judged_channels(requirement, rig)
+    near = min(2.0**OCTAVES * requirement.band[1], np.inf if amplifier is None else float(amplifier.corner))
+    index = rig.loads.index(own)
+    reads = np.eye(len(index)) + rig.transducer.cross_coupling.value[np.ix_(index, index)]
+    noise = np.array([stated.get(channel, np.nan) if channel in judged else np.nan for channel in own])
+    sigma = rig.transducer.noise.sigma[index]
+    factor = np.maximum(UNLIKE, np.exp(BEYOND * sigma / noise))
+    for one in recordings:
+        if (spectrum := one.run.spectrum) is None:
+            continue
+        raw, rate = replace(spectrum, S=reads @ spectrum.S @ reads.T), one.run.rates["wrench"]
+        first = white(np.concatenate(one.readings["wrench"].head))
+        less, more = quietest(raw, rate, near), np.minimum(quietest(raw, rate, np.inf), first)
+        for off, read, why in (
+            (factor * less < noise, less, "averaged or filtered before it was stored, or in another scale"),
+            (more > factor * noise, more, "disturbed, or in another scale"),
+        ):
+            told = [
+                f"{own[k]} has {read[k]:.2g} {rig.loads.units[index[k]]} rms, not {noise[k]:.2g} +- {sigma[k]:.2g}"
+                for k in np.flatnonzero(off)
+            ]
+            if told:
+                yield Doubt(f"the noise is not as stated in {one.entry.name}: {', '.join(told)}: {why}")
 
 
 def _conventions(
@@ -247,6 +287,37 @@ def repeated(recordings: Sequence[Prepared]) -> Iterator[str]:
                     yield f"{names[b]} repeats {names[a]} in {one.entry.name}: one stream is read twice"
 
 
+def mistimed(campaign: Campaign, recordings: Sequence[Prepared]) -> Iterator[str]:
+    """Angles that change faster or slower than their rates say; commands without rates in another cycle than stated.
+
+    The true slope lies between both regressions, whatever noise is in either.
+    """
+    cycle = campaign.rig.controller.cycle if campaign.drive == "command" and campaign.rig.controller else 0.0
+    for one in recordings:
+        for what, moved, due in _paces(one.run, float(cycle)):
+            both = float(moved @ due)
+            if both > 0.0 and not both < RATED * min(due @ due, moved @ moved):
+                times = float(np.sqrt((moved @ moved) / (due @ due)))
+                yield f"{what} in {one.entry.name} is {times:.3g}, expected 1"
+
+
+def _paces(run: Run, cycle: float) -> Iterator[tuple[str, Array, Array]]:
+    """Steps (n,) by what changes from sample to sample, and as they are due by rates, or by the stated `cycle`, s."""
+    if run.command is not None and len(run.command.t) > 1:
+        step = np.diff(run.command.t)
+        column = dict(zip(run.command.channels, run.command.values.T, strict=True))
+        rates = {name.removesuffix(".rate"): x for name, x in column.items() if name.endswith(".rate") and x.any()}
+        for joint, x in rates.items():
+            yield f"slope of command {joint} against its rate", np.diff(column[joint]), x[:-1] * step
+        if cycle and not rates:
+            yield "interval of commands over controller.cycle", np.atleast_1d(np.median(step)), np.array([cycle])
+    if run.angle is not None and run.rate is not None:
+        known = run.angle.valid & run.rate.valid
+        for joint in (name for name in run.angle.channels if name in run.rate.channels):
+            moved = np.gradient(run.angle.column(joint), run.angle.dt)[known]
+            yield f"slope of angle {joint} against its rate", moved, run.rate.column(joint)[known]
+
+
 def _far(beyond: Sequence[Moved], probability: float) -> Iterator[str]:
     for one in beyond[:_SHOWN]:
         yield (
@@ -278,12 +349,8 @@ def extent(rig: Rig) -> tuple[float, float]:
 def _most(equation: Equation) -> Array:
     """What may be left (c,) of a calibration, rms: a part of the weight, and of the torque that it can make."""
     weight, reach = extent(equation.elements.rig)
-    scale = np.array(
-        [
-            weight if channel[0] == "F" else weight * reach if channel in WRENCH_CHANNELS else 0.0
-            for channel in equation.channels
-        ]
-    )
+    by_kind = {"F": weight, "T": weight * reach}
+    scale = np.array([by_kind[key[0]] if key in WRENCH_CHANNELS else 0.0 for key in equation.channels])
     most: Array = np.where(scale > 0.0, LEFT * scale, np.inf)
     return most
 
@@ -294,14 +361,10 @@ def _calibrated(campaign: Campaign, samples: Sequence[Sample], model: GravityMod
     alone = [sample for sample in samples if sample.name in names]
     if not alone:
         return False
-    equation = model.equation
-    by_these = (
-        model
-        if names == set(model.taring)
-        else gravity.fit(
-            alone, equation.elements.rig, include_inertia=equation.include_inertia, settings=model.settings
-        )
-    )
+    by_these, equation = model, model.equation
+    if names != set(model.taring):
+        rig, inertia = equation.elements.rig, equation.include_inertia
+        by_these = gravity.fit(alone, rig, include_inertia=inertia, settings=model.settings)
     return tension(by_these, {}).sound and not any(_left(by_these, most))
 
 

@@ -83,6 +83,12 @@ class Readings:
         return True
 
 
+def white(x: Array) -> Array:
+    """Standard deviation of the white noise in readings (n,) or (n, c), whatever else is slow or seldom."""
+    rms: Array = 1.4826 * np.median(np.abs(np.diff(x, n=3, axis=0)), axis=0) / np.sqrt(20.0)
+    return rms
+
+
 def _step(x: Array) -> float:
     """The largest step of which all readings are multiples apart; zero where there is none."""
     levels = np.unique(x[np.isfinite(x)])

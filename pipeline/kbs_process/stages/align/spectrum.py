@@ -9,6 +9,8 @@ from scipy.signal import get_window
 from kbs_process.signals.records import Array, Mask, Spectrum
 
 DOUBT = 0.01  # a segment with a larger share of invented samples is left out
+OCTAVES = 3  # in which a noise is looked for
+LINES = 8  # averages counted, that tell it
 
 
 class Welch:
@@ -77,3 +79,16 @@ class Welch:
         X = np.ascontiguousarray(fft.rfft(x, axis=1)[:, : len(self._f)].T)
         self._sum += self._scale[:, None, None] * (X.conj()[:, :, None] * X[:, None, :])
         self._averages += 1
+
+
+def quietest(spectrum: Spectrum, rate: float, top: float) -> Array:
+    """White noise (c,), rms a sample at `rate`, in the quietest of the octaves below `top`, Hz; NaN if few lines tell.
+
+    Signals only add to noise: the quietest octave holds least of them.
+    """
+    top = min(top, 0.45 * rate, float(spectrum.f[-1]))
+    octaves = [(top / 2.0 ** (k + 1) < spectrum.f) & (spectrum.f <= top / 2.0**k) for k in range(OCTAVES)]
+    power = np.diagonal(spectrum.S, axis1=1, axis2=2).real
+    means = [power[one].mean(axis=0) for one in octaves if spectrum.averages * np.count_nonzero(one) >= LINES]
+    noise: Array = np.sqrt(0.5 * rate * np.min(means or [np.full(power.shape[1], np.nan)], axis=0))
+    return noise

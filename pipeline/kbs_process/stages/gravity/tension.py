@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
+from kbs_process.estimation.longrun import longrun_covariance
 from kbs_process.signals.records import WRENCH_CHANNELS, Array
 from kbs_process.stages.gravity.equation import Prepared
 from kbs_process.stages.gravity.model import GravityModel, taring_error
@@ -21,6 +22,7 @@ from kbs_process.stages.gravity.taring import Taring
 
 BEYOND = 4.0  # sigma
 BY_CHANCE = 1e-4
+TAKEN = 0.25  # part of the power of what is left that a lag explains, or it is none
 _ROUNDS = 4  # of weights
 _INFORMED = 0.1  # part of the prior's variance that the data take away: less says nothing of the prior
 
@@ -76,23 +78,29 @@ def tension(model: GravityModel, tarings: Mapping[str, Taring], lags: Sequence[M
     return Tension((*moved, *_zeros(model, tarings), *lags), together(fit.moved[known] / scale, C))
 
 
-def lag(model: GravityModel, data: Prepared, sigma: float) -> Moved:
+def lag(model: GravityModel, data: Prepared, sigma: float) -> Moved | None:
     """How late a recording's wrench is behind its angles (s), beyond what the model has, known to be 0 +- `sigma`.
 
-    What else is left may follow the angles' rates just as well: all of it counts for the chance.
+    Chance is what coloured residuals leave it uncertain by. None where it takes away less than `TAKEN` of what is left:
+    something else may follow the angles' rates.
     """
     equation = model.equation
     wrench = [at for at, channel in enumerate(equation.channels) if channel in WRENCH_CHANNELS]
     expected = equation.predict(model.fit.value[: equation.size], data)[:, wrench]
     left = data.wrench[:, wrench] - expected
     late = -np.gradient(expected, data.t, axis=0)
-    left, late = left - left.mean(axis=0), late - late.mean(axis=0)
+    rest = left = left - left.mean(axis=0)
+    late -= late.mean(axis=0)
     floor = least_sigma(data, equation.elements.rig)[wrench]
-    value, chance = 0.0, np.inf
     for _ in range(_ROUNDS):
-        weight = np.maximum((left - value * late).std(axis=0), floor) ** -2
+        weight = np.maximum(rest.std(axis=0), floor) ** -2
         power = max(float(np.sum(late**2 * weight)), 1e-300)
-        value, chance = float(np.sum(late * left * weight)) / power, float(np.sqrt(len(left) / power))
+        value = float(np.sum(late * left * weight)) / power
+        rest = left - value * late
+    if float(np.sum(rest**2 * weight)) > (1.0 - TAKEN) * float(np.sum(left**2 * weight)):
+        return None
+    scores = (late * rest * weight).reshape(-1, 1)
+    chance = float(np.sqrt(longrun_covariance(scores, [rest.shape])[0, 0])) / power
     return Moved(
         f"the wrench's lag (s) behind the angles in {data.name}", 0.0, sigma, value, float(np.hypot(sigma, chance))
     )
