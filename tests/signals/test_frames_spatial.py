@@ -66,3 +66,9 @@ def test_force_at_an_offset_makes_the_moment_r_cross_f():
     wrench = np.array([[0, 0, -10.0, 0, 0, 0]])
     moved = spatial.transform_wrench(wrench, np.eye(3), np.array([0.5, 0.25, 0]))
     np.testing.assert_allclose(moved, [[0, 0, -10, -2.5, 5.0, 0]])
+
+
+def test_into_xyz_is_the_turns_undone():
+    rng = np.random.default_rng(5)
+    angles, a = rng.uniform(-1.0, 1.0, (2, 7, 3))
+    np.testing.assert_allclose(frames.rotate(frames.from_xyz(angles), frames.into_xyz(angles, a)), a, atol=1e-14)

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kbs_process.rig.model import LAB, TRANSDUCER, Rig
-from kbs_process.signals.frames import about_axis, cross, from_rotation_vector, from_tilt, from_xyz, rotate, skew
+from kbs_process.signals.frames import about_axis, cross, from_rotation_vector, from_tilt, into_xyz, rotate, skew
 from kbs_process.signals.records import Array
 
 INERTIAL = ("m", "mcx", "mcy", "mcz", "Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz")
@@ -229,8 +229,9 @@ def _reaction(rig: Rig, links: dict[str, LinkMotion], beyond: frozenset[str], ab
         link = links[body.on]
         c = rotate(link.R, body.cog.value)
         F = -float(body.mass) * _accel_at(link, c)
-        I_link = link.R @ inertia_matrix(body.inertia.value) @ np.swapaxes(link.R, 1, 2)
-        spin = rotate(I_link, link.alpha) + cross(link.omega, rotate(I_link, link.omega))
+        inertia, R_t = inertia_matrix(body.inertia.value), np.swapaxes(link.R, 1, 2)
+        omega, alpha = rotate(R_t, link.omega), rotate(R_t, link.alpha)
+        spin = rotate(link.R, alpha @ inertia + cross(omega, omega @ inertia))
         force += F
         moment += cross(link.r + c - about, F) - spin
     return force, moment + _rotors(rig, links, beyond)
@@ -253,7 +254,7 @@ def _sagged(wrench: Array, rig: Rig, links: dict[str, LinkMotion], stiffness: Ar
     first_moment, accel = rotate(R_TL, first_moment), rotate(R_TL, T.accel)
     sagged = wrench
     for _ in range(_SAG_ROUNDS):
-        turned = rotate(np.swapaxes(from_xyz(sagged[:, 3:] / stiffness), 1, 2), accel) - accel
+        turned = into_xyz(sagged[:, 3:] / stiffness, accel) - accel
         sagged = wrench - np.concatenate([mass * turned, cross(first_moment, turned)], axis=1)
     return sagged
 

@@ -54,6 +54,17 @@ def from_xyz(angles: Array) -> Array:
     return R
 
 
+def into_xyz(angles: Array, a: Array) -> Array:
+    """from_xyz(angles)^T @ a: components, after these turns, of vectors given before them, (..., 3) each."""
+    c, s = np.cos(angles), np.sin(angles)
+    x, y, z = a[..., 0], a[..., 1], a[..., 2]
+    y, z = c[..., 0] * y + s[..., 0] * z, c[..., 0] * z - s[..., 0] * y
+    x, z = c[..., 1] * x - s[..., 1] * z, c[..., 1] * z + s[..., 1] * x
+    x, y = c[..., 2] * x + s[..., 2] * y, c[..., 2] * y - s[..., 2] * x
+    turned: Array = np.stack([x, y, z], axis=-1)
+    return turned
+
+
 def rotate(R: Array, a: Array) -> Array:
     """R @ a for stacks of matrices (..., 3, 3) and vectors (..., 3)."""
     b: Array = np.einsum("...ij,...j->...i", R, a)
