@@ -22,7 +22,7 @@ import numpy as np
 from numba import njit
 
 from engine.hardware import Hardware
-from engine.ports import BODY, OUT
+from engine.ports import BODY, OUT, disturb
 
 _STEPS = 200  # electrical and tooth cycles: T_cog and T_stat repeat 200 times a motor turn
 _ELECTRICAL = np.pi / 64  # electrical angle of a microstep, rad
@@ -166,12 +166,15 @@ def run_cycle(
     `state` holds views of MuJoCo's own qpos, qvel, qacc, qfrc_applied, sensordata, the antenna's xipos
     and its row of xfrc_applied. Row n of `wrench` (n, 6) and `q` (n, 7) belongs to t = start + (n + 1/2) dt.
     `act` and `extra` are what acts beyond the drives (engine.ports): its numbers and memory, the azimuth
-    body's row of xfrc_applied, MuJoCo's gravity, gravity at rest, and what `copy_bodies` reads.
+    body's row of xfrc_applied, MuJoCo's gravity, gravity at rest, what `copy_bodies` reads, and the disturbance.
     """
     qpos, qvel, qacc, qfrc, sensor, xipos, xfrc, hook = state
-    numbers, memory, xfrc_azimuth, gravity, still, view = extra
+    numbers, memory, xfrc_azimuth, gravity, still, view, disturbance = extra
     motion, bodies, out = np.zeros((3, 7)), np.zeros((2, BODY)), np.zeros(OUT)
     steps = len(wrench)
+    rates = np.zeros(2)
+    for axis in range(2):
+        rates[axis] = (field[1, axis] - field[0, axis]) / ((az.R if axis == 0 else el.R) * steps * dt)
     for n in range(steps):
         if acts:
             for k in range(7):
@@ -182,6 +185,8 @@ def run_cycle(
             copy_bodies(view, bodies)
             out[:] = 0.0
             act(start + (n + 0.5) * dt, dt, numbers, memory, motion, bodies, out)
+            if len(disturbance) > 0:
+                disturb(disturbance, start + (n + 0.5) * dt, rates, out)
             for k in range(3):
                 qfrc[k] = out[k]
                 gravity[k] = still[k] - out[19 + k]

@@ -32,6 +32,12 @@ GENERALISED, ON_AZIMUTH, ON_ANTENNA, FLOOR = slice(0, 7), slice(7, 13), slice(13
 OUT = 24
 BODY = 21
 
+# Columns of a disturbance.
+BY_FLOOR, BY_JOINTS, BY_ROTORS = slice(0, 3), slice(3, 5), slice(5, 7)
+DISTURBANCE_STEP = 2e-3  # s
+AT_REST = 0.1  # share of the joints' disturbance that is left where the field rests
+_SLOWLY = 2e-5  # rad/s of the output, commanded: half of the rest of it
+
 Act = Callable[..., None]
 FieldChange = Callable[[int, Array, Array], Array]
 EncoderChange = Callable[[Array, Array, Array], Array]
@@ -44,6 +50,21 @@ def nothing(
     t: float, dt: float, numbers: Any, memory: Any, motion: Any, bodies: Any, out: Any
 ) -> None:  # pragma: no cover
     """Leave everything as it is."""
+
+
+@njit(error_model="numpy")
+def disturb(disturbance: Any, t: float, rates: Any, out: Any) -> None:
+    """Add what acts at random at t (s) to `out`, while the joints are commanded at `rates` (2,), rad/s."""
+    x = t / DISTURBANCE_STEP
+    row = min(int(x), len(disturbance) - 2)
+    x -= row
+    for k in range(3):
+        out[19 + k] += (1 - x) * disturbance[row, k] + x * disturbance[row + 1, k]
+    for axis in range(2):
+        share = AT_REST + (1 - AT_REST) * abs(rates[axis]) / (abs(rates[axis]) + _SLOWLY)
+        for column, place, level in ((3, 4, share), (5, 3, 1.0)):
+            value = (1 - x) * disturbance[row, column + axis] + x * disturbance[row + 1, column + axis]
+            out[place + 2 * axis] += level * value
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,13 +80,16 @@ class Extra:
     encoder: EncoderChange | None = None
     # (t (n,), wrench (n, 6) behind cross-coupling) -> change (n, 6) of the reading before noise and rounding
     transducer: TransducerChange | None = None
+    # (rows, 7) every DISTURBANCE_STEP, linear between: acceleration of the floor (3), m/s^2, torque on the outputs az
+    # and el, reacted by their carriers, and on the rotors, N m
+    disturbance: Array = field(default_factory=lambda: np.zeros((0, 7)))
     # "wrench" and "encoder" -> (true t (n,)) -> change (n,) of the clock's reading, s
     clocks: Mapping[str, ClockChange] = field(default_factory=dict)
 
     @property
     def acts(self) -> bool:
         """Whether anything acts on the mechanism."""
-        return self.act is not nothing
+        return self.act is not nothing or len(self.disturbance) > 0
 
 
 NONE = Extra()

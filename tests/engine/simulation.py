@@ -114,7 +114,8 @@ def integrate(
     gravity = rigid.model.opt.gravity
     memory = np.zeros((len(extra.numbers), extra.states))
     more = (
-        extra.numbers, memory, data.xfrc_applied[rigid.azimuth], gravity, gravity.copy(), _view(rigid)
+        extra.numbers, memory, data.xfrc_applied[rigid.azimuth], gravity, gravity.copy(), _view(rigid),
+        extra.disturbance,
     )  # fmt: skip
     addresses = rigid.model._address, data._address
     cord = _cord(hardware)

@@ -71,12 +71,12 @@ def finish(
     work.begin(isolated)
     tell(f"Each method runs in {work.isolation}")
     orders = work.orders()
-    for done, (order, content) in enumerate(_each(pool, partial(make_sealed, make=work.maker.make), orders), start=1):
+    for done, (order, content) in enumerate(each(pool, partial(make_sealed, make=work.maker.make), orders), start=1):
         work.keep_trial(order.name, content)
         tell(f"made {order.name}, {done} of {len(orders)}")
     unanswered = work.unanswered(methods)
     todo = (Job(name, work.trial(name), left, hidden=(work.folder,)) for name, left in unanswered)
-    for done, (job, given) in enumerate(_each(pool, answered, todo), start=1):
+    for done, (job, given) in enumerate(each(pool, answered, todo), start=1):
         for method, content in given.items():
             work.keep_answer(job.trial, method, content)
         tell(f"answered {job.trial}, {done} of {len(unanswered)}: {', '.join(given)}")
@@ -123,7 +123,7 @@ _ISOLATION = {
 }
 
 
-def _each(pool: Executor, function: Callable[[W], R], work: Iterable[W]) -> Iterator[tuple[W, R]]:
+def each(pool: Executor, function: Callable[[W], R], work: Iterable[W]) -> Iterator[tuple[W, R]]:
     """Yield each piece of work with its result as it is done; no more than `_IN_FLIGHT` trials are held at a time."""
     waiting = iter(work)
     pending: dict[Future[R], W] = {}

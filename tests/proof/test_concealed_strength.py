@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from engine.hardware import Array, Hardware
+from engine.laboratory import Laboratory
 from engine.ports import NONE
 from engine.sensors import coloured
 from engine.simulation import integrate
@@ -154,3 +155,54 @@ def test_what_a_rig_cannot_stand_is_not_asked_of_it() -> None:
     sound = bench()
     weaker = scaled(Fragile(**{one.name: getattr(sound, one.name) for one in fields(sound)}), effect, 300.0)
     assert weaker is not None and weaker[2] == 100.0 and weaker[0].amplitude <= most
+
+
+NOISY = Laboratory(floor=3e-4, tilt=3e-6, joints=2e-3, motors=5e-5)
+
+
+@cache
+def noisy() -> Bench:
+    """The metric in a noisy laboratory."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sensitivity, "DRIVE", ("tcog", "Ka", *sensitivity.RUN_FRICTION))
+        return measure(HARDWARE, [PATH, PATH], (100.0, 50.0), laboratory=NOISY, rng=np.random.default_rng(8))
+
+
+def test_what_another_realisation_of_the_laboratory_makes_is_white() -> None:
+    setting = noisy().settings[0]
+    rng = np.random.default_rng(9)
+    powers, raw = [], []
+    for _ in range(4):
+        extra = replace(NONE, disturbance=NOISY.disturbance(float(PATH.t[-1]), rng))
+        change = setting.motion.observed(extra=extra) - noisy().readings[0]
+        powers.append(np.mean(setting.whiten(change) ** 2))
+        raw.append(np.mean(bench().settings[0].whiten(change) ** 2))
+    assert np.mean(raw) > 20.0
+    assert setting.whiten.common is not None
+    of_sensors = np.mean(np.sum(np.abs(np.linalg.inv(setting.whiten.common)) ** 2, axis=2))
+    assert np.mean(powers) + of_sensors == pytest.approx(1.0, abs=0.1)
+
+
+def test_an_effect_that_rings_is_weaker_in_a_noisy_laboratory() -> None:
+    effect = effects.draw(BY_NAME["cogging of another shape"], np.random.default_rng(3), "development", {})
+    quiet, loud = (one.strength([effect]) for one in (bench(), noisy()))
+    assert loud.rho < 0.7 * quiet.rho
+
+
+def test_repeats_in_a_noisy_laboratory_differ_by_its_floor() -> None:
+    t = np.arange(0.0, PATH.t[-1] + 1e-9, 1.0 / FINE_HZ)
+
+    def readings(seed: int) -> Array:
+        run = np.random.SeedSequence(seed)
+        made = record(HARDWARE, PATH, NONE, seed=run, epoch_ns=0, wrench_hz=100.0, encoder_hz=50.0, laboratory=NOISY)
+        columns = [
+            np.interp(t, 1e-9 * one.stamp, column) for one in (made.wrench, made.encoder) for column in one.values.T
+        ]
+        return to_working_rate(np.column_stack(columns))
+
+    setting, power = noisy().settings[0], np.zeros(8)
+    for seed in range(6):
+        difference = (readings(2 * seed) - readings(2 * seed + 1)) / np.sqrt(2.0)
+        power += np.mean(setting.above_floor(setting.whiten(difference)).reshape(-1, 8) ** 2, axis=0) / 6
+        assert np.mean(bench().settings[0].whiten(difference) ** 2) > 100.0
+    assert power[:6] == pytest.approx(np.full(6, 0.92), abs=0.3)  # 0.94 by the taper

@@ -85,7 +85,7 @@ def test_work_runs_on_a_dask_cluster() -> None:
         LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None) as cluster,
         prove.workers(1, cluster.scheduler_address) as pool,
     ):
-        found = dict(prove._each(pool, operator.neg, range(150)))
+        found = dict(prove.each(pool, operator.neg, range(150)))
     assert found == {k: -k for k in range(150)}
 
 

@@ -55,6 +55,7 @@ class Truth(Part, frozen=True, kw_only=True):
     effects: tuple[Concealed, ...] = ()
     beyond: tuple[Beyond, ...] = ()
     rho_eff: float = 0.0  # of all effects together
+    laboratory: dict[str, float] | None = None  # how much acts at random: engine.laboratory
 
     def __post_init__(self) -> None:
         if (self.kind == "concealed") != bool(self.effects):

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from engine.hardware import Array, Hardware
-from engine.ports import Extra
+from engine.laboratory import QUIET, Laboratory
+from engine.ports import NONE, Extra
 from engine.trajectories import Commands
 from proof.concealed import effects as catalogue
 from proof.concealed import paths
@@ -23,6 +24,7 @@ _REPEATS = 2  # of each trajectory that models are fitted to
 _NEAR = 0.2  # a strength is close enough to its level: its logarithm
 _FAR = 0.5  # what does not come near, as friction that sticks or not, may be as far off
 _ABSORBED = 0.99  # kappa; beyond, an effect is a change of known parameters by another name
+_REALISATIONS = 6  # of a laboratory's noise: with the bins that are averaged, 66 for eight channels
 _SEARCH = 7  # amplitudes tried
 
 # Not moved beyond: phases are unknown anyway, the others would not be physical or not be seen.
@@ -41,6 +43,7 @@ class Bench:
     settings: tuple[Setting, ...]  # of all that models are fitted to, the calibration last
     readings: tuple[Array, ...]
     columns: tuple[dict[Named, Array], ...]
+    laboratory: Laboratory
 
     @property
     def fitted(self) -> tuple[Commands, ...]:
@@ -70,8 +73,13 @@ def measure(
     trajectories: Sequence[Commands],
     rates: tuple[float, float],
     calibration: Commands | None = None,
+    laboratory: Laboratory = QUIET,
+    rng: np.random.Generator | None = None,
 ) -> Bench:
-    """Work out the metric of a rig along all trajectories but the last, each driven twice, and a calibration."""
+    """Work out the metric of a rig along all trajectories but the last, each driven twice, and a calibration.
+
+    A laboratory that is not quiet is realised by `rng`.
+    """
     settings, readings, sensitivities = [], [], []
     driven = [(path, _REPEATS) for path in trajectories[:-1]]
     if calibration is not None:
@@ -80,14 +88,29 @@ def measure(
         motion = Motion.of(hardware, path)
         seen = motion.observed()
         common, varying = columns(motion)
-        whiten = Whitening.of(hardware, seen, *rates)
+        disturbed = [] if rng is None or laboratory.quiet else _disturbed(motion, seen, laboratory, rng)
+        whiten = Whitening.of(hardware, seen, *rates, disturbed)
         stacked = whiten(np.stack(list(common.values()), axis=2))
         settings.append(Setting(motion, whiten, repeats, stacked, own_columns(whiten, seen, varying)))
         readings.append(seen)
         sensitivities.append(common)
     return Bench(
-        hardware, tuple(trajectories), calibration, rates, tuple(settings), tuple(readings), tuple(sensitivities)
-    )  # fmt: skip
+        hardware,
+        tuple(trajectories),
+        calibration,
+        rates,
+        tuple(settings),
+        tuple(readings),
+        tuple(sensitivities),
+        laboratory,
+    )
+
+
+def _disturbed(motion: Motion, seen: Array, laboratory: Laboratory, rng: np.random.Generator) -> list[Array]:
+    """What realisations of a laboratory's noise change in the readings."""
+    duration = float(motion.path.t[-1])
+    drawn = (laboratory.disturbance(duration, rng) for _ in range(_REALISATIONS))
+    return [motion.observed(extra=replace(NONE, disturbance=one)) - seen for one in drawn]
 
 
 def beyond(

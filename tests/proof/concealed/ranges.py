@@ -102,6 +102,16 @@ RUN_TO_RUN: dict[str, float] = {
 }
 STAMP_JITTER = 20e-6  # s, one sigma
 
+# A laboratory: see engine.laboratory. From the quietest class of floors, and quieter, to an ordinary building.
+LABORATORY: dict[str, Drawn] = {
+    "floor": Range(2e-5, 1e-3),
+    "tilt": Range(1e-6, 8e-6),
+    "joints": Range(3e-4, 5e-3),
+    "motors": Range(1e-5, 1e-4),
+    "mains": Range(0.03, 0.3),
+}
+SILENT = 0.1  # share of the trials in which nothing acts at random
+
 LEVELS = (40.0, 100.0, 300.0, 1000.0)  # rho_eff
 BEYOND_SIGMAS = Range(4.5, 8.5, log=False)  # of parameters that are off beyond their uncertainty
 

@@ -1,11 +1,15 @@
-"""One recorded run of a trial: hardware a little different from run to run, physics concealed, clocks that jitter."""
+"""One recorded run of a trial: hardware a little different from run to run, physics concealed, a noisy laboratory, and
+clocks that jitter."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 
 from engine import sensors
 from engine.hardware import AXES, Array, Hardware
+from engine.laboratory import QUIET, Laboratory
 from engine.ports import Extra
 from engine.sensors import Recording, Stream
 from engine.simulation import TIME_STEP, integrate, sample
@@ -35,20 +39,24 @@ def record(
     epoch_ns: int,
     wrench_hz: float,
     encoder_hz: float,
+    laboratory: Laboratory = QUIET,
     stamp_jitter: float = STAMP_JITTER,
     time_step: float = TIME_STEP,
 ) -> Recording:
     """Simulate one run with what is concealed, and record it. The same arguments give the same bits."""
-    run, clocks, noise, jitter, *arrivals = (np.random.default_rng(s) for s in seed.spawn(8))
+    run, clocks, noise, jitter, *arrivals, chance = (np.random.default_rng(s) for s in seed.spawn(9))
     hardware = vary(hardware, run)
     wrench_clock, encoder_clock = (sensors.draw_clock(clocks, wrench_hz), sensors.draw_clock(clocks, encoder_hz))
-    dense = integrate(hardware, path, time_step=time_step, extra=extra)
     duration = float(path.t[-1])
+    extra = replace(extra, disturbance=laboratory.disturbance(duration, chance))
+    dense = integrate(hardware, path, time_step=time_step, extra=extra)
     wrench_reading, wrench_t = sensors.ticks(wrench_clock, wrench_hz, duration)
     encoder_reading, encoder_t = sensors.ticks(encoder_clock, encoder_hz, duration)
     result = sample(hardware, dense, wrench_t, encoder_t, extra=extra)
     drift = sensors.DRIFT_SPREAD * hardware.sigmas["transducer.bias"] * run.standard_normal(6)
-    raw = sensors.read_transducer(hardware, wrench_t, result.wrench, drift, noise, extra=extra)
+    raw = sensors.read_transducer(
+        hardware, wrench_t, result.wrench, drift, noise, extra=_with_hum(extra, laboratory, hardware, chance)
+    )
     streams = {
         "wrench": (
             _stamped("wrench", wrench_reading, wrench_t, extra, stamp_jitter, jitter),
@@ -68,6 +76,16 @@ def record(
         for (name, columns), rng in zip(streams.items(), arrivals, strict=True)
     }
     return Recording(**made, hardware=hardware, drift=drift, wrench_clock=wrench_clock, encoder_clock=encoder_clock)
+
+
+def _with_hum(extra: Extra, laboratory: Laboratory, hardware: Hardware, rng: np.random.Generator) -> Extra:
+    """Let mains act on the transducer's channels beside what does."""
+
+    def change(t: Array, wrench: Array) -> Array:
+        hum = laboratory.hum(t, hardware["transducer.noise"], rng)
+        return hum if extra.transducer is None else hum + extra.transducer(t, wrench)
+
+    return replace(extra, transducer=change)
 
 
 def _stamped(name: str, reading: Array, t: Array, extra: Extra, jitter: float, rng: np.random.Generator) -> Array:

@@ -1,8 +1,10 @@
 """How far apart two predictions are, in units of the floor, and how much of that known parameters absorb.
 
 Whitened entries are 2 dt FFT(y) (df/S)^(1/2), real and imaginary parts of the bins below BAND_HZ: with a one-sided
-density S of the noise each has unit variance, and the sum of squares is rho^2 = 4 Int |Y|^2/S df. What repeats differ
-by is part of the floor: constant and slope of every channel, clocks' offsets, friction and inclination of each run, as
+density S of the noise each has unit variance, and the sum of squares is rho^2 = 4 Int |Y|^2/S df. What a laboratory's
+noise makes of the rig is common to the channels: in every bin, entries are whitened by the lower root of 1 + P, where
+P (8, 8) is the mean over realisations and neighbouring bins of what these entries have of it. What repeats differ by
+is part of the floor: constant and slope of every channel, clocks' offsets, friction and inclination of each run, as
 columns with their sigmas. Known parameters are columns of all runs together, with the sigmas that the campaign states:
 
     rho^2     = d' (I + G G')^-1 d             G: one set a run
@@ -13,10 +15,11 @@ columns with their sigmas. Known parameters are columns of all runs together, wi
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
+from scipy.ndimage import uniform_filter1d
 from scipy.signal.windows import tukey
 
 from engine.hardware import AXES, Array, Hardware
@@ -27,6 +30,7 @@ BAND_HZ = 8.0
 _EDGES = 0.05  # share of a run that is tapered
 _REST = 20.0  # s; an encoder that shows one code for as long tells nothing of the motion
 _FREE = 1e3  # sigmas of what is not known at all, in units of the noise
+_NEIGHBOURS = 5  # bins each way, of which the noise that the rig shows is the mean: less than its resonances' width
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,10 +48,16 @@ class Whitening:
 
     gain: Array  # (bins, 8)
     window: Array  # (n, 8): 0 where an encoder rests
+    common: Array | None = None  # (bins, 8, 8) lower roots: of the noise that the channels share
 
     @classmethod
-    def of(cls, hardware: Hardware, readings: Array, wrench_hz: float, encoder_hz: float) -> Whitening:
-        """From the sensors' noise; encoders' codes are as white as the motion across them makes them."""
+    def of(
+        cls, hardware: Hardware, readings: Array, wrench_hz: float, encoder_hz: float, disturbed: Sequence[Array] = ()
+    ) -> Whitening:
+        """From the sensors' noise; encoders' codes are as white as the motion across them makes them.
+
+        Each of `disturbed` (n, 8) is what one realisation of a laboratory's noise changes in the readings.
+        """
         n = len(readings)
         f = np.fft.rfftfreq(n, 1 / WORKING_HZ)
         used = (f > 0) & (f <= BAND_HZ)
@@ -65,15 +75,29 @@ class Whitening:
                 crossings = float(np.exp(np.mean(np.log(rate[moving])))) / code
                 density[:, 6 + k] = 2 * code**2 / 12 / min(encoder_hz, max(crossings, 1.0 / _REST))
         dt, df = 1 / WORKING_HZ, WORKING_HZ / n
-        return cls(2 * dt * np.sqrt(df / density), window)
+        alone = cls(2 * dt * np.sqrt(df / density), window)
+        return replace(alone, common=_root(alone, disturbed)) if len(disturbed) else alone
+
+    def spectrum(self, columns: Array) -> Array:
+        """Columns (n, 8, m) over the sensors' noise: (bins, 8, m), complex."""
+        spectrum = np.fft.rfft(columns * self.window[:, :, None], axis=0)[1 : 1 + len(self.gain)]
+        return np.asarray(spectrum * self.gain[:, :, None])
 
     def __call__(self, readings: Array) -> Array:
         """Whitened entries (2 bins 8, ...) of readings (n, 8) or of columns (n, 8, m)."""
         shape = readings.shape
-        columns = readings.reshape(*shape[:2], -1)
-        spectrum = np.fft.rfft(columns * self.window[:, :, None], axis=0)[1 : 1 + len(self.gain)]
-        spectrum = spectrum * self.gain[:, :, None]
+        spectrum = self.spectrum(readings.reshape(*shape[:2], -1))
+        if self.common is not None:
+            spectrum = np.linalg.solve(self.common, spectrum)
         return np.concatenate([spectrum.real, spectrum.imag]).reshape(-1, *shape[2:])
+
+
+def _root(alone: Whitening, disturbed: Sequence[Array]) -> Array:
+    """The lower root of 1 + P in every bin."""
+    entries = alone.spectrum(np.stack(disturbed, axis=2))
+    power = np.einsum("bim,bjm->bij", entries, entries.conj()) / (2 * len(disturbed))
+    power = uniform_filter1d(power, 2 * _NEIGHBOURS + 1, axis=0, mode="nearest")
+    return np.asarray(np.linalg.cholesky(np.eye(8) + power))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -5,19 +5,20 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
 from engine.hardware import Hardware
+from engine.laboratory import QUIET, Laboratory
 from engine.mcap_file import Format, write
 from engine.ports import NONE
 from proof.concealed import articles, campaign, effects, paths
 from proof.concealed.bench import Bench, beyond, measure, scaled
 from proof.concealed.physics import Effect
-from proof.concealed.ranges import ARTICLE, LEVELS, Split
+from proof.concealed.ranges import ARTICLE, LABORATORY, LEVELS, SILENT, Split
 from proof.concealed.recording import record
 from proof.concealed.strength import Strength
 
@@ -97,18 +98,26 @@ def chosen(split: Split, seed: int, index: int, physics: Sequence[str], level: f
 
 def streams(spec: Spec) -> list[np.random.SeedSequence]:
     """Streams of random numbers: what is seen of a trial does not depend on what is concealed in it."""
-    return np.random.SeedSequence([spec.seed, len(spec.split), 3, spec.index]).spawn(6)
+    return np.random.SeedSequence([spec.seed, len(spec.split), 3, spec.index]).spawn(7)
+
+
+def laboratory_of(split: Split, rng: np.random.Generator) -> Laboratory:
+    """Draw how much acts at random in a trial."""
+    silent = rng.uniform() < SILENT
+    drawn = {name: drawn.draw(rng, split) for name, drawn in LABORATORY.items()}
+    return QUIET if silent else Laboratory(**drawn)
 
 
 def prepare(spec: Spec, folder: Path) -> tuple[Bench, list[dict[str, Any]]]:
     """Write the parameter files; draw hardware and trajectories; work out the metric."""
-    article, drawn, motions, _, runs, off = streams(spec)
+    article, drawn, motions, _, runs, off, chance = streams(spec)
     rates = describe_article(folder, np.random.default_rng(article), spec.split)
     nominal = Hardware.from_campaign(folder)
     hardware = hardware_of(spec.kind, nominal, np.random.default_rng(drawn))
     trajectories = paths.draw(np.random.default_rng(motions), spec.split, 3)
     calibration = paths.calibration(np.random.default_rng(runs.spawn(2)[1]))
-    bench = measure(hardware, trajectories, rates, calibration)
+    noise = np.random.default_rng(chance)
+    bench = measure(hardware, trajectories, rates, calibration, laboratory_of(spec.split, noise), noise)
     if spec.kind != "beyond":
         return bench, []
     hardware, moved = beyond(bench, nominal, np.random.default_rng(off), spec.split)
@@ -169,7 +178,7 @@ def make(spec: Spec, folder: Path) -> dict[str, Any]:
     """Make a trial's campaign in `folder`, which may not exist yet; return its truth."""
     folder.mkdir(parents=True, exist_ok=True)
     bench, moved = prepare(spec, folder)
-    *_, concealing, runs_, _ = streams(spec)
+    *_, concealing, runs_, _, _ = streams(spec)
     concealed = conceal(bench, spec, np.random.default_rng(concealing)) if spec.count else []
     hidden = [effect for effect, _, _ in concealed]
     total = bench.strength(hidden).rho_eff if hidden else 0.0
@@ -182,6 +191,7 @@ def make(spec: Spec, folder: Path) -> dict[str, Any]:
         "effects": [told(effect, found) for effect, found, _ in concealed],
         "beyond": moved,
         "rho_eff": total,
+        "laboratory": asdict(bench.laboratory),
     }
 
 
@@ -245,6 +255,7 @@ def _record(spec: Spec, folder: Path, bench: Bench, hidden: Sequence[Effect], se
             epoch_ns=(start + k * RUN_S) * 1_000_000_000,
             wrench_hz=bench.rates[0],
             encoder_hz=bench.rates[1],
+            laboratory=bench.laboratory,
         )
         write(folder / "recordings" / run.file, recording, Format(message_index=False))
         checked.append(entry(folder, run))

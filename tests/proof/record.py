@@ -1,0 +1,144 @@
+"""The benchmark of record: the trials by which a change of the diagnosis is judged; from tests/:
+
+    python -m proof.record --output FOLDER     # what the diagnosis of this checkout says of them, and how much is right
+    python -m proof.paired BEFORE AFTER        # what a change gains, trial by trial
+
+The trials are the same for ever, and count as development. Of every five, three conceal one effect that a catalogue
+names, one an effect that is in none, and one two effects at once; so the first of them are like all. No family of
+physics comes twice before all have come. Trials that FOLDER/score.json holds are not answered again: what was begun
+goes on, and what belongs to other code belongs into another folder.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import tempfile
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from time import monotonic
+
+import msgspec
+import numpy as np
+
+from proof import answer
+from proof.__main__ import table
+from proof.answer import Answer
+from proof.bundle import pack
+from proof.concealed import trials
+from proof.concealed.effects import BY_NAME, PHYSICS
+from proof.concealed.trials import Spec
+from proof.isolate import CHECKOUT
+from proof.methods import Job, answer_trial
+from proof.page import write_page
+from proof.prove import each, isolation, workers
+from proof.score import Bench, score
+from proof.truth import Truth
+from proof.words import OURS
+
+SEED = 1996
+COUNT = 40
+_LEVELS = (300.0, 100.0, 1000.0, 300.0)  # of the trials in turn, effects of one trial alike
+
+
+def draw(count: int = COUNT) -> list[Spec]:
+    """Say what the first `count` trials are."""
+    rng = np.random.default_rng([SEED, 5])
+    catalogued = _by_family([physics.name for physics in PHYSICS if physics.catalogued], rng)
+    foreign = [str(name) for name in rng.permutation([physics.name for physics in PHYSICS if not physics.catalogued])]
+    pairs = [
+        (one, other) for one in catalogued for other in catalogued[::-1] if BY_NAME[one].port != BY_NAME[other].port
+    ]
+    order = rng.permutation(len(pairs))
+    specs = []
+    for index in range(count):
+        turn, place = divmod(index, 5)
+        named: tuple[str, ...] = (catalogued[(3 * turn + place) % len(catalogued)],)
+        if place == 3:
+            named = (foreign[turn % len(foreign)],)
+        elif place == 4:
+            named = pairs[order[turn]]
+        alike = [name for name in (foreign if place == 3 else catalogued) if name not in named]
+        spare = [alike[k] for k in np.random.default_rng([SEED, 6, index]).permutation(len(alike))]
+        levels = (_LEVELS[(index + turn) % len(_LEVELS)],) * len(named)
+        specs.append(Spec("development", SEED, index, "concealed", (*named, *spare), len(named), levels))
+    return specs
+
+
+def _by_family(names: Sequence[str], rng: np.random.Generator) -> list[str]:
+    """Shuffle physics so that each family comes once before any comes again."""
+    seen: dict[str, int] = {}
+    rounds = []
+    for place, k in enumerate(rng.permutation(len(names))):
+        family = BY_NAME[names[k]].family
+        seen[family] = seen.get(family, 0) + 1
+        rounds.append((seen[family], place, names[k]))
+    return [name for *_, name in sorted(rounds)]
+
+
+def made(spec: Spec, cache: Path) -> tuple[bytes, Truth]:
+    """Return a trial, packed, and its truth; from `cache`, if it was made before."""
+    name = f"R{spec.index:03d}"
+    files = cache / f"{name}.tar", cache / f"{name}.json"
+    if not all(file.is_file() for file in files):
+        cache.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(prefix="make-") as scratch:
+            folder = Path(scratch) / name
+            told = msgspec.convert(trials.make(spec, folder), Truth)
+            for file, content in zip(files, (pack(folder), msgspec.json.encode(told)), strict=True):
+                aside = file.with_suffix(".part")
+                aside.write_bytes(content)
+                aside.replace(file)
+    return files[0].read_bytes(), msgspec.json.decode(files[1].read_bytes(), type=Truth)
+
+
+def answered(spec: Spec, cache: Path) -> tuple[Truth, Answer]:
+    """Make a trial and let the diagnosis answer it, in a process that cannot see the truth."""
+    content, truth = made(spec, cache)
+    given = answer_trial(Job(truth.trial, content, (OURS,), hidden=(cache,)))
+    return truth, answer.decode(given[OURS])
+
+
+def main() -> None:
+    """Answer what was not answered before; write score and page after each."""
+    options = argparse.ArgumentParser(prog="python -m proof.record", description=__doc__)
+    options.add_argument("--output", "-o", type=Path, required=True, help="where score.json and the page go")
+    options.add_argument("--trials", type=int, default=COUNT, help=f"the first so many [default: {COUNT}]")
+    options.add_argument("--cache", type=Path, default=CHECKOUT / ".proof" / "record", help="where made trials stay")
+    options.add_argument("--jobs", type=int, default=len(os.sched_getaffinity(0)), help="processes")
+    asked = options.parse_args()
+    file, begin = asked.output / "score.json", monotonic()
+    known: dict[str, tuple[Truth, Answer]] = {}
+    if file.is_file():
+        before = msgspec.json.decode(file.read_bytes(), type=Bench)
+        known = {truth.trial: (truth, said) for truth, said in zip(before.truths, before.answers, strict=True)}
+    todo = [spec for spec in draw(asked.trials) if f"R{spec.index:03d}" not in known]
+    with workers(asked.jobs, None) as pool:
+        for done, (_, (truth, said)) in enumerate(each(pool, partial(answered, cache=asked.cache), todo), start=1):
+            known[truth.trial] = truth, said
+            bench = _bench([known[name] for name in sorted(known)])
+            asked.output.mkdir(parents=True, exist_ok=True)
+            content = msgspec.json.format(msgspec.json.encode(bench, order="deterministic"), indent=1) + b"\n"
+            file.write_bytes(content)
+            write_page(bench, asked.output / "index.html")
+            print(f"{monotonic() - begin:7.1f} s  {truth.trial}, {done} of {len(todo)}", file=sys.stderr, flush=True)
+    print("\n".join(table(msgspec.json.decode(file.read_bytes(), type=Bench).rows)))
+
+
+def _bench(pairs: Sequence[tuple[Truth, Answer]]) -> Bench:
+    truths, answers = zip(*pairs, strict=True)
+    return Bench(
+        split="development",
+        seed=str(SEED),
+        command="python -m proof.record",
+        isolation=isolation(None),
+        rows=score(truths, answers),
+        truths=truths,
+        answers=answers,
+    )
+
+
+if __name__ == "__main__":
+    main()
