@@ -70,6 +70,8 @@ role = "fit"
 repeat = 1
 """
 
+OWN_TIME = MAPPING.replace('[time]\ncolumn = "t"\nunit = "s"\n', "")
+
 WRENCH = Stream("wrench", "/transducer/wrench", ("wrench.force.x", "wrench.force.y", "wrench.force.z"))
 ANGLE = Stream("encoder", "/encoder", ("position[wheel]",))
 
