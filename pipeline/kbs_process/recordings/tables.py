@@ -113,16 +113,18 @@ class SeriesTable:
         self.path = path
         self.odd = Counter[str]()
         self._series: dict[str, Series] = {}
-        left_out = []
+        left_out, named = [], Counter[str]()
         for item in items:
             if isinstance(item, str):
                 left_out.append(item)
             elif isinstance(item, Counter):
                 self.odd += item
-            elif item.column.name in self._series:
-                left_out.append(f"{item.column.name}: one before it has the same name")
             else:
+                named[item.column.name] += 1
                 self._series[item.column.name] = item
+        for name in [name for name, count in named.items() if count > 1]:
+            left_out.append(f"{name}: {named[name]} are called so: rename them")
+            del self._series[name]
         self.columns = tuple(one.column for one in self._series.values())
         self.left_out = tuple(left_out)
 

@@ -60,17 +60,28 @@ def _series(path: Path) -> Iterator[Item]:
             if index == master and not other:
                 continue
             name = channel.name if len(file.channels_db[channel.name]) == 1 else f"{number}/{channel.name}"
-            head = _read(file, number, index, 0, 1)[0]
+            if any(getattr(one, "formula", "") for one in _conversions(channel.conversion)):
+                yield f"{name}: a formula makes its numbers, which is not computed here: save the numbers"
+                continue
+            signal = _read(file, number, index, 0, 1)
+            head = np.asarray(signal.samples)
             if head.ndim != 1 or head.dtype.names or head.dtype.kind not in "iufbSU":
                 yield f"{name}: it holds arrays, structures or bytes"
                 continue
-            yield Series(Column(name, str(channel.unit or ""), clock), rows, _data(file, number, index, rows))
+            yield Series(Column(name, str(signal.unit or ""), clock), rows, _data(file, number, index, rows))
 
 
-def _read(file: Any, group: int, index: int, first: int, count: int) -> tuple[Any, Any]:
-    """Return samples, and which of them are marked as not valid, or None."""
-    signal = file.get(group=group, index=index, record_offset=first, record_count=count, ignore_invalidation_bits=True)
-    return np.asarray(signal.samples), signal.invalidation_bits
+def _conversions(conversion: Any) -> Iterator[Any]:
+    """Yield what converts a channel, with all that it refers to."""
+    if conversion is not None:
+        yield conversion
+        for one in (getattr(conversion, "referenced_blocks", None) or {}).values():
+            yield from _conversions(None if isinstance(one, bytes) else one)
+
+
+def _read(file: Any, group: int, index: int, first: int, count: int) -> Any:
+    """Return samples, with those that are marked as not valid."""
+    return file.get(group=group, index=index, record_offset=first, record_count=count, ignore_invalidation_bits=True)
 
 
 def _master(file: Any, group: int, first: int, count: int) -> Cells:
@@ -81,7 +92,8 @@ def _data(file: Any, group: int, index: int, rows: int) -> Slice:
     def read(first: int, count: int) -> Cells:
         if first >= rows:
             return np.empty(0)
-        samples, invalid = _read(file, group, index, first, min(count, rows - first))
+        signal = _read(file, group, index, first, min(count, rows - first))
+        samples, invalid = np.asarray(signal.samples), signal.invalidation_bits
         if samples.dtype.kind in "SU":
             plain = np.char.decode(samples, "utf-8", "replace") if samples.dtype.kind == "S" else samples
             return texts(plain.tolist() if invalid is None else np.where(invalid, "", plain).tolist())
