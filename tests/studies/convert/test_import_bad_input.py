@@ -140,7 +140,8 @@ def test_why_time_goes_back_is_told_by_how_far(tmp_path: Path, by: float, said: 
         ("SOURCE", "x" * 5000, "there is no 'xxx"),
         ("SOURCE", "../run.csv", "is no file of the source folder"),
         ("SOURCE", "/etc/passwd", "is no file of the source folder"),
-        ("repeat = 1", "repeat = 1\nstart_s = 1e308", "no sample of"),
+        ("repeat = 1", "repeat = 1\nstart_s = 1e308", "is greater than 1e.09"),
+        ("repeat = 1", "repeat = 1\nstart_s = 1e9", "no sample of"),
         ("repeat = 1", 'repeat = 1\n[text]\nencoding = "\\u0000"', "embedded null"),
     ],
 )

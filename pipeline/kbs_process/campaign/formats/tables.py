@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar, Self, TypeVar
 from pydantic import AfterValidator, BaseModel, ConfigDict, Discriminator, Field, Tag, model_validator
 from pydantic_core import PydanticCustomError
 
-from kbs_process.campaign.formats.kind import Kind
+from kbs_process.campaign.formats.kind import GREATEST, Kind
 
 # Patterns of texts, and what they ask for in words.
 NAME = "^[A-Za-z0-9][A-Za-z0-9._-]*$"
@@ -24,8 +24,15 @@ Text = Annotated[str, Field(min_length=1)]
 Name = Annotated[str, Field(pattern=NAME)]  # part of a file's name
 LinkName = Annotated[str, Field(pattern=LINK)]  # of a joint, a body, a satellite
 Checksum = Annotated[str, Field(pattern=SHA256)]
-Positive = Annotated[float, Field(gt=0.0)]
 NotNegative = Annotated[float, Field(ge=0.0)]
+# Plain numbers, within what any rig on Earth has.
+Hertz = Annotated[float, Field(gt=0.0, le=GREATEST["Hz"])]
+HertzOrNone = Annotated[float, Field(ge=0.0, le=GREATEST["Hz"])]
+Seconds = Annotated[float, Field(gt=0.0, le=GREATEST["s"])]
+SecondsOrNone = Annotated[float, Field(ge=0.0, le=GREATEST["s"])]
+Metres = Annotated[float, Field(gt=0.0, le=GREATEST["m"])]
+Positive = Annotated[float, Field(gt=0.0, le=1e9)]
+Magnitude = Annotated[float, Field(ge=-1e9, le=1e9)]
 
 
 Count = Annotated[int, Field(ge=1, le=1_000_000)]
@@ -147,5 +154,5 @@ def quantities(table: Table) -> Iterator[tuple[str, Kind, QuantityTable | PlainQ
 class LimitTable(Table):
     """What a requirement allows."""
 
-    value: Positive
+    value: Annotated[float, Field(gt=0.0)]
     unit: Text
