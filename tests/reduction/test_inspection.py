@@ -10,8 +10,11 @@ import pytest
 from mcap.writer import Writer
 
 from kbs_process.recordings.mcap.messages.encoding import OutStream
+from kbs_process.recordings.mcap.source import open_recording
+from kbs_process.recordings.mcap.streams import Stream
 from kbs_process.recordings.mcap.writer import write_mcap
 from kbs_process.reduction.inspection import inspect_recording
+from kbs_process.stages.align.stream import Collected
 from recordings.mcap.mcap_files import build
 from recordings.mcap.message_encodings import Encoding, write_encoded
 
@@ -64,6 +67,22 @@ def test_a_clock_that_was_set_is_told_as_processing_tells_it(tmp_path: Path) -> 
     (refused,) = [loss for loss in found.losses if loss.kind == "unusable"]
     assert found.state == "lossy" and refused.where == "/encoder"
     assert "step by -0.4 s, 30" in refused.detail and refused.detail.endswith("a clock was set")
+
+
+@pytest.mark.parametrize(("by", "said"), [(267 * 365.25 * 86400.0, "97521.8 days after"), (-70.0, "70 s before")])
+def test_log_times_far_from_the_stamps_are_told_as_processing_tells_them(tmp_path: Path, by: float, said: str) -> None:
+    stamp = np.arange(2000) * 10_000_000 + 10**12
+    for name, later in (("a", 0), ("b", int(by * 1e9))):
+        angle = np.linspace(0.0, 1.0, 2000)[:, None]
+        write_mcap(tmp_path / f"{name}.mcap", [OutStream("/e", "joints", stamp, stamp + later, angle, ("az",))])
+    assert not inspect_recording(tmp_path / "a.mcap").losses
+    (told,) = inspect_recording(tmp_path / "b.mcap").losses
+    assert told.kind == "clocks apart" and said in told.detail
+    collected = Collected("/e", ("az",))
+    for _, block in open_recording(tmp_path / "b.mcap").read([Stream("e", "/e", ("position[az]",))]):
+        collected.push(block)
+    collected.finish()
+    assert [(loss.kind, loss.detail) for loss in collected.line.losses(0.0, 1.0)] == [(told.kind, told.detail)]
 
 
 def test_clean(tmp_path: Path) -> None:
