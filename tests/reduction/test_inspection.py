@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tracemalloc
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from kbs_process.recordings.mcap.messages.encoding import OutStream
 from kbs_process.recordings.mcap.source import open_recording
 from kbs_process.recordings.mcap.streams import Stream
 from kbs_process.recordings.mcap.writer import write_mcap
+from kbs_process.reduction import inspection
 from kbs_process.reduction.inspection import inspect_recording
 from kbs_process.stages.align.stream import Collected
 from recordings.mcap.mcap_files import build
@@ -143,7 +145,7 @@ def test_a_damaged_schema_is_told_and_not_clean(
 
 
 @pytest.mark.slow
-def test_topics_of_one_type_share_it(tmp_path: Path) -> None:
+def test_topics_of_one_type_share_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """What thousands of topics take in memory is what each has of its own."""
 
     def peak(topics: int) -> int:
@@ -164,6 +166,28 @@ def test_topics_of_one_type_share_it(tmp_path: Path) -> None:
 
     peak(10)
     assert (peak(1100) - peak(100)) / 1000 < 35_000  # bytes a topic; 42,000 where each has its type
+    monkeypatch.setattr(inspection, "TOGETHER", 100)
+    assert (peak(1100) - peak(100)) / 1000 < 15_000  # what is kept of a topic's 61 ranges
+
+
+@pytest.mark.parametrize("together", [1, 2, 3])
+def test_topics_read_in_several_passes_are_told_as_in_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, together: int
+) -> None:
+    stamp, force = np.arange(500) * 10_000_000, np.linspace(0.0, 1.0, 3000).reshape(500, 6)
+    force[7, 2] = np.nan
+    kept = [np.delete(stamp, slice(40, 60 + i)) for i in range(3)]
+    streams = [OutStream(f"/w{i}", "wrench", t, t, force[: len(t)]) for i, t in enumerate(kept)]
+    write_mcap(tmp_path / "a.mcap", streams)
+    data = (tmp_path / "a.mcap").read_bytes()
+    (tmp_path / "a.mcap").write_bytes(data[:-300])
+    whole = inspect_recording(tmp_path / "a.mcap")
+    monkeypatch.setattr(inspection, "TOGETHER", together)
+    parts = inspect_recording(tmp_path / "a.mcap")
+    assert whole.state == parts.state == "lossy"
+    assert whole.topics == parts.topics and len(whole.topics) == 3
+    assert Counter(whole.losses) == Counter(parts.losses)
+    assert any(loss.kind == "truncated" for loss in whole.losses)
 
 
 def test_messages_of_any_type_are_counted(tmp_path: Path) -> None:
