@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -411,6 +412,48 @@ def test_mdf_masters_and_invalid_samples(tmp_path: Path) -> None:
     np.testing.assert_array_equal(column(table, "b"), np.where((T == 1.5) | (T == 2.0), NAN, T))
     assert cells(table, "0: time")[1] == np.datetime64("2026-01-31T12:00:00.5")
     assert "taken for UTC: it begins at 2026-01-31 12:00:00" in next(iter(table.odd))
+
+
+def master_of(group: Any, **changes: Any) -> None:
+    for name, value in changes.items():
+        setattr(group.channels[0], name, value)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("change", "name", "why"),
+    [
+        (lambda group: master_of(group, unit="ms"), "0: time", "stated in 'ms', not in s"),
+        (lambda group: master_of(group, sync_type=0), "0: time", "of no stated kind"),
+        (lambda group: setattr(group.channels[1], "flags", 1), "a", "not valid"),
+    ],
+    ids=["master in ms", "master of no kind", "all invalid"],
+)
+def test_mdf_that_states_what_its_numbers_are_not(
+    tmp_path: Path, change: Callable[[Any], None], name: str, why: str
+) -> None:
+    asammdf = pytest.importorskip("asammdf")
+    with asammdf.MDF(version="4.10") as file:
+        file.append([asammdf.Signal(T, T, name="a"), asammdf.Signal(T, T, name="b")])
+        change(file.groups[0])
+        file.save(tmp_path / "a.mf4", overwrite=True)
+    table = read(tmp_path / "a.mf4", "mdf")
+    assert why in told(table, name)
+    assert name not in names(table)
+
+
+@pytest.mark.slow
+def test_mdf_that_declares_rows_that_are_not_there(tmp_path: Path) -> None:
+    path = tmp_path / "a.mf4"
+    assert not any("rows" in one for one in (*mdf(path).odd, *mdf(path).left_out))
+    data = bytearray(path.read_bytes())
+    group = data.index(b"##CG")
+    at = group + 24 + 8 * data[group + 16] + 8  # behind links and record number
+    for rows, why in ((30, "ends before the rows that it declares"), (10**12, "1000000000000 rows, far more")):
+        data[at : at + 8] = rows.to_bytes(8, "little")
+        path.write_bytes(data)
+        table = read(path, "mdf")
+        assert why in " ".join((*table.odd, *table.left_out))
 
 
 @pytest.mark.slow

@@ -13,6 +13,7 @@ import numpy as np
 from kbs_process.recordings.formats import Format, Text
 from kbs_process.recordings.tables import (
     CHUNK_ROWS,
+    UNPACKED,
     Cells,
     Column,
     Item,
@@ -24,7 +25,9 @@ from kbs_process.recordings.tables import (
     too_coarse,
 )
 
-_SYNCHRONISED_BY = {2: "an angle", 3: "a distance", 4: "an index"}  # of a group's master, which else is time
+# Of a group's master, which else is time.
+_SYNCHRONISED_BY = {0: "of no stated kind", 2: "an angle", 3: "a distance", 4: "an index"}
+_ALL_INVALID = 1  # among the flags of a channel
 
 
 def read_mdf(path: Path, _: Text) -> SeriesTable:
@@ -46,7 +49,15 @@ def _series(path: Path) -> Iterator[Item]:
         rows = int(group.channel_group.cycles_nr)
         if not rows:
             continue
+        if rows * max(int(group.channel_group.samples_byte_nr), 1) > UNPACKED * path.stat().st_size:
+            yield f"{number}: it declares {rows} rows, far more than a file of this size can hold"
+            continue
         other = "" if master is None else _SYNCHRONISED_BY.get(getattr(group.channels[master], "sync_type", 1), "")
+        if not len(_read(file, number, 0, rows - 1, 1).samples):
+            yield Counter({"group of channels ends before the rows that it declares": 1})
+        unit = "" if master is None else str(getattr(group.channels[master], "unit", ""))
+        if not other and unit not in ("", "s"):
+            other = f"stated in '{unit}', not in s"
         if other:
             yield f"{number}: time: the master of that group is {other}, and no time"
         elif master is not None and group.channels[master].dtype_fmt.kind == "f":
@@ -60,6 +71,9 @@ def _series(path: Path) -> Iterator[Item]:
             if index == master and not other:
                 continue
             name = channel.name if len(file.channels_db[channel.name]) == 1 else f"{number}/{channel.name}"
+            if getattr(channel, "flags", 0) & _ALL_INVALID:
+                yield f"{name}: all its samples are marked as not valid"
+                continue
             if any(getattr(one, "formula", "") for one in _conversions(channel.conversion)):
                 yield f"{name}: a formula makes its numbers, which is not computed here: save the numbers"
                 continue
