@@ -122,9 +122,8 @@ class SeriesTable:
             else:
                 named[item.column.name] += 1
                 self._series[item.column.name] = item
-        for name in [name for name, count in named.items() if count > 1]:
-            left_out.append(f"{name}: {named[name]} are called so: rename them")
-            del self._series[name]
+        left_out += [f"{name}: {count} are called so: rename them" for name, count in named.items() if count > 1]
+        self._series = {name: one for name, one in self._series.items() if named[name] == 1}
         self.columns = tuple(one.column for one in self._series.values())
         self.left_out = tuple(left_out)
 

@@ -6,6 +6,7 @@ The conventions of netCDF are kept: what `scale_factor` and `add_offset` pack is
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -32,13 +33,7 @@ _NO_VARIABLE = "This is a netCDF dimension but not a netCDF variable"
 _VALUES = {"scale_factor": 1, "add_offset": 1, "valid_min": 1, "valid_max": 1, "valid_range": 2}
 _VALUES |= {"_FillValue": 0, "missing_value": 0}
 # Classes of MATLAB; what others write has none.
-_MATLAB_NUMBERS = {
-    "",
-    "double",
-    "single",
-    "logical",
-    *(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)),
-}
+_MATLAB_NUMBERS = re.compile("|double|single|logical|u?int(8|16|32|64)")
 _BLOCK_CELLS = 1 << 22  # of a matrix, read together for its columns
 _UNWRITTEN = 1 << 26  # bytes of a data set that may be fill values alone
 
@@ -78,7 +73,7 @@ def _why_not(data: Any, classes: bool) -> str:
         return "its numbers lie in other files, which are not opened: copy them into this one"
     if _text(data.attrs.get("NAME", "")).startswith(_NO_VARIABLE):
         return "it is a dimension without values"
-    if _text(kind) not in _MATLAB_NUMBERS:
+    if not _MATLAB_NUMBERS.fullmatch(_text(kind)):
         return f"it is a {_text(kind)}: save numbers"
     if data.size * data.dtype.itemsize > UNPACKED * data.id.get_storage_size() + _UNWRITTEN:
         return f"next to none of its {data.size} numbers was written"
@@ -106,10 +101,8 @@ def _columns(data: Any, name: str, classes: bool) -> Iterator[Item]:
         return
     packing = _Packing.of(data) if data.dtype.kind in "iuf" else None
     change = None if packing is None else packing.unpacked
-    if data.ndim == 2:
-        # MATLAB's are transposed: of a square one, too.
-        upright = data.shape[0] > data.shape[1] or (data.shape[0] == data.shape[1] and not classes)
-        yield from matrix_of(_Cached(data), name, unit, change, upright=upright)
+    if data.ndim == 2:  # MATLAB's are transposed: of a square one, too
+        yield from matrix_of(_Cached(data), name, unit, change, upright=data.shape[0] >= data.shape[1] + classes)
     else:
         yield from series_of(data, name, unit, change)
 
