@@ -130,7 +130,7 @@ FAULTS = {
     "limit beyond all": (CAMPAIGN, "value = 0.06,", "value = 1e300,", ["limit", "1e+300 N m", "at most 1e+08 N m"]),
     "code of many turns": (RIG, "step = { value = 3.834951969714103e-4", "step = { value = 1e9", ["encoder.step.value", "1e+09 in SI", "at most 1"]),
     "inertia beyond all": (DRIVES, "rotor_inertia = { value = 2e-5", "rotor_inertia = { value = 1e11", ["rotor_inertia.value", "at most 1e+08"]),
-    "rate beyond all": (CAMPAIGN, "high_pass_Hz = 0.01", "high_pass_Hz = 1e7", ["bands.high_pass_Hz", "greater than 1e+06"]),
+    "rate beyond all": (CAMPAIGN, "high_pass_Hz = 0.01", "high_pass_Hz = 1e10", ["bands.high_pass_Hz", "greater than 1e+09"]),
     "no stiffness": (RIG, "[4000, 4000, 6000]", "[1e-308, 4000, 6000]", ["transducer.stiffness.value", "1e-308 in SI", "1e-15"]),
     "endless bias": (RIG, "bias = { value = [0,", "bias = { value = [1e12,", ["transducer.bias.value", "so large"]),
     "cycle of a microsecond": (DRIVES, "cycle = { value = 0.1", "cycle = { value = 1e-6", ["controller.cycle.value", "at least 1e-05"]),

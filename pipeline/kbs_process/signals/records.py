@@ -103,7 +103,6 @@ class Events:
     channels: tuple[str, ...]
 
 
-APART = "clocks apart"  # log times and stamps count from another zero: told
 BLOW = "blow"  # samples that look single in one channel, while others move: kept, and told
 PUT_IN_ORDER = "put in order"  # messages that came after younger ones: told, although nothing is lost by that
 ROUNDED = "rounded stamps"  # behind which a regular rate was found: likewise
@@ -127,7 +126,7 @@ class Loss:
     @property
     def real(self) -> bool:
         """Whether anything is missing, doubtful or left out by it."""
-        return self.kind not in (PUT_IN_ORDER, ROUNDED, BLOW, APART)
+        return self.kind not in (PUT_IN_ORDER, ROUNDED, BLOW, "clocks apart")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

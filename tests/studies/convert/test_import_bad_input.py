@@ -400,16 +400,16 @@ def test_a_unit_that_contradicts_the_mapping_is_refused_or_told(
         import_recordings(write_mapping(tmp_path, file, text), tmp_path, target, notice=notices.append)
         return read_back(target, "turn_1")
 
-    with pytest.raises(RecordingError, match="'run/angle' in 'deg', the mapping says 'rad'"):
+    with pytest.raises(RecordingError, match="'run/angle' is in 'deg' as the file states it, in 'rad' as"):
         imported("deg")
-    with pytest.raises(RecordingError, match="'run/t' in 's', the mapping says 'ms'"):
+    with pytest.raises(RecordingError, match="'run/t' is in 's' as the file states it, in 'ms' as"):
         imported("rad", mapping.replace('unit = "s"', 'unit = "ms"'))
     imported("rad")
     assert not notices
     imported("degrees")
-    assert "'run/angle' is in 'degrees' by the file, taken for 'rad'" in notices[0]
+    assert "'run/angle' is in 'degrees' as the file states it, in 'rad' as" in notices[0]
     imported("V", mapping.replace('unit = "rad"', 'unit = "rad", scale = 2.0'))
-    assert "in 'V' by the file, taken for 'rad' after scale 2" in notices[0]
+    assert "is in 'V' as the file states it, in 'rad' as" in notices[0]
 
 
 def test_a_unit_is_the_same_however_it_is_parted() -> None:

@@ -7,20 +7,17 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import ConfigDict, Field
 
 from kbs_process.campaign.config import DrivenBy, Frame, Load, Role, Statistic
-from kbs_process.campaign.formats.kind import GREATEST
 from kbs_process.campaign.formats.tables import (
     TABLE,
     TEXT,
     Checksum,
     Count,
     Distinct,
-    Hertz,
-    HertzOrNone,
     LimitTable,
     Name,
+    NotNegative,
     PlainQuantity,
-    Seconds,
-    SecondsOrNone,
+    Positive,
     Some,
     SomeDistinct,
     Table,
@@ -38,7 +35,7 @@ class RequirementTable(Table):
     frame: Frame = Field(description='"S": at the spacecraft\'s centre of mass; "T": at the transducer')
     statistic: Statistic = Field(description="of every axis alone")
     limit: LimitTable
-    band_Hz: Annotated[list[HertzOrNone], Field(min_length=2, max_length=2)] = Field(
+    band_Hz: Annotated[list[NotNegative], Field(min_length=2, max_length=2)] = Field(
         description="lower and upper edge, Hz"
     )
     source: Text
@@ -58,11 +55,11 @@ class PointingTable(Table):
 class BandsTable(Table):
     """The frequency bands in which histories are compared."""
 
-    high_pass_Hz: HertzOrNone = Field(description="lower edge of every band, Hz; 0 is none")
-    low_pass_Hz: Annotated[SomeDistinct[Hertz], Field(max_length=20)] = Field(
+    high_pass_Hz: NotNegative = Field(description="lower edge of every band, Hz; 0 is none")
+    low_pass_Hz: Annotated[SomeDistinct[Positive], Field(max_length=20)] = Field(
         description="upper edges, Hz: one band each"
     )
-    working_rate_Hz: Annotated[float, Field(ge=0.01, le=GREATEST["Hz"])] = Field(
+    working_rate_Hz: Annotated[float, Field(ge=0.01, le=1e6)] = Field(
         description="sampling rate after decimation, Hz; all stages work at this rate"
     )
 
@@ -163,8 +160,8 @@ class RecordingTable(Table):
     )
     repeat: Count = Field(1, description="number of this run of the trajectory, from 1")
     sha256: Checksum | None = Field(None, description="of the file; checked")
-    start_s: SecondsOrNone | None = Field(None, description="leave out what is before, s from the recording's start")
-    end_s: Seconds | None = Field(None, description="leave out what is after, s from the recording's start")
+    start_s: NotNegative | None = Field(None, description="leave out what is before, s from the recording's start")
+    end_s: Positive | None = Field(None, description="leave out what is after, s from the recording's start")
     without: Distinct[str] = Field(
         [], description="effects of the model that did not act in this recording, as a cord that was not attached"
     )

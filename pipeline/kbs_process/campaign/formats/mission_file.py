@@ -17,7 +17,7 @@ from kbs_process.campaign.formats.tables import (
     Magnitude,
     Name,
     PlainQuantity,
-    Seconds,
+    Positive,
     Some,
     Table,
     Text,
@@ -116,7 +116,7 @@ class SectionEntry(Table):
     until: Literal["loss", "acquisition", "azimuth-extreme", "elevation-extreme", "end"] = Field(
         description="event at which the section ends"
     )
-    near: Seconds = Field(alias="near_s", description="which of these events: the nearest to this time")
+    near: Positive = Field(alias="near_s", description="which of these events: the nearest to this time")
     published: Published | None = None
 
 

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import ConfigDict, Field
 
-from kbs_process.campaign.formats.tables import Hertz, HertzOrNone, Magnitude, Some, Table, Version
+from kbs_process.campaign.formats.tables import Magnitude, NotNegative, Positive, Some, Table, Version
 
 Six = Annotated[list[Magnitude], Field(min_length=6, max_length=6)]
 
@@ -21,8 +21,8 @@ class AngleTable(Table):
 class ModeTable(Table):
     """One mode, of unit modal mass."""
 
-    frequency_Hz: Hertz
-    frequency_sigma_Hz: HertzOrNone = Field(0.0, description="one standard deviation")
+    frequency_Hz: Positive
+    frequency_sigma_Hz: NotNegative = Field(0.0, description="one standard deviation")
     damping: Annotated[float, Field(gt=0.0, lt=1.0)] = Field(description="of critical")
     damping_sigma: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.0
     shape: Six = Field(

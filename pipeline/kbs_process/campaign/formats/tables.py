@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar, Self, TypeVar
 from pydantic import AfterValidator, BaseModel, ConfigDict, Discriminator, Field, Tag, model_validator
 from pydantic_core import PydanticCustomError
 
-from kbs_process.campaign.formats.kind import GREATEST, Kind
+from kbs_process.campaign.formats.kind import Kind
 
 # Patterns of texts, and what they ask for in words.
 NAME = "^[A-Za-z0-9][A-Za-z0-9._-]*$"
@@ -24,14 +24,9 @@ Text = Annotated[str, Field(min_length=1)]
 Name = Annotated[str, Field(pattern=NAME)]  # part of a file's name
 LinkName = Annotated[str, Field(pattern=LINK)]  # of a joint, a body, a satellite
 Checksum = Annotated[str, Field(pattern=SHA256)]
-NotNegative = Annotated[float, Field(ge=0.0)]
-# Plain numbers, within what any rig on Earth has.
-Hertz = Annotated[float, Field(gt=0.0, le=GREATEST["Hz"])]
-HertzOrNone = Annotated[float, Field(ge=0.0, le=GREATEST["Hz"])]
-Seconds = Annotated[float, Field(gt=0.0, le=GREATEST["s"])]
-SecondsOrNone = Annotated[float, Field(ge=0.0, le=GREATEST["s"])]
-Metres = Annotated[float, Field(gt=0.0, le=GREATEST["m"])]
+# Plain numbers, such as Hz and s, within what any rig on Earth has.
 Positive = Annotated[float, Field(gt=0.0, le=1e9)]
+NotNegative = Annotated[float, Field(ge=0.0, le=1e9)]
 Magnitude = Annotated[float, Field(ge=-1e9, le=1e9)]
 
 
@@ -112,7 +107,8 @@ class Table(BaseModel):
 
 
 Row = Annotated[Annotated[float, NUMBER] | Annotated[Some[float], ARRAY], by_kind]
-SigmaRow = Annotated[Annotated[NotNegative, NUMBER] | Annotated[Some[NotNegative], ARRAY], by_kind]
+Sigma = Annotated[float, Field(ge=0.0)]  # in any unit: bounded in SI
+SigmaRow = Annotated[Annotated[Sigma, NUMBER] | Annotated[Some[Sigma], ARRAY], by_kind]
 
 
 class QuantityTable(Table):
@@ -124,11 +120,11 @@ class QuantityTable(Table):
     unit: Annotated[Annotated[str, TEXT] | Annotated[list[str], ARRAY], by_kind] = Field(
         description='one for all elements, or a list with one each; "1" without dimension'
     )
-    sigma: Annotated[
-        Annotated[NotNegative, NUMBER] | Annotated[Text, TEXT] | Annotated[Some[SigmaRow], ARRAY], by_kind
-    ] = Field(
-        description="one standard deviation, in the same unit; 0 is exact by definition; one number goes for all "
-        "elements"
+    sigma: Annotated[Annotated[Sigma, NUMBER] | Annotated[Text, TEXT] | Annotated[Some[SigmaRow], ARRAY], by_kind] = (
+        Field(
+            description="one standard deviation, in the same unit; 0 is exact by definition; one number goes for all "
+            "elements"
+        )
     )
     source: Text = Field(description="where the number comes from")
 

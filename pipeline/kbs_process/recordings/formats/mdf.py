@@ -74,7 +74,7 @@ def _series(path: Path) -> Iterator[Item]:
             if getattr(channel, "flags", 0) & _ALL_INVALID:
                 yield f"{name}: all its samples are marked as not valid"
                 continue
-            if any(getattr(one, "formula", "") for one in _conversions(channel.conversion)):
+            if _by_formula(channel.conversion):
                 yield f"{name}: a formula makes its numbers, which is not computed here: save the numbers"
                 continue
             signal = _read(file, number, index, 0, 1)
@@ -85,12 +85,10 @@ def _series(path: Path) -> Iterator[Item]:
             yield Series(Column(name, str(signal.unit or ""), clock), rows, _data(file, number, index, rows))
 
 
-def _conversions(conversion: Any) -> Iterator[Any]:
-    """Yield what converts a channel, with all that it refers to."""
-    if conversion is not None:
-        yield conversion
-        for one in (getattr(conversion, "referenced_blocks", None) or {}).values():
-            yield from _conversions(None if isinstance(one, bytes) else one)
+def _by_formula(conversion: Any) -> bool:
+    """Whether a formula has a part in a conversion."""
+    inner = getattr(conversion, "referenced_blocks", None) or {}
+    return bool(getattr(conversion, "formula", "")) or any(map(_by_formula, inner.values()))
 
 
 def _read(file: Any, group: int, index: int, first: int, count: int) -> Any:

@@ -8,19 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from kbs_process.errors import RecordingError
-from kbs_process.signals.records import (
-    APART,
-    BLOW,
-    DROPOUT,
-    PUT_IN_ORDER,
-    ROUNDED,
-    SPIKE,
-    Array,
-    Block,
-    Loss,
-    Mask,
-    Stamps,
-)
+from kbs_process.signals.records import BLOW, DROPOUT, PUT_IN_ORDER, ROUNDED, SPIKE, Array, Block, Loss, Mask, Stamps
 from kbs_process.stages.align.arrival import REGULAR, Arrival
 from kbs_process.stages.align.clocks import ClockData, FloorStep, LatencyFloor
 from kbs_process.stages.align.envelope import MinMax
@@ -412,7 +400,9 @@ class Timeline:
         if self._floor is not None and abs(apart := 1e-9 * (self._floor.first_log - self._first)) > LONGEST_LATENCY:
             far = f"{abs(apart):.4g} s" if abs(apart) < 86400.0 else f"{abs(apart) / 86400.0:.6g} days"
             ways = f"log times lie {far} {'after' if apart > 0.0 else 'before'} the stamps"
-            found.append(Loss(APART, self.where, 0, detail=f"{ways}, which no latency is: one of the two is no date"))
+            found.append(
+                Loss("clocks apart", self.where, 0, detail=f"{ways}, which no latency is: one of the two is no date")
+            )
         if self._floor is not None and not self.by_recorder and (trouble := self._floor.trouble()):
             found.append(Loss("clock", self.where, 0, detail=trouble))
         if self._orderer is not None:

@@ -13,14 +13,11 @@ from kbs_process.campaign.formats.tables import (
     TEXT,
     TRUTH,
     Count,
-    Hertz,
     LinkName,
     Magnitude,
-    Metres,
     Name,
+    NotNegative,
     Positive,
-    Seconds,
-    SecondsOrNone,
     Some,
     Table,
     Version,
@@ -53,7 +50,7 @@ class Time(Table):
 
     column: Which | None = Field(None, description="a column's name, or its number counted from 1")
     unit: Literal["s", "ms", "us", "ns", "min", "datetime"] = "s"
-    rate_Hz: Hertz | None = Field(
+    rate_Hz: Positive | None = Field(
         None, description="sampling rate, Hz: the column counts samples, or, without a column, so do the rows"
     )
     start: AwareDatetime | None = Field(
@@ -79,7 +76,7 @@ class ColumnTable(Table):
     column: Which = Field(description="a column's name, or its number counted from 1")
     unit: Words = Field(description="in which the file has it")
     scale: Magnitude = Field(1.0, description="multiplies the file's numbers; -1 turns the sign")
-    radius_m: Metres | None = Field(
+    radius_m: Positive | None = Field(
         None,
         description="the file has the way or the speed of a surface at this radius, in a unit of length or velocity",
     )
@@ -141,8 +138,8 @@ class Part(Table):
     trajectory: Name
     role: Role
     repeat: Count = 1
-    start_s: SecondsOrNone = Field(0.0, description="leave out what is before, s from the file's first sample")
-    end_s: Seconds = Field(inf, description="leave out this moment and what is after")
+    start_s: NotNegative = Field(0.0, description="leave out what is before, s from the file's first sample")
+    end_s: Positive = Field(inf, description="leave out this moment and what is after")
 
     @property
     def stem(self) -> str:

@@ -212,17 +212,11 @@ def _pieces(table: Table, mapping: Mapping, streams: Sequence[StreamMap], findin
 def _check_unit(table: Table, column: Column, given: str, scale: float, findings: Findings) -> None:
     """Raise RecordingError where the file states another unit than the mapping; report what cannot be compared."""
     same = agree(column.unit, given) if column.unit else True
+    what = f"'{column.name}' is in '{column.unit}' as the file states it, in '{given}' as the mapping does"
     if same is False and abs(scale) == 1.0:
-        raise RecordingError(
-            f"the file has '{column.name}' in '{column.unit}', the mapping says '{given}'",
-            where=str(table.path),
-            remedy="correct the unit in the mapping; if the file is wrong, correct the unit there",
-        )
+        raise RecordingError(what, where=str(table.path), remedy="correct the unit where it is wrong")
     if not same:
-        findings.counts[
-            f"column with a unit that is not the mapping's: '{column.name}' is in '{column.unit}' by the "
-            f"file, taken for '{given}'" + ("" if abs(scale) == 1.0 else f" after scale {scale:g}")
-        ] = 1
+        findings.counts[f"column whose unit cannot be compared: {what}"] = 1
 
 
 def _stamps(
