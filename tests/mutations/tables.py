@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 
 from kbs_process.studies.convert.run import import_recordings
+from mutations.encodings import WAYS, Columns, written_anew
 from mutations.subject import Subject, Tell, damaged
 from studies.convert import importer_files as files
 
-Columns = dict[str, np.ndarray]
 NAMES = ("t", "Fx", "Fy", "Fz", "angle")
 _ROWS = 300
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
@@ -90,19 +90,27 @@ def _mdf(path: Path) -> Columns:
     from asammdf import MDF
 
     with MDF(path) as file:
-        read = {name: file.get(name) for name in NAMES[1:]}
-    return {"t": read["Fx"].timestamps} | {name: one.samples for name, one in read.items()}
+        read = {name: file.get(name, ignore_invalidation_bits=True) for name in NAMES[1:]}
+    return {"t": read["Fx"].timestamps} | {
+        name: one.samples if one.invalidation_bits is None else np.where(one.invalidation_bits, np.nan, one.samples)
+        for name, one in read.items()
+    }
 
 
 def _matlab(path: Path) -> Columns:
+    import h5py
     from scipy.io import loadmat
 
+    if h5py.is_hdf5(path):
+        with h5py.File(path) as file:
+            return {name: file[name][()].ravel() for name in NAMES}
     read = loadmat(path)
     return {name: read[name].ravel() for name in NAMES}
 
 
 def _numpy(path: Path) -> Columns:
-    return dict(zip(NAMES, np.load(path, allow_pickle=False), strict=True))
+    table = np.load(path, allow_pickle=False)
+    return dict(zip(NAMES, table if len(table) == len(NAMES) else table.T, strict=True))
 
 
 def judged(file: str, read: Callable[[Path], Columns]) -> Callable[[Path, Tell], None]:
@@ -137,9 +145,14 @@ def _same(got: dict[str, tuple[np.ndarray, np.ndarray]], columns: Columns) -> bo
     )
 
 
-def _mutate(file: str, text: bool) -> Callable[[random.Random, Path], str]:
+def _mutate(name: str, file: str) -> Callable[[random.Random, Path], str]:
+    text = name not in WAYS
+
     def mutate(rng: random.Random, folder: Path) -> str:
         path = folder / file
+        # Checksums and lengths find most damage; so half of the files are sound, with other values in them.
+        if not text and rng.random() < 0.5:
+            return written_anew(rng, name, path, sound())
         data = path.read_bytes()
         if text and rng.random() < 0.5:
             lines = [line.split(",") for line in data.decode().splitlines()]
@@ -160,18 +173,19 @@ def _subject(
     write: files.Writer,
     read: Callable[[Path], Columns],
     columns: dict[str, str] | dict[str, int] | None = None,
+    mapping: str = files.MAPPING,
 ) -> Subject:
     file = f"run.{name}"
 
     def make(folder: Path) -> None:
-        mapping = files.MAPPING
+        placed = mapping
         for column, place in (columns or {}).items():
             named = f'"{place}"' if isinstance(place, str) else str(place)
-            mapping = mapping.replace(f'column = "{column}"', f"column = {named}")
-        files.write_mapping(folder, file, mapping)
+            placed = placed.replace(f'column = "{column}"', f"column = {named}")
+        files.write_mapping(folder, file, placed)
         write(folder / file, sound())
 
-    return Subject(name, share, make, _mutate(file, name == "csv"), judged(file, read))
+    return Subject(name, share, make, _mutate(name, file), judged(file, read))
 
 
 SUBJECTS = (
@@ -179,7 +193,7 @@ SUBJECTS = (
     _subject("parquet", 1.0, files.write_parquet, _parquet),
     _subject("h5", 1.0, files.write_hdf5, _hdf5, _HDF5),
     _subject("tdms", 1.0, files.write_tdms, _tdms, _TDMS),
-    _subject("mf4", 1.0, files.write_mdf, _mdf),
+    _subject("mf4", 1.0, files.write_mdf, _mdf, mapping=files.OWN_TIME),
     _subject("mat", 1.0, files.write_matlab, _matlab),
     _subject("npy", 1.0, files.write_numpy, _numpy, _NUMPY),
 )

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from kbs_process.errors import RecordingError
-from mutations import tables
+from mutations import encodings, tables
 from mutations.subject import Outcome, Subject, damaged
 
 pytestmark = pytest.mark.slow
@@ -104,6 +104,19 @@ def test_a_number_that_no_other_reader_has_is_wrong(tmp_path: Path) -> None:
     (tmp_path / "campaign").rename(tmp_path / "campaign of before")
     tables.SUBJECTS[0].judge(tmp_path, told.append)
     assert told == ["wrong", "wrong", "right"]
+
+
+@pytest.mark.parametrize(
+    ("name", "way"), [(name, way) for name in ("tdms", "mf4", "mat") for way in ("as made", *encodings.WAYS[name])]
+)
+def test_what_is_sound_is_right_in_every_way_to_write_it(tmp_path: Path, name: str, way: str) -> None:
+    subject, told = next(one for one in tables.SUBJECTS if one.name == name), list[Outcome]()
+    subject.make(tmp_path)
+    if way != "as made":
+        (tmp_path / f"run.{name}").unlink()
+        encodings.WAYS[name][way](tmp_path / f"run.{name}", tables.sound())
+    subject.judge(tmp_path, told.append)
+    assert told[-1] == "right"
 
 
 def test_damage_is_the_same_for_the_same_seed() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -212,6 +213,60 @@ def test_matlab_7_3_kinds(tmp_path: Path) -> None:
     assert "sparse" in told(table, "s.data")
 
 
+@pytest.mark.parametrize("kind", ["categorical", "duration", "timeseries", "containers.Map"])
+def test_matlab_7_3_objects_are_no_numbers(tmp_path: Path, kind: str) -> None:
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "a.mat", "w", userblock_size=512) as file:
+        file["x"], file["o"] = T[None, :], np.array([[0xDD000000, 2, 1, 1, 1, 1]], "u4")
+        file["o"].attrs["MATLAB_class"] = np.bytes_(kind)
+    table = read(tmp_path / "a.mat", "matlab")
+    assert names(table) == ["x"]
+    assert kind in told(table, "o")
+
+
+def test_a_square_matrix_has_the_same_columns_in_every_version(tmp_path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    from scipy.io import savemat
+
+    square = np.arange(9.0).reshape(3, 3)
+    savemat(tmp_path / "5.mat", {"m": square})
+    with h5py.File(tmp_path / "7.3.mat", "w", userblock_size=512) as file:
+        file["m"] = square.T
+    for version in ("5", "7.3"):
+        np.testing.assert_array_equal(column(read(tmp_path / f"{version}.mat", "matlab"), "m[1]"), [0.0, 3.0, 6.0])
+
+
+def element(kind: int, data: bytes) -> bytes:
+    """An element of a .mat file of version 5."""
+    return np.array([kind, len(data)], "<u4").tobytes() + data + bytes(-len(data) % 8)
+
+
+def test_matlab_objects_and_variables_of_one_name(tmp_path: Path) -> None:
+    from scipy.io import savemat
+
+    for name, x in (("a", T), ("b", -T)):
+        savemat(tmp_path / f"{name}.mat", {"x": x} | ({"y": x} if name == "a" else {}))
+    head, again = ((tmp_path / f"{name}.mat").read_bytes() for name in ("a", "b"))
+    flags = [element(6, np.array([kind, 0], "<u4").tobytes()) for kind in (17, 13)]
+    inner = element(5, np.array([6, 1], "<i4").tobytes()) + element(1, b"") + element(6, bytes(24))
+    words = b"".join(element(1, word) for word in (b"tt", b"MCOS", b"timetable"))
+    made = element(14, flags[0] + words + element(14, flags[1] + inner))
+    (tmp_path / "c.mat").write_bytes(head + again[128:] + made)
+    table = read(tmp_path / "c.mat", "matlab")
+    assert names(table) == ["y"]
+    assert "2 are called so" in told(table, "x")
+    assert "an object" in told(table, "None")
+
+
+def test_matlab_4_variables_of_one_name(tmp_path: Path) -> None:
+    from scipy.io import savemat
+
+    savemat(tmp_path / "a.mat", {"x": T}, format="4")
+    data = (tmp_path / "a.mat").read_bytes()
+    (tmp_path / "a.mat").write_bytes(data + data)
+    assert "2 are called so" in told(read(tmp_path / "a.mat", "matlab"), "x")
+
+
 def test_numpy_kinds(tmp_path: Path) -> None:
     rows = np.zeros(20, np.dtype([("t", "M8[ms]"), ("F", ">f4", (3,)), ("z", "c16")]))
     rows["t"], rows["F"][:, 2] = np.arange(20).astype("M8[ms]"), T
@@ -288,6 +343,43 @@ def test_tdms_clocks(tmp_path: Path) -> None:
     assert "within the file" in told(later, "g/a")
 
 
+SCALE = {
+    "NI_Number_Of_Scales": 1,
+    "NI_Scaling_Status": "unscaled",
+    "NI_Scale[0]_Scale_Type": "Linear",
+    "NI_Scale[0]_Linear_Slope": 0.5,
+    "NI_Scale[0]_Linear_Y_Intercept": 1.0,
+    "NI_Scale[0]_Linear_Input_Source": 0xFFFFFFFF,
+}
+
+
+def test_tdms_scales_and_units(tmp_path: Path) -> None:
+    table = tdms(tmp_path / "a.tdms", SCALE | {"NI_UnitDescription": "N"}, SCALE)
+    np.testing.assert_array_equal(column(table, "g/a"), [*(0.5 * T + 1.0), *(0.5 * T + 1.0)])
+    assert table.columns[0].unit == "N"
+    for name, segments, why in (
+        ("scale", (SCALE, SCALE | {"NI_Scale[0]_Linear_Slope": 5.0}), "within the file"),
+        ("unit", ({"unit_string": "deg"}, {"unit_string": "rad"}), "within the file"),
+        ("unknown", (SCALE | {"NI_Scale[0]_Scale_Type": "Bridge"},), "'Bridge' is not known"),
+    ):
+        table = tdms(tmp_path / f"{name}.tdms", *segments)
+        assert not table.columns
+        assert why in told(table, "g/a")
+
+
+def test_tdms_frequencies_are_no_time(tmp_path: Path) -> None:
+    table = tdms(tmp_path / "a.tdms", {"wf_increment": 1.0, "wf_xunit_string": "Hz"})
+    assert names(table) == ["g/a"]
+    assert "'Hz'" in told(table, "g/a: time")
+
+
+def test_tdms_channels_of_one_name(tmp_path: Path) -> None:
+    nptdms = pytest.importorskip("nptdms")
+    with nptdms.TdmsWriter(tmp_path / "a.tdms") as writer:
+        writer.write_segment([nptdms.ChannelObject("g/x", "a", T), nptdms.ChannelObject("g", "x/a", -T)])
+    assert "2 are called so" in told(read(tmp_path / "a.tdms", "tdms"), "g/x/a")
+
+
 def test_tdms_that_breaks_off_and_an_index_of_another_file(tmp_path: Path) -> None:
     tdms(tmp_path / "a.tdms", {})
     data = (tmp_path / "a.tdms").read_bytes()
@@ -320,6 +412,67 @@ def test_mdf_masters_and_invalid_samples(tmp_path: Path) -> None:
     np.testing.assert_array_equal(column(table, "b"), np.where((T == 1.5) | (T == 2.0), NAN, T))
     assert cells(table, "0: time")[1] == np.datetime64("2026-01-31T12:00:00.5")
     assert "taken for UTC: it begins at 2026-01-31 12:00:00" in next(iter(table.odd))
+
+
+def master_of(group: Any, **changes: Any) -> None:
+    for name, value in changes.items():
+        setattr(group.channels[0], name, value)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("change", "name", "why"),
+    [
+        (lambda group: master_of(group, unit="ms"), "0: time", "stated in 'ms', not in s"),
+        (lambda group: master_of(group, sync_type=0), "0: time", "of no stated kind"),
+        (lambda group: setattr(group.channels[1], "flags", 1), "a", "not valid"),
+    ],
+    ids=["master in ms", "master of no kind", "all invalid"],
+)
+def test_mdf_that_states_what_its_numbers_are_not(
+    tmp_path: Path, change: Callable[[Any], None], name: str, why: str
+) -> None:
+    asammdf = pytest.importorskip("asammdf")
+    with asammdf.MDF(version="4.10") as file:
+        file.append([asammdf.Signal(T, T, name="a"), asammdf.Signal(T, T, name="b")])
+        change(file.groups[0])
+        file.save(tmp_path / "a.mf4", overwrite=True)
+    table = read(tmp_path / "a.mf4", "mdf")
+    assert why in told(table, name)
+    assert name not in names(table)
+
+
+@pytest.mark.slow
+def test_mdf_that_declares_rows_that_are_not_there(tmp_path: Path) -> None:
+    path = tmp_path / "a.mf4"
+    assert not any("rows" in one for one in (*mdf(path).odd, *mdf(path).left_out))
+    data = bytearray(path.read_bytes())
+    group = data.index(b"##CG")
+    at = group + 24 + 8 * data[group + 16] + 8  # behind links and record number
+    for rows, why in ((30, "ends before the rows that it declares"), (10**12, "1000000000000 rows, far more")):
+        data[at : at + 8] = rows.to_bytes(8, "little")
+        path.write_bytes(data)
+        table = read(path, "mdf")
+        assert why in " ".join((*table.odd, *table.left_out))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("formula", ["X*X", "X*missing"])
+def test_mdf_formulas_are_no_numbers(tmp_path: Path, formula: str) -> None:
+    table = mdf(tmp_path / "a.mf4", conversion={"formula": formula})
+    assert names(table) == ["0: time", "b"]
+    assert "formula" in told(table, "a")
+
+
+@pytest.mark.slow
+def test_mdf_3_has_units_in_its_conversions(tmp_path: Path) -> None:
+    asammdf = pytest.importorskip("asammdf")
+    with asammdf.MDF(version="3.30") as file:
+        file.append([asammdf.Signal(np.arange(20), T, name="a", unit="N", conversion={"a": 0.5, "b": 1.0})])
+        file.save(tmp_path / "a.mdf", overwrite=True)
+    table = read(tmp_path / "a.mdf", "mdf")
+    assert [one.unit for one in table.columns if one.name == "a"] == ["N"]
+    np.testing.assert_array_equal(column(table, "a"), 0.5 * np.arange(20) + 1.0)
 
 
 @pytest.mark.slow

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tracemalloc
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +11,12 @@ import pytest
 from mcap.writer import Writer
 
 from kbs_process.recordings.mcap.messages.encoding import OutStream
+from kbs_process.recordings.mcap.source import open_recording
+from kbs_process.recordings.mcap.streams import Stream
 from kbs_process.recordings.mcap.writer import write_mcap
+from kbs_process.reduction import inspection
 from kbs_process.reduction.inspection import inspect_recording
+from kbs_process.stages.align.stream import Collected
 from recordings.mcap.mcap_files import build
 from recordings.mcap.message_encodings import Encoding, write_encoded
 
@@ -64,6 +69,22 @@ def test_a_clock_that_was_set_is_told_as_processing_tells_it(tmp_path: Path) -> 
     (refused,) = [loss for loss in found.losses if loss.kind == "unusable"]
     assert found.state == "lossy" and refused.where == "/encoder"
     assert "step by -0.4 s, 30" in refused.detail and refused.detail.endswith("a clock was set")
+
+
+@pytest.mark.parametrize(("by", "said"), [(267 * 365.25 * 86400.0, "97521.8 days after"), (-70.0, "70 s before")])
+def test_log_times_far_from_the_stamps_are_told_as_processing_tells_them(tmp_path: Path, by: float, said: str) -> None:
+    stamp = np.arange(2000) * 10_000_000 + 10**12
+    for name, later in (("a", 0), ("b", int(by * 1e9))):
+        angle = np.linspace(0.0, 1.0, 2000)[:, None]
+        write_mcap(tmp_path / f"{name}.mcap", [OutStream("/e", "joints", stamp, stamp + later, angle, ("az",))])
+    assert not inspect_recording(tmp_path / "a.mcap").losses
+    (told,) = inspect_recording(tmp_path / "b.mcap").losses
+    assert told.kind == "clocks apart" and said in told.detail
+    collected = Collected("/e", ("az",))
+    for _, block in open_recording(tmp_path / "b.mcap").read([Stream("e", "/e", ("position[az]",))]):
+        collected.push(block)
+    collected.finish()
+    assert [(loss.kind, loss.detail) for loss in collected.line.losses(0.0, 1.0)] == [(told.kind, told.detail)]
 
 
 def test_clean(tmp_path: Path) -> None:
@@ -124,7 +145,7 @@ def test_a_damaged_schema_is_told_and_not_clean(
 
 
 @pytest.mark.slow
-def test_topics_of_one_type_share_it(tmp_path: Path) -> None:
+def test_topics_of_one_type_share_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """What thousands of topics take in memory is what each has of its own."""
 
     def peak(topics: int) -> int:
@@ -145,6 +166,28 @@ def test_topics_of_one_type_share_it(tmp_path: Path) -> None:
 
     peak(10)
     assert (peak(1100) - peak(100)) / 1000 < 35_000  # bytes a topic; 42,000 where each has its type
+    monkeypatch.setattr(inspection, "TOGETHER", 100)
+    assert (peak(1100) - peak(100)) / 1000 < 15_000  # what is kept of a topic's 61 ranges
+
+
+@pytest.mark.parametrize("together", [1, 2, 3])
+def test_topics_read_in_several_passes_are_told_as_in_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, together: int
+) -> None:
+    stamp, force = np.arange(500) * 10_000_000, np.linspace(0.0, 1.0, 3000).reshape(500, 6)
+    force[7, 2] = np.nan
+    kept = [np.delete(stamp, slice(40, 60 + i)) for i in range(3)]
+    streams = [OutStream(f"/w{i}", "wrench", t, t, force[: len(t)]) for i, t in enumerate(kept)]
+    write_mcap(tmp_path / "a.mcap", streams)
+    data = (tmp_path / "a.mcap").read_bytes()
+    (tmp_path / "a.mcap").write_bytes(data[:-300])
+    whole = inspect_recording(tmp_path / "a.mcap")
+    monkeypatch.setattr(inspection, "TOGETHER", together)
+    parts = inspect_recording(tmp_path / "a.mcap")
+    assert whole.state == parts.state == "lossy"
+    assert whole.topics == parts.topics and len(whole.topics) == 3
+    assert Counter(whole.losses) == Counter(parts.losses)
+    assert any(loss.kind == "truncated" for loss in whole.losses)
 
 
 def test_messages_of_any_type_are_counted(tmp_path: Path) -> None:

@@ -16,8 +16,7 @@ from kbs_process.files import regular
 from kbs_process.rig.model import Quantity
 from kbs_process.signals.records import WRENCH_CHANNELS, WRENCH_UNITS, Array
 
-# Of what is measured or made, in SI. Beyond them, squares and ratios of numbers are none that can be computed with.
-MOST, LEAST = 1e12, 1e-15
+LEAST = 1e-15  # of what is measured or made, in SI: below, squares and ratios are none that can be computed with
 _NEAREST = 1e-6  # of the distance from its bound: what a number is that must not reach it
 
 
@@ -33,9 +32,9 @@ def read_quantity(name: str, table: QuantityTable | PlainQuantity, kind: Kind, f
     with np.errstate(over="ignore"):
         value, sigma = value * scale, sigma * scale
     for key, array in (("value", value), ("sigma", sigma)):
-        if not (np.abs(array) < MOST).all():
+        if not (np.abs(array) <= kind.most).all():
             what = f"is {_extreme(array):.3g} in SI: nothing on a test bench is so large"
-            raise ConfigError(what, where=key, remedy=f"check number and unit; give less than {MOST:g}")
+            raise ConfigError(what, where=key, remedy=f"check number and unit; give at most {kind.most:g}")
         tiny = (array != 0.0) & (np.abs(array) < LEAST)
         if (key == "sigma" or kind.strict) and tiny.any():
             what = f"is {array[tiny].flat[0]:.3g} in SI: nothing on a test bench is so small"

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from math import isfinite
 from typing import TYPE_CHECKING
 
 from kbs_process.campaign.config import PointingRequirement, Requirement
 from kbs_process.campaign.documents import Document, Key
+from kbs_process.campaign.formats.kind import GREATEST
 from kbs_process.campaign.problems import Problems
 from kbs_process.campaign.units import UnitMismatchError, factor
 
@@ -46,6 +46,9 @@ def _limit(limit: LimitTable, unit: str, key: Key, document: Document, problems:
         scale = factor(limit.unit, unit)
     except UnitMismatchError as error:
         problems.add(document.place((*key, "limit", "unit")), str(error), error.remedy)
-    if not isfinite(limit.value * scale):
-        problems.add(document.place((*key, "limit")), f"is beyond all numbers in {unit}", "check number and unit")
+    if not limit.value * scale <= GREATEST[unit]:
+        what = f"is {limit.value * scale:.3g} {unit}: nothing on a test bench is so large"
+        problems.add(
+            document.place((*key, "limit")), what, f"check number and unit; give at most {GREATEST[unit]:g} {unit}"
+        )
     return limit.value * scale

@@ -11,7 +11,7 @@ DIMENSIONS: dict[str, dict[str, float]] = {
     "pure number": {"1": 1.0, "%": 1e-2},
     "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6},
     "mass": {"kg": 1.0, "g": 1e-3},
-    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0},
+    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0},
     "frequency": {"Hz": 1.0, "kHz": 1e3},
     "sweep rate": {"Hz/s": 1.0, "kHz/s": 1e3},
     "rate of growth": {"1/s": 1.0, "1/min": 1.0 / 60.0},
@@ -50,6 +50,8 @@ DIMENSIONS: dict[str, dict[str, float]] = {
 }
 
 _DIMENSION_OF = {unit: dimension for dimension, units in DIMENSIONS.items() for unit in units}
+_PARTED = str.maketrans({" ": "", "*": "", "·": "", "²": "^2"})  # spelt otherwise, or not at all
+_SPELT = {unit.translate(_PARTED): unit for unit in _DIMENSION_OF}
 
 
 class UnitMismatchError(ValueError):
@@ -63,6 +65,14 @@ class UnitMismatchError(ValueError):
 def alike(unit: str, other: str) -> bool:
     """Say whether two units are of one dimension; units that are not in the table are alike if they are the same."""
     return unit == other or (unit in _DIMENSION_OF and _DIMENSION_OF[unit] == _DIMENSION_OF.get(other))
+
+
+def agree(stated: str, unit: str) -> bool | None:
+    """Say whether a unit as files spell it ("Nm", "N*m") is the same as `unit`, None where it is not in the table."""
+    known = _SPELT.get(stated.translate(_PARTED), stated)
+    if unit == known or known not in _DIMENSION_OF:
+        return True if unit == known else None
+    return alike(known, unit) and DIMENSIONS[_DIMENSION_OF[known]][known] == DIMENSIONS[_DIMENSION_OF[unit]][unit]
 
 
 def factor(unit: str, expected: str) -> float:

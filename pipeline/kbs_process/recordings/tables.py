@@ -113,16 +113,17 @@ class SeriesTable:
         self.path = path
         self.odd = Counter[str]()
         self._series: dict[str, Series] = {}
-        left_out = []
+        left_out, named = [], Counter[str]()
         for item in items:
             if isinstance(item, str):
                 left_out.append(item)
             elif isinstance(item, Counter):
                 self.odd += item
-            elif item.column.name in self._series:
-                left_out.append(f"{item.column.name}: one before it has the same name")
             else:
+                named[item.column.name] += 1
                 self._series[item.column.name] = item
+        left_out += [f"{name}: {count} are called so: rename them" for name, count in named.items() if count > 1]
+        self._series = {name: one for name, one in self._series.items() if named[name] == 1}
         self.columns = tuple(one.column for one in self._series.values())
         self.left_out = tuple(left_out)
 

@@ -1,4 +1,4 @@
-"""What is in a recording: topics, rates, ranges, losses; one pass, in constant memory.
+"""What is in a recording: topics, rates, ranges, losses; a pass for every 4096 topics, in constant memory.
 
 What is wrong with a stream is judged by the steps that processing goes through as well.
 """
@@ -6,7 +6,7 @@ What is wrong with a stream is judged by the steps that processing goes through 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -23,6 +23,7 @@ from kbs_process.stages.align.condense import CondenseSettings, set_clock
 from kbs_process.stages.align.grid import longest_bridged
 from kbs_process.stages.align.stream import Timeline
 
+TOGETHER = 4096  # topics read in one pass: each keeps some 10 kB until its end, and a file may have 65,535
 LONGEST_ARRAY = 64  # elements of a sequence whose ranges are given
 # Of these readings the single samples are judged; of others the stamps alone, as steps of them may be meant.
 READINGS = ("wrench.", "position[")
@@ -147,27 +148,40 @@ class _Gathered:
 
 def inspect_recording(path: Path) -> Inspection:
     """Read a whole recording and say what is in it; never raises for what is wrong with the file."""
+    found, losses = list[TopicInspection](), list[Loss]()
     try:
         source = open_recording(path)
         topics = source.topics
         samples = source.samples()
-        plans = {topic.topic: _plan(samples.pop(topic.topic, None)) for topic in topics}
-        gathered = {topic: _Gathered(topic, plan) for topic, plan in plans.items()}
-        for topic, block in source.read(
-            [Stream(topic, topic, plan.fields, lenient=True) for topic, plan in plans.items()]
-        ):
-            gathered[topic].add(block)
+        for first in range(0, max(len(topics), 1), TOGETHER):
+            part = topics[first : first + TOGETHER]
+            plans = {topic.topic: _plan(samples.pop(topic.topic, None)) for topic in part}
+            gathered = _gathered(source, plans)
+            # Every pass meets what is wrong with the file itself.
+            known = set(losses)
+            losses += [loss for loss in source.losses if loss not in known]
+            losses += _by_turns(source)
+            for one in gathered.values():
+                losses += one.losses(source.start_ns)
+            found += [_conclude(topic, plans[topic.topic], gathered[topic.topic]) for topic in part]
     except RecordingError as error:
         return Inspection(path, "unreadable", (), (), str(error))
+    if source.losses and not any(topic.count for topic in found):
+        return Inspection(path, "unreadable", tuple(found), tuple(losses), "no message could be read")
+    state: Literal["clean", "lossy"] = "lossy" if any(loss.real for loss in losses) else "clean"
+    return Inspection(path, state, tuple(found), tuple(losses))
+
+
+def _gathered(source: Source, plans: Mapping[str, _Plan]) -> dict[str, _Gathered]:
+    """Read some of the topics through."""
+    gathered = {topic: _Gathered(topic, plan) for topic, plan in plans.items()}
+    streams = [Stream(topic, topic, plan.fields, lenient=True) for topic, plan in plans.items()]
+    for topic, block in source.read(streams):
+        gathered[topic].add(block)
     lines = {topic: one.finish() for topic, one in gathered.items()}
     if (found_set := set_clock({topic: line for topic, line in lines.items() if line is not None})) is not None:
         gathered[found_set[0]].refused = found_set[1]
-    losses = [*source.losses, *_by_turns(source)]
-    losses += [loss for one in gathered.values() for loss in one.losses(source.start_ns)]
-    found = tuple(_conclude(topic, plans[topic.topic], gathered[topic.topic]) for topic in topics)
-    if source.losses and not any(topic.count for topic in found):
-        return Inspection(path, "unreadable", found, tuple(losses), "no message could be read")
-    return Inspection(path, "lossy" if any(loss.real for loss in losses) else "clean", found, tuple(losses))
+    return gathered
 
 
 def _by_turns(source: Source) -> Iterator[Loss]:

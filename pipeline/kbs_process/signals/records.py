@@ -126,7 +126,7 @@ class Loss:
     @property
     def real(self) -> bool:
         """Whether anything is missing, doubtful or left out by it."""
-        return self.kind not in (PUT_IN_ORDER, ROUNDED, BLOW)
+        return self.kind not in (PUT_IN_ORDER, ROUNDED, BLOW, "clocks apart")
 
 
 @dataclass(frozen=True, slots=True)

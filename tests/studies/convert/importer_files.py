@@ -70,6 +70,9 @@ role = "fit"
 repeat = 1
 """
 
+UNITS = {"t": "s", "Fx": "N", "Fy": "N", "Fz": "N", "angle": "rad"}
+OWN_TIME = MAPPING.replace('[time]\ncolumn = "t"\nunit = "s"\n', "")
+
 WRENCH = Stream("wrench", "/transducer/wrench", ("wrench.force.x", "wrench.force.y", "wrench.force.z"))
 ANGLE = Stream("encoder", "/encoder", ("position[wheel]",))
 
@@ -151,7 +154,9 @@ def write_mdf(path: Path, columns: dict[str, np.ndarray]) -> None:
     from asammdf import MDF, Signal
 
     with MDF(version="4.10") as file:
-        file.append([Signal(x, columns["t"], name=name, unit="N") for name, x in columns.items() if name != "t"])
+        file.append(
+            [Signal(x, columns["t"], name=name, unit=UNITS[name]) for name, x in columns.items() if name != "t"]
+        )
         file.start_time = pd.Timestamp("1970-01-01T00:00:00Z").to_pydatetime()
         file.save(path, overwrite=True)
 

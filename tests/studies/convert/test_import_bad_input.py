@@ -6,6 +6,7 @@ import os
 import re
 import socket
 import tomllib
+from collections.abc import Callable
 from importlib.machinery import ModuleSpec
 from pathlib import Path
 
@@ -13,6 +14,7 @@ import numpy as np
 import pytest
 
 from kbs_process.campaign.load import load_campaign
+from kbs_process.campaign.units import agree
 from kbs_process.errors import ConfigError, KbsError, OutputError, RecordingError
 from kbs_process.recordings import isolated
 from kbs_process.reduction.commands import read_commands
@@ -23,6 +25,7 @@ from kbs_process.studies.convert.run import import_recordings
 from studies.convert.importer_files import (
     CAMPAIGN,
     MAPPING,
+    UNITS,
     Writer,
     read_back,
     signals,
@@ -137,7 +140,8 @@ def test_why_time_goes_back_is_told_by_how_far(tmp_path: Path, by: float, said: 
         ("SOURCE", "x" * 5000, "there is no 'xxx"),
         ("SOURCE", "../run.csv", "is no file of the source folder"),
         ("SOURCE", "/etc/passwd", "is no file of the source folder"),
-        ("repeat = 1", "repeat = 1\nstart_s = 1e308", "no sample of"),
+        ("repeat = 1", "repeat = 1\nstart_s = 1e308", "is greater than 1e.09"),
+        ("repeat = 1", "repeat = 1\nstart_s = 1e9", "no sample of"),
         ("repeat = 1", 'repeat = 1\n[text]\nencoding = "\\u0000"', "embedded null"),
     ],
 )
@@ -337,3 +341,80 @@ def test_time_that_starts_again_is_refused_with_its_row(tmp_path: Path) -> None:
     ) as caught:
         _import(tmp_path, "run.csv")
     assert "split the file there" in str(caught.value)
+
+
+def _tdms_in(unit: str) -> Writer:
+    def write(path: Path, columns: dict[str, np.ndarray]) -> None:
+        from nptdms import ChannelObject, TdmsWriter
+
+        with TdmsWriter(path) as writer:
+            units = UNITS | {"angle": unit}
+            writer.write_segment(
+                [ChannelObject("run", name, x, {"unit_string": units[name]}) for name, x in columns.items()]
+            )
+
+    return write
+
+
+def _hdf5_in(unit: str) -> Writer:
+    def write(path: Path, columns: dict[str, np.ndarray]) -> None:
+        import h5py
+
+        with h5py.File(path, "w") as file:
+            for name, x in columns.items():
+                file[f"run/{name}"] = x
+                file[f"run/{name}"].attrs["units"] = (UNITS | {"angle": unit})[name]
+
+    return write
+
+
+def _text_in(unit: str) -> Writer:
+    def write(path: Path, columns: dict[str, np.ndarray]) -> None:
+        units = UNITS | {"angle": unit}
+        rows = zip(*(x.tolist() for x in columns.values()), strict=True)
+        lines = [
+            [f"run/{name}" for name in columns],
+            [units[name] for name in columns],
+            *(map(repr, row) for row in rows),
+        ]
+        path.write_text("\n".join(",".join(line) for line in lines))
+
+    return write
+
+
+IN_RUN = MAPPING.replace('column = "', 'column = "run/')
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("file", "writer"), [("a.tdms", _tdms_in), ("a.h5", _hdf5_in), ("a.csv", _text_in)])
+def test_a_unit_that_contradicts_the_mapping_is_refused_or_told(
+    tmp_path: Path, file: str, writer: Callable[[str], Writer]
+) -> None:
+    mapping = IN_RUN + ("[text]\nunits_row = true\n" if file.endswith("csv") else "")
+    columns, notices = signals(20), list[str]()
+
+    def imported(unit: str, text: str = mapping) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+        writer(unit)(tmp_path / file, columns)
+        target = tmp_path / f"c{len(list(tmp_path.iterdir()))}"
+        notices.clear()
+        import_recordings(write_mapping(tmp_path, file, text), tmp_path, target, notice=notices.append)
+        return read_back(target, "turn_1")
+
+    with pytest.raises(RecordingError, match="'run/angle' is in 'deg' as the file states it, in 'rad' as"):
+        imported("deg")
+    with pytest.raises(RecordingError, match="'run/t' is in 's' as the file states it, in 'ms' as"):
+        imported("rad", mapping.replace('unit = "s"', 'unit = "ms"'))
+    imported("rad")
+    assert not notices
+    imported("degrees")
+    assert "'run/angle' is in 'degrees' as the file states it, in 'rad' as" in notices[0]
+    imported("V", mapping.replace('unit = "rad"', 'unit = "rad", scale = 2.0'))
+    assert "is in 'V' as the file states it, in 'rad' as" in notices[0]
+
+
+def test_a_unit_is_the_same_however_it_is_parted() -> None:
+    assert all(agree(stated, "N m") for stated in ("N m", "Nm", "N*m", "N·m"))
+    assert agree("Nmm", "mN m")
+    assert agree("Nmm", "N m") is False
+    assert agree("ns", "s") is False
+    assert agree("Newton metres", "N m") is None

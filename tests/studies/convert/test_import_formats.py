@@ -17,6 +17,7 @@ from kbs_process.studies.convert.clock import numbers
 from kbs_process.studies.convert.run import import_recordings
 from studies.convert.importer_files import (
     MAPPING,
+    OWN_TIME,
     Writer,
     read_back,
     signals,
@@ -31,8 +32,6 @@ from studies.convert.importer_files import (
     write_tdms,
     write_tsv,
 )
-
-NO_TIME = MAPPING.replace('[time]\ncolumn = "t"\nunit = "s"\n', "")
 
 
 @pytest.mark.parametrize(
@@ -62,7 +61,7 @@ NO_TIME = MAPPING.replace('[time]\ncolumn = "t"\nunit = "s"\n', "")
             .replace('"run/turn"', '"turn"')
             .replace('"run/fit"', '"fit"'),
         ),
-        ("run.mf4", write_mdf, NO_TIME),
+        ("run.mf4", write_mdf, OWN_TIME),
         ("run.mat", write_matlab, MAPPING),
         (
             "run.npy",
@@ -99,7 +98,7 @@ def test_waveforms_bring_their_own_clocks(tmp_path: Path) -> None:
     with TdmsWriter(tmp_path / "run.tdms") as writer:
         forces = [ChannelObject("run", name, columns[name], fast) for name in ("Fx", "Fy", "Fz")]
         writer.write_segment([*forces, ChannelObject("run", "angle", columns["angle"][:20], slow)])
-    mapping = NO_TIME
+    mapping = OWN_TIME
     for name in ("Fx", "Fy", "Fz", "angle"):
         mapping = mapping.replace(f'"{name}"', f'"run/{name}"')
     folder = import_recordings(write_mapping(tmp_path, "run.tdms", mapping), tmp_path, tmp_path / "c")

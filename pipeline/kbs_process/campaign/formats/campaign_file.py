@@ -59,7 +59,7 @@ class BandsTable(Table):
     low_pass_Hz: Annotated[SomeDistinct[Positive], Field(max_length=20)] = Field(
         description="upper edges, Hz: one band each"
     )
-    working_rate_Hz: Annotated[float, Field(ge=0.01)] = Field(
+    working_rate_Hz: Annotated[float, Field(ge=0.01, le=1e6)] = Field(
         description="sampling rate after decimation, Hz; all stages work at this rate"
     )
 

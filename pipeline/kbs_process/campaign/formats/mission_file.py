@@ -14,6 +14,7 @@ from kbs_process.campaign.formats.tables import (
     Count,
     LimitTable,
     LinkName,
+    Magnitude,
     Name,
     PlainQuantity,
     Positive,
@@ -45,7 +46,7 @@ class OrbitTable(Table):
     repeat_days: Count = Field(description="nodal days in which the ground track repeats")
     repeat_orbits: Count = Field(description="nodal revolutions in them")
     inclination: Angle
-    eccentricity: Annotated[PlainQuantity, Kind("1", low=0.0)]
+    eccentricity: Annotated[PlainQuantity, Kind("1", low=0.0, high=1.0)]
     argument_of_perigee: Angle
     ascending_node_time: Time = Field(description="local mean solar time of the ascending node, from midnight")
     argument_of_latitude: Angle = Field(description="mean, at the epoch")
@@ -64,7 +65,7 @@ class MountingTable(Table):
         description="rotation vector that turns the local orbital frame (x forward, z to the zenith) into T"
     )
     yaw_steering: bool = Field(description="x follows the velocity over the turning Earth")
-    grazing_height: Annotated[PlainQuantity, Kind("m", low=0.0)] = Field(
+    grazing_height: Annotated[PlainQuantity, Kind("m", low=0.0, high=1e8)] = Field(
         description="above the equatorial radius, below which a line of sight is lost"
     )
 
@@ -101,9 +102,9 @@ class DayRequirementTable(Table):
 class Published(Table):
     """A published table's figures for this section, shown beside ours."""
 
-    azimuth_mdeg: float = Field(description="95 % of the azimuth error")
-    elevation_mdeg: float = Field(description="95 % of the elevation error")
-    torque_Nm: float = Field(description="greatest disturbance torque, or its bound")
+    azimuth_mdeg: Magnitude = Field(description="95 % of the azimuth error")
+    elevation_mdeg: Magnitude = Field(description="95 % of the elevation error")
+    torque_Nm: Magnitude = Field(description="greatest disturbance torque, or its bound")
     torque: str = Field(description='the same as printed: "< 0.02"')
     comment: str
 

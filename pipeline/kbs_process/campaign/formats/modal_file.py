@@ -6,16 +6,15 @@ from typing import Annotated, Literal
 
 from pydantic import ConfigDict, Field
 
-from kbs_process.campaign.formats.tables import NotNegative, Positive, Some, Table, Version
+from kbs_process.campaign.formats.tables import Magnitude, NotNegative, Positive, Some, Table, Version
 
-# Numbers whose squares are numbers, too.
-Six = Annotated[list[Annotated[float, Field(ge=-1e100, le=1e100)]], Field(min_length=6, max_length=6)]
+Six = Annotated[list[Magnitude], Field(min_length=6, max_length=6)]
 
 
 class AngleTable(Table):
     """The joint's angle of a pose."""
 
-    value: float
+    value: Magnitude
     unit: Literal["rad", "deg", "mrad"]
 
 
@@ -25,7 +24,7 @@ class ModeTable(Table):
     frequency_Hz: Positive
     frequency_sigma_Hz: NotNegative = Field(0.0, description="one standard deviation")
     damping: Annotated[float, Field(gt=0.0, lt=1.0)] = Field(description="of critical")
-    damping_sigma: NotNegative = 0.0
+    damping_sigma: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.0
     shape: Six = Field(
         description="motion of the interface, unit modal mass: 3 x kg^-1/2, 3 x rad kg^-1/2 m^-1; 0 where it is rigid"
     )

@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import ConfigDict, Field
 
 from kbs_process.campaign.formats.kind import CHANNELWISE, PAIRWISE, Kind
-from kbs_process.campaign.formats.tables import LinkName, QuantityTable, SomeDistinct, Table
+from kbs_process.campaign.formats.tables import LinkName, Magnitude, QuantityTable, SomeDistinct, Table
 from kbs_process.rig.model import JointType
 
 Lengths = Annotated[QuantityTable, Kind("m", (3,))]
@@ -23,7 +23,7 @@ class SpreadTable(Table):
 class GravityTable(SpreadTable):
     """Weight at the place of the test."""
 
-    magnitude: Annotated[QuantityTable, Kind("m/s^2", low=0.0)] = Field(description="0 in flight")
+    magnitude: Annotated[QuantityTable, Kind("m/s^2", low=0.0, high=100.0)] = Field(description="0 in flight")
 
 
 class AmplifierTable(Table):
@@ -53,15 +53,15 @@ class TransducerTable(SpreadTable):
         description="raw = (I + this) wrench; row: channel that reads"
     )
     bias: Annotated[QuantityTable, Kind(CHANNELWISE, (6,))]
-    noise: Annotated[QuantityTable, Kind(CHANNELWISE, (6,), low=0.0)] = Field(description="rms of a sample")
-    resolution: Annotated[QuantityTable, Kind(CHANNELWISE, (6,), low=0.0)] = Field(description="of a sample")
+    noise: Annotated[QuantityTable, Kind(CHANNELWISE, (6,), low=0.0, high=1e6)] = Field(description="rms of a sample")
+    resolution: Annotated[QuantityTable, Kind(CHANNELWISE, (6,), low=0.0, high=1e6)] = Field(description="of a sample")
     amplifier: AmplifierTable | None = None
 
 
 class ControllerTable(SpreadTable):
     """The pointing controller."""
 
-    cycle: Annotated[QuantityTable, Kind("s", low=1e-5)] = Field(description="real-time cycle")
+    cycle: Annotated[QuantityTable, Kind("s", low=1e-5, high=100.0)] = Field(description="real-time cycle")
     loop: Literal["open", "closed"]
     Kp: Annotated[QuantityTable, Kind("1", each_joint=True)]
     Ki: Annotated[QuantityTable, Kind("1/s", each_joint=True)]
@@ -104,7 +104,7 @@ class EffortTable(Table):
 class EncoderTable(Table):
     """The encoder of a joint; its unit is m of a prismatic one."""
 
-    step: Annotated[QuantityTable, Kind("rad", low=0.0, of_joint=True)] = Field(
+    step: Annotated[QuantityTable, Kind("rad", low=0.0, high=1.0, of_joint=True)] = Field(
         description="one code; 0 is unquantised"
     )
     offset: Annotated[QuantityTable, Kind("rad", of_joint=True)]
@@ -128,7 +128,7 @@ class JointTable(SpreadTable):
     """A joint and the link that it moves."""
 
     parent: str = Field(description='link that carries the joint: "lab", "T" or another joint')
-    axis: Annotated[list[float], Field(min_length=3, max_length=3)] = Field(
+    axis: Annotated[list[Magnitude], Field(min_length=3, max_length=3)] = Field(
         description="direction of positive turning, right-handed, or of positive sliding, in the parent's axes"
     )
     type: JointType = Field(

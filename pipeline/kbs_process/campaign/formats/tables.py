@@ -24,8 +24,10 @@ Text = Annotated[str, Field(min_length=1)]
 Name = Annotated[str, Field(pattern=NAME)]  # part of a file's name
 LinkName = Annotated[str, Field(pattern=LINK)]  # of a joint, a body, a satellite
 Checksum = Annotated[str, Field(pattern=SHA256)]
-Positive = Annotated[float, Field(gt=0.0)]
-NotNegative = Annotated[float, Field(ge=0.0)]
+# Plain numbers, such as Hz and s, within what any rig on Earth has.
+Positive = Annotated[float, Field(gt=0.0, le=1e9)]
+NotNegative = Annotated[float, Field(ge=0.0, le=1e9)]
+Magnitude = Annotated[float, Field(ge=-1e9, le=1e9)]
 
 
 Count = Annotated[int, Field(ge=1, le=1_000_000)]
@@ -105,7 +107,8 @@ class Table(BaseModel):
 
 
 Row = Annotated[Annotated[float, NUMBER] | Annotated[Some[float], ARRAY], by_kind]
-SigmaRow = Annotated[Annotated[NotNegative, NUMBER] | Annotated[Some[NotNegative], ARRAY], by_kind]
+Sigma = Annotated[float, Field(ge=0.0)]  # in any unit: bounded in SI
+SigmaRow = Annotated[Annotated[Sigma, NUMBER] | Annotated[Some[Sigma], ARRAY], by_kind]
 
 
 class QuantityTable(Table):
@@ -117,11 +120,11 @@ class QuantityTable(Table):
     unit: Annotated[Annotated[str, TEXT] | Annotated[list[str], ARRAY], by_kind] = Field(
         description='one for all elements, or a list with one each; "1" without dimension'
     )
-    sigma: Annotated[
-        Annotated[NotNegative, NUMBER] | Annotated[Text, TEXT] | Annotated[Some[SigmaRow], ARRAY], by_kind
-    ] = Field(
-        description="one standard deviation, in the same unit; 0 is exact by definition; one number goes for all "
-        "elements"
+    sigma: Annotated[Annotated[Sigma, NUMBER] | Annotated[Text, TEXT] | Annotated[Some[SigmaRow], ARRAY], by_kind] = (
+        Field(
+            description="one standard deviation, in the same unit; 0 is exact by definition; one number goes for all "
+            "elements"
+        )
     )
     source: Text = Field(description="where the number comes from")
 
@@ -147,5 +150,5 @@ def quantities(table: Table) -> Iterator[tuple[str, Kind, QuantityTable | PlainQ
 class LimitTable(Table):
     """What a requirement allows."""
 
-    value: Positive
+    value: Annotated[float, Field(gt=0.0)]
     unit: Text

@@ -6,6 +6,7 @@ The conventions of netCDF are kept: what `scale_factor` and `add_offset` pack is
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -31,6 +32,8 @@ _NO_VARIABLE = "This is a netCDF dimension but not a netCDF variable"
 # How many numbers attributes have, 0 for any.
 _VALUES = {"scale_factor": 1, "add_offset": 1, "valid_min": 1, "valid_max": 1, "valid_range": 2}
 _VALUES |= {"_FillValue": 0, "missing_value": 0}
+# Classes of MATLAB; what others write has none.
+_MATLAB_NUMBERS = re.compile("|double|single|logical|u?int(8|16|32|64)")
 _BLOCK_CELLS = 1 << 22  # of a matrix, read together for its columns
 _UNWRITTEN = 1 << 26  # bytes of a data set that may be fill values alone
 
@@ -56,7 +59,7 @@ def datasets(path: Path, separator: str = "/", classes: bool = False) -> Iterato
             if why := _why_not(data, classes) or ("it is a sparse matrix" if name.startswith(sparse) else ""):
                 yield f"{label}: {why}"
             elif not data.attrs.get("MATLAB_empty"):
-                yield from _columns(data, label)
+                yield from _columns(data, label, classes)
         except (LookupError, OSError, RuntimeError, TypeError, ValueError):  # what h5py raises for odd types and damage
             yield f"{label}: its type, or an attribute of it, cannot be read: write it anew as numbers"
 
@@ -70,7 +73,7 @@ def _why_not(data: Any, classes: bool) -> str:
         return "its numbers lie in other files, which are not opened: copy them into this one"
     if _text(data.attrs.get("NAME", "")).startswith(_NO_VARIABLE):
         return "it is a dimension without values"
-    if _text(kind) in ("char", "cell", "function_handle", "table", "string", "timetable", "datetime"):
+    if not _MATLAB_NUMBERS.fullmatch(_text(kind)):
         return f"it is a {_text(kind)}: save numbers"
     if data.size * data.dtype.itemsize > UNPACKED * data.id.get_storage_size() + _UNWRITTEN:
         return f"next to none of its {data.size} numbers was written"
@@ -79,7 +82,7 @@ def _why_not(data: Any, classes: bool) -> str:
     return ""
 
 
-def _columns(data: Any, name: str) -> Iterator[Item]:
+def _columns(data: Any, name: str, classes: bool) -> Iterator[Item]:
     unit = _text(data.attrs.get("units", "")) if "unit" not in data.attrs else _text(data.attrs["unit"])
     if data.dtype.names and data.ndim == 1:
         for member in data.dtype.names:
@@ -97,9 +100,11 @@ def _columns(data: Any, name: str) -> Iterator[Item]:
         yield f"{name}: its attribute {odd}"
         return
     packing = _Packing.of(data) if data.dtype.kind in "iuf" else None
-    yield from series_of(
-        _Cached(data) if data.ndim == 2 else data, name, unit, None if packing is None else packing.unpacked
-    )
+    change = None if packing is None else packing.unpacked
+    if data.ndim == 2:  # MATLAB's are transposed: of a square one, too
+        yield from matrix_of(_Cached(data), name, unit, change, upright=data.shape[0] >= data.shape[1] + classes)
+    else:
+        yield from series_of(data, name, unit, change)
 
 
 def _odd(data: Any, attribute: str, count: int) -> str:

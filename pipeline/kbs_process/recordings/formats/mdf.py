@@ -13,6 +13,7 @@ import numpy as np
 from kbs_process.recordings.formats import Format, Text
 from kbs_process.recordings.tables import (
     CHUNK_ROWS,
+    UNPACKED,
     Cells,
     Column,
     Item,
@@ -24,7 +25,9 @@ from kbs_process.recordings.tables import (
     too_coarse,
 )
 
-_SYNCHRONISED_BY = {2: "an angle", 3: "a distance", 4: "an index"}  # of a group's master, which else is time
+# Of a group's master, which else is time.
+_SYNCHRONISED_BY = {0: "of no stated kind", 2: "an angle", 3: "a distance", 4: "an index"}
+_ALL_INVALID = 1  # among the flags of a channel
 
 
 def read_mdf(path: Path, _: Text) -> SeriesTable:
@@ -46,7 +49,15 @@ def _series(path: Path) -> Iterator[Item]:
         rows = int(group.channel_group.cycles_nr)
         if not rows:
             continue
+        if rows * max(int(group.channel_group.samples_byte_nr), 1) > UNPACKED * path.stat().st_size:
+            yield f"{number}: it declares {rows} rows, far more than a file of this size can hold"
+            continue
         other = "" if master is None else _SYNCHRONISED_BY.get(getattr(group.channels[master], "sync_type", 1), "")
+        if not len(_read(file, number, 0, rows - 1, 1).samples):
+            yield Counter({"group of channels ends before the rows that it declares": 1})
+        unit = "" if master is None else str(getattr(group.channels[master], "unit", ""))
+        if not other and unit not in ("", "s"):
+            other = f"stated in '{unit}', not in s"
         if other:
             yield f"{number}: time: the master of that group is {other}, and no time"
         elif master is not None and group.channels[master].dtype_fmt.kind == "f":
@@ -60,17 +71,29 @@ def _series(path: Path) -> Iterator[Item]:
             if index == master and not other:
                 continue
             name = channel.name if len(file.channels_db[channel.name]) == 1 else f"{number}/{channel.name}"
-            head = _read(file, number, index, 0, 1)[0]
+            if getattr(channel, "flags", 0) & _ALL_INVALID:
+                yield f"{name}: all its samples are marked as not valid"
+                continue
+            if _by_formula(channel.conversion):
+                yield f"{name}: a formula makes its numbers, which is not computed here: save the numbers"
+                continue
+            signal = _read(file, number, index, 0, 1)
+            head = np.asarray(signal.samples)
             if head.ndim != 1 or head.dtype.names or head.dtype.kind not in "iufbSU":
                 yield f"{name}: it holds arrays, structures or bytes"
                 continue
-            yield Series(Column(name, str(channel.unit or ""), clock), rows, _data(file, number, index, rows))
+            yield Series(Column(name, str(signal.unit or ""), clock), rows, _data(file, number, index, rows))
 
 
-def _read(file: Any, group: int, index: int, first: int, count: int) -> tuple[Any, Any]:
-    """Return samples, and which of them are marked as not valid, or None."""
-    signal = file.get(group=group, index=index, record_offset=first, record_count=count, ignore_invalidation_bits=True)
-    return np.asarray(signal.samples), signal.invalidation_bits
+def _by_formula(conversion: Any) -> bool:
+    """Whether a formula has a part in a conversion."""
+    inner = getattr(conversion, "referenced_blocks", None) or {}
+    return bool(getattr(conversion, "formula", "")) or any(map(_by_formula, inner.values()))
+
+
+def _read(file: Any, group: int, index: int, first: int, count: int) -> Any:
+    """Return samples, with those that are marked as not valid."""
+    return file.get(group=group, index=index, record_offset=first, record_count=count, ignore_invalidation_bits=True)
 
 
 def _master(file: Any, group: int, first: int, count: int) -> Cells:
@@ -81,7 +104,8 @@ def _data(file: Any, group: int, index: int, rows: int) -> Slice:
     def read(first: int, count: int) -> Cells:
         if first >= rows:
             return np.empty(0)
-        samples, invalid = _read(file, group, index, first, min(count, rows - first))
+        signal = _read(file, group, index, first, min(count, rows - first))
+        samples, invalid = np.asarray(signal.samples), signal.invalidation_bits
         if samples.dtype.kind in "SU":
             plain = np.char.decode(samples, "utf-8", "replace") if samples.dtype.kind == "S" else samples
             return texts(plain.tolist() if invalid is None else np.where(invalid, "", plain).tolist())

@@ -13,6 +13,10 @@ from kbs_process.recordings.formats import Format, Text
 from kbs_process.recordings.tables import Cells, Column, Item, Series, SeriesTable, Slice, stamps_after, texts
 
 _CLOCK = ("wf_start_time", "wf_start_offset", "wf_increment")
+_UNITS = ("unit_string", "NI_UnitDescription")
+_SCALE = "NI_Scal"  # what begins the names of properties that scale a channel, or say that it is scaled
+_SCALES = {"Linear", "Polynomial", "RTD", "Strain", "Table", "Thermistor", "Thermocouple", "Add", "Subtract"}
+_SCALES |= {"AdvancedAPI"}  # which the file's writer applied
 
 
 def read_tdms(path: Path, _: Text) -> SeriesTable:
@@ -23,7 +27,7 @@ def read_tdms(path: Path, _: Text) -> SeriesTable:
 def _series(path: Path) -> Iterator[Item]:
     from nptdms import TdmsFile
 
-    changed = _changed_clocks(path)
+    changed = _changed(path)
     file = TdmsFile.open(path.open("rb"))
     if file.file_status.incomplete_final_segment:
         yield Counter({"file breaks off within its last segment, of which what there is is read": 1})
@@ -35,31 +39,41 @@ def _series(path: Path) -> Iterator[Item]:
             if np.dtype(channel.dtype).kind == "c":
                 yield f"{name}: it holds complex numbers"
                 continue
-            step = channel.properties.get("wf_increment")
+            scales = {kind for key, kind in channel.properties.items() if key.endswith("_Scale_Type")}
+            if any(owner == channel.path and key not in _CLOCK for owner, key in changed):
+                yield f"{name}: its scale or unit changes within the file: split the file"
+                continue
+            if odd := sorted(map(str, scales - _SCALES)):
+                yield f"{name}: its scale '{odd[0]}' is not known: save it scaled"
+                continue
+            step, axis = channel.properties.get("wf_increment"), channel.properties.get("wf_xunit_string")
             clock = ""
-            if channel.path in changed:
+            if axis not in (None, "", "s"):
+                yield f"{name}: time: it is stated in '{axis}', not in s"
+            elif any(owner == channel.path for owner, _ in changed):
                 yield f"{name}: time: its start or step changes within the file, so it has no clock: split the file"
             elif isinstance(step, int | float) and 0.0 < step < np.inf:
                 clock = f"{name}: time"
-            unit = str(channel.properties.get("unit_string", ""))
+            unit = next((str(given) for key in _UNITS if (given := channel.properties.get(key))), "")
             yield Series(Column(name, unit, clock), len(channel), _data(channel))
             if clock:
                 yield Series(Column(clock, "datetime"), len(channel), _time(channel))
 
 
-def _changed_clocks(path: Path) -> set[str]:
-    """Return the channels whose waveform begins again in a later segment: of its properties only the last is kept."""
+def _changed(path: Path) -> set[tuple[str, str]]:
+    """Return what a later segment changes, by channel and property: time, scale or unit, of which the last is kept."""
     from nptdms.reader import TdmsReader
 
     first: dict[tuple[str, str], Any] = {}
-    changed: set[str] = set()
+    changed: set[tuple[str, str]] = set()
 
     class Reader(TdmsReader):  # type: ignore[misc]
         def _update_object_properties(self, properties: Any) -> None:
             for owner, pairs in (properties or {}).items():
                 for key, value in pairs:
-                    if key in _CLOCK and first.setdefault((owner, key), value) != value:
-                        changed.add(owner)
+                    kept = key in _CLOCK + _UNITS or key.startswith(_SCALE)
+                    if kept and first.setdefault((owner, key), value) != value:
+                        changed.add((owner, key))
             super()._update_object_properties(properties)
 
     with path.open("rb") as file:

@@ -31,6 +31,7 @@ from kbs_process.stages.align.spikes import LISTED, Oddity, Spikes
 TIMES = 10  # of single bad samples, one by one
 GAPS_LISTED = 5  # one by one; more of them in one line
 GAPS_KEPT = 1000
+LONGEST_LATENCY = 60.0  # s, of a message; beyond it log times and stamps count from different zeros
 LONG_GAP = 3  # samples
 # Samples that may be made up for missing ones: so many, and so many for each that is there.
 MADE_UP, MADE_UP_EACH = 1 << 20, 10
@@ -418,6 +419,12 @@ class Timeline:
                 f"{0.5e3 * self.rounded:.2g} ms"
             )
             found.append(Loss(ROUNDED, self.where, 0, detail=detail))
+        if self._floor is not None and abs(apart := 1e-9 * (self._floor.first_log - self._first)) > LONGEST_LATENCY:
+            far = f"{abs(apart):.4g} s" if abs(apart) < 86400.0 else f"{abs(apart) / 86400.0:.6g} days"
+            ways = f"log times lie {far} {'after' if apart > 0.0 else 'before'} the stamps"
+            found.append(
+                Loss("clocks apart", self.where, 0, detail=f"{ways}, which no latency is: one of the two is no date")
+            )
         if self._floor is not None and not self.by_recorder and (trouble := self._floor.trouble()):
             found.append(Loss("clock", self.where, 0, detail=trouble))
         if self._orderer is not None:

@@ -26,6 +26,8 @@ class Channel(msgspec.Struct, frozen=True):
 
     field: str  # place in the message: "wrench.force.x", "position[az]"
     column: int | str
+    given: str  # unit of the file's numbers, as the mapping says
+    scale: float  # that multiplies them
     unit: str  # SI
     gain: float
     offset: float = 0.0
@@ -147,7 +149,7 @@ def _channel(
         except UnitMismatchError as error:
             problems.add(document.place((*key, "unit")), str(error), error.remedy)
     turn = 2.0 * math.pi * again if isinstance(again, bool) else abs(again * gain * scale)
-    return Channel(field, cell.column, si, gain * scale, offset, turn)
+    return Channel(field, cell.column, unit, scale, si, gain * scale, offset, turn)
 
 
 def _time(document: Document, common: TimesTable, key: str, problems: Problems) -> Time | None:

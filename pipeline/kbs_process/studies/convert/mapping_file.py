@@ -14,6 +14,7 @@ from kbs_process.campaign.formats.tables import (
     TRUTH,
     Count,
     LinkName,
+    Magnitude,
     Name,
     NotNegative,
     Positive,
@@ -74,7 +75,7 @@ class ColumnTable(Table):
 
     column: Which = Field(description="a column's name, or its number counted from 1")
     unit: Words = Field(description="in which the file has it")
-    scale: float = Field(1.0, description="multiplies the file's numbers; -1 turns the sign")
+    scale: Magnitude = Field(1.0, description="multiplies the file's numbers; -1 turns the sign")
     radius_m: Positive | None = Field(
         None,
         description="the file has the way or the speed of a surface at this radius, in a unit of length or velocity",
@@ -115,8 +116,8 @@ class Turn(Table):
     """For a file whose forces and moments are in the axes of a link that does not turn with the transducer."""
 
     joint: Words = Field(description="its angle of the same row is taken")
-    axis: Annotated[list[float], Field(min_length=3, max_length=3)] = Field(description="unit vector, in T")
-    factor: float = Field(
+    axis: Annotated[list[Magnitude], Field(min_length=3, max_length=3)] = Field(description="unit vector, in T")
+    factor: Magnitude = Field(
         description="force and moment are turned by this times the angle, right-handed about the axis"
     )
 

@@ -9,8 +9,9 @@ from itertools import chain
 
 import numpy as np
 
+from kbs_process.campaign.units import agree
 from kbs_process.errors import RecordingError
-from kbs_process.recordings.tables import Cells, Table, find_column
+from kbs_process.recordings.tables import Cells, Column, Table, find_column
 from kbs_process.signals.records import Array, Block, Mask, Stamps
 from kbs_process.stages.align.arrival import Arrival
 from kbs_process.stages.align.condense import SLOW
@@ -184,7 +185,12 @@ def _pieces(table: Table, mapping: Mapping, streams: Sequence[StreamMap], findin
                 remedy="say in the mapping's [time] which column holds it, or give rate_Hz",
             )
     else:
-        clocks = [find_column(table, time.column).name] if time.column is not None else []
+        clock = None if time.column is None else find_column(table, time.column)
+        clocks = [clock.name] if clock else []
+        if clock and time.rate_Hz is None and clock.unit != "datetime":
+            _check_unit(table, clock, time.unit, 1.0, findings)
+    for channel, column in zip(channels, columns, strict=True):
+        _check_unit(table, column, channel.given, channel.scale, findings)
     wanted = list(dict.fromkeys([column.name for column in columns] + clocks))
     carry: dict[str, float] = {}
     rows = 0
@@ -201,6 +207,16 @@ def _pieces(table: Table, mapping: Mapping, streams: Sequence[StreamMap], findin
         if mapping.turn and any(stream.key == "wrench" for stream in streams):
             _turn(values, mapping.turn)
         yield {stream.key: _select(Block(stamp, stamp, _matrix(stream, values)), known) for stream in streams}
+
+
+def _check_unit(table: Table, column: Column, given: str, scale: float, findings: Findings) -> None:
+    """Raise RecordingError where the file states another unit than the mapping; report what cannot be compared."""
+    same = agree(column.unit, given) if column.unit else True
+    what = f"'{column.name}' is in '{column.unit}' as the file states it, in '{given}' as the mapping does"
+    if same is False and abs(scale) == 1.0:
+        raise RecordingError(what, where=str(table.path), remedy="correct the unit where it is wrong")
+    if not same:
+        findings.counts[f"column whose unit cannot be compared: {what}"] = 1
 
 
 def _stamps(
