@@ -74,7 +74,6 @@ RIVALS = {
     "sparse": "sparse regression on the residual: PySINDy's library, an ensemble of thresholded least squares",
     "gaussian process": "a Gaussian process for the discrepancy, relevance by its length scales",
     "boosting": "gradient boosting of the residual on the plant's signals, relevance by permutation",
-    "smoother": "weak-constraint smoothing: motion follows the recordings, forces at ports, effects as columns there",
     "grey box": "stepwise grey box: the term that gains most enters, F-tests, residual tests",
 }
 METHODS = (OURS, *RIVALS)
