@@ -40,6 +40,7 @@ from proof.words import OURS
 
 SEED = 1996
 COUNT = 40
+SMOOTHER = "smoother"  # a rival that is not part of sealed sets: proof.rivals.smoother
 _LEVELS = (300.0, 100.0, 1000.0, 300.0)  # of the trials in turn, effects of one trial alike
 
 
@@ -94,11 +95,11 @@ def made(spec: Spec, cache: Path) -> tuple[bytes, Truth]:
     return files[0].read_bytes(), msgspec.json.decode(files[1].read_bytes(), type=Truth)
 
 
-def answered(spec: Spec, cache: Path) -> tuple[Truth, Answer]:
-    """Make a trial and let the diagnosis answer it, in a process that cannot see the truth."""
+def answered(spec: Spec, cache: Path, method: str) -> tuple[Truth, Answer]:
+    """Make a trial and let a method answer it, in a process that cannot see the truth."""
     content, truth = made(spec, cache)
-    given = answer_trial(Job(truth.trial, content, (OURS,), hidden=(cache,)))
-    return truth, answer.decode(given[OURS])
+    given = answer_trial(Job(truth.trial, content, (method,), hidden=(cache,)))
+    return truth, answer.decode(given[method])
 
 
 def main() -> None:
@@ -106,6 +107,7 @@ def main() -> None:
     options = argparse.ArgumentParser(prog="python -m proof.record", description=__doc__)
     options.add_argument("--output", "-o", type=Path, required=True, help="where score.json and the page go")
     options.add_argument("--trials", type=int, default=COUNT, help=f"the first so many [default: {COUNT}]")
+    options.add_argument("--method", choices=(OURS, SMOOTHER), default=OURS, help=f"who answers [default: {OURS}]")
     options.add_argument("--cache", type=Path, default=CHECKOUT / ".proof" / "record", help="where made trials stay")
     options.add_argument("--jobs", type=int, default=len(os.sched_getaffinity(0)), help="processes")
     asked = options.parse_args()
@@ -115,8 +117,9 @@ def main() -> None:
         before = msgspec.json.decode(file.read_bytes(), type=Bench)
         known = {truth.trial: (truth, said) for truth, said in zip(before.truths, before.answers, strict=True)}
     todo = [spec for spec in draw(asked.trials) if f"R{spec.index:03d}" not in known]
+    task = partial(answered, cache=asked.cache, method=asked.method)
     with workers(asked.jobs, None) as pool:
-        for done, (_, (truth, said)) in enumerate(each(pool, partial(answered, cache=asked.cache), todo), start=1):
+        for done, (_, (truth, said)) in enumerate(each(pool, task, todo), start=1):
             known[truth.trial] = truth, said
             bench = _bench([known[name] for name in sorted(known)])
             asked.output.mkdir(parents=True, exist_ok=True)

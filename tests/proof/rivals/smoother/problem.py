@@ -1,0 +1,278 @@
+"""A campaign as rows: readings of wrench and encoders, balances of plate and joints, the floor at rest.
+
+    wrench   reading = (I + dX) W(motion; rig) + zero + clock          noise of the transducer
+    angle    reading = joint + offset + clock                          rounding
+    plate    W's moment on the plate - its springs = force             weak: `intensity`
+    joint    gear's torque at the field - torque needed = -force       weak
+    floor    acceleration = force                                      weak
+
+A row's weight is one over its variance; where recordings say nothing, it has none.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import binary_erosion
+
+from kbs_process.diagnosis.experiments.experiment import Experiment
+from kbs_process.diagnosis.experiments.hypothesis import decoupling
+from kbs_process.rig.model import Amplifier, Rig
+from kbs_process.stages.gravity.parameters import RigElements
+from proof.rivals.case import Array
+from proof.rivals.smoother.balance import FIRST_JOINT, FLOOR, PLATE, Loads, Motion, needed
+from proof.rivals.smoother.drive import Field, priors, spring
+from proof.rivals.smoother.splines import Splines
+
+BAND_HZ = 8.0  # of what is compared: as many independent numbers twice a second
+_ENDS = 1.0  # s left out at a recording's ends, and half of it beside gaps
+_LINES = 3  # first terms of a channel's zero: constant, slope, curvature
+_DRIFT = 0.05  # of the bias's sigma: what they drift by
+_PINK_HZ = 0.1  # up to which a channel's noise may be 1/f, as large as its white noise there
+_CLOCK = 3e-3  # s, of a clock against the field's
+_STEPS = (1e-6, 1e-6, 1e-4)  # of values, rates and accelerations, for slopes
+_FLOOR_STEP = 1e-3  # m/s^2
+_SHARE = 1e-3  # of a sigma: step of an unknown
+_OF_RIG = ("body.", "transducer.tilt", "transducer.stiffness", "transducer.damping")
+_OF_JOINT = (".origin", ".misalignment", ".Ka", ".fsv", ".Tmax")
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """A recording on its own samples."""
+
+    trial: int
+    first: int  # samples of its trajectory's grid before it
+    dt: float
+    reading: Array  # (n, 6 + joints) wrench decoupled, amplifier undone; angles
+    weight: Array  # (n,) 1 where it counts, else 0
+    turning: Array  # (n, joints) share of an angle's samples that are rounded apart: codes crossed in one of them
+    field: Field
+    splines: Splines
+
+    @property
+    def n(self) -> int:
+        return len(self.reading)
+
+    @cached_property
+    def zero(self) -> Array:
+        """Shapes (n, terms) of a zero: lines, then cosines."""
+        t = np.linspace(-1.0, 1.0, self.n)
+        phase = np.pi * (np.arange(self.n) + 0.5) / self.n
+        lines = [np.ones(self.n), t, 1.5 * t**2 - 0.5]
+        return np.stack([*lines, *(np.cos(k * phase) for k in self._waves)], axis=1)
+
+    @property
+    def _waves(self) -> NDArray[np.int_]:
+        return np.arange(_LINES, int(2 * _PINK_HZ * self.n * self.dt) + 1)
+
+    def spread(self, bias: Array, white: Array) -> Array:
+        """Sigmas (channels, terms) of a zero: `bias` is the constant's, `white` the noise, one-sided, per Hz."""
+        lines = np.outer(bias, [1.0] + [_DRIFT] * (_LINES - 1))
+        return np.hstack([lines, np.sqrt(np.outer(white, 2 * _PINK_HZ / self._waves))])
+
+
+class Problem:
+    """Rows, unknowns and priors of some recordings of an experiment."""
+
+    def __init__(self, experiment: Experiment, trials: list[int]) -> None:
+        self.experiment, self.rig = experiment, experiment.rig
+        self.joints = len(self.rig.joints)
+        self.freedoms = FIRST_JOINT + self.joints
+        self.recordings = [_recording(experiment, k) for k in trials]
+        self._undone = decoupling(experiment)
+        self.wrench, self.angles = slice(0, 6), slice(6, 6 + self.joints)
+        self.plate = slice(self.angles.stop, self.angles.stop + 3)
+        self.joint = slice(self.plate.stop, self.plate.stop + self.joints)
+        self.floor = slice(self.joint.stop, self.joint.stop + 3)
+        self.rows = self.floor.stop
+        transducer, dt = self.rig.transducer, experiment.dt
+        rate = experiment.trials[trials[0]].wrench_rate
+        noise = np.hypot(transducer.noise.value, transducer.resolution.value / np.sqrt(12))
+        self.sigma = np.ones(self.rows)
+        self.sigma[self.wrench] = noise / np.sqrt(rate * dt)
+        self.sigma[self.angles] = [float(j.encoder.step) / np.sqrt(12) for j in self.rig.joints if j.encoder]
+        self.independent = 2 * BAND_HZ * dt  # numbers a sample
+        self._place_unknowns()
+
+    @property
+    def forces(self) -> slice:
+        """The rows of which the residual is a force that the equations lack."""
+        return slice(self.plate.start, self.rows)
+
+    def _place_unknowns(self) -> None:
+        quantities = self.rig.quantities()
+        chosen = [
+            quantity
+            for name, quantity in quantities.items()
+            if np.any(quantity.sigma > 0)
+            and (name.startswith(_OF_RIG) or (name.startswith("joint.") and name.endswith(_OF_JOINT)))
+        ]
+        self.elements = RigElements(self.rig, tuple(chosen), tuple(q.sigma > 0 for q in chosen))
+        X = self.rig.transducer.cross_coupling
+        self.coupled = [(int(i), int(k)) for i, k in np.argwhere(X.sigma > 0)]
+        drives = [priors(joint.drive) for joint in self.rig.joints if joint.drive is not None]
+        offsets = [float(joint.encoder.offset.sigma) for joint in self.rig.joints if joint.encoder is not None]
+        bias = self.rig.transducer.bias.sigma
+        white = 2.0 * self.sigma[self.wrench] ** 2 * self.experiment.dt
+        own = [np.append(one.spread(bias, white).ravel(), [_CLOCK, _CLOCK]) for one in self.recordings]
+        blocks = [
+            (self.elements.value, self.elements.sigma),
+            (np.concatenate([value for value, _ in drives]), np.concatenate([sigma for _, sigma in drives])),
+            (np.zeros(len(self.coupled)), np.array([X.sigma[place] for place in self.coupled])),
+            (np.zeros(len(offsets)), np.array(offsets)),
+            *[(np.zeros(len(one)), one) for one in own],
+        ]
+        self.prior, self.spread = (np.concatenate([block[k] for block in blocks]) for k in (0, 1))
+        ends = np.cumsum([0, *(len(value) for value, _ in blocks)])
+        of_rig, numbers, coupling, offset, *each = (slice(a, b) for a, b in pairwise(ends))
+        self.of_rig, self.numbers, self.coupling, self.offsets, self.own = of_rig, numbers, coupling, offset, each
+        common = np.arange(each[0].start)
+        self.local = [np.concatenate([common, np.arange(one.start, one.stop)]) for one in each]
+        scales = (".Ka", ".fsv", ".Tmax")
+        self.scaling = np.zeros(len(self.prior), dtype=bool)  # numbers that scale a balance
+        self.scaling[: len(self.elements.names)] = [
+            name.endswith(scales) or name.startswith(("transducer.stiffness", "transducer.damping"))
+            for name in self.elements.names
+        ]
+
+    def rig_at(self, x: Array) -> Rig:
+        """The rig with its elements at x."""
+        return self.elements.rig_at(x[self.of_rig])
+
+    def start(self, k: int) -> Array:
+        """Coefficients of a motion that follows the field, at rest at every instant."""
+        recording = self.recordings[k]
+        still = np.zeros((recording.n, self.freedoms))
+        x = still.copy()
+        drives = [joint.drive for joint in self.rig.joints if joint.drive is not None]
+        stiffness = self.rig.transducer.stiffness
+        for _ in range(3):
+            _, efforts = needed(self.rig, (x, still, still))
+            if stiffness is not None:
+                x[:, PLATE] = -efforts[:, :3] / stiffness.value
+            for j, drive in enumerate(drives):
+                wound = efforts[:, 3 + j] / float(drive.parameters["Ka"])
+                x[:, FIRST_JOINT + j] = recording.field.angle[:, j] / float(drive.ratio) - wound
+        return recording.splines.fitted(x)
+
+    def behind(self, k: int, x: Array, motion: Motion, torques: Array | None) -> Array:
+        """How far each rotor (n, joints) is behind its field, motor rad."""
+        rig = self.rig_at(x)
+        _, efforts = needed(rig, motion)
+        return np.stack([self._behind(rig, k, x, j, efforts[:, 3 + j], torques) for j in range(self.joints)], axis=1)
+
+    def _behind(self, rig: Rig, k: int, x: Array, j: int, torque: Array, torques: Array | None) -> Array:
+        drive = rig.joints[j].drive
+        assert drive is not None
+        of_rotor = float(drive.rotor_inertia) * self.recordings[k].field.acceleration[:, j]
+        if torques is not None:
+            of_rotor = of_rotor - torques[:, j] @ x[self.numbers].reshape(self.joints, -1)[j]
+        return np.asarray((torque / float(drive.ratio) + of_rotor) / spring(drive))
+
+    def predicted(
+        self, k: int, x: Array, motion: Motion, torques: Array, rig: Rig | None = None, loads: Loads | None = None
+    ) -> Array:
+        """Rows (n, rows) of a recording: readings, and what the balances leave.
+
+        `rig` and the `loads` that it needs are those at x and the motion, where somebody knows them.
+        """
+        recording, rig = self.recordings[k], rig or self.rig_at(x)
+        angle, rate, _ = motion
+        wrench, efforts = loads or needed(rig, motion)
+        out = np.zeros((recording.n, self.rows))
+        own = x[self.own[k]]
+        dX = np.zeros((6, 6))
+        for place, value in zip(self.coupled, x[self.coupling], strict=True):
+            dX[place] = value
+        out[:, self.wrench] = wrench @ (np.eye(6) + self._undone @ dX).T
+        out[:, self.wrench] += recording.zero @ own[:-2].reshape(6, -1).T
+        out[:, self.angles] = angle[:, FIRST_JOINT:] + x[self.offsets]
+        slope = np.gradient(recording.reading, recording.dt, axis=0)
+        out[:, self.wrench] -= own[-2] * slope[:, self.wrench]
+        out[:, self.angles] -= own[-1] * rate[:, FIRST_JOINT:]
+        out[:, self.plate] = efforts[:, :3]
+        if rig.transducer.stiffness is not None:
+            out[:, self.plate] += angle[:, PLATE] * rig.transducer.stiffness.value
+        if rig.transducer.damping is not None:
+            out[:, self.plate] += rate[:, PLATE] * rig.transducer.damping.value
+        field = recording.field
+        for j, joint in enumerate(rig.joints):
+            assert joint.drive is not None
+            ratio, numbers = float(joint.drive.ratio), joint.drive.parameters
+            torque = efforts[:, 3 + j]
+            rotor = (field.angle[:, j] - self._behind(rig, k, x, j, torque, torques)) / ratio
+            wound, winding = rotor - angle[:, FIRST_JOINT + j], field.rate[:, j] / ratio - rate[:, FIRST_JOINT + j]
+            out[:, self.joint.start + j] = float(numbers["Ka"]) * wound + float(numbers["fsv"]) * winding - torque
+        out[:, self.floor] = angle[:, FLOOR]
+        return out
+
+    def residual(self, k: int, x: Array, motion: Motion, torques: Array) -> Array:
+        """Measured less predicted (n, rows); the balances' measured is zero."""
+        left = -self.predicted(k, x, motion, torques)
+        left[:, : self.angles.stop] += self.recordings[k].reading
+        return left
+
+    def slopes(self, k: int, x: Array, motion: Motion, torques: Array) -> tuple[Array, Array]:
+        """Slopes of the rows by the motion (n, rows, freedoms, 3), and by a recording's unknowns (n, rows, local)."""
+        rig, n = self.rig_at(x), self.recordings[k].n
+        loads = needed(rig, motion)
+        base = self.predicted(k, x, motion, torques, rig, loads)
+        by_motion = np.zeros((n, self.rows, self.freedoms, 3))
+        for d in range(self.freedoms):
+            for order, step in enumerate(_STEPS):
+                if d < FLOOR.stop:
+                    step = _FLOOR_STEP
+                    if order:
+                        continue
+                moved = [part.copy() if o == order else part for o, part in enumerate(motion)]
+                moved[order][:, d] += step
+                shown = self.predicted(k, x, (moved[0], moved[1], moved[2]), torques, rig)
+                by_motion[:, :, d, order] = (shown - base) / step
+        local = self.local[k]
+        by_unknown = np.zeros((n, self.rows, len(local)))
+        for column, place in enumerate(local):
+            step = _SHARE * self.spread[place]
+            moved_x = x.copy()
+            moved_x[place] += step
+            same = (None, None) if place < self.of_rig.stop else (rig, loads)
+            by_unknown[:, :, column] = (self.predicted(k, moved_x, motion, torques, *same) - base) / step
+        return by_motion, by_unknown
+
+
+def _recording(experiment: Experiment, k: int) -> Recording:
+    trial = experiment.trials[k]
+    there = np.flatnonzero(trial.valid)
+    first, end = int(there[0]), int(there[-1]) + 1
+    reading, n, dt = trial.measured[first:end].copy(), end - first, experiment.dt
+    amplifier = experiment.rig.transducer.amplifier
+    if amplifier is not None:
+        reading[:, :6] = _undone(reading[:, :6], amplifier, dt)
+    weight = np.zeros(n)
+    ends = round(_ENDS / dt)
+    weight[ends:-ends] = 1.0
+    if not trial.valid[first:end].all():
+        weight *= binary_erosion(trial.valid[first:end], iterations=ends // 2)
+    schedule = experiment.drives[trial.drive].schedule
+    assert schedule is not None
+    field = Field.of(experiment.rig, schedule, first, n, dt)
+    steps = np.array([float(j.encoder.step) for j in experiment.rig.joints if j.encoder is not None])
+    ratios = np.array([float(j.drive.ratio) for j in experiment.rig.joints if j.drive is not None])
+    turning = np.clip(np.abs(field.rate) / ratios / steps / (2 * BAND_HZ), 0.0, 1.0)
+    return Recording(k, first, dt, reading, weight, turning, field, Splines(n, dt))
+
+
+def _undone(wrench: Array, amplifier: Amplifier, dt: float) -> Array:
+    """Undo an amplifier of the second order; a line from the first to the last sample is taken apart."""
+    n, corner = len(wrench), 2 * np.pi * float(amplifier.corner)
+    across = wrench[-1:] - wrench[:1]
+    line = wrench[:1] + across * np.linspace(0.0, 1.0, n)[:, None]
+    both = np.concatenate([wrench - line, (line - wrench)[::-1]])
+    s = 2j * np.pi * np.fft.rfftfreq(len(both), dt) / corner
+    spectrum = np.fft.rfft(both, axis=0) * (1 + np.sqrt(2) * s + s**2)[:, None]
+    late = np.sqrt(2) / corner * across / (dt * (n - 1))
+    return np.asarray(np.fft.irfft(spectrum, len(both), axis=0)[:n] + line + late)
