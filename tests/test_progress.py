@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 
 import pytest
 
@@ -31,7 +32,7 @@ def test_a_terminal_keeps_one_line_for_each_outer_task(
     work(progress)
     captured = capsys.readouterr()
     assert captured.out == ""
-    assert captured.err.count("Fitting gravity  0.0 s") == 2
+    assert len(re.findall(r"Fitting gravity  \d+\.\d s", captured.err)) == 2
 
 
 @pytest.mark.parametrize("kind", [SilentProgress, PlainProgress, TerminalProgress])
