@@ -22,6 +22,7 @@ from kbs_process.stages.gravity.taring import Taring
 
 BEYOND = 4.0  # sigma
 BY_CHANCE = 1e-4
+KNOWN_S = 0.02  # to which a delay between two recorders can be known at best
 TAKEN = 0.25  # part of the power of what is left that a lag explains, or it is none
 _ROUNDS = 4  # of weights
 _INFORMED = 0.1  # part of the prior's variance that the data take away: less says nothing of the prior
@@ -87,6 +88,9 @@ def lag(model: GravityModel, data: Prepared, sigma: float) -> Moved | None:
     equation = model.equation
     wrench = [at for at, channel in enumerate(equation.channels) if channel in WRENCH_CHANNELS]
     expected = equation.predict(model.fit.value[: equation.size], data)[:, wrench]
+    if not wrench:
+        return None
+    sigma = max(sigma, KNOWN_S)
     left = data.wrench[:, wrench] - expected
     late = -np.gradient(expected, data.t, axis=0)
     rest = left = left - left.mean(axis=0)
