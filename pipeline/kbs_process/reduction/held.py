@@ -1,8 +1,9 @@
 """Readings that a transducer's channel holds although it has noise: saturated, cut off or dead.
 
-A channel holds a reading for longer than half a second, and than chance would have it: readings with noise sigma in
-steps of D are the same with a probability of up to erf(D / (sqrt(8) sigma)). Where the noise is less than half a step,
-as stated or as readings around show, they are coarse, and none is held. What is held is left out as if it were missing.
+A channel holds a reading for longer than chance would have it: readings with noise sigma in steps of D are the same
+with a probability of up to erf(D / (sqrt(8) sigma)). Where the noise is less than half a step, as stated or as readings
+around show, they are coarse, and none is held. Where none show the noise, only half a second and more is held.
+What is held is left out as if it were missing.
 A joint's effort may be what was commanded, or zero behind a brake, and is not looked at.
 """
 
@@ -23,6 +24,7 @@ from kbs_process.stages.align.ordering import concatenate, select
 from kbs_process.stages.align.readings import white
 
 HELD_S = 0.5  # longer than any channel with noise shows one and the same reading, whatever its amplifier passes
+FEW = 5  # times as many the same as a logger repeats each reading are held, if all around shows noise
 CHANCE = 1e-9  # of a sample, that as many readings as are held are the same by it
 FREE = 64  # readings that tell a channel's noise; as many are the same by chance at most
 DEAD = 0.5  # share of a recording beyond which a channel that is held is no channel
@@ -39,7 +41,8 @@ def noisy(rig: Rig) -> dict[str, float]:
 class Alive:
     """Passes the blocks of a recording on, without rows in which a channel is held; tells what it has left out.
 
-    With `keep` it leaves nothing out and tells all the same: a peak that was cut off was no smaller.
+    With `keep` it leaves out only where all channels are held for less than `HELD_S`, and tells of all the rest: a peak
+    that was cut off was no smaller.
     """
 
     def __init__(self, rig: Rig, entry: RecordingEntry, *, keep: bool = False) -> None:
@@ -92,6 +95,8 @@ class _Stream:
     spans: dict[int, tuple[int, int]] = field(default_factory=dict)  # ns
     reading: dict[int, float] = field(default_factory=dict)
     step: dict[int, float] = field(default_factory=dict)  # the least that readings differed by
+    own: dict[int, float] = field(default_factory=dict)  # the noise that readings show, at most
+    repeats: float = np.inf  # rows of one reading of all channels
     _block: Block | None = None
     _done: int = 0  # rows of it that were passed on
 
@@ -111,15 +116,22 @@ class _Stream:
         part = slice(self._done, end)
         gone = np.zeros(end - self._done, dtype=np.bool_)
         least = _least(block)
-        for column, held in ((c, self._held(c, block.values[:, c], least)[part]) for c in self.channels):
-            if held.any():
-                self._note(column, select(block, part), held)
-                gone |= held
+        new = np.flatnonzero(np.any(block.values[1:] != block.values[:-1], axis=1))
+        self.repeats = min(self.repeats, float(np.median(np.diff(new)))) if len(new) > FEW else self.repeats
+        every = {column: self._held(column, block.values[:, column], least) for column in self.channels}
+        gone = np.logical_or.reduce([held[part] for held in every.values()])
+        if self.keep:
+            gone = np.logical_and.reduce(list(every.values())) & (len(every) > 1)
+            gone = (gone & ~_same(np.where(gone, 0.0, np.nan), least))[part]
+        for column, held in every.items():
+            told = held[part] & ~gone if self.keep else held[part]
+            if told.any():
+                self._note(column, select(block, part), told)
         self.rows += len(gone)
         start = max(0, end - kept)
         ready = select(block, part)
         self._block, self._done = select(block, slice(start, None)), end - start
-        return select(ready, ~gone) if gone.any() and not self.keep else ready
+        return select(ready, ~gone) if gone.any() else ready
 
     def _held(self, column: int, x: Array, least: int) -> Mask:
         """(n,) where a channel holds what it reads."""
@@ -129,14 +141,14 @@ class _Stream:
         if np.isfinite(step):
             self.step[column] = step
             free = x[~held & np.isfinite(x)]
-            noise = self.noise[column]
-            if held.any() and len(free) >= FREE:
-                own = float(white(free))
-                noise = min(noise, float(np.sqrt(max(own**2 - step**2 / 12.0, 0.0))))
-            if held.any():
-                chance = max(erf(step / (np.sqrt(8.0) * max(noise, 0.5 * step))), CHANCE)
-                held = _same(x, max(least, 1 + int(np.ceil(np.log(CHANCE) / np.log(chance)))))
-                held &= noise >= 0.5 * step
+            if len(free) >= FREE:
+                own = float(np.sqrt(max(float(white(free)) ** 2 - step**2 / 12.0, 0.0)))
+                self.own[column] = max(own, self.own.get(column, 0.0))
+                least = int(min(least, FEW * self.repeats))
+            noise = min(self.noise[column], self.own.get(column, np.inf))
+            chance = max(erf(step / (np.sqrt(8.0) * max(noise, 0.5 * step))), CHANCE)
+            held = _same(x, max(least, 1 + int(np.ceil(np.log(CHANCE) / np.log(chance)))))
+            held &= noise >= 0.5 * step
         return held
 
     def _note(self, column: int, block: Block, held: Mask) -> None:

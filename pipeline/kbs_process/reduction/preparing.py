@@ -14,6 +14,7 @@ from kbs_process.reduction.relief import forces_in, relieved, without_effects
 from kbs_process.reduction.settings import gravity_settings, motion_settings
 from kbs_process.signals.records import COPY, Loss, Run, Signal
 from kbs_process.stages import decouple, motion
+from kbs_process.stages.align.prints import Printed, Prints
 from kbs_process.stages.align.readings import Readings, Watch
 from kbs_process.stages.decouple import Decoupling
 from kbs_process.stages.gravity import model as gravity
@@ -32,6 +33,7 @@ class Prepared:
     run: Run
     motion: Motion
     readings: Mapping[str, Readings] = field(default_factory=dict)  # by stream
+    prints: Sequence[Prints] = ()  # of the wrench, by recorded channel
 
 
 def prepare(
@@ -39,8 +41,10 @@ def prepare(
 ) -> Prepared:
     """Read a recording as processing needs it; `keep_spikes`: with its single bad samples."""
     with progress.task(f"Reading {entry.name}"):
-        watch = Watch()
-        run = read_alive(campaign, entry, keep=True, keep_spikes=keep_spikes, watch=watch)
+        watch, printed = Watch(), Printed()
+        run = read_alive(
+            campaign, entry, keep=True, keep_spikes=keep_spikes, watch=lambda blocks: printed(watch(blocks))
+        )
         if run.loads is None:
             raise RecordingError("there is neither wrench nor effort in this recording", where=str(entry.path))
         return Prepared(
@@ -49,6 +53,7 @@ def prepare(
             decouple.apply(run, decoupling),
             motion.estimate(run, campaign.rig, motion_settings(campaign)),
             watch.streams,
+            printed.channels,
         )
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
+from itertools import combinations, combinations_with_replacement
 
 import msgspec
 import numpy as np
@@ -28,6 +28,7 @@ from kbs_process.rig.model import Rig
 from kbs_process.signals.records import WRENCH_CHANNELS, Array, Mask, Run
 from kbs_process.signals.smoothing import smooth
 from kbs_process.stages.align.clocks import late_sigma
+from kbs_process.stages.align.prints import RUN
 from kbs_process.stages.align.readings import white
 from kbs_process.stages.align.spectrum import OCTAVES, quietest
 from kbs_process.stages.conventions import (
@@ -45,7 +46,7 @@ from kbs_process.stages.gravity.equation import Prepared as Instants
 from kbs_process.stages.gravity.hypotheses import Explained, explanations
 from kbs_process.stages.gravity.model import GravityModel, Sample, prepared
 from kbs_process.stages.gravity.tension import BY_CHANCE, Moved, lag, tension
-from kbs_process.stages.repeats import commanded
+from kbs_process.stages.repeats import commanded, copies, motion_of
 
 LEFT = 0.1  # of the weight, and of the torque that it can make: a calibration leaves less, whatever rubs or pulls
 UNLIKE = 3.0  # times less noise than is stated, or more, however well it is known
@@ -180,6 +181,7 @@ def _hidden(
     if campaign.rig.transducer.channels:
         edge = requirement.band[1]
         yield from unlike_stated(requirement, campaign.rig, judged)
+        yield from copied(requirement, campaign.rig, recordings)
         yield from measurable.attenuated(campaign.rig.transducer.amplifier, edge)
         poses = [one.motion.q[at] for one in judged[:1] for at in (0, -1)]
         every = [mode.frequency for pose in poses for mode in modes(model.rig, select(campaign.effects), pose)]
@@ -216,6 +218,47 @@ def unlike_stated(requirement: Requirement, rig: Rig, recordings: Sequence[Prepa
             ]
             if told:
                 yield Doubt(f"the noise is not as stated in {one.entry.name}: {', '.join(told)}: {why}")
+
+
+def copied(requirement: Requirement, rig: Rig, recordings: Sequence[Prepared]) -> Iterator[Doubt]:
+    """Runs of readings that come twice, in one recording or in two, of channels whose noise is a step and more.
+
+    Recordings that are the same throughout, motion and all, are one: `told_copies` tells of that.
+    """
+    own, watched = rig.transducer.channels, noisy(rig)
+    judged = own if requirement.frame == "S" else measurable.judged_channels(requirement, rig)
+    for one, other in combinations_with_replacement(recordings, 2):
+        if {one.entry.role, other.entry.role} == {"calibration"} or (one is not other and _same(one, other)):
+            continue
+        found = {
+            own[place]: span
+            for place, (prints, others) in enumerate(zip(one.prints, other.prints, strict=False))
+            if own[place] in watched and own[place] in judged and _shows_noise(one, place)
+            if (span := others.again(prints))
+        }
+        if found:
+            begin, end = (
+                (at(stamps) - other.run.epoch_ns) * 1e-9
+                for at, stamps in zip((min, max), zip(*found.values(), strict=True), strict=True)
+            )
+            where = "at another time of it" if one is other else f"in {one.entry.name}"
+            yield Doubt(
+                f"readings of {', '.join(found)} in {other.entry.name}, from {begin:.1f} s to {end:.1f} s, come "
+                f"{where} as well: noise does not repeat, so they were copied"
+            )
+
+
+def _shows_noise(one: Prepared, place: int) -> bool:
+    """Whether a channel's noise is greater than the step in which it reads."""
+    head = np.concatenate(one.readings["wrench"].head)[:, place]
+    head = head[np.isfinite(head)]
+    return len(head) > RUN and bool(white(head) > np.diff(np.unique(head)).min(initial=np.inf))
+
+
+def _same(one: Prepared, other: Prepared) -> bool:
+    """Whether two recordings read the same and move the same, from beginning to end."""
+    a, b = motion_of(one.run), motion_of(other.run)
+    return bool(copies([one.run, other.run])) and (a is None or b is None or np.array_equal(a.values, b.values))
 
 
 def _conventions(

@@ -98,7 +98,7 @@ def test_stretches_in_which_a_channel_is_saturated_are_left_out_and_told(chunk: 
     stamps, losses = passed(values, chunk=chunk)
     assert len(stamps) == 2000 and losses == ()
     values[600:740, 4] = 0.1
-    values[1000:1040, 1] = 0.1  # shorter than anything that is told from chance
+    values[1000:1012, 1] = 0.1  # shorter than anything that is told from chance
     stamps, (loss,) = passed(values, chunk=chunk)
     assert set(np.arange(2000)) - set(stamps // 10_000_000) == set(range(600, 740))
     assert (loss.kind, loss.where, loss.count) == ("held", "Ty", 140)
@@ -114,6 +114,21 @@ def test_what_is_judged_keeps_what_was_cut_off_and_tells_of_it(apart: int) -> No
     assert len(stamps) == 2000
     assert (loss.kind, loss.where) == ("held", "Ty")
     assert loss.count == pytest.approx(140, abs=2)
+
+
+@pytest.mark.parametrize("chunk", [37, 2000])
+def test_what_noise_does_not_repeat_is_held_however_short(chunk: int) -> None:
+    """All channels are missing then, and one may be cut off; what a logger repeats all the time is not held."""
+    values = np.random.default_rng(4).normal(0.0, bench.rig().transducer.noise.value, (2000, 6))
+    frozen, cut = values.copy(), values.copy()
+    frozen[1000:1020] = frozen[1000]
+    stamps, losses = passed(frozen, chunk=chunk, keep=True)
+    assert set(np.arange(2000)) - set(stamps // 10_000_000) == set(range(1000, 1020)) and losses == ()
+    cut[1000:1020, 4] = 0.25
+    stamps, (loss,) = passed(cut, chunk=chunk, keep=True)
+    assert len(stamps) == 2000 and (loss.where, loss.count) == ("Ty", 20)
+    stamps, losses = passed(values.repeat(4, axis=0), chunk=chunk, keep=True)
+    assert len(stamps) == 8000 and losses == ()
 
 
 def test_a_channel_whose_resolution_hides_its_noise_may_stand_still() -> None:

@@ -40,7 +40,7 @@ def test_readings_that_may_be_a_knock_are_named() -> None:
     requirement = SimpleNamespace(band_Hz=(0.01, 1.0))
 
     def told(*stretches: Stretch) -> str:
-        run = SimpleNamespace(stretches=stretches, losses=())
+        run = SimpleNamespace(stretches=stretches, losses=(), load_rates=[100.0])
         prepared = [SimpleNamespace(entry=SimpleNamespace(name="test", trajectory="a"), run=run)]
         return unclear(campaign, prepared, requirement)
 
