@@ -125,8 +125,43 @@ def test_a_channel_that_no_recording_shows_to_respond_is_told(tmp_path):
     found = checked(campaign, recordings)
     assert found.mute == ("Tz",) and found.soundness.sound, "an arm that turns about y has no torque about z"
     (notice,) = found.notices()
-    assert notice.severity == "info" and "only noise shows in Tz," in notice.what
+    assert notice.severity == "warning" and "shows a response of Tz, only noise" in notice.what
     assert not found.doubts(judged)
+
+
+@pytest.mark.slow
+def test_a_clock_that_runs_too_fast_is_told_and_nothing_is_judged_by_it(tmp_path):
+    campaign = described(tmp_path)
+    (judged,) = campaign.requirements
+    read = []
+    for one in recorded(campaign, drawn(campaign, 1), 1, period=12.0):
+        run, dt = one.run, one.run.angle.dt / 2.0
+        run = replace(run, angle=replace(run.angle, dt=dt), wrench=replace(run.wrench, dt=dt))
+        moved = replace(one.motion, dt=dt, qd=2.0 * one.motion.qd, qdd=4.0 * one.motion.qdd)
+        read.append(replace(one, raw=replace(one.raw, dt=dt), run=run, motion=moved))
+    found = checked(campaign, read)
+    (suggestion,) = found.soundness.suggestions
+    assert suggestion.startswith(
+        ("clock: all times are 0.5 ", "clock: all times are 0.499 ", "clock: all times are 0.501 ")
+    )
+    assert found.doubts(judged)[0].of_failed, "the calibration is wrong as well"
+
+
+@pytest.mark.slow
+def test_an_encoder_that_stands_still_while_its_joint_turns_is_told(tmp_path):
+    campaign = described(tmp_path)
+    (judged,) = campaign.requirements
+    sweep, test = recorded(campaign, drawn(campaign, 1), 1)
+    rest = np.zeros_like(test.motion.q)
+    dead = replace(test, motion=replace(test.motion, q=rest, qd=rest, qdd=rest))
+    found = checked(campaign, [sweep, dead])
+    assert found.soundness.reasons == ("the angle of arm is still in test, and the load changes as if it turned",)
+    assert found.soundness.suggestions[0].startswith("encoder: ") and found.doubts(judged)[0].of_failed
+    for pull in ([20.0, 0.0, 0.0, 0.0, 2.0, 0.0], [0.0, 0.0, 0.0, 0.0, 0.2, 0.0]):  # by a cord; less than a turn makes
+        push = np.sin(np.arange(len(rest)) / 60.0)[:, None] * np.array(pull)
+        read = dead.raw.derive(sweep.raw.values[:1] + push + 1e-3 * np.sin(np.arange(len(rest)))[:, None], "at rest")
+        still = replace(dead, raw=read, run=replace(test.run, wrench=read))
+        assert not any("is still" in one for one in checked(campaign, [sweep, still]).soundness.reasons)
 
 
 @pytest.mark.slow
