@@ -98,7 +98,7 @@ class Checked:
             )
         if self.mute:
             yield Notice(
-                severity="warning",
+                severity="info",
                 what=f"nothing in these recordings shows a response of {', '.join(self.mute)}, only noise",
                 remedy="record a weight that is put on beside the axis, or a push, and look at this channel",
             )
