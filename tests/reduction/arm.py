@@ -88,21 +88,28 @@ def drawn(campaign: Campaign, seed: int) -> Rig:
     return perturbed(campaign.rig, np.random.default_rng(seed), names=(".mass", ".cog", ".tilt", ".misalignment"))
 
 
-def swing(seconds: float = 120.0) -> Array:
+def swing(seconds: float = 120.0, period: float = 30.0) -> Array:
     """Angle (n, 1) rad at the encoder's rate."""
     t = np.arange(int(seconds * FINE)) / FINE
-    return (0.6 - 0.6 * np.cos(2.0 * np.pi * t / 30.0))[:, None]
+    return (0.6 - 0.6 * np.cos(2.0 * np.pi * t / period))[:, None]
 
 
 def recorded(
-    campaign: Campaign, rig: Rig, seed: int, *, reads: Array | None = None, angle: float = 1.0, zero: float = 0.0
+    campaign: Campaign,
+    rig: Rig,
+    seed: int,
+    *,
+    reads: Array | None = None,
+    angle: float = 1.0,
+    zero: float = 0.0,
+    period: float = 30.0,
 ) -> list[Prepared]:
     """Both recordings of a rig, the wrench as `reads` (6, 6) makes it, angles times `angle` and `zero` rad more."""
     found = []
     decoupling = decouple.fit(campaign.rig)
     for index, entry in enumerate(campaign.recordings):
         rng = np.random.default_rng([seed, index])
-        run = record(rig, entry.name, swing(), rng)
+        run = record(rig, entry.name, swing(period=period), rng)
         assert run.wrench is not None and run.angle is not None
         wrench = run.wrench.derive(run.wrench.values @ (np.eye(6) if reads is None else reads).T, "read")
         turned = run.angle.derive(run.angle.values * angle + zero, "read")

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from msgspec.structs import replace as replace_of
 
 import archived
 from kbs_process.reduction.analysis import Pair
@@ -15,6 +16,7 @@ from kbs_process.reduction.judging import coverage_below, decided, judged
 from kbs_process.results.judged import Budget, Doubt, Requirement
 from kbs_process.signals.records import WRENCH_CHANNELS, WRENCH_UNITS, Signal
 from kbs_process.stages.bandpass import Band
+from kbs_process.studies.correlate.summary import conclusion
 
 BAND = Band("lt1Hz", 0.01, 1.0)
 
@@ -43,6 +45,13 @@ def verdict(quiet: tuple[float, float], noisy: tuple[float, float], doubts: tupl
     runs = [recorded("quiet", quiet[0]), recorded("noisy", noisy[0])]
     budgets = [*stated("quiet", quiet[1]), *stated("noisy", noisy[1])]
     return judged(campaign, requirement, runs, budgets, doubts)
+
+
+def test_a_channel_that_nothing_shows_to_respond_is_said_beside_the_verdict() -> None:
+    met = replace_of(verdict((0.01, 0.001), (0.02, 0.001)), mute=("Tz",))
+    assert conclusion([met]).sentence.endswith(" Nothing shows a response of Tz, only noise.")
+    broken = replace_of(met, verdict="fail")
+    assert "response" not in conclusion([broken]).sentence
 
 
 def test_a_lower_peak_that_is_less_well_known_decides() -> None:

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 import archived
-from kbs_process.reduction.measurable import amplified, attenuated, doubtful, hidden
+from kbs_process.errors import ConfigError
+from kbs_process.reduction.measurable import amplified, attenuated, check_requirements, doubtful, hidden, unrecorded
 from kbs_process.rig.model import Amplifier, Quantity
 from kbs_process.signals.records import COPY, WRENCH_CHANNELS, WRENCH_UNITS, Block, Loss, Signal, Stretch
 from kbs_process.stages.align.readings import Readings
@@ -89,6 +90,25 @@ def test_an_amplifier_that_takes_much_off_forbids_a_verdict():
 def test_a_resonance_next_to_a_band_forbids_a_verdict():
     assert not list(amplified([6.0, 10.0], 1.0)) and not list(amplified([], 1.0))
     assert len(list(amplified([6.0, 10.0], 5.0))) == 1
+
+
+def test_axes_that_are_not_recorded_forbid_a_verdict():
+    campaign = archived.campaign("EL089", recordings=False)
+    rig, (asked, *_) = campaign.rig, campaign.requirements
+    asked = replace(asked, frame="T")
+    assert not list(unrecorded(asked, rig))
+    some = replace(rig, transducer=replace(rig.transducer, channels=("Fx", "Fz", "Ty")))
+    (doubt,) = unrecorded(asked, some)
+    assert doubt.why.startswith("not recorded: Tx, Tz") and not doubt.of_failed
+
+
+def test_calibrations_alone_are_refused_where_something_is_required():
+    campaign = archived.campaign("EL089", recordings=False)
+    check_requirements(campaign)
+    alone = replace(campaign, recordings=tuple(replace(one, role="calibration") for one in campaign.recordings))
+    with pytest.raises(ConfigError, match="no recording is judged"):
+        check_requirements(alone)
+    check_requirements(replace(alone, requirements=()))
 
 
 def doubts(

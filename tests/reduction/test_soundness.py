@@ -11,7 +11,9 @@ import pytest
 
 import archived
 from kbs_process.campaign.config import Campaign
-from kbs_process.reduction.soundness import extent, mistimed, repeated
+from kbs_process.progress import SilentProgress
+from kbs_process.reduction.preparing import fit_gravity
+from kbs_process.reduction.soundness import check_model, extent, mistimed, repeated
 from kbs_process.signals.records import Events, Signal
 from reduction.arm import checked, described, drawn, recorded
 
@@ -125,8 +127,50 @@ def test_a_channel_that_no_recording_shows_to_respond_is_told(tmp_path):
     found = checked(campaign, recordings)
     assert found.mute == ("Tz",) and found.soundness.sound, "an arm that turns about y has no torque about z"
     (notice,) = found.notices()
-    assert notice.severity == "info" and "only noise shows in Tz," in notice.what
+    assert notice.severity == "info" and "shows a response of Tz, only noise" in notice.what
     assert not found.doubts(judged)
+
+
+@pytest.fixture(scope="module")
+def fitted(tmp_path_factory):
+    """A sound campaign, its recordings, and the fit to them."""
+    campaign = described(tmp_path_factory.mktemp("arm"))
+    read = recorded(campaign, drawn(campaign, 1), 1)
+    return campaign, read, fit_gravity(campaign, read, SilentProgress())
+
+
+@pytest.mark.slow
+def test_a_clock_that_runs_too_fast_is_told_and_nothing_is_judged_by_it(fitted):
+    campaign, _, model = fitted
+    (judged,) = campaign.requirements
+    read = []
+    for one in recorded(campaign, drawn(campaign, 1), 1, period=12.0):
+        dt = one.motion.dt / 2.0
+        run = replace(one.run, angle=replace(one.run.angle, dt=dt), wrench=replace(one.run.wrench, dt=dt))
+        moved = replace(one.motion, dt=dt, qd=2.0 * one.motion.qd, qdd=4.0 * one.motion.qdd)
+        read.append(replace(one, raw=replace(one.raw, dt=dt), run=run, motion=moved))
+    found = check_model(campaign, read, model, SilentProgress())
+    (suggestion,) = found.soundness.suggestions
+    assert float(suggestion.removeprefix("clock: all times are ").split()[0]) == pytest.approx(0.5, rel=0.01)
+    assert found.doubts(judged)[0].of_failed, "the calibration is wrong as well"
+
+
+@pytest.mark.slow
+def test_an_encoder_that_stands_still_while_its_joint_turns_is_told(fitted):
+    campaign, (sweep, test), model = fitted
+    (judged,) = campaign.requirements
+    rest = np.zeros_like(test.motion.q)
+    dead = replace(test, motion=replace(test.motion, q=rest, qd=rest, qdd=rest))
+    found = check_model(campaign, [sweep, dead], model, SilentProgress())
+    assert found.soundness.reasons == ("the angle of arm is still in test, and the load changes as if it turned",)
+    assert found.soundness.suggestions == ("encoder: it is not read, or does not turn with its joint",)
+    assert found.doubts(judged)[0].of_failed
+    held, change = sweep.raw.values[:1], np.sin(np.arange(len(rest)) / 60.0)[:, None]
+    for pull in ([20.0, 0.0, 0.0, 0.0, 2.0, 0.0], [0.0, 0.0, 0.0, 0.0, 0.2, 0.0]):  # by a cord; less than a turn makes
+        read = dead.raw.derive(held + change * np.array(pull), "at rest")
+        still = replace(dead, raw=read, run=replace(test.run, wrench=read))
+        found = check_model(campaign, [sweep, still], model, SilentProgress())
+        assert not any("is still" in one for one in found.soundness.reasons)
 
 
 @pytest.mark.slow

@@ -54,10 +54,12 @@ def judged(
     budgets: Sequence[results.Budget],
     doubts: Sequence[Doubt] = (),
     rounding: Mapping[str, float] = _NONE,
+    mute: Sequence[str] = (),
 ) -> results.Requirement:
     """Judge a requirement by the channel and recording that are closest to failing it, if no doubt forbids it.
 
     `rounding`: standard deviation, by channel, of readings that are rounded more coarsely than is stated.
+    `mute`: channels that no recording shows to respond.
     """
     band = band_of(requirement, bands_of(campaign.bands))
     key = (requirement.frame, band.name)
@@ -126,6 +128,7 @@ def judged(
             for channel in channels
             if any(one.extreme.channel == channel for one in measured)
         ),
+        mute=tuple(channel for channel in channels if channel in mute),
         source=requirement.source,
         lever_m=None
         if campaign.rig.spacecraft is None or requirement.frame != "S"

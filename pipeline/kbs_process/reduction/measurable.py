@@ -29,9 +29,15 @@ AMPLIFIED = 0.05  # part of a reading that an amplifier may take off at a band's
 
 
 def check_requirements(campaign: Campaign) -> None:
-    """Raise ConfigError for the first requirement of which nothing is measured."""
+    """Raise ConfigError for the first requirement of which nothing is measured, or where no recording is judged."""
     for requirement in campaign.requirements:
         judged_channels(requirement, campaign.rig)
+        if all(entry.role == "calibration" for entry in campaign.recordings):
+            raise ConfigError(
+                "no recording is judged: all are of role 'calibration'",
+                where=requirement.name,
+                remedy="add a recording of the test, of role 'fit' or 'held-out', or take the requirement out",
+            )
 
 
 def judged_channels(requirement: Requirement, rig: Rig) -> tuple[str, ...]:
@@ -57,6 +63,14 @@ def judged_channels(requirement: Requirement, rig: Rig) -> tuple[str, ...]:
             remedy=f"state a requirement on what is: {', '.join(measured[requirement.frame])}",
         )
     return channels
+
+
+def unrecorded(requirement: Requirement, rig: Rig) -> Iterator[Doubt]:
+    """Yield a doubt where axes of a requirement are not recorded: every axis must meet it."""
+    judged = judged_channels(requirement, rig)
+    lacking = [name for name in WRENCH_CHANNELS if name[0] == judged[0][0] and name not in judged]
+    if lacking:
+        yield Doubt(f"not recorded: {', '.join(lacking)}, and every axis has to meet the limit", of_failed=False)
 
 
 def hidden(

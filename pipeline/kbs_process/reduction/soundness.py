@@ -1,7 +1,7 @@
 """Is the model of the rig right? What was fitted against what was known, before anything is judged by it.
 
 `validate` and processing ask the same here: every fitted number against its prior, each recording's zero, the slope of
-what is read against computed gravity, and what a calibration leaves. Where one of them is beyond what chance allows,
+what is read against computed loads, and what a calibration leaves. Where one of them is beyond what chance allows,
 no requirement is met; what a simple fault would explain is said first.
 """
 
@@ -17,6 +17,7 @@ import numpy as np
 from kbs_process.campaign.config import Campaign, Requirement
 from kbs_process.plant.laws import select
 from kbs_process.plant.linear.modes import modes
+from kbs_process.plant.rigid import static_wrench
 from kbs_process.progress import Progress
 from kbs_process.reduction import measurable
 from kbs_process.reduction.held import noisy
@@ -41,20 +42,23 @@ from kbs_process.stages.conventions import (
     check_weight,
 )
 from kbs_process.stages.gravity import model as gravity
-from kbs_process.stages.gravity.equation import Equation
+from kbs_process.stages.gravity.equation import Equation, encoder_offsets
 from kbs_process.stages.gravity.equation import Prepared as Instants
 from kbs_process.stages.gravity.hypotheses import Explained, explanations
 from kbs_process.stages.gravity.model import GravityModel, Sample, prepared
-from kbs_process.stages.gravity.tension import BY_CHANCE, Moved, lag, tension
+from kbs_process.stages.gravity.tension import BY_CHANCE, TAKEN, Moved, lag, tension
 from kbs_process.stages.repeats import commanded, copies, motion_of
 
 LEFT = 0.1  # of the weight, and of the torque that it can make: a calibration leaves less, whatever rubs or pulls
 UNLIKE = 3.0  # times less noise than is stated, or more, however well it is known
 RATED = 1.1  # times: angles that change by more, or by less than its inverse, do not follow their rates
 _SCALE = "clock: the times of all streams run too fast or too slow, or rates are in another unit"
+_STUCK = "encoder: it is not read, or does not turn with its joint"
 _LATE = "clock: the wrench is {:+.2g} s late, by its timestamps or a filter"
 _LIKE = 0.03  # relative: a gain this near to a unit's factor is that unit's
 _SHOWN = 6
+_TURN = 72  # angles of a turn
+_UNCHANGED = 1e-3  # of the largest load that a turn changes: less is none
 _SAME = 1e-12  # relative: what rounding makes of the same reading
 _FORCES = {"pound-force": 4.4482216, "kilogram-force": 9.80665, "gram-force": 9.80665e-3, "kN": 1e3, "mN": 1e-3}
 _TORQUES = {
@@ -96,7 +100,7 @@ class Checked:
         if self.mute:
             yield Notice(
                 severity="info",
-                what=f"only noise shows in {', '.join(self.mute)}, in all recordings: that it responds is not known",
+                what=f"nothing in these recordings shows a response of {', '.join(self.mute)}, only noise",
                 remedy="record a weight that is put on beside the axis, or a push, and look at this channel",
             )
         for name, doubts in self.hidden.items():
@@ -140,8 +144,10 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
         rounding = {key: x for one in recordings for key, x in measurable.rounding(campaign, one.readings).items()}
         hidden = {one.name: tuple(_hidden(campaign, one, recordings, model)) for one in campaign.requirements}
         timed = tuple(mistimed(campaign, recordings))
+        still = tuple(stuck(recordings, instants, model))
         reasons = (
             *timed,
+            *still,
             *repeated(recordings),
             *_far(found.beyond, found.probability),
             *(f"{one.check} is {one.found}, expected {one.expected}" for one in conventions if not one.ok),
@@ -150,10 +156,12 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
         judged = {key for one in campaign.requirements for key in measurable.judged_channels(one, campaign.rig)}
         mute = tuple(key for key in _mute(equation, [read for read, _, _ in shown]) if key in judged)
         soundness = Soundness(probability=found.probability)
+        tests = [one.entry.name for one in recordings if one.entry.role != "calibration"]
         if reasons:
             shifted = [one for one in found.beyond if one in lags]
-            told = [_SCALE for _ in timed[:1]] + [_LATE.format(one.value) for one in shifted[:1]]
-            if reasons != (*timed, *_far(shifted, 1.0)):
+            told = [_SCALE for _ in timed[:1]] + [_STUCK for _ in still[:1]]
+            told += [_LATE.format(one.value) for one in shifted[:1]]
+            if reasons != (*timed, *still, *_far(shifted, 1.0)):
                 told += [_in_words(one, equation) for one in explanations(equation, instants, most)]
             soundness = Soundness(
                 sound=False,
@@ -161,9 +169,12 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
                 beyond=tuple(_beyond(one, model) for one in found.beyond),
                 reasons=reasons,
                 suggestions=tuple(told),
-                calibrated=not (timed or shifted)
+                calibrated=not (timed or still or shifted)
                 and _calibrated(campaign, samples, model, most)
-                and all(one.ok or not one.check.startswith(OF_ENCODER) for one in conventions),
+                and all(
+                    one.ok or (one.check.rpartition(", ")[2] in tests and not one.check.startswith(OF_ENCODER))
+                    for one in conventions
+                ),
             )
         return Checked(soundness, conventions, hidden, rounding, mute)
 
@@ -172,6 +183,7 @@ def _hidden(
     campaign: Campaign, requirement: Requirement, recordings: Sequence[Prepared], model: GravityModel
 ) -> Iterator[Doubt]:
     """What the samples cannot show of a requirement."""
+    yield from measurable.unrecorded(requirement, campaign.rig)
     judged = [one for one in recordings if one.entry.role != "calibration"]
     unclear = measurable.doubtful(campaign, [(one.entry, one.run) for one in judged], requirement.band[1])
     for one in judged:
@@ -282,6 +294,42 @@ def _conventions(
             found += check_encoder_sense(angle, command)
         for check in found:
             yield msgspec.structs.replace(check, check=f"{check.check}, {one.entry.name}")
+
+
+def stuck(recordings: Sequence[Prepared], instants: Sequence[Instants], model: GravityModel) -> Iterator[str]:
+    """Turning joints whose angle stands still, while the load changes as it would if they turned.
+
+    What gravity leaves (n, c), over the noise, is far more than in other recordings, is such as a turn of the joint
+    changes, and a good part of that: a blow is less, and what pulls or pushes has a force.
+    """
+    equation, rig = model.equation, model.rig
+    channels = rig.transducer.channels
+    index = [WRENCH_CHANNELS.index(channel) for channel in channels]
+    noise = np.maximum(rig.transducer.noise.value[index], 1e-12)
+    elsewhere = {name: _power(rms[None, : len(channels)] / noise) for name, rms in model.residual_rms.items()}
+    for one, data in zip(recordings, instants, strict=True):
+        left = data.wrench - equation.predict(model.fit.value[: equation.size], data)
+        left = (left - left.mean(axis=0))[:, : len(channels)] / noise
+        power = _power(left)
+        least = BEYOND**2 * max((x for name, x in elsewhere.items() if name != one.entry.name), default=0.0)
+        for j, joint in enumerate(rig.joints):
+            moved = np.ptp(data.q[:, j]) > gravity.STILL * max(float(data.sigma_q[:, j].max()), 1e-6)
+            if moved or joint.type != "revolute" or power <= least:
+                continue
+            poses = np.tile(data.q.mean(axis=0) - encoder_offsets(rig), (_TURN, 1))
+            poses[:, j] += 2.0 * np.pi * np.arange(_TURN) / _TURN
+            turned = static_wrench(rig, poses)[:, index] / noise
+            turned -= turned.mean(axis=0)
+            size, along = np.linalg.svd(turned, full_matrices=False)[1:]
+            along = along[size > _UNCHANGED * size[0]]
+            within = LEFT**2 * _power(turned) < power <= float(np.max(np.sum(turned**2, axis=1)))
+            if within and _power(left - left @ along.T @ along) < TAKEN * power:
+                yield f"the angle of {joint.name} is still in {one.entry.name}, and the load changes as if it turned"
+
+
+def _power(x: Array) -> float:
+    """Mean square length of the rows of x (n, c)."""
+    return float(np.mean(np.sum(x**2, axis=1)))
 
 
 def _moved_alone(equation: Equation, zeros: Array) -> Mask:
@@ -433,6 +481,8 @@ def _in_words(one: Explained, equation: Equation) -> str:
             return f"sign: the angle of {fault.what} turns the other way, by its axis or its encoder's sign"
         case "unit":
             return f"unit: {fault.what}"
+        case "clock":
+            return f"clock: all times are {np.sqrt(found[0]):.3g} of what passes, by a wrong rate or unit of time"
         case "zero":
             return f"zero: the angle of {fault.what} is {np.degrees(found[0]):.4g} degrees too large"
         case "point":

@@ -51,6 +51,7 @@ class Requirement(Record, frozen=True, kw_only=True):
     low: float | None = None  # the true value lies between low and high, at 95 %
     high: float | None = None
     doubt: str = ""  # why it is undecided, whatever the figures are
+    mute: tuple[str, ...] = ()  # channels that no recording shows to respond
     lever_m: float | None = None  # from the transducer to the point about which torques are judged, elsewhere
 
 

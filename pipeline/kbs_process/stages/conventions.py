@@ -76,7 +76,7 @@ def check_gravity_sign(
         testable = BEYOND * np.sqrt(noisy + stated) / power < _HALF
         tests.append(
             SignCheck(
-                check=f"slope of measured {channel} against computed gravity",
+                check=f"slope of measured {channel} against its computed load",
                 expected="+1",
                 found=f"{slope:+.3f} ± {sigma:.2g}" if testable else f"not testable here, ± {sigma:.2g}",
                 ok=bool(not testable or abs(slope - 1.0) < np.clip(BEYOND * sigma, _EXACT, _HALF)),

@@ -198,7 +198,7 @@ def test_what_is_read_with_the_other_sign_is_told() -> None:
     check_signs(run, moved, campaign(), ENTRY)
     reaction = replace(run, wrench=run.wrench.derive(-run.wrench.values, "reaction"))
     with pytest.raises(
-        RecordingError, match=r"slope of measured [FT]. against computed gravity is -1\.000 ± .*, expected \+1"
+        RecordingError, match=r"slope of measured [FT]. against its computed load is -1\.000 ± .*, expected \+1"
     ):
         check_signs(reaction, moved, campaign(), ENTRY)
     noise = bench.rig().loads.noise[:6]

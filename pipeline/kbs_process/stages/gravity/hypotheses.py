@@ -21,7 +21,7 @@ from kbs_process.stages.gravity.parameters import CROSS_COUPLING, Index
 from kbs_process.stages.gravity.solve import ZERO, least_sigma, zero_basis, zero_sigma
 from kbs_process.stages.gravity.tension import BEYOND, BY_CHANCE, by_chance, together
 
-Kind = Literal["gain", "swapped", "axes", "sense", "unit", "zero", "point", "bias", "number"]
+Kind = Literal["gain", "swapped", "axes", "sense", "unit", "clock", "zero", "point", "bias", "number"]
 
 _POINTS = 60  # instants of a recording
 _RECORDINGS = 3
@@ -38,6 +38,7 @@ _ANGLES = {  # rad, of what was taken for a radian
     "turns": 2.0 * np.pi,
     "radian, converted as if they were degrees": 180.0 / np.pi,
 }
+_LEAST = 1e-6  # factor of accelerations
 _QUARTERS = (0.0, 0.5 * np.pi, np.pi, -0.5 * np.pi)  # where an angle's zero is looked for
 
 
@@ -62,7 +63,7 @@ class Explained:
     fault: Fault
     cost: float  # -2 ln of the posterior
     sound: bool  # all else is within its prior, and little is left
-    found: Array  # the gain, the zero (rad), the point of reference (m), or the numbers set free
+    found: Array  # the gain, accelerations' factor, the zero (rad), the point of reference (m), or numbers set free
     stated: Array  # what is said of the latter
     sigma: float = 0.0  # of a gain's logarithm
 
@@ -97,6 +98,7 @@ def _faults(data: _Data) -> Iterator[Fault]:
         scaled = unit.copy()
         scaled[some, some] = factor
         yield Fault("unit", f"angles of {', '.join(joints[index].name for index in some)} are {name}", angles=scaled)
+    yield Fault("clock", "")
     for index, near in itertools.product(turning, _QUARTERS):
         yield Fault("zero", joints[index].name, joint=index, near=near)
     if channels[:6] == WRENCH_CHANNELS:
@@ -207,24 +209,27 @@ def _solve(data: _Data, fault: Fault, most: Array, *, anew: bool) -> Explained:
         open_ = np.array([_first_gain(data, at)])
     elif fault.joint is not None:
         open_ = np.array([fault.near])
+    elif fault.kind == "clock":
+        open_ = np.ones(1)
     elif fault.kind == "point":
         open_ = np.zeros(3)
     about = data.about
     for step in range(_STEPS if anew or fault.gained or fault.joint is not None else 1):
-        turned = fault.angles is not None or fault.joint is not None
+        turned = fault.angles is not None or fault.joint is not None or fault.kind == "clock"
         if turned or (anew and step):
             angled = [_turned(p, fault, open_) for p in data.prepared] if turned else data.prepared
             local = _linear(data.equation, angled, about)
         else:
             local = data
         wrench = [_undone(data, fault, p.wrench, at, open_) for p in data.prepared]
-        slopes = [_slopes(local, fault, p, base, at) for p, base in zip(local.prepared, local.base, strict=True)]
+        slopes = [_slopes(local, fault, p, base, at, open_) for p, base in zip(local.prepared, local.base, strict=True)]
         numbers, more, solved = _refit(local, fault, wrench, slopes, most)
         about = numbers if anew else about
         if fault.gained:
             open_ = open_ * np.exp(np.clip(more, -1.0, 1.0))
         else:
             open_ = more if fault.kind == "point" else open_ + more
+            open_ = np.maximum(open_, _LEAST) if fault.kind == "clock" else open_
     if fault.gained:
         count = 2.0 * len(at) * sum(len(p.q) for p in data.prepared)
         solved = replace(solved, cost=solved.cost + count * float(np.log(abs(open_[0]))))
@@ -234,7 +239,9 @@ def _solve(data: _Data, fault: Fault, most: Array, *, anew: bool) -> Explained:
         solved,
         found=numbers[free] if free else open_,
         stated=data.prior[free],
-        sound=solved.sound and bool(np.all(numbers[free] >= lower[free])),
+        sound=solved.sound
+        and bool(np.all(numbers[free] >= lower[free]))
+        and not (fault.kind == "clock" and open_[0] <= _LEAST),
     )
 
 
@@ -254,14 +261,18 @@ def _undone(data: _Data, fault: Fault, wrench: Array, at: list[int], open_: Arra
     return wrench if fault.wrench is None else _decoupled(data, _raw(data, wrench) @ fault.wrench.T)
 
 
-def _slopes(data: _Data, fault: Fault, p: Prepared, base: Array, at: list[int]) -> Array:
-    """(n, c, m) what a step of the gain's logarithm, of the angle's zero or of the point of reference changes."""
+def _slopes(data: _Data, fault: Fault, p: Prepared, base: Array, at: list[int], open_: Array) -> Array:
+    """(n, c, m) what a step changes: of the gain's logarithm, accelerations' factor, the angle's zero, or the point."""
     if fault.gained:
         part = np.zeros(base.shape[1])
         part[at] = 1.0
         return _decoupled(data, _raw(data, base) * part)[:, :, None]
     if fault.joint is not None:
         return -data.equation.angle_slopes(data.about[: data.equation.size], p)[:, :, [fault.joint]]
+    if fault.kind == "clock":
+        theta, still = data.about[: data.equation.size], _turned(p, fault, np.zeros(1))
+        by_motion: Array = (data.equation.predict(theta, p) - data.equation.predict(theta, still))[:, :, None] / open_
+        return by_motion
     if fault.kind == "point":
         slopes = np.zeros((*base.shape, 3))
         for axis, unit in enumerate(np.eye(3)):
@@ -275,9 +286,11 @@ def _turned(p: Prepared, fault: Fault, open_: Array) -> Prepared:
     zero = np.zeros(len(matrix))
     if fault.joint is not None:
         zero[fault.joint] = open_[0]
+    faster = float(open_[0]) if fault.kind == "clock" else 1.0
 
     def along(angles: Angles) -> Angles:
-        return angles[0] @ matrix.T - zero, angles[1] @ matrix.T, angles[2] @ matrix.T
+        q, qd, qdd = (each @ matrix.T for each in angles)
+        return q - zero, qd * np.sqrt(faster), qdd * faster
 
     q, qd, qdd = along((p.q, p.qd, p.qdd))
     before, after = (None if angles is None else along(angles) for angles in (p.before, p.after))

@@ -27,7 +27,7 @@ from kbs_process.stages.gravity.taring import Taring, estimate, of_fit
 from kbs_process.stages.motion import Motion
 
 _ROUNDS = 3  # of weights
-_STILL = 10.0  # sigma of the angle within which a joint has not moved
+STILL = 10.0  # sigma of the angle within which a joint has not moved
 _ERROR_POINTS = 1000  # of a recording at which the model's error is evaluated, linear in between
 _CHUNK = 65536  # samples a step, which bounds memory
 
@@ -285,7 +285,7 @@ def _refuse_no_motion(samples: Sequence[Sample], rig: Rig) -> None:
             "no recording to fit gravity to", remedy="give a recording the role 'calibration' or 'fit' in campaign.toml"
         )
     for sample in samples:
-        noise = _STILL * np.maximum(sample.motion.sigma_q.max(axis=0), 1e-6)
+        noise = STILL * np.maximum(sample.motion.sigma_q.max(axis=0), 1e-6)
         if np.any(np.ptp(sample.motion.q, axis=0) > noise):
             return
     bodies = ", ".join(f"{body.cog.name}, {body.mass.name}" for body in rig.bodies)

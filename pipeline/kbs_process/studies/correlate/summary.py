@@ -40,7 +40,7 @@ def summarise(
     modes = resonances(campaign, runs, model)
     budget = tuple(budgets(campaign, runs, model, decoupling, stated, repeated, modes))
     requirements = tuple(
-        judged(campaign, requirement, runs, budget, checked.doubts(requirement), checked.rounding)
+        judged(campaign, requirement, runs, budget, checked.doubts(requirement), checked.rounding, checked.mute)
         for requirement in campaign.requirements
     )
     found = results.Results(
@@ -81,12 +81,14 @@ def conclusion(requirements: Sequence[Requirement]) -> Conclusion:
     words = {"pass": "met", "fail": "not met", "undecided": "neither met nor broken within the uncertainty"}
     words["undecided"] = f"undecided: {worst.doubt}" if worst.doubt else words["undecided"]
     value, low, high = (figure or 0.0 for figure in (worst.value, worst.low, worst.high))
+    unshown = f" Nothing shows a response of {', '.join(worst.mute)}, only noise." if worst.mute else ""
     least = f"{low:.4f}" if low > 0.0 else "0"
     sentence = (
         f"{worst.name}: {words[worst.verdict]}. {worst.statistic.capitalize()} {value:.4f} {worst.unit} "
         f"({least} to {high:.4f} at 95 %) on {worst.channel} in {worst.recording}, "
         f"{worst.band_Hz[0] or 0:g} to {worst.band_Hz[1] or 0:g} Hz; limit {worst.limit:g} {worst.unit}"
         f"{'' if worst.lever_m is None else f', {worst.lever_m:.3g} m from the transducer'}."
+        f"{unshown if worst.verdict == 'pass' else ''}"
     )
     return Conclusion(status=worst.verdict, sentence=sentence)
 
