@@ -11,6 +11,7 @@ import numpy as np
 from kbs_process.campaign.config import Campaign, Topic
 from kbs_process.campaign.documents import shown
 from kbs_process.campaign.load import load_campaign
+from kbs_process.campaign.locate import CAMPAIGN_FILE
 from kbs_process.errors import OutputError, RecordingError, did_you_mean
 from kbs_process.progress import Progress, SilentProgress
 from kbs_process.recordings.mcap.messages.encoding import JOINT_PARTS, OutStream
@@ -48,7 +49,7 @@ def import_recordings(
     plan = load_mapping(find_mapping(mapping))
     files = _source_files(plan, source)
     _refuse_occupied(target)
-    with writing(target) as folder:
+    with writing(target, CAMPAIGN_FILE) as folder:
         _refuse_occupied(target)  # another import may have ended while this one waited for the lock
         campaign = prepare(plan, folder)
         checksums: dict[str, str] = {}
