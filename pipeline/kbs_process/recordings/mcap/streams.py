@@ -14,7 +14,7 @@ from kbs_process.recordings.mcap.framing import MalformedError
 from kbs_process.recordings.mcap.kernels import NO_STAMP, Bytes, Words
 from kbs_process.recordings.mcap.messages.decoders import Decoder, MessageType, message_type
 from kbs_process.recordings.mcap.messages.fields import Elements, Step, resolve
-from kbs_process.signals.records import Block, Loss, Stamps
+from kbs_process.signals.records import Array, Block, Loss, Mask, Stamps
 
 CHOOSE = "several publishers bring the topic: choose one by its `channel` in campaign.toml"
 RETURNS = 2  # to a channel that was left for another of the same topic: there are two publishers
@@ -31,7 +31,7 @@ class Stream:
     fields: tuple[str, ...]
     otherwise: str = ""  # what to do where no message has one of the elements that fields name
     channel: int | None = None  # number of the one channel of the topic that is wanted; None: all
-    lenient: bool = False  # a message without an element that fields name is a loss, and never an error
+    lenient: bool = False  # a message without an element that fields name is a loss, never an error; see `_bad`
 
 
 @dataclass(slots=True, eq=False)
@@ -50,6 +50,11 @@ class Tally:
             self.spans[kind] = (min(first, low), max(last, high))
             self.counts[kind] = self.counts.get(kind, 0) + len(log)
             self.details.setdefault(kind, detail)
+
+    def take(self, kind: str, other: Tally) -> None:
+        """Count of a kind what another one has instead."""
+        if kind in other.counts:
+            self.counts[kind], self.spans[kind], self.details[kind] = other.counts[kind], other.spans[kind], ""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -127,7 +132,8 @@ class Reading:
         self.stream = stream
         self._container = container
         self._plans: dict[int, _Plan] = {}
-        self._tally = Tally()
+        self._tally, self._read = Tally(), Tally()  # what is lost, and of messages all that came
+        self._heard = np.zeros(len(stream.fields), dtype=bool)  # fields that had a reading
         self._where = f"{container.path.name}, {stream.topic}"
         self._turns = _Turns()
 
@@ -182,15 +188,35 @@ class Reading:
             otherwise = CHOOSE if several else self.stream.otherwise
             _require_names(plan, decoded.present.tolist(), payload, self._where, otherwise)
         stamped = stamp != NO_STAMP
-        if decoded.flawless and stamped.all():
+        if decoded.flawless and stamped.all() and not self.stream.lenient:
             return places, Block(stamp, log, values)
         self._tally.add("missing field", log[lacking])
         self._tally.add("undecodable", log[~good], decoded.reason)
         self._tally.add("no valid stamp", log[good & ~stamped], _NO_STAMP)
         kept = good & stamped
-        bad = kept & ~lacking & ~np.isfinite(np.where(good[:, None], values, 0.0)).all(axis=1)
-        self._tally.add("non-finite", log[bad])
+        read = kept & ~lacking
+        self._tally.add("non-finite", log[read][self._bad(values[read], log[read])])
         return places[kept], Block(stamp[kept], log[kept], values[kept])
+
+    def _bad(self, values: Array, log: Stamps) -> Mask:
+        """Which messages hold something that is no number.
+
+        Of a listing, which reads every field, one that never has a reading is none, and no loss; unless all are so.
+        """
+        finite: Mask = np.isfinite(values)
+        if self.stream.lenient:
+            finite |= self._never(values, log)
+        bad: Mask = ~np.logical_and.reduce(finite, axis=1)
+        return bad
+
+    def _never(self, values: Array, log: Stamps) -> Mask:
+        """Return which fields have had no reading so far, if others have."""
+        heard = self._heard | ~np.isnan(values).all(axis=0)
+        if (heard & ~self._heard).any():  # it was missing in all that came before
+            self._tally.take("non-finite", self._read)
+        self._heard = heard
+        self._read.add("non-finite", log)
+        return ~heard & heard.any()
 
     def _plan(self, channel: Described, samples: Iterator[bytes]) -> _Plan:
         kind = type_of(channel, samples, self._where)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from datetime import UTC, datetime
 
@@ -31,6 +32,9 @@ def _topic(topic: TopicInspection) -> Iterator[str]:
         yield f"    {topic.note}"
     width = max((len(entry.field) for entry in topic.ranges), default=0)
     for entry in topic.ranges:
+        if math.isnan(entry.low):
+            yield f"    {entry.field:<{width}}  no reading"
+            continue
         bad = f"  {entry.not_finite} not finite" if entry.not_finite else ""
         yield f"    {entry.field:<{width}}  {entry.low + 0.0:>13.6g} to {entry.high + 0.0:<13.6g}{bad}".rstrip()
 
