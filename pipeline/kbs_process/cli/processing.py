@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 @campaign_argument
 @output_option("results/NAME")
 @pdf_option
-@check_option("a requirement is not met, or undecided")
+@check_option("a requirement is not met, or undecided, or a recording has losses")
 @click.option(
     "--diagnose/--no-diagnose",
     "why",
@@ -72,7 +72,7 @@ def process(campaign: str, output: Path | None, pdf: bool | None, check: bool, w
     except KeyboardInterrupt:
         complain("interrupted: the report is written, a new diagnosis is not")
         sys.exit(INTERRUPTED)
-    if check and outcome.requirement_met is False:
+    if check and outcome.failed:
         sys.exit(NOT_MET)
 
 
