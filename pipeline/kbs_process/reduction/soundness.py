@@ -89,7 +89,7 @@ class Checked:
         if not self.soundness.sound:
             yield Notice(
                 severity="error",
-                what=f"{WRONG}: {'; '.join(self.soundness.reasons)}",
+                what=f"{WRONG}: {_cause(self.soundness.suggestions)}{'; '.join(self.soundness.reasons)}",
                 remedy=_remedy(self.soundness.suggestions),
             )
         if self.mute:
@@ -115,7 +115,12 @@ def _remedy(suggestions: Sequence[str]) -> str:
             "no single simple fault (gain, unit, sign, axis, zero, swapped channels, one number) explains it: look for "
             "what else pulls or rubs, and compare the parameter files with the rig"
         )
-    return f"this explains it: {'; or '.join(suggestions)}. Correct it and process again"
+    return "correct it and process again"
+
+
+def _cause(suggestions: Sequence[str]) -> str:
+    """What explains all that is wrong, where it is known, to stand before it."""
+    return f"{'; or '.join(suggestions)}. This explains it: " if suggestions else ""
 
 
 def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: GravityModel, progress: Progress) -> Checked:
@@ -320,10 +325,8 @@ def _paces(run: Run, cycle: float) -> Iterator[tuple[str, Array, Array]]:
 
 def _far(beyond: Sequence[Moved], probability: float) -> Iterator[str]:
     for one in beyond[:_SHOWN]:
-        yield (
-            f"{one.name} is {one.value:.4g} by the fit, {one.prior:.4g} +- {one.prior_sigma:.2g} by what is stated: "
-            f"{abs(one.distance):.1f} sigma"
-        )
+        known = one.known or f"{one.prior:.4g} +- {one.prior_sigma:.2g} by what is stated"
+        yield f"{one.name} is {one.value:.4g} by the fit, {known}: {abs(one.distance):.1f} sigma"
     if len(beyond) > _SHOWN:
         yield f"{len(beyond) - _SHOWN} other numbers are as far off"
     if probability < BY_CHANCE and not beyond:

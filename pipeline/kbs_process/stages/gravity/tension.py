@@ -22,6 +22,7 @@ from kbs_process.stages.gravity.taring import Taring
 
 BEYOND = 4.0  # sigma
 BY_CHANCE = 1e-4
+ONE_CLOCK_S = 1e-6  # what stamps by one clock leave open at most
 TAKEN = 0.25  # part of the power of what is left that a lag explains, or it is none
 _ROUNDS = 4  # of weights
 _INFORMED = 0.1  # part of the prior's variance that the data take away: less says nothing of the prior
@@ -36,6 +37,7 @@ class Moved:
     prior_sigma: float
     value: float
     chance: float  # standard deviation of value - prior, where all is right
+    known: str = ""  # the prior and why, where no parameter file states it
 
     @property
     def distance(self) -> float:
@@ -101,9 +103,9 @@ def lag(model: GravityModel, data: Prepared, sigma: float) -> Moved | None:
         return None
     scores = (late * rest * weight).reshape(-1, 1)
     chance = float(np.sqrt(longrun_covariance(scores, [rest.shape])[0, 0])) / power
-    return Moved(
-        f"the wrench's lag (s) behind the angles in {data.name}", 0.0, sigma, value, float(np.hypot(sigma, chance))
-    )
+    known = f"0 +- {sigma:.2g} by the clocks" if sigma > ONE_CLOCK_S else "0 (one clock)"
+    name, chance = f"the wrench's lag (s) behind the angles in {data.name}", float(np.hypot(sigma, chance))
+    return Moved(name, 0.0, sigma, value, chance, known)
 
 
 def by_chance(names: Sequence[str], prior: Array, value: Array, sigma: Array, covariance: Array) -> tuple[Moved, ...]:
