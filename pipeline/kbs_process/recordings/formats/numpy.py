@@ -18,21 +18,17 @@ from kbs_process.recordings.tables import Item, SeriesTable, matrix_of, series_o
 
 def read_numpy(path: Path, _: Text) -> SeriesTable:
     """Open a .npy or .npz file."""
-    data = _numbers(lambda: np.load(path, mmap_mode="r", allow_pickle=False))
+    data = _numbers(partial(np.load, mmap_mode="r", allow_pickle=False), path)
     if isinstance(data, np.ndarray):
         return SeriesTable(path, _columns(data, ""))
-    return SeriesTable(
-        path, (one for name in data.files for one in _columns(_numbers(partial(data.__getitem__, name)), name))
-    )
+    return SeriesTable(path, (one for name in data.files for one in _columns(_numbers(data.get, name), name)))
 
 
-def _numbers(load: Callable[[], Any]) -> Any:
+def _numbers(load: Callable[..., Any], what: Path | str) -> Any:
     """Load, without the advice to run what an unknown file says."""
     try:
-        return load()
-    except ValueError as error:
-        if "pickle" not in str(error):
-            raise
+        return load(what)
+    except ValueError:
         raise ValueError("it holds no numbers that NumPy can read: damaged, or objects") from None
 
 

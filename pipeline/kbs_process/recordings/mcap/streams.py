@@ -31,7 +31,7 @@ class Stream:
     fields: tuple[str, ...]
     otherwise: str = ""  # what to do where no message has one of the elements that fields name
     channel: int | None = None  # number of the one channel of the topic that is wanted; None: all
-    lenient: bool = False  # a message without an element that fields name is a loss, never an error; see `_bad`
+    lenient: bool = False  # a message without an element that fields name is a loss, never an error; see `_never`
 
 
 @dataclass(slots=True, eq=False)
@@ -50,11 +50,6 @@ class Tally:
             self.spans[kind] = (min(first, low), max(last, high))
             self.counts[kind] = self.counts.get(kind, 0) + len(log)
             self.details.setdefault(kind, detail)
-
-    def take(self, kind: str, other: Tally) -> None:
-        """Count of a kind what another one has instead."""
-        if kind in other.counts:
-            self.counts[kind], self.spans[kind], self.details[kind] = other.counts[kind], other.spans[kind], ""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -133,7 +128,7 @@ class Reading:
         self._container = container
         self._plans: dict[int, _Plan] = {}
         self._tally, self._read = Tally(), Tally()  # what is lost, and of messages all that came
-        self._heard = np.zeros(len(stream.fields), dtype=bool)  # fields that had a reading
+        self._heard = np.full(len(stream.fields), not stream.lenient)  # fields that had a reading, or must have
         self._where = f"{container.path.name}, {stream.topic}"
         self._turns = _Turns()
 
@@ -195,25 +190,17 @@ class Reading:
         self._tally.add("no valid stamp", log[good & ~stamped], _NO_STAMP)
         kept = good & stamped
         read = kept & ~lacking
-        self._tally.add("non-finite", log[read][self._bad(values[read], log[read])])
+        bad: Mask = ~np.logical_and.reduce(np.isfinite(values[read]) | self._never(values[read], log[read]), axis=1)
+        self._tally.add("non-finite", log[read][bad])
         return places[kept], Block(stamp[kept], log[kept], values[kept])
 
-    def _bad(self, values: Array, log: Stamps) -> Mask:
-        """Which messages hold something that is no number.
-
-        Of a listing, which reads every field, one that never has a reading is none, and no loss; unless all are so.
-        """
-        finite: Mask = np.isfinite(values)
-        if self.stream.lenient:
-            finite |= self._never(values, log)
-        bad: Mask = ~np.logical_and.reduce(finite, axis=1)
-        return bad
-
     def _never(self, values: Array, log: Stamps) -> Mask:
-        """Return which fields have had no reading so far, if others have."""
+        """Which fields of a listing have had no reading so far, if others have: they lack nothing."""
         heard = self._heard | ~np.isnan(values).all(axis=0)
-        if (heard & ~self._heard).any():  # it was missing in all that came before
-            self._tally.take("non-finite", self._read)
+        if (heard & ~self._heard).any() and self._read.counts:  # it was missing in all that came before
+            self._tally.counts |= self._read.counts
+            self._tally.spans |= self._read.spans
+            self._tally.details |= self._read.details
         self._heard = heard
         self._read.add("non-finite", log)
         return ~heard & heard.any()

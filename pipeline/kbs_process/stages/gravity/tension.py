@@ -22,7 +22,7 @@ from kbs_process.stages.gravity.taring import Taring
 
 BEYOND = 4.0  # sigma
 BY_CHANCE = 1e-4
-ONE_CLOCK_S = 1e-6  # what stamps by one clock leave open at most
+KNOWN_S = 0.02  # to which a delay between two recorders can be known at best
 TAKEN = 0.25  # part of the power of what is left that a lag explains, or it is none
 _ROUNDS = 4  # of weights
 _INFORMED = 0.1  # part of the prior's variance that the data take away: less says nothing of the prior
@@ -37,7 +37,6 @@ class Moved:
     prior_sigma: float
     value: float
     chance: float  # standard deviation of value - prior, where all is right
-    known: str = ""  # the prior and why, where no parameter file states it
 
     @property
     def distance(self) -> float:
@@ -89,6 +88,9 @@ def lag(model: GravityModel, data: Prepared, sigma: float) -> Moved | None:
     equation = model.equation
     wrench = [at for at, channel in enumerate(equation.channels) if channel in WRENCH_CHANNELS]
     expected = equation.predict(model.fit.value[: equation.size], data)[:, wrench]
+    if not wrench:
+        return None
+    sigma = max(sigma, KNOWN_S)
     left = data.wrench[:, wrench] - expected
     late = -np.gradient(expected, data.t, axis=0)
     rest = left = left - left.mean(axis=0)
@@ -103,9 +105,9 @@ def lag(model: GravityModel, data: Prepared, sigma: float) -> Moved | None:
         return None
     scores = (late * rest * weight).reshape(-1, 1)
     chance = float(np.sqrt(longrun_covariance(scores, [rest.shape])[0, 0])) / power
-    known = f"0 +- {sigma:.2g} by the clocks" if sigma > ONE_CLOCK_S else "0 (one clock)"
-    name, chance = f"the wrench's lag (s) behind the angles in {data.name}", float(np.hypot(sigma, chance))
-    return Moved(name, 0.0, sigma, value, chance, known)
+    return Moved(
+        f"the wrench's lag (s) behind the angles in {data.name}", 0.0, sigma, value, float(np.hypot(sigma, chance))
+    )
 
 
 def by_chance(names: Sequence[str], prior: Array, value: Array, sigma: Array, covariance: Array) -> tuple[Moved, ...]:
