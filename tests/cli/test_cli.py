@@ -222,7 +222,7 @@ def processable(tmp_path: Path) -> CampaignFolder:
     """The example's description with recordings of its rig that are long enough for the gravity fit."""
     folder = make_folder(tmp_path / "campaigns" / "EL089")
     for number, path in enumerate(sorted((folder.path / "recordings").iterdir())):
-        short_campaign.record(path, noise=0.01, seed=number, rig=rig())
+        short_campaign.record(path, noise=rig().transducer.noise.value, seed=number, rig=rig())
     return folder
 
 
@@ -244,7 +244,13 @@ def test_validate_finds_sound_recordings_clean(processable: CampaignFolder, caps
 def test_validate_tells_losses_and_fails_only_when_asked(
     processable: CampaignFolder, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    short_campaign.record(processable.path / "recordings" / "EL089P00_2.mcap", noise=0.01, seed=5, nan=True, rig=rig())
+    short_campaign.record(
+        processable.path / "recordings" / "EL089P00_2.mcap",
+        noise=rig().transducer.noise.value,
+        seed=5,
+        nan=True,
+        rig=rig(),
+    )
     assert run("validate", str(processable.path)) == 0
     assert run("validate", str(processable.path), "--check") == 1
     out = capsys.readouterr().out
@@ -258,7 +264,7 @@ def test_validate_of_a_wrong_model_fails_when_asked(
 ) -> None:
     heavy = substitute(rig(), {"body.base.mass": rig().quantities()["body.base.mass"].value + 20.0})
     for seed, path in enumerate((processable.path / "recordings").iterdir()):
-        short_campaign.record(path, noise=0.01, seed=seed, rig=heavy)
+        short_campaign.record(path, noise=rig().transducer.noise.value, seed=seed, rig=heavy)
     assert run("validate", str(processable.path), "--check") == 1
     out = capsys.readouterr().out
     assert "error: the model of this rig is wrong" in out
@@ -270,7 +276,11 @@ def test_validate_tells_what_was_put_in_order_and_counts_no_loss(
     processable: CampaignFolder, capsys: pytest.CaptureFixture[str]
 ) -> None:
     short_campaign.record(
-        processable.path / "recordings" / "EL089P00_2.mcap", noise=0.01, seed=5, swapped=True, rig=rig()
+        processable.path / "recordings" / "EL089P00_2.mcap",
+        noise=rig().transducer.noise.value,
+        seed=5,
+        swapped=True,
+        rig=rig(),
     )
     assert run("validate", str(processable.path), "--check") == 0
     out = capsys.readouterr().out
@@ -285,7 +295,7 @@ def test_validate_tells_a_recording_of_which_nothing_is_whole_long_enough(
 ) -> None:
     """Gravity is not fitted to a recording that is held out, and processing has to take it off all the same."""
     path = processable.path / "recordings" / "EL089P00_2.mcap"
-    short_campaign.record(path, noise=0.01, seed=5, nan=slice(0, None, 2), rig=rig())
+    short_campaign.record(path, noise=rig().transducer.noise.value, seed=5, nan=slice(0, None, 2), rig=rig())
     assert run("validate", str(processable.path), "-q") == 2
     out = capsys.readouterr().out
     assert "EL089P00_2: wrench (Fz in 1000: interpolated)" in out

@@ -12,6 +12,7 @@ from kbs_process.plant.rigid import loads
 from kbs_process.recordings.mcap.messages.encoding import OutStream
 from kbs_process.recordings.mcap.writer import write_mcap
 from kbs_process.rig.model import Rig
+from kbs_process.signals.records import Array
 
 JOINTS = ("az", "el")
 
@@ -29,7 +30,7 @@ def record(
     path: Path,
     *,
     moving: bool = True,
-    noise: float = 0.0,
+    noise: float | Array = 0.0,
     seed: int = 1,
     nan: bool | slice = False,
     swapped: bool = False,
@@ -37,7 +38,8 @@ def record(
     rig: Rig | None = None,
     degrees: bool = False,
 ) -> None:
-    """Write twenty seconds: elevation at rest, or swinging; a constant wrench, or that of a `rig`, and noise (N, N m).
+    """Write twenty seconds: elevation at rest, or swinging; a constant wrench, or that of a `rig`, and noise (N, N m),
+    of all channels or of each.
 
     With `nan` ten readings of Fz are no numbers, or a slice of them; if `swapped`, two messages are in the other's
     place. Encoders `read` some joints, as `degrees` if that is asked for.

@@ -83,7 +83,7 @@ def probe(name: str, folder: Path) -> Outcome:
         READERS[name][0](folder)
         tell("right")
 
-    subject = Subject(name, 1.0, Path.mkdir, lambda rng, folder: "", judge)
+    subject = Subject(name, 1.0, Path.mkdir, lambda rng, folder: "nothing", judge)
     return process.try_one(subject, folder, 1).outcome
 
 

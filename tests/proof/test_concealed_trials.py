@@ -66,7 +66,7 @@ def test_a_trial_comes_out_the_same_and_says_nothing_of_what_it_conceals(short: 
     assert null.keys() == full.keys()
     for name, content in null.items():
         if name.endswith(".mcap"):
-            assert len(full[name]) == pytest.approx(len(content), rel=0.02)
+            assert len(full[name]) == pytest.approx(len(content), rel=0.04)
         elif not name.endswith("campaign.toml"):
             assert full[name] == content
     described = [tomllib.loads(part["x/campaign.toml"].decode()) for part in (null, full)]

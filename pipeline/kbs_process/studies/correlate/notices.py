@@ -40,6 +40,8 @@ UNKNOWN_PHASE = 1.0
 LONGEST = 100.0
 # A limit is seldom this many times above all that was measured, uncertainty included.
 FAR = 100.0
+# A calibration that leaves this many times what noise and uncertainty make is not at rest.
+UNQUIET = 1.5
 LEFT_OUT = (SPIKE, DROPOUT)
 QUANTITY = {"torque": "T", "force": "F"}  # first letter of its channels
 
@@ -151,7 +153,7 @@ def calibration(analyses: Sequence[Analysis], model: GravityModel) -> Iterable[N
     for analysis in (one for one in analyses if one.entry.role == "calibration"):
         for misfit, unexplained, sigma in zip(analysis.misfits, model.unexplained, noise, strict=True):
             most = np.sqrt(max(misfit.explained**2 - unexplained**2, 0.0) + sigma**2)
-            if misfit.left > most and sigma > 0.0:
+            if misfit.left > UNQUIET * most and sigma > 0.0:
                 shown = _shown(analysis, misfit.channel, model)
                 facts = {"low_pass": model.settings.low_pass_Hz, "one": misfit, "most": most, "shown": shown}
                 yield _notice("info", "calibration", analysis.entry.name, **facts)
