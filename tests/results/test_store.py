@@ -453,7 +453,7 @@ def test_only_its_own_kind_is_replaced(tmp_path: Path, before: str, after: str) 
             (folder / "provenance.json").write_text(kind)
 
     make(before)
-    with pytest.raises(OutputError, match=f"something else that kbs-process made .without {after}."):
+    with pytest.raises(OutputError, match=f"as something else .no {after}.: nothing was changed"):
         make(after)
     assert content(target) == {before: before, "provenance.json": before} and leftovers(target) == []
     make(before)

@@ -101,7 +101,6 @@ def validate(campaign: str, check: bool, quiet: bool) -> None:
     """Check CAMPAIGN's description, read all its recordings through, and fit gravity to them.
 
     Exits with 0 if all is well or can be processed, with 2 if something cannot be read, or processing would refuse it.
-    What can be processed may hold losses or a wrong model of the rig: scripts give --check, and get 1 for these.
     """
     from kbs_process.campaign.load import load_campaign
     from kbs_process.campaign.locate import find_campaign

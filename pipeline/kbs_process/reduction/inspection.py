@@ -88,32 +88,26 @@ class _Gathered:
         self.low = np.full(columns, np.inf)
         self.high = np.full(columns, -np.inf)
         self.not_finite = np.zeros(columns, dtype=np.int64)
-        self._topic, self._fields = topic, plan.fields
-        self._judge_those([at for at, name in enumerate(plan.fields) if name.startswith(READINGS)])
-
-    def _judge_those(self, read: list[int]) -> None:
-        """Judge the single samples of these fields."""
-        self._read = read
-        names = tuple(self._fields[at] for at in read)
+        self._read = [at for at, name in enumerate(plan.fields) if name.startswith(READINGS)]
+        names = tuple(plan.fields[at] for at in self._read)
         angles = np.array([name.startswith("position") for name in names], dtype=np.float64)
         self.line = Timeline(
-            self._topic,
+            topic,
             names,
             bridged=longest_bridged(0.5 * CondenseSettings().working_rate_Hz),
-            file=self._topic,
+            file=topic,
             filled=bool(names),
             turning=angles,
         )
 
     def add(self, block: Block) -> None:
-        if not self.count:  # what has no readings has none that are bad
-            silent = np.logical_and.reduce(np.isnan(block.values), axis=0)
-            self._judge_those([at for at in self._read if not silent[at]] or self._read)
+        if not self.count:  # what begins without a reading is not judged, or nothing else would be
+            self._silent = np.logical_and.reduce(np.isnan(block.values), axis=0)
         first, last = int(block.stamp.min()), int(block.stamp.max())
         self.start = first if self.start is None else min(self.start, first)
         self.end = last if self.end is None else max(self.end, last)
         self.count += len(block)
-        self._judge(Block(block.stamp, block.log, block.values[:, self._read]))
+        self._judge(Block(block.stamp, block.log, np.where(self._silent, 0.0, block.values)[:, self._read]))
         if block.values.shape[1]:
             finite = np.isfinite(block.values)
             self.not_finite += len(block) - finite.sum(axis=0)

@@ -42,9 +42,7 @@ def _extent(losses: Sequence[Loss], file: str) -> str:
     if not starts:
         return count
     first, last = min(starts), max([*ends, *starts])
-    if {loss.kind for loss in losses} == {
-        TRUNCATED
-    }:  # how long it would have been, a file that breaks off does not say
+    if losses[0].kind == TRUNCATED:  # how long it would have been, a file that breaks off does not say
         return f"{count}, from {first:.1f} s on"
     start, end = f"{first:.1f} s", f"{last:.1f} s"
     return f"{count}, at {start}" if start == end else f"{count}, between {start} and {end}"

@@ -213,18 +213,13 @@ def _files_of_the_user(target: Path, made: str, *, revised: Collection[str] | No
     """Return the files in the folder that this program did not write; refuse one that it cannot replace."""
     if not target.exists():
         return []
-    if not target.is_dir() or (any(target.iterdir()) and not _is_ours(target) and revised is None):
-        raise OutputError(
-            f"is there already, and kbs-process did not make it (no {LIST})",
-            where=str(target),
-            remedy="name a new or an empty folder with --output",
-        )
     written = {name: digest for digest, name in _listed(target)}
-    if written and made not in {*written, *_files(target)}:
+    theirs = not target.is_dir() or (any(target.iterdir()) and not _is_ours(target) and revised is None)
+    if theirs or (written and made not in {*written, *_files(target)}):
         raise OutputError(
-            f"is there already, and is something else that kbs-process made (without {made}): nothing was changed",
+            f"is there already, and kbs-process did not make it, or as something else (no {made}): nothing was changed",
             where=str(target),
-            remedy="name a new or an empty folder with --output",
+            remedy="name a new or an empty folder",
         )
     users = []
     for name in _files(target):
@@ -267,7 +262,7 @@ def _listed(folder: Path) -> list[tuple[str, str]]:
     """Return digest and name of each file in a folder's list."""
     try:
         lines = (folder / LIST).read_text(encoding="utf-8", errors="replace").splitlines()
-    except FileNotFoundError:
+    except (FileNotFoundError, NotADirectoryError):
         return []
     return [(digest, name) for digest, _, name in (line.partition("  ") for line in lines)]
 

@@ -162,7 +162,7 @@ class Reading:
         seconds = self._container.seconds
         for kind, count in self._tally.counts.items():
             first, last = self._tally.spans[kind]
-            yield Loss(kind, self._where, count, seconds(first), seconds(last), self._tally.details[kind])
+            yield Loss(kind, self._where, count, seconds(first), seconds(last), self._tally.details.get(kind, ""))
 
     def _decode(self, channel: Described, segment: Segment) -> tuple[Stamps, Block]:
         places = segment.places(channel.number)
@@ -200,7 +200,6 @@ class Reading:
         if (heard & ~self._heard).any() and self._read.counts:  # it was missing in all that came before
             self._tally.counts |= self._read.counts
             self._tally.spans |= self._read.spans
-            self._tally.details |= self._read.details
         self._heard = heard
         self._read.add("non-finite", log)
         return ~heard & heard.any()
