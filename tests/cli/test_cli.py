@@ -76,13 +76,13 @@ def record(path: Path, *, nan: bool = False) -> None:
 @pytest.fixture
 def processed(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
     """Replaces the pipeline; `met` and `error` say how it ends, `called` what it was asked."""
-    state = SimpleNamespace(met=True, error=None, called=None)
+    state = SimpleNamespace(met=True, lossy=False, error=None, called=None)
 
     def process(campaign: Any, target: Path, *, progress: Any, pdf: bool | None) -> Outcome:
         state.called = (campaign.name, target, pdf)
         if state.error is not None:
             raise state.error
-        return Outcome(("torque 0.04 N m, limit 0.06 N m: met",), state.met, target / "index.html")
+        return Outcome(("torque 0.04 N m, limit 0.06 N m: met",), state.met, target / "index.html", state.lossy)
 
     importlib.import_module("kbs_process.studies.diagnose.run")  # which the real one is read by
     fake = ModuleType("kbs_process.studies.correlate.run")
@@ -151,13 +151,20 @@ def test_a_campaign_without_a_verb_is_processed(
 
 
 @pytest.mark.parametrize(
-    ("met", "options", "status"),
-    [(True, ["--check"], 0), (False, [], 0), (False, ["--check"], 1), (None, ["--check"], 0)],
+    ("met", "lossy", "options", "status"),
+    [
+        (True, False, ["--check"], 0),
+        (False, True, [], 0),
+        (False, False, ["--check"], 1),
+        (None, False, ["--check"], 0),
+        (True, True, ["--check"], 1),
+        (None, True, ["--check"], 1),
+    ],
 )
-def test_a_requirement_not_met_is_a_status_only_when_asked(
-    folder: CampaignFolder, processed: SimpleNamespace, met: bool | None, options: list[str], status: int
+def test_a_requirement_not_met_or_a_loss_is_a_status_only_when_asked(
+    folder: CampaignFolder, processed: SimpleNamespace, met: bool | None, lossy: bool, options: list[str], status: int
 ) -> None:
-    processed.met = met
+    processed.met, processed.lossy = met, lossy
     assert run(*options, str(folder.path), "-o", str(folder.path.parents[1] / "out"), "--no-pdf") == status
     assert processed.called[1:] == (folder.path.parents[1] / "out", False)
 

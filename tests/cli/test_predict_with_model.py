@@ -16,11 +16,13 @@ from end_to_end.short_campaign import record
 from kbs_process import cli
 from kbs_process.campaign.config import SensingLaw
 from kbs_process.campaign.load import load_campaign
+from kbs_process.campaign.locate import CAMPAIGN_FILE
 from kbs_process.campaign.writing.corrected_model import write_model
 from kbs_process.diagnosis.experiments.hypothesis import Hypothesis
 from kbs_process.diagnosis.proposing.measured import inserted
 from kbs_process.plant.laws.position.measured_law import MEASURED
 from kbs_process.reduction.inspection import inspect_recording
+from kbs_process.results.store import writing
 from kbs_process.rig.model import Quantity
 from kbs_process.signals.records import Array
 
@@ -76,6 +78,13 @@ def test_a_recording_that_nobody_used(folder: Path) -> None:
     assert "read through channel_gain at Fz" in about["history"]
     inspected = inspect_recording(whole / "predicted.mcap")
     assert inspected.state == "clean", inspected
+    with writing(folder / "bench", CAMPAIGN_FILE) as imported:
+        (imported / CAMPAIGN_FILE).write_text("mine")
+    assert run("predict", "--model", model, other, "-o", str(folder / "bench")) == 2
+    assert (folder / "bench" / CAMPAIGN_FILE).read_text() == "mine"
+    assert run(str(folder / "campaigns" / "EL089"), "-o", str(whole)) == 2
+    assert (whole / "predicted.mcap").is_file()
+    assert run("predict", "--model", model, other, "-o", str(whole)) == 0
 
 
 def test_commands_of_a_table(folder: Path) -> None:

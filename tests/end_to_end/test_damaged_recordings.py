@@ -77,6 +77,7 @@ def damaged(tmp_path_factory: pytest.TempPathFactory) -> Damaged:
 
     damage.alter(recordings / "EL089P00_3.mcap", "/transducer/wrench", spoil)
     outcome = process(load_campaign(folder), root / "results", progress=SilentProgress(), pdf=False)
+    assert outcome.failed and "3 recordings with losses" in outcome.lines  # as --check says, whatever the verdict
     return Damaged(
         Processed("EL089", root / "results"),
         ((start - epoch) * 1e-9, (end - epoch) * 1e-9),
@@ -133,8 +134,8 @@ def test_a_clock_that_jumps_back(damaged: Damaged) -> None:
     count = damaged.set_back
     assert count > 25
     what = damaged.warning("EL089P00_3")
-    assert f"odd stamp: {count}, at {BACK[0]:.1f} s" in what
-    assert f"gap: {count}, between {BACK[0]:.1f} s and {BACK[1]:.1f} s" in what
+    assert f"odd stamp: {count} of wrench, at {BACK[0]:.1f} s" in what
+    assert f"gap: {count} of wrench, between {BACK[0]:.1f} s and {BACK[1]:.1f} s" in what
 
 
 def test_every_warning_stands_at_the_top_of_the_report(damaged: Damaged) -> None:

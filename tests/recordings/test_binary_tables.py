@@ -281,8 +281,12 @@ def test_numpy_kinds(tmp_path: Path) -> None:
     packed = read(tmp_path / "a.npz", "numpy")
     np.testing.assert_array_equal(column(packed, "run[F][3]"), T)
     np.save(tmp_path / "o.npy", np.array([1, "a"], dtype=object))
-    with pytest.raises(ValueError, match="Python objects"):
-        read(tmp_path / "o.npy", "numpy")
+    np.savez(tmp_path / "o.npz", o=np.array([1, "a"], dtype=object))
+    for name in ("r.npy", "r.npz"):
+        (tmp_path / name).write_bytes(np.random.default_rng(1).bytes(5000))
+    for name in ("o.npy", "o.npz", "r.npy", "r.npz"):
+        with pytest.raises(ValueError, match="it holds no numbers that NumPy can read: damaged, or objects"):
+            list(read(tmp_path / name, "numpy").series())
 
 
 def test_parquet_kinds(tmp_path: Path) -> None:

@@ -17,6 +17,7 @@ from kbs_process.recordings.mcap.writer import write_mcap
 from kbs_process.reduction import inspection
 from kbs_process.reduction.inspection import inspect_recording
 from kbs_process.stages.align.stream import Collected
+from kbs_process.studies.validate.listing import describe_inspection
 from recordings.mcap.mcap_files import build
 from recordings.mcap.message_encodings import Encoding, write_encoded
 
@@ -53,6 +54,31 @@ def test_rates_gaps_repeats_and_ranges(tmp_path: Path, encoding: Encoding) -> No
     assert limits["wrench.force.y"].not_finite == 1
     assert encoder.names == ("az", "el")
     assert [(e.field, e.low, e.high) for e in encoder.ranges][:2] == [("position[az]", 0, 1), ("position[el]", 2, 3)]
+
+
+@pytest.mark.parametrize(
+    ("lost", "count", "times"),
+    [
+        (np.s_[:, [1, 3]], 0, None),  # channels that the source never had
+        (np.s_[17:20, 0], 3, (0.17, 0.19)),
+        (np.s_[:15_000, 1], 15_000, (0.0, 149.99)),  # in many blocks, before the channel comes
+        (np.s_[15_000:, 1], 5_000, (150.0, 199.99)),
+        (np.s_[:, :], 20_000, (0.0, 199.99)),  # nothing is left
+    ],
+)
+def test_a_channel_without_any_reading_is_no_loss(
+    tmp_path: Path, lost: tuple[slice, list[int]], count: int, times: tuple[float, float] | None
+) -> None:
+    t, wrench = np.arange(20_000) * 10_000_000, np.random.default_rng(1).normal(0.0, 1.0, (20_000, 6))
+    wrench[10_000, 5] = 1e3  # a single sample off its neighbours
+    wrench[lost] = np.nan
+    write_mcap(tmp_path / "a.mcap", [OutStream("/wrench", "wrench", t, t, wrench)])
+    found = inspect_recording(tmp_path / "a.mcap")
+    told = [(one.count, (one.start_s, one.end_s)) for one in found.losses if one.kind == "non-finite"]
+    assert told == ([(count, pytest.approx(times))] if times else [])
+    assert times or [(one.kind, one.where) for one in found.losses] == [("spike", "/wrench, wrench.torque.z")]
+    said = [line.split()[-2:] for line in describe_inspection(found) if "wrench.torque.x" in line]
+    assert (said == [["no", "reading"]]) == np.isnan(wrench[:, 3]).all()
 
 
 def test_a_clock_that_was_set_is_told_as_processing_tells_it(tmp_path: Path) -> None:

@@ -39,6 +39,8 @@ def told(name: str, folder: Path) -> None:
     notice, *_ = found.notices()
     assert (notice.severity, found.soundness.calibrated) == ("error", False)
     assert any(one.startswith(name) for one in found.soundness.suggestions), found.soundness
+    cause, _, symptoms = notice.what.removeprefix("the model of this rig is wrong: ").partition(". This explains it: ")
+    assert cause == "; or ".join(found.soundness.suggestions) and symptoms == "; ".join(found.soundness.reasons)
 
 
 @pytest.mark.slow

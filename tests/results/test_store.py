@@ -441,6 +441,24 @@ def test_a_folder_with_results_of_something_else_is_not_replaced(tmp_path: Path)
     assert content(target) == {MARKER: '{"other": 1}', "src/a.py": "x"}
 
 
+@pytest.mark.parametrize(
+    ("before", "after"), list(itertools.permutations(("campaign.toml", "predicted.mcap", MARKER), 2))
+)
+def test_only_its_own_kind_is_replaced(tmp_path: Path, before: str, after: str) -> None:
+    target = tmp_path / "A"
+
+    def make(kind: str) -> None:
+        with writing(target, kind) as folder:
+            (folder / kind).write_text(kind)
+            (folder / "provenance.json").write_text(kind)
+
+    make(before)
+    with pytest.raises(OutputError, match=f"as something else .no {after}.: nothing was changed"):
+        make(after)
+    assert content(target) == {before: before, "provenance.json": before} and leftovers(target) == []
+    make(before)
+
+
 def test_what_stands_beside_the_results_and_is_the_users_stays(tmp_path: Path) -> None:
     target = tmp_path / "A"
     for name in (".A.old", ".A.new-photos", ".A.new-abcdefgh"):

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 @campaign_argument
 @output_option("results/NAME")
 @pdf_option
-@check_option("a requirement is not met, or undecided")
+@check_option("a requirement is not met, or undecided, or a recording has losses")
 @click.option(
     "--diagnose/--no-diagnose",
     "why",
@@ -72,7 +72,7 @@ def process(campaign: str, output: Path | None, pdf: bool | None, check: bool, w
     except KeyboardInterrupt:
         complain("interrupted: the report is written, a new diagnosis is not")
         sys.exit(INTERRUPTED)
-    if check and outcome.requirement_met is False:
+    if check and outcome.failed:
         sys.exit(NOT_MET)
 
 
@@ -101,7 +101,6 @@ def validate(campaign: str, check: bool, quiet: bool) -> None:
     """Check CAMPAIGN's description, read all its recordings through, and fit gravity to them.
 
     Exits with 0 if all is well or can be processed, with 2 if something cannot be read, or processing would refuse it.
-    What can be processed may hold losses or a wrong model of the rig: scripts give --check, and get 1 for these.
     """
     from kbs_process.campaign.load import load_campaign
     from kbs_process.campaign.locate import find_campaign

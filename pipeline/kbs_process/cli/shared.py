@@ -142,9 +142,9 @@ def verb(
 
 
 def conclude(outcome: Outcome | Iterable[str], *, check: bool = False) -> None:
-    """Print what a study tells, and end with the status of a requirement that is not met if `check` asks for it."""
+    """Print what a study tells, and end with the status of what failed if `check` asks for it."""
     from kbs_process.results.outcome import Outcome
 
     say(*(outcome.lines if isinstance(outcome, Outcome) else outcome))
-    if check and isinstance(outcome, Outcome) and outcome.requirement_met is False:
+    if check and isinstance(outcome, Outcome) and outcome.failed:
         sys.exit(NOT_MET)

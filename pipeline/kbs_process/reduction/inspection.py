@@ -101,11 +101,13 @@ class _Gathered:
         )
 
     def add(self, block: Block) -> None:
+        if not self.count:  # what begins without a reading is not judged, or nothing else would be
+            self._silent = np.logical_and.reduce(np.isnan(block.values), axis=0)
         first, last = int(block.stamp.min()), int(block.stamp.max())
         self.start = first if self.start is None else min(self.start, first)
         self.end = last if self.end is None else max(self.end, last)
         self.count += len(block)
-        self._judge(Block(block.stamp, block.log, block.values[:, self._read]))
+        self._judge(Block(block.stamp, block.log, np.where(self._silent, 0.0, block.values)[:, self._read]))
         if block.values.shape[1]:
             finite = np.isfinite(block.values)
             self.not_finite += len(block) - finite.sum(axis=0)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
+import re
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Sequence
 
 from kbs_process.campaign.config import RecordingEntry
@@ -25,23 +26,26 @@ def lost(entry: RecordingEntry, losses: Sequence[Loss]) -> Iterable[Notice]:
 
 
 def _extent(losses: Sequence[Loss], file: str) -> str:
-    """How many, and from when to when: "3, between 12.0 s and 14.2 s".
+    """How many of what, and from when to when: "3 of wrench, 1 of encoder, between 12.0 s and 14.2 s".
 
     What the reader of the file found and a stage behind it found again counts once.
     """
-    by_reader = sum(max(loss.count, 1) for loss in losses if loss.where.startswith(file))
-    behind_it = sum(max(loss.count, 1) for loss in losses if not loss.where.startswith(file))
-    count = str(max(by_reader, behind_it))
+    by_reader, behind_it = Counter[str](), Counter[str]()
+    for loss in losses:
+        stream = "" if loss.where == file else re.split("[:,] ", loss.where)[-1]
+        found = by_reader if loss.where.startswith(file) else behind_it
+        found["encoder" if stream == "angle" else stream] += max(loss.count, 1)
+    told = max(behind_it, by_reader, key=Counter.total)
+    count = ", ".join(f"{many} of {stream}" if stream else f"{many}" for stream, many in told.items())
     starts = [loss.start_s for loss in losses if loss.start_s is not None]
     ends = [loss.end_s for loss in losses if loss.end_s is not None]
     if not starts:
         return count
     first, last = min(starts), max([*ends, *starts])
-    if {loss.kind for loss in losses} == {
-        TRUNCATED
-    }:  # how long it would have been, a file that breaks off does not say
+    if losses[0].kind == TRUNCATED:  # how long it would have been, a file that breaks off does not say
         return f"{count}, from {first:.1f} s on"
-    return f"{count}, between {first:.1f} s and {last:.1f} s" if last > first else f"{count}, at {first:.1f} s"
+    start, end = f"{first:.1f} s", f"{last:.1f} s"
+    return f"{count}, at {start}" if start == end else f"{count}, between {start} and {end}"
 
 
 def in_words(loss: Loss) -> str:

@@ -55,6 +55,10 @@ RATED = 1.1  # times: angles that change by more, or by less than its inverse, d
 _SCALE = "clock: the times of all streams run too fast or too slow, or rates are in another unit"
 _STUCK = "encoder: it is not read, or does not turn with its joint"
 _LATE = "clock: the wrench is {:+.2g} s late, by its timestamps or a filter"
+_UNEXPLAINED = (
+    "no single simple fault (gain, unit, sign, axis, zero, swapped channels, one number) explains it: look for what "
+    "else pulls or rubs, and compare the parameter files with the rig"
+)
 _LIKE = 0.03  # relative: a gain this near to a unit's factor is that unit's
 _SHOWN = 6
 _TURN = 72  # angles of a turn
@@ -92,10 +96,11 @@ class Checked:
     def notices(self) -> Iterator[Notice]:
         """What comes first in every report, if the model is wrong."""
         if not self.soundness.sound:
+            cause = "; or ".join(self.soundness.suggestions)
             yield Notice(
                 severity="error",
-                what=f"{WRONG}: {'; '.join(self.soundness.reasons)}",
-                remedy=_remedy(self.soundness.suggestions),
+                what=f"{WRONG}: {cause and f'{cause}. This explains it: '}{'; '.join(self.soundness.reasons)}",
+                remedy="correct it and process again" if cause else _UNEXPLAINED,
             )
         if self.mute:
             yield Notice(
@@ -112,15 +117,6 @@ class Checked:
                     remedy="what lies there is not judged: record anew, faster, without filter or gaps, correct what "
                     "is stated, or judge a lower band",
                 )
-
-
-def _remedy(suggestions: Sequence[str]) -> str:
-    if not suggestions:
-        return (
-            "no single simple fault (gain, unit, sign, axis, zero, swapped channels, one number) explains it: look for "
-            "what else pulls or rubs, and compare the parameter files with the rig"
-        )
-    return f"this explains it: {'; or '.join(suggestions)}. Correct it and process again"
 
 
 def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: GravityModel, progress: Progress) -> Checked:
@@ -411,10 +407,8 @@ def _paces(run: Run, cycle: float) -> Iterator[tuple[str, Array, Array]]:
 
 def _far(beyond: Sequence[Moved], probability: float) -> Iterator[str]:
     for one in beyond[:_SHOWN]:
-        yield (
-            f"{one.name} is {one.value:.4g} by the fit, {one.prior:.4g} +- {one.prior_sigma:.2g} by what is stated: "
-            f"{abs(one.distance):.1f} sigma"
-        )
+        known = f"{one.prior:.4g} +- {one.prior_sigma:.2g} by what is known"
+        yield f"{one.name} is {one.value:.4g} by the fit, {known}: {abs(one.distance):.1f} sigma"
     if len(beyond) > _SHOWN:
         yield f"{len(beyond) - _SHOWN} other numbers are as far off"
     if probability < BY_CHANCE and not beyond:

@@ -13,6 +13,12 @@ class Outcome:
     verdict_lines: tuple[str, ...]
     requirement_met: bool | None  # None: there is no requirement; one that is undecided is not met
     report: Path
+    lossy: bool = False  # whether a recording lacks something
+
+    @property
+    def failed(self) -> bool:
+        """Whether --check gives exit status 1."""
+        return self.requirement_met is False or self.lossy
 
     @property
     def lines(self) -> tuple[str, ...]:

@@ -8,8 +8,9 @@ A process that is killed leaves some of them behind; the next one that holds the
 locked is none, cleans up.
 
 In every folder of results lies a list of the files that were written, each with its SHA-256 (`sha256sum -c` reads it).
-What it does not prove to be of this program is the user's: it is kept, or nothing is written. No link is followed,
-save that T itself may be one: then all of this happens where it leads.
+What it does not prove to be of this program is the user's: it is kept, or nothing is written. A folder is replaced by
+its own kind only, results by results, told by one file that each of a kind has. No link is followed, save that T itself
+may be one: then all of this happens where it leads.
 """
 
 from __future__ import annotations
@@ -49,16 +50,17 @@ _REFUSED = {
 
 
 @contextmanager
-def writing(target: Path) -> Iterator[Path]:
+def writing(target: Path, made: str = RESULTS) -> Iterator[Path]:
     """Yield an empty private folder that replaces `target`, whole, when the block ends well.
 
-    Until then, and whenever the block fails or the process dies, `target` stays as it was. Files in it that this
-    program did not write move into the new folder.
+    `made` is a file that every folder of its kind has: none of another kind is replaced. Until then, and whenever the
+    block fails or the process dies, `target` stays as it was. Files in it that this program did not write move into the
+    new folder.
 
     Raises OutputError if the place cannot be written, is full, holds something else, or is being written; or if a file
     was changed since it was written here.
     """
-    with _replacing(target) as private:
+    with _replacing(target, made) as private:
         yield private
 
 
@@ -70,13 +72,13 @@ def revising(target: Path, *, without: Collection[str] = ()) -> Iterator[Path]:
     """
     if not (target / RESULTS).is_file():
         raise OutputError(f"holds no results (no {RESULTS})", where=str(target), remedy="process the campaign first")
-    with _replacing(target, revised=without) as private:
+    with _replacing(target, RESULTS, revised=without) as private:
         link_tree(target, private, without={*without, LIST})
         yield private
 
 
 @contextmanager
-def _replacing(target: Path, *, revised: Collection[str] | None = None) -> Iterator[Path]:
+def _replacing(target: Path, made: str, *, revised: Collection[str] | None = None) -> Iterator[Path]:
     """Yield the private folder of `target`, which, where it is `revised`, may be of before such lists.
 
     Then those entries of it are taken for this program's.
@@ -85,7 +87,7 @@ def _replacing(target: Path, *, revised: Collection[str] | None = None) -> Itera
         target = Path(os.path.realpath(target))
         with _locked(target):
             _recover(target)
-            users = _files_of_the_user(target, revised=revised)
+            users = _files_of_the_user(target, made, revised=revised)
             # Named before it is made: an interrupt while it is being made leaves nothing either.
             private = target.parent / f".{target.name}.new-{secrets.token_hex(4)}"
             try:
@@ -207,17 +209,18 @@ def _is_ours(folder: Path) -> bool:
     return folder.is_dir() and not folder.is_symlink() and (folder / LIST).is_file()
 
 
-def _files_of_the_user(target: Path, *, revised: Collection[str] | None) -> list[str]:
+def _files_of_the_user(target: Path, made: str, *, revised: Collection[str] | None) -> list[str]:
     """Return the files in the folder that this program did not write; refuse one that it cannot replace."""
     if not target.exists():
         return []
-    if not target.is_dir() or (any(target.iterdir()) and not _is_ours(target) and revised is None):
-        raise OutputError(
-            f"is there already, and kbs-process did not make it (no {LIST})",
-            where=str(target),
-            remedy="name a new or an empty folder with --output",
-        )
     written = {name: digest for digest, name in _listed(target)}
+    theirs = not target.is_dir() or (any(target.iterdir()) and not _is_ours(target) and revised is None)
+    if theirs or (written and made not in {*written, *_files(target)}):
+        raise OutputError(
+            f"is there already, and kbs-process did not make it, or as something else (no {made}): nothing was changed",
+            where=str(target),
+            remedy="name a new or an empty folder",
+        )
     users = []
     for name in _files(target):
         if name not in written:
@@ -259,7 +262,7 @@ def _listed(folder: Path) -> list[tuple[str, str]]:
     """Return digest and name of each file in a folder's list."""
     try:
         lines = (folder / LIST).read_text(encoding="utf-8", errors="replace").splitlines()
-    except FileNotFoundError:
+    except (FileNotFoundError, NotADirectoryError):
         return []
     return [(digest, name) for digest, _, name in (line.partition("  ") for line in lines)]
 

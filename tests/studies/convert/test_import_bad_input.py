@@ -18,6 +18,7 @@ from kbs_process.campaign.units import agree
 from kbs_process.errors import ConfigError, KbsError, OutputError, RecordingError
 from kbs_process.recordings import isolated
 from kbs_process.reduction.commands import read_commands
+from kbs_process.results.store import LIST
 from kbs_process.studies.convert.clock import nanoseconds
 from kbs_process.studies.convert.describe import describe
 from kbs_process.studies.convert.mapping_file import Time
@@ -176,8 +177,16 @@ def test_a_folder_with_something_in_it_is_left_alone(tmp_path: Path) -> None:
     write_csv(tmp_path / "run.csv", signals(20))
     folder = _import(tmp_path, "run.csv")
     before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    _import(tmp_path, "run.csv")  # nobody touched what is replaced
+    assert before == {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    before[folder / "campaign.toml"] += b"# mine"
+    (folder / "campaign.toml").write_bytes(before[folder / "campaign.toml"])
+    with pytest.raises(OutputError, match="was changed since kbs-process wrote it"):
+        _import(tmp_path, "run.csv")
+    (folder / LIST).unlink()
     with pytest.raises(OutputError, match="nothing was changed"):
         _import(tmp_path, "run.csv")
+    del before[folder / LIST]
     assert before == {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 

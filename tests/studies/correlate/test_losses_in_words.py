@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import pytest
 
 from kbs_process.campaign.config import RecordingEntry
-from kbs_process.signals.records import PUT_IN_ORDER, SPIKE, TRUNCATED, Loss
+from kbs_process.signals.records import BLOW, PUT_IN_ORDER, SPIKE, TRUNCATED, Loss
 from kbs_process.studies.correlate import results
 from kbs_process.studies.correlate.notices import lost, spikes
 from kbs_process.studies.validate.run import in_words
@@ -41,6 +41,27 @@ def test_what_was_put_in_order_alone_is_no_warning(also: tuple[str, ...], severi
         losses=listed,
     )  # fmt: skip
     assert [one.kind for one in recording.lost] == list(also)
+
+
+@pytest.mark.parametrize(
+    ("losses", "said"),
+    [
+        ([Loss("gap", f"a: {key}", 10, 12.0, 14.2) for key in ("wrench", "angle")],
+         "gap: 10 of wrench, 10 of encoder, between 12.0 s and 14.2 s"),
+        ([Loss("gap", "a: wrench", 3, t, t + 0.1) for t in (12.0, 14.1)],
+         "gap: 6 of wrench, between 12.0 s and 14.2 s"),
+        ([Loss(BLOW, f"a: wrench, {key}", 1, t, t) for key, t in (("Fz", 35.01), ("Ty", 35.02))],
+         "blow: 1 of Fz, 1 of Ty, at 35.0 s"),
+        ([Loss("crc", "a.mcap", 1, 3.0, 4.0)], "crc: 1, between 3.0 s and 4.0 s"),
+        # Told by the reader and by what comes behind it: once.
+        ([Loss("non-finite", "a.mcap, /w", 5, 3.0, 4.0), Loss("non-finite", "a: wrench", 5)],
+         "non-finite: 5 of wrench, between 3.0 s and 4.0 s"),
+        ([Loss("non-finite", "a.mcap, /w", 5, 3.0, 4.0)], "non-finite: 5 of /w, between 3.0 s and 4.0 s"),
+    ],
+)  # fmt: skip
+def test_what_is_lost_is_counted_by_stream(losses: list[Loss], said: str) -> None:
+    (notice,) = lost(RecordingEntry("a", Path("a.mcap"), "A", "fit", 1, None, None, None), losses)
+    assert notice.what == said
 
 
 def test_single_bad_samples_are_told_with_the_figures_with_and_without_them() -> None:

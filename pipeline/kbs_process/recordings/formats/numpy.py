@@ -5,7 +5,8 @@ In a .npz, which holds several, their names come before: "forces[2]", "run[Fx]".
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,10 +18,18 @@ from kbs_process.recordings.tables import Item, SeriesTable, matrix_of, series_o
 
 def read_numpy(path: Path, _: Text) -> SeriesTable:
     """Open a .npy or .npz file."""
-    data = np.load(path, mmap_mode="r", allow_pickle=False)
+    data = _numbers(partial(np.load, mmap_mode="r", allow_pickle=False), path)
     if isinstance(data, np.ndarray):
         return SeriesTable(path, _columns(data, ""))
-    return SeriesTable(path, (one for name in data.files for one in _columns(data[name], name)))
+    return SeriesTable(path, (one for name in data.files for one in _columns(_numbers(data.get, name), name)))
+
+
+def _numbers(load: Callable[..., Any], what: Path | str) -> Any:
+    """Load, without the advice to run what an unknown file says."""
+    try:
+        return load(what)
+    except ValueError:
+        raise ValueError("it holds no numbers that NumPy can read: damaged, or objects") from None
 
 
 def _columns(data: Any, name: str) -> Iterator[Item]:

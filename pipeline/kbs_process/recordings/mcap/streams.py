@@ -14,7 +14,7 @@ from kbs_process.recordings.mcap.framing import MalformedError
 from kbs_process.recordings.mcap.kernels import NO_STAMP, Bytes, Words
 from kbs_process.recordings.mcap.messages.decoders import Decoder, MessageType, message_type
 from kbs_process.recordings.mcap.messages.fields import Elements, Step, resolve
-from kbs_process.signals.records import Block, Loss, Stamps
+from kbs_process.signals.records import Array, Block, Loss, Mask, Stamps
 
 CHOOSE = "several publishers bring the topic: choose one by its `channel` in campaign.toml"
 RETURNS = 2  # to a channel that was left for another of the same topic: there are two publishers
@@ -31,7 +31,7 @@ class Stream:
     fields: tuple[str, ...]
     otherwise: str = ""  # what to do where no message has one of the elements that fields name
     channel: int | None = None  # number of the one channel of the topic that is wanted; None: all
-    lenient: bool = False  # a message without an element that fields name is a loss, and never an error
+    lenient: bool = False  # a message without an element that fields name is a loss, never an error; see `_never`
 
 
 @dataclass(slots=True, eq=False)
@@ -127,7 +127,8 @@ class Reading:
         self.stream = stream
         self._container = container
         self._plans: dict[int, _Plan] = {}
-        self._tally = Tally()
+        self._tally, self._read = Tally(), Tally()  # what is lost, and of messages all that came
+        self._heard = np.full(len(stream.fields), not stream.lenient)  # fields that had a reading, or must have
         self._where = f"{container.path.name}, {stream.topic}"
         self._turns = _Turns()
 
@@ -161,7 +162,7 @@ class Reading:
         seconds = self._container.seconds
         for kind, count in self._tally.counts.items():
             first, last = self._tally.spans[kind]
-            yield Loss(kind, self._where, count, seconds(first), seconds(last), self._tally.details[kind])
+            yield Loss(kind, self._where, count, seconds(first), seconds(last), self._tally.details.get(kind, ""))
 
     def _decode(self, channel: Described, segment: Segment) -> tuple[Stamps, Block]:
         places = segment.places(channel.number)
@@ -182,15 +183,26 @@ class Reading:
             otherwise = CHOOSE if several else self.stream.otherwise
             _require_names(plan, decoded.present.tolist(), payload, self._where, otherwise)
         stamped = stamp != NO_STAMP
-        if decoded.flawless and stamped.all():
+        if decoded.flawless and stamped.all() and not self.stream.lenient:
             return places, Block(stamp, log, values)
         self._tally.add("missing field", log[lacking])
         self._tally.add("undecodable", log[~good], decoded.reason)
         self._tally.add("no valid stamp", log[good & ~stamped], _NO_STAMP)
         kept = good & stamped
-        bad = kept & ~lacking & ~np.isfinite(np.where(good[:, None], values, 0.0)).all(axis=1)
-        self._tally.add("non-finite", log[bad])
+        read = kept & ~lacking
+        bad: Mask = ~np.logical_and.reduce(np.isfinite(values[read]) | self._never(values[read], log[read]), axis=1)
+        self._tally.add("non-finite", log[read][bad])
         return places[kept], Block(stamp[kept], log[kept], values[kept])
+
+    def _never(self, values: Array, log: Stamps) -> Mask:
+        """Which fields of a listing have had no reading so far, if others have: they lack nothing."""
+        heard = self._heard | ~np.isnan(values).all(axis=0)
+        if (heard & ~self._heard).any() and self._read.counts:  # it was missing in all that came before
+            self._tally.counts |= self._read.counts
+            self._tally.spans |= self._read.spans
+        self._heard = heard
+        self._read.add("non-finite", log)
+        return ~heard & heard.any()
 
     def _plan(self, channel: Described, samples: Iterator[bytes]) -> _Plan:
         kind = type_of(channel, samples, self._where)

@@ -11,7 +11,8 @@ import numpy as np
 from kbs_process.campaign.config import Campaign, Topic
 from kbs_process.campaign.documents import shown
 from kbs_process.campaign.load import load_campaign
-from kbs_process.errors import OutputError, RecordingError, did_you_mean
+from kbs_process.campaign.locate import CAMPAIGN_FILE
+from kbs_process.errors import RecordingError, did_you_mean
 from kbs_process.progress import Progress, SilentProgress
 from kbs_process.recordings.mcap.messages.encoding import JOINT_PARTS, OutStream
 from kbs_process.recordings.mcap.writer import write_pieces
@@ -38,7 +39,7 @@ def import_recordings(
     """Convert source files into a new campaign folder and return it.
 
     `mapping` is the path of a mapping or the name of a preset; `source` the folder of the files that it names,
-    or, where it names one, that file; `target` the folder to make, which must not exist, or be empty. It
+    or, where it names one, that file; `target` the folder to make, which may hold an earlier import. It
     appears whole or not at all. `notice` is given one line for each thing that is wrong with the files but
     not fatal: cells that are no number, time stamps that repeat or go back.
 
@@ -47,9 +48,7 @@ def import_recordings(
     progress = progress or SilentProgress()
     plan = load_mapping(find_mapping(mapping))
     files = _source_files(plan, source)
-    _refuse_occupied(target)
-    with writing(target) as folder:
-        _refuse_occupied(target)  # another import may have ended while this one waited for the lock
+    with writing(target, CAMPAIGN_FILE) as folder:
         campaign = prepare(plan, folder)
         checksums: dict[str, str] = {}
         findings: dict[str, tuple[str, ...]] = {}
@@ -102,15 +101,6 @@ def _is_there(path: Path) -> bool:
         return path.exists()
     except OSError:  # no disk can hold a file of that name
         return False
-
-
-def _refuse_occupied(target: Path) -> None:
-    if target.exists() and not (target.is_dir() and not any(target.iterdir())):
-        raise OutputError(
-            "is there already, and is not empty: nothing was changed",
-            where=shown(target),
-            remedy="name another folder, or move this one away",
-        )
 
 
 def _convert_part(mapping: Mapping, part: Part, path: Path, campaign: Campaign, folder: Path) -> tuple[str, ...]:

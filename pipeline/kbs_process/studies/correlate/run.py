@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import msgspec
@@ -62,7 +63,10 @@ def process(
             found = msgspec.structs.replace(found, transducer=on_transducer and on_transducer.findings)
             serious = sum(notice.severity != "info" for notice in found.warnings)
             more = [f"{count(serious, 'warning')}: see the top of the report"] if serious else []
-            return publish(folder, target, found, DOCUMENT if page else None, pdf, *more)
+            lossy = sum(bool(recording.lost) for recording in found.recordings)
+            more += [f"{count(lossy, 'recording')} with losses"] if lossy else []
+            outcome = publish(folder, target, found, DOCUMENT if page else None, pdf, *more)
+            return replace(outcome, lossy=lossy > 0)
 
 
 def _found(

@@ -41,7 +41,7 @@ def write_prediction(
 
     `kind` is "simulated" or "predicted", `name` says what of; `epoch_ns` is the sensor clock at time zero.
     """
-    with writing(target) as folder:
+    with writing(target, f"{kind}.mcap") as folder:
         tables: dict[str, _Table] = {}
         with ExitStack() as open_tables:
 

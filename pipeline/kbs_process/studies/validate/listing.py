@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from datetime import UTC, datetime
 
@@ -32,7 +33,8 @@ def _topic(topic: TopicInspection) -> Iterator[str]:
     width = max((len(entry.field) for entry in topic.ranges), default=0)
     for entry in topic.ranges:
         bad = f"  {entry.not_finite} not finite" if entry.not_finite else ""
-        yield f"    {entry.field:<{width}}  {entry.low + 0.0:>13.6g} to {entry.high + 0.0:<13.6g}{bad}".rstrip()
+        held = f"{entry.low + 0.0:>13.6g} to {entry.high + 0.0:<13.6g}{bad}".rstrip()
+        yield f"    {entry.field:<{width}}  {'no reading' if math.isnan(entry.low) else held}"
 
 
 def _clock(stamp_ns: int) -> str:
