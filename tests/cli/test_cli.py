@@ -411,7 +411,7 @@ def test_simulate_a_command_file(folder: CampaignFolder, tmp_path: Path) -> None
 def test_an_interrupted_simulation_leaves_the_old_one(folder: CampaignFolder, tmp_path: Path) -> None:
     target = tmp_path / "simulated"
     with writing(target) as private:
-        (private / "provenance.json").write_text("old")
+        (private / "simulated.mcap").write_text("old")
     (tmp_path / "long.csv").write_text("t,az,el\n0,0,1.3\n1,0,1.3\n20000,0,1.31\n")
     command = [sys.executable, "-m", "kbs_process", "simulate", str(folder.path), "-o", str(target)]
     process = subprocess.Popen(
@@ -425,7 +425,7 @@ def test_an_interrupted_simulation_leaves_the_old_one(folder: CampaignFolder, tm
     _, message = process.communicate(timeout=120)
     assert process.returncode == 130, message
     assert "interrupted" in message
-    assert (target / "provenance.json").read_text() == "old"
+    assert (target / "simulated.mcap").read_text() == "old"
     assert not list(tmp_path.glob(".simulated.new-*"))
 
 

@@ -53,6 +53,7 @@ LEFT = 0.1  # of the weight, and of the torque that it can make: a calibration l
 UNLIKE = 3.0  # times less noise than is stated, or more, however well it is known
 RATED = 1.1  # times: angles that change by more, or by less than its inverse, do not follow their rates
 _SCALE = "clock: the times of all streams run too fast or too slow, or rates are in another unit"
+_TOLD = 1e-3  # rad: a joint that commands move by less rests
 _STUCK = "encoder: it is not read, or does not turn with its joint"
 _LATE = "clock: the wrench is {:+.2g} s late, by its timestamps or a filter"
 _UNEXPLAINED = (
@@ -296,7 +297,8 @@ def stuck(recordings: Sequence[Prepared], instants: Sequence[Instants], model: G
     """Turning joints whose angle stands still, while the load changes as it would if they turned.
 
     What gravity leaves (n, c), over the noise, is far more than in other recordings, is such as a turn of the joint
-    changes, and a good part of that: a blow is less, and what pulls or pushes has a force.
+    changes, and a good part of that: a blow is less, and what pulls or pushes has a force. A joint that was told to
+    rest does.
     """
     equation, rig = model.equation, model.rig
     channels = rig.transducer.channels
@@ -310,7 +312,7 @@ def stuck(recordings: Sequence[Prepared], instants: Sequence[Instants], model: G
         least = BEYOND**2 * max((x for name, x in elsewhere.items() if name != one.entry.name), default=0.0)
         for j, joint in enumerate(rig.joints):
             moved = np.ptp(data.q[:, j]) > gravity.STILL * max(float(data.sigma_q[:, j].max()), 1e-6)
-            if moved or joint.type != "revolute" or power <= least:
+            if moved or _rests(joint.name, one.run) or joint.type != "revolute" or power <= least:
                 continue
             poses = np.tile(data.q.mean(axis=0) - encoder_offsets(rig), (_TURN, 1))
             poses[:, j] += 2.0 * np.pi * np.arange(_TURN) / _TURN
@@ -321,6 +323,12 @@ def stuck(recordings: Sequence[Prepared], instants: Sequence[Instants], model: G
             within = LEFT**2 * _power(turned) < power <= float(np.max(np.sum(turned**2, axis=1)))
             if within and _power(left - left @ along.T @ along) < TAKEN * power:
                 yield f"the angle of {joint.name} is still in {one.entry.name}, and the load changes as if it turned"
+
+
+def _rests(joint: str, run: Run) -> bool:
+    """Whether commands say that a joint does not turn."""
+    told = commanded(run)
+    return told is not None and joint in told.channels and bool(np.ptp(told.column(joint)) < _TOLD)
 
 
 def _power(x: Array) -> float:
