@@ -65,6 +65,11 @@ def judged_channels(requirement: Requirement, rig: Rig) -> tuple[str, ...]:
     return channels
 
 
+def needed_channels(requirement: Requirement, rig: Rig) -> tuple[str, ...]:
+    """Return the channels of the wrench that a requirement's figure is made of: at the spacecraft, all."""
+    return WRENCH_CHANNELS if requirement.frame == "S" else judged_channels(requirement, rig)
+
+
 def unrecorded(requirement: Requirement, rig: Rig) -> Iterator[Doubt]:
     """Yield a doubt where axes of a requirement are not recorded: every axis must meet it."""
     judged = judged_channels(requirement, rig)
@@ -77,9 +82,7 @@ def hidden(
     campaign: Campaign, requirement: Requirement, name: str, run: Run, moving: Mask, streams: Mapping[str, Readings]
 ) -> Iterator[Doubt]:
     """Yield what a recording's samples cannot show of a requirement; `moving` (n,): where its angles are known."""
-    rig, edge = campaign.rig, requirement.band[1]
-    judged = judged_channels(requirement, rig)
-    channels = WRENCH_CHANNELS if requirement.frame == "S" else judged
+    edge, channels = requirement.band[1], needed_channels(requirement, campaign.rig)
     needed = edge / SHOWN
     for key, readings in streams.items():
         share, rate = readings.slow(needed, at_rest=key == "angle")

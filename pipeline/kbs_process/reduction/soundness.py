@@ -204,13 +204,13 @@ def unlike_stated(requirement: Requirement, rig: Rig, recordings: Sequence[Prepa
     Noise is more where it is so up to half the sampling rate, and from sample to sample.
     """
     own, stated, amplifier = rig.transducer.channels, noisy(rig), rig.transducer.amplifier
-    judged = own if requirement.frame == "S" else measurable.judged_channels(requirement, rig)
+    judged = measurable.needed_channels(requirement, rig)
     near = min(2.0**OCTAVES * requirement.band[1], np.inf if amplifier is None else float(amplifier.corner))
     index = rig.loads.index(own)
     reads = np.eye(len(index)) + rig.transducer.cross_coupling.value[np.ix_(index, index)]
     noise = np.array([stated.get(channel, np.nan) if channel in judged else np.nan for channel in own])
     sigma = rig.transducer.noise.sigma[index]
-    factor = np.maximum(UNLIKE, np.exp(BEYOND * sigma / noise))
+    factor = np.maximum(UNLIKE, np.exp(np.minimum(BEYOND * sigma / noise, 100.0)))  # beyond, nothing is known
     for one in recordings:
         if (spectrum := one.run.spectrum) is None:
             continue
@@ -235,7 +235,7 @@ def copied(requirement: Requirement, rig: Rig, recordings: Sequence[Prepared]) -
     Recordings that are the same throughout, motion and all, are one: `told_copies` tells of that.
     """
     own, watched = rig.transducer.channels, noisy(rig)
-    judged = own if requirement.frame == "S" else measurable.judged_channels(requirement, rig)
+    judged = measurable.needed_channels(requirement, rig)
     for one, other in combinations_with_replacement(recordings, 2):
         if {one.entry.role, other.entry.role} == {"calibration"} or (one is not other and _same(one, other)):
             continue
