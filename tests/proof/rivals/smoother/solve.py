@@ -54,6 +54,8 @@ def solve(folder: Path) -> Answer:
             break
         finds.append(_claim(best, scored))
         known.append(best.candidate)
+        own = _suspect(best.candidate)
+        chosen = [one for one in chosen if _suspect(one) != own]  # another shape of it is no second effect
     moved = _moved(fitted, state)
     return Answer(
         method=METHOD,
