@@ -44,7 +44,7 @@ from kbs_process.stages.conventions import (
 from kbs_process.stages.gravity import model as gravity
 from kbs_process.stages.gravity.equation import Equation, encoder_offsets
 from kbs_process.stages.gravity.equation import Prepared as Instants
-from kbs_process.stages.gravity.hypotheses import Explained, explanations
+from kbs_process.stages.gravity.hypotheses import Explained, explanations, shown_gains
 from kbs_process.stages.gravity.model import GravityModel, Sample, prepared
 from kbs_process.stages.gravity.tension import BY_CHANCE, TAKEN, Moved, lag, tension
 from kbs_process.stages.repeats import commanded, copies, motion_of
@@ -84,6 +84,7 @@ class Checked:
     conventions: tuple[SignCheck, ...]
     hidden: Mapping[str, tuple[Doubt, ...]]  # by requirement, what the samples cannot show
     rounding: Mapping[str, float]  # by channel, of readings that are coarser than stated
+    noise: Mapping[str, Mapping[str, float]]  # of a sample, rms, by recording and channel, as measured
     mute: tuple[str, ...]  # channels that are judged, and that no recording shows to respond
 
     def doubts(self, requirement: Requirement) -> tuple[Doubt, ...]:
@@ -139,6 +140,11 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
         found = tension(model, {sample.name: taring for sample, taring in tared}, [one for one in lags if one])
         most = _most(equation)
         rounding = {key: x for one in recordings for key, x in measurable.rounding(campaign, one.readings).items()}
+        own = model.rig.transducer.channels
+        noise = {
+            one.entry.name: dict(zip(own, measured_noise(model.rig, one)[1].tolist(), strict=True))
+            for one in recordings
+        }
         hidden = {one.name: tuple(_hidden(campaign, one, recordings, model)) for one in campaign.requirements}
         timed = tuple(mistimed(campaign, recordings))
         still = tuple(stuck(recordings, instants, model))
@@ -152,7 +158,8 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
         )
         judged = {key for one in campaign.requirements for key in measurable.judged_channels(one, campaign.rig)}
         mute = tuple(key for key in _mute(equation, [read for read, _, _ in shown]) if key in judged)
-        soundness = Soundness(probability=found.probability)
+        gains = shown_gains(equation, instants)
+        soundness = Soundness(probability=found.probability, gains=gains)
         tests = [one.entry.name for one in recordings if one.entry.role != "calibration"]
         if reasons:
             shifted = [one for one in found.beyond if one in lags]
@@ -163,6 +170,7 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
             soundness = Soundness(
                 sound=False,
                 probability=found.probability,
+                gains=gains,
                 beyond=tuple(_beyond(one, model) for one in found.beyond),
                 reasons=reasons,
                 suggestions=tuple(told),
@@ -173,7 +181,7 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
                     for one in conventions
                 ),
             )
-        return Checked(soundness, conventions, hidden, rounding, mute)
+        return Checked(soundness, conventions, hidden, rounding, noise, mute)
 
 
 def _hidden(

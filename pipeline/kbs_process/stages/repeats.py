@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
+import itertools
 from collections.abc import Sequence
 
 import numpy as np
@@ -44,17 +44,13 @@ def commanded(run: Run) -> Signal | None:
 def copies(runs: Sequence[Run]) -> dict[int, int]:
     """Return which of the runs have the readings of one before them, or begin with them, and of which."""
     found: dict[int, int] = {}
-    begun: dict[bytes, list[int]] = defaultdict(list)  # by their first readings
-    for second, other in enumerate(runs):
-        b = other.loads
-        if b is None or not len(b):
+    for (first, one), (second, other) in itertools.combinations(enumerate(runs), 2):
+        a, b = one.loads, other.loads
+        if a is None or b is None:
             continue
-        for first in begun[b.values[0].tobytes()]:
-            a = runs[first].loads
-            both = 0 if a is None else min(len(a), len(b)) - (END if len(a) != len(b) else 0)
-            if a is not None and both > 0 and np.array_equal(a.values[:both], b.values[:both]):
-                found.setdefault(second, first)
-        begun[b.values[0].tobytes()].append(second)
+        both = min(len(a), len(b)) - (END if len(a) != len(b) else 0)
+        if both > 0 and np.array_equal(a.values[:both], b.values[:both]):
+            found.setdefault(second, first)
     return found
 
 

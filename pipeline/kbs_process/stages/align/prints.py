@@ -43,8 +43,6 @@ class Prints:
         words ^= words >> np.uint64(29)
         words *= _FACTOR
         few = np.flatnonzero(words <= (self.words.max() if len(self.words) == KEPT else ~np.uint64(0)))
-        if not len(few):
-            return
         old, words = len(self.words), np.concatenate([self.words, words[few]])
         order = np.argsort(words, kind="stable")
         no_third = np.ones(len(order), dtype=np.bool_)

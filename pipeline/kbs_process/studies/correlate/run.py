@@ -26,6 +26,7 @@ from kbs_process.stages import decouple
 from kbs_process.stages.decouple import Decoupling
 from kbs_process.stages.gravity.model import GravityModel
 from kbs_process.studies.correlate.earlier_diagnosis import keep_diagnosis
+from kbs_process.studies.correlate.left_out import with_left_out
 from kbs_process.studies.correlate.notices import has_spikes, spikes, unclear
 from kbs_process.studies.correlate.output import write_tables
 from kbs_process.studies.correlate.results import Results
@@ -53,6 +54,7 @@ def process(
             found = msgspec.structs.replace(
                 found, warnings=(*told, *found.warnings), requirements=judged, verdict=conclusion(judged)
             )
+        found = with_left_out(campaign, found, analyses, model, decoupling, progress)
         with progress.task("Following the transducer's resonance") as task:
             on_transducer = study(campaign, analyses, model.rig, task.update)
         with progress.task("Writing the report"):

@@ -38,7 +38,7 @@ def summarise(
     stated = statements(bands_of(campaign.bands), runs)
     repeated = tuple(repeatabilities(runs))
     modes = resonances(campaign, runs, model)
-    budget = tuple(budgets(campaign, runs, model, decoupling, stated, repeated, modes))
+    budget = tuple(budgets(campaign, runs, model, decoupling, stated, repeated, modes, checked.noise))
     requirements = tuple(
         judged(campaign, requirement, runs, budget, checked.doubts(requirement), checked.rounding, checked.mute)
         for requirement in campaign.requirements
@@ -77,11 +77,12 @@ def conclusion(requirements: Sequence[Requirement]) -> Conclusion:
     """Return what the worst verdict says, in a sentence."""
     if not requirements:
         return Conclusion(status="none", sentence="The campaign states no requirement.")
-    worst = max(requirements, key=lambda one: ("pass", "undecided", "fail").index(one.verdict))
+    worst = max(requirements, key=lambda one: (("pass", "undecided", "fail").index(one.verdict), one.only_without))
     words = {"pass": "met", "fail": "not met", "undecided": "neither met nor broken within the uncertainty"}
     words["undecided"] = f"undecided: {worst.doubt}" if worst.doubt else words["undecided"]
     value, low, high = (figure or 0.0 for figure in (worst.value, worst.low, worst.high))
     unshown = f" Nothing shows a response of {', '.join(worst.mute)}, only noise." if worst.mute else ""
+    axes = ", ".join(worst.axes)
     least = f"{low:.4f}" if low > 0.0 else "0"
     sentence = (
         f"{worst.name}: {words[worst.verdict]}. {worst.statistic.capitalize()} {value:.4f} {worst.unit} "
@@ -89,6 +90,8 @@ def conclusion(requirements: Sequence[Requirement]) -> Conclusion:
         f"{worst.band_Hz[0] or 0:g} to {worst.band_Hz[1] or 0:g} Hz; limit {worst.limit:g} {worst.unit}"
         f"{'' if worst.lever_m is None else f', {worst.lever_m:.3g} m from the transducer'}."
         f"{unshown if worst.verdict == 'pass' else ''}"
+        f"{f' Judged on {axes} alone, as the requirement says.' if len(worst.axes) < 3 else ''}"
+        f"{f' {worst.left_out}' if worst.only_without else ''}"
     )
     return Conclusion(status=worst.verdict, sentence=sentence)
 
