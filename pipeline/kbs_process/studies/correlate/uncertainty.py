@@ -34,7 +34,8 @@ def budgets(
 ) -> Iterable[Budget]:
     """Yield every recording's own budget; where nothing of a recording is known in a band, there is none.
 
-    `noise`: of a sample, rms, by recording and channel, as measured; what is stated counts where it is more.
+    `noise`: of a sample, rms, by recording and channel, as measured; what is stated counts where it is more, and no
+    noise is more than all that is read in the band.
     """
     lowest = min((mode.frequency_Hz for mode in resonances), default=None)
     spacecraft, own = campaign.rig.spacecraft, campaign.rig.frame
@@ -45,10 +46,9 @@ def budgets(
                 continue
             of_band = [entry for entry in repeated if (entry.frame, entry.band) == (own, band.name)]
             repeats = _repeat_noise(of_band, measured.channels, analysis.entry.trajectory)
-            shown = [noise.get(analysis.entry.name, {}).get(channel, 0.0) for channel in measured.channels]
-            sensor = np.fmax(campaign.rig.loads.noise[campaign.rig.loads.index(measured.channels)], shown)
+            shown = np.nan_to_num([noise.get(analysis.entry.name, {}).get(key, 0.0) for key in measured.channels])
             edges = statements[band.name]
-            entries = _entries(campaign, analysis, model, decoupling, band, edges, sensor, repeats, lowest)
+            entries = _entries(campaign, analysis, model, decoupling, band, edges, shown, repeats, lowest)
             frame: Frame = "joint" if own == "joint" else "T"
             yield from _rows(entries, frame, band.name, analysis.entry.name, measured)
             if spacecraft is not None and set(WRENCH_CHANNELS) <= set(measured.channels):
@@ -79,7 +79,10 @@ def _entries(
     rig = campaign.rig
     measured = analysis.pairs[rig.frame, band.name].measured
     limits = passband(band, campaign.bands.working_rate)
-    sensor = budget.sensor_noise(noise, analysis.run.load_rates, bandpass.noise_bandwidth(band, measured.dt))
+    rates, width = analysis.run.load_rates, bandpass.noise_bandwidth(band, measured.dt)
+    most = budget.rms(measured) / budget.sensor_noise(np.ones(len(measured.channels)), rates, width).sigma
+    least = rig.loads.noise[rig.loads.index(measured.channels)]
+    sensor = budget.sensor_noise(np.maximum(least, np.minimum(noise, most)), rates, width)
     late = late_sigma(analysis.run.clocks, rig.transducer.amplifier)
     entries = [
         sensor,
