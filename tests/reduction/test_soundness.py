@@ -158,6 +158,21 @@ def test_a_clock_that_runs_too_fast_is_told_and_nothing_is_judged_by_it(fitted):
 
 
 @pytest.mark.slow
+def test_gravity_shows_a_gain_as_well_as_the_weight_and_its_place_are_known(fitted):
+    campaign, read, model = fitted
+    gains = check_model(campaign, read, model, SilentProgress()).soundness.gains
+    assert gains["Fz"] == pytest.approx(0.02, rel=0.2), "a mass of 5 +- 0.1 kg"
+    assert 0.015 < gains["Ty"] < 0.05 and gains["Tz"] > 1.0
+    read = [replace(one, run=replace(one.run, wrench=_gained(one.run.wrench, 1.03))) for one in read]
+    found = check_model(campaign, read, fit_gravity(campaign, read, SilentProgress()), SilentProgress())
+    assert found.soundness.sound, "which is within two standard deviations"
+
+
+def _gained(wrench, gain):
+    return wrench.derive(wrench.values * np.where(np.arange(6) == 4, gain, 1.0), "gained")
+
+
+@pytest.mark.slow
 def test_an_encoder_that_stands_still_while_its_joint_turns_is_told(fitted):
     campaign, (sweep, test), model = fitted
     (judged,) = campaign.requirements

@@ -87,9 +87,7 @@ class Soundness(Record, frozen=True, kw_only=True):
     beyond: tuple[Beyond, ...] = ()  # the farthest first
     reasons: tuple[str, ...] = ()
     suggestions: tuple[str, ...] = ()  # simple faults, each of which explains the data alone
-    gains: dict[str, float] = msgspec.field(
-        default_factory=dict
-    )  # by channel: relative standard deviation of its gain, by gravity alone
+    gains: dict[str, float] = msgspec.field(default_factory=dict)  # by channel: relative sigma, by gravity alone
     calibrated: bool = True  # the calibrations by themselves agree with what was known
 
 
