@@ -71,7 +71,7 @@ def again(prints: Sequence[Prints], noise: Array) -> dict[tuple[int, int], tuple
     finer, coarser = np.sort([_step(runs[a]), _step(runs[b])], axis=0)
     apart = np.where(coarser - finer < 0.5 * coarser, 2.0 * _ON_GRID, 1.0) * coarser + _STEPS[0]
     least = np.minimum(noise[which[a]], noise[which[b]])
-    same = (np.ptp(runs[a] - runs[b], axis=1) <= apart) & (apart <= least)
+    same = (np.ptp(runs[a] - runs[b], axis=1) <= apart) & (coarser < least)
     found: dict[tuple[int, int], tuple[int, int]] = {}
     for one, other, when in zip(which[a[same]].tolist(), which[b[same]].tolist(), at[b[same]].tolist(), strict=True):
         first, last = found.get((one, other), (when, when))
