@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 
 import msgspec
 import numpy as np
 
-from kbs_process.campaign.config import Campaign
+from kbs_process.campaign.config import Campaign, RecordingEntry
+from kbs_process.errors import KbsError
 from kbs_process.reduction.analysis import Analysis, bands_of, select
 from kbs_process.reduction.judging import judged
 from kbs_process.reduction.pointing import recorded_pointing
@@ -94,6 +96,51 @@ def conclusion(requirements: Sequence[Requirement]) -> Conclusion:
         f"{f' {worst.left_out}' if worst.only_without else ''}"
     )
     return Conclusion(status=worst.verdict, sentence=sentence)
+
+
+def with_left_out(
+    campaign: Campaign,
+    found: results.Results,
+    analyses: Sequence[Analysis],
+    model: GravityModel,
+    decoupling: Decoupling,
+    read: Callable[[RecordingEntry], Analysis],
+) -> results.Results:
+    """Return results whose requirements tell what the campaign leaves out, calibrations and what is cut off.
+
+    They tell what is judged of these recordings by themselves; `read` analyses one that was cut, as a whole.
+    """
+    left = [one for one in analyses if _named(one.entry)]
+    if not left:
+        return found
+    words = f"The campaign leaves out {', '.join(_named(one.entry) for one in left)}."
+    try:
+        every = [replace(one.entry, role="calibration", start=None, end=None) for one in left]
+        whole = [one if one.entry == entry else read(entry) for one, entry in zip(left, every, strict=True)]
+        stated = statements(bands_of(campaign.bands), whole)
+        rows = tuple(budgets(campaign, whole, model, decoupling, stated, found.repeatability, found.resonances, {}))
+        others = [_words(judged(campaign, asked, whole, rows)) for asked in campaign.requirements]
+    except KbsError as error:
+        others = [("undecided", f"By itself that cannot be judged: {error.what}.")] * len(found.requirements)
+    told = [
+        msgspec.structs.replace(one, left_out=f"{words} {what}", only_without=one.verdict == "pass" != verdict)
+        for one, (verdict, what) in zip(found.requirements, others, strict=True)
+    ]
+    return msgspec.structs.replace(found, requirements=tuple(told), verdict=conclusion(told))
+
+
+def _words(one: Requirement) -> tuple[str, str]:
+    """A verdict on what is left out, and the figure."""
+    words = {"pass": "met", "fail": "not met", "undecided": "undecided"}[one.verdict]
+    figure = f"{one.value or 0.0:.4f} {one.unit} ({one.low or 0.0:.4f} to {one.high or 0.0:.4f} at 95 %)"
+    return one.verdict, f"By itself that is {words}: {one.statistic} {figure} on {one.channel} in {one.recording}."
+
+
+def _named(entry: RecordingEntry) -> str:
+    """What the campaign leaves out of a recording; empty where it is judged from beginning to end."""
+    parts = ["(calibration)"] if entry.role == "calibration" else []
+    parts += [f"{which} {at:g} s" for which, at in (("before", entry.start), ("after", entry.end)) if at is not None]
+    return " ".join([entry.name, *parts]) if parts else ""
 
 
 def _recording(analysis: Analysis) -> results.Recording:
