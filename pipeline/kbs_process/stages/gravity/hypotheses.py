@@ -195,7 +195,8 @@ def _linear(equation: Equation, prepared: Sequence[Prepared], about: Array | Non
     about = prior if about is None else about
     base, slopes = [], []
     every = joined(prepared)
-    whole, static = equation.jacobian(about[:size], every).reshape(-1, c, size), equation.predict(about[:size], every)
+    static = equation.predict(about[:size], every)
+    whole = equation.jacobian(about[:size], every).reshape(*static.shape, size)
     ends = np.cumsum([0, *(len(p.q) for p in prepared)])
     for index, p in enumerate(prepared):
         rows = slice(ends[index], ends[index + 1])
