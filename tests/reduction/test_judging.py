@@ -13,7 +13,7 @@ from msgspec.structs import replace as replace_of
 import archived
 from kbs_process.reduction.analysis import Pair
 from kbs_process.reduction.judging import coverage_below, decided, judged
-from kbs_process.results.judged import Budget, Doubt, Requirement
+from kbs_process.results.judged import Budget, BudgetItem, Doubt, Requirement
 from kbs_process.signals.records import WRENCH_CHANNELS, WRENCH_UNITS, Signal
 from kbs_process.stages.bandpass import Band
 from kbs_process.studies.correlate.summary import conclusion
@@ -93,6 +93,24 @@ def test_short_gaps_widen_the_interval_of_their_recording_by_what_a_line_may_err
     assert plain.value == wide.value
     error = (2.0 * np.pi * 0.1) ** 2 / 8.0 * 0.2
     assert plain.sigma == pytest.approx(1e-4) and wide.sigma == pytest.approx(np.hypot(1e-4, error * 0.05))
+
+
+def test_what_is_not_known_of_a_gain_counts_at_the_peak() -> None:
+    campaign, one = archived.campaign("EL089"), recorded("a", 0.05)
+    rms = 0.05 / np.sqrt(100.0)
+    budgets = [
+        replace_of(
+            row,
+            total=float(np.hypot(1e-4, 0.03 * rms)),
+            contributions=(
+                BudgetItem(stage="noise", source="", sigma=1e-4),
+                BudgetItem(stage="cross-coupling", source="", sigma=0.03 * rms, grows=True),
+            ),
+        )
+        for row in stated("a", 0.0)
+    ]
+    found = judged(campaign, campaign.requirements[0], [one], budgets)
+    assert found.sigma == pytest.approx(np.hypot(1e-4, 0.03 * 0.05))
 
 
 def test_what_may_be_a_knock_is_judged_where_both_ways_agree() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -11,6 +12,7 @@ import pytest
 
 import archived
 from kbs_process.campaign.config import Campaign
+from kbs_process.campaign.load import load_campaign
 from kbs_process.progress import SilentProgress
 from kbs_process.reduction.preparing import fit_gravity
 from kbs_process.reduction.soundness import check_model, extent, mistimed, repeated
@@ -155,6 +157,31 @@ def test_a_clock_that_runs_too_fast_is_told_and_nothing_is_judged_by_it(fitted):
     (suggestion,) = found.soundness.suggestions
     assert float(suggestion.removeprefix("clock: all times are ").split()[0]) == pytest.approx(0.5, rel=0.01)
     assert found.doubts(judged)[0].of_failed, "the calibration is wrong as well"
+
+
+@pytest.mark.slow
+def test_gravity_shows_a_gain_as_well_as_the_weight_and_its_place_are_known(fitted):
+    campaign, read, model = fitted
+    gains = check_model(campaign, read, model, SilentProgress()).soundness.gains
+    assert gains["Fz"] == pytest.approx(0.02, rel=0.2), "a mass of 5 +- 0.1 kg"
+    assert 0.015 < gains["Ty"] < 0.05 and gains["Tz"] > 1.0
+    read = [replace(one, run=replace(one.run, wrench=_gained(one.run.wrench, 1.03))) for one in read]
+    found = check_model(campaign, read, fit_gravity(campaign, read, SilentProgress()), SilentProgress())
+    assert found.soundness.sound, "which is within two standard deviations"
+
+
+@pytest.mark.slow
+def test_a_rig_of_which_all_is_exact_shows_its_gains(fitted, tmp_path):
+    described(tmp_path / "exact")
+    rig = tmp_path / "exact" / "rig.toml"
+    rig.write_text(re.sub(r"sigma = (\[.*?\]|[\d.e-]+)", "sigma = 0", rig.read_text()))
+    campaign, read = load_campaign(tmp_path / "exact", checksums=False), fitted[1]
+    gains = check_model(campaign, read, fit_gravity(campaign, read, SilentProgress()), SilentProgress()).soundness.gains
+    assert gains["Fz"] < 0.02 and gains["Tz"] > 1.0
+
+
+def _gained(wrench, gain):
+    return wrench.derive(wrench.values * np.where(np.arange(6) == 4, gain, 1.0), "gained")
 
 
 @pytest.mark.slow

@@ -13,13 +13,14 @@ DrivenBy = Literal["command", "motion"]
 Load = Literal["torque", "force"]
 Frame = Literal["S", "T"]  # at the spacecraft's centre of mass, or at the transducer
 Statistic = Literal["peak", "rms"]
+Axis = Literal["x", "y", "z"]
 PointingStatistic = Literal["random", "bias", "orbit", "percentile"]
 Role = Literal["calibration", "fit", "held-out"]
 
 
 @dataclass(frozen=True, slots=True)
 class Requirement:
-    """A limit on the disturbance; every axis must meet it alone."""
+    """A limit on the disturbance; each of its axes must meet it alone."""
 
     name: str
     quantity: Load
@@ -29,6 +30,12 @@ class Requirement:
     unit: str  # "N m" or "N"
     band: tuple[float, float]  # Hz
     source: str
+    axes: tuple[Axis, ...] = ("x", "y", "z")
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """The channels of a wrench that it is about."""
+        return tuple(("T" if self.quantity == "torque" else "F") + axis for axis in self.axes)
 
 
 @dataclass(frozen=True, slots=True)

@@ -29,6 +29,7 @@ def disturbance(table: RequirementTable, key: Key, document: Document, problems:
         unit=unit,
         band=(low, high),
         source=table.source,
+        axes=tuple(sorted(table.axes or ("x", "y", "z"))),
     )
 
 

@@ -65,21 +65,24 @@ def judged(
     key = (requirement.frame, band.name)
     channels = judged_channels(requirement, campaign.rig)
     pairs = [(analysis.entry.name, analysis.pairs[key]) for analysis in runs]
-    below = coverage_below(requirement.statistic, [pair.measured for _, pair in pairs], band)
-    sigmas = {
-        (entry.recording, entry.channel): float(np.hypot(entry.total, rounding.get(entry.channel, 0.0)))
-        for entry in budgets
-        if (entry.frame, entry.band) == key
-    }
+    signals = [(name, pair.measured) for name, pair in pairs]
+    below = coverage_below(requirement.statistic, [signal for _, signal in signals], band)
+    usual = {(one.recording, one.channel): one.value for one in extremes(signals, channels, "rms")}
+    own = {(one.recording, one.channel): one for one in budgets if (one.frame, one.band) == key}
+
+    def sigma(one: Extreme) -> float:
+        """What a statistic may be wrong by: what grows with the signal is more at a peak than over the recording."""
+        place = one.recording, one.channel
+        crest = max(one.value / usual[place], 1.0) if usual[place] > 0.0 else 1.0
+        grows = sum(item.sigma**2 for item in own[place].contributions if item.grows)
+        return float(np.sqrt(own[place].total ** 2 + (crest**2 - 1.0) * grows + rounding.get(one.channel, 0.0) ** 2))
+
     hides = {analysis.entry.name: bridging_error(analysis.run.gaps, band) for analysis in runs}
     measured = [
         _Candidate(
-            extreme,
-            float(np.hypot(sigmas[extreme.recording, extreme.channel], hides[extreme.recording] * extreme.value)),
-            requirement.limit,
-            below,
+            extreme, float(np.hypot(sigma(extreme), hides[extreme.recording] * extreme.value)), requirement.limit, below
         )
-        for extreme in extremes([(name, pair.measured) for name, pair in pairs], channels, requirement.statistic)
+        for extreme in extremes(signals, channels, requirement.statistic)
     ]
     if not measured:
         raise ConfigError(
@@ -93,13 +96,13 @@ def judged(
     )
     worst = max(measured, key=_Candidate.severity)
     beside = [
-        _Candidate(extreme, sigmas[extreme.recording, extreme.channel], requirement.limit, below)
+        _Candidate(extreme, sigma(extreme), requirement.limit, below)
         for extreme in extremes(
             [(one.entry.name, _beside(one, one.pairs[key].measured, band)) for one in runs],
             channels,
             requirement.statistic,
         )
-        if requirement.statistic == "peak" and (extreme.recording, extreme.channel) in sigmas
+        if requirement.statistic == "peak" and (extreme.recording, extreme.channel) in own
     ]
     doubts = (*doubts, *(_unsure(one, requirement.unit) for one in beside if one.verdict != "pass"))
     doubt = next((one.why for one in doubts if one.of_failed or worst.verdict != "fail"), "")
@@ -130,6 +133,7 @@ def judged(
         ),
         mute=tuple(channel for channel in channels if channel in mute),
         source=requirement.source,
+        axes=requirement.axes,
         lever_m=None
         if campaign.rig.spacecraft is None or requirement.frame != "S"
         else float(np.linalg.norm(campaign.rig.spacecraft.position.value)),

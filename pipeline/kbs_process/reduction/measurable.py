@@ -54,11 +54,10 @@ def judged_channels(requirement: Requirement, rig: Rig) -> tuple[str, ...]:
             where=requirement.name,
             remedy="give [spacecraft] in the parameter files and all six channels, or frame = 'T'",
         )
-    prefix = "T" if requirement.quantity == "torque" else "F"
-    channels = tuple(name for name in measured[requirement.frame] if name.startswith(prefix))
+    channels = tuple(name for name in measured[requirement.frame] if name in requirement.channels)
     if not channels:
         raise ConfigError(
-            f"no {requirement.quantity} was measured in frame {requirement.frame}",
+            f"none of {', '.join(requirement.channels)} was measured in frame {requirement.frame}",
             where=requirement.name,
             remedy=f"state a requirement on what is: {', '.join(measured[requirement.frame])}",
         )
@@ -71,11 +70,11 @@ def needed_channels(requirement: Requirement, rig: Rig) -> tuple[str, ...]:
 
 
 def unrecorded(requirement: Requirement, rig: Rig) -> Iterator[Doubt]:
-    """Yield a doubt where axes of a requirement are not recorded: every axis must meet it."""
-    judged = judged_channels(requirement, rig)
-    lacking = [name for name in WRENCH_CHANNELS if name[0] == judged[0][0] and name not in judged]
+    """Yield a doubt where axes of a requirement are not recorded: each must meet it."""
+    lacking = set(requirement.channels).difference(judged_channels(requirement, rig))
     if lacking:
-        yield Doubt(f"not recorded: {', '.join(lacking)}, and every axis has to meet the limit", of_failed=False)
+        which = "every axis has to meet the limit, unless 'axes' names those that the requirement is about"
+        yield Doubt(f"not recorded: {', '.join(sorted(lacking))}, and {which}", of_failed=False)
 
 
 def hidden(

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations, combinations_with_replacement
+from itertools import combinations
 
 import msgspec
 import numpy as np
@@ -29,7 +29,7 @@ from kbs_process.rig.model import Rig
 from kbs_process.signals.records import WRENCH_CHANNELS, Array, Mask, Run
 from kbs_process.signals.smoothing import smooth
 from kbs_process.stages.align.clocks import late_sigma
-from kbs_process.stages.align.prints import RUN
+from kbs_process.stages.align.prints import Prints, again
 from kbs_process.stages.align.readings import white
 from kbs_process.stages.align.spectrum import OCTAVES, quietest
 from kbs_process.stages.conventions import (
@@ -44,7 +44,7 @@ from kbs_process.stages.conventions import (
 from kbs_process.stages.gravity import model as gravity
 from kbs_process.stages.gravity.equation import Equation, encoder_offsets
 from kbs_process.stages.gravity.equation import Prepared as Instants
-from kbs_process.stages.gravity.hypotheses import Explained, explanations
+from kbs_process.stages.gravity.hypotheses import Explained, explanations, shown_gains
 from kbs_process.stages.gravity.model import GravityModel, Sample, prepared
 from kbs_process.stages.gravity.tension import BY_CHANCE, TAKEN, Moved, lag, tension
 from kbs_process.stages.repeats import commanded, copies, motion_of
@@ -84,6 +84,7 @@ class Checked:
     conventions: tuple[SignCheck, ...]
     hidden: Mapping[str, tuple[Doubt, ...]]  # by requirement, what the samples cannot show
     rounding: Mapping[str, float]  # by channel, of readings that are coarser than stated
+    noise: Mapping[str, Mapping[str, float]]  # of a sample, rms, by recording and channel, as measured
     mute: tuple[str, ...]  # channels that are judged, and that no recording shows to respond
 
     def doubts(self, requirement: Requirement) -> tuple[Doubt, ...]:
@@ -139,6 +140,11 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
         found = tension(model, {sample.name: taring for sample, taring in tared}, [one for one in lags if one])
         most = _most(equation)
         rounding = {key: x for one in recordings for key, x in measurable.rounding(campaign, one.readings).items()}
+        own = model.rig.transducer.channels
+        noise = {
+            one.entry.name: dict(zip(own, measured_noise(model.rig, one)[1].tolist(), strict=True))
+            for one in recordings
+        }
         hidden = {one.name: tuple(_hidden(campaign, one, recordings, model)) for one in campaign.requirements}
         timed = tuple(mistimed(campaign, recordings))
         still = tuple(stuck(recordings, instants, model))
@@ -152,7 +158,8 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
         )
         judged = {key for one in campaign.requirements for key in measurable.judged_channels(one, campaign.rig)}
         mute = tuple(key for key in _mute(equation, [read for read, _, _ in shown]) if key in judged)
-        soundness = Soundness(probability=found.probability)
+        gains = shown_gains(equation, instants)
+        soundness = Soundness(probability=found.probability, gains=gains)
         tests = [one.entry.name for one in recordings if one.entry.role != "calibration"]
         if reasons:
             shifted = [one for one in found.beyond if one in lags]
@@ -163,6 +170,7 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
             soundness = Soundness(
                 sound=False,
                 probability=found.probability,
+                gains=gains,
                 beyond=tuple(_beyond(one, model) for one in found.beyond),
                 reasons=reasons,
                 suggestions=tuple(told),
@@ -173,7 +181,7 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
                     for one in conventions
                 ),
             )
-        return Checked(soundness, conventions, hidden, rounding, mute)
+        return Checked(soundness, conventions, hidden, rounding, noise, mute)
 
 
 def _hidden(
@@ -207,16 +215,11 @@ def unlike_stated(requirement: Requirement, rig: Rig, recordings: Sequence[Prepa
     judged = measurable.needed_channels(requirement, rig)
     near = min(2.0**OCTAVES * requirement.band[1], np.inf if amplifier is None else float(amplifier.corner))
     index = rig.loads.index(own)
-    reads = np.eye(len(index)) + rig.transducer.cross_coupling.value[np.ix_(index, index)]
     noise = np.array([stated.get(channel, np.nan) if channel in judged else np.nan for channel in own])
     sigma = rig.transducer.noise.sigma[index]
     factor = np.maximum(UNLIKE, np.exp(np.minimum(BEYOND * sigma / noise, 100.0)))  # beyond, nothing is known
     for one in recordings:
-        if (spectrum := one.run.spectrum) is None:
-            continue
-        raw, rate = replace(spectrum, S=reads @ spectrum.S @ reads.T), one.run.rates["wrench"]
-        first = white(np.concatenate(one.readings["wrench"].head))
-        less, more = quietest(raw, rate, near), np.minimum(quietest(raw, rate, np.inf), first)
+        less, more = measured_noise(rig, one, near)
         for off, read, why in (
             (factor * less < noise, less, "averaged or filtered before it was stored, or in another scale"),
             (more > factor * noise, more, "disturbed, or in another scale"),
@@ -229,39 +232,46 @@ def unlike_stated(requirement: Requirement, rig: Rig, recordings: Sequence[Prepa
                 yield Doubt(f"the noise is not as stated in {one.entry.name}: {', '.join(told)}: {why}")
 
 
+def measured_noise(rig: Rig, one: Prepared, near: float = np.inf) -> tuple[Array, Array]:
+    """White noise (c,) of each recorded channel, rms: in the octaves below `near`, Hz; in all, and between samples.
+
+    NaN where nothing tells.
+    """
+    index = rig.loads.index(rig.transducer.channels)
+    if (spectrum := one.run.spectrum) is None or "wrench" not in one.readings:
+        return np.full(len(index), np.nan), np.full(len(index), np.nan)
+    reads = np.eye(len(index)) + rig.transducer.cross_coupling.value[np.ix_(index, index)]
+    raw, rate = replace(spectrum, S=reads @ spectrum.S @ reads.T), one.run.rates["wrench"]
+    first = white(np.concatenate(one.readings["wrench"].head))
+    return quietest(raw, rate, near), np.minimum(quietest(raw, rate, np.inf), first)
+
+
 def copied(requirement: Requirement, rig: Rig, recordings: Sequence[Prepared]) -> Iterator[Doubt]:
-    """Runs of readings that come twice, in one recording or in two, of channels whose noise is a step and more.
+    """Runs of readings that come twice, rounded anew or not, of channels whose noise is more than rounding moves them.
 
     Recordings that are the same throughout, motion and all, are one: `told_copies` tells of that.
     """
-    own, watched = rig.transducer.channels, noisy(rig)
-    judged = measurable.needed_channels(requirement, rig)
-    for one, other in combinations_with_replacement(recordings, 2):
+    own, stated = rig.transducer.channels, noisy(rig)
+    noise = np.stack([measured_noise(rig, one)[1] for one in recordings])
+    found: dict[tuple[int, int], dict[str, tuple[int, int]]] = {}
+    for place, channel in enumerate(own):
+        if channel in stated and channel in measurable.needed_channels(requirement, rig):
+            prints = [one.prints[place] if one.prints else Prints() for one in recordings]
+            for pair, span in again(prints, np.minimum(noise[:, place], stated[channel])).items():
+                found.setdefault(pair, {})[channel] = span
+    for (first, second), spans in sorted(found.items()):
+        one, other = recordings[first], recordings[second]
         if {one.entry.role, other.entry.role} == {"calibration"} or (one is not other and _same(one, other)):
             continue
-        found = {
-            own[place]: span
-            for place, (prints, others) in enumerate(zip(one.prints, other.prints, strict=False))
-            if own[place] in watched and own[place] in judged and _shows_noise(one, place)
-            if (span := others.again(prints))
-        }
-        if found:
-            begin, end = (
-                (at(stamps) - other.run.epoch_ns) * 1e-9
-                for at, stamps in zip((min, max), zip(*found.values(), strict=True), strict=True)
-            )
-            where = "at another time of it" if one is other else f"in {one.entry.name}"
-            yield Doubt(
-                f"readings of {', '.join(found)} in {other.entry.name}, from {begin:.1f} s to {end:.1f} s, come "
-                f"{where} as well: noise does not repeat, so they were copied"
-            )
-
-
-def _shows_noise(one: Prepared, place: int) -> bool:
-    """Whether a channel's noise is greater than the step in which it reads."""
-    head = np.concatenate(one.readings["wrench"].head)[:, place]
-    head = head[np.isfinite(head)]
-    return len(head) > RUN and bool(white(head) > np.diff(np.unique(head)).min(initial=np.inf))
+        begin, end = (
+            (at(stamps) - other.run.epoch_ns) * 1e-9
+            for at, stamps in zip((min, max), zip(*spans.values(), strict=True), strict=True)
+        )
+        where = "at another time of it" if one is other else f"in {one.entry.name}"
+        yield Doubt(
+            f"readings of {', '.join(spans)} in {other.entry.name}, from {begin:.1f} s to {end:.1f} s, come "
+            f"{where} as well: noise does not repeat, so they were copied"
+        )
 
 
 def _same(one: Prepared, other: Prepared) -> bool:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+import msgspec
+
 from kbs_process.results.records import Record
 
 Verdict = Literal["pass", "fail", "undecided"]
@@ -52,6 +54,9 @@ class Requirement(Record, frozen=True, kw_only=True):
     high: float | None = None
     doubt: str = ""  # why it is undecided, whatever the figures are
     mute: tuple[str, ...] = ()  # channels that no recording shows to respond
+    axes: tuple[str, ...] = ("x", "y", "z")  # that it is about
+    left_out: str = ""  # what the campaign leaves out of all this, and the figure of that
+    only_without: bool = False  # whether it is met, and what is left out would not be, or is not known to be
     lever_m: float | None = None  # from the transducer to the point about which torques are judged, elsewhere
 
 
@@ -82,6 +87,7 @@ class Soundness(Record, frozen=True, kw_only=True):
     beyond: tuple[Beyond, ...] = ()  # the farthest first
     reasons: tuple[str, ...] = ()
     suggestions: tuple[str, ...] = ()  # simple faults, each of which explains the data alone
+    gains: dict[str, float] = msgspec.field(default_factory=dict)  # by channel: relative sigma, by gravity alone
     calibrated: bool = True  # the calibrations by themselves agree with what was known
 
 
@@ -91,6 +97,7 @@ class BudgetItem(Record, frozen=True, kw_only=True):
     stage: str
     source: str
     sigma: float
+    grows: bool = False  # with what is read: at a peak it is more than over the recording
 
 
 class Budget(Record, frozen=True, kw_only=True):

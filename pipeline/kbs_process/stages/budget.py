@@ -29,6 +29,7 @@ class Entry:
     stage: str
     source: str
     sigma: Array
+    grows: bool = False  # with the signal: at a peak, by as many times as this is above the rms
 
 
 def total(entries: Sequence[Entry]) -> Array:
@@ -71,7 +72,7 @@ def from_shapes(stage: str, source: str, shapes: Sequence[Signal], band: Filter,
 
 def cross_coupling(wrench: Signal, sigma: Array) -> Entry:
     """Error of each channel from the uncertainty `sigma` (c, c) of the matrix, for a wrench within the band."""
-    return Entry("cross-coupling", "what is not known of the matrix", np.sqrt(sigma**2 @ rms(wrench) ** 2))
+    return Entry("cross-coupling", "what is not known of the matrix", np.sqrt(sigma**2 @ rms(wrench) ** 2), grows=True)
 
 
 def clock(static: Signal, sigma_s: float, band: Filter, moving: Mask | None = None) -> Entry:
@@ -136,4 +137,4 @@ def resonance(signal: Signal, frequency: float | None, passband: tuple[float, fl
         return Entry("transducer", "resonance next to the band", np.zeros(len(signal.channels)))
     ratio = (passband[1] / frequency) ** 2
     gain = ratio / (1.0 - ratio) if ratio < 0.5 else 1.0
-    return Entry("transducer", "resonance next to the band", gain * rms(signal))
+    return Entry("transducer", "resonance next to the band", gain * rms(signal), grows=True)

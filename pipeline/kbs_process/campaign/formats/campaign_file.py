@@ -6,7 +6,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import ConfigDict, Field
 
-from kbs_process.campaign.config import DrivenBy, Frame, Load, Role, Statistic
+from kbs_process.campaign.config import Axis, DrivenBy, Frame, Load, Role, Statistic
 from kbs_process.campaign.formats.tables import (
     TABLE,
     TEXT,
@@ -34,6 +34,7 @@ class RequirementTable(Table):
     quantity: Load
     frame: Frame = Field(description='"S": at the spacecraft\'s centre of mass; "T": at the transducer')
     statistic: Statistic = Field(description="of every axis alone")
+    axes: SomeDistinct[Axis] | None = Field(None, description="axes that the requirement is about; default: all three")
     limit: LimitTable
     band_Hz: Annotated[list[NotNegative], Field(min_length=2, max_length=2)] = Field(
         description="lower and upper edge, Hz"

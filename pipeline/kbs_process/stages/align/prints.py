@@ -1,72 +1,121 @@
-"""Prints of runs of successive readings, by which a part of a recording is found again, whatever its place."""
+"""Prints of runs of successive readings, by which a part of a recording is found again, rounded anew or not.
+
+A print is the signs of a run's third differences: what moves slowly, a zero and a gain are not in it, and rounding
+seldom changes it. Of all prints those with the least values are kept, the same in every recording, each with its
+readings: these tell whether two runs with the same print are the same but for rounding.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from kbs_process.signals.records import Array, Block, Stamps
+from kbs_process.signals.records import Array, Block, Mask, Stamps
+from kbs_process.stages.align.ordering import concatenate, select
 
-Hashes = NDArray[np.uint64]
-DOUBLINGS = 5
-RUN = 2**DOUBLINGS  # readings: of noise of a step and more, no two recordings have as many in common by chance
-KEPT = 8  # of so many prints one is kept, by its own value, so that the same are kept everywhere
-_FACTOR = 0x9E3779B97F4A7C15  # odd: it mixes bits
+ORDER, DOUBLINGS = 3, 5
+RUN = 2**DOUBLINGS + ORDER  # readings: of noise of a step and more, no two runs are the same by chance
+KEPT = 1024  # prints of a channel: they find what is some thousandths of a recording
+_STEPS = (*(m * 10.0**k for k in range(-12, 2) for m in (1.0, 2.0, 5.0)), *(2.0**k for k in range(-40, 4)))
+_ON_GRID = 1e-3  # of a step
+_FACTOR = np.uint64(0x9E3779B97F4A7C15)  # odd: it mixes bits
 
 
 @dataclass(slots=True)
 class Prints:
-    """Prints of one channel. A reading that comes several times on end counts once."""
+    """The least prints of one channel, and of the same prints no more than two."""
 
-    found: list[Hashes] = field(default_factory=list)
-    at: list[Stamps] = field(default_factory=list)  # ns, where each run begins
-    _x: Array = field(default_factory=lambda: np.zeros(0))
-    _stamp: Stamps = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    words: NDArray[np.uint64] = field(default_factory=lambda: np.zeros(0, dtype=np.uint64))
+    at: Stamps = field(default_factory=lambda: np.zeros(0, dtype=np.int64))  # ns, where each run begins
+    runs: Array = field(default_factory=lambda: np.zeros((0, RUN)))  # from its first
 
     def push(self, stamp: Stamps, x: Array) -> None:
-        """Take in readings (n,) at `stamp` (n,), ns; those that are no numbers are passed over."""
-        x, stamp = np.concatenate([self._x, x]), np.concatenate([self._stamp, stamp])
-        new = np.isfinite(x) & np.concatenate([[True], x[1:] != x[:-1]])
-        x, stamp = x[new], stamp[new]
-        self._x, self._stamp = x[-(RUN - 1) :], stamp[-(RUN - 1) :]
-        if len(x) < RUN:
-            return
-        prints = np.ascontiguousarray(x).view(np.uint64) * np.uint64(_FACTOR)
-        prints ^= prints >> np.uint64(29)
+        """Take the runs of readings (n,) at `stamp` (n,), ns."""
+        words = (np.diff(x, ORDER) > 0.0).astype(np.uint64)
         for doubling in range(DOUBLINGS):
             width = 2**doubling
-            prints = prints[:-width] * np.uint64(pow(_FACTOR, width, 2**64)) + prints[width:]
-        prints ^= prints >> np.uint64(32)
-        kept = prints % np.uint64(KEPT) == 0
-        self.found.append(prints[kept])
-        self.at.append(stamp[: -(RUN - 1)][kept])
+            words = (words[:-width] << np.uint64(width)) | words[width:]
+        words *= _FACTOR
+        words ^= words >> np.uint64(29)
+        words *= _FACTOR
+        few = np.flatnonzero(words <= (self.words.max() if len(self.words) == KEPT else ~np.uint64(0)))
+        old, words = len(self.words), np.concatenate([self.words, words[few]])
+        order = np.argsort(words, kind="stable")
+        no_third = np.ones(len(order), dtype=np.bool_)
+        no_third[2:] = words[order[2:]] != words[order[:-2]]
+        order = order[no_third][:KEPT]
+        before, new = order[order < old], order[order >= old]
+        self.words = np.concatenate([words[before], words[new]])
+        new = few[new - old]
+        runs = sliding_window_view(x, RUN)[new]
+        self.at = np.concatenate([self.at[before], stamp[new]])
+        self.runs = np.concatenate([self.runs[before], runs - runs[:, :1]])
 
-    def again(self, other: Prints) -> tuple[int, int] | None:
-        """When (ns) the first and the last run begins that `other`, or itself at another time, has as well."""
-        if not self.found or not other.found:
-            return None
-        own, at = np.concatenate(self.found), np.concatenate(self.at)
-        if other is self:
-            _, index, counts = np.unique(own, return_inverse=True, return_counts=True)
-            which = counts[index] > 1
-        else:
-            which = np.isin(own, np.concatenate(other.found))
-        return (int(at[which].min()), int(at[which].max())) if which.any() else None
+
+def again(prints: Sequence[Prints], noise: Array) -> dict[tuple[int, int], tuple[int, int]]:
+    """When (ns) the first and the last run of a channel begins that an earlier recording, or the same one, has as well.
+
+    By places of both recordings. Two runs are the same if they differ by a constant, or by no more than
+    the steps of one, which are twice those of the other; the noise (n,) of each recording is more than that.
+    """
+    words, at = np.concatenate([one.words for one in prints]), np.concatenate([one.at for one in prints])
+    runs = np.concatenate([one.runs for one in prints])
+    which = np.repeat(np.arange(len(prints)), [len(one.words) for one in prints])
+    order = np.lexsort((runs[:, 1], words))  # the same but for rounding are next to each other
+    order = np.stack([order[:-1], order[1:]])[:, words[order[1:]] == words[order[:-1]]]
+    a, b = np.sort(order, axis=0)
+    finer, coarser = np.sort([_step(runs[a]), _step(runs[b])], axis=0)
+    apart = np.where(coarser - finer < 0.5 * coarser, 2.0 * _ON_GRID, 1.0) * coarser + _STEPS[0]
+    least = np.minimum(noise[which[a]], noise[which[b]])
+    same = (np.ptp(runs[a] - runs[b], axis=1) <= apart) & (coarser < least)
+    found: dict[tuple[int, int], tuple[int, int]] = {}
+    for one, other, when in zip(which[a[same]].tolist(), which[b[same]].tolist(), at[b[same]].tolist(), strict=True):
+        first, last = found.get((one, other), (when, when))
+        found[one, other] = min(first, when), max(last, when)
+    return found
+
+
+def _step(runs: Array) -> Array:
+    """The greatest step (n,) of which all readings of each run are multiples apart: least change, or a round one."""
+    apart = np.diff(np.sort(runs, axis=1), axis=1)
+    least = np.where(apart > _STEPS[0], apart, np.inf).min(axis=1)
+    step = np.zeros(len(runs))
+    for one in (least, *_STEPS):
+        multiples = runs.T / one
+        whole = np.all(np.abs(multiples - np.rint(multiples)) < _ON_GRID, axis=0) & (one <= np.ptp(runs, axis=1))
+        step = np.where(whole & (one > step), one, step)
+    return step
 
 
 @dataclass(slots=True)
 class Printed:
-    """Passes the blocks of a recording on, and keeps the prints of the wrench's channels."""
+    """Passes the blocks of a recording on, and keeps the prints of the wrench's channels.
+
+    Rows that are no numbers are passed over. Rows that come several times on end count once.
+    """
 
     channels: list[Prints] = field(default_factory=list)
+    _rows: Block | None = None  # the last ones
 
     def __call__(self, blocks: Iterator[tuple[str, Block]]) -> Iterator[tuple[str, Block]]:
         for key, block in blocks:
             if key == "wrench" and len(block):
-                self.channels = self.channels or [Prints() for _ in block.values.T]
-                for prints, x in zip(self.channels, block.values.T, strict=True):
-                    prints.push(block.stamp, x)
+                self._push(block)
             yield key, block
+
+    def _push(self, block: Block) -> None:
+        rows = block if self._rows is None else concatenate([self._rows, block])
+        good: Mask = np.all(np.isfinite(rows.values), axis=1)
+        rows = select(rows, good)
+        new = np.ones(len(rows), dtype=np.bool_)
+        new[1:] = np.any(rows.values[1:] != rows.values[:-1], axis=1)
+        rows = select(rows, new)
+        self.channels = self.channels or [Prints() for _ in block.values.T]
+        if len(rows) >= RUN:
+            for prints, x in zip(self.channels, rows.values.T, strict=True):
+                prints.push(rows.stamp, np.ascontiguousarray(x))
+        self._rows = select(rows, slice(-(RUN - 1), None))

@@ -34,7 +34,6 @@ CROWDED = 10  # of the nearest, that are suspect as well: all that is near gives
 AGREE = 0.35  # of what spikes are off by, that all beside them agree within
 HELD_S = 0.5  # longer than any channel with noise shows one and the same reading
 GAP = 1.5  # periods
-SEVERAL = 2.5  # periods: more than one sample is missing
 PUSHED_S = 2.0
 PAUSE_S = 1.0  # a longer gap may be a pause, in which the rig moved
 PAUSE_RATE = 1.0  # rad/s that no antenna is turned with where its readings are missing
@@ -118,7 +117,6 @@ class Spikes:
     blows: list[Oddity] = field(default_factory=list)  # of several channels and samples at once: kept
     steps: list[Oddity] = field(default_factory=list)
     lost: list[Oddity] = field(default_factory=list)  # stretches that stand still: left out
-    shaken: dict[int, bool] = field(default_factory=dict)  # ns, where gaps of several samples begin, if it shakes there
     changing: dict[int, Oddity] = field(default_factory=dict)  # channels whose samples change to and fro
     beating: set[int] = field(default_factory=set)  # of these, tones
     samples: int = 0
@@ -192,9 +190,6 @@ class Spikes:
             if len(places[0]):
                 before = x.copy() if before is x else before
                 x[:, channel] = column
-        for at in (done + np.flatnonzero(steps[done:end] > SEVERAL)).tolist():
-            if len(self.shaken) < LISTED and at > 0:
-                self.shaken[int(stamp[at - 1])] = _shaken(before, steps, at, at, set())
         self._note(found, stamp, steps, x, before)
         self._last = still
         self.samples += end - done

@@ -302,8 +302,8 @@ class Timeline:
     def stretches(self) -> Iterator[tuple[str, float, float, bool]]:
         """Yield kind, start and length, s, of what was bridged, and whether what happened may be the cause.
 
-        One bad sample in one channel shows nothing that happened, nor does what a driver fills in. Where messages come,
-        and several in a row lack a number, or several are lost while something shakes, that may be the cause.
+        One bad sample in one channel shows nothing that happened, nor does what a driver fills in. Where several
+        messages in a row are lost, or lack a number, that may be the cause.
         """
         if self.spikes is None or self.grid is None:
             return
@@ -317,10 +317,9 @@ class Timeline:
         found += [("non-finite", first, last, last > first) for first, last in runs[longest].tolist()]
         for kind, first, last, likely in found:
             yield kind, self.own_one(first), 1e-9 * (last - first + period), likely
-        shaken = {self.own_one(first) for first, shakes in self.spikes.shaken.items() if shakes}
         for gap in self.gaps:
             if gap.missing > 1:
-                yield "gap", gap.start, gap.end - gap.start - 1e-9 * period, gap.start in shaken
+                yield "gap", gap.start, gap.end - gap.start - 1e-9 * period, True
 
     @property
     def non_finite_channels(self) -> str:

@@ -80,6 +80,14 @@ def explanations(equation: Equation, prepared: Sequence[Prepared], most: Array) 
     return tuple(one for one in again if one.sound and one.cost < best)[:_MOST]
 
 
+def shown_gains(equation: Equation, prepared: Sequence[Prepared]) -> dict[str, float]:
+    """Standard deviation of each channel's gain, relative, if nothing is known of it but what gravity shows."""
+    data = _linear(equation, [p.rows(_spread(len(p.q))) for p in prepared[:_RECORDINGS]])
+    most = np.full(len(equation.channels), np.inf)
+    single = (Fault("gain", key, gained=(key,)) for key in equation.channels if key in WRENCH_CHANNELS)
+    return {one.what: _solve(data, one, most, anew=False).sigma for one in single}
+
+
 def _spread(count: int) -> Index:
     return np.unique(np.linspace(0, count - 1, min(count, _POINTS)).astype(np.intp))
 
@@ -187,7 +195,8 @@ def _linear(equation: Equation, prepared: Sequence[Prepared], about: Array | Non
     about = prior if about is None else about
     base, slopes = [], []
     every = joined(prepared)
-    whole, static = equation.jacobian(about[:size], every).reshape(-1, c, size), equation.predict(about[:size], every)
+    static = equation.predict(about[:size], every)
+    whole = equation.jacobian(about[:size], every).reshape(*static.shape, size)
     ends = np.cumsum([0, *(len(p.q) for p in prepared)])
     for index, p in enumerate(prepared):
         rows = slice(ends[index], ends[index + 1])

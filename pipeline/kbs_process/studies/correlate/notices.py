@@ -54,8 +54,9 @@ def notices(campaign: Campaign, analyses: Sequence[Analysis], model: GravityMode
         yield from lost(analysis.entry, [loss for loss in analysis.run.losses if loss.kind not in LEFT_OUT])
     yield from implausible(campaign, found.requirements)
     yield from _unjudged(analyses)
-    yield from _static_load(campaign, analyses, model)
-    yield from calibration(analyses, model)
+    if not found.soundness.suggestions:  # which explain what gravity leaves as well
+        yield from _static_load(campaign, analyses, model)
+        yield from calibration(analyses, model)
     for check in model.fit.checks:
         if not check.passed:
             yield _notice("info", "fit", check=check)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import msgspec
 
-from kbs_process.campaign.config import Campaign
+from kbs_process.campaign.config import Campaign, RecordingEntry
 from kbs_process.errors import FitError, RecordingError, SimulationError
 from kbs_process.progress import Progress
 from kbs_process.reduction.analysis import Analysis, analyse
@@ -29,7 +29,7 @@ from kbs_process.studies.correlate.earlier_diagnosis import keep_diagnosis
 from kbs_process.studies.correlate.notices import has_spikes, spikes, unclear
 from kbs_process.studies.correlate.output import write_tables
 from kbs_process.studies.correlate.results import Results
-from kbs_process.studies.correlate.summary import conclusion, summarise
+from kbs_process.studies.correlate.summary import conclusion, summarise, with_left_out
 from kbs_process.studies.correlate.transducer import study
 
 
@@ -53,6 +53,11 @@ def process(
             found = msgspec.structs.replace(
                 found, warnings=(*told, *found.warnings), requirements=judged, verdict=conclusion(judged)
             )
+
+        def read(entry: RecordingEntry) -> Analysis:
+            return _analyse(campaign, prepare(campaign, entry, decoupling, progress), model, progress)
+
+        found = with_left_out(campaign, found, analyses, model, decoupling, read)
         with progress.task("Following the transducer's resonance") as task:
             on_transducer = study(campaign, analyses, model.rig, task.update)
         with progress.task("Writing the report"):

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 
 import msgspec
 import numpy as np
 
-from kbs_process.campaign.config import Campaign
+from kbs_process.campaign.config import Campaign, RecordingEntry
+from kbs_process.errors import KbsError
 from kbs_process.reduction.analysis import Analysis, bands_of, select
 from kbs_process.reduction.judging import judged
 from kbs_process.reduction.pointing import recorded_pointing
@@ -38,7 +40,7 @@ def summarise(
     stated = statements(bands_of(campaign.bands), runs)
     repeated = tuple(repeatabilities(runs))
     modes = resonances(campaign, runs, model)
-    budget = tuple(budgets(campaign, runs, model, decoupling, stated, repeated, modes))
+    budget = tuple(budgets(campaign, runs, model, decoupling, stated, repeated, modes, checked.noise))
     requirements = tuple(
         judged(campaign, requirement, runs, budget, checked.doubts(requirement), checked.rounding, checked.mute)
         for requirement in campaign.requirements
@@ -77,11 +79,12 @@ def conclusion(requirements: Sequence[Requirement]) -> Conclusion:
     """Return what the worst verdict says, in a sentence."""
     if not requirements:
         return Conclusion(status="none", sentence="The campaign states no requirement.")
-    worst = max(requirements, key=lambda one: ("pass", "undecided", "fail").index(one.verdict))
+    worst = max(requirements, key=lambda one: (("pass", "undecided", "fail").index(one.verdict), one.only_without))
     words = {"pass": "met", "fail": "not met", "undecided": "neither met nor broken within the uncertainty"}
     words["undecided"] = f"undecided: {worst.doubt}" if worst.doubt else words["undecided"]
     value, low, high = (figure or 0.0 for figure in (worst.value, worst.low, worst.high))
     unshown = f" Nothing shows a response of {', '.join(worst.mute)}, only noise." if worst.mute else ""
+    axes = ", ".join(worst.axes)
     least = f"{low:.4f}" if low > 0.0 else "0"
     sentence = (
         f"{worst.name}: {words[worst.verdict]}. {worst.statistic.capitalize()} {value:.4f} {worst.unit} "
@@ -89,8 +92,55 @@ def conclusion(requirements: Sequence[Requirement]) -> Conclusion:
         f"{worst.band_Hz[0] or 0:g} to {worst.band_Hz[1] or 0:g} Hz; limit {worst.limit:g} {worst.unit}"
         f"{'' if worst.lever_m is None else f', {worst.lever_m:.3g} m from the transducer'}."
         f"{unshown if worst.verdict == 'pass' else ''}"
+        f"{f' Judged on {axes} alone, as the requirement says.' if len(worst.axes) < 3 else ''}"
+        f"{f' {worst.left_out}' if worst.only_without else ''}"
     )
     return Conclusion(status=worst.verdict, sentence=sentence)
+
+
+def with_left_out(
+    campaign: Campaign,
+    found: results.Results,
+    analyses: Sequence[Analysis],
+    model: GravityModel,
+    decoupling: Decoupling,
+    read: Callable[[RecordingEntry], Analysis],
+) -> results.Results:
+    """Return results whose requirements tell what the campaign leaves out, calibrations and what is cut off.
+
+    They tell what is judged of these recordings by themselves; `read` analyses one that was cut, as a whole.
+    """
+    left = [one for one in analyses if _named(one.entry)]
+    if not left:
+        return found
+    words = f"The campaign leaves out {', '.join(_named(one.entry) for one in left)}."
+    try:
+        every = [replace(one.entry, role="calibration", start=None, end=None) for one in left]
+        whole = [one if one.entry == entry else read(entry) for one, entry in zip(left, every, strict=True)]
+        stated = statements(bands_of(campaign.bands), whole)
+        rows = tuple(budgets(campaign, whole, model, decoupling, stated, found.repeatability, found.resonances, {}))
+        others = [_words(judged(campaign, asked, whole, rows)) for asked in campaign.requirements]
+    except KbsError as error:
+        others = [("undecided", f"By itself that cannot be judged: {error.what}.")] * len(found.requirements)
+    told = [
+        msgspec.structs.replace(one, left_out=f"{words} {what}", only_without=one.verdict == "pass" != verdict)
+        for one, (verdict, what) in zip(found.requirements, others, strict=True)
+    ]
+    return msgspec.structs.replace(found, requirements=tuple(told), verdict=conclusion(told))
+
+
+def _words(one: Requirement) -> tuple[str, str]:
+    """A verdict on what is left out, and the figure."""
+    words = {"pass": "met", "fail": "not met", "undecided": "undecided"}[one.verdict]
+    figure = f"{one.value or 0.0:.4f} {one.unit} ({one.low or 0.0:.4f} to {one.high or 0.0:.4f} at 95 %)"
+    return one.verdict, f"By itself that is {words}: {one.statistic} {figure} on {one.channel} in {one.recording}."
+
+
+def _named(entry: RecordingEntry) -> str:
+    """What the campaign leaves out of a recording; empty where it is judged from beginning to end."""
+    parts = ["(calibration)"] if entry.role == "calibration" else []
+    parts += [f"{which} {at:g} s" for which, at in (("before", entry.start), ("after", entry.end)) if at is not None]
+    return " ".join([entry.name, *parts]) if parts else ""
 
 
 def _recording(analysis: Analysis) -> results.Recording:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -29,8 +30,13 @@ def budgets(
     statements: Mapping[str, BandStatement],
     repeated: Sequence[results.Repeatability],
     resonances: Sequence[results.Resonance],
+    noise: Mapping[str, Mapping[str, float]],
 ) -> Iterable[Budget]:
-    """Yield every recording's own budget; where nothing of a recording is known in a band, there is none."""
+    """Yield every recording's own budget; where nothing of a recording is known in a band, there is none.
+
+    `noise`: of a sample, rms, by recording and channel, as measured; what is stated counts where it is more, and no
+    noise is more than all that is read in the band.
+    """
     lowest = min((mode.frequency_Hz for mode in resonances), default=None)
     spacecraft, own = campaign.rig.spacecraft, campaign.rig.frame
     for band in bands_of(campaign.bands)[1:]:
@@ -39,19 +45,18 @@ def budgets(
             if not measured.valid.any():
                 continue
             of_band = [entry for entry in repeated if (entry.frame, entry.band) == (own, band.name)]
-            noise = _repeat_noise(of_band, measured.channels, analysis.entry.trajectory)
-            entries = _entries(campaign, analysis, model, decoupling, band, statements[band.name], noise, lowest)
+            repeats = _repeat_noise(of_band, measured.channels, analysis.entry.trajectory)
+            shown = np.nan_to_num([noise.get(analysis.entry.name, {}).get(key, 0.0) for key in measured.channels])
+            edges = statements[band.name]
+            entries = _entries(campaign, analysis, model, decoupling, band, edges, shown, repeats, lowest)
             frame: Frame = "joint" if own == "joint" else "T"
             yield from _rows(entries, frame, band.name, analysis.entry.name, measured)
             if spacecraft is not None and set(WRENCH_CHANNELS) <= set(measured.channels):
                 whole = select(measured, WRENCH_CHANNELS)
                 six = [measured.channels.index(channel) for channel in WRENCH_CHANNELS]
-                moved = [
-                    budget.Entry(entry.stage, entry.source, sigma_at_spacecraft(entry.sigma[six], spacecraft))
-                    for entry in entries
-                ]
+                moved = [replace(entry, sigma=sigma_at_spacecraft(entry.sigma[six], spacecraft)) for entry in entries]
                 pose = sigma_of_pose(whole, spacecraft)
-                moved.append(budget.Entry("to the spacecraft", "position and attitude of S in T", pose))
+                moved.append(budget.Entry("to the spacecraft", "position and attitude of S in T", pose, grows=True))
                 yield from _rows(moved, "S", band.name, analysis.entry.name, whole)
 
 
@@ -62,6 +67,7 @@ def _entries(
     decoupling: Decoupling,
     band: Band,
     stated: BandStatement,
+    noise: Array,
     repeat_noise: Array | None,
     resonance: float | None,
 ) -> list[budget.Entry]:
@@ -73,11 +79,10 @@ def _entries(
     rig = campaign.rig
     measured = analysis.pairs[rig.frame, band.name].measured
     limits = passband(band, campaign.bands.working_rate)
-    sensor = budget.sensor_noise(
-        rig.loads.noise[rig.loads.index(measured.channels)],
-        analysis.run.load_rates,
-        bandpass.noise_bandwidth(band, measured.dt),
-    )
+    rates, width = analysis.run.load_rates, bandpass.noise_bandwidth(band, measured.dt)
+    most = budget.rms(measured) / budget.sensor_noise(np.ones(len(measured.channels)), rates, width).sigma
+    least = rig.loads.noise[rig.loads.index(measured.channels)]
+    sensor = budget.sensor_noise(np.maximum(least, np.minimum(noise, most)), rates, width)
     late = late_sigma(analysis.run.clocks, rig.transducer.amplifier)
     entries = [
         sensor,
@@ -110,7 +115,7 @@ def _cross_coupling(analysis: Analysis, model: GravityModel, decoupling: Decoupl
         wrench = bandpass.apply(analysis.run.wrench, band)
         leak = budget.cross_coupling(wrench, decoupling.sigma)
         efforts = len(measured.channels) - len(wrench.channels)
-        return budget.Entry(leak.stage, leak.source, np.append(leak.sigma, np.zeros(efforts)))
+        return replace(leak, sigma=np.append(leak.sigma, np.zeros(efforts)))
     index = model.equation.index
     fitted = model.equation.whole_coupling(model.fit.sigma[: model.equation.size])[np.ix_(index, index)]
     return budget.cross_coupling(measured, fitted)
@@ -138,7 +143,8 @@ def _rows(
             band=band,
             recording=recording,
             contributions=tuple(
-                BudgetItem(stage=entry.stage, source=entry.source, sigma=float(entry.sigma[index])) for entry in entries
+                BudgetItem(stage=entry.stage, source=entry.source, sigma=float(entry.sigma[index]), grows=entry.grows)
+                for entry in entries
             ),
             total=float(sums[index]),
         )

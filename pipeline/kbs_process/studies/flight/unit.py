@@ -159,6 +159,4 @@ def _judged(campaign: Campaign, requirement: Requirement) -> Judged:
             where=f"{campaign.name}: {requirement.name}",
             remedy="give [spacecraft] in the parameter files",
         )
-    prefix = "T" if requirement.quantity == "torque" else "F"
-    channels = tuple(channel for channel in WRENCH_CHANNELS if channel.startswith(prefix))
-    return Judged(requirement, band_of(requirement, bands_of(campaign.bands)), channels)
+    return Judged(requirement, band_of(requirement, bands_of(campaign.bands)), requirement.channels)

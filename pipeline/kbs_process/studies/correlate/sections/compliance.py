@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from kbs_process.report import draw
-from kbs_process.report.panel import Block, Cell, Figure, Fold, Grid, Notices, Panel, Picture, Text
+from kbs_process.report.panel import Block, Cell, Figure, Fold, Grid, Notices, Panel, Picture, Text, Tone
 from kbs_process.report.prose import Prose
 from kbs_process.report.tables import Tables
 from kbs_process.report.text import MISSING, band_hz, count, exact, frame_label, label, measure, number, percent, unit
@@ -23,6 +23,13 @@ def panel(results: Results, tables: Tables) -> Panel:
     blocks: list[Block] = [_table(results)] if results.requirements else []
     if not results.requirements:
         blocks.append(Text("This campaign states no requirement; the report compares, and gives no verdict."))
+    for entry in results.requirements:
+        tone: Tone = "undecided" if entry.only_without else ""
+        blocks += [Text(f"{entry.name}: {entry.left_out}", tone=tone)] if entry.left_out else []
+    if results.cross_coupling is not None and results.requirements:
+        stated = 2.0 * max(row[place] for place, row in enumerate(results.cross_coupling.sigma))
+        shown = [(channel, 2.0 * sigma) for channel, sigma in results.soundness.gains.items()]
+        blocks.append(Text(_SAYS("gains", stated=stated, shown=shown)))
     blocks.append(_qualified(results))
     serious = tuple(_entry(notice) for notice in _sorted(results.warnings) if notice.severity != "info")
     if serious:
@@ -44,7 +51,7 @@ def _predicted(entry: Requirement) -> str:
 def _table(results: Results) -> Grid:
     rows = tuple(
         (
-            f"{entry.name} ({entry.statistic}, {entry.frame}{_lever(entry)})",
+            f"{entry.name} ({entry.statistic}, {entry.frame}{_axes(entry)}{_lever(entry)})",
             band_hz(*entry.band_Hz),
             f"{number(entry.value)} {unit(entry.unit)}",
             _interval(entry),
@@ -85,6 +92,10 @@ def _margin(entry: Requirement) -> str:
 
 def _lever(entry: Requirement) -> str:
     return "" if entry.lever_m is None else f", {number(entry.lever_m)}\u00a0m from the transducer"
+
+
+def _axes(entry: Requirement) -> str:
+    return "" if len(entry.axes) == 3 else f", {', '.join(entry.axes)} alone"
 
 
 def _where(entry: Requirement) -> str:
