@@ -21,7 +21,7 @@ from scipy.interpolate import CubicSpline
 from kbs_process.errors import RecordingError
 from kbs_process.rig.model import Joint, Rig
 from kbs_process.signals.records import Array, Events, Mask, Run, Signal
-from kbs_process.signals.smoothing import kernel_length, smooth
+from kbs_process.signals.smoothing import Index, kernel_length, smooth, smooth_rows
 
 Source = Literal["auto", "encoder", "command+encoder", "rate"]
 _CORNERS = (0.05, 0.1, 0.2, 0.5)  # Hz, of the low-pass on encoder - command
@@ -243,11 +243,14 @@ def rounding_histories(motion: Array, dt: float, step: float, encoder_rate: floa
     """
     if step == 0.0:
         return np.zeros((len(_PHASES), len(motion)))
-    factor = max(1, round(encoder_rate * dt))
-    fine = np.interp(np.arange((len(motion) - 1) * factor + 1) / factor, np.arange(len(motion)), motion)
-    codes = fine / step + np.array(_PHASES)[:, None]
-    histories: Array = smooth((step * (np.round(codes) - codes)).T, dt / factor, band)[::factor].T
-    return histories
+    factor, own = max(1, round(encoder_rate * dt)), np.arange(len(motion))
+
+    def errors(at: Index) -> Array:
+        codes = np.interp(at / factor, own, motion)[:, None] / step + np.array(_PHASES)
+        error: Array = step * (np.round(codes) - codes)
+        return error
+
+    return smooth_rows(errors, (len(motion) - 1) * factor + 1, dt / factor, band, every=factor).T
 
 
 def rounding_error(histories: Array, dt: float) -> Array:

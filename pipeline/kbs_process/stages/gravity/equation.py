@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,6 +16,8 @@ from kbs_process.stages.gravity.parameters import Index, RigElements, coupling_e
 from kbs_process.stages.motion import Motion
 
 _RATE = 4.0  # samples kept in a period of the low-pass's corner: its stop band begins at twice the corner
+_MOST = 2**15  # instants of a recording; of a longer one they are farther apart
+_BLOCK = 2**12  # instants that are worked on at a time, which bounds memory
 _ANGLE_STEP = 1e-5  # rad
 RESPONSE = ("response.delay", "response.inertia")  # s, s^2
 
@@ -91,6 +93,12 @@ def joined(prepared: Sequence[Prepared]) -> Prepared:
     )
 
 
+def blocks(p: Prepared) -> Iterator[Prepared]:
+    """The instants, some at a time."""
+    for start in range(0, len(p.q), _BLOCK):
+        yield p.rows(slice(start, start + _BLOCK))
+
+
 def prepare(
     name: str, motion: Motion, wrench: Signal, low_pass: float, *, with_neighbours: bool, lost: str = ""
 ) -> Prepared:
@@ -98,7 +106,7 @@ def prepare(
     if len(motion) != len(wrench) or abs(motion.t0 - wrench.t0) > 0.01 * motion.dt:
         raise RecordingError(f"{name}: motion and wrench do not lie on one grid")
     edge = kernel_length(low_pass, motion.dt)
-    stride = max(1, int(1.0 / (_RATE * low_pass * motion.dt)))
+    stride = max(1, int(1.0 / (_RATE * low_pass * motion.dt)), -(-len(motion) // _MOST))
     good = _away_from_invalid(motion.valid & wrench.valid, edge)
     at = np.arange(0, len(good), stride)[good[::stride]]
     if len(at) < 8:

@@ -20,16 +20,15 @@ from kbs_process.errors import FitError
 from kbs_process.estimation.fit import Fit
 from kbs_process.rig.model import Rig
 from kbs_process.signals.records import Array, Signal
-from kbs_process.stages.gravity.equation import Equation, Prepared, at_rest, prepare
+from kbs_process.stages.gravity.equation import Equation, Prepared, at_rest, blocks, prepare
 from kbs_process.stages.gravity.parameters import Index
-from kbs_process.stages.gravity.solve import first_sigma, least_sigma, refuse_uninformed, residual_sigma, solve, zeros
+from kbs_process.stages.gravity.solve import first_sigma, least_sigma, refuse_uninformed, residual_sigma, solve
 from kbs_process.stages.gravity.taring import Taring, estimate, of_fit
 from kbs_process.stages.motion import Motion
 
 _ROUNDS = 3  # of weights
 STILL = 10.0  # sigma of the angle within which a joint has not moved
 _ERROR_POINTS = 1000  # of a recording at which the model's error is evaluated, linear in between
-_CHUNK = 65536  # samples a step, which bounds memory
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -135,14 +134,14 @@ def fit(
     for used in [first] + [data] * _ROUNDS:
         if len(sigmas) != len(used):
             sigmas = [residual_sigma(equation, theta, p, rig) for p in used]
-        weighed = sigmas
-        result = solve(equation, used, sigmas, theta, settings.low_pass_Hz)
-        theta = result.value[: equation.size]
+        solution = solve(equation, used, sigmas, theta)
+        theta = solution.theta
         sigmas = [residual_sigma(equation, theta, p, rig) for p in used]
     refuse_uninformed(equation, data)
-    biases = zeros(equation, result, len(data))[:, 0]
+    result, biases = solution.stated(settings.low_pass_Hz), solution.zeros[:, 0]
     taring = {
-        p.name: of_fit(equation, theta, p, bias, sigma) for p, bias, sigma in zip(data, biases, weighed, strict=True)
+        p.name: of_fit(equation, theta, p, bias, sigma)
+        for p, bias, sigma in zip(data, biases, solution.sigmas, strict=True)
     }
     return GravityModel(
         rig=equation.rig_at(theta, result.sigma[: equation.size]),
@@ -198,10 +197,7 @@ def apply(motion: Motion, model: GravityModel, taring: Taring | None = None) -> 
     theta = model.fit.value[: equation.size]
     taring = taring or Taring.none(c, equation.size)
     whole = _from_motion(motion, equation)
-    values = np.empty((len(motion), c))
-    for start in range(0, len(motion), _CHUNK):
-        rows = slice(start, min(start + _CHUNK, len(motion)))
-        values[rows] = equation.predict(theta, whole.rows(rows)) + taring.bias
+    values = np.concatenate([equation.predict(theta, part) + taring.bias for part in blocks(whole)])
     count = min(len(motion), _ERROR_POINTS)
     at = np.arange(count, dtype=np.intp) * (len(motion) - 1) // max(count - 1, 1)
     sparse = whole.rows(at)
