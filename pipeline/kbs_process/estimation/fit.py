@@ -20,7 +20,7 @@ from kbs_process.signals.records import Array
 Residual = Callable[[Array], Array]
 _MAX_ITERATIONS = 60
 _LARGEST_DAMPING = 1e12
-_PROMISE = 1e-6  # of the cost, where 1 is a sigma: a step that promises less is the last
+_PROMISE = 1e-8  # of the cost, where 1 is a sigma: a step that promises less is not taken, and ends the search
 _SINGULAR = 1e-11  # of the greatest singular value, columns scaled to unit length
 _WEAK = 0.9  # posterior over prior sigma from which the data say little
 _CONFUSED = 0.98  # correlation
@@ -125,6 +125,7 @@ class Problem:
     cost: Callable[[Array], float]  # |r|^2
     triangle: Callable[[Array], Array]  # T (k, p + 1) of T'T = [J r]'[J r]
     samples: int
+    bent: Callable[[Array, Array], Array] = lambda theta, reached: reached  # where a straight step should have led
 
 
 def fit_map(
@@ -223,16 +224,16 @@ def minimise(problem: Problem, parameters: Parameters, start: Array, most: int =
             _refuse_singular(R, parameters.names)
         while True:
             candidate = damped_step(R, rhs, damping, theta, parameters)
-            promised = _cost(rhs) - _cost(rhs - R @ ((candidate - theta) / scale))
+            if _cost(rhs) - _cost(rhs - R @ ((candidate - theta) / scale)) < _PROMISE:
+                return Found(theta, iteration, True)
+            candidate = problem.bent(theta, candidate)
             new = cost_at(candidate)
-            if new <= cost or promised < _PROMISE or damping > _LARGEST_DAMPING:
+            if new <= cost or damping > _LARGEST_DAMPING:
                 break
             damping = max(10.0 * damping, 1e-6)
         if new <= cost:
             theta, cost = candidate, new
         damping = 0.0 if damping <= 1e-6 else damping / 10.0
-        if promised < _PROMISE:
-            return Found(theta, iteration, True)
     return Found(theta, most, False)
 
 

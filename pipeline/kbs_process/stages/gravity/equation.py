@@ -16,7 +16,7 @@ from kbs_process.stages.gravity.parameters import Index, RigElements, coupling_e
 from kbs_process.stages.motion import Motion
 
 _RATE = 4.0  # samples kept in a period of the low-pass's corner: its stop band begins at twice the corner
-_MOST = 2**15  # instants of a recording; of a longer one they are farther apart
+_MOST = 2**14  # instants of a recording; of a longer one they are farther apart
 _BLOCK = 2**12  # instants that are worked on at a time, which bounds memory
 _ANGLE_STEP = 1e-5  # rad
 RESPONSE = ("response.delay", "response.inertia")  # s, s^2
@@ -246,6 +246,16 @@ class Equation:
         if sigma is not None:
             spread[self.rows, self.columns] = sigma[count : count + len(self.rows)]
         return RigElements(rig, (X,), (np.ones((6, 6), dtype=bool),)).rig_at(total.ravel(), spread.ravel())
+
+    def bent(self, theta: Array, reached: Array) -> Array:
+        """`reached` with centres of gravity where a straight step of mass times cog leads: in that loads are linear."""
+        names, result = self.elements.names, reached.copy()
+        for body in self.elements.rig.bodies:
+            mass = names.index(body.mass.name) if body.mass.name in names else -1
+            if mass >= 0 and reached[mass] > 0.5 * theta[mass] > 0.0:
+                cog = [place for place, name in enumerate(names) if name.startswith(f"{body.cog.name}[")]
+                result[cog] = theta[cog] + theta[mass] / reached[mass] * (reached[cog] - theta[cog])
+        return result
 
     def predict(self, theta: Array, p: Prepared) -> Array:
         """(n, c) in the channels' units."""

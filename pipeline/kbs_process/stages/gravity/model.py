@@ -22,7 +22,7 @@ from kbs_process.rig.model import Rig
 from kbs_process.signals.records import Array, Signal
 from kbs_process.stages.gravity.equation import Equation, Prepared, at_rest, blocks, prepare
 from kbs_process.stages.gravity.parameters import Index
-from kbs_process.stages.gravity.solve import first_sigma, least_sigma, refuse_uninformed, residual_sigma, solve
+from kbs_process.stages.gravity.solve import Rows, first_sigma, least_sigma, refuse_uninformed, residual_sigma, solve
 from kbs_process.stages.gravity.taring import Taring, estimate, of_fit
 from kbs_process.stages.motion import Motion
 
@@ -129,20 +129,18 @@ def fit(
     )
     data = [prepared(sample, equation, settings, settings.low_pass_Hz) for sample in samples]
     first = [p for p, s in zip(data, samples, strict=True) if s.calibration] or data
-    theta = equation.start()
+    theta, rows = equation.start(), Rows(equation, data)
+    refuse_uninformed(rows)
     sigmas = [first_sigma(p, rig) for p in first]
-    for used in [first] + [data] * _ROUNDS:
-        if len(sigmas) != len(used):
-            sigmas = [residual_sigma(equation, theta, p, rig) for p in used]
-        solution = solve(equation, used, sigmas, theta)
+    for used in [rows if first is data else Rows(equation, first)] + [rows] * _ROUNDS:
+        if len(sigmas) != len(used.prepared):
+            sigmas = [residual_sigma(equation, theta, p, rig) for p in used.prepared]
+        solution = solve(used, sigmas, theta)
         theta = solution.theta
-        sigmas = [residual_sigma(equation, theta, p, rig) for p in used]
-    refuse_uninformed(equation, data)
+        sigmas = [residual_sigma(equation, theta, p, rig) for p in used.prepared]
     result, biases = solution.stated(settings.low_pass_Hz), solution.zeros[:, 0]
-    taring = {
-        p.name: of_fit(equation, theta, p, bias, sigma)
-        for p, bias, sigma in zip(data, biases, solution.sigmas, strict=True)
-    }
+    each = zip(data, biases, rows.mean_slopes(theta), solution.sigmas, strict=True)
+    taring = {p.name: of_fit(equation, slope, p, bias, sigma) for p, bias, slope, sigma in each}
     return GravityModel(
         rig=equation.rig_at(theta, result.sigma[: equation.size]),
         fit=result,

@@ -32,6 +32,49 @@ _TERMS = len(ZERO)
 DRIFT_S = 60.0  # in which a zero drifts by the noise of a sample, one sigma
 
 
+class Rows:
+    """The equation at all instants of some recordings, a block of which is in memory at a time."""
+
+    def __init__(self, equation: Equation, prepared: Sequence[Prepared]) -> None:
+        self.equation, self.prepared = equation, prepared
+        self._every, self._whose = joined(prepared), np.repeat(np.arange(len(prepared)), [len(p.q) for p in prepared])
+        self._last: tuple[Array, Array] | None = None
+
+    def residuals(self, theta: Array) -> list[Array]:
+        """What is predicted less what is measured, (n, c) of each recording."""
+        left = [self.equation.predict(theta, part) - part.wrench for part in blocks(self._every)]
+        return np.split(np.concatenate(left), np.flatnonzero(np.diff(self._whose)) + 1)
+
+    def triangles(self, theta: Array) -> Array:
+        """T (recordings, c, k, k) of T'T = A'A, rows of A: a zero's terms, slopes, what is predicted less measured.
+
+        A has a row for each instant of a channel.
+        """
+        if self._last is not None and np.array_equal(self._last[0], theta):
+            return self._last[1]
+        c, width = len(self.equation.channels), _TERMS + self.equation.size + 1
+        bases = np.concatenate([zero_basis(p) for p in self.prepared])
+        T, start = np.zeros((len(self.prepared), c, width, width)), 0
+        for part in blocks(self._every):
+            rows = slice(start, start := start + len(part.q))
+            A = np.empty((len(part.q), c, width))
+            A[..., :_TERMS] = bases[rows, None]
+            A[..., _TERMS:-1] = self.equation.jacobian(theta, part).reshape(len(A), c, -1)
+            A[..., -1] = self.equation.predict(theta, part) - part.wrench
+            for index in np.unique(self._whose[rows]):
+                own = np.swapaxes(A[self._whose[rows] == index], 0, 1)
+                T[index] = np.linalg.qr(np.concatenate([T[index], own], axis=1), mode="r")
+        self._last = theta.copy(), T
+        return T
+
+    def mean_slopes(self, theta: Array) -> Array:
+        """Slopes (recordings, c, p), each the mean over a recording: the first term of a zero is 1."""
+        T = self.triangles(theta)
+        counts = np.bincount(self._whose)
+        mean: Array = np.einsum("rck,rckp->rcp", T[..., 0], T[..., _TERMS:-1]) / counts[:, None, None]
+        return mean
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Solution:
     """The rig's parameters that fit all recordings, each channel weighed by its sigma, and the recordings' zeros."""
@@ -75,66 +118,53 @@ class Solution:
         return stated(self.problem, self.parameters, self.found, [longrun, modelled + rounding.scores()])
 
 
-def solve(equation: Equation, prepared: Sequence[Prepared], sigmas: Sequence[Array], theta: Array) -> Solution:
-    """Solve from `theta` on; of a recording's rows triangles are kept, a few for each channel."""
+def solve(rows: Rows, sigmas: Sequence[Array], theta: Array) -> Solution:
+    """Solve from `theta` on."""
+    equation, prepared = rows.equation, rows.prepared
     size, loose = equation.size, _loose(equation)
-    every, ends = joined(prepared), np.cumsum([len(p.q) for p in prepared])[:-1]
-    bases = [zero_basis(p) for p in prepared]
+    bases, known = [zero_basis(p) for p in prepared], [zero_sigma(equation, p)[:, loose].T for p in prepared]
 
-    def residuals(theta: Array) -> list[Array]:
-        return np.split(np.concatenate([equation.predict(theta, part) for part in blocks(every)]) - every.wrench, ends)
+    def with_zeros(theta: Array) -> Array:
+        """These parameters of the rig, and the zeros that fit best with them."""
+        best = []
+        for left, basis, sigma, prior in zip(rows.residuals(theta), bases, sigmas, known, strict=True):
+            weight = sigma[loose, None] ** -2
+            H = weight[:, None] * (basis.T @ basis) + np.eye(_TERMS) * prior[:, None] ** -2
+            best.append(np.linalg.solve(H, (weight * -(basis.T @ left[:, loose]).T)[..., None])[..., 0].T.ravel())
+        return np.concatenate([theta, *best])
 
     def cost(full: Array) -> float:
-        each = zip(residuals(full[:size]), bases, _zeros(full[size:], len(prepared), equation), sigmas, strict=True)
+        zeros = _zeros(full[size:], len(prepared), equation)
+        each = zip(rows.residuals(full[:size]), bases, zeros, sigmas, strict=True)
         return float(sum(np.sum(((left + basis @ zero) / sigma) ** 2) for left, basis, zero, sigma in each))
 
     def triangle(full: Array) -> Array:
-        T = triangles(equation, full[:size], prepared) / np.stack(sigmas)[:, :, None, None]
-        rows = np.zeros((*T.shape[:3], len(full) + 1))
-        rows[..., :size] = T[..., _TERMS:-1]
-        zero = np.swapaxes(_zeros(full[size:], len(prepared), equation), 1, 2)
-        rows[..., -1] = T[..., -1] + np.einsum("rckt,rct->rck", T[..., :_TERMS], zero)
+        T = rows.triangles(full[:size]) / np.stack(sigmas)[:, :, None, None]
+        whole = np.zeros((*T.shape[:3], len(full) + 1))
+        whole[..., :size] = T[..., _TERMS:-1]
+        zeros = np.swapaxes(_zeros(full[size:], len(prepared), equation), 1, 2)
+        whole[..., -1] = T[..., -1] + np.einsum("rckt,rct->rck", T[..., :_TERMS], zeros)
         for index, (place, channel) in itertools.product(range(len(prepared)), enumerate(loose)):
             at = size + (index * _TERMS + np.arange(_TERMS)) * len(loose) + place
-            rows[index, channel][:, at] = T[index, channel, :, :_TERMS]
-        return rows.reshape(-1, len(full) + 1)
+            whole[index, channel][:, at] = T[index, channel, :, :_TERMS]
+        return whole.reshape(-1, len(full) + 1)
 
     names = tuple(f"{term}[{p.name}].{equation.channels[index]}" for p in prepared for term in ZERO for index in loose)
     parameters = Parameters(
         names=equation.names + names,
         value=np.concatenate([equation.start(), np.zeros(len(names))]),
-        sigma=np.concatenate([equation.sigma(), *(zero_sigma(equation, p)[:, loose].ravel() for p in prepared)]),
+        sigma=np.concatenate([equation.sigma(), *(prior.T.ravel() for prior in known)]),
         lower=np.concatenate([equation.lower(), np.full(len(names), -np.inf)]),
         tensors=Tensors.among(equation.names, equation.elements.rig.inertias),
     )
-    first = [
-        np.linalg.lstsq(basis, -left[:, loose])[0].ravel() for left, basis in zip(residuals(theta), bases, strict=True)
-    ]
-    problem = Problem(cost, triangle, every.wrench.size)
-    found = minimise(problem, parameters, np.concatenate([theta, *first]))
+    problem = Problem(
+        cost,
+        triangle,
+        sum(p.wrench.size for p in prepared),
+        lambda full, reached: with_zeros(equation.bent(full[:size], reached[:size])),
+    )
+    found = minimise(problem, parameters, with_zeros(theta))
     return Solution(equation, prepared, sigmas, parameters, problem, found)
-
-
-def triangles(equation: Equation, theta: Array, prepared: Sequence[Prepared]) -> Array:
-    """T (recordings, c, k, k) of T'T = A'A, rows of A: a zero's terms, the slopes, what is predicted less measured.
-
-    A has a row for each instant of a channel; a block of them is in memory at a time.
-    """
-    every, c = joined(prepared), len(equation.channels)
-    bases = np.concatenate([zero_basis(p) for p in prepared])
-    A = np.empty((0, c, _TERMS + equation.size + 1))
-    T = np.zeros((len(prepared), c, A.shape[2], A.shape[2]))
-    whose, start = np.repeat(np.arange(len(prepared)), [len(p.q) for p in prepared]), 0
-    for part in blocks(every):
-        rows = slice(start, start := start + len(part.q))
-        A = np.empty((len(part.q), *A.shape[1:]))
-        A[..., :_TERMS] = bases[rows, None]
-        A[..., _TERMS:-1] = equation.jacobian(theta, part).reshape(len(A), c, -1)
-        A[..., -1] = equation.predict(theta, part) - part.wrench
-        for index in np.unique(whose[rows]):
-            own = np.swapaxes(A[whose[rows] == index], 0, 1)
-            T[index] = np.linalg.qr(np.concatenate([T[index], own], axis=1), mode="r")
-    return T
 
 
 def _zeros(values: Array, recordings: int, equation: Equation) -> Array:
@@ -190,15 +220,16 @@ def least_sigma(p: Prepared, rig: Rig) -> Array:
     return floor
 
 
-def refuse_uninformed(equation: Equation, prepared: Sequence[Prepared]) -> None:
+def refuse_uninformed(rows: Rows) -> None:
     """Refuse data whose strongest message about the rig, zero and drift aside, is weaker than the prior.
 
     What they could say is asked, with the sensor's noise alone: what else is in them is no reason to move more.
     """
+    equation = rows.equation
     if equation.size == 0:
         return  # the files know the rig exactly
-    least = 10.0 * np.stack([least_sigma(p, equation.elements.rig) for p in prepared])
-    apart = triangles(equation, equation.start(), prepared)[:, :, _TERMS:, _TERMS:-1] / least[:, :, None, None]
+    least = 10.0 * np.stack([least_sigma(p, equation.elements.rig) for p in rows.prepared])
+    apart = rows.triangles(equation.start())[:, :, _TERMS:, _TERMS:-1] / least[:, :, None, None]
     _, s, Vt = np.linalg.svd(apart.reshape(-1, equation.size) * equation.sigma(), full_matrices=False)
     if s[0] < 1.0:
         direction = combination(Vt[0], equation.names)
