@@ -21,7 +21,7 @@ def _scores_of_ty(elevation):
     moving = motion.estimate(run, rig, motion.MotionSettings(source="encoder"))
     equation = Equation.of(rig, include_inertia=False, cross_coupling=False, response_sigma=None)
     sample = gravity.Sample("run", moving, run.wrench)
-    data = gravity.prepared(sample, equation, gravity.GravitySettings(), 1.0)
+    data = gravity.prepared(sample, equation, gravity.GravitySettings(), 1.0, equation.start())
     c = len(equation.channels)
     rounding = Rounding(equation, equation.start(), 1)
     rounding.add(data, np.ones(c), np.tile(np.eye(c)[:, [4]], (len(data.q), 1, 1)), np.array([0]))
