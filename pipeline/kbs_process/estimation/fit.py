@@ -178,7 +178,7 @@ def stated(problem: Problem, parameters: Parameters, found: Found, scores: Seque
     # moved = (I - H^-1 P) d + H^-1 J^T e, d the prior's own error: (I - H^-1 P) P^-1 (I - P H^-1) + H^-1 S H^-1.
     moved_covariance = np.diag(parameters.sigma**2) - 2.0 * H_inverse + covariance
     checks = (
-        Check("converged", found.converged, f"{found.iterations} iterations"),
+        Check("converged", found.converged, f"{found.iterations} iteration{'s' * (found.iterations != 1)}"),
         _bounds_check(theta, parameters),
         _identifiable_check(T[:, :-1], sigma, covariance, parameters),
     )

@@ -32,10 +32,10 @@ def errors(rig: Rig, model: GravityModel) -> Array:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("rate", "slow", "seed"), [(10.0, 1.0, 0), (10.0, 1.0, 1), (160.0, 8.0, 4)])
-def test_what_is_found_is_as_far_off_as_it_says(tmp_path: Path, rate: float, slow: float, seed: int) -> None:
-    """At 10 Hz products of angles lie beyond the band; slow swings at 160 Hz are no more than an encoder's rounding."""
-    rig, model = drawn(tmp_path, rate, seed, slow)
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_what_is_found_is_as_far_off_as_it_says(tmp_path: Path, seed: int) -> None:
+    """Below 0.83 Hz, beyond which lie products of the angles."""
+    rig, model = drawn(tmp_path, 10.0, seed, 1.0)
     assert model.fit.checks[0].passed
     z = errors(rig, model)
     assert np.sqrt(np.mean(z**2)) < 1.4, z
