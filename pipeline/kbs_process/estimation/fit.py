@@ -151,23 +151,13 @@ def fit_map(
         lambda theta: triangle(np.column_stack([gradient(theta), residual(theta)])),
         len(residual(begin)),
     )
-    found = minimise(problem, parameters, begin, iterations)
-    covariances = [] if scores is None else [scores(residual(found.theta), gradient(found.theta))]
-    return stated(problem, parameters, found, covariances)
+    theta, converged = minimise(problem, parameters, begin, iterations)
+    covariances = [] if scores is None else [scores(residual(theta), gradient(theta))]
+    return stated(problem, parameters, theta, converged, covariances)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Found:
-    """Where a search ended."""
-
-    theta: Array  # (p,)
-    iterations: int
-    converged: bool
-
-
-def stated(problem: Problem, parameters: Parameters, found: Found, scores: Sequence[Array] = ()) -> Fit:
+def stated(problem: Problem, parameters: Parameters, theta: Array, converged: Check, scores: Sequence[Array]) -> Fit:
     """State what was found, its covariance no smaller than by each of `scores`, covariances (p, p) of J^T r."""
-    theta = found.theta
     T = problem.triangle(theta)
     precision = parameters.sigma**-2.0
     H_inverse = _inverse(T[:, :-1], precision, parameters)
@@ -177,18 +167,14 @@ def stated(problem: Problem, parameters: Parameters, found: Found, scores: Seque
     sigma = np.sqrt(np.diag(covariance))
     # moved = (I - H^-1 P) d + H^-1 J^T e, d the prior's own error: (I - H^-1 P) P^-1 (I - P H^-1) + H^-1 S H^-1.
     moved_covariance = np.diag(parameters.sigma**2) - 2.0 * H_inverse + covariance
-    checks = (
-        Check("converged", found.converged, f"{found.iterations} iteration{'s' * (found.iterations != 1)}"),
-        _bounds_check(theta, parameters),
-        _identifiable_check(T[:, :-1], sigma, covariance, parameters),
-    )
+    identifiable = _identifiable_check(T[:, :-1], sigma, covariance, parameters)
     return Fit(
         names=parameters.names,
         value=theta,
         sigma=sigma,
         covariance=covariance,
         prior_sigma=parameters.sigma,
-        checks=checks,
+        checks=(converged, _bounds_check(theta, parameters), identifiable),
         residual_rms=float(np.sqrt(problem.cost(theta) / problem.samples)),
         dof=problem.samples - len(theta),
         moved=theta - parameters.value,
@@ -206,7 +192,9 @@ def difference_jacobian(residual: Residual, theta: Array, scale: Array) -> Array
     return np.stack(columns, axis=1)
 
 
-def minimise(problem: Problem, parameters: Parameters, start: Array, most: int = _MAX_ITERATIONS) -> Found:
+def minimise(
+    problem: Problem, parameters: Parameters, start: Array, most: int = _MAX_ITERATIONS
+) -> tuple[Array, Check]:
     """Search from `start` until a step promises nothing that matters, by the slopes, or `most` are taken."""
     root = 1.0 / parameters.sigma
 
@@ -225,7 +213,7 @@ def minimise(problem: Problem, parameters: Parameters, start: Array, most: int =
         while True:
             candidate = damped_step(R, rhs, damping, theta, parameters)
             if _cost(rhs) - _cost(rhs - R @ ((candidate - theta) / scale)) < _PROMISE:
-                return Found(theta, iteration, True)
+                return theta, Check("converged", True, f"{iteration} iteration{'s' * (iteration > 1)}")
             candidate = problem.bent(theta, candidate)
             new = cost_at(candidate)
             if new <= cost or damping > _LARGEST_DAMPING:
@@ -234,7 +222,7 @@ def minimise(problem: Problem, parameters: Parameters, start: Array, most: int =
         if new <= cost:
             theta, cost = candidate, new
         damping = 0.0 if damping <= 1e-6 else damping / 10.0
-    return Found(theta, most, False)
+    return theta, Check("converged", False, f"{most} iterations")
 
 
 def damped_step(R: Array, rhs: Array, damping: float, theta: Array, parameters: Parameters) -> Array:

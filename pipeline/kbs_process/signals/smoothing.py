@@ -43,16 +43,13 @@ def smooth_rows(
     pieces = []
     for start in range(0, n, length):
         at = np.arange(start - half, min(start + length, n) + half)
-        values = rows(np.clip(at, 0, n - 1))
-        before, after = np.count_nonzero(at < 0), np.count_nonzero(at >= n)
-        if before:
-            values[:before] = 2.0 * rows(np.zeros(1, dtype=np.intp)) - rows(np.minimum(-at[:before], n - 1))
-        if after:
-            mirrored = np.maximum(2 * (n - 1) - at[-after:], 0)
-            values[-after:] = 2.0 * rows(np.array([n - 1])) - rows(mirrored)
+        end = np.clip(at, 0, n - 1)  # the nearest row that there is
+        values = rows(end)
+        if np.any(at != end):
+            values = 2.0 * values - rows(np.clip(2 * end - at, 0, n - 1))
         shape = (-1,) + (1,) * (values.ndim - 1)
         pieces.append(fftconvolve(values, kernel.reshape(shape), mode="valid", axes=0)[::every])
-    return np.concatenate(pieces) if len(pieces) > 1 else pieces[0]
+    return np.concatenate(pieces)
 
 
 def _kernel(dt: float, cutoff: float, half: int, derivative: int) -> Array:

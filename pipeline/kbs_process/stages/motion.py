@@ -98,10 +98,8 @@ def estimate(run: Run, rig: Rig, settings: MotionSettings = MotionSettings()) ->
     q = np.stack([angle.q for angle in angles], axis=1)
     offset = np.array([_offset(joint) for joint in rig.joints])
     delay = 0.0 if rig.transducer.amplifier is None else rig.transducer.amplifier.delay
-    each = [
-        _derivatives(angle, rate, grid.dt, settings.band_Hz)
-        for angle, rate in zip(angles, _second_rates(run, rig, settings), strict=True)
-    ]
+    rates = [_column(run.rate, joint.name) if settings.source == "auto" else None for joint in rig.joints]
+    each = [_derivatives(angle, rate, grid.dt, settings.band_Hz) for angle, rate in zip(angles, rates, strict=True)]
     moved = _later(smooth(q, grid.dt, settings.band_Hz), grid.dt, delay)
     rate, acceleration = (
         _later(np.stack([own[order] for own, _, _ in each], axis=1), grid.dt, delay) for order in (0, 1)
@@ -127,14 +125,6 @@ def estimate(run: Run, rig: Rig, settings: MotionSettings = MotionSettings()) ->
         # Tails of a kernel are below 1 % beyond the half of its length.
         reach=0.5 * grid.dt * kernel_length(min(angle.corner for angle in angles), grid.dt),
     )
-
-
-def _second_rates(run: Run, rig: Rig, settings: MotionSettings) -> list[Array | None]:
-    """Rates of the joints that are measured beside their angle."""
-    beside = settings.source == "auto" and run.angle is not None
-    return [
-        _column(run.rate, name) if beside and _column(run.angle, name) is not None else None for name in rig.joint_names
-    ]
 
 
 def _derivatives(angle: _Angle, measured: Array | None, dt: float, band: float) -> tuple[Array, float, bool]:

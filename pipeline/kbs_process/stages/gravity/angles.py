@@ -27,8 +27,7 @@ class Rounding:
         self._equation, self._theta, self._size = equation, theta, size
         encoders = [joint.encoder for joint in equation.elements.rig.joints]
         self._steps = [0.0 if encoder is None else float(encoder.step) for encoder in encoders]
-        self._codes: list[list[Array]] = [[] for _ in self._steps]
-        self._sums: list[list[Array]] = [[] for _ in self._steps]
+        self._sums: list[list[tuple[Array, Array]]] = [[] for _ in self._steps]
 
     def add(self, p: Prepared, sigma: Array, J: Array, at: Index) -> None:
         """Take a recording's J (n, c, k), whitened by `sigma` (c,), of the parameters that are `at` (k,)."""
@@ -37,18 +36,16 @@ class Rounding:
             if step > 0.0:
                 codes, which = np.unique(np.round(p.q[:, index] / step), return_inverse=True)
                 by_code = np.zeros((len(codes), self._size))
-                scores = np.einsum("nc,ncp->np", slopes[:, :, index], J)
-                np.add.at(by_code, (which[:, None], at), scores)
-                self._codes[index].append(codes)
-                self._sums[index].append(by_code)
+                np.add.at(by_code, (which[:, None], at), np.einsum("nc,ncp->np", slopes[:, :, index], J))
+                self._sums[index].append((codes, by_code))
 
     def scores(self) -> Array:
         """The covariance, of all recordings: one that rests where another did errs alike."""
         total = np.zeros((self._size, self._size))
-        for codes, sums in zip(self._codes, self._sums, strict=True):
-            if codes:
-                every, which = np.unique(np.concatenate(codes), return_inverse=True)
-                by_code = np.zeros((len(every), self._size))
-                np.add.at(by_code, which, np.concatenate(sums))
-                total += by_code.T @ by_code
+        for sums in filter(None, self._sums):
+            codes, by_recording = map(np.concatenate, zip(*sums, strict=True))
+            every, which = np.unique(codes, return_inverse=True)
+            by_code = np.zeros((len(every), self._size))
+            np.add.at(by_code, which, by_recording)
+            total += by_code.T @ by_code
         return total

@@ -132,13 +132,11 @@ def fit(
     data = [prepared(sample, equation, settings, settings.low_pass_Hz, theta) for sample in samples]
     refuse_uninformed(Rows(equation, data))
     first = [p for p, s in zip(data, samples, strict=True) if s.calibration] or data
-    used, sigmas = first, [first_sigma(p, rig) for p in first]
-    for round_ in range(_ROUNDS + 1):
-        if round_:
-            used = data = [prepared(sample, equation, settings, settings.low_pass_Hz, theta) for sample in samples]
-            sigmas = [residual_sigma(equation, theta, p, rig) for p in used]
-        rows = Rows(equation, used)
-        solution = solve(rows, sigmas, theta)
+    theta = solve(Rows(equation, first), [first_sigma(p, rig) for p in first], theta).theta
+    for _ in range(_ROUNDS):
+        data = [prepared(sample, equation, settings, settings.low_pass_Hz, theta) for sample in samples]
+        rows = Rows(equation, data)
+        solution = solve(rows, [residual_sigma(equation, theta, p, rig) for p in data], theta)
         theta = solution.theta
     result, biases = solution.stated(settings.low_pass_Hz), solution.zeros[:, 0]
     each = zip(data, biases, rows.mean_slopes(theta), solution.sigmas, strict=True)

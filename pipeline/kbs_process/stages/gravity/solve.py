@@ -17,7 +17,7 @@ import numpy as np
 from numpy.polynomial.legendre import legvander
 
 from kbs_process.errors import FitError
-from kbs_process.estimation.fit import Fit, Found, Parameters, Problem, combination, minimise, stated
+from kbs_process.estimation.fit import Check, Fit, Parameters, Problem, combination, minimise, stated
 from kbs_process.estimation.flicker import flicker_scores
 from kbs_process.estimation.longrun import longrun_covariance, variance_inflation
 from kbs_process.estimation.tensors import Tensors
@@ -46,10 +46,7 @@ class Rows:
         return np.split(np.concatenate(left), np.flatnonzero(np.diff(self._whose)) + 1)
 
     def triangles(self, theta: Array) -> Array:
-        """T (recordings, c, k, k) of T'T = A'A, rows of A: a zero's terms, slopes, what is predicted less measured.
-
-        A has a row for each instant of a channel.
-        """
+        """T (recordings, c, k, k) of T'T = A'A, rows of A: a zero's terms, slopes, what is predicted less measured."""
         if self._last is not None and np.array_equal(self._last[0], theta):
             return self._last[1]
         c, width = len(self.equation.channels), _TERMS + self.equation.size + 1
@@ -57,10 +54,10 @@ class Rows:
         T, start = np.zeros((len(self.prepared), c, width, width)), 0
         for part in blocks(self._every):
             rows = slice(start, start := start + len(part.q))
-            A = np.empty((len(part.q), c, width))
-            A[..., :_TERMS] = bases[rows, None]
-            A[..., _TERMS:-1] = self.equation.jacobian(theta, part).reshape(len(A), c, -1)
-            A[..., -1] = self.equation.predict(theta, part) - part.wrench
+            left = self.equation.predict(theta, part) - part.wrench
+            zero = np.broadcast_to(bases[rows, None], (*left.shape, _TERMS))
+            slopes = self.equation.jacobian(theta, part).reshape(*left.shape, -1)
+            A = np.concatenate([zero, slopes, left[..., None]], axis=2)
             for index in np.unique(self._whose[rows]):
                 own = np.swapaxes(A[self._whose[rows] == index], 0, 1)
                 T[index] = np.linalg.qr(np.concatenate([T[index], own], axis=1), mode="r")
@@ -79,35 +76,33 @@ class Rows:
 class Solution:
     """The rig's parameters that fit all recordings, each channel weighed by its sigma, and the recordings' zeros."""
 
-    equation: Equation
-    prepared: Sequence[Prepared]
+    rows: Rows
     sigmas: Sequence[Array]  # (c,) of each recording
     parameters: Parameters
     problem: Problem
-    found: Found
+    every: Array  # number
+    converged: Check
 
     @property
     def theta(self) -> Array:
         """The rig's parameters alone."""
-        return self.found.theta[: self.equation.size]
+        return self.every[: self.rows.equation.size]
 
     @property
     def zeros(self) -> Array:
         """Coefficients of each recording's zero: (recordings, terms, c), the constant first."""
-        return _zeros(self.found.theta[self.equation.size :], len(self.prepared), self.equation)
+        return _zeros(self.every[len(self.theta) :], len(self.sigmas), self.rows.equation)
 
     def stated(self, low_pass_Hz: float) -> Fit:
         """The fit with its uncertainty: residuals of any colour, 1/f noise below `low_pass_Hz`, encoder rounding."""
-        equation, count = self.equation, len(self.found.theta)
-        loose, c = _loose(equation), len(equation.channels)
+        equation, count, c = self.rows.equation, len(self.every), len(self.rows.equation.channels)
         longrun, modelled = np.zeros((count, count)), np.zeros((count, count))
         rounding = Rounding(equation, self.theta, count)
-        for index, (p, sigma, zero) in enumerate(zip(self.prepared, self.sigmas, self.zeros, strict=True)):
-            basis = zero_basis(p)
-            terms = np.einsum("nk,cd->nckd", basis, np.eye(c)[:, loose]).reshape(len(p.q), c, -1)
+        for index, (p, sigma, zero) in enumerate(zip(self.rows.prepared, self.sigmas, self.zeros, strict=True)):
+            terms = zero_slopes(equation, p)
             slopes = equation.jacobian(self.theta, p).reshape(len(p.q), c, -1)
             J = np.concatenate([slopes, terms], axis=2) / sigma[:, None]
-            r = (equation.predict(self.theta, p) + basis @ zero - p.wrench) / sigma
+            r = (equation.predict(self.theta, p) + zero_basis(p) @ zero - p.wrench) / sigma
             width = terms.shape[2]
             at = np.r_[: equation.size, equation.size + index * width : equation.size + (index + 1) * width]
             own = np.ix_(at, at)
@@ -115,7 +110,8 @@ class Solution:
             flat, interval = J.reshape(r.size, -1), float(np.median(np.diff(p.t)))
             modelled[own] += flicker_scores(r.ravel(), flat, [r.shape], [interval], low_pass_Hz)
             rounding.add(p, sigma, J, at)
-        return stated(self.problem, self.parameters, self.found, [longrun, modelled + rounding.scores()])
+        scores = [longrun, modelled + rounding.scores()]
+        return stated(self.problem, self.parameters, self.every, self.converged, scores)
 
 
 def solve(rows: Rows, sigmas: Sequence[Array], theta: Array) -> Solution:
@@ -149,22 +145,31 @@ def solve(rows: Rows, sigmas: Sequence[Array], theta: Array) -> Solution:
             whole[index, channel][:, at] = T[index, channel, :, :_TERMS]
         return whole.reshape(-1, len(full) + 1)
 
-    names = tuple(f"{term}[{p.name}].{equation.channels[index]}" for p in prepared for term in ZERO for index in loose)
+    names, sigma = zero_priors(equation, prepared)
     parameters = Parameters(
         names=equation.names + names,
         value=np.concatenate([equation.start(), np.zeros(len(names))]),
-        sigma=np.concatenate([equation.sigma(), *(prior.T.ravel() for prior in known)]),
+        sigma=np.concatenate([equation.sigma(), sigma]),
         lower=np.concatenate([equation.lower(), np.full(len(names), -np.inf)]),
         tensors=Tensors.among(equation.names, equation.elements.rig.inertias),
     )
-    problem = Problem(
-        cost,
-        triangle,
-        sum(p.wrench.size for p in prepared),
-        lambda full, reached: with_zeros(equation.bent(full[:size], reached[:size])),
-    )
-    found = minimise(problem, parameters, with_zeros(theta))
-    return Solution(equation, prepared, sigmas, parameters, problem, found)
+    samples = sum(p.wrench.size for p in prepared)
+    problem = Problem(cost, triangle, samples, lambda full, to: with_zeros(equation.bent(full[:size], to[:size])))
+    return Solution(rows, sigmas, parameters, problem, *minimise(problem, parameters, with_zeros(theta)))
+
+
+def zero_priors(equation: Equation, prepared: Sequence[Prepared]) -> tuple[tuple[str, ...], Array]:
+    """Names and sigmas of all recordings' zeros, in the order of `zero_slopes`."""
+    loose = _loose(equation)
+    names = tuple(f"{term}[{p.name}].{equation.channels[index]}" for p in prepared for term in ZERO for index in loose)
+    return names, np.concatenate([zero_sigma(equation, p)[:, loose].ravel() for p in prepared])
+
+
+def zero_slopes(equation: Equation, p: Prepared) -> Array:
+    """Derivatives (n, c, k) by the numbers of a recording's zero."""
+    own = np.eye(len(equation.channels))[:, _loose(equation)]
+    slopes: Array = np.einsum("nk,cd->nckd", zero_basis(p), own).reshape(len(p.q), len(own), -1)
+    return slopes
 
 
 def _zeros(values: Array, recordings: int, equation: Equation) -> Array:

@@ -59,25 +59,21 @@ def _tables(writer: TableWriter, analysis: Analysis) -> None:
 def _recording(folder: Path, analysis: Analysis) -> None:
     """One MCAP file a recording: every band and frame, measured and predicted, as any viewer opens it."""
     signals = [
-        (f"/{kind}/{band}", signal)
+        (_streams, f"/{kind}/{band}", signal)
         for (_, band), pair in sorted(analysis.pairs.items())
         for kind, signal in (("measured", pair.measured), ("predicted", pair.predicted))
-        if signal is not None
     ]
-    signals.append(("/gravity", analysis.static.wrench))
-    angles = [("/encoder", analysis.run.angle), ("/command", commanded(analysis.run))]
-    joints = [(topic, signal) for topic, signal in angles if signal is not None]
-    epoch = analysis.run.epoch_ns
-
-    def pieces() -> Iterator[OutStream]:
-        for start in range(0, max(len(signal) for _, signal in (*signals, *joints)), _PIECE):
-            for topic, signal in signals:
-                yield from _streams(topic, crop(signal, start, _PIECE), epoch)
-            for topic, signal in joints:
-                yield _joints(topic, crop(signal, start, _PIECE), epoch)
-
+    signals.append((_streams, "/gravity", analysis.static.wrench))
+    signals += [(_joints, "/encoder", analysis.run.angle), (_joints, "/command", commanded(analysis.run))]
+    known = [(make, topic, signal) for make, topic, signal in signals if signal is not None]
+    pieces = (
+        piece
+        for start in range(0, max(len(signal) for _, _, signal in known), _PIECE)
+        for make, topic, signal in known
+        for piece in make(topic, crop(signal, start, _PIECE), analysis.run.epoch_ns)
+    )
     folder.mkdir(exist_ok=True)
-    write_pieces(folder / f"{analysis.entry.name}.mcap", pieces())
+    write_pieces(folder / f"{analysis.entry.name}.mcap", pieces)
 
 
 def _streams(topic: str, signal: Signal, epoch_ns: int) -> Iterator[OutStream]:
@@ -100,7 +96,7 @@ def _streams(topic: str, signal: Signal, epoch_ns: int) -> Iterator[OutStream]:
         yield OutStream(topic=f"{topic}/joints", kind="joints", stamp=stamp, log=stamp, values=values, names=names)
 
 
-def _joints(topic: str, signal: Signal, epoch_ns: int) -> OutStream:
+def _joints(topic: str, signal: Signal, epoch_ns: int) -> Iterator[OutStream]:
     """Angles of the joints that a signal has."""
     stamp = epoch_ns + np.rint(signal.t * 1e9).astype(np.int64)
-    return OutStream(topic=topic, kind="joints", stamp=stamp, log=stamp, values=signal.values, names=signal.channels)
+    yield OutStream(topic=topic, kind="joints", stamp=stamp, log=stamp, values=signal.values, names=signal.channels)
