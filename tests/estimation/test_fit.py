@@ -21,7 +21,7 @@ def _parameters(sigma, value=(0.0, 0.0, 0.0)):
 
 
 def _longrun(r, J):
-    return longrun_covariance(r[:, None] * J, [(len(r), 1)])
+    return longrun_covariance(r[:, None] * J)
 
 
 def test_linear_problem_without_prior_is_least_squares():

@@ -254,6 +254,5 @@ def _norm(x: Array) -> Array:
 
 def _root_mean_square(at: Array, error: Array, without: int) -> float:
     """Over samples `at`, and `without` more that have no error."""
-    if len(at) < 2:
-        return float(error[0])
-    return float(np.sqrt(np.trapezoid(error**2, at) / (at[-1] - at[0] + without)))
+    mean = np.trapezoid(error**2, at) / (at[-1] - at[0] + without) if len(at) > 1 else error[0] ** 2
+    return float(np.sqrt(mean))

@@ -106,9 +106,8 @@ class Solution:
             width = terms.shape[2]
             at = np.r_[: equation.size, equation.size + index * width : equation.size + (index + 1) * width]
             own = np.ix_(at, at)
-            longrun[own] += longrun_covariance(np.einsum("nc,ncp->np", r, J), [(len(r), 1)])
-            flat, interval = J.reshape(r.size, -1), float(np.median(np.diff(p.t)))
-            modelled[own] += flicker_scores(r.ravel(), flat, [r.shape], [interval], low_pass_Hz)
+            longrun[own] += longrun_covariance(np.einsum("nc,ncp->np", r, J))
+            modelled[own] += flicker_scores(r, J, float(np.median(np.diff(p.t))), low_pass_Hz)
             rounding.add(p, sigma, J, at)
         scores = [longrun, modelled + rounding.scores()]
         return stated(self.problem, self.parameters, self.every, self.converged, scores)

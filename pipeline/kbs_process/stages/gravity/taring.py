@@ -83,7 +83,7 @@ def locate(x: Array, scale: float) -> tuple[float, float, Array]:
     weight = _weight(z)
     curvature = float(np.sum(weight * (_FREEDOM - z**2) / (_FREEDOM + z**2))) / scale
     scores = weight * z
-    spread, most = float(longrun_covariance(scores[:, None], [(len(x), 1)])[0, 0]), float(np.ptp(x)) ** 2
+    spread, most = float(longrun_covariance(scores[:, None])[0, 0]), float(np.ptp(x)) ** 2
     told = curvature > 0.0 and spread < most * curvature**2
     return float(location[best]), spread / curvature**2 if told else most, weight
 
