@@ -8,6 +8,7 @@ from scipy.signal import lfilter
 
 from kbs_process.errors import FitError
 from kbs_process.estimation.fit import Parameters, fit_map
+from kbs_process.estimation.longrun import longrun_covariance
 
 
 def _line(n=200):
@@ -17,6 +18,10 @@ def _line(n=200):
 
 def _parameters(sigma, value=(0.0, 0.0, 0.0)):
     return Parameters(("a", "b", "c"), np.array(value), np.broadcast_to(np.asarray(sigma, float), 3).copy())
+
+
+def _longrun(r, J):
+    return longrun_covariance(r[:, None] * J)
 
 
 def test_linear_problem_without_prior_is_least_squares():
@@ -50,7 +55,7 @@ def test_intervals_cover_the_truth_for_white_and_coloured_noise(rho):
     for _ in range(trials):
         noise = lfilter([np.sqrt(1 - rho**2)], [1, -rho], rng.standard_normal(800))[200:]
         y = A @ truth + noise
-        fit = fit_map(lambda x, y=y: A @ x - y, _parameters(np.inf), jacobian=lambda x: A, series=[(600, 1)])
+        fit = fit_map(lambda x, y=y: A @ x - y, _parameters(np.inf), jacobian=lambda x: A, scores=_longrun)
         inside += np.sum(np.abs(fit.value - truth) < 1.96 * fit.sigma)
     coverage = inside / (3 * trials)
     assert 0.88 < coverage < 0.985
@@ -60,7 +65,7 @@ def test_coloured_noise_would_be_underestimated_without_its_series():
     A, rng = _line(600), np.random.default_rng(2)
     y = lfilter([np.sqrt(1 - 0.9**2)], [1, -0.9], rng.standard_normal(800))[200:]
     white = fit_map(lambda x: A @ x - y, _parameters(np.inf))
-    coloured = fit_map(lambda x: A @ x - y, _parameters(np.inf), series=[(600, 1)])
+    coloured = fit_map(lambda x: A @ x - y, _parameters(np.inf), scores=_longrun)
     assert np.all(coloured.sigma > 2.0 * white.sigma)
 
 

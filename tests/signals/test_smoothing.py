@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.signal import fftconvolve
 
-from kbs_process.signals.smoothing import kernel_length, smooth
+from kbs_process.signals.smoothing import kernel_length, smooth, smooth_rows
 
 DT, CORNER = 0.05, 2.0
 T = DT * np.arange(2000)
@@ -39,3 +40,18 @@ def test_straight_lines_keep_their_slope_to_the_ends():
 
 def test_records_shorter_than_the_kernel_are_taken():
     assert smooth(np.arange(9.0)[:, None], DT, 0.1).shape == (9, 1)
+
+
+@pytest.mark.parametrize("order", [0, 1, 2])
+def test_across_its_pieces_the_filter_is_that_of_the_whole(order):
+    """Long enough for three pieces; the whole is filtered by the kernel as an impulse shows it."""
+    n, half = 150_001, kernel_length(CORNER, DT)
+    x = np.cumsum(np.random.default_rng(3).standard_normal((n, 2)), axis=0)
+    impulse = np.zeros(4 * half + 1)
+    impulse[2 * half] = 1.0
+    kernel = smooth(impulse, DT, CORNER, order)[half : 3 * half + 1]
+    whole = fftconvolve(np.pad(x, ((half, half), (0, 0)), mode="reflect", reflect_type="odd"), kernel[:, None], "valid")
+    atol = 1e-10 * np.abs(whole).max()
+    np.testing.assert_allclose(smooth(x, DT, CORNER, order), whole, rtol=0, atol=atol)
+    thinned = smooth_rows(lambda at: x[at], n, DT, CORNER, order, every=7)
+    np.testing.assert_allclose(thinned, whole[::7], rtol=0, atol=atol)

@@ -182,3 +182,13 @@ def test_a_line_across_a_gap_that_is_short_in_the_band_is_what_was_there() -> No
     )
     assert filtered.valid[100:-100].all()
     assert np.abs(filtered.values - truth.values)[100:-100].max() < 1.5 * bridging_error(gaps, BELOW_1) < 0.015
+
+
+@pytest.mark.parametrize("band", [Band("lt1Hz", 0.05, 1.0), Band("lp", None, 1.0)])
+def test_the_statement_of_a_long_record_is_that_of_its_ends(band: Band) -> None:
+    """Errors are over the whole record: of one four times as long they are half as large, if its middle has none."""
+    n = int((60.0 if band.high_pass_Hz is None else 1600.0) / (0.25 * DT))
+    short, long = statement(band, DT, n), statement(band, DT, 4 * n)
+    assert long.edge_s == pytest.approx(short.edge_s, rel=0.2)
+    for one, other in ((short.edge_error, long.edge_error), (short.edge_error_drift, long.edge_error_drift)):
+        assert other == pytest.approx(0.5 * one, rel=0.05)

@@ -106,6 +106,51 @@ def test_a_measured_rate_is_integrated():
     np.testing.assert_allclose(motion.qd[100:-100], rate[100:-100], atol=1e-5)
 
 
+def swing(seconds=200.0):
+    """Both joints swing slowly, one of them with a ripple that is far below a code of 0.2 mrad."""
+    t = np.arange(int(seconds * FINE)) / FINE
+    q = 0.03 * np.sin(2 * np.pi * 0.03 * t)
+    return np.stack([q, q + 1e-6 * np.sin(2 * np.pi * 1.0 * t)], axis=1)
+
+
+def _rated(run, q, noise):
+    """The run with measured rates: true ones with `noise` rad/s rms a sample."""
+    rate = smooth(q, 1 / FINE, 2.0, derivative=1)[:: int(FINE / RATE)]
+    rate = rate + noise * np.random.default_rng(1).standard_normal(rate.shape)
+    return replace(run, rate=Signal(0.0, 1 / RATE, rate, run.angle.channels, ("rad/s",) * 2, "joint", run.angle.valid))
+
+
+def _off(motion, q):
+    """Rms errors (2, joints) of rates and accelerations."""
+    true = (smooth(q, 1 / FINE, 2.0, derivative=order)[:: int(FINE / RATE)] for order in (1, 2))
+    inner = slice(200, -200)
+    return [np.sqrt(np.mean((x - y)[inner] ** 2, axis=0)) for x, y in zip((motion.qd, motion.qdd), true, strict=True)]
+
+
+def test_accelerations_end_where_rounding_is_most_of_them():
+    rig, q = pointing_rig(step=2e-4), swing()
+    run = replace(record(rig, "slow", q, np.random.default_rng(0)), command=None)
+    motion = estimate(run, rig)
+    _, error = _off(motion, q)
+    whole = smooth(run.angle.values, run.angle.dt, 2.0, derivative=2)
+    _, before = _off(replace(motion, qdd=whole), q)
+    assert np.all(error < 0.1 * before)
+    fine = pointing_rig(step=1e-8)
+    resolved = estimate(replace(record(fine, "fine", q, np.random.default_rng(0)), command=None), fine)
+    assert np.all(_off(resolved, q)[1] < 0.01 * np.abs(resolved.qdd).max())
+
+
+def test_a_measured_rate_serves_where_it_errs_less_than_the_encoder():
+    rig, q = pointing_rig(step=2e-4), swing()
+    run = replace(record(rig, "slow", q, np.random.default_rng(0)), command=None)
+    alone = _off(estimate(run, rig), q)
+    good = estimate(_rated(run, q, 1e-7), rig)
+    assert any("by its measured rate" in step for step in good.history)
+    assert _off(good, q)[1][1] < 0.3 * alone[1][1]
+    for with_it, without in zip(_off(estimate(_rated(run, q, 1e-1), rig), q), alone, strict=True):
+        assert np.all(with_it < 1.1 * without)
+
+
 def test_a_run_without_angles_is_refused():
     rig = pointing_rig()
     run = record(rig, "none", slow_ramp(20.0), np.random.default_rng(0))

@@ -31,7 +31,6 @@ class Descent:
 def descend(residual: Residual, J: Array, parameters: Parameters, start: Array, *, gain: float, steps: int) -> Descent:
     """Go down from `start` with slopes J (n, p) until a step promises less than `gain`, at most `steps` residuals."""
     scale, root = parameters.scale, 1.0 / parameters.sigma
-    low, high = parameters.lower, parameters.upper
     R = triangle(np.vstack([J, np.diag(root)]) * scale)
 
     def augmented(theta: Array) -> tuple[Array, Array, float]:
@@ -44,13 +43,12 @@ def descend(residual: Residual, J: Array, parameters: Parameters, start: Array, 
     for _ in range(steps):
         gradient = scale * (J.T @ misfit + root * excess)
         rhs = -np.asarray(solve_triangular(R, gradient, trans="T"), dtype=np.float64)
-        step = damped_step(R, rhs, damping, (low - theta) / scale, (high - theta) / scale)
-        left = rhs - R @ step
+        candidate = damped_step(R, rhs, damping, theta, parameters)
+        left = rhs - R @ ((candidate - theta) / scale)
         promised = float(rhs @ rhs - left @ left)
         first = promised if first < 0.0 else first
         if promised < gain:
             break
-        candidate = parameters.clipped(theta + step * scale)
         *new, new_cost = augmented(candidate)
         gained = cost - new_cost
         if not gained > 0.0:

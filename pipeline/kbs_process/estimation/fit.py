@@ -1,8 +1,8 @@
 """Maximum a posteriori least squares: Levenberg-Marquardt on whitened residuals with Gaussian priors.
 
 theta = argmin |r(theta)|^2 + sum(((theta - theta_0) / sigma_0)^2), r whitened by the caller. The covariance is the
-greater of the model's H^-1 (right where residuals are white with unit variance) and the sandwich H^-1 (S + P) H^-1,
-with S the long-run covariance of the scores, which holds for residuals of any colour.
+greater of the model's H^-1 (right where residuals are white with unit variance) and the sandwiches H^-1 (S + P) H^-1,
+with S covariances of the scores J^T r for residuals of any colour.
 """
 
 from __future__ import annotations
@@ -14,15 +14,13 @@ import numpy as np
 from scipy.linalg import lstsq
 
 from kbs_process.errors import FitError
-from kbs_process.estimation.longrun import longrun_covariance
 from kbs_process.estimation.tensors import Tensors
 from kbs_process.signals.records import Array
 
 Residual = Callable[[Array], Array]
 _MAX_ITERATIONS = 60
 _LARGEST_DAMPING = 1e12
-_GAIN = 1e-10  # of the cost: an iteration that gains less ends the search
-_MOVE = 1e-7  # of the parameters' scales, likewise
+_PROMISE = 1e-8  # of the cost, where 1 is a sigma: a step that promises less is not taken, and ends the search
 _SINGULAR = 1e-11  # of the greatest singular value, columns scaled to unit length
 _WEAK = 0.9  # posterior over prior sigma from which the data say little
 _CONFUSED = 0.98  # correlation
@@ -120,54 +118,65 @@ class Fit:
         return float(self.value[self.names.index(name)])
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Problem:
+    """A whitened residual r (n,) that is never held as a whole."""
+
+    cost: Callable[[Array], float]  # |r|^2
+    triangle: Callable[[Array], Array]  # T (k, p + 1) of T'T = [J r]'[J r]
+    samples: int
+    bent: Callable[[Array, Array], Array] = lambda theta, reached: reached  # where a straight step should have led
+
+
 def fit_map(
     residual: Residual,
     parameters: Parameters,
     *,
     jacobian: Callable[[Array], Array] | None = None,
-    series: Sequence[tuple[int, int]] | None = None,
     scores: Callable[[Array, Array], Array] | None = None,
     start: Array | None = None,
     iterations: int = _MAX_ITERATIONS,
 ) -> Fit:
     """Fit `parameters` to a residual (n,) that is measured less modelled over its standard deviation.
 
-    `series` says how the residual is laid out: (samples, channels) of each independent stretch of uniformly
-    sampled data, row-major, in order; without it residuals are taken as white. `scores` gives, from the residual and
-    its Jacobian (n, p), the covariance (p, p) of J^T r by a model of the errors, for what residuals hide; the
-    parameters' is then no smaller. The search begins at `start`, or at the prior's mean, and ends after `iterations`
-    at the latest. Raises FitError where data and prior leave a combination of parameters undetermined, and names it.
+    `scores` gives, from the residual and its Jacobian (n, p), the covariance (p, p) of J^T r by a model of the errors;
+    without it they are taken as white. The search begins at `start`, or at the prior's mean, and ends after
+    `iterations` at the latest. Raises FitError where data and prior leave a combination of parameters undetermined,
+    and names it.
     """
     gradient = jacobian or (lambda theta: difference_jacobian(residual, theta, parameters.scale))
     begin = parameters.value if start is None else start
-    theta, taken, converged = _minimise(residual, gradient, parameters, begin, iterations)
-    r, J = residual(theta), gradient(theta)
+    problem = Problem(
+        lambda theta: _cost(residual(theta)),
+        lambda theta: triangle(np.column_stack([gradient(theta), residual(theta)])),
+        len(residual(begin)),
+    )
+    theta, converged = minimise(problem, parameters, begin, iterations)
+    covariances = [] if scores is None else [scores(residual(theta), gradient(theta))]
+    return stated(problem, parameters, theta, converged, covariances)
+
+
+def stated(problem: Problem, parameters: Parameters, theta: Array, converged: Check, scores: Sequence[Array]) -> Fit:
+    """State what was found, its covariance no smaller than by each of `scores`, covariances (p, p) of J^T r."""
+    T = problem.triangle(theta)
     precision = parameters.sigma**-2.0
-    H_inverse = _inverse(J, precision, parameters)
+    H_inverse = _inverse(T[:, :-1], precision, parameters)
     covariance = H_inverse
-    if series is not None:
-        S = longrun_covariance(r[:, None] * J, series) + np.diag(precision)
-        covariance = _at_least(H_inverse @ S @ H_inverse, H_inverse)
-    if scores is not None:
-        S = scores(r, J) + np.diag(precision)
-        covariance = _at_least(H_inverse @ S @ H_inverse, covariance)
+    for S in scores:
+        covariance = _at_least(H_inverse @ (S + np.diag(precision)) @ H_inverse, covariance)
     sigma = np.sqrt(np.diag(covariance))
     # moved = (I - H^-1 P) d + H^-1 J^T e, d the prior's own error: (I - H^-1 P) P^-1 (I - P H^-1) + H^-1 S H^-1.
     moved_covariance = np.diag(parameters.sigma**2) - 2.0 * H_inverse + covariance
-    checks = (
-        Check("converged", converged, f"{taken} iterations"),
-        _bounds_check(theta, parameters),
-        _identifiable_check(J, sigma, covariance, parameters),
-    )
+    identifiable = _identifiable_check(T[:, :-1], sigma, covariance, parameters)
     return Fit(
         names=parameters.names,
         value=theta,
         sigma=sigma,
         covariance=covariance,
         prior_sigma=parameters.sigma,
-        checks=checks,
-        residual_rms=float(np.sqrt(np.mean(r**2))),
-        dof=len(r) - len(theta),
+        checks=(converged, _bounds_check(theta, parameters), identifiable),
+        residual_rms=float(np.sqrt(problem.cost(theta) / problem.samples)),
+        dof=problem.samples - len(theta),
         moved=theta - parameters.value,
         moved_covariance=moved_covariance,
     )
@@ -183,57 +192,57 @@ def difference_jacobian(residual: Residual, theta: Array, scale: Array) -> Array
     return np.stack(columns, axis=1)
 
 
-def _minimise(
-    residual: Residual, gradient: Callable[[Array], Array], parameters: Parameters, start: Array, most: int
-) -> tuple[Array, int, bool]:
+def minimise(
+    problem: Problem, parameters: Parameters, start: Array, most: int = _MAX_ITERATIONS
+) -> tuple[Array, Check]:
+    """Search from `start` until a step promises nothing that matters, by the slopes, or `most` are taken."""
     root = 1.0 / parameters.sigma
-    low, high = parameters.lower, parameters.upper
 
-    def augmented(theta: Array) -> Array:
-        return np.concatenate([residual(theta), (theta - parameters.value) * root])
+    def cost_at(theta: Array) -> float:
+        return problem.cost(theta) + _cost((theta - parameters.value) * root)
 
     theta = parameters.clipped(start)
     scale = parameters.scale
-    misfit = augmented(theta)
-    cost, damping = _cost(misfit), 0.0
+    cost, damping = cost_at(theta), 0.0
     for iteration in range(1, most + 1):
-        # One QR carries the normal equations of all samples into a triangle of the parameters' size.
-        A = np.column_stack([np.vstack([gradient(theta), np.diag(root)]) * scale, -misfit])
-        reduced = triangle(A)
+        priors = np.column_stack([np.diag(root), (theta - parameters.value) * root])
+        reduced = triangle(np.vstack([problem.triangle(theta), priors]) * np.append(scale, -1.0))
         R, rhs = reduced[:, :-1], reduced[:, -1]
         if iteration == 1:
             _refuse_singular(R, parameters.names)
         while True:
-            whole = damped_step(R, rhs, damping, (low - theta) / scale, (high - theta) / scale)
-            candidate = parameters.clipped(theta + whole * scale)
-            candidate_misfit = augmented(candidate)
-            new = _cost(candidate_misfit)
+            candidate = damped_step(R, rhs, damping, theta, parameters)
+            if _cost(rhs) - _cost(rhs - R @ ((candidate - theta) / scale)) < _PROMISE:
+                return theta, Check("converged", True, f"{iteration} iteration{'s' * (iteration > 1)}")
+            candidate = problem.bent(theta, candidate)
+            new = cost_at(candidate)
             if new <= cost or damping > _LARGEST_DAMPING:
                 break
             damping = max(10.0 * damping, 1e-6)
-        moved = float(np.linalg.norm((candidate - theta) / scale))
-        gained = cost - new
-        if gained > 0.0:
-            theta, cost, misfit = candidate, new, candidate_misfit
+        if new <= cost:
+            theta, cost = candidate, new
         damping = 0.0 if damping <= 1e-6 else damping / 10.0
-        if gained <= _GAIN * cost or moved < _MOVE:
-            return theta, iteration, True
-    return theta, most, False
+    return theta, Check("converged", False, f"{most} iterations")
 
 
-def damped_step(R: Array, rhs: Array, damping: float, lowest: Array, highest: Array) -> Array:
-    """Step within bounds (p,) each: those that it would cross are held at theirs, and the others follow."""
+def damped_step(R: Array, rhs: Array, damping: float, theta: Array, parameters: Parameters) -> Array:
+    """Where a step from `theta` leads within bounds: numbers that would cross them are held there, the others follow.
+
+    R (k, p) and `rhs` (k,) are for steps in units of the parameters' scales.
+    """
+    scale = parameters.scale
     damped = np.vstack([R, np.sqrt(damping) * np.diag(np.linalg.norm(R, axis=0))])
     wanted = np.concatenate([rhs, np.zeros(R.shape[1])])
-    step = np.asarray(lstsq(damped, wanted)[0])
-    held = np.zeros(len(step), dtype=np.bool_)
-    while (crossing := ~held & ((step < lowest) | (step > highest))).any():
+    reached = theta + scale * np.asarray(lstsq(damped, wanted)[0])
+    held = np.zeros(len(theta), dtype=np.bool_)
+    while (crossing := ~held & ((near := parameters.clipped(reached)) != reached)).any():
         held |= crossing
-        step[held] = np.clip(step, lowest, highest)[held]
+        reached[held] = near[held]
         if held.all():
             break
-        step[~held] = lstsq(damped[:, ~held], wanted - damped[:, held] @ step[held])[0]
-    return step
+        known = wanted - damped[:, held] @ ((reached - theta) / scale)[held]
+        reached[~held] = theta[~held] + scale[~held] * lstsq(damped[:, ~held], known)[0]
+    return parameters.clipped(reached)
 
 
 def _cost(r: Array) -> float:
@@ -290,14 +299,14 @@ def _bounds_check(theta: Array, parameters: Parameters) -> Check:
     return Check("within bounds", not stuck, f"at a bound: {', '.join(stuck)}" if stuck else "none at a bound")
 
 
-def _identifiable_check(J: Array, sigma: Array, covariance: Array, parameters: Parameters) -> Check:
+def _identifiable_check(R: Array, sigma: Array, covariance: Array, parameters: Parameters) -> Check:
     """Which estimates are little more than their prior, and which pairs only their combination is known of.
 
     Prior only: sigma posterior / sigma prior > 0.9. Confused: |correlation| > 0.98 with the named partner.
     """
     correlation = covariance / np.outer(sigma, sigma) - np.eye(len(sigma))
     partner = np.argmax(np.abs(correlation), axis=1)
-    informed = np.linalg.norm(J, axis=0) * parameters.sigma
+    informed = np.linalg.norm(R, axis=0) * parameters.sigma
     prior_only, confused = [], []
     for index, name in enumerate(parameters.names):
         other = parameters.names[partner[index]]

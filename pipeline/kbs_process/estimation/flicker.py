@@ -6,7 +6,6 @@ taken from them finds little. That part is extrapolated here, by the law that a 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -51,27 +50,20 @@ def fit_flicker(residual: Array, dt: float, highest: float) -> Flicker:
     return Flicker(float(weight @ levels), float(weight @ (levels * _KNEES)))
 
 
-def flicker_scores(
-    residual: Array, J: Array, series: Sequence[tuple[int, int]], intervals: Sequence[float], highest: float
-) -> Array:
-    """Covariance (p, p) of the scores J^T e, e white and 1/f noise of each channel of each record alone.
+def flicker_scores(residual: Array, J: Array, dt: float, highest: float) -> Array:
+    """Covariance (p, p) of the scores J^T e of a record, e white and 1/f noise of each channel alone.
 
-    `residual` (n,) and J (n, p) are laid out as `series` of (samples, channels), sampled every `intervals` s. The zero
-    frequency counts as half of the record's lowest.
+    `residual` (n, c) and J (n, c, p) are sampled every `dt` s. The zero frequency counts as half of the record's
+    lowest.
     """
-    total = np.zeros((J.shape[1], J.shape[1]))
-    start = 0
-    for (n, channels), dt in zip(series, intervals, strict=True):
-        rows = slice(start, start + n * channels)
-        left, slopes = residual[rows].reshape(n, channels), J[rows].reshape(n, channels, -1)
-        start += n * channels
-        f = np.maximum(np.fft.rfftfreq(n, dt), 0.5 / (n * dt))
-        twice = np.full(len(f), 2.0)  # positive and negative frequencies, but for the zero and the highest
-        twice[0] = 1.0
-        if n % 2 == 0:
-            twice[-1] = 1.0
-        for channel in range(channels):
-            power = fit_flicker(left[:, channel], dt, highest).at(f)
-            G = np.fft.rfft(slopes[:, channel], axis=0) * np.sqrt(twice * power / n)[:, None]
-            total += G.real.T @ G.real + G.imag.T @ G.imag
+    n, total = len(residual), np.zeros((J.shape[2], J.shape[2]))
+    f = np.maximum(np.fft.rfftfreq(n, dt), 0.5 / (n * dt))
+    twice = np.full(len(f), 2.0)  # positive and negative frequencies, but for the zero and the highest
+    twice[0] = 1.0
+    if n % 2 == 0:
+        twice[-1] = 1.0
+    for channel, left in enumerate(residual.T):
+        power = fit_flicker(left, dt, highest).at(f)
+        G = np.fft.rfft(J[:, channel], axis=0) * np.sqrt(twice * power / n)[:, None]
+        total += G.real.T @ G.real + G.imag.T @ G.imag
     return total

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from scipy.fft import next_fast_len, rfft
 
@@ -14,35 +12,23 @@ _RECORD_PER_MEMORY = 10  # the record is this many times as long as the memory t
 _STRETCH = 1.330  # ((1.96 + 2.9694 b + 0.4160 b^2 - 0.5324 b^3) / 1.96)^2 at b = 1/10
 
 
-def longrun_covariance(scores: Array, series: Sequence[tuple[int, int]]) -> Array:
-    """Covariance (p, p) of the sum of scores (n, p) over independent `series` of (samples, channels).
+def longrun_covariance(scores: Array) -> Array:
+    """Covariance (p, p) of the sum of scores (n, p), one of each instant of a record.
 
-    Scores of one instant are added over channels, pre-whitened by one first-order autoregression (Andrews and
+    They are pre-whitened by one first-order autoregression (Andrews and
     Monahan, Econometrica 60:953, 1992), summed with Bartlett weights to a tenth of the record (Kiefer and
     Vogelsang, Econometric Theory 21:1130, 2005), and recoloured. A memory that grows with the record keeps what
     shorter ones miss: 1/f noise and drift below white noise. So long a memory leaves the estimate few degrees of
     freedom; it is stretched so that +- 1.96 sigma still covers 95 %, by their factor for the Bartlett kernel.
     """
-    total = np.zeros((scores.shape[1], scores.shape[1]))
-    start = 0
-    for samples, channels in series:
-        block = scores[start : start + samples * channels].reshape(samples, channels, -1).sum(axis=1)
-        start += samples * channels
-        total += _one_series(block)
-    if start != len(scores):
-        raise ValueError(f"series cover {start} of {len(scores)} residuals")
-    return total
-
-
-def _one_series(u: Array) -> Array:
-    n = len(u)
+    n = len(scores)
     if n < 8:
-        return u.T @ u
+        return scores.T @ scores
     # One coefficient for all: a combination of parameters that moves nothing must keep a score of zero.
-    power = np.sum(u**2, axis=0)
-    each = np.sum(u[1:] * u[:-1], axis=0)[power > 0.0] / power[power > 0.0]
+    power = np.sum(scores**2, axis=0)
+    each = np.sum(scores[1:] * scores[:-1], axis=0)[power > 0.0] / power[power > 0.0]
     rho = float(np.clip(np.mean(each), -_LARGEST_AR, _LARGEST_AR)) if len(each) else 0.0
-    e = u[1:] - rho * u[:-1]
+    e = scores[1:] - rho * scores[:-1]
     S = _STRETCH * _bartlett(e, max(1, n // _RECORD_PER_MEMORY))
     S_full: Array = S / (1.0 - rho) ** 2 * (n / (n - 1))
     return S_full

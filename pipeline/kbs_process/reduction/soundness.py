@@ -130,7 +130,8 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
         ]
         samples = [sample for sample, _ in tared]
         equation = model.equation
-        instants = [prepared(sample, equation, model.settings, model.settings.low_pass_Hz) for sample in samples]
+        low_pass, theta = model.settings.low_pass_Hz, model.fit.value[: equation.size]
+        instants = [prepared(sample, equation, model.settings, low_pass, theta) for sample in samples]
         zeros = np.stack([taring.bias for _, taring in tared])
         shown = [_read_and_due(one, data, model) for one, data in zip(recordings, instants, strict=True)]
         conventions = (*check_weight(campaign.rig), *_conventions(recordings, instants, model, zeros, shown))

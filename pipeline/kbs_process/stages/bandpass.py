@@ -14,6 +14,7 @@ from kbs_process.stages.lowfrequency import METHOD, high_pass, high_pass_gain
 ORDER = 4  # of the low-pass, run forwards and backwards
 BRIDGED = 0.125  # of the shortest period of a band: across so long a gap a line errs by 8 % of a tone of that period
 TOLERANCE = 1e-3  # an edge ends where the error is this part of the signal's rms
+_FAR = 8  # times a filter's memory, beyond which a record has a middle that its ends do not reach
 NEAR = 1.0  # s on either side of invalid samples, whose means a straight line joins
 
 
@@ -191,12 +192,15 @@ def statement(band: Band, dt: float, n: int) -> BandStatement:
     """Compute the statement for records of n samples from the filter's own impulse responses.
 
     Row t of the filter on n samples, less row t of the filter on an endless record, weighs the unknown; its
-    norm is the error at t for a flat spectrum, the norm of its running sum that for a random walk.
+    norm is the error at t for a flat spectrum, the norm of its running sum that for a random walk. In the middle of a
+    record of many periods there is none: it is computed for a shorter one.
     """
     slowest = _slowest(band, dt)
     if slowest is None:
         return BandStatement(band.name, None, None, "as it is", 0.0, 0.0, 0.0, 0.0)
     margin = int(np.ceil((16.0 if band.high_pass_Hz is None else 4.0) / (slowest * dt)))
+    without = max(n - _FAR * margin, 0)  # samples
+    n -= without
     at = np.unique(np.concatenate(([0], np.geomspace(1, max(n // 2, 2), 40).astype(int))))
     at = at[at < n]
     short, endless = _low_pass_rows(band, dt, n, at, margin)
@@ -223,8 +227,8 @@ def statement(band: Band, dt: float, n: int) -> BandStatement:
         method=_step(band),
         edge_s=float(edge),
         flagged_s=flagged * dt,
-        edge_error=_root_mean_square(at[valid], flat[valid]),
-        edge_error_drift=_root_mean_square(at[valid], drift[valid]),
+        edge_error=_root_mean_square(at[valid], flat[valid], without // 2),
+        edge_error_drift=_root_mean_square(at[valid], drift[valid], without // 2),
     )
 
 
@@ -248,5 +252,7 @@ def _norm(x: Array) -> Array:
     return norm
 
 
-def _root_mean_square(at: Array, error: Array) -> float:
-    return float(np.sqrt(np.trapezoid(error**2, at) / (at[-1] - at[0]))) if len(at) > 1 else float(error[0])
+def _root_mean_square(at: Array, error: Array, without: int) -> float:
+    """Over samples `at`, and `without` more that have no error."""
+    mean = np.trapezoid(error**2, at) / (at[-1] - at[0] + without) if len(at) > 1 else error[0] ** 2
+    return float(np.sqrt(mean))

@@ -8,7 +8,7 @@ the other better known. Entries are independent causes; the total is the root of
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -59,14 +59,12 @@ def sensor_noise(noise: Array, rate: Array | float, bandwidth: float) -> Entry:
     return Entry("transducer", "noise of the transducer, white", noise * np.sqrt(2.0 * bandwidth / rate))
 
 
-def from_shapes(stage: str, source: str, shapes: Sequence[Signal], band: Filter, moving: Mask | None = None) -> Entry:
+def from_shapes(stage: str, source: str, shapes: Iterable[Signal], band: Filter, moving: Mask | None = None) -> Entry:
     """Entry of a stage whose independent one-sigma errors have known time histories `shapes` (at least one)."""
-    variance = np.zeros_like(shapes[0].values)
-    valid = np.ones(len(shapes[0]), dtype=np.bool_)
-    for shape in shapes:
-        cut = band(shape)
-        variance += cut.values**2
-        valid &= cut.valid
+    variance, valid = np.zeros(1), np.ones(1, dtype=np.bool_)
+    for cut in map(band, shapes):
+        variance = variance + cut.values**2
+        valid = valid & cut.valid
     return Entry(stage, source, _root_mean(variance, valid, moving))
 
 

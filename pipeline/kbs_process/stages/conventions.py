@@ -69,7 +69,7 @@ def check_gravity_sign(
         if power == 0.0:
             continue
         slope = float(x @ y) / power
-        seen = float(longrun_covariance(((y - slope * x) * x)[:, None], [(len(x), 1)])[0, 0])
+        seen = float(longrun_covariance(((y - slope * x) * x)[:, None])[0, 0])
         noisy = power * float(noise[index]) ** 2
         stated = 0.0 if errors is None else float(np.sum((x @ errors[:, index]) ** 2))
         sigma = float(np.sqrt(max(seen, noisy) + stated)) / power

@@ -21,7 +21,7 @@ from scipy.interpolate import CubicSpline
 from kbs_process.errors import RecordingError
 from kbs_process.rig.model import Joint, Rig
 from kbs_process.signals.records import Array, Events, Mask, Run, Signal
-from kbs_process.signals.smoothing import kernel_length, smooth
+from kbs_process.signals.smoothing import Index, kernel_length, smooth, smooth_rows
 
 Source = Literal["auto", "encoder", "command+encoder", "rate"]
 _CORNERS = (0.05, 0.1, 0.2, 0.5)  # Hz, of the low-pass on encoder - command
@@ -98,9 +98,13 @@ def estimate(run: Run, rig: Rig, settings: MotionSettings = MotionSettings()) ->
     q = np.stack([angle.q for angle in angles], axis=1)
     offset = np.array([_offset(joint) for joint in rig.joints])
     delay = 0.0 if rig.transducer.amplifier is None else rig.transducer.amplifier.delay
-    moved, rate, acceleration = (
-        _later(smooth(q, grid.dt, settings.band_Hz, derivative=order), grid.dt, delay) for order in (0, 1, 2)
+    rates = [_column(run.rate, joint.name) if settings.source == "auto" else None for joint in rig.joints]
+    each = [_derivatives(angle, rate, grid.dt, settings.band_Hz) for angle, rate in zip(angles, rates, strict=True)]
+    moved = _later(smooth(q, grid.dt, settings.band_Hz), grid.dt, delay)
+    rate, acceleration = (
+        _later(np.stack([own[order] for own, _, _ in each], axis=1), grid.dt, delay) for order in (0, 1)
     )
+    told = (f"{up_to:.3g} Hz" + ", by its measured rate" * rated for _, up_to, rated in each)
     return Motion(
         t0=grid.t0,
         dt=grid.dt,
@@ -111,10 +115,11 @@ def estimate(run: Run, rig: Rig, settings: MotionSettings = MotionSettings()) ->
         rounding=np.stack([angle.rounding for angle in angles], axis=2),
         missed=np.array([angle.missed for angle in angles]),
         offset=offset,
-        valid=_valid(run, rig, grid),
+        valid=_valid(run, rig, grid, rated=any(rated for _, _, rated in each)),
         history=(
             *(f"{joint.name}: {angle.how}" for joint, angle in zip(rig.joints, angles, strict=True)),
-            f"angles low-passed at {settings.band_Hz:g} Hz and differentiated",
+            f"angles low-passed at {settings.band_Hz:g} Hz",
+            f"and differentiated up to {'; '.join(told)}",
             *([f"angles delayed by {1e3 * delay:.1f} ms, as the amplifier delays the wrench"] if delay else []),
         ),
         # Tails of a kernel are below 1 % beyond the half of its length.
@@ -122,9 +127,39 @@ def estimate(run: Run, rig: Rig, settings: MotionSettings = MotionSettings()) ->
     )
 
 
-def _valid(run: Run, rig: Rig, grid: Signal) -> Mask:
-    """Where the joints' motion was measured: a joint's rate counts where its angle is not read."""
-    if run.angle is None or run.rate is None or set(rig.joint_names) <= set(run.angle.channels):
+def _derivatives(angle: _Angle, measured: Array | None, dt: float, band: float) -> tuple[Array, float, bool]:
+    """Rate and acceleration (2, n) up to `band` Hz as far as they are resolved, to where, and if by a `measured` rate.
+
+    By octaves, from the highest down: each is the angle's or the measured rate's, whichever errs less in acceleration.
+    The angle errs by its rounding, and the rate by what else the two differ by. Left out are the octaves above the
+    first one of which at least half of the power is no error.
+    """
+
+    def up_to(f: float) -> tuple[Array, Array]:
+        own = [[smooth(angle.q, dt, f, order) for order in (1, 2)]]
+        if measured is not None:
+            own.append([smooth(measured, dt, f, order) for order in (0, 1)])
+        return np.array(own), smooth(angle.rounding.T, dt, f, 2)
+
+    total, highest, rated = np.zeros((2, len(angle.q))), 0.0, False
+    upper, noise = up_to(band)
+    while True:
+        last = kernel_length(0.5 * band, dt) > len(angle.q) // 2
+        lower, quiet = (0.0 * upper, 0.0 * noise) if last else up_to(0.5 * band)
+        octave, rounding = upper - lower, _rms(noise - quiet) ** 2
+        errs = [rounding, *(max(_rms(other[1] - octave[0, 1]) ** 2 - rounding, 0.0) for other in octave[1:])]
+        best = int(np.argmin(errs))
+        if highest or last or _rms(octave[best, 1]) ** 2 >= 2.0 * errs[best]:
+            highest, rated = highest or band, rated or best > 0
+            total += upper[0] if measured is None else octave[best]
+        if last or (highest and measured is None):
+            return total, highest, rated
+        upper, noise, band = lower, quiet, 0.5 * band
+
+
+def _valid(run: Run, rig: Rig, grid: Signal, *, rated: bool) -> Mask:
+    """Where the joints' motion was measured: a joint's rate counts where it is used."""
+    if run.rate is None or not (rated or run.angle is None or not set(rig.joint_names) <= set(run.angle.channels)):
         return grid.valid
     return grid.valid & run.rate.valid
 
@@ -243,11 +278,14 @@ def rounding_histories(motion: Array, dt: float, step: float, encoder_rate: floa
     """
     if step == 0.0:
         return np.zeros((len(_PHASES), len(motion)))
-    factor = max(1, round(encoder_rate * dt))
-    fine = np.interp(np.arange((len(motion) - 1) * factor + 1) / factor, np.arange(len(motion)), motion)
-    codes = fine / step + np.array(_PHASES)[:, None]
-    histories: Array = smooth((step * (np.round(codes) - codes)).T, dt / factor, band)[::factor].T
-    return histories
+    factor, own = max(1, round(encoder_rate * dt)), np.arange(len(motion))
+
+    def errors(at: Index) -> Array:
+        codes = np.interp(at / factor, own, motion)[:, None] / step + np.array(_PHASES)
+        error: Array = step * (np.round(codes) - codes)
+        return error
+
+    return smooth_rows(errors, (len(motion) - 1) * factor + 1, dt / factor, band, every=factor).T
 
 
 def rounding_error(histories: Array, dt: float) -> Array:

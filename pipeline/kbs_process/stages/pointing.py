@@ -148,9 +148,7 @@ def uncertainty(scores: Array) -> Array:
     size = max(1, len(scores) // _BLOCKS)
     blocks = len(scores) // size
     means = scores[: blocks * size].reshape(blocks, size, -1).mean(axis=1)
-    sigma: Array = np.stack(
-        [np.sqrt(longrun_covariance(column[:, None], [(blocks, 1)])[0, 0]) / blocks for column in means.T]
-    )
+    sigma: Array = np.stack([np.sqrt(longrun_covariance(column[:, None])[0, 0]) / blocks for column in means.T])
     return sigma
 
 

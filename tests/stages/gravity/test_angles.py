@@ -7,7 +7,7 @@ import pytest
 
 from kbs_process.stages import motion
 from kbs_process.stages.gravity import model as gravity
-from kbs_process.stages.gravity.angles import rounding_scores
+from kbs_process.stages.gravity.angles import Rounding
 from kbs_process.stages.gravity.equation import Equation
 from plant.rigs import pointing_rig
 from stages.gravity.synthetic import FINE, record
@@ -21,10 +21,11 @@ def _scores_of_ty(elevation):
     moving = motion.estimate(run, rig, motion.MotionSettings(source="encoder"))
     equation = Equation.of(rig, include_inertia=False, cross_coupling=False, response_sigma=None)
     sample = gravity.Sample("run", moving, run.wrench)
-    data = gravity.prepared(sample, equation, gravity.GravitySettings(), 1.0)
+    data = gravity.prepared(sample, equation, gravity.GravitySettings(), 1.0, equation.start())
     c = len(equation.channels)
-    J = np.tile(np.eye(c)[:, [4]], (len(data.q), 1))
-    S = rounding_scores(equation, equation.start(), [data], [np.ones(c)], J)
+    rounding = Rounding(equation, equation.start(), 1)
+    rounding.add(data, np.ones(c), np.tile(np.eye(c)[:, [4]], (len(data.q), 1, 1)), np.array([0]))
+    S = rounding.scores()
     slope = equation.angle_slopes(equation.start(), data)[:, 4, :]
     return float(np.sqrt(S[0, 0])) / len(data.q), np.abs(slope).mean(axis=0)
 

@@ -62,5 +62,5 @@ def test_scores_variance_of_a_slow_signal_in_one_over_f_noise_is_that_of_many_re
     n, dt = 1600, 0.25
     J = np.sin(2 * np.pi * 5 * np.arange(n) / n + 0.4)[:, None]
     noises = [pink(rng, n, dt, 0.05) for _ in range(200)]
-    stated = np.mean([flicker_scores(x, J, [(n, 1)], [dt], 1.0)[0, 0] for x in noises[:40]])
+    stated = np.mean([flicker_scores(x[:, None], J[:, None], dt, 1.0)[0, 0] for x in noises[:40]])
     assert stated == pytest.approx(np.var([J[:, 0] @ x for x in noises]), rel=0.35)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,6 +16,8 @@ from kbs_process.stages.gravity.parameters import Index, RigElements, coupling_e
 from kbs_process.stages.motion import Motion
 
 _RATE = 4.0  # samples kept in a period of the low-pass's corner: its stop band begins at twice the corner
+_MOST = 2**14  # instants of a recording; of a longer one they are farther apart
+_BLOCK = 2**12  # instants that are worked on at a time, which bounds memory
 _ANGLE_STEP = 1e-5  # rad
 RESPONSE = ("response.delay", "response.inertia")  # s, s^2
 
@@ -91,6 +93,12 @@ def joined(prepared: Sequence[Prepared]) -> Prepared:
     )
 
 
+def blocks(p: Prepared) -> Iterator[Prepared]:
+    """The instants, some at a time."""
+    for start in range(0, len(p.q), _BLOCK):
+        yield p.rows(slice(start, start + _BLOCK))
+
+
 def prepare(
     name: str, motion: Motion, wrench: Signal, low_pass: float, *, with_neighbours: bool, lost: str = ""
 ) -> Prepared:
@@ -98,7 +106,7 @@ def prepare(
     if len(motion) != len(wrench) or abs(motion.t0 - wrench.t0) > 0.01 * motion.dt:
         raise RecordingError(f"{name}: motion and wrench do not lie on one grid")
     edge = kernel_length(low_pass, motion.dt)
-    stride = max(1, int(1.0 / (_RATE * low_pass * motion.dt)))
+    stride = max(1, int(1.0 / (_RATE * low_pass * motion.dt)), -(-len(motion) // _MOST))
     good = _away_from_invalid(motion.valid & wrench.valid, edge)
     at = np.arange(0, len(good), stride)[good[::stride]]
     if len(at) < 8:
@@ -238,6 +246,16 @@ class Equation:
         if sigma is not None:
             spread[self.rows, self.columns] = sigma[count : count + len(self.rows)]
         return RigElements(rig, (X,), (np.ones((6, 6), dtype=bool),)).rig_at(total.ravel(), spread.ravel())
+
+    def bent(self, theta: Array, reached: Array) -> Array:
+        """`reached` with centres of gravity where a straight step of mass times cog leads: in that loads are linear."""
+        names, result = self.elements.names, reached.copy()
+        for body in self.elements.rig.bodies:
+            mass = names.index(body.mass.name) if body.mass.name in names else -1
+            if mass >= 0 and reached[mass] > 0.5 * theta[mass] > 0.0:
+                cog = [place for place, name in enumerate(names) if name.startswith(f"{body.cog.name}[")]
+                result[cog] = theta[cog] + theta[mass] / reached[mass] * (reached[cog] - theta[cog])
+        return result
 
     def predict(self, theta: Array, p: Prepared) -> Array:
         """(n, c) in the channels' units."""

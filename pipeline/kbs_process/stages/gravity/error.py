@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from kbs_process.signals.records import Array, Mask
@@ -28,9 +30,9 @@ def entries(motion: Motion, static: Static, model: GravityModel, band: Filter) -
     that time or over the rest, whichever is larger.
     """
     in_motion = moving(motion)
-    shapes = [
+    shapes = (
         static.wrench.derive(shape, "error of the gravity model") for shape in _shapes(motion, model, static.taring)
-    ]
+    )
     parameters = from_shapes("gravity", "covariance of the fitted parameters", shapes, band, in_motion)
     constant = np.broadcast_to(static.taring.noise, static.wrench.values.shape)
     tared = from_shapes(
@@ -40,11 +42,11 @@ def entries(motion: Motion, static: Static, model: GravityModel, band: Filter) -
         band,
     )
     slope = _slope(motion, model)
-    rounding = [
+    rounding = (
         static.wrench.derive(slope[:, :, joint] * history[:, None] / np.sqrt(len(motion.rounding)), "rounding")
         for phase in motion.rounding
         for joint, history in enumerate(phase.T)
-    ]
+    )
     rounded = from_shapes("gravity", "", rounding, band, in_motion).sigma
     share = np.mean(in_motion) if in_motion.any() else 1.0
     missed = np.sqrt(np.mean((slope * motion.missed) ** 2, axis=0).sum(axis=1) / share)
@@ -72,17 +74,16 @@ def _sparse(motion: Motion) -> Index:
     return np.unique(np.linspace(0, len(motion) - 1, min(len(motion), _POINTS)).astype(np.int64))
 
 
-def _shapes(motion: Motion, model: GravityModel, taring: Taring) -> list[Array]:
+def _shapes(motion: Motion, model: GravityModel, taring: Taring) -> Iterator[Array]:
     """One-sigma error histories (n, c) of independent directions of the rig's fitted parameters; none fitted: zero."""
     at = _sparse(motion)
     size = model.equation.size
     if size == 0:
-        return [np.zeros((len(motion), len(model.channels)))]
+        yield np.zeros((len(motion), len(model.channels)))
+        return
     J = derivatives(motion, model, at) + taring.slope
     variance, directions = np.linalg.eigh(model.fit.covariance[:size, :size])
     t = np.arange(len(motion))
-    return [
-        np.stack([np.interp(t, at, column) for column in (J @ direction * root).T], axis=1)
-        for root, direction in zip(np.sqrt(np.maximum(variance, 0.0)), directions.T, strict=True)
-        if root**2 > _NEGLIGIBLE * variance[-1]
-    ]
+    for root, direction in zip(np.sqrt(np.maximum(variance, 0.0)), directions.T, strict=True):
+        if root**2 > _NEGLIGIBLE * variance[-1]:
+            yield np.stack([np.interp(t, at, column) for column in (J @ direction * root).T], axis=1)

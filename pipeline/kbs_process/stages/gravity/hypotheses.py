@@ -18,7 +18,7 @@ from kbs_process.estimation.longrun import variance_inflation
 from kbs_process.signals.records import WRENCH_CHANNELS, Array
 from kbs_process.stages.gravity.equation import Angles, Equation, Prepared, joined
 from kbs_process.stages.gravity.parameters import CROSS_COUPLING, Index
-from kbs_process.stages.gravity.solve import ZERO, least_sigma, zero_basis, zero_sigma
+from kbs_process.stages.gravity.solve import ZERO, least_sigma, zero_priors, zero_slopes
 from kbs_process.stages.gravity.tension import BEYOND, BY_CHANCE, by_chance, together
 
 Kind = Literal["gain", "swapped", "axes", "sense", "unit", "clock", "zero", "point", "bias", "number"]
@@ -188,9 +188,8 @@ class _Data:
 
 def _linear(equation: Equation, prepared: Sequence[Prepared], about: Array | None = None) -> _Data:
     c, size = len(equation.channels), equation.size
-    loose = np.flatnonzero(equation.bias_sigma > 0.0)
-    width = len(ZERO) * len(loose)
-    zeros = tuple(f"{term}[{p.name}].{equation.channels[index]}" for p in prepared for term in ZERO for index in loose)
+    zeros, zeros_sigma = zero_priors(equation, prepared)
+    width = len(zeros) // len(prepared)
     prior = np.concatenate([equation.start(), np.zeros(len(zeros))])
     about = prior if about is None else about
     base, slopes = [], []
@@ -203,10 +202,10 @@ def _linear(equation: Equation, prepared: Sequence[Prepared], about: Array | Non
         J = np.zeros((len(p.q), c, len(prior)))
         J[:, :, :size] = whole[rows]
         own = slice(size + index * width, size + (index + 1) * width)
-        J[:, :, own] = np.einsum("nk,cd->nckd", zero_basis(p), np.eye(c)[:, loose]).reshape(len(p.q), c, width)
+        J[:, :, own] = zero_slopes(equation, p)
         base.append(static[rows] + J[:, :, own] @ about[own])
         slopes.append(J)
-    sigma = np.concatenate([equation.sigma(), *(zero_sigma(equation, p)[:, loose].ravel() for p in prepared)])
+    sigma = np.concatenate([equation.sigma(), zeros_sigma])
     return _Data(equation, equation.names + zeros, prior, sigma, about, tuple(prepared), tuple(base), tuple(slopes))
 
 

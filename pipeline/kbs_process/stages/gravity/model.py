@@ -12,7 +12,7 @@ counts for what it is worth.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,16 +20,16 @@ from kbs_process.errors import FitError
 from kbs_process.estimation.fit import Fit
 from kbs_process.rig.model import Rig
 from kbs_process.signals.records import Array, Signal
-from kbs_process.stages.gravity.equation import Equation, Prepared, at_rest, prepare
+from kbs_process.signals.smoothing import smooth
+from kbs_process.stages.gravity.equation import Equation, Prepared, at_rest, blocks, prepare
 from kbs_process.stages.gravity.parameters import Index
-from kbs_process.stages.gravity.solve import first_sigma, least_sigma, refuse_uninformed, residual_sigma, solve, zeros
+from kbs_process.stages.gravity.solve import Rows, first_sigma, least_sigma, refuse_uninformed, residual_sigma, solve
 from kbs_process.stages.gravity.taring import Taring, estimate, of_fit
 from kbs_process.stages.motion import Motion
 
 _ROUNDS = 3  # of weights
 STILL = 10.0  # sigma of the angle within which a joint has not moved
 _ERROR_POINTS = 1000  # of a recording at which the model's error is evaluated, linear in between
-_CHUNK = 65536  # samples a step, which bounds memory
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -128,22 +128,19 @@ def fit(
         if settings.response
         else None,
     )
-    data = [prepared(sample, equation, settings, settings.low_pass_Hz) for sample in samples]
-    first = [p for p, s in zip(data, samples, strict=True) if s.calibration] or data
     theta = equation.start()
-    sigmas = [first_sigma(p, rig) for p in first]
-    for used in [first] + [data] * _ROUNDS:
-        if len(sigmas) != len(used):
-            sigmas = [residual_sigma(equation, theta, p, rig) for p in used]
-        weighed = sigmas
-        result = solve(equation, used, sigmas, theta, settings.low_pass_Hz)
-        theta = result.value[: equation.size]
-        sigmas = [residual_sigma(equation, theta, p, rig) for p in used]
-    refuse_uninformed(equation, data)
-    biases = zeros(equation, result, len(data))[:, 0]
-    taring = {
-        p.name: of_fit(equation, theta, p, bias, sigma) for p, bias, sigma in zip(data, biases, weighed, strict=True)
-    }
+    data = [prepared(sample, equation, settings, settings.low_pass_Hz, theta) for sample in samples]
+    refuse_uninformed(Rows(equation, data))
+    first = [p for p, s in zip(data, samples, strict=True) if s.calibration] or data
+    theta = solve(Rows(equation, first), [first_sigma(p, rig) for p in first], theta).theta
+    for _ in range(_ROUNDS):
+        data = [prepared(sample, equation, settings, settings.low_pass_Hz, theta) for sample in samples]
+        rows = Rows(equation, data)
+        solution = solve(rows, [residual_sigma(equation, theta, p, rig) for p in data], theta)
+        theta = solution.theta
+    result, biases = solution.stated(settings.low_pass_Hz), solution.zeros[:, 0]
+    each = zip(data, biases, rows.mean_slopes(theta), solution.sigmas, strict=True)
+    taring = {p.name: of_fit(equation, slope, p, bias, sigma) for p, bias, slope, sigma in each}
     return GravityModel(
         rig=equation.rig_at(theta, result.sigma[: equation.size]),
         fit=result,
@@ -166,17 +163,28 @@ def _spread(
     """Rms (c,) of what the model leaves of all samples below `taring_Hz`, each weighing the same."""
     powers = []
     for sample, bias in zip(samples, biases, strict=True):
-        p = prepared(sample, equation, settings, settings.taring_Hz)
+        p = prepared(sample, equation, settings, settings.taring_Hz, theta)
         powers.append(np.mean((p.wrench - equation.predict(theta, p) - bias) ** 2, axis=0))
     spread: Array = np.sqrt(np.mean(powers, axis=0))
     return spread
 
 
-def prepared(sample: Sample, equation: Equation, settings: GravitySettings, low_pass_Hz: float) -> Prepared:
-    """The instants of a recording that the equation is compared with; see `at_rest` for a model without inertia."""
+def prepared(
+    sample: Sample, equation: Equation, settings: GravitySettings, low_pass_Hz: float, theta: Array
+) -> Prepared:
+    """The instants of a recording that the equation is compared with; see `at_rest` for a model without inertia.
+
+    A low-passed wrench is not that of the low-passed motion, where products of angles and rates lie beyond the corner.
+    By how much they differ is computed with the rig's parameters `theta`, and taken off.
+    """
     parts = sample.name, sample.motion, sample.wrench, low_pass_Hz
     data = prepare(*parts, with_neighbours=settings.response, lost=sample.lost)
-    return data if equation.include_inertia else at_rest(data, equation.elements.rig)
+    if not equation.include_inertia:
+        return at_rest(data, equation.elements.rig)
+    whole = np.concatenate([equation.predict(theta, part) for part in blocks(_from_motion(sample.motion, equation))])
+    at = np.rint(data.t / data.dt).astype(np.intp)
+    products = smooth(whole, data.dt, low_pass_Hz)[at] - equation.predict(theta, data)
+    return replace(data, wrench=data.wrench - products)
 
 
 def tare(sample: Sample, model: GravityModel) -> Taring:
@@ -184,9 +192,10 @@ def tare(sample: Sample, model: GravityModel) -> Taring:
     if sample.name in model.taring:
         return model.taring[sample.name]
     equation = model.equation
-    data = prepared(sample, equation, model.settings, model.settings.taring_Hz)
+    theta = model.fit.value[: equation.size]
+    data = prepared(sample, equation, model.settings, model.settings.taring_Hz, theta)
     spread = np.maximum(model.taring_spread, least_sigma(data, model.rig))
-    return estimate(equation, model.fit.value[: equation.size], data, spread)
+    return estimate(equation, theta, data, spread)
 
 
 def apply(motion: Motion, model: GravityModel, taring: Taring | None = None) -> Static:
@@ -198,10 +207,7 @@ def apply(motion: Motion, model: GravityModel, taring: Taring | None = None) -> 
     theta = model.fit.value[: equation.size]
     taring = taring or Taring.none(c, equation.size)
     whole = _from_motion(motion, equation)
-    values = np.empty((len(motion), c))
-    for start in range(0, len(motion), _CHUNK):
-        rows = slice(start, min(start + _CHUNK, len(motion)))
-        values[rows] = equation.predict(theta, whole.rows(rows)) + taring.bias
+    values = np.concatenate([equation.predict(theta, part) + taring.bias for part in blocks(whole)])
     count = min(len(motion), _ERROR_POINTS)
     at = np.arange(count, dtype=np.intp) * (len(motion) - 1) // max(count - 1, 1)
     sparse = whole.rows(at)

@@ -62,8 +62,8 @@ def misfits(sample: Sample, model: GravityModel, taring: Taring, others: Array |
     `others` (c,) is the rms of what else the recording may err by.
     """
     equation = model.equation
-    data = prepared(sample, equation, model.settings, model.settings.low_pass_Hz)
     theta = model.fit.value[: equation.size]
+    data = prepared(sample, equation, model.settings, model.settings.low_pass_Hz, theta)
     residual = data.wrench - equation.predict(theta, data) - taring.bias
     error = np.hypot(error_of(model, data, taring), equation.encoder_error(theta, data))
     left = np.sqrt(np.mean(residual**2, axis=0))

@@ -36,15 +36,15 @@ class Taring:
         return Taring(np.zeros(channels), np.zeros((channels, parameters)), np.zeros(channels), fitted=False)
 
 
-def of_fit(equation: Equation, theta: Array, p: Prepared, bias: Array, sigma: Array) -> Taring:
+def of_fit(equation: Equation, slope: Array, p: Prepared, bias: Array, sigma: Array) -> Taring:
     """The constant that the fit found for one of its recordings, whose samples it weighed by `sigma` (c,).
 
-    Given theta it is the mean of what the model leaves, shrunk by its prior, and errs as that does.
+    `slope` (c, p) is the mean derivative over its instants. Given the rig's parameters the constant is the mean of
+    what the model leaves, shrunk by its prior, and errs as that does.
     """
     variance = sigma**2 / len(p.q)
     shrink = _shrink(equation.bias_sigma, variance)
-    J = equation.jacobian(theta, p).reshape(len(p.q), len(bias), equation.size)
-    return Taring(bias, -shrink[:, None] * J.mean(axis=0), np.sqrt(shrink * variance), fitted=True)
+    return Taring(bias, -shrink[:, None] * slope, np.sqrt(shrink * variance), fitted=True)
 
 
 def estimate(equation: Equation, theta: Array, p: Prepared, spread: Array) -> Taring:
@@ -83,7 +83,7 @@ def locate(x: Array, scale: float) -> tuple[float, float, Array]:
     weight = _weight(z)
     curvature = float(np.sum(weight * (_FREEDOM - z**2) / (_FREEDOM + z**2))) / scale
     scores = weight * z
-    spread, most = float(longrun_covariance(scores[:, None], [(len(x), 1)])[0, 0]), float(np.ptp(x)) ** 2
+    spread, most = float(longrun_covariance(scores[:, None])[0, 0]), float(np.ptp(x)) ** 2
     told = curvature > 0.0 and spread < most * curvature**2
     return float(location[best]), spread / curvature**2 if told else most, weight
 

@@ -103,8 +103,8 @@ def lag(model: GravityModel, data: Prepared, sigma: float) -> Moved | None:
         rest = left - value * late
     if float(np.sum(rest**2 * weight)) > (1.0 - TAKEN) * float(np.sum(left**2 * weight)):
         return None
-    scores = (late * rest * weight).reshape(-1, 1)
-    chance = float(np.sqrt(longrun_covariance(scores, [rest.shape])[0, 0])) / power
+    scores = np.sum(late * rest * weight, axis=1, keepdims=True)
+    chance = float(np.sqrt(longrun_covariance(scores)[0, 0])) / power
     return Moved(
         f"the wrench's lag (s) behind the angles in {data.name}", 0.0, sigma, value, float(np.hypot(sigma, chance))
     )

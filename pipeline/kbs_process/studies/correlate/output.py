@@ -8,12 +8,15 @@ from pathlib import Path
 import numpy as np
 
 from kbs_process.recordings.mcap.messages.encoding import OutStream
-from kbs_process.recordings.mcap.writer import write_mcap
+from kbs_process.recordings.mcap.writer import write_pieces
 from kbs_process.reduction.analysis import Analysis
 from kbs_process.results.tables import TableWriter, write_table
+from kbs_process.signals.grid import crop
 from kbs_process.signals.records import WRENCH_CHANNELS, Signal
 from kbs_process.stages.repeats import commanded
 from kbs_process.studies.correlate.transducer import Study
+
+_PIECE = 2**13  # samples that are written at a time
 
 
 def write_tables(folder: Path, analyses: Sequence[Analysis], on_transducer: Study | None) -> None:
@@ -55,17 +58,22 @@ def _tables(writer: TableWriter, analysis: Analysis) -> None:
 
 def _recording(folder: Path, analysis: Analysis) -> None:
     """One MCAP file a recording: every band and frame, measured and predicted, as any viewer opens it."""
-    streams: list[OutStream] = []
-    for (_, band), pair in sorted(analysis.pairs.items()):
-        for kind, signal in (("measured", pair.measured), ("predicted", pair.predicted)):
-            if signal is not None:
-                streams += _streams(f"/{kind}/{band}", signal, analysis.run.epoch_ns)
-    streams += _streams("/gravity", analysis.static.wrench, analysis.run.epoch_ns)
-    for topic, joints in (("/encoder", analysis.run.angle), ("/command", commanded(analysis.run))):
-        if joints is not None:
-            streams.append(_joints(topic, joints, analysis.run.epoch_ns))
+    signals = [
+        (_streams, f"/{kind}/{band}", signal)
+        for (_, band), pair in sorted(analysis.pairs.items())
+        for kind, signal in (("measured", pair.measured), ("predicted", pair.predicted))
+    ]
+    signals.append((_streams, "/gravity", analysis.static.wrench))
+    signals += [(_joints, "/encoder", analysis.run.angle), (_joints, "/command", commanded(analysis.run))]
+    known = [(make, topic, signal) for make, topic, signal in signals if signal is not None]
+    pieces = (
+        piece
+        for start in range(0, max(len(signal) for _, _, signal in known), _PIECE)
+        for make, topic, signal in known
+        for piece in make(topic, crop(signal, start, _PIECE), analysis.run.epoch_ns)
+    )
     folder.mkdir(exist_ok=True)
-    write_mcap(folder / f"{analysis.entry.name}.mcap", streams)
+    write_pieces(folder / f"{analysis.entry.name}.mcap", pieces)
 
 
 def _streams(topic: str, signal: Signal, epoch_ns: int) -> Iterator[OutStream]:
@@ -88,7 +96,7 @@ def _streams(topic: str, signal: Signal, epoch_ns: int) -> Iterator[OutStream]:
         yield OutStream(topic=f"{topic}/joints", kind="joints", stamp=stamp, log=stamp, values=values, names=names)
 
 
-def _joints(topic: str, signal: Signal, epoch_ns: int) -> OutStream:
+def _joints(topic: str, signal: Signal, epoch_ns: int) -> Iterator[OutStream]:
     """Angles of the joints that a signal has."""
     stamp = epoch_ns + np.rint(signal.t * 1e9).astype(np.int64)
-    return OutStream(topic=topic, kind="joints", stamp=stamp, log=stamp, values=signal.values, names=signal.channels)
+    yield OutStream(topic=topic, kind="joints", stamp=stamp, log=stamp, values=signal.values, names=signal.channels)
