@@ -37,6 +37,11 @@ class Field:
     rate: Array  # its slopes
     acceleration: Array
 
+    @property
+    def rotors(self) -> tuple[Array, Array]:
+        """Rates and accelerations of the rotors, which follow it at once."""
+        return self.rate, self.acceleration
+
     @classmethod
     def of(cls, rig: Rig, schedule: Schedule, first: int, n: int, dt: float) -> Field:
         """Along a schedule, for n samples from the `first` on."""

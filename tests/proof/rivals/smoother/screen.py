@@ -49,7 +49,7 @@ class Course:
     """A recording's motion as signals of the plant, and what enters at a port as rows."""
 
     def __init__(self, problem: Problem, state: State, k: int, rig: Rig) -> None:
-        recording, motion = problem.recordings[k], state.motion(problem, k)
+        recording, motion = problem.recordings[k], state.ideal_motion(problem, k)
         self.problem, self.rig, self.recording = problem, rig, recording
         dt, n, first = recording.dt, recording.n, recording.first
         own = dt * (first + np.arange(n))
@@ -61,12 +61,12 @@ class Course:
             np.stack([np.interp(t, field.t, column) for column in part.T], axis=1)
             for part in (field.whole, field.smooth)
         )
-        behind = problem.behind(k, state.x, motion, state.torques[k])
+        behind = problem.behind(k, state.x, motion, state.ideal_torques[k])
         rotor = smooth - make_interp_spline(own, behind, k=3)(inside)
         turning = np.gradient(rotor, axis=0) * _TAPS_HZ
         joints = slice(FIRST_JOINT, None)
         values = [whole, rotor, turning, angle[:, joints], rate[:, joints], angle[:, PLATE], rate[:, PLATE]]
-        shown = problem.predicted(k, state.x, motion, state.torques[k])[:, : problem.angles.stop]
+        shown = problem.predicted(k, state.x, motion, state.ideal_torques[k])[:, : problem.angles.stop]
         readings = make_interp_spline(own, shown, k=3)(inside)
         self.tapped = Tapped(_TAPS_HZ, tap_columns(problem.rig), np.hstack(values), readings)
         self.shown = np.vstack([np.repeat(shown[:1], first, axis=0), shown])
