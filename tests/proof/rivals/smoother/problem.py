@@ -26,9 +26,8 @@ from kbs_process.stages.gravity.parameters import RigElements
 from proof.rivals.case import Array
 from proof.rivals.smoother.balance import FIRST_JOINT, FLOOR, PLATE, Loads, Motion, needed
 from proof.rivals.smoother.drive import Field, priors, spring
-from proof.rivals.smoother.splines import Splines
+from proof.rivals.smoother.splines import BAND_HZ, Splines, in_band
 
-BAND_HZ = 8.0  # of what is compared: as many independent numbers twice a second
 _ENDS = 1.0  # s left out at a recording's ends, and half of it beside gaps
 _LINES = 3  # first terms of a channel's zero: constant, slope, curvature
 _DRIFT = 0.05  # of the bias's sigma: what they drift by
@@ -266,8 +265,8 @@ def _recording(experiment: Experiment, k: int) -> Recording:
     first, end = int(there[0]), int(there[-1]) + 1
     reading, n, dt = trial.measured[first:end].copy(), end - first, experiment.dt
     amplifier = experiment.rig.transducer.amplifier
-    if amplifier is not None:
-        reading[:, :6] = _undone(reading[:, :6], amplifier, dt)
+    reading[:, 6:] = in_band(reading[:, 6:], dt)
+    reading[:, :6] = _undone(reading[:, :6], amplifier, dt)
     weight = np.zeros(n)
     ends = round(_ENDS / dt)
     weight[ends:-ends] = 1.0
@@ -282,13 +281,10 @@ def _recording(experiment: Experiment, k: int) -> Recording:
     return Recording(k, first, dt, reading, weight, turning, field, Splines(n, dt))
 
 
-def _undone(wrench: Array, amplifier: Amplifier, dt: float) -> Array:
-    """Undo an amplifier of the second order; a line from the first to the last sample is taken apart."""
-    n, corner = len(wrench), 2 * np.pi * float(amplifier.corner)
-    across = wrench[-1:] - wrench[:1]
-    line = wrench[:1] + across * np.linspace(0.0, 1.0, n)[:, None]
-    both = np.concatenate([wrench - line, (line - wrench)[::-1]])
-    s = 2j * np.pi * np.fft.rfftfreq(len(both), dt) / corner
-    spectrum = np.fft.rfft(both, axis=0) * (1 + np.sqrt(2) * s + s**2)[:, None]
-    late = np.sqrt(2) / corner * across / (dt * (n - 1))
-    return np.asarray(np.fft.irfft(spectrum, len(both), axis=0)[:n] + line + late)
+def _undone(wrench: Array, amplifier: Amplifier | None, dt: float) -> Array:
+    """Undo an amplifier of the second order."""
+    if amplifier is None:
+        return in_band(wrench, dt)
+    corner = float(amplifier.corner)
+    late = np.sqrt(2) / (2 * np.pi * corner) * (wrench[-1:] - wrench[:1]) / (dt * (len(wrench) - 1))
+    return in_band(wrench, dt, lambda f: 1 + np.sqrt(2) * 1j * f / corner - (f / corner) ** 2) + late

@@ -23,6 +23,7 @@ from proof.rivals.smoother.balance import FIRST_JOINT, PLATE
 from proof.rivals.smoother.drive import spring
 from proof.rivals.smoother.fit import Quadratic, State
 from proof.rivals.smoother.problem import Problem
+from proof.rivals.smoother.splines import in_band
 
 _TAPS_HZ = 100.0
 _KNOT_S = 1.0  # between poses at which ports are worked out
@@ -90,6 +91,7 @@ class Course:
         out = np.zeros((n, problem.rows))
         for inlet, means in column.items():
             slow = resample(means[:, None], _TAPS_HZ, 1 / self.recording.dt)[self.recording.first :, 0]
+            slow = in_band(slow, self.recording.dt)
             slow = np.pad(slow, (0, max(n - len(slow), 0)), mode="edge")[:n, None]
             place = self._inlets[inlet]
             force = self._force[:, :, place] * slow
@@ -112,7 +114,7 @@ class Course:
             t = experiment.dt * np.arange(len(self.shown))
             shown = sensed(candidate, t, self.shown, experiment.channels, self.rig)
         out = np.zeros((self.recording.n, problem.rows, shown.shape[2]))
-        out[:, : problem.angles.stop] = shown[self.recording.first :][: self.recording.n]
+        out[:, : problem.angles.stop] = in_band(shown[self.recording.first :][: self.recording.n], self.recording.dt)
         return out
 
 
