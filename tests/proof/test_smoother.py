@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 import tarfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from kbs_process.campaign.load import load_campaign
-from kbs_process.plant.rigid import static_wrench
+from kbs_process.plant.rigid import inverse_dynamics, joint_efforts, kinematics, static_wrench
 from kbs_process.progress import SilentProgress
 from kbs_process.studies.diagnose.reading import experiment_of
 from proof.rivals.smoother.balance import FIRST_JOINT, FLOOR, PLATE, needed
-from proof.rivals.smoother.fit import State, descend
+from proof.rivals.smoother.fit import Quadratic, State, step
+from proof.rivals.smoother.intensities import powers
 from proof.rivals.smoother.problem import Problem
-from proof.rivals.smoother.solve import LOOSE, _forces
+from proof.rivals.smoother.solve import settled
 from proof.rivals.smoother.splines import Splines
-
-pytestmark = pytest.mark.slow
 
 CAMPAIGN = Path(__file__).parents[2] / "campaigns" / "EL089"
 NULL = Path(__file__).with_name("small") / "T00000000A1.tar"
@@ -38,33 +38,75 @@ def test_splines_give_values_rates_and_accelerations() -> None:
         assert found[inside] == pytest.approx(np.stack(expected, axis=1)[inside], abs=2e-4)
 
 
+@pytest.mark.slow
 def test_what_a_motion_needs_is_the_sagged_weight_and_what_the_floor_adds() -> None:
     rig = load_campaign(CAMPAIGN, checksums=False).rig
     assert rig.transducer.stiffness is not None
     q = np.radians([[10.0, 75.0], [-30.0, 82.0]])
     still, x = np.zeros((2, FIRST_JOINT + 2)), np.zeros((2, FIRST_JOINT + 2))
     x[:, FIRST_JOINT:] = q
+    rest = (np.zeros((2, 2)), np.zeros((2, 2)))
     for _ in range(4):
-        wrench, efforts = needed(rig, (x, still, still))
+        wrench, efforts = needed(rig, (x, still, still), rest)
         x[:, PLATE] = -efforts[:, :3] / rig.transducer.stiffness.value
     assert wrench == pytest.approx(static_wrench(rig, q), abs=1e-4)
     # The mounting carries what the transducer feels, about axes that the plate's small angles hardly turn.
     assert -efforts[:, :3] == pytest.approx(wrench[:, 3:], abs=0.05)
     raised = x.copy()
     raised[:, FLOOR] = [0.0, 0.0, 0.1]
-    heavier, _ = needed(rig, (raised, still, still))
+    heavier, _ = needed(rig, (raised, still, still), rest)
     assert heavier[:, 2] / wrench[:, 2] == pytest.approx(1 + 0.1 / float(rig.gravity), rel=1e-4)
 
 
-def test_a_null_is_fitted_to_its_noise_from_a_cold_start(tmp_path: Path) -> None:
+def test_what_a_motion_needs_is_what_inverse_dynamics_of_the_product_says() -> None:
+    rig = load_campaign(CAMPAIGN, checksums=False).rig
+    rng = np.random.default_rng(0)
+    motion = tuple(0.3 * rng.standard_normal((20, FIRST_JOINT + 2)) for _ in range(3))
+    for part in motion:
+        part[:, :FIRST_JOINT] = 0.0
+    q, rate, acceleration = (part[:, FIRST_JOINT:] for part in motion)
+    ratio = np.array([float(joint.drive.ratio) for joint in rig.joints if joint.drive])
+    wrench, efforts = needed(rig, motion, (ratio * rate, ratio * acceleration))
+    level = replace(rig, transducer=replace(rig.transducer, stiffness=None))
+    assert wrench == pytest.approx(inverse_dynamics(level, q, rate, acceleration), abs=1e-9)
+    # Of a joint it is what the gear gives: the rotors' own part is the drives'.
+    links = kinematics(level, q, rate, acceleration)
+    for k, joint in enumerate(rig.joints):
+        assert joint.drive is not None
+        along = np.sum(links[joint.name].axis * links[joint.parent].alpha, axis=1)
+        own = ratio[k] * float(joint.drive.rotor_inertia) * (ratio[k] * acceleration[:, k] + along)
+        expected = joint_efforts(level, q, rate, acceleration)[:, k] - own
+        assert efforts[:, 3 + k] == pytest.approx(expected, abs=1e-9)
+
+
+def _null(folder: Path, trials: list[int]) -> Problem:
     with tarfile.open(NULL) as archive:
-        archive.extractall(tmp_path / "T", filter="data")
-    experiment = experiment_of(load_campaign(tmp_path / "T", checksums=False), SilentProgress())
-    problem = Problem(experiment, [1])
-    state = State.of(problem, _forces(problem, LOOSE))
+        archive.extractall(folder / "T", filter="data")
+    return Problem(experiment_of(load_campaign(folder / "T", checksums=False), SilentProgress()), trials)
+
+
+@pytest.mark.slow
+def test_a_cold_start_follows_its_readings_after_three_steps(tmp_path: Path) -> None:
+    problem = _null(tmp_path, [1])
+    state = State.of(problem, np.repeat([0.05, 0.2, 0.01], [3, 2, 3]))
     cold = state.cost(problem)
-    descend(problem, state, 2, ~problem.scaling)
+    for _ in range(3):
+        state.idealise(problem, 0.1)
+        step(problem, state, Quadratic.of(problem, state), ~problem.dynamic)
     numbers = problem.recordings[0].weight.sum() * problem.independent * problem.rows
     assert cold > 1e3 * numbers
     assert state.cost(problem) < 0.5 * numbers  # forces this loose follow some of the noise
-    assert np.abs(state.x - problem.prior)[problem.of_rig].max() < 10.0
+
+
+@pytest.mark.validation
+def test_a_null_is_fitted_to_its_noise_and_forces_to_what_repeats_differ_by(tmp_path: Path) -> None:
+    problem = _null(tmp_path, [1, 2])
+    state = settled(problem)
+    left = powers(problem, state, Quadratic.of(problem, state))
+    assert left.of_repeats is not None
+    # Repeats differ by what forces are said to be, and readings by their noise; encoders less than if all were rounded.
+    assert left.of_repeats[problem.forces] == pytest.approx(1.0, abs=0.4)
+    assert np.all(left.of_repeats[problem.wrench] < 1.2)
+    assert np.all(left.of_all[problem.wrench] < 1.5)
+    off = np.abs(state.x - problem.prior)[problem.of_rig] / problem.spread[problem.of_rig]
+    assert off.max() < 10.0

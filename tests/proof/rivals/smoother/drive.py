@@ -16,6 +16,7 @@ from kbs_process.plant.schedule import Schedule, covering
 from kbs_process.rig.model import Drive, Rig
 from kbs_process.stages.align.resample import resample
 from proof.rivals.case import Array
+from proof.rivals.smoother.splines import in_band
 
 FINE = 1000.0  # Hz, at which torques along the field are taken
 _PARTS = 8  # of a fine step, over which whole microsteps are averaged
@@ -37,6 +38,11 @@ class Field:
     rate: Array  # its slopes
     acceleration: Array
 
+    @property
+    def rotors(self) -> tuple[Array, Array]:
+        """Rates and accelerations of the rotors, which follow it at once."""
+        return self.rate, self.acceleration
+
     @classmethod
     def of(cls, rig: Rig, schedule: Schedule, first: int, n: int, dt: float) -> Field:
         """Along a schedule, for n samples from the `first` on."""
@@ -51,7 +57,7 @@ class Field:
         dense = np.stack([np.interp(parts, given.t, column) for column in field.T], axis=1)
         whole = (np.round(dense / step) * step).reshape(len(t), _PARTS, -1).mean(axis=1)
         smooth = np.stack([np.interp(t, given.t, column) for column in field.T], axis=1)
-        angle = resample(whole, FINE, 1 / dt)[first : first + n]
+        angle = in_band(resample(whole, FINE, 1 / dt)[first : first + n], dt)
         spline = make_interp_spline(dt * np.arange(n), angle, k=5)
         own = dt * np.arange(n)
         return cls(t, smooth, whole, first, n, dt, angle, spline.derivative()(own), spline.derivative(2)(own))
@@ -70,7 +76,7 @@ class Field:
             turned = [-np.sin(2 * angle) * sliding, -np.cos(2 * angle) * sliding]
             stiction = [-sign * s, -sign * c, -sign * s2, -sign * c2, -sign]
             columns = np.stack([-rate, -sliding, s, c, *turned, *stiction], axis=1)
-            out[:, j] = resample(columns, FINE, 1 / self.dt)[self.first : self.first + self.n]
+            out[:, j] = in_band(resample(columns, FINE, 1 / self.dt)[self.first : self.first + self.n], self.dt)
         return out
 
 

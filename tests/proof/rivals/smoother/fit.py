@@ -13,8 +13,8 @@ from proof.rivals.smoother.balance import Motion
 from proof.rivals.smoother.problem import Problem
 from proof.rivals.smoother.splines import LOCAL
 
-_HALVES = 6  # of a step that does not gain
-_ENOUGH = 1e-3  # of the cost: a step that gains less is the last
+_FAR = 4.0  # prior sigmas that a step goes at most
+_RUNS = 2
 
 
 @dataclass(slots=True, eq=False)
@@ -25,6 +25,8 @@ class State:
     coefficients: list[Array]
     sigma: Array  # (rows,)
     torques: list[Array] = field(default_factory=list)  # of the rotors along each motion
+    ideal: list[Array] = field(default_factory=list)  # coefficients of the motion that the model has by itself
+    ideal_torques: list[Array] = field(default_factory=list)
 
     @classmethod
     def of(cls, problem: Problem, forces: Array) -> State:
@@ -42,15 +44,40 @@ class State:
     def follow(self, problem: Problem) -> None:
         """Take the rotors' torques where the motion is now."""
         before = self.torques or [None] * len(problem.recordings)
-        self.torques = [
-            recording.field.torques(problem.rig, problem.behind(k, self.x, self.motion(problem, k), before[k]))
-            for k, recording in enumerate(problem.recordings)
-        ]
+        self.torques = [_torques(problem, k, self.x, self.motion(problem, k), before[k]) for k in range(len(before))]
 
-    def weights(self, problem: Problem, k: int) -> Array:
+    def idealise(self, problem: Problem, stiff: float) -> None:
+        """Let the model run by itself: forces that it lacks are `stiff` times as large, and readings hardly count."""
+        if not self.ideal:
+            self.ideal = [problem.start(k) for k in range(len(problem.recordings))]
+            self.ideal_torques = [
+                _torques(problem, k, self.x, self.ideal_motion(problem, k), None) for k in range(len(self.ideal))
+            ]
+        sigma = self.sigma.copy()
+        sigma[problem.forces] *= stiff
+        for k in range(len(self.ideal)):
+            for _ in range(_RUNS):
+                self.ideal[k], self.ideal_torques[k] = _moved(
+                    problem, k, self.x, self.ideal[k], self.ideal_torques[k], self.weights(problem, k, sigma)
+                )
+
+    def smooth(self, problem: Problem) -> None:
+        """Bring the motion to where it is best for the unknowns as they are."""
+        for k in range(len(self.coefficients)):
+            self.coefficients[k], self.torques[k] = _moved(
+                problem, k, self.x, self.coefficients[k], self.torques[k], self.weights(problem, k)
+            )
+
+    def ideal_motion(self, problem: Problem, k: int) -> Motion:
+        """The motion that the model has by itself."""
+        return problem.recordings[k].splines.motion(self.ideal[k])
+
+    def weights(self, problem: Problem, k: int, sigma: Array | None = None) -> Array:
         """(n, rows) one over the variance of each row, as far as samples are independent."""
-        weights = np.outer(problem.recordings[k].weight, problem.independent / self.sigma**2)
+        sigma = self.sigma if sigma is None else sigma
+        weights = np.outer(problem.recordings[k].weight, problem.independent / sigma**2)
         weights[:, problem.angles] *= problem.recordings[k].turning
+        weights[:, problem.forces] = problem.independent / sigma[problem.forces] ** 2  # they hold where nothing is read
         return weights
 
     def residuals(self, problem: Problem) -> list[Array]:
@@ -66,61 +93,95 @@ class State:
         return total
 
 
+def _torques(problem: Problem, k: int, x: Array, motion: Motion, before: Array | None) -> Array:
+    return problem.recordings[k].field.torques(problem.rig, problem.behind(k, x, motion, before))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Banded:
+    """What a recording's rows say of its motion, factorised."""
+
+    by_motion: Array  # (n, rows, LOCAL freedoms) square roots of weights in it, as in all below
+    factor: Array
+    size: int
+
+    @classmethod
+    def of(cls, problem: Problem, k: int, by_motion: Array, root: Array) -> Banded:
+        """Of slopes (n, rows, freedoms, 3) and square roots of weights (n, rows)."""
+        recording, freedoms = problem.recordings[k], problem.freedoms
+        n, width = recording.n, LOCAL * problem.freedoms
+        bases = recording.splines.values.transpose(1, 2, 0)  # (n, LOCAL, 3)
+        local = np.matmul(bases[:, None], by_motion.swapaxes(2, 3)).reshape(n, problem.rows, width)
+        local *= root[:, :, None]
+        size = recording.splines.size * freedoms
+        products = np.matmul(local.swapaxes(1, 2), local)
+        banded = np.zeros((width, size))
+        for i in range(width):
+            for j in range(i + 1):
+                banded[i - j, j : j + freedoms * (n - 1) : freedoms] += products[:-1, i, j]
+                banded[i - j, j + freedoms * (n - 2)] += products[-1, i, j]
+        banded[0] = banded[0] * (1 + 1e-9) + 1e-9 * np.median(banded[0])
+        return cls(local, cholesky_banded(banded, lower=True), size)
+
+    def against(self, columns: Array) -> Array:
+        """Products (size, m) of columns (n rows, m) with what the motion does."""
+        n, rows, width = self.by_motion.shape
+        products = np.matmul(self.by_motion.swapaxes(1, 2), columns.reshape(n, rows, -1))
+        out = np.zeros((self.size, products.shape[2]))
+        each = out.reshape(-1, width // LOCAL, products.shape[2])
+        for a, part in enumerate(np.split(products, LOCAL, axis=1)):
+            each[a : a + n - 1] += part[:-1]
+            each[a + n - 2] += part[-1]  # the last sample sees the coefficients of the one before it
+        return out
+
+    def solve(self, against: Array) -> Array:
+        """Coefficients (size, m) that take columns up, of their products with the motion."""
+        return np.asarray(cho_solve_banded((self.factor, True), against))
+
+
+def _moved(
+    problem: Problem, k: int, x: Array, coefficients: Array, torques: Array, weights: Array
+) -> tuple[Array, Array]:
+    """Coefficients after a step of Gauss and Newton in the motion alone, and the rotors' torques there."""
+    splines, root = problem.recordings[k].splines, np.sqrt(weights)
+    motion = splines.motion(coefficients)
+    banded = Banded.of(problem, k, problem.by_motion(k, x, motion, torques), root)
+    left = problem.residual(k, x, motion, torques) * root
+    coefficients = coefficients + banded.solve(banded.against(left.reshape(-1, 1))).reshape(coefficients.shape)
+    return coefficients, _torques(problem, k, x, splines.motion(coefficients), torques)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Reduced:
     """A recording's rows with its motion taken out of them: columns are projected by `gram`."""
 
-    by_motion: Array  # (n, rows, LOCAL freedoms) square roots of weights in it, as in all below
-    places: NDArray[np.intp]  # (n, LOCAL freedoms) of the coefficients
-    factor: Array  # banded
-    size: int
+    motion: Banded
     root: Array  # (n, rows) square roots of the weights
     columns: Array  # (n rows, local + 1) unknowns, then the residual
     against: Array  # (size, local + 1) their products with the motion
     solved: Array
+
+    @classmethod
+    def of(cls, problem: Problem, state: State, k: int) -> Reduced:
+        """At a state; unknowns along the motion that the model has by itself, in which there is no noise."""
+        motion = state.motion(problem, k)
+        root = np.sqrt(state.weights(problem, k))
+        banded = Banded.of(problem, k, problem.by_motion(k, state.x, motion, state.torques[k]), root)
+        left = problem.residual(k, state.x, motion, state.torques[k])
+        by_unknown = problem.by_unknown(k, state.x, state.ideal_motion(problem, k), state.ideal_torques[k])
+        columns = np.concatenate([by_unknown, left[:, :, None]], axis=2) * root[:, :, None]
+        columns = columns.reshape(root.size, -1)
+        against = banded.against(columns)
+        return cls(banded, root, columns, against, banded.solve(against))
 
     def gram(self, columns: Array) -> tuple[Array, Array]:
         """Products of columns (n rows, m) with the unknowns and the residual (m, local + 1), and with each other.
 
         The latter (m, m), both with the motion taken out.
         """
-        against = self.against_motion(columns)
-        solved = cho_solve_banded((self.factor, True), against)
-        return columns.T @ self.columns - against.T @ self.solved, columns.T @ columns - against.T @ solved
-
-    def against_motion(self, columns: Array) -> Array:
-        """Products (size, m) of columns with what the motion does."""
-        n, rows, width = self.by_motion.shape
-        products = np.einsum("nri,nrm->nim", self.by_motion, columns.reshape(n, rows, -1), optimize=True)
-        out = np.zeros((self.size, products.shape[2]))
-        for i in range(width):
-            np.add.at(out, self.places[:, i], products[:, i])
-        return out
-
-
-def reduce(problem: Problem, state: State, k: int) -> Reduced:
-    """Factorise a recording's motion."""
-    recording, motion = problem.recordings[k], state.motion(problem, k)
-    by_motion, by_unknown = problem.slopes(k, state.x, motion, state.torques[k])
-    left = problem.residual(k, state.x, motion, state.torques[k])
-    root = np.sqrt(state.weights(problem, k))
-    n, rows, freedoms = recording.n, problem.rows, problem.freedoms
-    width = LOCAL * freedoms
-    local = np.einsum("nrdk,kna->nrad", by_motion, recording.splines.values, optimize=True).reshape(n, rows, width)
-    local = local * root[:, :, None]
-    places = recording.splines.first[:, None] * freedoms + np.arange(width)
-    size = recording.splines.size * freedoms
-    products = np.einsum("nri,nrj->nij", local, local, optimize=True)
-    banded = np.zeros((width, size))
-    for i in range(width):
-        for j in range(i + 1):
-            np.add.at(banded[i - j], places[:, j], products[:, i, j])
-    banded[0] = banded[0] * (1 + 1e-9) + 1e-9 * np.median(banded[0])
-    factor = cholesky_banded(banded, lower=True)
-    columns = np.concatenate([by_unknown * root[:, :, None], (left * root)[:, :, None]], axis=2).reshape(n * rows, -1)
-    part = Reduced(local, places, factor, size, root, columns, np.zeros(0), np.zeros(0))
-    against = part.against_motion(columns)
-    return Reduced(local, places, factor, size, root, columns, against, cho_solve_banded((factor, True), against))
+        against = self.motion.against(columns)
+        mixed = columns.T @ self.columns - against.T @ self.solved
+        return mixed, columns.T @ columns - against.T @ self.motion.solve(against)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -139,7 +200,7 @@ class Quadratic:
         normal, pull = np.diag(problem.spread**-2.0), -off / problem.spread
         left, parts = float(off @ off), []
         for k, local in enumerate(problem.local):
-            part = reduce(problem, state, k)
+            part = Reduced.of(problem, state, k)
             whole = part.columns.T @ part.columns - part.against.T @ part.solved
             normal[np.ix_(local, local)] += whole[:-1, :-1]
             pull[local] += whole[:-1, -1]
@@ -149,42 +210,27 @@ class Quadratic:
 
     def solve(self, spread: Array, right: Array, free: NDArray[np.bool_] | None = None) -> Array:
         """normal^-1 right, of the free unknowns; zero of the others."""
-        chosen = np.ones(len(spread), dtype=bool) if free is None else free
-        scale = spread[chosen]
-        columns = right.reshape(len(spread), -1)[chosen] * scale[:, None]
-        factor = cho_factor(self.normal[np.ix_(chosen, chosen)] * np.outer(scale, scale))
-        out = np.zeros((len(spread), columns.shape[1]))
-        out[chosen] = cho_solve(factor, columns) * scale[:, None]
-        return out.reshape(right.shape)
+        scale = spread if free is None else np.where(free, spread, 0.0)
+        factor = cho_factor(self.normal * np.outer(scale, scale) + np.diag((scale == 0.0).astype(float)))
+        found = cho_solve(factor, right.reshape(len(spread), -1) * scale[:, None]) * scale[:, None]
+        return np.asarray(found.reshape(right.shape))
 
 
-def descend(problem: Problem, state: State, steps: int, free: NDArray[np.bool_]) -> None:
-    """Take some steps of Gauss and Newton, halved where they do not gain."""
-    cost = state.cost(problem)
-    for _ in range(steps):
-        quadratic = Quadratic.of(problem, state)
-        change = quadratic.solve(problem.spread, quadratic.pull, free)
-        moves = [
-            (part.solved[:, -1] - part.solved[:, :-1] @ change[local]).reshape(-1, problem.freedoms)
-            for part, local in zip(quadratic.parts, problem.local, strict=True)
-        ]
-        step, gained = 1.0, False
-        for _ in range(_HALVES):
-            tried = State(
-                state.x + step * change,
-                [c + step * move for c, move in zip(state.coefficients, moves, strict=True)],
-                state.sigma,
-                state.torques,
-            )
-            tried.follow(problem)
-            after = tried.cost(problem)
-            gained = after < cost
-            if gained:
-                break
-            step /= 2
-        if not gained:
-            return
-        small = cost - after < _ENOUGH * after
-        state.x, state.coefficients, state.torques, cost = tried.x, tried.coefficients, tried.torques, after
-        if small:
-            return
+def step(problem: Problem, state: State, quadratic: Quadratic, free: NDArray[np.bool_] | None = None) -> float:
+    """Take a step of Gauss and Newton; return its length in sigmas of the unknowns.
+
+    What pulls an unknown is what the residual has of its slopes along the motion that the model has by itself, so that
+    no noise is in both (instruments): the smoothed motion's own noise would pull all that scales a balance to nothing.
+    """
+    change = quadratic.solve(problem.spread, quadratic.pull, free)
+    change *= min(1.0, _FAR / max(float(np.abs(change / problem.spread).max()), 1e-300))
+    bounded = state.x + change
+    bounded[problem.of_rig] = np.maximum(bounded[problem.of_rig], problem.lower)
+    change, state.x = bounded - state.x, bounded
+    state.coefficients = [
+        c + (part.solved[:, -1] - part.solved[:, :-1] @ change[local]).reshape(-1, problem.freedoms)
+        for c, part, local in zip(state.coefficients, quadratic.parts, problem.local, strict=True)
+    ]
+    state.follow(problem)
+    state.smooth(problem)
+    return float(np.sqrt(change @ quadratic.normal @ change))

@@ -26,14 +26,14 @@ from kbs_process.stages.gravity.parameters import RigElements
 from proof.rivals.case import Array
 from proof.rivals.smoother.balance import FIRST_JOINT, FLOOR, PLATE, Loads, Motion, needed
 from proof.rivals.smoother.drive import Field, priors, spring
-from proof.rivals.smoother.splines import Splines
+from proof.rivals.smoother.splines import BAND_HZ, Splines, in_band
 
-BAND_HZ = 8.0  # of what is compared: as many independent numbers twice a second
 _ENDS = 1.0  # s left out at a recording's ends, and half of it beside gaps
 _LINES = 3  # first terms of a channel's zero: constant, slope, curvature
 _DRIFT = 0.05  # of the bias's sigma: what they drift by
 _PINK_HZ = 0.1  # up to which a channel's noise may be 1/f, as large as its white noise there
 _CLOCK = 3e-3  # s, of a clock against the field's
+_LEAST = 0.1  # of its value: what a stiffness, a damping or an inertia is at least
 _STEPS = (1e-6, 1e-6, 1e-4)  # of values, rates and accelerations, for slopes
 _FLOOR_STEP = 1e-3  # m/s^2
 _SHARE = 1e-3  # of a sigma: step of an unknown
@@ -99,6 +99,14 @@ class Problem:
         self.independent = 2 * BAND_HZ * dt  # numbers a sample
         self._place_unknowns()
 
+    @cached_property
+    def repeats(self) -> list[list[int]]:
+        """Recordings of one trajectory, of each that was recorded more than once."""
+        by_trajectory: dict[int, list[int]] = {}
+        for k, recording in enumerate(self.recordings):
+            by_trajectory.setdefault(self.experiment.trials[recording.trial].trajectory, []).append(k)
+        return [own for own in by_trajectory.values() if len(own) > 1]
+
     @property
     def forces(self) -> slice:
         """The rows of which the residual is a force that the equations lack."""
@@ -133,12 +141,14 @@ class Problem:
         self.of_rig, self.numbers, self.coupling, self.offsets, self.own = of_rig, numbers, coupling, offset, each
         common = np.arange(each[0].start)
         self.local = [np.concatenate([common, np.arange(one.start, one.stop)]) for one in each]
-        scales = (".Ka", ".fsv", ".Tmax")
-        self.scaling = np.zeros(len(self.prior), dtype=bool)  # numbers that scale a balance
-        self.scaling[: len(self.elements.names)] = [
+        scales = (".Ka", ".fsv", ".Tmax", ".inertia[0]", ".inertia[1]", ".inertia[2]")
+        positive = [
             name.endswith(scales) or name.startswith(("transducer.stiffness", "transducer.damping"))
             for name in self.elements.names
         ]
+        self.dynamic = np.zeros(len(self.prior), dtype=bool)  # numbers that scale a balance, and show while it moves
+        self.dynamic[: len(positive)] = np.array(positive) | [".inertia[" in name for name in self.elements.names]
+        self.lower = np.where(positive, _LEAST * self.elements.value, self.elements.lower)
 
     def rig_at(self, x: Array) -> Rig:
         """The rig with its elements at x."""
@@ -152,7 +162,7 @@ class Problem:
         drives = [joint.drive for joint in self.rig.joints if joint.drive is not None]
         stiffness = self.rig.transducer.stiffness
         for _ in range(3):
-            _, efforts = needed(self.rig, (x, still, still))
+            _, efforts = needed(self.rig, (x, still, still), recording.field.rotors)
             if stiffness is not None:
                 x[:, PLATE] = -efforts[:, :3] / stiffness.value
             for j, drive in enumerate(drives):
@@ -163,7 +173,7 @@ class Problem:
     def behind(self, k: int, x: Array, motion: Motion, torques: Array | None) -> Array:
         """How far each rotor (n, joints) is behind its field, motor rad."""
         rig = self.rig_at(x)
-        _, efforts = needed(rig, motion)
+        _, efforts = needed(rig, motion, self.recordings[k].field.rotors)
         return np.stack([self._behind(rig, k, x, j, efforts[:, 3 + j], torques) for j in range(self.joints)], axis=1)
 
     def _behind(self, rig: Rig, k: int, x: Array, j: int, torque: Array, torques: Array | None) -> Array:
@@ -183,7 +193,7 @@ class Problem:
         """
         recording, rig = self.recordings[k], rig or self.rig_at(x)
         angle, rate, _ = motion
-        wrench, efforts = loads or needed(rig, motion)
+        wrench, efforts = loads or needed(rig, motion, recording.field.rotors)
         out = np.zeros((recording.n, self.rows))
         own = x[self.own[k]]
         dX = np.zeros((6, 6))
@@ -217,12 +227,11 @@ class Problem:
         left[:, : self.angles.stop] += self.recordings[k].reading
         return left
 
-    def slopes(self, k: int, x: Array, motion: Motion, torques: Array) -> tuple[Array, Array]:
-        """Slopes of the rows by the motion (n, rows, freedoms, 3), and by a recording's unknowns (n, rows, local)."""
-        rig, n = self.rig_at(x), self.recordings[k].n
-        loads = needed(rig, motion)
-        base = self.predicted(k, x, motion, torques, rig, loads)
-        by_motion = np.zeros((n, self.rows, self.freedoms, 3))
+    def by_motion(self, k: int, x: Array, motion: Motion, torques: Array) -> Array:
+        """Slopes of a recording's rows by its motion (n, rows, freedoms, 3): values, rates, accelerations."""
+        rig = self.rig_at(x)
+        base = self.predicted(k, x, motion, torques, rig)
+        slopes = np.zeros((self.recordings[k].n, self.rows, self.freedoms, 3))
         for d in range(self.freedoms):
             for order, step in enumerate(_STEPS):
                 if d < FLOOR.stop:
@@ -232,16 +241,22 @@ class Problem:
                 moved = [part.copy() if o == order else part for o, part in enumerate(motion)]
                 moved[order][:, d] += step
                 shown = self.predicted(k, x, (moved[0], moved[1], moved[2]), torques, rig)
-                by_motion[:, :, d, order] = (shown - base) / step
-        local = self.local[k]
-        by_unknown = np.zeros((n, self.rows, len(local)))
+                slopes[:, :, d, order] = (shown - base) / step
+        return slopes
+
+    def by_unknown(self, k: int, x: Array, motion: Motion, torques: Array) -> Array:
+        """Slopes of a recording's rows by its unknowns (n, rows, local)."""
+        rig, local = self.rig_at(x), self.local[k]
+        loads = needed(rig, motion, self.recordings[k].field.rotors)
+        base = self.predicted(k, x, motion, torques, rig, loads)
+        slopes = np.zeros((self.recordings[k].n, self.rows, len(local)))
         for column, place in enumerate(local):
             step = _SHARE * self.spread[place]
             moved_x = x.copy()
             moved_x[place] += step
             same = (None, None) if place < self.of_rig.stop else (rig, loads)
-            by_unknown[:, :, column] = (self.predicted(k, moved_x, motion, torques, *same) - base) / step
-        return by_motion, by_unknown
+            slopes[:, :, column] = (self.predicted(k, moved_x, motion, torques, *same) - base) / step
+        return slopes
 
 
 def _recording(experiment: Experiment, k: int) -> Recording:
@@ -250,8 +265,8 @@ def _recording(experiment: Experiment, k: int) -> Recording:
     first, end = int(there[0]), int(there[-1]) + 1
     reading, n, dt = trial.measured[first:end].copy(), end - first, experiment.dt
     amplifier = experiment.rig.transducer.amplifier
-    if amplifier is not None:
-        reading[:, :6] = _undone(reading[:, :6], amplifier, dt)
+    reading[:, 6:] = in_band(reading[:, 6:], dt)
+    reading[:, :6] = _undone(reading[:, :6], amplifier, dt)
     weight = np.zeros(n)
     ends = round(_ENDS / dt)
     weight[ends:-ends] = 1.0
@@ -266,13 +281,10 @@ def _recording(experiment: Experiment, k: int) -> Recording:
     return Recording(k, first, dt, reading, weight, turning, field, Splines(n, dt))
 
 
-def _undone(wrench: Array, amplifier: Amplifier, dt: float) -> Array:
-    """Undo an amplifier of the second order; a line from the first to the last sample is taken apart."""
-    n, corner = len(wrench), 2 * np.pi * float(amplifier.corner)
-    across = wrench[-1:] - wrench[:1]
-    line = wrench[:1] + across * np.linspace(0.0, 1.0, n)[:, None]
-    both = np.concatenate([wrench - line, (line - wrench)[::-1]])
-    s = 2j * np.pi * np.fft.rfftfreq(len(both), dt) / corner
-    spectrum = np.fft.rfft(both, axis=0) * (1 + np.sqrt(2) * s + s**2)[:, None]
-    late = np.sqrt(2) / corner * across / (dt * (n - 1))
-    return np.asarray(np.fft.irfft(spectrum, len(both), axis=0)[:n] + line + late)
+def _undone(wrench: Array, amplifier: Amplifier | None, dt: float) -> Array:
+    """Undo an amplifier of the second order."""
+    if amplifier is None:
+        return in_band(wrench, dt)
+    corner = float(amplifier.corner)
+    late = np.sqrt(2) / (2 * np.pi * corner) * (wrench[-1:] - wrench[:1]) / (dt * (len(wrench) - 1))
+    return in_band(wrench, dt, lambda f: 1 + np.sqrt(2) * 1j * f / corner - (f / corner) ** 2) + late

@@ -23,6 +23,7 @@ from proof.rivals.smoother.balance import FIRST_JOINT, PLATE
 from proof.rivals.smoother.drive import spring
 from proof.rivals.smoother.fit import Quadratic, State
 from proof.rivals.smoother.problem import Problem
+from proof.rivals.smoother.splines import in_band
 
 _TAPS_HZ = 100.0
 _KNOT_S = 1.0  # between poses at which ports are worked out
@@ -49,7 +50,7 @@ class Course:
     """A recording's motion as signals of the plant, and what enters at a port as rows."""
 
     def __init__(self, problem: Problem, state: State, k: int, rig: Rig) -> None:
-        recording, motion = problem.recordings[k], state.motion(problem, k)
+        recording, motion = problem.recordings[k], state.ideal_motion(problem, k)
         self.problem, self.rig, self.recording = problem, rig, recording
         dt, n, first = recording.dt, recording.n, recording.first
         own = dt * (first + np.arange(n))
@@ -61,12 +62,12 @@ class Course:
             np.stack([np.interp(t, field.t, column) for column in part.T], axis=1)
             for part in (field.whole, field.smooth)
         )
-        behind = problem.behind(k, state.x, motion, state.torques[k])
+        behind = problem.behind(k, state.x, motion, state.ideal_torques[k])
         rotor = smooth - make_interp_spline(own, behind, k=3)(inside)
         turning = np.gradient(rotor, axis=0) * _TAPS_HZ
         joints = slice(FIRST_JOINT, None)
         values = [whole, rotor, turning, angle[:, joints], rate[:, joints], angle[:, PLATE], rate[:, PLATE]]
-        shown = problem.predicted(k, state.x, motion, state.torques[k])[:, : problem.angles.stop]
+        shown = problem.predicted(k, state.x, motion, state.ideal_torques[k])[:, : problem.angles.stop]
         readings = make_interp_spline(own, shown, k=3)(inside)
         self.tapped = Tapped(_TAPS_HZ, tap_columns(problem.rig), np.hstack(values), readings)
         self.shown = np.vstack([np.repeat(shown[:1], first, axis=0), shown])
@@ -90,6 +91,7 @@ class Course:
         out = np.zeros((n, problem.rows))
         for inlet, means in column.items():
             slow = resample(means[:, None], _TAPS_HZ, 1 / self.recording.dt)[self.recording.first :, 0]
+            slow = in_band(slow, self.recording.dt)
             slow = np.pad(slow, (0, max(n - len(slow), 0)), mode="edge")[:n, None]
             place = self._inlets[inlet]
             force = self._force[:, :, place] * slow
@@ -112,7 +114,7 @@ class Course:
             t = experiment.dt * np.arange(len(self.shown))
             shown = sensed(candidate, t, self.shown, experiment.channels, self.rig)
         out = np.zeros((self.recording.n, problem.rows, shown.shape[2]))
-        out[:, : problem.angles.stop] = shown[self.recording.first :][: self.recording.n]
+        out[:, : problem.angles.stop] = in_band(shown[self.recording.first :][: self.recording.n], self.recording.dt)
         return out
 
 

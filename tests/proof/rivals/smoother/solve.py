@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
 from time import monotonic
 
@@ -20,15 +19,20 @@ from kbs_process.studies.diagnose.reading import experiment_of
 from proof.answer import Answer, Claim, Moved, Suspect
 from proof.answer import Candidate as Claimed
 from proof.rivals.case import Array
-from proof.rivals.smoother.fit import State, descend
+from proof.rivals.smoother.fit import Quadratic, State, step
+from proof.rivals.smoother.intensities import powers
 from proof.rivals.smoother.problem import Problem
 from proof.rivals.smoother.screen import Scored, Screen
 
 METHOD = "smoother"
-LOOSE = (0.1, 0.5, 0.02)  # N m of the plate, N m of a joint, m/s^2 of the floor: anything fits
-LEAST = (1e-4, 5e-4, 1e-5)
-WIDER = 2.0  # times what repeats differ by
-STEPS = 5
+WIDER, OF_JOINT = 10.0, 3.0  # times a reading's noise that forces are, to begin with; those of joints times as much
+STEPS = 25
+# Of a fit's phases: all is statics; forces are estimated; all is free. The share that forces have of a model by itself.
+STIFF = (0.1, 0.03, 0.01)
+SETTLED = 100.0  # sigmas of all unknowns together that a step goes, below which forces are estimated
+ARRIVED = 3.0  # below which it is the last
+CHANGE = (0.3, 1.5)  # of a force's sigma in a step
+KNOWN = 0.2  # of its logarithm, below which a force's sigma is known
 DETECTED = 100.0  # of the cost, that an effect takes
 SHARE = 0.25  # of its gain for each sample, that it has on recordings held out
 MOST = 3  # effects
@@ -43,6 +47,9 @@ def solve(folder: Path) -> Answer:
     experiment = experiment_of(load_campaign(folder, checksums=False), SilentProgress())
     fitted = Problem(experiment, list(experiment.fit))
     state = settled(fitted)
+    left = powers(fitted, state, Quadratic.of(fitted, state))
+    # What comes again and no number takes up counts as noise until an effect explains it.
+    state.sigma[fitted.forces] *= np.sqrt(np.maximum(left.of_all, 1.0))[fitted.forces]
     screen = Screen(fitted, state)
     judge = _held_out(experiment, fitted, state)
     chosen, finds = screen.candidates(), []
@@ -68,35 +75,38 @@ def solve(folder: Path) -> Answer:
     )
 
 
-def settled(problem: Problem) -> State:
-    """Fit with forces that may be anything, then with those that repeats differ by."""
-    state = State.of(problem, _forces(problem, LOOSE))
-    descend(problem, state, STEPS, ~problem.scaling)
-    differ = _differ(problem, state)
-    if differ is not None:
-        state.sigma[problem.forces] = np.maximum(WIDER * differ, _forces(problem, LEAST))
-        descend(problem, state, STEPS, np.ones(len(problem.prior), dtype=bool))
+def settled(problem: Problem, sigma: Array | None = None) -> State:
+    """Fit with forces of `sigma`; without, with large ones first, then with those that repeats differ by.
+
+    What shows while the rig moves alone is held until forces are known: beside large ones nothing tells it.
+    """
+    state = State.of(problem, _forces(problem) if sigma is None else sigma)
+    length = wrong = np.inf
+    phase = 0 if sigma is None else 2
+    for _ in range(STEPS):
+        state.idealise(problem, STIFF[phase])
+        quadratic = Quadratic.of(problem, state)
+        if phase and sigma is None:
+            power = powers(problem, state, quadratic).noise[problem.forces]
+            ratio = np.clip(np.sqrt(power), *CHANGE)
+            state.sigma[problem.forces] *= ratio
+            wrong = float(np.abs(np.log(ratio)).max())
+            quadratic = Quadratic.of(problem, state)
+        length = step(problem, state, quadratic, None if phase == 2 else ~problem.dynamic)
+        if phase == 0 and length < SETTLED:
+            phase = 1
+        elif phase == 1 and wrong < KNOWN:
+            phase = 2
+        elif phase == 2 and length < ARRIVED and (sigma is not None or wrong < KNOWN):
+            break
     return state
 
 
-def _forces(problem: Problem, levels: Sequence[float]) -> Array:
-    return np.repeat(levels, [3, problem.joints, 3])
-
-
-def _differ(problem: Problem, state: State) -> Array | None:
-    """Rms by which the forces of repeats differ, over sqrt 2; None where nothing was repeated."""
-    left = [part[:, problem.forces] for part in state.residuals(problem)]
-    trials = problem.experiment.trials
-    by_trajectory: dict[int, list[int]] = {}
-    for k, recording in enumerate(problem.recordings):
-        by_trajectory.setdefault(trials[recording.trial].trajectory, []).append(k)
-    apart = []
-    for one, other in (pair for own in by_trajectory.values() for pair in pairwise(own)):
-        a, b = problem.recordings[one], problem.recordings[other]
-        first, end = max(a.first, b.first), min(a.first + a.n, b.first + b.n)
-        both = [(left[k] * r.weight[:, None])[first - r.first : end - r.first] for k, r in ((one, a), (other, b))]
-        apart.append((both[0] - both[1]) / np.sqrt(2.0))
-    return np.asarray(np.sqrt(np.mean(np.concatenate(apart) ** 2, axis=0))) if apart else None
+def _forces(problem: Problem) -> Array:
+    """Sigmas (forces,) to begin with: what a reading's noise is as a force."""
+    force, torque = problem.sigma[:3].mean(), problem.sigma[3:6].mean()
+    mass = sum(float(body.mass) for body in problem.rig.bodies)
+    return WIDER * np.repeat([torque, OF_JOINT * torque, force / mass], [3, problem.joints, 3])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -120,8 +130,7 @@ def _held_out(experiment: Experiment, fitted: Problem, state: State) -> _Judge |
     problem = Problem(experiment, list(experiment.held_out))
     common = problem.own[0].start
     problem.prior[:common], problem.spread[:common] = state.x[:common], 1e-6 * problem.spread[:common]
-    own = State.of(problem, state.sigma[problem.forces])
-    descend(problem, own, STEPS, np.arange(len(problem.prior)) >= common)
+    own = settled(problem, state.sigma[problem.forces])
     counted = [sum(float(r.weight.sum()) for r in p.recordings) for p in (problem, fitted)]
     return _Judge(Screen(problem, own), counted[0] / counted[1])
 

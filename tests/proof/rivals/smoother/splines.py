@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline
@@ -10,7 +12,22 @@ from scipy.linalg import cho_solve_banded, cholesky_banded
 from proof.rivals.case import Array
 
 DEGREE = 5
+BAND_HZ = 8.0  # of what is compared: as many independent numbers twice a second
 LOCAL = DEGREE + 1  # coefficients that a sample sees
+
+
+def in_band(values: Array, dt: float, undo: Callable[[Array], Array] | None = None) -> Array:
+    """Values (n, ...), dt s apart, without what lies beyond the band; `undo` are factors over frequency, Hz.
+
+    A line from the first to the last sample is taken apart, and what is left is mirrored. Whatever is compared goes
+    through here: what a working rate's filter lets through beyond the band is in part another frequency's.
+    """
+    n, rest = len(values), (1,) * (values.ndim - 1)
+    line = values[:1] + (values[-1:] - values[:1]) * np.linspace(0.0, 1.0, n).reshape(-1, *rest)
+    spectrum = np.fft.rfft(np.concatenate([values - line, (line - values)[::-1]]), axis=0)
+    f = np.fft.rfftfreq(2 * n, dt)
+    factors = (f <= BAND_HZ) * (1.0 if undo is None else undo(f))
+    return np.asarray(np.fft.irfft(spectrum * factors.reshape(-1, *rest), 2 * n, axis=0)[:n] + line)
 
 
 class Splines:

@@ -1,0 +1,64 @@
+"""How large the forces are that the equations lack, each row of its own: from repeats, as often as they differ.
+
+    S <- S sum over repeats (f - fbar)^2 / S / numbers,   numbers = rows less those that the motion has taken up
+
+to its fixed point (restricted maximum likelihood of a variance). What a fit takes up is the trace of its hat matrix,
+by one random probe a row (Hutchinson): as good as its rows are many.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from proof.rivals.case import Array
+from proof.rivals.smoother.fit import Quadratic, State
+from proof.rivals.smoother.problem import Problem
+
+_SEED = 1996
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Powers:
+    """Power of each row over that which its sigma has, (rows,)."""
+
+    of_repeats: Array | None  # by which they differ; None without any
+    of_all: Array  # that is left
+
+    @property
+    def noise(self) -> Array:
+        """What is noise in them, as far as repeats tell."""
+        return self.of_all if self.of_repeats is None else self.of_repeats
+
+
+def powers(problem: Problem, state: State, quadratic: Quadratic) -> Powers:
+    """Compare what rows leave with what their sigmas say; `quadratic` is that of the state."""
+    free = [_free(problem, quadratic, k) for k in range(len(problem.recordings))]
+    left = [residual / state.sigma for residual in state.residuals(problem)]
+    weight = [recording.weight[:, None] for recording in problem.recordings]
+    every = sum((np.sum(z**2 * w, axis=0) for z, w in zip(left, weight, strict=True)), np.zeros(problem.rows))
+    power = numbers = np.zeros(problem.rows)
+    for own in problem.repeats:
+        first = max(problem.recordings[k].first for k in own)
+        end = min(problem.recordings[k].first + problem.recordings[k].n for k in own)
+        cut = [slice(first - problem.recordings[k].first, end - problem.recordings[k].first) for k in own]
+        common = np.prod([weight[k][c] for k, c in zip(own, cut, strict=True)], axis=0)
+        z = np.stack([left[k][c] for k, c in zip(own, cut, strict=True)])
+        power = power + np.sum((z - z.mean(axis=0)) ** 2 * common, axis=(0, 1))
+        share = np.mean([free[k] / weight[k].sum() for k in own], axis=0)
+        numbers = numbers + (len(own) - 1) * common.sum() * share
+    of_repeats = power / numbers if problem.repeats else None
+    return Powers(of_repeats, every / np.sum(free, axis=0))
+
+
+def _free(problem: Problem, quadratic: Quadratic, k: int) -> Array:
+    """Numbers (rows,) of each row that a recording's motion leaves."""
+    part, weight = quadratic.parts[k], problem.recordings[k].weight
+    rng = np.random.default_rng([_SEED, k])
+    probes = np.zeros((*part.root.shape, problem.rows))
+    every = np.arange(problem.rows)
+    probes[:, every, every] = rng.choice([-1.0, 1.0], part.root.shape) * (part.root > 0.0)
+    against = part.motion.against(probes.reshape(part.root.size, -1))
+    taken = np.sum(against * part.motion.solve(against), axis=0)
+    return np.asarray(np.maximum(weight.sum() - taken, 1e-3 * weight.sum()))
