@@ -218,6 +218,13 @@ def test_text_that_is_not_utf8(folder: CampaignFolder) -> None:
     assert "not UTF-8" in str(folder.refusal())
 
 
+def test_a_mark_of_the_byte_order_is_no_fault(folder: CampaignFolder) -> None:
+    plain = load_campaign(folder.path)
+    text = (folder.path / CAMPAIGN).read_bytes()
+    (folder.path / CAMPAIGN).write_bytes(b"\xef\xbb\xbf" + text)
+    assert load_campaign(folder.path).recordings == plain.recordings
+
+
 def test_wrong_checksum_names_both(folder: CampaignFolder) -> None:
     stated = "0" * 64
     folder.replace(CAMPAIGN, 'role = "fit"', f'role = "fit"\nsha256 = "{stated}"')

@@ -104,3 +104,10 @@ def test_many_columns_take_one_pass(tmp_path: Path) -> None:
     found = table(tmp_path, ",".join(names) + "\n" + ",".join("1" for _ in names) + "\n")
     (cells,) = found.chunks(names)
     assert len(cells) == len(names)
+
+
+def test_a_line_of_units_that_nobody_told_of(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("time,Ty\ns,N mm\n0.0,1.0\n0.1,2.0\n")
+    with pytest.raises(RecordingError, match=r"line 2 holds no number: s, N mm[\s\S]*units_row = true"):
+        TextTable(tmp_path / "a.csv", Text())
+    assert [column.unit for column in TextTable(tmp_path / "a.csv", Text(units_row=True)).columns] == ["s", "N mm"]

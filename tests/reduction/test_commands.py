@@ -33,3 +33,9 @@ def test_degrees_called_radians(tmp_path: Path) -> None:
 def test_more_than_a_turn_from_a_start_within_one(tmp_path: Path) -> None:
     path = table(tmp_path, "t,wheel\n0,0\n1,7\n2,14\n")
     assert read_commands(path, ("wheel",)).position[:, 0] == pytest.approx([0.0, 7.0, 14.0])
+
+
+def test_commands_of_decades(tmp_path: Path) -> None:
+    path = table(tmp_path, "t,wheel\n0,0\n1e9,0\n")
+    with pytest.raises(RecordingError, match=r"'t' lasts 1e\+09 s[\s\S]*seconds"):
+        read_commands(path, ("wheel",))

@@ -86,7 +86,7 @@ def within(folder: Path, name: str, *, where: str) -> Path:
 def read(path: Path, *, role: str, remedy: str) -> Document:
     """Read one TOML file; `role` says what it is for in the message when it is missing."""
     try:
-        text = regular(path).read_text(encoding="utf-8")
+        text = regular(path).read_text(encoding="utf-8").removeprefix("\ufeff")  # as editors of Windows begin a file
     except (FileNotFoundError, NotADirectoryError) as error:
         raise ConfigError(f"{role} does not exist", where=shown(path), remedy=remedy) from error
     except UnicodeDecodeError as error:

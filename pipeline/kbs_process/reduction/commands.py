@@ -20,6 +20,8 @@ from kbs_process.reduction.reading import read_run
 from kbs_process.rig.model import Rig
 from kbs_process.signals.records import Array, Run
 
+LONGEST_S = 1e6  # that commands last
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Commands:
@@ -68,6 +70,12 @@ def read_commands(path: Path, joints: tuple[str, ...]) -> Schedule:
             "column 't' has fewer than two times, or they do not increase",
             where=str(path),
             remedy="sort the rows by time, and delete repeated ones",
+        )
+    if not t[-1] - t[0] <= LONGEST_S:
+        raise RecordingError(
+            f"column 't' lasts {t[-1] - t[0]:.3g} s",
+            where=str(path),
+            remedy=f"give seconds; commands may last {LONGEST_S:g} s",
         )
     position = np.stack([_angle(table, joint, path) for joint in joints], axis=1)
     names = [f"{joint}.rate" for joint in joints]

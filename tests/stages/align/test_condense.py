@@ -271,6 +271,8 @@ def test_recordings_that_cannot_be_used_say_what_to_do() -> None:
         run_of(empty)
     with pytest.raises(RecordingError, match=r"short: wrench: 400 samples in 0.399 s are too few[\s\S]*->"):
         run_of({"wrench": rows(recording()["wrench"], slice(0, 400))}, "short")
+    with pytest.raises(RecordingError, match=r"slow: wrench: samples come every 10 s[\s\S]*unit of its times"):
+        run_of({"wrench": stream(lambda t: wrench(t / 1e3), 0.1, 5000.0)}, "slow")
     with pytest.raises(RecordingError, match="neither wrench nor joint angles"):
         run_of({"command": recording()["command"]})
 

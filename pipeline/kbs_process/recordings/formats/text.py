@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 DELIMITERS = "\t;,|"
 _HEAD_LINES = 32
+_SHOWN = 60  # characters of a line
 _LONGEST_LINE = 1 << 24  # characters
 _DATE = re.compile(r"\d{4}-\d\d-\d\d([T ]\d\d:\d\d.*)?")
 _UTF16 = (b"\xff\xfe", b"\xfe\xff")
@@ -60,6 +61,13 @@ class TextTable:
             )
         self._first_data_row = head[told][0]
         rows = cells[told:]
+        first, second = ([cell for cell in row if cell] for row in (*rows, [], [])[:2])
+        if named and first and any(map(self._is_number, second)) and not any(map(self._is_number, first)):
+            raise RecordingError(
+                f"line {self._first_data_row + 1} holds no number: {', '.join(first)[:_SHOWN]}",
+                where=str(path),
+                remedy="write units_row = true in the mapping's [text] if these are units; else take the line out",
+            )
         usual = Counter(map(len, rows or cells)).most_common(1)[0][0]
         names = self._fitted(cells[0], rows) if named else [""] * usual
         units = cells[named][: len(names)] if options.units_row and len(cells) > named else []

@@ -34,6 +34,7 @@ from kbs_process.stages.align.stream import ONE_PART, Collected, Timeline, Unifo
 
 Progress = Callable[[str, int], None]  # stream, samples just taken
 
+SLOWEST = 100.0  # times that a stream may be slower than the working rate
 # Brought to the working rate; the first one present is the reference.
 SAMPLED = ("wrench", "effort", "angle", "rate", "pointing")
 LOADS = ("wrench", "effort")  # the first one present has spectrum and envelope
@@ -239,10 +240,15 @@ def _stream(
 
 
 def _finished(key: str, stream: Uniform, settings: CondenseSettings, file: str) -> Kept:
-    kept = stream.finish()
+    kept, line = stream.finish(), stream.line
+    if line.grid is not None and line.grid.rate * SLOWEST < settings.working_rate_Hz:
+        raise RecordingError(
+            f"samples come every {1 / line.grid.rate:.3g} s, and the working rate is {settings.working_rate_Hz:g} Hz",
+            where=_place(file, key),
+            remedy="check the unit of its times; of a sensor as slow as that no band can be judged",
+        )
     if kept is not None:
         return kept
-    line = stream.line
     if line.grid is None:
         raise RecordingError(
             f"{line.samples} samples are no signal",

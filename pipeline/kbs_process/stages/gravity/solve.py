@@ -238,7 +238,7 @@ def refuse_uninformed(rows: Rows) -> None:
     if s[0] < 1.0:
         direction = combination(Vt[0], equation.names)
         raise FitError(
-            "the recordings say less about the rig than its parameter files do; the best that they hold, "
-            f"{direction} (in prior sigmas), cannot be told apart from the zeros of the readings",
-            remedy="add a recording that turns the joints further",
+            "the recordings say less about the rig than its parameter files do: zeros of the readings hide even what "
+            f"they show best, which is {direction} (each in its prior sigmas)",
+            remedy="add a recording that turns the joints further, or lasts longer",
         )
