@@ -132,7 +132,7 @@ def _derivatives(angle: _Angle, measured: Array | None, dt: float, band: float) 
 
     By octaves, from the highest down: each is the angle's or the measured rate's, whichever errs less in acceleration.
     The angle errs by its rounding, and the rate by what else the two differ by. Left out are the octaves above the
-    first one of which at least half of the power is no error.
+    one above the first of which at least half of the power is no error: a low-pass takes some of the octave below it.
     """
 
     def up_to(f: float) -> tuple[Array, Array]:
@@ -141,7 +141,7 @@ def _derivatives(angle: _Angle, measured: Array | None, dt: float, band: float) 
             own.append([smooth(measured, dt, f, order) for order in (0, 1)])
         return np.array(own), smooth(angle.rounding.T, dt, f, 2)
 
-    total, highest, rated = np.zeros((2, len(angle.q))), 0.0, False
+    total, above, highest, rated = np.zeros((2, len(angle.q))), np.zeros((2, len(angle.q))), 0.0, False
     upper, noise = up_to(band)
     while True:
         last = kernel_length(0.5 * band, dt) > len(angle.q) // 2
@@ -150,11 +150,11 @@ def _derivatives(angle: _Angle, measured: Array | None, dt: float, band: float) 
         errs = [rounding, *(max(_rms(other[1] - octave[0, 1]) ** 2 - rounding, 0.0) for other in octave[1:])]
         best = int(np.argmin(errs))
         if highest or last or _rms(octave[best, 1]) ** 2 >= 2.0 * errs[best]:
+            total += (upper[0] if measured is None else octave[best]) + (0.0 if highest else above)
             highest, rated = highest or band, rated or best > 0
-            total += upper[0] if measured is None else octave[best]
         if last or (highest and measured is None):
             return total, highest, rated
-        upper, noise, band = lower, quiet, 0.5 * band
+        above, upper, noise, band = octave[best], lower, quiet, 0.5 * band
 
 
 def _valid(run: Run, rig: Rig, grid: Signal, *, rated: bool) -> Mask:
