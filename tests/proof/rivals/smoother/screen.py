@@ -142,13 +142,16 @@ class Screen:
         found = [one for some in _batches(chosen, known) for one in self._scored(some, known)]
         return sorted(found, key=lambda one: -one.worth)
 
-    def predicted(self, one: Scored) -> float:
-        """What an effect takes of the cost with the amplitudes that it has, which were found elsewhere."""
+    def predicted(self, one: Scored) -> tuple[float, float]:
+        """What an effect takes of the cost with the amplitudes that it has, which were found elsewhere; what it would.
+
+        The latter, if these amplitudes were right.
+        """
         unknowns, products, squares = (np.sum(parts, axis=0) for parts in self._sums([one.candidate]))
         given = one.amplitudes[-len(one.candidate.amplitudes) :]
         by = unknowns @ given
-        left = given @ squares @ given - by @ self.quadratic.solve(self.problem.spread, by)
-        return float(2.0 * (given @ products - by @ self._own) - left)
+        foretold = float(given @ squares @ given - by @ self.quadratic.solve(self.problem.spread, by))
+        return float(2.0 * (given @ products - by @ self._own)) - foretold, foretold
 
     def _scored(self, chosen: Sequence[Candidate], known: Sequence[Candidate]) -> Iterator[Scored]:
         every = [*known, *chosen]

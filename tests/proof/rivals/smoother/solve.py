@@ -34,7 +34,8 @@ ARRIVED = 3.0  # below which it is the last
 CHANGE = (0.3, 1.5)  # of a force's sigma in a step
 KNOWN = 0.2  # of its logarithm, below which a force's sigma is known
 DETECTED = 100.0  # of the cost, that an effect takes
-SHARE = 0.25  # of its gain for each sample, that it has on recordings held out
+SHARE = 0.25  # of its gain for each sample, that an effect of each recording's own has on recordings held out
+FORETOLD = 0.5  # of what another would take there, that it takes
 MOST = 3  # effects
 OFF = 4.0  # sigmas
 NEXT = 2  # alternatives that are named
@@ -117,11 +118,12 @@ class _Judge:
     samples: float  # over those of the recordings that were fitted
 
     def confirms(self, one: Scored) -> bool:
-        """Whether an effect, at the amplitudes that were fitted, predicts recordings held out."""
+        """Whether recordings held out show an effect, at the amplitudes that were fitted, as far as it shows there."""
         if one.candidate.effect.each_trial:
             (again,) = self.screen.scored([one.candidate])
             return again.gain > SHARE * self.samples * one.gain
-        return self.screen.predicted(one) > SHARE * self.samples * one.gain
+        gained, foretold = self.screen.predicted(one)
+        return foretold < DETECTED or gained > FORETOLD * foretold
 
 
 def _held_out(experiment: Experiment, fitted: Problem, state: State) -> _Judge | None:
