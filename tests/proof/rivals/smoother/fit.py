@@ -14,7 +14,7 @@ from proof.rivals.smoother.problem import Problem
 from proof.rivals.smoother.splines import LOCAL
 
 _FAR = 4.0  # prior sigmas that a step goes at most
-_RUNS = 2
+_RUNS = 2  # steps in which a motion follows unknowns that moved
 
 
 @dataclass(slots=True, eq=False)
