@@ -350,6 +350,14 @@ def _gravity_result() -> r.Gravity:
         samples=26000,
         reduced_chi_square=1.04,
         feasible="Computed gravity compensation is feasible: its error is 0.003 N m, 5 % of the limit.",
+        ladder=tuple(
+            r.Rung(
+                name=name,
+                rms={channel: share * SCALE[channel] for channel in CHANNELS},
+                peak={channel: 3.0 * share * SCALE[channel] for channel in CHANNELS},
+            )
+            for name, share in (("masses and CoGs", 0.4), ("tilt", 0.05))
+        ),
     )
 
 

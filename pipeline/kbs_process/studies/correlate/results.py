@@ -102,6 +102,14 @@ class StaticRecording(Record, frozen=True, kw_only=True):
     channels: tuple[StaticChannel, ...]
 
 
+class Rung(Record, frozen=True, kw_only=True):
+    """What the gravity model leaves below 0.3 Hz of the fitted recordings, with this part and those before it."""
+
+    name: str
+    rms: dict[str, float]  # by channel
+    peak: dict[str, float]
+
+
 class Gravity(Record, frozen=True, kw_only=True):
     """The gravity (and where identified, inertia) fit."""
 
@@ -113,6 +121,7 @@ class Gravity(Record, frozen=True, kw_only=True):
     feasible: str = ""  # a sentence: is computed gravity compensation feasible?
     recordings: tuple[StaticRecording, ...] = ()
     low_pass_Hz: float | None = None  # below which the model was fitted
+    ladder: tuple[Rung, ...] = ()
 
 
 class Contribution(Record, frozen=True, kw_only=True):

@@ -14,7 +14,7 @@ from kbs_process.progress import Progress
 from kbs_process.reduction.analysis import Analysis, analyse
 from kbs_process.reduction.judging import decided
 from kbs_process.reduction.measurable import check_requirements
-from kbs_process.reduction.preparing import Prepared, fit_gravity, prepare, told_copies
+from kbs_process.reduction.preparing import Prepared, fit_gravity, prepare, samples, told_copies
 from kbs_process.reduction.relief import relieved
 from kbs_process.reduction.soundness import check_model
 from kbs_process.report.build import publish
@@ -24,6 +24,7 @@ from kbs_process.results.outcome import Outcome
 from kbs_process.results.store import writing
 from kbs_process.stages import decouple
 from kbs_process.stages.decouple import Decoupling
+from kbs_process.stages.gravity.ladder import ladder
 from kbs_process.stages.gravity.model import GravityModel
 from kbs_process.studies.correlate.earlier_diagnosis import keep_diagnosis
 from kbs_process.studies.correlate.notices import has_spikes, spikes, unclear
@@ -88,7 +89,8 @@ def _found(
                 raise SimulationError(f"{notice.what}; {error.what}", remedy=notice.remedy) from error
         raise
     with progress.task("Comparing, summing up uncertainties"):
-        return summarise(campaign, analyses, model, decoupling, checked), analyses, model
+        rungs = ladder(samples(campaign, prepared), model) if campaign.rig.transducer.channels else ()
+        return summarise(campaign, analyses, model, decoupling, checked, rungs), analyses, model
 
 
 def _with_spikes(

@@ -20,6 +20,7 @@ from kbs_process.results.records import Check, Conclusion
 from kbs_process.signals.records import Signal
 from kbs_process.stages.decouple import Decoupling
 from kbs_process.stages.gravity.equation import RESPONSE
+from kbs_process.stages.gravity.ladder import Rung
 from kbs_process.stages.gravity.model import GravityModel, taring_error
 from kbs_process.stages.gravity.quality import feasibility
 from kbs_process.stages.to_cog import ASSUMPTION
@@ -33,7 +34,12 @@ RESPONSE_UNITS = dict(zip(RESPONSE, ("s", "s^2"), strict=True))
 
 
 def summarise(
-    campaign: Campaign, analyses: Sequence[Analysis], model: GravityModel, decoupling: Decoupling, checked: Checked
+    campaign: Campaign,
+    analyses: Sequence[Analysis],
+    model: GravityModel,
+    decoupling: Decoupling,
+    checked: Checked,
+    rungs: Sequence[Rung],
 ) -> results.Results:
     """Return the contents of results.json; calibrations serve the fit and are judged by its residual alone."""
     runs = [analysis for analysis in analyses if analysis.entry.role != "calibration"]
@@ -60,7 +66,7 @@ def summarise(
         recordings=tuple(_recording(analysis) for analysis in analyses),
         conventions=checked.conventions,
         soundness=checked.soundness,
-        gravity=_gravity(campaign, analyses, model),
+        gravity=_gravity(campaign, analyses, model, rungs),
         cross_coupling=_cross_coupling(analyses, decoupling) if decoupling.channels else None,
         bands=tuple(map(band, stated.values())),
         repeatability=repeated,
@@ -167,7 +173,9 @@ def _recording(analysis: Analysis) -> results.Recording:
     )
 
 
-def _gravity(campaign: Campaign, analyses: Sequence[Analysis], model: GravityModel) -> results.Gravity:
+def _gravity(
+    campaign: Campaign, analyses: Sequence[Analysis], model: GravityModel, rungs: Sequence[Rung]
+) -> results.Gravity:
     fit = model.fit
     prior = model.equation.start()
     quantities = campaign.rig.quantities()
@@ -193,6 +201,14 @@ def _gravity(campaign: Campaign, analyses: Sequence[Analysis], model: GravityMod
         feasible=_feasible(campaign, model),
         recordings=tuple(_static_recording(analysis, model) for analysis in analyses),
         low_pass_Hz=model.settings.low_pass_Hz,
+        ladder=tuple(
+            results.Rung(
+                name=rung.name,
+                rms=dict(zip(model.channels, rung.rms.tolist(), strict=True)),
+                peak=dict(zip(model.channels, rung.peak.tolist(), strict=True)),
+            )
+            for rung in rungs
+        ),
     )
 
 
