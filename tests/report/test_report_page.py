@@ -91,6 +91,9 @@ def test_the_verdict_comes_first_with_what_qualifies_it(page: Page) -> None:
         "Standard uncertainties, EL089P00_2, below 1 Hz, spacecraft (S)",
         "Other recordings",
         "Computed gravity compensation is feasible",
+        "What each part of the model is worth",
+        "and tilt",
+        "Is the prediction pessimistic?",
         "The largest coupling takes 0.9 N m",
         "encoder quantisation and noise",
         "63.200 to 63.612 s",
@@ -125,6 +128,12 @@ def test_every_recording_band_and_frame_is_in_the_interactive_figure(page: Page)
     assert [channel["name"] for channel in first["channels"]] == list(sample.CHANNELS)
     assert [channel["limit"] for channel in first["channels"]] == [None] * 3 + [0.06] * 3
     assert first["shaded"][0][0] == 0.0
+
+
+def test_the_torques_at_the_transducer_are_drawn_in_every_band(page: Page) -> None:
+    drawn = [str(image["alt"]) for image in page.all("img")]
+    for band in ("below 1 Hz", "below 2 Hz", "unfiltered"):
+        assert any(f"EL089P00_2, {band}, transducer (T): measured and predicted" in alt for alt in drawn)
 
 
 def test_nothing_is_loaded_from_elsewhere(page: Page) -> None:
