@@ -176,6 +176,17 @@ def command_results() -> r.Results:
             r.Resonance(axis="about x", frequency_Hz=2.94, source="plant at 78 deg", sigma_Hz=0.09),
             r.Resonance(axis="about z", frequency_Hz=10.4, source="plant at 78 deg"),
         ),
+        six_channels=tuple(
+            r.SixChannels(
+                recording=name,
+                band="lt1Hz",
+                chi_square=chi_square,
+                explained=chi_square < 2.0,
+                peak={"Tx": 0.0021, "Ty": 0.0032, "Tz": 0.0016},
+                sigma={"Tx": 0.0004, "Ty": 0.0011, "Tz": 0.0005},
+            )
+            for name, chi_square in (("EL089P00_1", 0.97), ("EL089P00_2", 11.3))
+        ),
         budget=tuple(
             Budget(
                 channel=channel,

@@ -102,6 +102,17 @@ class StaticRecording(Record, frozen=True, kw_only=True):
     channels: tuple[StaticChannel, ...]
 
 
+class SixChannels(Record, frozen=True, kw_only=True):
+    """The article's torque at the spacecraft from all six channels of one recording at once, in one band."""
+
+    recording: str
+    band: str
+    chi_square: float  # of a degree of freedom
+    explained: bool  # by rigid bodies, floor and budget
+    peak: dict[str, float]  # by torque channel, N m
+    sigma: dict[str, float]  # of every instant
+
+
 class Rung(Record, frozen=True, kw_only=True):
     """What the gravity model leaves below 0.3 Hz of the fitted recordings, with this part and those before it."""
 
@@ -275,6 +286,7 @@ class Results(ResultsFile, frozen=True, kw_only=True):
     resonances: tuple[Resonance, ...] = ()
     transducer: OnTransducer | None = None
     budget: tuple[Budget, ...] = ()
+    six_channels: tuple[SixChannels, ...] = ()
     pointing: tuple[RecordedPointing, ...] = ()
     methods: str = ""  # paragraphs, separated by empty lines
     parameters: tuple[Constant, ...] = ()

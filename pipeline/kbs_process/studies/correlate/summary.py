@@ -28,7 +28,7 @@ from kbs_process.studies.correlate import results
 from kbs_process.studies.correlate.findings import band, merits, repeatabilities, resonances, statements
 from kbs_process.studies.correlate.methods import methods
 from kbs_process.studies.correlate.notices import notices
-from kbs_process.studies.correlate.uncertainty import budgets
+from kbs_process.studies.correlate.uncertainty import budgets, six_channels
 
 RESPONSE_UNITS = dict(zip(RESPONSE, ("s", "s^2"), strict=True))
 
@@ -73,6 +73,7 @@ def summarise(
         merit=tuple(merits(campaign, runs, budget)),
         resonances=modes,
         budget=budget,
+        six_channels=tuple(six_channels(campaign, runs, budget)),
         pointing=tuple(recorded_pointing(analyses)),
         parameters=tuple(provenance.constants(campaign.rig)),
         notes=(ASSUMPTION,) if campaign.rig.spacecraft is not None else (),
