@@ -70,15 +70,15 @@ def six_channels(
     Not where a hand or a cord moves the article: more acts on it than its joints.
     """
     spacecraft, transducer = campaign.rig.spacecraft, campaign.rig.transducer
-    if spacecraft is None or campaign.drive != "command" or transducer.on != LAB:
+    if spacecraft is None or campaign.drive != "command" or transducer.on != LAB or len(campaign.rig.joints) >= 6:
         return
     for band in bands_of(campaign.bands)[1:]:
         for analysis in runs:
             name, measured = analysis.entry.name, analysis.pairs["T", band.name].measured
             known = {b.channel: b.total for b in budget if (b.recording, b.band, b.frame) == (name, band.name, "T")}
-            if forces_in(campaign, analysis.entry) or not set(WRENCH_CHANNELS) <= set(known):
+            sigma = np.array([known.get(channel, 0.0) for channel in WRENCH_CHANNELS])
+            if forces_in(campaign, analysis.entry) or not np.all(sigma > 0.0):
                 continue
-            sigma = np.array([known[channel] for channel in WRENCH_CHANNELS])
             found = together(select(measured, WRENCH_CHANNELS), analysis.motion.q, sigma, campaign.rig, spacecraft)
             peaks = np.abs(found.wrench.values[measured.valid]).max(axis=0)
             yield results.SixChannels(
