@@ -14,12 +14,12 @@ from kbs_process.studies.correlate.sections.merit import panel
 from report import sample
 
 
-def answer(*rows: tuple[float, float]) -> str:
-    """What is said of Tx, for the pessimism and the measured rms over its sigma of each recording."""
+def answer(*rows: tuple[float, float], sigma: float | None = 1.0) -> str:
+    """What is said of Tx, for the pessimism and the measured rms of each recording."""
     first = next(row for row in sample.command_results().merit if (row.channel, row.frame) == ("Tx", "T"))
 
     def row(index: int, ratio: float, signal: float) -> Merit:
-        changes = {"recording": str(index), "pessimism": ratio, "measured_rms": signal, "sigma": 1.0}
+        changes = {"recording": str(index), "pessimism": ratio, "measured_rms": signal, "sigma": sigma}
         return msgspec.structs.replace(first, **changes)
 
     merit = tuple(row(index, *each) for index, each in enumerate(rows))
@@ -41,3 +41,7 @@ def answer(*rows: tuple[float, float]) -> str:
 )
 def test_only_what_is_above_the_noise_answers(rows: list[tuple[float, float]], said: str) -> None:
     assert answer(*rows) == said
+
+
+def test_without_a_stated_uncertainty_nothing_is_said() -> None:
+    assert answer((1.2, 5.0), sigma=None) == "not testable"

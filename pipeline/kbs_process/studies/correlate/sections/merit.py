@@ -66,7 +66,8 @@ def _pessimistic(results: Results) -> Grid:
 
 
 def _answer(rows: Sequence[Merit]) -> Cell:
-    ratios = [row.pessimism for row in rows if row.pessimism is not None and not row.at_the_noise]
+    known = [row for row in rows if row.sigma is not None and not row.at_the_noise]
+    ratios = [row.pessimism for row in known if row.pessimism is not None]
     larger = sum(ratio >= 1.0 for ratio in ratios)
     if not ratios:
         return Cell("not testable", "muted")
