@@ -45,6 +45,18 @@ class TextTable(Table):
     encoding: Words | None = None
 
 
+class TextsTable(TextTable):
+    """Delimited text of all files. Streams in files of their own have tables of their own, whole."""
+
+    wrench: TextTable | None = None
+    effort: TextTable | None = None
+    encoder: TextTable | None = None
+    rate: TextTable | None = None
+    command: TextTable | None = None
+    field: TextTable | None = None
+    temperature: TextTable | None = None
+
+
 class Time(Table):
     """Where the time of a stream's samples is."""
 
@@ -130,10 +142,38 @@ class Source(Table):
     reference: Words | None = Field(None, description="publication")
 
 
+class StreamFiles(Table):
+    """Files of streams that a logger of their own wrote."""
+
+    wrench: Words | None = None
+    effort: Words | None = None
+    encoder: Words | None = None
+    rate: Words | None = None
+    command: Words | None = None
+    field: Words | None = None
+    temperature: Words | None = None
+
+
+class Shifts(Table):
+    """What is added to the times of a stream, s: its clock then agrees with that of the other files."""
+
+    wrench: Magnitude | None = None
+    effort: Magnitude | None = None
+    encoder: Magnitude | None = None
+    rate: Magnitude | None = None
+    command: Magnitude | None = None
+    field: Magnitude | None = None
+    temperature: Magnitude | None = None
+
+
 class Part(Table):
     """One recording, or the part of a source file that becomes one."""
 
     source: Words = Field(description="file in the source folder")
+    file: StreamFiles = Field(
+        StreamFiles.model_construct(), description="other files there, of streams that lie in one"
+    )
+    shift_s: Shifts = Shifts.model_construct()
     name: Name | None = Field(None, description="of the recording; default: trajectory_repeat")
     trajectory: Name
     role: Role
@@ -145,6 +185,11 @@ class Part(Table):
     def stem(self) -> str:
         """Name of the recording's file, without suffix."""
         return self.name or f"{self.trajectory}_{self.repeat}"
+
+    def file_of(self, stream: str) -> str:
+        """Name of the file that a stream is in."""
+        name: str | None = getattr(self.file, stream)
+        return name or self.source
 
 
 class MappingFile(Table):
@@ -160,7 +205,7 @@ class MappingFile(Table):
     format: Words | None = Field(
         None, description="of the source files, by name: text, hdf5, ...; default: by their suffix"
     )
-    text: TextTable = TextTable.model_construct()
+    text: TextsTable = TextsTable.model_construct()
     time: TimesTable = TimesTable.model_construct()
     wrench: WrenchTable | None = None
     turn: Turn | None = None
