@@ -22,6 +22,21 @@ from kbs_process.cli.shared import (
 from kbs_process.studies.convert import preset_names
 
 
+@click.command(epilog=examples("init bench --from logs/*.csv", "validate bench"))
+@click.argument("folder", type=FOLDER)
+@click.option("--from", "given", required=True, type=EXISTING_FILE, metavar="FILE...", help="Recordings of any format.")
+@click.argument("more", nargs=-1, type=EXISTING_FILE, metavar="")
+def init(folder: Path, given: Path, more: tuple[Path, ...]) -> None:
+    """Begin a campaign of a rig of your own: FOLDER with campaign.toml, rig.toml and mapping.toml.
+
+    What the recordings tell is put in, and printed. What only you know is marked "?"; `validate FOLDER` lists it.
+    """
+    from kbs_process.studies.convert.begin import begin
+
+    say(*begin(folder, (given, *more)))
+    say(f"Begun: {folder}", f'  -> put in what is marked "?"; kbs-process validate {folder} lists it')
+
+
 @click.command(epilog=examples("inspect recording.mcap", "inspect --check campaigns/EL089/recordings/*.mcap"))
 @click.argument("files", nargs=-1, required=True, type=EXISTING_FILE, metavar="FILE...")
 @check_option("a recording has losses")
@@ -46,14 +61,14 @@ def inspect(files: tuple[Path, ...], check: bool) -> None:
 
 @click.command(
     "import",
-    epilog=examples("import --describe bench.tdms > mapping.toml", "import mapping.toml /data/bench campaigns/BENCH")
+    epilog=examples("import --describe bench.tdms", "import mapping.toml /data/bench campaigns/BENCH")
     + f"\n\nPresets, for public recordings of other rigs: {', '.join(preset_names())}.",
 )
 @click.argument("mapping", required=False)
 @click.argument("source", required=False, type=click.Path(path_type=Path, exists=True))
 @click.argument("campaign", required=False, type=FOLDER)
 @click.option(
-    "--describe", "file", type=EXISTING_FILE, metavar="FILE", help="Print the beginning of a mapping for FILE."
+    "--describe", "file", type=EXISTING_FILE, metavar="FILE", help="List the columns of FILE, with their ranges."
 )
 @quiet_option
 def import_(mapping: str | None, source: Path | None, campaign: Path | None, file: Path | None, quiet: bool) -> None:

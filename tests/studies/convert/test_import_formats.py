@@ -259,7 +259,7 @@ def test_a_recording_of_two_loggers(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("", "", "has a clock of its own: nothing says how it stands to that of 'wrench.csv'\n  -> give shift_s"),
+        ("", "", "'wrench.csv' and 'angle.csv' have a clock each: nothing says how they stand to each"),
         ("encoder = ", "rate = ", "file.rate: is not mapped\n  -> add [rate]"),
         ('"angle.csv"', '"../angle.csv"', "'../angle.csv' is no file of the source folder"),
     ],

@@ -184,6 +184,7 @@ def _time(document: Document, common: TimesTable, key: str, problems: Problems) 
 
 
 def _check_parts(document: Document, parts: Sequence[Part], streams: Sequence[StreamMap], problems: Problems) -> None:
+    mapped = [stream.key for stream in streams]
     dated = all(one.time is None or one.time.unit == "datetime" or one.time.start for one in streams)
     stems: set[str] = set()
     for index, part in enumerate(parts):
@@ -196,23 +197,24 @@ def _check_parts(document: Document, parts: Sequence[Part], streams: Sequence[St
         stems.add(part.stem)
         if part.end_s <= part.start_s:
             problems.add(document.place(("recording", index, "end_s")), "is not after start_s", "give a later moment")
-        own = {key: part.file_of(key) for key in STREAMS if key in part.file.model_fields_set}
-        for place, name in ((("source",), part.source), *((("file", key), name) for key, name in own.items())):
+        for place, name in ((("source",), part.source), *((("file", key), name) for key, name in part.file.items())):
             if Path(name).is_absolute() or ".." in Path(name).parts:
                 problems.add(
                     document.place(("recording", index, *place)),
                     f"'{name}' is no file of the source folder",
                     "name it relative to that folder; the folder is given on the command line",
                 )
-        for key, name in own.items():
-            if key not in {stream.key for stream in streams}:
+        for key in part.file:
+            if key not in mapped:
                 problems.add(document.place(("recording", index, "file", key)), "is not mapped", f"add [{key}]")
-            elif name != part.source and not dated and key not in part.shift_s.model_fields_set:
-                problems.add(
-                    document.place(("recording", index, "file", key)),
-                    f"'{name}' has a clock of its own: nothing says how it stands to that of '{part.source}'",
-                    f"give shift_s = {{ {key} = ... }}, s that are added to its times, or dates in both files",
-                )
+        stated = {part.file_of(key) for key in part.shift_s}
+        unstated = [name for name in dict.fromkeys(map(part.file_of, mapped)) if name not in stated]
+        if len(unstated) > 1 and not dated:
+            problems.add(
+                document.place(("recording", index, "file")),
+                f"'{unstated[0]}' and '{unstated[1]}' have a clock each: nothing says how they stand to each other",
+                "give shift_s = { encoder = ... }, s that are added to the times of a stream, or dates in both files",
+            )
 
 
 def _check_turn(

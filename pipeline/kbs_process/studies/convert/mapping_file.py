@@ -10,6 +10,7 @@ from pydantic import AwareDatetime, ConfigDict, Field
 from kbs_process.campaign.config import Role
 from kbs_process.campaign.formats.tables import (
     NUMBER,
+    STREAM,
     TEXT,
     TRUTH,
     Count,
@@ -27,6 +28,9 @@ from kbs_process.campaign.formats.tables import Text as Words
 
 Which = Annotated[Annotated[Words, TEXT] | Annotated[Count, NUMBER], by_kind]
 OneCharacter = Annotated[str, Field(min_length=1, max_length=1)]
+
+
+StreamKey = Annotated[str, Field(pattern=STREAM)]
 
 
 class TextTable(Table):
@@ -142,38 +146,14 @@ class Source(Table):
     reference: Words | None = Field(None, description="publication")
 
 
-class StreamFiles(Table):
-    """Files of streams that a logger of their own wrote."""
-
-    wrench: Words | None = None
-    effort: Words | None = None
-    encoder: Words | None = None
-    rate: Words | None = None
-    command: Words | None = None
-    field: Words | None = None
-    temperature: Words | None = None
-
-
-class Shifts(Table):
-    """What is added to the times of a stream, s: its clock then agrees with that of the other files."""
-
-    wrench: Magnitude | None = None
-    effort: Magnitude | None = None
-    encoder: Magnitude | None = None
-    rate: Magnitude | None = None
-    command: Magnitude | None = None
-    field: Magnitude | None = None
-    temperature: Magnitude | None = None
-
-
 class Part(Table):
     """One recording, or the part of a source file that becomes one."""
 
     source: Words = Field(description="file in the source folder")
-    file: StreamFiles = Field(
-        StreamFiles.model_construct(), description="other files there, of streams that lie in one"
+    file: dict[StreamKey, Words] = Field({}, description="other files there, of streams that lie in one")
+    shift_s: dict[StreamKey, Magnitude] = Field(
+        {}, description="added to the times of a stream, s, so that its clock agrees with that of the other files"
     )
-    shift_s: Shifts = Shifts.model_construct()
     name: Name | None = Field(None, description="of the recording; default: trajectory_repeat")
     trajectory: Name
     role: Role
@@ -188,8 +168,7 @@ class Part(Table):
 
     def file_of(self, stream: str) -> str:
         """Name of the file that a stream is in."""
-        name: str | None = getattr(self.file, stream)
-        return name or self.source
+        return self.file.get(stream, self.source)
 
 
 class MappingFile(Table):

@@ -19,7 +19,7 @@ from kbs_process.stages.align.condense import SLOW
 from kbs_process.stages.align.stream import FAR_SLOW_NS, STAMP_EACH
 from kbs_process.studies.convert.clock import nanoseconds, numbers
 from kbs_process.studies.convert.mapping import Channel, Mapping, StreamMap
-from kbs_process.studies.convert.mapping_file import Part, Shifts, Time, Turn
+from kbs_process.studies.convert.mapping_file import Part, Time, Turn
 
 _NO_STAMPS = np.empty(0, dtype=np.int64)
 _SET_BACK = {3600.0: "clocks went from summer to winter time", 43200.0: "it has twelve hours, without a.m. and p.m."}
@@ -167,11 +167,13 @@ def _side_by_side(passes: Sequence[Iterator[Piece]]) -> Iterator[Piece]:
         reached[behind] = max([reached[behind], *(int(b.stamp[-1]) for b in piece.values() if len(b))])
 
 
-def _passes(streams: Sequence[StreamMap], tables: MappingOf[str, Table], shifts: Shifts) -> list[list[StreamMap]]:
+def _passes(
+    streams: Sequence[StreamMap], tables: MappingOf[str, Table], shifts: MappingOf[str, float]
+) -> list[list[StreamMap]]:
     """Group streams that share file and time: the file is read once for each group."""
 
     def clock(stream: StreamMap) -> tuple[object, ...]:
-        return stream.time, id(tables[stream.key]), getattr(shifts, stream.key)
+        return stream.time, id(tables[stream.key]), shifts.get(stream.key)
 
     passes: list[list[StreamMap]] = []
     for stream in streams:
@@ -184,10 +186,10 @@ def _passes(streams: Sequence[StreamMap], tables: MappingOf[str, Table], shifts:
 
 
 def _pieces(
-    table: Table, mapping: Mapping, streams: Sequence[StreamMap], shifts: Shifts, findings: Findings
+    table: Table, mapping: Mapping, streams: Sequence[StreamMap], shifts: MappingOf[str, float], findings: Findings
 ) -> Iterator[Piece]:
     time = streams[0].time
-    shift = round((getattr(shifts, streams[0].key) or 0.0) * 1e9)  # ns
+    shift = round(shifts.get(streams[0].key, 0.0) * 1e9)  # ns
     channels = [channel for stream in streams for channel in stream.channels]
     columns = [find_column(table, channel.column) for channel in channels]
     if time is None:
