@@ -42,6 +42,7 @@ def head(results: Results) -> Head:
         about,
         results.verdict,
         results.provenance.version,
+        model=(results.model.status, results.model.sentence) if results.model else ("", ""),
     )
 
 

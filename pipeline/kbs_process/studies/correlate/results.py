@@ -160,6 +160,10 @@ class Repeatability(Record, frozen=True, kw_only=True):
     n: int
 
 
+# Predictions that explain less of the measured variance than this do not describe it.
+WEAK = 0.5
+
+
 class Merit(compare.Merit, frozen=True, kw_only=True):
     """Figures of merit of a prediction on one channel of one recording, in one band."""
 
@@ -173,6 +177,24 @@ class Merit(compare.Merit, frozen=True, kw_only=True):
     def at_the_noise(self) -> bool:
         """Whether there is too little signal for these figures to say anything of the prediction."""
         return self.sigma is not None and self.measured_rms is not None and self.measured_rms < 2.0 * self.sigma
+
+    @property
+    def testable(self) -> bool:
+        """Whether the measured disturbance, or a predicted one, would show above its uncertainty."""
+        return self.sigma is not None and max(self.measured_rms or 0.0, self.predicted_rms or 0.0) >= 2.0 * self.sigma
+
+    @property
+    def correlated(self) -> bool:
+        """Whether the prediction explains half of the measured variance, or errs by no more than the uncertainty."""
+        within = self.sigma is not None and (self.residual_rms or 0.0) <= 2.0 * self.sigma
+        return within or (self.fraction_of_variance or 0.0) >= WEAK
+
+
+class ModelVerdict(Record, frozen=True, kw_only=True):
+    """Does the model predict what was measured? In a word, and in a sentence."""
+
+    status: Literal["correlated", "not correlated", "not testable"]
+    sentence: str
 
 
 class Resonance(Record, frozen=True, kw_only=True):
@@ -254,6 +276,7 @@ class Results(ResultsFile, frozen=True, kw_only=True):
 
     campaign: CampaignSummary
     kind: Literal["correlation"] = "correlation"
+    model: ModelVerdict | None = None  # None: nothing was predicted
     requirements: tuple[Requirement, ...] = ()
     recordings: tuple[Recording, ...] = ()
     conventions: tuple[SignCheck, ...] = ()

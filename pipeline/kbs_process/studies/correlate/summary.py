@@ -26,7 +26,7 @@ from kbs_process.stages.to_cog import ASSUMPTION
 from kbs_process.studies.correlate import results
 from kbs_process.studies.correlate.findings import band, merits, repeatabilities, resonances, statements
 from kbs_process.studies.correlate.methods import methods
-from kbs_process.studies.correlate.notices import notices
+from kbs_process.studies.correlate.notices import model_verdict, notices
 from kbs_process.studies.correlate.uncertainty import budgets
 
 RESPONSE_UNITS = dict(zip(RESPONSE, ("s", "s^2"), strict=True))
@@ -71,6 +71,7 @@ def summarise(
         parameters=tuple(provenance.constants(campaign.rig)),
         notes=(ASSUMPTION,) if campaign.rig.spacecraft is not None else (),
     )
+    found = msgspec.structs.replace(found, model=model_verdict(found))
     warnings = (*checked.notices(), *notices(campaign, analyses, model, found))
     return msgspec.structs.replace(found, warnings=warnings, methods=methods(campaign, analyses, found))
 
