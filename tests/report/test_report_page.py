@@ -84,6 +84,9 @@ def test_the_verdict_comes_first_with_what_qualifies_it(page: Page) -> None:
 @pytest.mark.parametrize(
     "said",
     [
+        "Document TR-089 Revision B Date of test 1995-06-15 Operator A. Tester Processed with kbs-process",
+        ", commit 0123456789ab",
+        "Tested by A. Tester Checked by Approved by",
         "Tx / N m",
         "EL089P00_2",
         "held-out",

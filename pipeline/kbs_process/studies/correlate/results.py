@@ -31,6 +31,16 @@ class CampaignSummary(Record, frozen=True, kw_only=True):
     frame: Frame = "T"  # of the loads that were recorded
 
 
+class DocumentHead(Record, frozen=True, kw_only=True):
+    """What identifies the report as a document; empty where nobody says."""
+
+    number: str = ""
+    revision: str = ""
+    operator: str = ""
+    serial_number: str = ""  # of the article
+    date: str = ""  # of the test
+
+
 class Clock(Record, frozen=True, kw_only=True):
     """A stream's sensor clock against the recording's time axis: t = stamp (1 + skew) + offset."""
 
@@ -276,6 +286,7 @@ class Results(ResultsFile, frozen=True, kw_only=True):
 
     campaign: CampaignSummary
     kind: Literal["correlation"] = "correlation"
+    document: DocumentHead = DocumentHead()
     model: ModelVerdict | None = None  # None: nothing was predicted
     requirements: tuple[Requirement, ...] = ()
     recordings: tuple[Recording, ...] = ()
