@@ -73,6 +73,27 @@ print(load_campaign(Path({str(ROOT / "campaigns" / "EL089")!r}), checksums=False
     assert done.stdout.split() == ["EL089", str(tmp_path / "kbs_process" / "__init__.py")], done.stderr
 
 
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--help"], "validate campaign/EL089"),
+        (["schema", "campaign"], '"title": "campaign.toml: one test campaign"'),
+        (["init", "made", "--from", "a.csv"], "wrench Fx in N"),
+    ],
+)
+def test_the_wheel_works_without_a_checkout(
+    built: tuple[Path, Path], tmp_path: Path, words: list[str], said: str
+) -> None:
+    with zipfile.ZipFile(built[1]) as wheel:
+        wheel.extractall(tmp_path / "site")
+    (tmp_path / "a.csv").write_text("t_s,Fx [N],az_deg\n" + "".join(f"{k},{k % 3},{k}\n" for k in range(40)))
+    code = (
+        f"import sys; sys.path.insert(0, {str(tmp_path / 'site')!r}); from kbs_process.cli import main; main({words})"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0 and said in done.stdout, done.stderr
+
+
 def test_what_is_built_and_archived_says_of_which_commit(built: tuple[Path, Path], tmp_path: Path) -> None:
     tree = tmp_path / "tree"
     shutil.copytree(built[0], tree, ignore=shutil.ignore_patterns("*.egg-info", "build"))

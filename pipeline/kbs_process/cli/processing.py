@@ -17,11 +17,13 @@ from kbs_process.cli.shared import (
     complain,
     conclude,
     examples,
+    json_option,
     output_option,
     pdf_option,
     progress,
     quiet_option,
     say,
+    say_json,
 )
 from kbs_process.errors import ConfigError, FitError, RecordingError, SimulationError
 
@@ -96,8 +98,9 @@ def _diagnose(campaign: Campaign, results: Path, *, progress: Progress, pdf: boo
 @click.command(epilog=examples("validate campaign/EL089", "validate campaign/EL089 --check"))
 @campaign_argument
 @check_option("a recording has losses, or the model of the rig is wrong")
+@json_option
 @quiet_option
-def validate(campaign: str, check: bool, quiet: bool) -> None:
+def validate(campaign: str, check: bool, as_json: bool, quiet: bool) -> None:
     """Check CAMPAIGN's description, read all its recordings through, and fit gravity to them.
 
     Of what `init` began, list what is still to be put in.
@@ -115,7 +118,10 @@ def validate(campaign: str, check: bool, quiet: bool) -> None:
         return
     loaded = load_campaign(folder)
     found = run(loaded, progress(quiet))
-    say(*describe(loaded, found))
+    if as_json:
+        say_json(found)
+    else:
+        say(*describe(loaded, found))
     if found.refused:
         sys.exit(BAD_INPUT)
     if check and (

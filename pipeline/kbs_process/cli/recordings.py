@@ -15,9 +15,11 @@ from kbs_process.cli.shared import (
     check_option,
     complain,
     examples,
+    json_option,
     progress,
     quiet_option,
     say,
+    say_json,
 )
 from kbs_process.studies.convert import preset_names
 
@@ -40,7 +42,8 @@ def init(folder: Path, given: Path, more: tuple[Path, ...]) -> None:
 @click.command(epilog=examples("inspect recording.mcap", "inspect --check campaigns/EL089/recordings/*.mcap"))
 @click.argument("files", nargs=-1, required=True, type=EXISTING_FILE, metavar="FILE...")
 @check_option("a recording has losses")
-def inspect(files: tuple[Path, ...], check: bool) -> None:
+@json_option
+def inspect(files: tuple[Path, ...], check: bool, as_json: bool) -> None:
     """Show what is in recordings: topics, rates, gaps, ranges, damage.
 
     Exits with 2 if one of them cannot be read at all.
@@ -48,11 +51,14 @@ def inspect(files: tuple[Path, ...], check: bool) -> None:
     from kbs_process.reduction.inspection import inspect_recording
     from kbs_process.studies.validate.listing import describe_inspection
 
-    states = set()
+    found = []
     for path in files:
-        inspection = inspect_recording(path)
-        states.add(inspection.state)
-        say(*describe_inspection(inspection))
+        found.append(inspect_recording(path))
+        if not as_json:
+            say(*describe_inspection(found[-1]))
+    if as_json:
+        say_json(found)
+    states = {inspection.state for inspection in found}
     if "unreadable" in states:
         sys.exit(BAD_INPUT)
     if check and "lossy" in states:
@@ -89,3 +95,12 @@ def import_(mapping: str | None, source: Path | None, campaign: Path | None, fil
 
     made = import_recordings(mapping, source, campaign, progress=progress(quiet), notice=complain)
     say(f"Campaign: {made}")
+
+
+@click.command(epilog=examples("schema campaign > campaign.schema.json", "schema correlation > results.schema.json"))
+@click.argument("name")
+def schema(name: str) -> None:
+    """Print the JSON Schema of a kind of files, such as campaign, parameters or import, for editors and programs."""
+    from kbs_process.studies.schemas import schema_text
+
+    click.echo(schema_text(name), nl=False)
