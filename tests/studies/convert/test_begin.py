@@ -38,7 +38,7 @@ LATE = 3.724  # s: the clock of the wrench began so much later
         ("az_deg", "", "encoder", "az", "deg"),
         ("El angle", "mrad", "encoder", "el", "mrad"),
         ("azimuth", "", "encoder", "azimuth", "?"),
-        ("arm rate [deg/s]", "", "rate", "arm", "deg/s"),
+        ("arm rate [deg/s]", "", "", "", "deg/s"),
         ("slide position (in)", "", "encoder", "slide", "in"),
         ("angle [°]", "", "encoder", "joint", "deg"),
         ("t_ms", "", "time", "", "ms"),
@@ -50,7 +50,7 @@ LATE = 3.724  # s: the clock of the wrench began so much later
         ("bench/Fx", "N", "wrench", "Fx", "N"),
         ("data.az_deg", "", "encoder", "az", "deg"),
         ("Fz/N", "", "wrench", "Fz", "N"),
-        ("wheel_rad/s", "", "rate", "wheel", "rad/s"),
+        ("wheel_rad/s", "", "", "", "rad/s"),
     ],
 )
 def test_what_a_name_tells(name: str, stated: str, stream: str, channel: str, unit: str) -> None:
@@ -181,6 +181,19 @@ def test_from_two_loggers_to_a_campaign(tmp_path: Path) -> None:
     assert said[0] == "arm: the description is complete; 2 recordings are to be imported"
     campaign = load_campaign(import_recordings(tmp_path / "arm" / "mapping.toml", tmp_path, tmp_path / "made"))
     assert [one.name for one in campaign.recordings] == ["sweep_1", "test_1"]
+
+
+def test_clocks_that_run_apart_have_no_shift(tmp_path: Path) -> None:
+    files = write_logs(tmp_path)
+    for path in tmp_path.glob("angle_*.txt"):
+        *head, table = path.read_text().split("\n", 3)
+        rows = [line.split(";") for line in table.split()]
+        late = [f"{float(t.replace(',', '.')) * 1.002:.2f}".replace(".", ",") + f";{angle}" for t, angle in rows]
+        path.write_text("\n".join([*head, *late]) + "\n")
+    lines = "\n".join(begin(tmp_path / "arm", files))
+    assert "how their clocks stand to each other is not known: it is 3.7" in lines
+    mapping = (tmp_path / "arm" / "mapping.toml").read_text()
+    assert mapping.count('shift_s = { wrench = "?" }  # s, added to the times of the wrench: it is 3.7') == 2
 
 
 def test_a_value_that_is_still_to_be_put_in_is_refused_by_every_reader(tmp_path: Path) -> None:

@@ -240,6 +240,15 @@ def write_two_loggers(folder: Path, rows: int = 200) -> dict[str, np.ndarray]:
     return columns
 
 
+def test_scale_and_offset_are_applied_in_the_unit_of_the_file(tmp_path: Path) -> None:
+    columns = {"t": np.arange(20) * 0.1, "Fx": np.arange(20.0), "Fy": np.ones(20), "Fz": np.ones(20)}
+    write_csv(tmp_path / "run.csv", columns | {"angle": np.arange(20.0)})
+    text = MAPPING.replace('column = "Fx", unit = "N"', 'column = "Fx", unit = "kN", scale = 2.0, offset = -0.5')
+    campaign = import_recordings(write_mapping(tmp_path, "run.csv", text), tmp_path, tmp_path / "campaign")
+    fx = read_back(campaign, "turn_1")["wrench"][1][:, 0]
+    np.testing.assert_allclose(fx, 2000.0 * np.arange(20.0) - 500.0)
+
+
 def test_a_recording_of_two_loggers(tmp_path: Path) -> None:
     columns = write_two_loggers(tmp_path)
     text = (

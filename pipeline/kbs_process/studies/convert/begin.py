@@ -32,6 +32,7 @@ from kbs_process.studies.convert.shift import find_shift
 
 MAPPING_FILE = "mapping.toml"
 _PREAMBLE = 40  # lines above a table that are looked through
+_APART = 5.0  # sigmas: clocks whose shift changes by more from half to half run at different rates
 _KEPT = 4096  # rows of a piece that are kept, as averages
 _RATES = [digit * 10.0**power for power in range(-2, 6) for digit in (1, 2, 5)]
 
@@ -276,13 +277,18 @@ def _shift(load: Log, angle: Log) -> tuple[str, str]:
     if load.dated and angle.dated:
         return "# both files have dates: their clocks are taken to agree", "both have dates"
     joints = angle.of("encoder")
-    found = None
+    found, asked = None, "the motion does not tell it"
     if load.times and angle.times and all(one.unit != QUESTION for one in joints):
         (t, wrench), (t_angle, q) = load.samples("wrench"), angle.samples("encoder")
-        found = find_shift(t, wrench, t_angle, q, [dimension(one.unit) == "angle" for one in joints])
+        turns = [dimension(one.unit) == "angle" for one in joints]
+        found = find_shift(t, wrench, t_angle, q, turns)
+        halves = [slice(None, len(t) // 2), slice(len(t) // 2, None)]
+        parts = [one for half in halves if (one := find_shift(t[half], wrench[half], t_angle, q, turns))]
+        if found and len(parts) == 2 and abs(parts[1][0] - parts[0][0]) > _APART * np.hypot(parts[0][1], parts[1][1]):
+            found, asked = None, f"it is {parts[0][0]:.4f} s in the first half, {parts[1][0]:.4f} s in the second"
     if found is None:
-        asked = "s, added to the times of the wrench: the motion does not tell it"
-        return f'shift_s = {{ wrench = "?" }}  # {asked}', "how their clocks stand to each other is not known"
+        told = f"how their clocks stand to each other is not known: {asked}"
+        return f'shift_s = {{ wrench = "?" }}  # s, added to the times of the wrench: {asked}', told
     shift, sigma = found
     later, earlier = max(shift, 0.0), max(-shift, 0.0)  # what is added to the times of the wrench, of the angles
     starts, ends = ((t[at] + later, t_angle[at] + earlier) for at in (0, -1))

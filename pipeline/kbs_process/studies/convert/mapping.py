@@ -163,7 +163,7 @@ def _channel(
         except UnitMismatchError as error:
             problems.add(document.place((*key, "unit")), str(error), error.remedy)
     turn = 2.0 * math.pi * again if isinstance(again, bool) else abs(again * gain * scale)
-    return Channel(field, cell.column, unit, scale, si, gain * scale, offset, turn)
+    return Channel(field, cell.column, unit, scale, si, gain * scale, offset + gain * cell.offset, turn)
 
 
 def _time(document: Document, common: TimesTable, key: str, problems: Problems) -> Time | None:

@@ -92,6 +92,7 @@ class ColumnTable(Table):
     column: Which = Field(description="a column's name, or its number counted from 1")
     unit: Words = Field(description="in which the file has it")
     scale: Magnitude = Field(1.0, description="multiplies the file's numbers; -1 turns the sign")
+    offset: Magnitude = Field(0.0, description="added after that, in `unit`")
     radius_m: Positive | None = Field(
         None,
         description="the file has the way or the speed of a surface at this radius, in a unit of length or velocity",

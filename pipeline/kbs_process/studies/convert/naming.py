@@ -16,8 +16,7 @@ _LOAD = re.compile(r"(f|force|m|mom|moment|t|torque)([xyz])|([xyz])(force|moment
 _TIMES = {"t", "time", "timestamp", "stamp", "zeit", "clock"}
 _COMMANDED = {"cmd", "command", "commanded", "demand", "desired", "ref", "reference", "set", "setpoint", "target"}
 _ANGLES = {"angle", "position", "pos", "enc", "encoder", "winkel", "az", "el", "azimuth", "elevation", "joint"}
-_WORDS = {"angle", "position", "pos", "enc", "encoder", "winkel", "rate", "speed", "velocity", "vel", "actual", "meas"}
-_KINDS = {"angle": "encoder", "length": "encoder", "angular rate": "rate", "velocity": "rate"}
+_WORDS = {"angle", "position", "pos", "enc", "encoder", "winkel", "actual", "meas"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +24,7 @@ class Meaning:
     """What a column is for; of no use to a campaign where `stream` is empty."""
 
     column: str
-    stream: str = ""  # "time", "wrench", "encoder", "rate"
+    stream: str = ""  # "time", "wrench", "encoder"
     channel: str = ""  # "Fx", or a joint's name
     unit: str = QUESTION  # as campaigns write it
 
@@ -42,11 +41,11 @@ def meaning(column: Column) -> Meaning:
         force = first[0].lower() == "f"
         fits = kind == ("force" if force else "torque")
         return Meaning(column.name, "wrench", f"{'F' if force else 'T'}{axis.lower()}", unit if fits else QUESTION)
-    stream = _KINDS.get(kind, "encoder" if not kind and set(words) & _ANGLES else "")
-    if set(words) & _COMMANDED or not stream or (kind in ("length", "velocity") and not set(words) & _WORDS):
+    moved = kind == "angle" or (kind in ("length", "") and set(words) & _ANGLES)
+    if set(words) & _COMMANDED or not moved:
         return Meaning(column.name, unit=unit)
     name = "_".join(word for word in words if word not in _WORDS)
-    return Meaning(column.name, stream, name if name[:1].isalpha() else f"joint{name}", unit)
+    return Meaning(column.name, "encoder", name if name[:1].isalpha() else f"joint{name}", unit)
 
 
 def _parted(column: Column) -> tuple[str, str]:
