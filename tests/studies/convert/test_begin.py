@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.io import savemat
 
 from kbs_process.campaign.documents import read
 from kbs_process.campaign.load import load_campaign
@@ -216,6 +217,16 @@ def test_every_format_begins_a_campaign(tmp_path: Path, name: str, write: Callab
     units = {one["unit"] for one in [*mapping["wrench"].values(), *mapping["encoder"].values()]}
     assert units == ({"N", "rad"} if known else {"?"})
     assert "shift_s" not in mapping["recording"][0]
+
+
+def test_an_angle_that_begins_again_is_unwrapped_and_what_has_no_column_is_told(tmp_path: Path) -> None:
+    t = np.arange(0.0, 40.0, 0.1)
+    savemat(tmp_path / "a.mat", {"t_s": t, "Fx_N": t, "az_deg": (30.0 * t) % 360.0, "el_deg": 10.0 * t, "note": "text"})
+    lines = list(begin(tmp_path / "made", [tmp_path / "a.mat"]))
+    assert "  az_deg  encoder az in deg, begins again at every turn" in lines
+    assert "  el_deg  encoder el in deg" in lines and "  left out: note: it is text" in lines
+    encoder = tree(tmp_path / "made" / "mapping.toml")["encoder"]
+    assert {name: one.get("unwrap") for name, one in encoder.items()} == {"az": True, "el": None}
 
 
 def test_files_of_which_none_is_known_are_all_questions(tmp_path: Path) -> None:

@@ -50,6 +50,8 @@ class Log:
     noise: dict[str, float] = field(default_factory=dict)  # by column, rms of a reading
     step: dict[str, float] = field(default_factory=dict)  # by column, least step of readings
     rate: float = 0.0  # Hz; 0: not known
+    wraps: set[str] = field(default_factory=set)  # columns of angles that begin again at every turn
+    left_out: tuple[str, ...] = ()  # what the file holds besides, and why it has no column
 
     def of(self, stream: str) -> list[Meaning]:
         """Return the columns of a stream."""
@@ -128,7 +130,7 @@ def _read(path: Path) -> Log:
     log = Log(path, text, [meaning(column) for column in table.columns])
     clock = next((one for one in table.columns if one.clock), None)
     stamp = log.of("time")[:1]
-    log.dated = clock is not None
+    log.dated, log.left_out = clock is not None, table.left_out
     used = [one.column for one in log.columns if one.stream in ("wrench", "encoder")]
     wanted = list(dict.fromkeys([*used, *((clock.clock,) if clock else ()), *(one.column for one in stamp)]))
     for index, cells in enumerate(table.chunks(wanted)):
@@ -138,6 +140,10 @@ def _read(path: Path) -> Log:
         whole = rows // block * block
         values = {name: numbers(named[name][:rows]) for name in used}
         if index == 0:
+            turns = {
+                one.column: 2.0 * np.pi / to_si(one.unit) for one in log.of("encoder") if dimension(one.unit) == "angle"
+            }
+            log.wraps = {name for name, turn in turns.items() if np.any(np.abs(np.diff(values[name])) > 0.5 * turn)}
             log.noise, log.step = ({name: how(x) for name, x in values.items()} for how in (_noise, _step))
         if (seconds := _seconds(log, named, clock.clock if clock else "", stamp, rows)) is not None:
             if index == 0 and rows > 2:
@@ -230,7 +236,10 @@ def _facts(loads: Sequence[Log], angles: Sequence[Log]) -> dict[str, Any]:
             key: "\n".join(_text(log)) for key, log in logs.items() if any(_text(one) for one in (log, logs[""]))
         },
         "streams": {
-            key: [asdict(one) | {"asked": QUESTION in (one.column, one.unit)} for one in rows]
+            key: [
+                asdict(one) | {"asked": QUESTION in (one.column, one.unit), "wraps": one.column in angle.wraps}
+                for one in rows
+            ]
             for key, rows in streams.items()
         },
         "runs": _runs(loads, angles if load is not angle else ()),
@@ -308,4 +317,6 @@ def _listing(log: Log) -> Iterator[str]:
     width = max(len(one.column) for one in log.columns)
     for one in log.columns:
         use = f"{one.stream} {one.channel}".strip() + f" in {one.unit}" if one.stream else "not used"
-        yield f"  {one.column:<{width}}  {use}"
+        again = ", begins again at every turn" if one.column in log.wraps else ""
+        yield f"  {one.column:<{width}}  {use}{again}"
+    yield from (f"  left out: {one}" for one in log.left_out)

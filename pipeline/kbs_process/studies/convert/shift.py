@@ -39,7 +39,8 @@ def find_shift(
         terms = [np.ones(inside.sum()), *parts, *(a * b for i, a in enumerate(parts) for b in parts[:i])]
         design = np.stack(terms, axis=1)
         there = loads[inside] - loads[inside].mean(0)
-        residual = there - design @ np.linalg.lstsq(design, there, rcond=None)[0]
+        basis = np.linalg.qr(design)[0]
+        residual = there - basis @ (basis.T @ there)
         return residual, (residual**2).sum(0) / np.maximum((there**2).sum(0), np.finfo(float).tiny)
 
     half = 0.5 * min(t[-1] - t[0], t_angle[-1] - t_angle[0])
