@@ -10,7 +10,7 @@ from kbs_process.campaign.documents import QUESTION
 from kbs_process.campaign.units import dimension, spelt
 from kbs_process.recordings.tables import Column
 
-_BRACKETS = re.compile(r"(.*?)[\s_,/]*[\[({]([^\[\](){}]+)[\])}]\s*")
+_LONGEST = 20  # characters of a unit
 _PARTS = re.compile(r"[A-Za-z0-9]+")
 _LOAD = re.compile(r"(f|force|m|mom|moment|t|torque)([xyz])|([xyz])(force|moment|torque)", re.IGNORECASE)
 _TIMES = {"t", "time", "timestamp", "stamp", "zeit", "clock"}
@@ -50,14 +50,15 @@ def meaning(column: Column) -> Meaning:
 
 def _parted(column: Column) -> tuple[str, str]:
     """Return a column's name without its unit, and the unit: of the file, in brackets, or the name's last words."""
-    found = _BRACKETS.fullmatch(column.name)
-    base, told = (found[1], found[2]) if found else (column.name, "")
+    name = column.name.strip()
+    opened = max(name.rfind(sign) for sign in "[({") if name.endswith(("]", ")", "}")) else -1
+    base, told = (name[:opened], name[opened + 1 : -1]) if opened >= 0 else (name, "")
     if stated := column.unit or told:
         return base, spelt(stated) or QUESTION
-    for cut in re.finditer(r"[\s_,/]+", column.name.strip()):
-        if unit := spelt(column.name.strip()[cut.end() :]):
-            return column.name[: cut.start()], unit
-    return column.name, QUESTION
+    for cut in re.finditer(r"[\s_,/]+", name):
+        if len(name) - cut.end() <= _LONGEST and (unit := spelt(name[cut.end() :])):
+            return name[: cut.start()], unit
+    return name, QUESTION
 
 
 def by_channel(columns: Sequence[Meaning]) -> dict[str, Meaning]:
