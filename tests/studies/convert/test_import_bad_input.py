@@ -414,8 +414,10 @@ def test_a_unit_that_contradicts_the_mapping_is_refused_or_told(
         imported("rad", mapping.replace('unit = "s"', 'unit = "ms"'))
     imported("rad")
     assert not notices
-    imported("degrees")
-    assert "'run/angle' is in 'degrees' as the file states it, in 'rad' as" in notices[0]
+    with pytest.raises(RecordingError, match="'run/angle' is in 'degrees' as the file states it, in 'rad' as"):
+        imported("degrees")
+    imported("angular units")
+    assert "'run/angle' is in 'angular units' as the file states it, in 'rad' as" in notices[0]
     imported("V", mapping.replace('unit = "rad"', 'unit = "rad", scale = 2.0'))
     assert "is in 'V' as the file states it, in 'rad' as" in notices[0]
 
