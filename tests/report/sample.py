@@ -122,6 +122,8 @@ def command_results() -> r.Results:
             sentence="The disturbance torque at the spacecraft's centre of mass stays below 0.06 N m between 0.01 "
             "and 1 Hz: 0.0412 N m (0.0273 to 0.0474 at 95 %; Ty, EL089P00_2), a margin of 31 %.",
         ),
+        document=r.DocumentHead(number="TR-089", revision="B", operator="A. Tester", date="1995-06-15"),
+        model=r.ModelVerdict(status="correlated", sentence="The prediction explains 87 % of the variance of Ty."),
         provenance=PROVENANCE,
         requirements=(_requirement(),),
         warnings=(

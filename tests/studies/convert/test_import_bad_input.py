@@ -286,12 +286,11 @@ def test_what_is_no_file_is_told_as_what_it_is(tmp_path: Path) -> None:
                 read_commands(tmp_path / name, ("az",))
 
 
-def test_description_is_a_mapping_to_start_from(tmp_path: Path) -> None:
+def test_a_description_lists_columns_with_their_ranges(tmp_path: Path) -> None:
     write_hdf5(tmp_path / "run.h5", signals(100) | {"t": np.arange(100) * 0.5})
     described = describe(tmp_path / "run.h5")
-    assert tomllib.loads(described)["recording"][0]["source"] == "run.h5"
     row = next(line for line in described.splitlines() if line.endswith("  t"))
-    assert row.split()[2:6] == ["100", "0", "0", "49.5"]
+    assert row.split()[1:5] == ["100", "0", "0", "49.5"]
 
 
 def test_the_description_is_taken_whole_and_from_its_folder_only(tmp_path: Path) -> None:
@@ -415,8 +414,10 @@ def test_a_unit_that_contradicts_the_mapping_is_refused_or_told(
         imported("rad", mapping.replace('unit = "s"', 'unit = "ms"'))
     imported("rad")
     assert not notices
-    imported("degrees")
-    assert "'run/angle' is in 'degrees' as the file states it, in 'rad' as" in notices[0]
+    with pytest.raises(RecordingError, match="'run/angle' is in 'degrees' as the file states it, in 'rad' as"):
+        imported("degrees")
+    imported("angular units")
+    assert "'run/angle' is in 'angular units' as the file states it, in 'rad' as" in notices[0]
     imported("V", mapping.replace('unit = "rad"', 'unit = "rad", scale = 2.0'))
     assert "is in 'V' as the file states it, in 'rad' as" in notices[0]
 

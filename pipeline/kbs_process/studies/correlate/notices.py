@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from itertools import zip_longest
+from typing import Literal
 
 import numpy as np
 
@@ -24,12 +25,10 @@ from kbs_process.stages.align.clocks import UNKNOWN_OFFSET_S
 from kbs_process.stages.gravity.model import GravityModel
 from kbs_process.stages.leftover import description
 from kbs_process.stages.verdict import COVERAGE
-from kbs_process.studies.correlate.results import Repeatability, Results
+from kbs_process.studies.correlate.results import WEAK, Merit, ModelVerdict, Repeatability, Results
 
 # A resonance below this many times a band's edge is next to it: the band then holds part of the resonance's flank.
 NEXT_TO = 4.0
-# Predictions that explain less of the measured variance than this deserve a word.
-WEAK = 0.5
 # Repeats with less signal than this many times their noise are dominated by noise.
 NOISY = 1.0
 # Samples: where fewer are missing together, and at the ends of every record, nothing is lost that matters.
@@ -215,10 +214,34 @@ def _resonance(found: Results) -> Iterable[Notice]:
             yield _notice("info", "resonance", band.label, lowest=lowest, edge=edge)
 
 
+def model_verdict(found: Results) -> ModelVerdict | None:
+    """Whether the model predicts what was measured, where requirements judge, or else unfiltered.
+
+    Recordings held out count, where there are any. Where a disturbance would show, measured or predicted, each channel
+    has to be described; where none would show, recordings say nothing of the model.
+    """
+    compared = _of_judged(found) if found.requirements else [one for one in found.merit if one.band == "unfiltered"]
+    compared = [one for one in compared if one.role == "held-out"] or compared
+    if not compared:
+        return None
+    testable = [one for one in compared if one.testable]
+    if not testable:
+        return ModelVerdict(status="not testable", sentence=_SAYS("model_not_testable", compared=compared))
+    worst = min(testable, key=lambda one: (one.correlated, one.fraction_of_variance or 0.0))
+    status: Literal["correlated", "not correlated"] = "correlated" if worst.correlated else "not correlated"
+    label = next(band.label for band in found.bands if band.name == worst.band)
+    sentence = _SAYS("model_tested", worst=worst, label=label, testable=testable, compared=compared)
+    return ModelVerdict(status=status, sentence=sentence)
+
+
+def _of_judged(found: Results) -> list[Merit]:
+    judged = _judged(found)
+    return [merit for merit in found.merit if (merit.frame, merit.band, merit.channel[0]) in judged]
+
+
 def _predictions(found: Results) -> Iterable[Notice]:
     """Where the prediction can be tested in a requirement's band, and fails; and where it cannot be tested."""
-    judged = _judged(found)
-    of_judged = [merit for merit in found.merit if (merit.frame, merit.band, merit.channel[0]) in judged]
+    of_judged = _of_judged(found)
     noise = {merit.channel for merit in of_judged if merit.at_the_noise}
     if noise:
         yield _notice("info", "untested", channels=sorted(noise))

@@ -68,7 +68,8 @@ def process(
 
             found = msgspec.structs.replace(found, transducer=on_transducer and on_transducer.findings)
             serious = sum(notice.severity != "info" for notice in found.warnings)
-            more = [f"{count(serious, 'warning')}: see the top of the report"] if serious else []
+            more = [f"Model: {found.model.status}. {found.model.sentence}"] if found.model else []
+            more += [f"{count(serious, 'warning')}: see the top of the report"] if serious else []
             lossy = sum(bool(recording.lost) for recording in found.recordings)
             more += [f"{count(lossy, 'recording')} with losses"] if lossy else []
             outcome = publish(folder, target, found, DOCUMENT if page else None, pdf, *more)

@@ -27,9 +27,10 @@ from kbs_process.stages.to_cog import ASSUMPTION
 from kbs_process.studies.correlate import results
 from kbs_process.studies.correlate.findings import band, merits, repeatabilities, resonances, statements
 from kbs_process.studies.correlate.methods import methods
-from kbs_process.studies.correlate.notices import notices
+from kbs_process.studies.correlate.notices import model_verdict, notices
 from kbs_process.studies.correlate.uncertainty import budgets, six_channels
 
+DATED_NS = 315_532_800 * 10**9  # 1980-01-01: no recording is older, but those whose clock counts from its own start
 RESPONSE_UNITS = dict(zip(RESPONSE, ("s", "s^2"), strict=True))
 
 
@@ -60,6 +61,7 @@ def summarise(
             drive=campaign.drive,
             frame="joint" if campaign.rig.frame == "joint" else "T",
         ),
+        document=results.DocumentHead(**({"date": date_of(analyses)} | campaign.document)),
         verdict=conclusion(requirements),
         provenance=provenance.made("", campaign.folder, campaign.files),
         requirements=requirements,
@@ -78,8 +80,18 @@ def summarise(
         parameters=tuple(provenance.constants(campaign.rig)),
         notes=(ASSUMPTION,) if campaign.rig.spacecraft is not None else (),
     )
+    found = msgspec.structs.replace(found, model=model_verdict(found))
     warnings = (*checked.notices(), *notices(campaign, analyses, model, found))
     return msgspec.structs.replace(found, warnings=warnings, methods=methods(campaign, analyses, found))
+
+
+def date_of(analyses: Sequence[Analysis]) -> str:
+    """Return from which day to which recordings were made, UTC; empty where a clock counts from its own start."""
+    stamps = [analysis.run.epoch_ns for analysis in analyses]
+    if not stamps or min(stamps) < DATED_NS:
+        return ""
+    days = sorted({str(np.datetime64(stamp, "ns").astype("datetime64[D]")) for stamp in stamps})
+    return days[0] if len(days) == 1 else f"{days[0]} to {days[-1]}"
 
 
 def conclusion(requirements: Sequence[Requirement]) -> Conclusion:
