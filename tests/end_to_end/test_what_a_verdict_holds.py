@@ -28,6 +28,7 @@ def judged(
     noise: float = 1.0,
     shaken: dict[str, tuple[float, float]] | None = None,  # by recording: from when to when, s, at 0.1 N m
     dead: str = "",  # a recording in which the encoder stands still
+    lost: str = "",  # "rows" or "numbers" that are missing, 2 % of all, and some in a row, at the same places
     text: tuple[str, str] = ("", ""),
 ) -> dict:
     """Results of the arm that is as described, `text` of its campaign.toml replaced."""
@@ -41,8 +42,12 @@ def judged(
         wrench[:, TY] += 0.1 * np.sin(2.0 * np.pi * 0.5 * t) * ((begin <= t) & (t < end))
         wrench += noise * np.repeat([0.02, 0.002], 3) * rng.standard_normal(wrench.shape)
         angle = moved[0][:, None] * (name != dead)
+        gone = np.random.default_rng(7).random(len(t)) < 0.02
+        gone[1000:1002] = True
+        wrench[gone & (lost == "numbers")] = np.nan
+        kept = ~gone | (lost != "rows")
         streams = [
-            OutStream("/transducer/wrench", "wrench", stamp, stamp, wrench),
+            OutStream("/transducer/wrench", "wrench", stamp[kept], stamp[kept], wrench[kept]),
             OutStream("/encoder", "joints", stamp, stamp, angle, ("arm",)),
         ]
         write_mcap(folder / f"{name}.mcap", streams)
@@ -90,3 +95,12 @@ def test_what_a_dead_encoder_makes_is_told_once(tmp_path: Path) -> None:
     told = [one["what"] for one in found["warnings"]]
     assert sum("the angle of arm is still in test" in one for one in told) == 1
     assert not any("unmodelled" in one for one in told)
+
+
+@pytest.mark.parametrize("lost", ["rows", "numbers"])
+def test_rows_that_a_logger_drops_leave_a_verdict(tmp_path: Path, lost: str) -> None:
+    found = judged(tmp_path / "arm", shaken={"test": (0.0, 60.0)}, lost=lost)
+    (one,) = found["requirements"]
+    assert (one["verdict"], one["doubt"]) == ("fail", "")
+    assert one["low"] < 0.1 < one["high"] and one["value"] == pytest.approx(0.1, rel=0.05)
+    assert not any("in no figure" in notice["what"] for notice in found["warnings"])

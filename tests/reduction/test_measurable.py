@@ -124,7 +124,7 @@ def doubts(
     values = noise(2400)
     loads = Signal(0.0, 0.05, values, WRENCH_CHANNELS, WRENCH_UNITS, "T", valid)
     run = SimpleNamespace(
-        loads=loads, gaps=np.array(gaps).reshape(-1, 2), losses=(), rates={"angle": rate}, stretches=unclear
+        loads=loads, gaps=np.array(gaps).reshape(-1, 2), losses=(), rates={"angle": rate}, stretches=unclear, reach=1.0
     )
     found = hidden(campaign, campaign.requirements[0], "test", run, valid, {"angle": Readings()})
     return [one.why for one in found if not one.of_failed]
@@ -151,12 +151,13 @@ def test_ends_of_a_slow_stream_lack_nothing_where_each_of_its_readings_is_known(
 
 
 def test_readings_that_are_missing_for_what_may_have_happened_forbid_met():
-    lost = [Stretch("non-finite", at, 0.03, likely=True) for at in (20.0, 50.0, 0.1)]  # the last before what is known
+    lost = [Stretch("gap", at, 0.03, likely=True) for at in (20.0, 50.0, 0.1)]  # the last before what is known
     (why,) = doubts([(20.0, 20.04), (50.0, 50.04)], unclear=tuple(lost))
     assert why.startswith(
-        "readings are missing in test, 2 times, for 0.03 s at 20.00 s: what happened may be the cause"
+        "readings are missing in test, 2 times, for 0.03 s at 20.00 s, and those beside them are shaken"
     )
-    assert doubts([], unclear=(Stretch("spike", 20.0, 0.03, likely=True),)) == []  # judged with it and without it
+    for kind in ("spike", "dropout"):  # judged with it and without it
+        assert doubts([], unclear=(Stretch(kind, 20.0, 0.03, likely=True),)) == []
 
 
 def unclear(

@@ -12,7 +12,7 @@ from kbs_process.campaign.config import Campaign, RecordingEntry, Requirement
 from kbs_process.errors import ConfigError
 from kbs_process.results.judged import Doubt
 from kbs_process.rig.model import Amplifier, Rig
-from kbs_process.signals.records import COPY, SPIKE, WRENCH_CHANNELS, Mask, Run, Stretch
+from kbs_process.signals.records import COPY, DROPOUT, SPIKE, WRENCH_CHANNELS, Mask, Run, Stretch
 from kbs_process.stages.align.readings import Readings
 from kbs_process.stages.align.spikes import GAP
 from kbs_process.stages.bandpass import Band, bridged, too_long
@@ -94,7 +94,7 @@ def hidden(
     loads = run.loads
     assert loads is not None  # every recording that is judged has some
     band = Band("", None, edge)
-    known = bridged(replace(loads, valid=loads.valid & moving), run.gaps, band).valid
+    known = bridged(replace(loads, valid=loads.valid & moving), run.gaps, band, run.reach).valid
     # Where filters lean on what lies beyond an end, samples of a slow stream are known, and not those between.
     slowest = min((run.rates[key] for key in streams if key in run.rates), default=loads.rate)
     edges = np.flatnonzero(np.diff(np.concatenate(([True], known, [True])).astype(np.int8)))
@@ -104,17 +104,17 @@ def hidden(
         share = 100.0 * lacking / len(known)
         yield Doubt(f"in {share:.0f} % of {name} readings or angles are missing", of_failed=False)
     first, last = loads.t[known][[0, -1]] if known.any() else (0.0, 0.0)
-    inside = run.gaps[(run.gaps[:, 1] > first) & (run.gaps[:, 0] < last)]
+    inside = run.gaps[(run.gaps[:, 1] > first) & (run.gaps[:, 0] < last) & np.isfinite(run.gaps).all(axis=1)]
     if len(gaps := too_long(inside, band)):
         start, end = gaps[np.argmax(np.diff(gaps)[:, 0])]
         where = f"readings or angles are missing in {name}, from {start:.2f} s to {end:.2f} s at the longest"
         yield Doubt(f"{where}: what there was up to {edge:g} Hz is not known", of_failed=False)
     within = [one for one in run.stretches if first < one.start + one.length and one.start < last]
-    if missing := [one for one in within if one.kind != SPIKE]:
+    if missing := [one for one in within if one.kind not in (SPIKE, DROPOUT)]:  # which are judged with and without
         longest = max(missing, key=lambda one: one.length)
         times = f"{len(missing)} times, " if len(missing) > 1 else ""
         where = f"readings are missing in {name}, {times}for {longest.length:.3g} s at {longest.start:.2f} s"
-        yield Doubt(f"{where}: what happened may be the cause, and is not known", of_failed=False)
+        yield Doubt(f"{where}, and those beside them are shaken: what happened is not known", of_failed=False)
     if coarse := [one for one in _coarse(campaign, streams) if one[0] in channels]:
         steps = ", ".join(f"{channel} in steps of {step:.3g} {unit}" for channel, unit, step in coarse)
         yield Doubt(f"{steps} in {name}: coarser than the resolution that is stated")

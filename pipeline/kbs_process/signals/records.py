@@ -197,7 +197,8 @@ class Run:
     stretches: tuple[Stretch, ...] = ()  # that were bridged
     gaps: Array = dataclasses.field(
         default_factory=lambda: np.zeros((0, 2))
-    )  # s, from when to when samples are made up
+    )  # s, from when to when samples are made up; infinite beyond the ends of a stream
+    reach: float = 0.0  # s beside these in which filters to the working rate lean on them
 
     @property
     def loads(self) -> Signal | None:

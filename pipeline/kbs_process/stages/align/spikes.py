@@ -117,6 +117,7 @@ class Spikes:
     blows: list[Oddity] = field(default_factory=list)  # of several channels and samples at once: kept
     steps: list[Oddity] = field(default_factory=list)
     lost: list[Oddity] = field(default_factory=list)  # stretches that stand still: left out
+    shaken: list[Oddity] = field(default_factory=list)  # gaps beside which readings move as nowhere around
     changing: dict[int, Oddity] = field(default_factory=dict)  # channels whose samples change to and fro
     beating: set[int] = field(default_factory=set)  # of these, tones
     samples: int = 0
@@ -191,6 +192,10 @@ class Spikes:
                 before = x.copy() if before is x else before
                 x[:, channel] = column
         self._note(found, stamp, steps, x, before)
+        for at in np.flatnonzero(gap[done:end]).tolist() if not self.turning.any() else ():
+            first, stop = done + at - 1, done + at
+            if len(self.shaken) < LISTED and _shaken(before, steps, stop, stop, set()):
+                self.shaken.append(Oddity(0, int(stamp[first]), int(stamp[stop]), 0.0, likely=True))
         self._last = still
         self.samples += end - done
         kept = slice(done, end) if self.keep else done + np.flatnonzero(~gone[done:end])
