@@ -167,7 +167,6 @@ def unclear(
     likely: bool = False,
     kind: str = "gap",
     losses: tuple[Loss, ...] = (),
-    rate: float = 100.0,
 ) -> list[int]:
     """How many of the stretches that begin at `starts`, of each repeat, may be what happened."""
     campaign = archived.campaign("EL089", recordings=False)
@@ -181,13 +180,7 @@ def unclear(
         moved = Signal(late, 0.05, turn, ("arm",), ("rad",), "joint", np.ones(2400, dtype=bool))
         stretches = tuple(Stretch(kind, at + late, length, likely) for at in own)
         run = SimpleNamespace(
-            loads=loads,
-            stretches=stretches,
-            command=None,
-            angle=moved,
-            wrench=loads,
-            losses=losses[:number],
-            load_rates=np.array([rate]),
+            loads=loads, stretches=stretches, command=None, angle=moved, wrench=loads, losses=losses[:number]
         )
         recordings.append((SimpleNamespace(name=str(number), trajectory="same"), run))
     return [len(own) for own in doubtful(campaign, recordings, 1.0).values()]
@@ -207,11 +200,3 @@ def test_what_an_amplifier_passes_and_the_band_shows_may_be_what_happened():
     assert unclear(True, [20.0], likely=True, length=0.01) == [0]  # 20 Hz pass nothing so short
     assert unclear(False, [20.0], kind="spike", length=0.2) == [0]
     assert unclear(False, [20.0], kind="spike", length=0.25) == [1]  # of a band up to 1 Hz
-
-
-def test_a_single_reading_of_a_slow_stream_may_be_what_happened():
-    assert unclear(False, [20.0], kind="spike", length=0.01, rate=100.0) == [0]
-    assert unclear(False, [20.0], kind="spike", length=0.04, rate=25.0) == [0]
-    assert unclear(False, [20.0], kind="spike", length=0.05, rate=20.0) == [1]
-    assert unclear(False, [20.0], kind="spike", length=0.125, rate=8.0) == [1]
-    assert unclear(False, [20.0], kind="spike", length=0.125, rate=100.0) == [0]  # filled in, reading by reading

@@ -14,7 +14,6 @@ from kbs_process.results.judged import Doubt
 from kbs_process.rig.model import Amplifier, Rig
 from kbs_process.signals.records import COPY, DROPOUT, SPIKE, WRENCH_CHANNELS, Mask, Run, Stretch
 from kbs_process.stages.align.readings import Readings
-from kbs_process.stages.align.spikes import GAP
 from kbs_process.stages.bandpass import Band, bridged, too_long
 from kbs_process.stages.repeats import lag, motion_of
 
@@ -22,7 +21,6 @@ SHOWN = 0.4  # of the rate of distinct readings: the highest frequency that they
 UNSEEN = 0.05  # share of a recording that may be unknown: an interval at 95 % leaves out as much
 ENDS_S, ENDS = 4.0, 40  # that filters and the beginning of streams may cost: seconds, or samples
 SEEN = 0.25  # of a band's shortest period: what lasts for as long shows in it
-SINGLE = 0.049  # likewise, of a single reading: 20 a second are few for a band up to 1 Hz, as any clock counts them
 SHORTEST = 0.25  # of an amplifier's corner's period: what it passes lasts for longer
 TOGETHER_S = 0.05  # what repeats have at the same instant, more often than by chance, has a cause
 AMPLIFIED = 0.05  # part of a reading that an amplifier may take off at a band's upper edge
@@ -127,18 +125,13 @@ def doubtful(
     campaign: Campaign, recordings: Sequence[tuple[RecordingEntry, Run]], edge: float
 ) -> dict[str, list[Stretch]]:
     """What was bridged, by recording, and may be what happened: it is likely, lasts as long as a band up to `edge`, Hz,
-    shows (single readings of a slow stream do), or comes at the same instant of repeats. Nothing is that no amplifier
-    passes.
+    shows, or comes at the same instant of repeats. Nothing is that no amplifier passes.
     """
     amplifier = campaign.rig.transducer.amplifier
     shortest = 0.0 if amplifier is None else SHORTEST / float(amplifier.corner)
     long = {entry.name: [one for one in run.stretches if one.length > shortest] for entry, run in recordings}
     found = {
-        entry.name: [
-            one
-            for one in long[entry.name]
-            if one.likely or (one.kind == SPIKE and one.length * edge >= _least(one, run))
-        ]
+        entry.name: [one for one in long[entry.name] if one.likely or (one.kind == SPIKE and one.length * edge >= SEEN)]
         for entry, run in recordings
     }
     repeats = [one for one in recordings if all(loss.kind != COPY for loss in one[1].losses)]
@@ -154,11 +147,6 @@ def doubtful(
             if np.count_nonzero(near) > chance + 3.0 * np.sqrt(chance):
                 found[entry.name] += [one for one, at_once in zip(long[entry.name], near, strict=True) if at_once]
     return found
-
-
-def _least(one: Stretch, run: Run) -> float:
-    """Share of a band's shortest period from which a stretch shows in it: less is enough of a single reading."""
-    return SINGLE if one.length * max(run.load_rates) < GAP else SEEN
 
 
 def rounding(campaign: Campaign, streams: Mapping[str, Readings]) -> dict[str, float]:

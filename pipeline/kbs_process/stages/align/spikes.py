@@ -102,7 +102,7 @@ class Oddity:
     last: int  # ns
     by: float  # largest deviation; the reading that stands still
     count: int = 1  # samples
-    likely: bool = False  # several samples or channels that read differently: it may be what happened
+    likely: bool = False  # nothing that a driver filled in: it may be what happened
 
 
 @dataclass(slots=True)
@@ -238,7 +238,8 @@ class Spikes:
             several = {other for other, begin, end, _ in found if first < abs(end) and begin < stop}
             rows = before[first : max(stop, first), channel]
             read = before[first : max(stop, first)][:, sorted(several)]
-            likely = bool((read != read[:1, :1]).any())  # what a driver fills in for what it lost is all the same
+            # What a driver fills in for what it lost is zero, or all the same.
+            likely = bool((read != read[:1, :1]).any() if read.size > 1 else read.any())
             one = Oddity(channel, int(stamp[first]), int(stamp[abs(stop) - 1]), by, abs(stop) - first, likely)
             if stop < 0:
                 kind = self.steps

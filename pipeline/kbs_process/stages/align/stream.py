@@ -300,8 +300,8 @@ class Timeline:
     def stretches(self) -> Iterator[tuple[str, float, float, bool]]:
         """Yield kind, start and length, s, of what was bridged, and whether what happened may be the cause.
 
-        One bad sample in one channel shows nothing that happened, nor does what a driver fills in. Nor do rows that are
-        missing, unless those beside them are shaken.
+        What a driver fills in shows nothing that happened. Nor do rows that are missing, unless those beside them are
+        shaken.
         """
         if self.spikes is None or self.grid is None:
             return
