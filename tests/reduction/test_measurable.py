@@ -116,6 +116,7 @@ def doubts(
     known: slice | np.ndarray = slice(20, -20),
     unclear: tuple[Stretch, ...] = (),
     rate: float = 20.0,
+    streams: dict[str, Readings] | None = None,
 ) -> list[str]:
     """Why EL089's requirement, up to 1 Hz, is not judged by two minutes with gaps, s, where they are `known`."""
     campaign = archived.campaign("EL089", recordings=False)
@@ -126,8 +127,17 @@ def doubts(
     run = SimpleNamespace(
         loads=loads, gaps=np.array(gaps).reshape(-1, 2), losses=(), rates={"angle": rate}, stretches=unclear, reach=1.0
     )
-    found = hidden(campaign, campaign.requirements[0], "test", run, valid, {"angle": Readings()})
-    return [one.why for one in found if not one.of_failed]
+    found = hidden(campaign, campaign.requirements[0], "test", run, valid, streams or {"angle": Readings()})
+    return [one.why for one in found if streams or not one.of_failed]
+
+
+def test_held_readings_need_more_a_second_than_those_that_come_once() -> None:
+    t = np.arange(0.0, 120.0, 0.01)
+    held = {rate: noise(len(t))[np.arange(len(t)) // (100 // rate) * (100 // rate)] for rate in (5, 10)}
+    (why,) = doubts([], streams={"wrench": read(t, held[5])}, rate=100.0)
+    assert why == ("readings of wrench are new only 5 times a second in 100 % of test, and a band up to 1 Hz needs 8")
+    assert doubts([], streams={"wrench": read(t, held[10])}) == []
+    assert doubts([], streams={"wrench": read(t[::20], held[5][::20])}, rate=5.0) == []
 
 
 def test_what_a_gap_may_hide_is_not_judged_and_a_few_lost_samples_are():

@@ -18,6 +18,7 @@ from kbs_process.stages.bandpass import Band, bridged, too_long
 from kbs_process.stages.repeats import lag, motion_of
 
 SHOWN = 0.4  # of the rate of distinct readings: the highest frequency that they show
+HELD = 0.125  # likewise, of readings of which each comes several times: that takes 3 % off
 UNSEEN = 0.05  # share of a recording that may be unknown: an interval at 95 % leaves out as much
 ENDS_S, ENDS = 4.0, 40  # that filters and the beginning of streams may cost: seconds, or samples
 SEEN = 0.25  # of a band's shortest period: what lasts for as long shows in it
@@ -80,14 +81,14 @@ def hidden(
 ) -> Iterator[Doubt]:
     """Yield what a recording's samples cannot show of a requirement; `moving` (n,): where its angles are known."""
     edge, channels = requirement.band[1], needed_channels(requirement, campaign.rig)
-    needed = edge / SHOWN
     for key, readings in streams.items():
+        needed = edge / (HELD if key != "angle" and readings.held else SHOWN)
         share, rate = readings.slow(needed, at_rest=key == "angle")
         if share > UNSEEN:
             stream = "encoder" if key == "angle" else key
             yield Doubt(
-                f"{stream} has {rate:.3g} distinct readings a second in {100.0 * share:.0f} % of {name}, and a band up "
-                f"to {edge:g} Hz needs {needed:.3g}"
+                f"readings of {stream} are new only {rate:.3g} times a second in {100.0 * share:.0f} % of {name}, and a "
+                f"band up to {edge:g} Hz needs {needed:.3g}"
             )
     loads = run.loads
     assert loads is not None  # every recording that is judged has some

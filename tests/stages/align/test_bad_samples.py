@@ -390,6 +390,13 @@ def test_rows_that_are_missing_may_hide_what_happened_where_those_beside_them_ar
     assert bridged(run_of(streams)) == [("gap", 29.99, round(0.01 * lost, 3), True)] * shaken
 
 
+@pytest.mark.parametrize("times", [10, 20, 100])
+def test_readings_that_a_logger_holds_are_not_lost(times: int) -> None:
+    streams = recording()
+    streams["wrench"].values[:] = streams["wrench"].values[np.arange(6000) // times * times]
+    assert not told(run_of(streams), "dropout") and not told(run_of(streams), "spike")
+
+
 def test_bursts_that_were_stamped_on_arrival_are_refused_by_name() -> None:
     streams = recording()
     k = np.arange(6000)

@@ -32,6 +32,7 @@ LISTED = 1000
 CLUSTER = 16  # samples, among which some are off and the others go on as before
 CROWDED = 10  # of the nearest, that are suspect as well: all that is near gives M then
 AGREE = 0.35  # of what spikes are off by, that all beside them agree within
+FEW = 5  # times as many the same as a logger repeats each reading are lost
 HELD_S = 0.5  # longer than any channel with noise shows one and the same reading
 GAP = 1.5  # periods
 PUSHED_S = 2.0
@@ -166,6 +167,9 @@ class Spikes:
         gap = steps > GAP
         found: list[tuple[int, int, int, float]] = []
         before, gone = x, np.zeros(len(x), dtype=np.bool_)
+        new = np.flatnonzero((x[1:] != x[:-1]).any(axis=1))
+        repeated = len(new) > NEAR and not self.turning.any()
+        least = max(LONGEST, int(FEW * np.median(np.diff(new)))) if repeated else LONGEST
         for channel in range(channels) if end > done else ():
             column = np.ascontiguousarray(x[:, channel])
             step = np.abs(np.diff(column[max(done - 1, 0) :]))
@@ -175,7 +179,7 @@ class Spikes:
             dead = np.zeros(len(x), dtype=np.bool_)
             if self.lively:
                 edges = (self.samples == 0, last)
-                dead = find_dead(column, steps, turn, done, end, floor, self._held, still[channel], edges)
+                dead = find_dead(column, steps, turn, done, end, floor, (least, self._held), still[channel], edges)
                 self._note_lost(channel, stamp, column, dead, done, end)
                 still[channel] = column[end - 1] if dead[end - 1] else np.nan
                 gone |= dead
@@ -357,16 +361,17 @@ def find_dead(
     begin: int,
     end: int,
     floor: float,
-    held: int,
+    lengths: tuple[int, int],
     last: float,
     edges: tuple[bool, bool],
 ) -> Mask:
     """Mark samples up to `end` that stand still off all others: a channel that was lost for a while.
 
-    They begin and end with a jump; or, where the channel has noise, stand still for `held` samples. `last` is the
-    reading that stood still up to `begin`, or NaN; `edges` says whether x begins and ends with the recording.
+    They are as many as the first of `lengths`, and begin and end with a jump; or, where the channel has noise, stand
+    still for as many as the second. `last` is the reading that stood still up to `begin`, or NaN; `edges` says whether
+    x begins and ends with the recording.
     """
-    n = len(x)
+    n, (least, held) = len(x), lengths
     d, dd = _differences(x, steps, period)
     dead = np.zeros(n, dtype=np.bool_)
     a = begin
@@ -378,7 +383,7 @@ def find_dead(
         b = a
         while b + 1 < n and x[b + 1] == x[a]:
             b += 1
-        if b - a >= LONGEST:
+        if b - a >= least:
             before, after = _scale(dd, a - AROUND, a - 1), _scale(dd, b + 2, b + 2 + AROUND)
             jump_in = _turned(x[a] - x[a - 1], period) - d[a - 1] if a >= 2 else 0.0
             jump_out = d[b + 1] - d[b + 2] if b + 2 < n else 0.0
