@@ -72,11 +72,11 @@ def test_noise_that_is_more_than_stated_is_in_the_interval(tmp_path: Path) -> No
         ({"sweep": (25.0, 40.0)}, ("", ""), "sweep (calibration)"),
     ],
 )
-def test_met_only_without_what_the_campaign_leaves_out_is_said_in_the_verdict(
+def test_what_is_met_only_without_what_the_campaign_leaves_out_is_undecided(
     tmp_path: Path, shaken: dict[str, tuple[float, float]], text: tuple[str, str], left_out: str
 ) -> None:
     found = judged(tmp_path / "arm", shaken=shaken, text=text)
-    assert found["verdict"]["status"] == "pass"
+    assert found["verdict"]["status"] == "undecided"
     said = found["verdict"]["sentence"].split("The campaign leaves out ")[1]
     assert left_out in said and "By itself that is not met: peak 0.10" in said
 
@@ -87,6 +87,12 @@ def test_the_axes_that_are_judged_are_said_and_what_is_left_out_if_it_changes_th
     (one,) = found["requirements"]
     assert [row["channel"] for row in one["channels"]] == ["Ty"]
     assert one["left_out"].startswith("The campaign leaves out sweep (calibration). By itself that is met: peak 0.00")
+
+
+def test_a_fault_of_one_recording_says_nothing_of_another(tmp_path: Path) -> None:
+    found = judged(tmp_path / "arm", dead="test", shaken={"sweep": (25.0, 40.0)})
+    assert any("angle of arm is still in test" in one["what"] for one in found["warnings"])
+    assert any("a calibration that is not at rest" in one["what"] for one in found["warnings"])
 
 
 def test_what_a_dead_encoder_makes_is_told_once(tmp_path: Path) -> None:

@@ -87,8 +87,8 @@ def hidden(
         if share > UNSEEN:
             stream = "encoder" if key == "angle" else key
             yield Doubt(
-                f"readings of {stream} are new only {rate:.3g} times a second in {100.0 * share:.0f} % of {name}, and a "
-                f"band up to {edge:g} Hz needs {needed:.3g}"
+                f"readings of {stream} are new only {rate:.3g} times a second in {100.0 * share:.0f} % of {name}, and "
+                f"a band up to {edge:g} Hz needs {needed:.3g}"
             )
     loads = run.loads
     assert loads is not None  # every recording that is judged has some
