@@ -390,6 +390,20 @@ def test_rows_that_are_missing_may_hide_what_happened_where_those_beside_them_ar
     assert bridged(run_of(streams)) == [("gap", 29.99, round(0.01 * lost, 3), True)] * shaken
 
 
+@pytest.mark.parametrize(("key", "span"), [("angle", 0.25), ("wrench", 1.5)])
+def test_numbers_that_are_too_short_for_what_they_hold_are_refused(key: str, span: float) -> None:
+    streams = recording()
+    streams[key].values[:] = np.mod(streams[key].values, span)
+    with pytest.raises(RecordingError, match="which is all that it spans"):
+        run_of(streams)
+
+
+def test_a_load_that_is_put_on_and_off_is_none_of_them() -> None:
+    streams = recording()
+    streams["wrench"].values[:, 0] += 50.0 * (np.arange(6000) // 700 % 2)
+    assert not told(run_of(streams), "spike")
+
+
 @pytest.mark.parametrize("times", [10, 20, 100])
 def test_readings_that_a_logger_holds_are_not_lost(times: int) -> None:
     streams = recording()

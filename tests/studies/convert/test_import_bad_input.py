@@ -171,6 +171,15 @@ def test_rows_that_come_twice_are_told_and_left_out(tmp_path: Path) -> None:
     assert any("2000 rows are those before them again" in line for line in told)
 
 
+def test_a_table_of_which_most_lines_are_no_rows_is_another(tmp_path: Path) -> None:
+    write_csv(tmp_path / "run.csv", signals(200))
+    text = (tmp_path / "run.csv").read_text()
+    (tmp_path / "run.csv").write_text(f"Logger 7, written by hand\nbegun, at noon\n{text}")
+    with pytest.raises(RecordingError, match=r"201 of 202 lines are no rows of 2 cells .*first is line 3") as caught:
+        describe(tmp_path / "run.csv")
+    assert "skip_rows and rows" in str(caught.value)
+
+
 def test_no_row_of_a_shuffled_file_is_far_from_the_others(tmp_path: Path) -> None:
     columns = {**signals(12000), "t": 0.01 * np.arange(12000)}
     order = np.random.default_rng(3).permutation(12000)

@@ -27,6 +27,7 @@ CODES = 3.0  # of the least difference between readings that was met
 STEP_LARGEST = 4.0  # a step's share of the largest second difference of the whole recording
 FASTEST = 100.0  # rad/s^2 that no antenna reaches
 SLOWEST_S = 0.05  # period of samples, beyond which a rig may well get from one place to another in between
+WRAPS = 0.05  # part of its span by which a channel's jump back may differ from it
 MOST_STEPS = 3  # more of them are how the signal is
 LISTED = 1000
 CLUSTER = 16  # samples, among which some are off and the others go on as before
@@ -103,7 +104,7 @@ class Oddity:
     last: int  # ns
     by: float  # largest deviation; the reading that stands still
     count: int = 1  # samples
-    likely: bool = False  # nothing that a driver filled in: it may be what happened
+    likely: bool = False  # nothing that a driver filled in: it may be what happened; a step: against all around it
 
 
 @dataclass(slots=True)
@@ -126,6 +127,7 @@ class Spikes:
     _code: Array | None = None  # (c,) least difference between readings
     _largest: Array | None = None  # (c,) second difference beside spikes and steps
     _fastest: Array | None = None  # (c,) first difference
+    _span: Array | None = None  # (2, c) least and greatest readings
     _gaps: list[Oddity] = field(default_factory=list)  # changes across gaps: `count` periods
     _last: Array | None = None  # (c,) reading that stands still; NaN
     _stamp: Stamps | None = None
@@ -196,6 +198,8 @@ class Spikes:
                 before = x.copy() if before is x else before
                 x[:, channel] = column
         self._note(found, stamp, steps, x, before)
+        read = x[done:end] if self._span is None else np.concatenate([self._span, x[done:end]])
+        self._span = np.stack([read.min(axis=0), read.max(axis=0)]) if len(read) else None
         for at in np.flatnonzero(gap[done:end]).tolist() if not self.turning.any() else ():
             first, stop = done + at - 1, done + at
             if len(self.shaken) < LISTED and _shaken(before, steps, stop, stop, set()):
@@ -247,6 +251,9 @@ class Spikes:
             one = Oddity(channel, int(stamp[first]), int(stamp[abs(stop) - 1]), by, abs(stop) - first, likely)
             if stop < 0:
                 kind = self.steps
+                around = (slice(max(first - NEAR, 0), first), slice(first, first + NEAR))
+                against = all(np.median(np.diff(before[own, channel])) * by < 0.0 for own in around)
+                one = replace(one, likely=against)
             elif not self.turning.any() and (
                 (len(rows) > 1 and len(several) > 1 and not (rows == rows[0]).all())
                 or _shaken(before, steps, first, stop, {c for c, begin, _, _ in found if abs(begin - first) < NEAR})
@@ -263,6 +270,15 @@ class Spikes:
     def mixed(self) -> Oddity | None:
         """A channel that two sources bring by turns."""
         return next((one for channel, one in self.changing.items() if channel not in self.beating), None)
+
+    @property
+    def wrapped(self) -> Oddity | None:
+        """A channel that jumps back by all that it spans, each time that it comes to an end of that."""
+        for channel, span in enumerate(() if self._span is None else (self._span[1] - self._span[0]).tolist()):
+            own = [one for one in self.steps if one.channel == channel]
+            if len(own) > 1 and all(one.likely and abs(abs(one.by) / span - 1.0) < WRAPS for one in own):
+                return own[0]
+        return None
 
     def noisy(self) -> tuple[int, int] | None:
         """A channel with more spikes than a signal has, and how many samples they are."""

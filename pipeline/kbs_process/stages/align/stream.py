@@ -266,6 +266,13 @@ class Timeline:
                 where=self.file or self.where,
                 remedy=TWO_SOURCES,
             )
+        if self.spikes is not None and (wrapped := self.spikes.wrapped) is not None:
+            raise RecordingError(
+                f"{self.channels[wrapped.channel]} jumps back by {abs(wrapped.by):.4g}, which is all that it spans, "
+                f"{self.own_one(wrapped.first):.6g} s after the first sample and again: it begins anew there",
+                where=self.file or self.where,
+                remedy="export it in more bits; of an angle, give `unwrap` in the mapping of its import",
+            )
         if self.spikes is not None and (noisy := self.spikes.noisy()) is not None:
             raise RecordingError(
                 f"{self.channels[noisy[0]]} is off its neighbours in {noisy[1]} single samples of {self.samples}: "

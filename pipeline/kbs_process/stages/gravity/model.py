@@ -29,6 +29,7 @@ from kbs_process.stages.gravity.taring import Taring, estimate, of_fit
 from kbs_process.stages.motion import Motion
 
 _ROUNDS = 3  # of weights
+_SLOWER = 0.5  # part of the fit's low-pass below which gravity's loads are, and a line across a gap tells of them
 STILL = 10.0  # sigma of the angle within which a joint has not moved
 _ERROR_POINTS = 1000  # of a recording at which the model's error is evaluated, linear in between
 
@@ -182,7 +183,7 @@ def prepared(
     `low_pass_Hz` are no gaps.
     """
     read = replace(sample.wrench, valid=sample.wrench.valid & sample.motion.valid)
-    known = bridged(read, sample.gaps, Band("", None, low_pass_Hz), sample.reach)
+    known = bridged(read, sample.gaps, Band("", None, _SLOWER * low_pass_Hz), sample.reach)
     parts = sample.name, sample.motion, known, low_pass_Hz
     data = prepare(*parts, with_neighbours=settings.response, lost=sample.lost)
     if not equation.include_inertia:

@@ -127,7 +127,9 @@ def with_left_out(
         only_without = one.verdict == "pass" != verdict
         one = msgspec.structs.replace(one, left_out=f"{words} {what}", only_without=only_without)
         if only_without and verdict == "fail":
-            one = msgspec.structs.replace(one, verdict="undecided", doubt="what the campaign leaves out does not meet it")
+            one = msgspec.structs.replace(
+                one, verdict="undecided", doubt="what the campaign leaves out does not meet it"
+            )
         told.append(one)
     return msgspec.structs.replace(found, requirements=tuple(told), verdict=conclusion(told))
 
