@@ -132,8 +132,7 @@ def bridging_error(gaps: Array, band: Band) -> float:
     A line across T is (2 pi f T)^2 / 8 off a tone at its crest, of which as much is in the band as T is of half its
     shortest period.
     """
-    lengths = _short(gaps, band)
-    return _together((2.0 * np.pi * lengths) ** 2 / 8.0 * 2.0 * lengths, gaps, band)
+    return _together((np.pi * _short(gaps, band)) ** 2 * _short(gaps, band), gaps, band)
 
 
 def bridging_noise(gaps: Array, band: Band, rate: float) -> float:
@@ -142,14 +141,13 @@ def bridging_noise(gaps: Array, band: Band, rate: float) -> float:
     A line across T has the noise of its two ends, sigma / sqrt(2) in the mean; in a band up to f that is 2 f T of it,
     next to sigma sqrt(2 f / rate).
     """
-    more = _together(_short(gaps, band) ** 2, gaps, band)
-    return float(np.sqrt(1.0 + more * rate / (band.low_pass_Hz or np.inf)))
+    return float(np.sqrt(1.0 + _together(_short(gaps, band) ** 2, gaps, band) * rate / (band.low_pass_Hz or np.inf)))
 
 
 def _together(each: Array, gaps: Array, band: Band) -> float:
     """The largest sum of what gaps (k, 2) do, `each` (k,), that begin within half a band's shortest period."""
-    order = np.argsort(gaps[:, 0])
-    begin, total = gaps[order, 0], np.concatenate(([0.0], np.cumsum(each[order])))
+    begin, order = np.sort(gaps[:, 0]), np.argsort(gaps[:, 0])
+    total = np.concatenate(([0.0], np.cumsum(each[order])))
     last = np.searchsorted(begin, begin + 0.5 / (band.low_pass_Hz or np.inf), side="right")
     return float(np.max(total[last] - total[:-1], initial=0.0))
 

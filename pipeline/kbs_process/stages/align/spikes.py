@@ -203,7 +203,7 @@ class Spikes:
         for at in np.flatnonzero(gap[done:end]).tolist() if not self.turning.any() else ():
             first, stop = done + at - 1, done + at
             if len(self.shaken) < LISTED and _shaken(before, steps, stop, stop, set()):
-                self.shaken.append(Oddity(0, int(stamp[first]), int(stamp[stop]), 0.0, likely=True))
+                self.shaken.append(Oddity(0, int(stamp[first]), int(stamp[stop]), 0.0))
         self._last = still
         self.samples += end - done
         kept = slice(done, end) if self.keep else done + np.flatnonzero(~gone[done:end])

@@ -313,16 +313,12 @@ class Timeline:
         if self.spikes is None or self.grid is None:
             return
         period = 1e-9 * self.grid.period_ns
-        found = [(SPIKE, one, one.likely, 1.0) for one in self.spikes.spikes]
-        found += [(DROPOUT, one, True, 1.0) for one in self.spikes.lost]
-        found += [("gap", one, True, -1.0) for one in self.spikes.shaken]  # between samples that are there
-        for kind, one, likely, more in found:
-            yield (
-                kind,
-                self.own_one(one.first),
-                self.own_one(one.last) - self.own_one(one.first) + more * period,
-                likely,
-            )
+        found = [(SPIKE, one, period) for one in self.spikes.spikes] + [
+            (DROPOUT, one, period) for one in self.spikes.lost
+        ]
+        found += [("gap", one, -period) for one in self.spikes.shaken]  # between samples that are there
+        for kind, one, more in found:
+            yield kind, self.own_one(one.first), 1e-9 * (one.last - one.first) + more, kind != SPIKE or one.likely
 
     @property
     def non_finite_channels(self) -> str:
@@ -559,10 +555,7 @@ class Uniform:
         return (np.concatenate(self._own), np.concatenate(self._values)) if self._own else None
 
     def gaps(self) -> Array:
-        """Return from when to when samples are made up (k, 2), s from the stream's first: the samples beside them.
-
-        The first and the last are what is before and after the stream.
-        """
+        """Return from when to when samples are made up (k, 2), s from the first one: also before and after the stream."""
         at = np.concatenate([np.zeros(0), *self._made_up])
         pieces = np.split(at, 1 + np.flatnonzero(np.diff(at) > 1.0))
         period = 1e-9 * self.line.grid.period_ns if self.line.grid is not None else 0.0
