@@ -164,7 +164,7 @@ def test_readings_that_are_missing_for_what_may_have_happened_forbid_met():
     lost = [Stretch("gap", at, 0.03, likely=True) for at in (20.0, 50.0, 0.1)]  # the last before what is known
     (why,) = doubts([(20.0, 20.04), (50.0, 50.04)], unclear=tuple(lost))
     assert why.startswith(
-        "readings are missing in test, 2 times, for 0.03 s at 20.00 s, and those beside them are shaken"
+        "readings are missing in test, 2 times, for 0.03 s at 20.00 s: what happened may be the cause"
     )
     for kind in ("spike", "dropout"):  # judged with it and without it
         assert doubts([], unclear=(Stretch(kind, 20.0, 0.03, likely=True),)) == []
@@ -173,7 +173,7 @@ def test_readings_that_are_missing_for_what_may_have_happened_forbid_met():
 def unclear(
     amplifier: bool,
     *starts: list[float],
-    length: float = 0.02,
+    length: float = 0.03,
     likely: bool = False,
     kind: str = "gap",
     losses: tuple[Loss, ...] = (),
@@ -190,16 +190,22 @@ def unclear(
         moved = Signal(late, 0.05, turn, ("arm",), ("rad",), "joint", np.ones(2400, dtype=bool))
         stretches = tuple(Stretch(kind, at + late, length, likely) for at in own)
         run = SimpleNamespace(
-            loads=loads, stretches=stretches, command=None, angle=moved, wrench=loads, losses=losses[:number]
+            loads=loads,
+            stretches=stretches,
+            command=None,
+            angle=moved,
+            wrench=loads,
+            losses=losses[:number],
+            load_rates=[100.0],
         )
         recordings.append((SimpleNamespace(name=str(number), trajectory="same"), run))
     return [len(own) for own in doubtful(campaign, recordings, 1.0).values()]
 
 
 def test_what_repeats_lack_at_the_same_instant_they_lack_for_a_reason():
-    assert unclear(False, [20.0, 30.0], [20.0, 70.0]) == [1, 1]
-    assert unclear(False, [20.0, 30.0], [21.3, 70.0]) == [0, 0]
-    assert unclear(False, [20.0], [20.0], losses=(Loss(COPY, "", 0),)) == [0, 0]  # which is no repeat
+    assert unclear(False, [20.0, 30.0], [20.0, 70.0], kind="spike") == [1, 1]
+    assert unclear(False, [20.0, 30.0], [21.3, 70.0], kind="spike") == [0, 0]
+    assert unclear(False, [20.0], [20.0], kind="spike", losses=(Loss(COPY, "", 0),)) == [0, 0]  # which is no repeat
     often = [list(np.random.default_rng(seed).uniform(0.0, 120.0, 200)) for seed in (1, 2)]
     assert unclear(False, *often) == [0, 0]  # no more than by chance
     assert unclear(True, [20.0], [20.0], kind="spike", length=0.01) == [0, 0]  # nothing so short passes 20 Hz
@@ -210,3 +216,11 @@ def test_what_an_amplifier_passes_and_the_band_shows_may_be_what_happened():
     assert unclear(True, [20.0], likely=True, length=0.01) == [0]  # 20 Hz pass nothing so short
     assert unclear(False, [20.0], kind="spike", length=0.2) == [0]
     assert unclear(False, [20.0], kind="spike", length=0.25) == [1]  # of a band up to 1 Hz
+
+
+def test_missing_rows_that_stand_alone_may_hide_what_happened_and_those_of_a_logger_do_not() -> None:
+    assert unclear(False, [20.0]) == [1] == unclear(False, [20.0], length=0.1)
+    assert unclear(False, [20.0], length=0.02) == [0]  # too brief for a band up to 1 Hz
+    assert unclear(False, [20.0, 30.0, 50.0]) == [0]  # as often as that they have another cause
+    assert unclear(False, [20.0, 30.0, 50.0], likely=True) == [3]
+    assert unclear(False, [20.0], length=0.02, likely=True) == [1]

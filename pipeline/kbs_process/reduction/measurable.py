@@ -12,8 +12,9 @@ from kbs_process.campaign.config import Campaign, RecordingEntry, Requirement
 from kbs_process.errors import ConfigError
 from kbs_process.results.judged import Doubt
 from kbs_process.rig.model import Amplifier, Rig
-from kbs_process.signals.records import COPY, DROPOUT, SPIKE, WRENCH_CHANNELS, Mask, Run, Stretch
+from kbs_process.signals.records import COPY, MISSING, WRENCH_CHANNELS, Mask, Run, Stretch
 from kbs_process.stages.align.readings import Readings
+from kbs_process.stages.align.spikes import GAP
 from kbs_process.stages.bandpass import Band, bridged, too_long
 from kbs_process.stages.repeats import lag, motion_of
 
@@ -22,6 +23,8 @@ HELD = 0.125  # likewise, of readings of which each comes several times: that ta
 UNSEEN = 0.05  # share of a recording that may be unknown: an interval at 95 % leaves out as much
 ENDS_S, ENDS = 4.0, 40  # that filters and the beginning of streams may cost: seconds, or samples
 SEEN = 0.25  # of a band's shortest period: what lasts for as long shows in it
+BRIEF = 0.025  # likewise, of missing rows: what hides in less shows in the band at a twentieth of its size
+OFTEN = 3  # stretches of missing rows that are alike, from which on a logger drops rows
 SHORTEST = 0.25  # of an amplifier's corner's period: what it passes lasts for longer
 TOGETHER_S = 0.05  # what repeats have at the same instant, more often than by chance, has a cause
 AMPLIFIED = 0.05  # part of a reading that an amplifier may take off at a band's upper edge
@@ -109,11 +112,11 @@ def hidden(
         where = f"readings or angles are missing in {name}, from {start:.2f} s to {end:.2f} s at the longest"
         yield Doubt(f"{where}: what there was up to {edge:g} Hz is not known", of_failed=False)
     within = [one for one in run.stretches if first < one.start + one.length and one.start < last]
-    if missing := [one for one in within if one.kind not in (SPIKE, DROPOUT)]:  # which are judged with and without
+    if missing := [one for one in within if one.kind == MISSING]:  # others are judged with and without
         longest = max(missing, key=lambda one: one.length)
         times = f"{len(missing)} times, " if len(missing) > 1 else ""
         where = f"readings are missing in {name}, {times}for {longest.length:.3g} s at {longest.start:.2f} s"
-        yield Doubt(f"{where}, and those beside them are shaken: what happened is not known", of_failed=False)
+        yield Doubt(f"{where}: what happened may be the cause, and is not known", of_failed=False)
     if coarse := [one for one in _coarse(campaign, streams) if one[0] in channels]:
         steps = ", ".join(f"{channel} in steps of {step:.3g} {unit}" for channel, unit, step in coarse)
         yield Doubt(f"{steps} in {name}: coarser than the resolution that is stated")
@@ -126,13 +129,25 @@ def doubtful(
     campaign: Campaign, recordings: Sequence[tuple[RecordingEntry, Run]], edge: float
 ) -> dict[str, list[Stretch]]:
     """What was bridged, by recording, and may be what happened: it is likely, lasts as long as a band up to `edge`, Hz,
-    shows, or comes at the same instant of repeats. Nothing is that no amplifier passes.
+    shows, or comes at the same instant of repeats; of missing rows, if they stand alone. Nothing is that no amplifier
+    passes, nor are missing rows that are brief in the band.
     """
     amplifier = campaign.rig.transducer.amplifier
     shortest = 0.0 if amplifier is None else SHORTEST / float(amplifier.corner)
-    long = {entry.name: [one for one in run.stretches if one.length > shortest] for entry, run in recordings}
+    long = {
+        entry.name: [
+            one
+            for one in run.stretches
+            if one.length > shortest and (one.likely or one.kind != MISSING or one.length * edge > BRIEF)
+        ]
+        for entry, run in recordings
+    }
     found = {
-        entry.name: [one for one in long[entry.name] if one.likely or (one.kind == SPIKE and one.length * edge >= SEEN)]
+        entry.name: [
+            one
+            for one in long[entry.name]
+            if one.likely or (_alone(one, run) if one.kind == MISSING else one.length * edge >= SEEN)
+        ]
         for entry, run in recordings
     }
     repeats = [one for one in recordings if all(loss.kind != COPY for loss in one[1].losses)]
@@ -148,6 +163,12 @@ def doubtful(
             if np.count_nonzero(near) > chance + 3.0 * np.sqrt(chance):
                 found[entry.name] += [one for one, at_once in zip(long[entry.name], near, strict=True) if at_once]
     return found
+
+
+def _alone(one: Stretch, run: Run) -> bool:
+    """Whether several rows are missing, and seldom as many or half of them: a logger that drops rows does so often."""
+    like = sum(other.kind == MISSING and 2.0 * other.length > one.length for other in run.stretches)
+    return one.length * max(run.load_rates) > GAP and like < OFTEN
 
 
 def rounding(campaign: Campaign, streams: Mapping[str, Readings]) -> dict[str, float]:

@@ -108,6 +108,7 @@ PUT_IN_ORDER = "put in order"  # messages that came after younger ones: told, al
 ROUNDED = "rounded stamps"  # behind which a regular rate was found: likewise
 COPY = "copy"  # of another recording, whose readings it has
 DROPOUT = "dropout"  # a channel that stood still off all its other readings: left out, likewise
+MISSING = "gap"  # rows that are not there, or no numbers
 SPIKE = "spike"  # single samples off their neighbours: interpolated, and the figures with them are told as well
 TRUNCATED = "truncated"  # the loss of a file that breaks off: all that would have followed
 

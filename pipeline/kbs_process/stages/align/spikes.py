@@ -119,7 +119,7 @@ class Spikes:
     blows: list[Oddity] = field(default_factory=list)  # of several channels and samples at once: kept
     steps: list[Oddity] = field(default_factory=list)
     lost: list[Oddity] = field(default_factory=list)  # stretches that stand still: left out
-    shaken: list[Oddity] = field(default_factory=list)  # gaps beside which readings move as nowhere around
+    gaps: list[Oddity] = field(default_factory=list)  # likely: readings beside them move as nowhere around
     changing: dict[int, Oddity] = field(default_factory=dict)  # channels whose samples change to and fro
     beating: set[int] = field(default_factory=set)  # of these, tones
     samples: int = 0
@@ -202,8 +202,9 @@ class Spikes:
         self._span = np.stack([read.min(axis=0), read.max(axis=0)]) if len(read) else None
         for at in np.flatnonzero(gap[done:end]).tolist() if not self.turning.any() else ():
             first, stop = done + at - 1, done + at
-            if len(self.shaken) < LISTED and _shaken(before, steps, stop, stop, set()):
-                self.shaken.append(Oddity(0, int(stamp[first]), int(stamp[stop]), 0.0))
+            if len(self.gaps) < LISTED:
+                shaken = _shaken(before, steps, stop, stop, set())
+                self.gaps.append(Oddity(0, int(stamp[first]), int(stamp[stop]), 0.0, likely=shaken))
         self._last = still
         self.samples += end - done
         kept = slice(done, end) if self.keep else done + np.flatnonzero(~gone[done:end])

@@ -8,7 +8,19 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from kbs_process.errors import RecordingError
-from kbs_process.signals.records import BLOW, DROPOUT, PUT_IN_ORDER, ROUNDED, SPIKE, Array, Block, Loss, Mask, Stamps
+from kbs_process.signals.records import (
+    BLOW,
+    DROPOUT,
+    MISSING,
+    PUT_IN_ORDER,
+    ROUNDED,
+    SPIKE,
+    Array,
+    Block,
+    Loss,
+    Mask,
+    Stamps,
+)
 from kbs_process.stages.align.arrival import REGULAR, Arrival
 from kbs_process.stages.align.clocks import ClockData, FloorStep, LatencyFloor
 from kbs_process.stages.align.envelope import MinMax
@@ -316,9 +328,9 @@ class Timeline:
         found = [(SPIKE, one, period) for one in self.spikes.spikes] + [
             (DROPOUT, one, period) for one in self.spikes.lost
         ]
-        found += [("gap", one, -period) for one in self.spikes.shaken]  # between samples that are there
+        found += [(MISSING, one, -period) for one in self.spikes.gaps]  # between samples that are there
         for kind, one, more in found:
-            yield kind, self.own_one(one.first), 1e-9 * (one.last - one.first) + more, kind != SPIKE or one.likely
+            yield kind, self.own_one(one.first), 1e-9 * (one.last - one.first) + more, kind == DROPOUT or one.likely
 
     @property
     def non_finite_channels(self) -> str:
@@ -555,7 +567,7 @@ class Uniform:
         return (np.concatenate(self._own), np.concatenate(self._values)) if self._own else None
 
     def gaps(self) -> Array:
-        """Return from when to when samples are made up (k, 2), s from the first one: also before and after the stream."""
+        """Return from when to when samples are made up (k, 2), s from the first: also before and after all."""
         at = np.concatenate([np.zeros(0), *self._made_up])
         pieces = np.split(at, 1 + np.flatnonzero(np.diff(at) > 1.0))
         period = 1e-9 * self.line.grid.period_ns if self.line.grid is not None else 0.0
