@@ -94,6 +94,8 @@ def samples(campaign: Campaign, prepared: Sequence[Prepared]) -> list[Sample]:
             without_effects(campaign, one.entry, one.motion, loads, campaign.rig),
             calibration=one.entry.role == "calibration",
             lost=foremost(one.run.losses),
+            gaps=one.run.gaps,
+            reach=one.run.reach,
         )
         for one in free or fitted
         if (loads := relieved(campaign, one.entry, one.run, one.motion).loads) is not None
@@ -109,7 +111,7 @@ def tare(
     """
     assert run.loads is not None  # `prepare` demands them
     loads = without_effects(campaign, entry, motion, run.loads, model.rig)
-    sample = Sample(entry.name, motion, loads, lost=foremost(run.losses))
+    sample = Sample(entry.name, motion, loads, lost=foremost(run.losses), gaps=run.gaps, reach=run.reach)
     return sample, gravity.tare(sample, model)
 
 

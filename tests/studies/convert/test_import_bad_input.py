@@ -162,6 +162,32 @@ def test_times_coarser_than_the_rows_are_refused(tmp_path: Path, digits: int, ro
     assert "give rate_Hz" in str(caught.value)
 
 
+def test_rows_that_come_twice_are_told_and_left_out(tmp_path: Path) -> None:
+    write_csv(tmp_path / "run.csv", {key: np.repeat(x, 2) for key, x in signals(2000).items()})
+    told: list[str] = []
+    stamp, values = read_back(_import(tmp_path, "run.csv", notices=told), "turn_1")["wrench"]
+    assert np.array_equal(stamp, np.rint(1e9 * signals(2000)["t"]))
+    assert np.array_equal(values[:, 0], signals(2000)["Fx"])
+    assert any("2000 rows are those before them again" in line for line in told)
+
+
+def test_a_table_of_which_most_lines_are_no_rows_is_another(tmp_path: Path) -> None:
+    write_csv(tmp_path / "run.csv", signals(200))
+    text = (tmp_path / "run.csv").read_text()
+    (tmp_path / "run.csv").write_text(f"Logger 7, written by hand\nbegun, at noon\n{text}")
+    with pytest.raises(RecordingError, match=r"201 of 202 lines are no rows of 2 cells .*first is line 3") as caught:
+        describe(tmp_path / "run.csv")
+    assert "skip_rows and rows" in str(caught.value)
+
+
+def test_no_row_of_a_shuffled_file_is_far_from_the_others(tmp_path: Path) -> None:
+    columns = {**signals(12000), "t": 0.01 * np.arange(12000)}
+    order = np.random.default_rng(3).permutation(12000)
+    write_csv(tmp_path / "run.csv", {key: x[order] for key, x in columns.items()})
+    stamp, _ = read_back(_import(tmp_path, "run.csv"), "turn_1")["wrench"]
+    assert len(stamp) == 12000
+
+
 def test_times_as_floats_of_32_bits_are_refused_where_they_are_too_coarse() -> None:
     t = np.arange(2000) * 0.01
     with pytest.raises(

@@ -218,13 +218,16 @@ def _pieces(
         stamp = stamp + shift
         rows += len(stamp)
         findings.counts[_TIMELESS] += int((~known).sum())
+        again = np.zeros(len(stamp), dtype=np.bool_)
+        again[1:] = np.logical_and.reduce([x[1:] == x[:-1] for x in (stamp, *named.values())])
+        findings.counts["rows are those before them again, time and all, left out"] += int((again & known).sum())
         values = {
             channel.field: _si(named[column.name], channel, carry)
             for channel, column in zip(channels, columns, strict=True)
         }
         if mapping.turn and any(stream.key == "wrench" for stream in streams):
             _turn(values, mapping.turn)
-        yield {stream.key: _select(Block(stamp, stamp, _matrix(stream, values)), known) for stream in streams}
+        yield {stream.key: _select(Block(stamp, stamp, _matrix(stream, values)), known & ~again) for stream in streams}
 
 
 def _check_unit(table: Table, column: Column, given: str, scale: float, findings: Findings) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from itertools import zip_longest
@@ -17,7 +18,7 @@ from kbs_process.reduction.losses import lost
 from kbs_process.reduction.preparing import Prepared
 from kbs_process.reduction.soundness import extent
 from kbs_process.report.prose import Prose
-from kbs_process.results.judged import Requirement
+from kbs_process.results.judged import Requirement, Soundness
 from kbs_process.results.records import Notice, Severity
 from kbs_process.signals.records import DROPOUT, SPIKE, Run
 from kbs_process.signals.smoothing import smooth
@@ -39,8 +40,6 @@ UNKNOWN_PHASE = 1.0
 LONGEST = 100.0
 # A limit is seldom this many times above all that was measured, uncertainty included.
 FAR = 100.0
-# A calibration that leaves this many times what noise and uncertainty make is not at rest.
-UNQUIET = 1.5
 LEFT_OUT = (SPIKE, DROPOUT)
 QUANTITY = {"torque": "T", "force": "F"}  # first letter of its channels
 
@@ -53,9 +52,9 @@ def notices(campaign: Campaign, analyses: Sequence[Analysis], model: GravityMode
         yield from lost(analysis.entry, [loss for loss in analysis.run.losses if loss.kind not in LEFT_OUT])
     yield from implausible(campaign, found.requirements)
     yield from _unjudged(analyses)
-    if not found.soundness.suggestions:  # which explain what gravity leaves as well
-        yield from _static_load(campaign, analyses, model)
-        yield from calibration(analyses, model)
+    told = _unexplained(analyses, found.soundness)
+    yield from _static_load(campaign, told, model)
+    yield from calibration(told, model)
     for check in model.fit.checks:
         if not check.passed:
             yield _notice("info", "fit", check=check)
@@ -130,6 +129,13 @@ def implausible(campaign: Campaign, requirements: Iterable[Requirement]) -> Iter
             yield _notice("warning", "limit", one.name, one=one, static=static if beyond else None, far=FAR)
 
 
+def _unexplained(analyses: Sequence[Analysis], soundness: Soundness) -> Sequence[Analysis]:
+    """Recordings in which what gravity leaves is not what a named fault explains: that of others, or of all."""
+    reasons = [set(re.findall(r"[\w-]+", reason)) for reason in soundness.reasons if soundness.suggestions]
+    of_some = all(any(one.entry.name in words for one in analyses) for words in reasons)
+    return [one for one in analyses if of_some and not any(one.entry.name in words for words in reasons)]
+
+
 def _static_load(campaign: Campaign, analyses: Sequence[Analysis], model: GravityModel) -> Iterable[Notice]:
     """A recording whose slow part the model leaves: what is judged or compared is then that load."""
     for analysis in analyses:
@@ -153,7 +159,7 @@ def calibration(analyses: Sequence[Analysis], model: GravityModel) -> Iterable[N
     for analysis in (one for one in analyses if one.entry.role == "calibration"):
         for misfit, unexplained, sigma in zip(analysis.misfits, model.unexplained, noise, strict=True):
             most = np.sqrt(max(misfit.explained**2 - unexplained**2, 0.0) + sigma**2)
-            if misfit.left > UNQUIET * most and sigma > 0.0:
+            if misfit.left > most and sigma > 0.0:
                 shown = _shown(analysis, misfit.channel, model)
                 facts = {"low_pass": model.settings.low_pass_Hz, "one": misfit, "most": most, "shown": shown}
                 yield _notice("info", "calibration", analysis.entry.name, **facts)

@@ -141,10 +141,15 @@ def with_left_out(
         others = [_words(judged(campaign, asked, whole, rows)) for asked in campaign.requirements]
     except KbsError as error:
         others = [("undecided", f"By itself that cannot be judged: {error.what}.")] * len(found.requirements)
-    told = [
-        msgspec.structs.replace(one, left_out=f"{words} {what}", only_without=one.verdict == "pass" != verdict)
-        for one, (verdict, what) in zip(found.requirements, others, strict=True)
-    ]
+    told = []
+    for one, (verdict, what) in zip(found.requirements, others, strict=True):
+        only_without = one.verdict == "pass" != verdict
+        one = msgspec.structs.replace(one, left_out=f"{words} {what}", only_without=only_without)
+        if only_without and verdict == "fail":
+            one = msgspec.structs.replace(
+                one, verdict="undecided", doubt="what the campaign leaves out does not meet it"
+            )
+        told.append(one)
     return msgspec.structs.replace(found, requirements=tuple(told), verdict=conclusion(told))
 
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from kbs_process.campaign.config import Campaign
-from kbs_process.reduction.analysis import Analysis, bands_of, passband, select
+from kbs_process.reduction.analysis import Analysis, banded, bands_of, passband, select
 from kbs_process.reduction.relief import errors, forces_in
 from kbs_process.results.judged import Budget, BudgetItem, Frame
 from kbs_process.rig.model import LAB
@@ -105,7 +105,7 @@ def _entries(
     """The budget of one recording in one band, in the frame of the recorded loads."""
 
     def cut(signal: Signal) -> Signal:
-        return bandpass.apply(signal, band)
+        return banded(signal, analysis.run, band)
 
     rig = campaign.rig
     measured = analysis.pairs[rig.frame, band.name].measured
@@ -113,7 +113,8 @@ def _entries(
     rates, width = analysis.run.load_rates, bandpass.noise_bandwidth(band, measured.dt)
     most = budget.rms(measured) / budget.sensor_noise(np.ones(len(measured.channels)), rates, width).sigma
     least = rig.loads.noise[rig.loads.index(measured.channels)]
-    sensor = budget.sensor_noise(np.maximum(least, np.minimum(noise, most)), rates, width)
+    bridged = bandpass.bridging_noise(analysis.run.gaps, band, float(np.max(rates)))
+    sensor = budget.sensor_noise(bridged * np.maximum(least, np.minimum(noise, most)), rates, width)
     late = late_sigma(analysis.run.clocks, rig.transducer.amplifier)
     entries = [
         sensor,
