@@ -28,6 +28,15 @@ SWITCHES = (
     "--remote-debugging-pipe",
 )
 PREPARED = "document.querySelectorAll('.uplot').length"
+SPLIT_WORDS = """[...document.querySelectorAll('td')].filter(cell => cell.offsetParent).flatMap(cell => {
+  const texts = document.createTreeWalker(cell, NodeFilter.SHOW_TEXT), found = [], range = document.createRange();
+  while (texts.nextNode()) for (const word of texts.currentNode.data.matchAll(/[^\\s-]+/g)) {
+    range.setStart(texts.currentNode, word.index);
+    range.setEnd(texts.currentNode, word.index + word[0].length);
+    if (new Set([...range.getClientRects()].map(line => line.top)).size > 1) found.push(word[0]);
+  }
+  return found;
+})"""
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(CHROMIUM is None, reason="no chromium on this machine")]
 
@@ -143,6 +152,7 @@ def test_the_page_renders_without_error_or_overflow(opened: Callable[[int], Brow
     browser = opened(width)
     assert browser.evaluate("document.documentElement.scrollWidth") <= width
     assert browser.evaluate(PREPARED) == 12
+    assert browser.evaluate(SPLIT_WORDS) == []
     assert browser.evaluate("[...document.images].every(i => i.complete && (i.naturalWidth || !i.offsetParent))")
     assert browser.complaints == []
 
