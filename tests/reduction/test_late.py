@@ -13,6 +13,7 @@ def test_an_amplifier_whose_corner_is_not_known_delays_by_what_is_not_known():
     corner = Quantity("corner", np.array(20.0), "Hz", np.array(2.0), "data sheet")
     clocks = {"angle": clock}
     assert late_sigma(clocks, None) == pytest.approx(5e-4)
+    assert late_sigma(clocks, None, 1.2e-3) == pytest.approx(1.3e-3)
     # Second-order Butterworth: sqrt(2) / (2 pi 20 Hz) = 11.25 ms, a tenth of it unknown.
     assert late_sigma(clocks, Amplifier(2, corner)) == pytest.approx(np.hypot(5e-4, 1.125e-3), rel=1e-3)
 

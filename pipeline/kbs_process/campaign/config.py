@@ -118,6 +118,7 @@ class RecordingEntry:
     start: float | None  # s from the recording's start; what is before is left out
     end: float | None  # s from the recording's start; what is after is left out
     without: tuple[str, ...] = ()  # effects of the model that did not act in it
+    clock_sigma: float = 0.0  # s, of how its streams' clocks stand to each other, beyond what stamps tell
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -186,6 +186,7 @@ def _recording(folder: Path, table: RecordingTable) -> RecordingEntry:
         start=table.start_s,
         end=table.end_s,
         without=tuple(table.without),
+        clock_sigma=table.clock_sigma_s,
     )
 
 

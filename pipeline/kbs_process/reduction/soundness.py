@@ -139,7 +139,7 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
         conventions = (*check_weight(campaign.rig), *_conventions(recordings, instants, model, zeros, shown))
         amplifier = campaign.rig.transducer.amplifier
         each = zip(recordings, instants, strict=True)
-        lags = [lag(model, data, late_sigma(one.run.clocks, amplifier)) for one, data in each]
+        lags = [lag(model, data, late_sigma(one.run.clocks, amplifier, one.entry.clock_sigma)) for one, data in each]
         found = tension(model, {sample.name: taring for sample, taring in tared}, [one for one in lags if one])
         most = _most(equation)
         rounding = {key: x for one in recordings for key, x in measurable.rounding(campaign, one.readings).items()}

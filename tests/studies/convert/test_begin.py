@@ -166,6 +166,8 @@ def test_from_two_loggers_to_a_campaign(tmp_path: Path) -> None:
     mapping = tree(tmp_path / "arm" / "mapping.toml")
     assert mapping["text"] == {"encoder": {"skip_rows": 2, "decimal": ","}}
     assert [one["shift_s"]["wrench"] for one in mapping["recording"]] == pytest.approx([LATE, LATE], abs=0.003)
+    known = np.array([one["shift_sigma_s"] for one in mapping["recording"]])
+    assert np.all((known > 0.0) & (known < 0.003))
     rig = tree(tmp_path / "arm" / "rig.toml")
     assert rig["transducer"]["noise"]["value"] == pytest.approx([0.02] * 3 + [0.002] * 3, rel=0.1)
     assert rig["joint"]["arm"]["encoder"]["step"]["value"] == pytest.approx(0.01)

@@ -261,7 +261,9 @@ def test_a_recording_of_two_loggers(tmp_path: Path) -> None:
     np.testing.assert_array_equal(streams["encoder"][1][:, 0], columns["angle"])
     begin = round((columns["t"][0] - 12.5) * 1e9)
     np.testing.assert_allclose(streams["encoder"][0], np.rint(columns["t"] * 1e9) - begin, atol=1.0)
-    sources = tomllib.loads((campaign / "campaign.toml").read_text())["source"]["file"]
+    described = tomllib.loads((campaign / "campaign.toml").read_text())
+    assert described["recording"][0]["clock_sigma_s"] == 1e-3  # nobody said how well the shift is known
+    sources = described["source"]["file"]
     assert [one["name"] for one in sources] == ["wrench.csv", "angle.csv"]
 
 

@@ -163,6 +163,10 @@ class RecordingTable(Table):
     sha256: Checksum | None = Field(None, description="of the file; checked")
     start_s: NotNegative | None = Field(None, description="leave out what is before, s from the recording's start")
     end_s: Positive | None = Field(None, description="leave out what is after, s from the recording's start")
+    clock_sigma_s: NotNegative = Field(
+        0.0,
+        description="standard deviation of how its streams' clocks stand to each other, s, beyond what the stamps tell",
+    )
     without: Distinct[str] = Field(
         [], description="effects of the model that did not act in this recording, as a cord that was not attached"
     )

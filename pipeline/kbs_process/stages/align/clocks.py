@@ -220,10 +220,14 @@ def offset_sigma(clock: Clock) -> float:
     return clock.sigma_offset_s if np.isfinite(clock.sigma_offset_s) else UNKNOWN_OFFSET_S
 
 
-def late_sigma(clocks: Mapping[str, Clock], amplifier: Amplifier | None) -> float:
-    """How well it is known when angles and wrench belong together, s: their clocks, and the amplifier's delay."""
+def late_sigma(clocks: Mapping[str, Clock], amplifier: Amplifier | None, stated: float = 0.0) -> float:
+    """How well it is known when angles and wrench belong together, s: their clocks, and the amplifier's delay.
+
+    `stated` is what the clocks are uncertain by beyond what their stamps tell.
+    """
     clock = clocks.get("angle") or clocks.get("rate")
     late = UNKNOWN_OFFSET_S if clock is None else float(np.hypot(offset_sigma(clock), np.nan_to_num(clock.latency_s)))
+    late = float(np.hypot(late, stated))
     if amplifier is None:
         return late
     return float(np.hypot(late, amplifier.delay * float(amplifier.corner.sigma) / float(amplifier.corner)))

@@ -303,7 +303,8 @@ def _shift(load: Log, angle: Log) -> tuple[str, str]:
     starts, ends = ((t[at] + later, t_angle[at] + earlier) for at in (0, -1))
     who = "wrench" if shift >= 0.0 else "encoder"
     return (
-        f"shift_s = {{ {who} = {abs(shift):.4f} }}  # +- {sigma:.1g} s, found from the motion: check it\n"
+        f"shift_s = {{ {who} = {abs(shift):.4f} }}  # found from the motion: check it\n"
+        f"shift_sigma_s = {sigma:.1g}  # its standard deviation\n"
         f"start_s = {max(starts) - min(starts):.3f}  # where both loggers ran\n"
         f"end_s = {min(ends) - min(starts):.3f}"
     ), f"{abs(shift):.4f} s (+- {sigma:.1g} s, from the motion) are added to the times of {who}"

@@ -87,6 +87,8 @@ def write_campaign(mapping: Mapping, folder: Path, checksums: MappingOf[str, str
             "role": part.role,
             "repeat": part.repeat,
         }
+        if part.shift_s:
+            table["clock_sigma_s"] = part.shift_sigma_s
         if part.stem in checksums:
             table["sha256"] = checksums[part.stem]
         blocks.append("[[recording]]\n" + _lines(table))

@@ -25,6 +25,7 @@ from kbs_process.campaign.formats.tables import (
     by_kind,
 )
 from kbs_process.campaign.formats.tables import Text as Words
+from kbs_process.stages.align.clocks import UNKNOWN_OFFSET_S
 
 Which = Annotated[Annotated[Words, TEXT] | Annotated[Count, NUMBER], by_kind]
 OneCharacter = Annotated[str, Field(min_length=1, max_length=1)]
@@ -154,6 +155,9 @@ class Part(Table):
     file: dict[StreamKey, Words] = Field({}, description="other files there, of streams that lie in one")
     shift_s: dict[StreamKey, Magnitude] = Field(
         {}, description="added to the times of a stream, s, so that its clock agrees with that of the other files"
+    )
+    shift_sigma_s: NotNegative = Field(
+        UNKNOWN_OFFSET_S, description="standard deviation of `shift_s`, s; it counts in the uncertainty of results"
     )
     name: Name | None = Field(None, description="of the recording; default: trajectory_repeat")
     trajectory: Name

@@ -115,7 +115,7 @@ def _entries(
     least = rig.loads.noise[rig.loads.index(measured.channels)]
     bridged = bandpass.bridging_noise(analysis.run.gaps, band, float(np.max(rates)))
     sensor = budget.sensor_noise(bridged * np.maximum(least, np.minimum(noise, most)), rates, width)
-    late = late_sigma(analysis.run.clocks, rig.transducer.amplifier)
+    late = late_sigma(analysis.run.clocks, rig.transducer.amplifier, analysis.entry.clock_sigma)
     entries = [
         sensor,
         *([_cross_coupling(analysis, model, decoupling, band)] if rig.transducer.channels else []),
