@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from campaign.campaign_folder import CampaignFolder, make_folder
 from kbs_process.campaign.load import load_campaign
@@ -32,7 +33,7 @@ def record(
     moving: bool = True,
     noise: float | Array = 0.0,
     seed: int = 1,
-    nan: bool | slice = False,
+    nan: slice | NDArray[np.intp] | None = None,
     swapped: bool = False,
     read: tuple[str, ...] = JOINTS,
     rig: Rig | None = None,
@@ -41,7 +42,7 @@ def record(
     """Write twenty seconds: elevation at rest, or swinging; a constant wrench, or that of a `rig`, and noise (N, N m),
     of all channels or of each.
 
-    With `nan` ten readings of Fz are no numbers, or a slice of them; if `swapped`, two messages are in the other's
+    The readings `nan` of Fz are no numbers; if `swapped`, two messages are in the other's
     place. Encoders `read` some joints, as `degrees` if that is asked for.
     """
     stamp = np.arange(2000) * 10_000_000
@@ -55,8 +56,8 @@ def record(
         gaining = np.stack([np.zeros(len(stamp)), -0.25 * swing], axis=1)
         wrench = loads(rig, angle, turning, gaining)[:, :6] @ (np.eye(6) + rig.transducer.cross_coupling.value).T
     wrench += noise * np.random.default_rng(seed).standard_normal(wrench.shape)
-    if nan:
-        wrench[nan if isinstance(nan, slice) else slice(200, 210), 2] = np.nan
+    if nan is not None:
+        wrench[nan, 2] = np.nan
     sensed = stamp.copy()
     if swapped:
         sensed[[700, 701]] = stamp[[701, 700]]
