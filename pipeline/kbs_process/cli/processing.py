@@ -98,7 +98,7 @@ def _diagnose(campaign: Campaign, results: Path, *, progress: Progress, pdf: boo
 @check_option("a recording has losses, or the model of the rig is wrong")
 @quiet_option
 def validate(campaign: str, check: bool, quiet: bool) -> None:
-    """Check CAMPAIGN's description, read all its recordings through, and fit gravity to them.
+    """Check CAMPAIGN's description, read all its recordings through, and fit gravity to them. Plan its mission, if any.
 
     Exits with 0 if all is well or can be processed, with 2 if something cannot be read, or processing would refuse it.
     """
@@ -107,7 +107,7 @@ def validate(campaign: str, check: bool, quiet: bool) -> None:
     from kbs_process.studies.validate.run import describe
     from kbs_process.studies.validate.run import validate as run
 
-    loaded = load_campaign(find_campaign(campaign))
+    loaded = load_campaign(find_campaign(campaign), mission_alone=True)
     found = run(loaded, progress(quiet))
     say(*describe(loaded, found))
     if found.refused:
