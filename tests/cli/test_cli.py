@@ -330,6 +330,7 @@ def test_validate_hints_at_a_campaign_without_repeats(
     assert hinted in out
 
 
+@pytest.mark.slow
 def test_validate_plans_the_day_of_a_campaign_without_recordings(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
