@@ -1,6 +1,6 @@
 """Search the reference day: hour, argument of latitude, azimuth's zero and planned hand-overs nearest to the paper.
 
-`cd tests && python -m mission.search` prints each better day that it finds; docs/1996.md has the last. What counts:
+`cd tests && python -m mission.search` prints each better day that it finds; docs/1996.md has one. What counts:
 how far sections end from the published times, how far slews stay below the rate limit, and slews too many. The
 archived mission gives all else. Deterministic for a seed.
 """

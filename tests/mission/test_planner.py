@@ -107,6 +107,13 @@ def test_a_planned_hand_over_leaves_a_satellite_that_could_be_held() -> None:
     assert begun[:2] == [("DRS44", 1400.0), ("DRS59", 4300.0)]
 
 
+@pytest.mark.parametrize("begin", [1550.0, 20000.0])
+def test_a_hand_over_that_cannot_begin_is_refused(begin: float) -> None:
+    """The antenna is on its way from 1500 to 1659 s, and the day ends at 14 600 s."""
+    with pytest.raises(MissionError, match="no satellite is tracked then"):
+        plan(replace(reference.mission(), hand_overs=(begin,), cycle=0.5))
+
+
 def test_a_planned_hand_over_waits_for_the_end_of_a_bridge() -> None:
     mission = replace(reference.later(-12.0), cycle=0.5)
     whole = plan(mission).phases

@@ -67,7 +67,8 @@ class Plan:
 def plan(mission: Mission, lead: float = 0.0) -> Plan:
     """Plan the trajectory from `lead` s before the epoch to the end of the mission.
 
-    Raises MissionError where no satellite can be tracked at the beginning or reached later.
+    Raises MissionError where no satellite can be tracked at the beginning or reached later, or none is tracked when a
+    hand-over is planned.
     """
     cycle = mission.cycle
     before, after = round(lead / cycle), round(mission.duration / cycle)
@@ -95,6 +96,13 @@ def plan(mission: Mission, lead: float = 0.0) -> Plan:
         else:
             break
     phases = [Phase(p.mode, p.relay, p.start, min(p.end, n)) for p in phases if p.start < n]
+    for at in planned:
+        if not any(p.start < at <= p.end and p.mode in ("tracking", "zenith") for p in phases):
+            raise MissionError(
+                f"at {(at - before) * cycle:g} s a hand-over is planned, and no satellite is tracked then",
+                where="[[hand_over]]",
+                remedy="plan it while one is tracked, or leave it out",
+            )
     by_name = {one.relay.name: one for one in tracks}
     for phase in phases:
         span = slice(phase.start, phase.end)
