@@ -62,6 +62,21 @@ def test_faults_are_told_with_their_place(changed: Callable[[str, str], Day], ol
     assert message in str(caught.value) and "mission.toml:" in str(caught.value)
 
 
+HAND_OVER = (
+    '[[hand_over]]\nbegin = { value = 4400, unit = "s", sigma = 0.0, source = "planned" }\n\n[[section]]\nname = "1"'
+)
+
+
+def test_planned_hand_overs_are_read(changed: Callable[[str, str], Day]) -> None:
+    assert changed('[[section]]\nname = "1"', HAND_OVER).mission.hand_overs == (4400.0,)
+
+
+def test_a_hand_over_without_a_time_is_told_with_its_place(changed: Callable[[str, str], Day]) -> None:
+    with pytest.raises(ConfigError) as caught:
+        changed('[[section]]\nname = "1"', HAND_OVER.replace('"s"', '"m"'))
+    assert "mission.toml:" in str(caught.value) and "hand_over[1].begin.unit: unit 'm'" in str(caught.value)
+
+
 def test_a_campaign_without_a_mission_says_how_to_give_one() -> None:
     campaign = load_campaign(ROOT / "campaigns" / "EL089", checksums=False)
     with pytest.raises(ConfigError, match="has no mission"):

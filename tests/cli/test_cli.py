@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import json
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -327,6 +328,21 @@ def test_validate_hints_at_a_campaign_without_repeats(
     out = capsys.readouterr().out
     assert ("hint: no trajectory is repeated" in out) == bool(hinted)
     assert hinted in out
+
+
+@pytest.mark.slow
+def test_validate_plans_the_day_of_a_campaign_without_recordings(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "REFDAY"
+    shutil.copytree(EXAMPLE.parent / "REFDAY", folder)
+    assert run("validate", str(folder), "--check", "-q") == 0
+    said = capsys.readouterr().out
+    assert "0 recordings" in said and "mission: 14600 s in 9 sections, 3 slews" in said
+    path = folder / "mission.toml"
+    path.write_text(path.read_text().replace("100000, unit", "30000000, unit"))
+    assert run("validate", str(folder), "-q") == 2
+    assert "no relay satellite can be tracked at the beginning" in capsys.readouterr().out
 
 
 def test_validate_refuses_what_it_cannot_read(folder: CampaignFolder, capsys: pytest.CaptureFixture[str]) -> None:

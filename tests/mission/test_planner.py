@@ -9,11 +9,11 @@ from functools import cache
 import numpy as np
 import pytest
 
+from kbs_process.campaign.mission import boundaries
 from kbs_process.errors import MissionError
 from kbs_process.mission.geometry import azimuth_elevation, line_of_sight
 from kbs_process.mission.model import Mission
 from kbs_process.mission.planner import Plan, plan
-from kbs_process.studies.reference_day.day import boundaries
 from mission import reference
 
 
@@ -97,6 +97,35 @@ def test_a_hand_over_is_as_fast_as_the_limits_allow() -> None:
     turned = abs(planned().q[phase.end, 0] - planned().q[phase.start, 0])
     least = 2.0 * np.sqrt(turned / reference.mission().limits.acceleration)  # from rest to rest
     assert (phase.end - phase.start) * reference.mission().cycle == pytest.approx(least, abs=8.0)
+
+
+def test_a_planned_hand_over_leaves_a_satellite_that_could_be_held() -> None:
+    mission = replace(reference.mission(), hand_overs=(1400.0, 4300.0), cycle=0.5)
+    made = plan(mission)
+    in_limits(made, mission)
+    begun = [(phase.relay, made.t[phase.start]) for phase in made.phases if phase.mode == "hand-over"]
+    assert begun[:2] == [("DRS44", 1400.0), ("DRS59", 4300.0)]
+
+
+@pytest.mark.parametrize("begin", [1550.0, 20000.0])
+def test_a_hand_over_that_cannot_begin_is_refused(begin: float) -> None:
+    """The antenna is on its way from 1500 to 1659 s, and the day ends at 14 600 s."""
+    with pytest.raises(MissionError, match="no satellite is tracked then"):
+        plan(replace(reference.mission(), hand_overs=(begin,), cycle=0.5))
+
+
+def test_a_planned_hand_over_waits_for_the_end_of_a_bridge() -> None:
+    mission = replace(reference.later(-12.0), cycle=0.5)
+    whole = plan(mission).phases
+    at = next(index for index, phase in enumerate(whole) if phase.mode == "zenith")
+    bridge = whole[at]
+    inside = 0.5 * (bridge.start + bridge.end) * mission.cycle
+    made = plan(replace(mission, hand_overs=(inside,)))
+    in_limits(made, mission)
+    assert made.phases[: at + 1] == whole[: at + 1]
+    last, slew = made.phases[at + 1 : at + 3]  # it leaves from the track, not from the bridge
+    assert (last.relay, last.start, last.end) == ("DRS59", bridge.end, bridge.end + 1)
+    assert (slew.relay, slew.start) == ("DRS44", bridge.end + 1)
 
 
 def test_the_antenna_takes_its_time_to_a_satellite_that_has_yet_to_rise() -> None:

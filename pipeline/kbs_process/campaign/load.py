@@ -27,20 +27,23 @@ from kbs_process.rig.model import Rig
 from kbs_process.signals.records import WRENCH_CHANNELS, WRENCH_UNITS
 
 
-def load_campaign(folder: Path, *, checksums: bool = True, flight: bool = False, recordings: bool = True) -> Campaign:
+def load_campaign(
+    folder: Path, *, checksums: bool = True, flight: bool = False, recordings: bool = True, mission_alone: bool = False
+) -> Campaign:
     """Read and check the campaign in `folder`.
 
     Raises ConfigError with the file, the key and the remedy of up to five faults. `checksums` says
     whether recordings are read through to compare the SHA-256 that the campaign states; with `flight`, the
     parameters of the flight model take the place of those of the test, and the laboratory stays behind. Without
-    `recordings` there need be none in a campaign with a mission, and those that are listed need not be there.
+    `recordings` there need be none in a campaign with a mission, and those that are listed need not be there; with
+    `mission_alone` there need be none either, and those that are listed are checked.
     """
     folder = folder.absolute()
     problems = Problems(subject=str(folder))
     document = read(
         folder / CAMPAIGN_FILE, role="the campaign's description", remedy="name a folder that holds a campaign.toml"
     )
-    if "recording" not in document.tree and (recordings or "mission" not in document.tree):
+    if "recording" not in document.tree and ("mission" not in document.tree or (recordings and not mission_alone)):
         remedy = "add [[recording]], or simulate the campaign's mission: kbs-process reference-day"
         problems.add(document.place(("recording",)), "is missing: there is nothing to read", remedy)
     file = checked(document, CampaignFile, problems)

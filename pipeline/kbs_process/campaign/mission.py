@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from kbs_process.campaign.config import Campaign, PointingRequirement
-from kbs_process.campaign.documents import Document, read
+from kbs_process.campaign.documents import Document, dotted, read
 from kbs_process.campaign.formats.faults import checked
 from kbs_process.campaign.formats.mission_file import LimitsTable, MissionFile, OrbitTable, SectionEntry
 from kbs_process.campaign.formats.tables import Table, quantities
@@ -17,6 +17,7 @@ from kbs_process.campaign.quantities import quantity_or_fault
 from kbs_process.campaign.requirements import pointing
 from kbs_process.errors import ConfigError
 from kbs_process.mission.model import Limits, Mission, Orbit, Relay
+from kbs_process.mission.planner import Plan
 from kbs_process.rig.model import Quantity
 
 
@@ -54,6 +55,7 @@ def load_day(campaign: Campaign) -> Day:
     mounting = reader.quantities(file.mounting, "mounting")
     limits = _limits(reader, file.limits)
     day = reader.numbers(file.day, "day")
+    hand_overs = [reader.numbers(one, "hand_over", index)["begin"] for index, one in enumerate(file.hand_over)]
     requirements = tuple(
         pointing(table, ("requirement", index), document, problems) for index, table in enumerate(file.requirement)
     )
@@ -69,6 +71,7 @@ def load_day(campaign: Campaign) -> Day:
             grazing_height=float(mounting["grazing_height"]),
             duration=day["duration"],
             cycle=float(campaign.rig.controller.cycle),
+            hand_overs=tuple(hand_overs),
         ),
         sections=tuple(file.section),
         requirements=requirements,
@@ -76,6 +79,30 @@ def load_day(campaign: Campaign) -> Day:
         smoothing=day["smoothing"],
         quantities=tuple(reader.found),
     )
+
+
+def boundaries(day: Day, planned: Plan) -> list[tuple[SectionEntry, float, float]]:
+    """Return each section with its start and end: the event of its kind that is nearest to the time it is given.
+
+    Raises ConfigError where there is no such event after the section's start.
+    """
+    found: list[tuple[SectionEntry, float, float]] = []
+    start = 0.0
+    for index, entry in enumerate(day.sections):
+        times = [event.t for event in planned.events if event.kind == entry.until and event.t > start]
+        if entry.until == "end":
+            times = [day.mission.duration]
+        if not times:
+            raise ConfigError(
+                f"section {entry.name} ends with '{entry.until}', and after {start:.0f} s there is none",
+                where=f"{day.path}: section[{index + 1}].until",
+                remedy="choose another event: the trajectory has "
+                + ", ".join(f"{event.kind} at {event.t:.0f} s" for event in planned.events),
+            )
+        end = min(times, key=lambda t: abs(t - entry.near))
+        found.append((entry, start, end))
+        start = end
+    return found
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,18 +113,18 @@ class _Reader:
     problems: Problems
     found: list[Quantity]
 
-    def quantities(self, table: Table, *key: str) -> dict[str, Quantity]:
+    def quantities(self, table: Table, *key: str | int) -> dict[str, Quantity]:
         """Return all quantities of the table at `key`, by their names in it."""
         own = {}
         for name, kind, given in quantities(table):
-            own[name], fault = quantity_or_fault(".".join((*key, name)), given, kind, self.document.path.parent)
+            own[name], fault = quantity_or_fault(dotted((*key, name)), given, kind, self.document.path.parent)
             if fault:
                 place = self.document.place((*key, name, fault.where))
                 self.problems.add(place, fault.what, fault.remedy)
         self.found.extend(own.values())
         return own
 
-    def numbers(self, table: Table, *key: str) -> dict[str, float]:
+    def numbers(self, table: Table, *key: str | int) -> dict[str, float]:
         """Return them as numbers."""
         return {name: float(quantity) for name, quantity in self.quantities(table, *key).items()}
 

@@ -101,7 +101,7 @@ def _diagnose(campaign: Campaign, results: Path, *, progress: Progress, pdf: boo
 @json_option
 @quiet_option
 def validate(campaign: str, check: bool, as_json: bool, quiet: bool) -> None:
-    """Check CAMPAIGN's description, read all its recordings through, and fit gravity to them.
+    """Check CAMPAIGN's description, read all its recordings through, and fit gravity to them. Plan its mission, if any.
 
     Of what `init` began, list what is still to be put in.
     Exits with 0 if all is well or can be processed, with 2 if something cannot be read, or processing would refuse it.
@@ -116,7 +116,7 @@ def validate(campaign: str, check: bool, as_json: bool, quiet: bool) -> None:
     if (folder / MAPPING_FILE).is_file():
         say(*check_description(folder))
         return
-    loaded = load_campaign(folder)
+    loaded = load_campaign(folder, mission_alone=True)
     found = run(loaded, progress(quiet))
     if as_json:
         say_json(found)

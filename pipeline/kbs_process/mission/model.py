@@ -57,3 +57,4 @@ class Mission:
     grazing_height: float  # m above the equatorial radius, below which a line of sight counts as occulted
     duration: float  # s
     cycle: float  # s, between commands
+    hand_overs: tuple[float, ...] = ()  # s, when a satellite is left for another although it could be held

@@ -1,9 +1,9 @@
 """The trajectory of a day: which satellite is tracked when, and how the antenna gets from one to the next.
 
 Rules. A satellite is held until it is lost: behind the Earth, out of the mechanism's range, or faster than the
-mechanism. Then the antenna goes to the satellite that it can be tracking first, by both axes at once: a
-hand-over, if that one is in view already, as fast as the limits allow; else pre-pointing to where it will rise, in
-all the time there is.
+mechanism; or until a hand-over to another is planned. Then the antenna goes to the satellite that it can be tracking
+first, by both axes at once: a hand-over, if that one is in view already, as fast as the limits allow; else
+pre-pointing to where it will rise, in all the time there is.
 """
 
 from __future__ import annotations
@@ -67,7 +67,8 @@ class Plan:
 def plan(mission: Mission, lead: float = 0.0) -> Plan:
     """Plan the trajectory from `lead` s before the epoch to the end of the mission.
 
-    Raises MissionError where no satellite can be tracked at the beginning or reached later.
+    Raises MissionError where no satellite can be tracked at the beginning or reached later, or none is tracked when a
+    hand-over is planned.
     """
     cycle = mission.cycle
     before, after = round(lead / cycle), round(mission.duration / cycle)
@@ -79,19 +80,29 @@ def plan(mission: Mission, lead: float = 0.0) -> Plan:
     offset = np.empty(len(t))
     phases: list[Phase] = []
     k, current = 0, _first(tracks)
+    planned = [before + round(begin / cycle) for begin in mission.hand_overs]
     while True:
         lost = _lost(current, k)
-        q[k:lost] = current.q[k:lost]
-        phases.extend(_modes(current, k, lost))
-        if lost < n:
-            arrival, target, path = _next(tracks, current, lost - 1, mission)
-            q[lost:arrival] = path[1:]
-            mode: Mode = "hand-over" if target.in_view[lost] else "pre-pointing"
-            phases.append(Phase(mode, target.relay.name, lost, arrival))
+        left = _left(current, k, lost, planned)
+        others = [one for one in tracks if one is not current] if left < lost else tracks
+        q[k:left] = current.q[k:left]
+        phases.extend(_modes(current, k, left))
+        if left < n:
+            arrival, target, path = _next(others, current, left - 1, mission)
+            q[left:arrival] = path[1:]
+            mode: Mode = "hand-over" if target.in_view[left] else "pre-pointing"
+            phases.append(Phase(mode, target.relay.name, left, arrival))
             current, k = target, arrival
         else:
             break
     phases = [Phase(p.mode, p.relay, p.start, min(p.end, n)) for p in phases if p.start < n]
+    for at in planned:
+        if not any(p.start < at <= p.end and p.mode in ("tracking", "zenith") for p in phases):
+            raise MissionError(
+                f"at {(at - before) * cycle:g} s a hand-over is planned, and no satellite is tracked then",
+                where="[[hand_over]]",
+                remedy="plan it while one is tracked, or leave it out",
+            )
     by_name = {one.relay.name: one for one in tracks}
     for phase in phases:
         span = slice(phase.start, phase.end)
@@ -117,6 +128,12 @@ def _lost(track: Track, k: int) -> int:
     """First cycle from k on in which the satellite cannot be tracked; the number of cycles where there is none."""
     gone = np.flatnonzero(~track.usable[k:])
     return k + int(gone[0]) if len(gone) else len(track.usable)
+
+
+def _left(track: Track, k: int, lost: int, planned: list[int]) -> int:
+    """First cycle after k in which a hand-over is planned and no bridge under way, at most `lost`."""
+    free = [at + np.flatnonzero(~track.bridged[at - 1 : lost]) for at in planned if k < at < lost]
+    return min((int(at[0]) for at in free if len(at)), default=lost)
 
 
 def _modes(track: Track, start: int, end: int) -> list[Phase]:

@@ -87,6 +87,12 @@ class DayTable(Table):
     smoothing: Duration = Field(description="averaging time that divides slow variation from random error")
 
 
+class HandOverTable(Table):
+    """A satellite is left for another, although it could be held."""
+
+    begin: Time = Field(description="when; at once after a bridge over the zenith, if that is under way")
+
+
 class DayRequirementTable(Table):
     """A limit on the pointing error."""
 
@@ -134,5 +140,6 @@ class MissionFile(Table):
     mounting: MountingTable
     limits: LimitsTable
     day: DayTable
+    hand_over: list[HandOverTable] = Field([], description="planned; without any, a satellite is held until lost")
     requirement: list[DayRequirementTable] = Field([])
     section: Some[SectionEntry]

@@ -9,8 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kbs_process.campaign.config import Campaign, PointingRequirement
-from kbs_process.campaign.formats.mission_file import SectionEntry
-from kbs_process.campaign.mission import Day
+from kbs_process.campaign.mission import Day, boundaries
 from kbs_process.errors import ConfigError
 from kbs_process.mission.planner import Plan
 from kbs_process.reduction.analysis import bands_of, passband
@@ -80,30 +79,6 @@ def assess(campaign: Campaign, day: Day, planned: Plan, angle: Signal, wrench: S
         ),
         whole=tuple(map(estimate, pointing.statistics(boresight, period, day.smoothing))),
     )
-
-
-def boundaries(day: Day, planned: Plan) -> list[tuple[SectionEntry, float, float]]:
-    """Return each section with its start and end: the event of its kind that is nearest to the time it is given.
-
-    Raises ConfigError where there is no such event after the section's start.
-    """
-    found: list[tuple[SectionEntry, float, float]] = []
-    start = 0.0
-    for index, entry in enumerate(day.sections):
-        times = [event.t for event in planned.events if event.kind == entry.until and event.t > start]
-        if entry.until == "end":
-            times = [day.mission.duration]
-        if not times:
-            raise ConfigError(
-                f"section {entry.name} ends with '{entry.until}', and after {start:.0f} s there is none",
-                where=f"{day.path}: section[{index + 1}].until",
-                remedy="choose another event: the trajectory has "
-                + ", ".join(f"{event.kind} at {event.t:.0f} s" for event in planned.events),
-            )
-        end = min(times, key=lambda t: abs(t - entry.near))
-        found.append((entry, start, end))
-        start = end
-    return found
 
 
 def _modes(planned: Plan, start: float, end: float) -> tuple[str, ...]:

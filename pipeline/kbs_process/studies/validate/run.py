@@ -6,7 +6,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 from kbs_process.campaign.config import Campaign, RecordingEntry
+from kbs_process.campaign.mission import boundaries, load_day
 from kbs_process.errors import KbsError, RecordingError
+from kbs_process.mission.planner import plan
 from kbs_process.progress import Progress
 from kbs_process.reduction.losses import in_words
 from kbs_process.reduction.measurable import check_requirements
@@ -40,6 +42,7 @@ class Validation:
     findings: tuple[Finding, ...]
     refusal: str = ""
     notices: tuple[Notice, ...] = ()  # what is wrong with the model of the rig
+    day: str = ""  # what is planned, where there is a mission
 
     @property
     def refused(self) -> bool:
@@ -47,7 +50,11 @@ class Validation:
 
 
 def validate(campaign: Campaign, progress: Progress) -> Validation:
-    """Read every recording of the campaign to its end; if all can, fit gravity and compare it with the files."""
+    """Read every recording of the campaign to its end; if all can, fit gravity and compare it with the files.
+
+    The day of a mission is planned and cut into its sections.
+    """
+    day = ""
     decoupling = decouple.fit(campaign.rig)
     findings: list[Finding] = []
     prepared: list[Prepared] = []
@@ -63,8 +70,10 @@ def validate(campaign: Campaign, progress: Progress) -> Validation:
     losses = {one.entry.name: one.run.losses for one in told_copies(prepared)}
     findings = [replace(finding, losses=losses.get(finding.name, ())) for finding in findings]
     try:
-        check_requirements(campaign)
-        if len(prepared) == len(findings):
+        day = _planned(campaign) if campaign.mission else ""
+        if findings:
+            check_requirements(campaign)
+        if findings and len(prepared) == len(findings):
             model = fit_gravity(campaign, prepared, progress)
             findings = [
                 replace(finding, error=_untared(campaign, one, model))
@@ -74,7 +83,15 @@ def validate(campaign: Campaign, progress: Progress) -> Validation:
                 notices = tuple(check_model(campaign, prepared, model, progress).notices())
     except KbsError as error:
         return Validation(tuple(findings), str(error))
-    return Validation(tuple(findings), notices=notices)
+    return Validation(tuple(findings), notices=notices, day=day)
+
+
+def _planned(campaign: Campaign) -> str:
+    day = load_day(campaign)
+    planned = plan(day.mission, day.lead)
+    sections = boundaries(day, planned)
+    slews = sum(phase.mode in ("hand-over", "pre-pointing") for phase in planned.phases)
+    return f"mission: {day.mission.duration:g} s in {len(sections)} sections, {slews} slews between relay satellites"
 
 
 def _untared(campaign: Campaign, one: Prepared, model: GravityModel) -> str:
@@ -95,7 +112,7 @@ def describe(campaign: Campaign, validation: Validation) -> Iterator[str]:
         f"  {len(rig.quantities())} quantities, joints {', '.join(rig.joint_names)}, "
         f"channels {', '.join(rig.channels)}, driven by {campaign.drive}"
     )
-    width = max(len(finding.name) for finding in findings)
+    width = max((len(finding.name) for finding in findings), default=0)
     for finding in findings:
         state = "unreadable" if finding.error else "lossy" if finding.lossy else "clean"
         rates = ", ".join(f"{key} {rate:.5g} Hz" for key, rate in sorted(finding.rates.items()))
@@ -108,6 +125,8 @@ def describe(campaign: Campaign, validation: Validation) -> Iterator[str]:
     lossy = sum(finding.lossy for finding in findings)
     recordings = "recording" if len(findings) == 1 else "recordings"
     yield f"{len(findings)} {recordings}: {bad} unreadable, {lossy} with losses"
+    if validation.day:
+        yield validation.day
     if validation.refusal:
         yield from f"cannot be processed: {validation.refusal}".split("\n")
     for notice in validation.notices:
