@@ -25,7 +25,7 @@ from proof.rivals.smoother.drive import spring
 from proof.rivals.smoother.fit import Quadratic, State
 from proof.rivals.smoother.lines import proposed
 from proof.rivals.smoother.problem import Problem
-from proof.rivals.smoother.splines import in_band
+from proof.rivals.smoother.splines import BAND_HZ, in_band
 
 _TAPS_HZ = 100.0
 _KNOT_S = 1.0  # between poses at which ports are worked out
@@ -191,7 +191,9 @@ class Screen:
         for _ in range(_ROUNDS if len(places) > 1 else 1):
             before = one.gain
             for place in places:
-                one = self._along(one, known, place, free[one.candidate.shape[place][0]].bounds)
+                entry = free[one.candidate.shape[place][0]]
+                low, high = entry.bounds
+                one = self._along(one, known, place, (low, min(high, BAND_HZ) if entry.unit == "Hz" else high))
             if one.gain < (1.0 + _SETTLED) * before:
                 break
         return one
@@ -203,19 +205,18 @@ class Screen:
             (found,) = self.scored([replace(one.candidate, shape=tuple(shape))], known)
             return found
 
-        value = one.candidate.shape[place][1]
-        step, best = _FIRST_STEP * max(abs(value), _FIRST_STEP), one
+        step, best = _FIRST_STEP * max(abs(one.candidate.shape[place][1]), _FIRST_STEP), one
         for _ in range(_HALVINGS):
-            sides = at(value - step), at(value + step)
-            best = max(best, *sides, key=lambda found: found.gain)
-            if min(side.gain for side in sides) > _NEAR * best.gain:
-                low, high = (side.gain for side in sides)
-                middle = at(value).gain
-                bend = low - 2.0 * middle + high
-                if best.gain <= middle and bend < 0.0:
-                    return max(best, at(value + 0.5 * step * (low - high) / bend), key=lambda found: found.gain)
             value = best.candidate.shape[place][1]
-            step *= 0.5
+            low, high = at(value - step), at(value + step)
+            if max(low.gain, high.gain) <= best.gain < min(low.gain, high.gain) / _NEAR:
+                bend = low.gain - 2.0 * best.gain + high.gain
+                if bend == 0.0:
+                    return best
+                return max(best, at(value + 0.5 * step * (low.gain - high.gain) / bend), key=lambda found: found.gain)
+            if max(low.gain, high.gain) <= best.gain:
+                step *= 0.5
+            best = max(best, low, high, key=lambda found: found.gain)
         return best
 
     def predicted(self, one: Scored, known: Sequence[Candidate] = ()) -> float:

@@ -33,12 +33,13 @@ SETTLED = 100.0  # sigmas of all unknowns together that a step goes, below which
 ARRIVED = 3.0  # below which it is the last
 CHANGE = (0.3, 1.5)  # of a force's sigma in a step
 KNOWN = 0.2  # of its logarithm, below which a force's sigma is known
-DETECTED = 100.0  # of the cost, that an effect takes
+DETECTED = 400.0  # of the cost, that an effect takes of all recordings: what the equations here leave out takes less
 SHARE = 0.25  # of its gain for each sample, that an effect of each recording's own has on recordings held out
 FORETOLD = 0.5  # of what another would take there, that it takes
 MOST = 3  # effects
 OFF = 4.0  # sigmas
 LEADERS = 12  # laws at a place, of which shapes are refined and recordings held out are asked
+BEHIND = 0.2  # of the first's worth, with less of which one is no leader
 NEXT = 2  # alternatives that are named
 ALIKE = 9.0  # of the cost: what differs by less is not told apart
 
@@ -138,7 +139,8 @@ def _first_of_each(scored: Sequence[Scored]) -> list[Scored]:
     first: dict[tuple[str, str], Scored] = {}
     for one in scored:
         first.setdefault((one.candidate.name, one.candidate.site), one)
-    return list(first.values())[:LEADERS]
+    leaders = list(first.values())[:LEADERS]
+    return [one for one in leaders if one.worth > BEHIND * leaders[0].worth]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
