@@ -15,6 +15,7 @@ from kbs_process.diagnosis.screening.ranges import ranges_of
 from kbs_process.diagnosis.screening.signature import inputs, reduced, sensed
 from kbs_process.diagnosis.screening.suspects import Candidate, candidates
 from kbs_process.plant.compiled.taps import tap_columns
+from kbs_process.plant.effect import Parameter
 from kbs_process.plant.laws import select
 from kbs_process.plant.linear.linearise import linearise
 from kbs_process.rig.model import Rig
@@ -45,12 +46,13 @@ class Scored:
     gain: float  # over that of the known alone
     freedom: int  # amplitudes that make a difference
     amplitudes: Array  # of the known and this one that all recordings share, one after the other
+    likely: float = 0.0  # of amplitudes of this size, beforehand; see `_likely`
     foreseen: float = 0.0  # what these amplitudes take on recordings held out
 
     @property
     def worth(self) -> float:
         """Of all recordings; gain less what numbers that mean nothing would have."""
-        return evidence(self.gain, self.freedom) + self.foreseen
+        return evidence(self.gain, self.freedom) + self.likely + self.foreseen
 
 
 def evidence(gain: float, freedom: int) -> float:
@@ -278,7 +280,9 @@ class Screen:
             gain, amplitudes, freedom = _best(square[np.ix_(places, places)], right[places], size[places])
             if before is not None:
                 gain, freedom = gain - before[0], freedom - before[2]
-            yield Scored(one, gain, freedom, amplitudes[~found.own[places]])
+            mine = amplitudes[found.owner[places] == number].reshape(-1, len(one.amplitudes))
+            likely = _likely(one.amplitudes, np.sqrt(np.mean(mine**2, axis=0)))
+            yield Scored(one, gain, freedom, amplitudes[~found.own[places]], likely)
 
     def _beside(self, found: _Products) -> tuple[Array, Array]:
         """Squares and products with the residual, once all numbers have had their part."""
@@ -320,6 +324,16 @@ def _best(square: Array, right: Array, size: Array) -> tuple[float, Array, int]:
     along = vectors[:, seen].T @ (right / size)
     amplitudes = vectors[:, seen] @ (along / values[seen]) / size
     return float(np.sum(along**2 / values[seen])), amplitudes, int(seen.sum())
+
+
+def _likely(entries: Sequence[Parameter], size: Array) -> float:
+    """Twice the logarithm of how likely amplitudes of a `size` are, against their priors' middles, with Cauchy's tails.
+
+    A motor's torque that would turn the gear as its own error does is out of all proportion; nothing else tells them
+    apart in the band.
+    """
+    spread = np.array([entry.prior.spread for entry in entries])
+    return float(-2.0 * np.sum(np.log1p((size / spread) ** 2)))
 
 
 def _batches(chosen: Sequence[Candidate], known: Sequence[Candidate]) -> Iterator[list[Candidate]]:
