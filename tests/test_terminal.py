@@ -17,6 +17,7 @@ from kbs_process.errors import ConfigError, RecordingError
 from kbs_process.progress import PlainProgress, TerminalProgress
 from kbs_process.recordings.mcap.source import open_recording
 from kbs_process.recordings.mcap.streams import Stream
+from kbs_process.studies.convert.begin import begin
 from kbs_process.studies.convert.describe import describe
 from kbs_process.terminal import printable
 
@@ -78,18 +79,21 @@ def test_no_name_of_a_file_makes_a_line(verb: list[str], tmp_path: Path) -> None
     assert not any(line.startswith("fake") for line in ran.stderr.splitlines())
 
 
-def test_a_description_of_columns_is_a_mapping_whatever_names_are(tmp_path: Path) -> None:
-    names = ["time\x7f\u2028", "\x1b]0;owned\x07\u202e\r\nfake = 1", 'quo"te\\', "N\n[wrench]"]
+def test_what_is_begun_is_a_mapping_whatever_names_are(tmp_path: Path) -> None:
+    names = ["time\x7f\u2028", "\x1b]0;owned\x07\u202e\r\nfake = 1", 'quo"te\\ angle', "N\n[wrench]", "fx"]
     source = tmp_path / "a\x1b[2J\n[fake].h5"
     with h5py.File(source, "w") as file:
         for name in names:
-            file.create_dataset(name, data=[1.0, 2.0]).attrs["unit"] = "N\nfake = 2"
-    text = describe(source)
-    tree = tomllib.loads(text)
-    assert set(tree) == {"schema", "campaign", "time", "wrench", "encoder", "recording"}
-    assert tree["recording"][0]["source"] == source.name
-    assert tree["time"]["column"] == "time\x7f\u2028"
-    assert all(line.isprintable() for line in text.splitlines())
+            file.create_dataset(name, data=[1.0, 2.0, 4.0]).attrs["unit"] = "N" if name == "fx" else "N\nfake = 2"
+    assert all(line.isprintable() for line in describe(source).splitlines())
+    list(begin(tmp_path / "made", [source]))
+    trees = {path.stem: tomllib.loads(path.read_text()) for path in (tmp_path / "made").glob("*.toml")}
+    assert set(trees["mapping"]) == {"schema", "campaign", "time", "wrench", "encoder", "recording"}
+    assert trees["mapping"]["recording"][0]["source"] == source.name
+    assert trees["mapping"]["time"]["column"] == "time\x7f\u2028"
+    assert set(trees["rig"]) == {"gravity", "transducer", "joint", "body"}
+    for path in (tmp_path / "made").glob("*.toml"):
+        assert all(line.isprintable() for line in path.read_text().splitlines())
 
 
 def test_errors_show_names_without_their_commands(tmp_path: Path) -> None:

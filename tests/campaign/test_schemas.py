@@ -23,7 +23,7 @@ def stored(name: str) -> Path:
 @pytest.mark.parametrize("name", FORMATS)
 def test_the_committed_schema_is_the_one_of_the_format(name: str) -> None:
     text = schema_text(name)
-    assert stored(name).read_text(encoding="utf-8") == text, f"python -m kbs_process.studies {name}"
+    assert stored(name).read_text(encoding="utf-8") == text, f"kbs-process schema {name}"
     jsonschema.Draft202012Validator.check_schema(json.loads(text))
 
 

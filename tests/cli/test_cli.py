@@ -492,3 +492,21 @@ def test_the_installed_command_runs() -> None:
     command = [sys.executable, "-m", "kbs_process", "--version"]
     done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=EXAMPLE)
     assert done.stdout.startswith("kbs-process, version ")
+
+
+def test_inspect_and_validate_speak_to_programs(folder: CampaignFolder, capsys: pytest.CaptureFixture[str]) -> None:
+    recording = next((folder.path / "recordings").iterdir())
+    assert run("inspect", "--json", str(recording)) == 0
+    (one,) = json.loads(capsys.readouterr().out)
+    assert (one["state"], one["path"]) == ("clean", str(recording))
+    assert {topic["topic"]: topic["count"] for topic in one["topics"]}["/transducer/wrench"] == 400
+    assert run("validate", "--json", "-q", str(folder.path)) in (0, 2)
+    findings = json.loads(capsys.readouterr().out)["findings"]
+    assert {one["name"] for one in findings} == {path.stem for path in (folder.path / "recordings").iterdir()}
+
+
+def test_a_schema_is_printed_or_its_name_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("schema", "import") == 0
+    assert json.loads(capsys.readouterr().out)["title"].startswith("mapping")
+    assert run("schema", "campain") == cli.BAD_INPUT
+    assert "did you mean 'campaign'?" in capsys.readouterr().err

@@ -48,12 +48,17 @@ class DriveNumbers(NamedTuple):
     phi_stat: float
     fsv: float
     Ka: float
+    kinematic_sin: float = 0.0
+    kinematic_cos: float = 0.0
+    kinematic_order: float = 2.0  # periods in a turn of the wave generator
 
 
 def drive_numbers(hardware: Hardware, axis: str) -> DriveNumbers:
     """Collect the numbers of one axis's drive."""
     named = {"Jr": "rotor_inertia", "R": "ratio", "microsteps": "steps_per_turn"}
-    return DriveNumbers(*(hardware.drive(axis, named.get(field, field)) for field in DriveNumbers._fields))
+    places = {field: f"joint.{axis}.drive.{named.get(field, field)}" for field in DriveNumbers._fields}
+    given = {field: hardware.scalar(place) for field, place in places.items() if place in hardware.values}
+    return DriveNumbers(**given)
 
 
 @njit(error_model="numpy")
@@ -74,6 +79,14 @@ def motor_torque(p: DriveNumbers, th_r: float, field_0: float, field_1: float) -
         lasts = min(high, NN + 0.5) - max(low, NN - 0.5)
         total += lasts * np.sin(_ELECTRICAL * NN - p.Kangle * th_r)
     return p.Tmax * total / (high - low)
+
+
+@njit(error_model="numpy")
+def gear_error(p: DriveNumbers, th_r: float) -> tuple[float, float]:
+    """What the output turns beyond th_r / R, rad, and its slope: phi = th_r / R + amplitude sin(n th_r + phase)."""
+    amplitude = np.hypot(p.kinematic_sin, p.kinematic_cos)
+    angle = p.kinematic_order * th_r + np.arctan2(p.kinematic_cos, p.kinematic_sin)
+    return amplitude * np.sin(angle), amplitude * p.kinematic_order * np.cos(angle)
 
 
 @njit(error_model="numpy")
@@ -199,12 +212,14 @@ def run_cycle(
             th_r, th_l = qpos[rotor], qpos[rotor + 1]
             w_r = qvel[rotor] + 0.5 * dt * qacc[rotor]
             w_l = qvel[rotor + 1] + 0.5 * dt * qacc[rotor + 1]
-            T_gear = p.fsv * (w_r / p.R - w_l) + p.Ka * (th_r / p.R - th_l)
+            beyond, slope = gear_error(p, th_r)
+            T_gear = p.fsv * (w_r / p.R + slope * w_r - w_l) + p.Ka * (th_r / p.R + beyond - th_l)
             travel = field[1, axis] - field[0, axis]
             T = motor_torque(
                 p, th_r, field[0, axis] + travel * (n / steps), field[0, axis] + travel * ((n + 1) / steps)
             )
             T += p.tcog * np.sin(_STEPS * th_r + p.phi_cog) - T_gear / p.R
+            T -= T_gear * slope  # virtual work: the rotor turns the output by 1/R + slope
             if acts:
                 T += out[rotor]
             qfrc[rotor] = T - friction_torque(p, T, th_r, qvel[rotor], dt, out[22 + axis])

@@ -114,6 +114,10 @@ class Hardware:
             values[name] = np.broadcast_to(np.asarray(value, dtype=float), values[name].shape).copy()
         return replace(self, values=values, **settings)
 
+    def having(self, more: Mapping[str, Array]) -> Hardware:
+        """Return the same hardware with numbers that its parameter files do not name."""
+        return replace(self, values={**self.values, **more})
+
     def __getitem__(self, name: str) -> Array:
         return self.values[name]
 

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.optimize import root
 from scipy.signal import butter, sosfilt, sosfilt_zi
 
-from engine.drive import copy_bodies, drive_numbers, motor_torque, pull_at, run_cycle
+from engine.drive import copy_bodies, drive_numbers, gear_error, motor_torque, pull_at, run_cycle
 from engine.hardware import AXES, Array, Hardware
 from engine.ports import BODY, GENERALISED, NONE, ON_ANTENNA, ON_AZIMUTH, OUT, Extra
 from engine.rigid import AZ, EL, HOOK, PLATE, ROTOR_AZ, ROTOR_EL, RigidModel, build, mj_step_function
@@ -178,9 +178,10 @@ def equilibrium(hardware: Hardware, rigid: RigidModel, angles: Array, extra: Ext
             pull_at(cord, _hook(hardware, rigid), centre, data.xfrc_applied[rigid.antenna])
         for axis, p in enumerate(drives):
             rotor = 3 + 2 * axis
-            T_gear = p.Ka * (q[rotor] / p.R - q[rotor + 1])
+            beyond, slope = gear_error(p, q[rotor])
+            T_gear = p.Ka * (q[rotor] / p.R + beyond - q[rotor + 1])
             T = motor_torque(p, q[rotor], p.R * angles[axis], p.R * angles[axis])
-            data.qfrc_applied[rotor] = T + p.tcog * np.sin(200 * q[rotor] + p.phi_cog) - T_gear / p.R
+            data.qfrc_applied[rotor] = T + p.tcog * np.sin(200 * q[rotor] + p.phi_cog) - T_gear / p.R - T_gear * slope
             data.qfrc_applied[rotor + 1] = T_gear
         if extra.acts:
             motion[0] = q

@@ -128,11 +128,19 @@ def energy(rig: Rig, m: Motion, field: Array) -> tuple[float, float]:
         value = {name: float(q) for name, q in drive.parameters.items()}
         R = float(drive.ratio)
         kinetic += 0.5 * float(drive.rotor_inertia) * m.spin[i] ** 2
-        windup = m.theta[i] / R - m.coordinates[3 + i]
+        windup = m.theta[i] / R + gear_error(value, m.theta[i]) - m.coordinates[3 + i]
         lag = value["Kangle"] * (field[i] - m.theta[i])
         cogging = value["tcog"] / 200.0 * np.cos(200.0 * m.theta[i] + value["phi_cog"])
         potential += 0.5 * value["Ka"] * windup**2 - value["Tmax"] / value["Kangle"] * np.cos(lag) + cogging
     return kinetic, potential
+
+
+def gear_error(value: dict[str, float], theta: float) -> float:
+    """What a gear turns its output by beyond theta over its ratio."""
+    if "kinematic_sin" not in value:
+        return 0.0
+    angle = value["kinematic_order"] * theta
+    return value["kinematic_sin"] * np.sin(angle) + value["kinematic_cos"] * np.cos(angle)
 
 
 def dissipation(rig: Rig, m: Motion) -> float:
@@ -142,6 +150,7 @@ def dissipation(rig: Rig, m: Motion) -> float:
         power += rig.transducer.damping.value @ m.rates[:3] ** 2
     for i, joint in enumerate(rig.joints):
         value = {name: float(q) for name, q in joint.drive.parameters.items()}
-        slip = m.rotor_rates[i] / float(joint.drive.ratio) - m.rates[3 + i]
+        ahead, behind = (gear_error(value, m.theta[i] + s * H) for s in (1, -1))
+        slip = m.rotor_rates[i] * (1.0 / float(joint.drive.ratio) + (ahead - behind) / (2 * H)) - m.rates[3 + i]
         power += value["fsv"] * slip**2 + value["b_m"] * m.rotor_rates[i] ** 2
     return float(power)

@@ -116,6 +116,7 @@ def doubts(
     known: slice | np.ndarray = slice(20, -20),
     unclear: tuple[Stretch, ...] = (),
     rate: float = 20.0,
+    streams: dict[str, Readings] | None = None,
 ) -> list[str]:
     """Why EL089's requirement, up to 1 Hz, is not judged by two minutes with gaps, s, where they are `known`."""
     campaign = archived.campaign("EL089", recordings=False)
@@ -124,10 +125,19 @@ def doubts(
     values = noise(2400)
     loads = Signal(0.0, 0.05, values, WRENCH_CHANNELS, WRENCH_UNITS, "T", valid)
     run = SimpleNamespace(
-        loads=loads, gaps=np.array(gaps).reshape(-1, 2), losses=(), rates={"angle": rate}, stretches=unclear
+        loads=loads, gaps=np.array(gaps).reshape(-1, 2), losses=(), rates={"angle": rate}, stretches=unclear, reach=1.0
     )
-    found = hidden(campaign, campaign.requirements[0], "test", run, valid, {"angle": Readings()})
-    return [one.why for one in found if not one.of_failed]
+    found = hidden(campaign, campaign.requirements[0], "test", run, valid, streams or {"angle": Readings()})
+    return [one.why for one in found if streams or not one.of_failed]
+
+
+def test_held_readings_need_more_a_second_than_those_that_come_once() -> None:
+    t = np.arange(0.0, 120.0, 0.01)
+    held = {rate: noise(len(t))[np.arange(len(t)) // (100 // rate) * (100 // rate)] for rate in (5, 10)}
+    (why,) = doubts([], streams={"wrench": read(t, held[5])}, rate=100.0)
+    assert why == ("readings of wrench are new only 5 times a second in 100 % of test, and a band up to 1 Hz needs 8")
+    assert doubts([], streams={"wrench": read(t, held[10])}) == []
+    assert doubts([], streams={"wrench": read(t[::20], held[5][::20])}, rate=5.0) == []
 
 
 def test_what_a_gap_may_hide_is_not_judged_and_a_few_lost_samples_are():
@@ -151,22 +161,22 @@ def test_ends_of_a_slow_stream_lack_nothing_where_each_of_its_readings_is_known(
 
 
 def test_readings_that_are_missing_for_what_may_have_happened_forbid_met():
-    lost = [Stretch("non-finite", at, 0.03, likely=True) for at in (20.0, 50.0, 0.1)]  # the last before what is known
+    lost = [Stretch("gap", at, 0.03, likely=True) for at in (20.0, 50.0, 0.1)]  # the last before what is known
     (why,) = doubts([(20.0, 20.04), (50.0, 50.04)], unclear=tuple(lost))
     assert why.startswith(
         "readings are missing in test, 2 times, for 0.03 s at 20.00 s: what happened may be the cause"
     )
-    assert doubts([], unclear=(Stretch("spike", 20.0, 0.03, likely=True),)) == []  # judged with it and without it
+    for kind in ("spike", "dropout"):  # judged with it and without it
+        assert doubts([], unclear=(Stretch(kind, 20.0, 0.03, likely=True),)) == []
 
 
 def unclear(
     amplifier: bool,
     *starts: list[float],
-    length: float = 0.02,
+    length: float = 0.03,
     likely: bool = False,
     kind: str = "gap",
     losses: tuple[Loss, ...] = (),
-    rate: float = 100.0,
 ) -> list[int]:
     """How many of the stretches that begin at `starts`, of each repeat, may be what happened."""
     campaign = archived.campaign("EL089", recordings=False)
@@ -186,16 +196,16 @@ def unclear(
             angle=moved,
             wrench=loads,
             losses=losses[:number],
-            load_rates=np.array([rate]),
+            load_rates=[100.0],
         )
         recordings.append((SimpleNamespace(name=str(number), trajectory="same"), run))
     return [len(own) for own in doubtful(campaign, recordings, 1.0).values()]
 
 
 def test_what_repeats_lack_at_the_same_instant_they_lack_for_a_reason():
-    assert unclear(False, [20.0, 30.0], [20.0, 70.0]) == [1, 1]
-    assert unclear(False, [20.0, 30.0], [21.3, 70.0]) == [0, 0]
-    assert unclear(False, [20.0], [20.0], losses=(Loss(COPY, "", 0),)) == [0, 0]  # which is no repeat
+    assert unclear(False, [20.0, 30.0], [20.0, 70.0], kind="spike") == [1, 1]
+    assert unclear(False, [20.0, 30.0], [21.3, 70.0], kind="spike") == [0, 0]
+    assert unclear(False, [20.0], [20.0], kind="spike", losses=(Loss(COPY, "", 0),)) == [0, 0]  # which is no repeat
     often = [list(np.random.default_rng(seed).uniform(0.0, 120.0, 200)) for seed in (1, 2)]
     assert unclear(False, *often) == [0, 0]  # no more than by chance
     assert unclear(True, [20.0], [20.0], kind="spike", length=0.01) == [0, 0]  # nothing so short passes 20 Hz
@@ -208,9 +218,9 @@ def test_what_an_amplifier_passes_and_the_band_shows_may_be_what_happened():
     assert unclear(False, [20.0], kind="spike", length=0.25) == [1]  # of a band up to 1 Hz
 
 
-def test_a_single_reading_of_a_slow_stream_may_be_what_happened():
-    assert unclear(False, [20.0], kind="spike", length=0.01, rate=100.0) == [0]
-    assert unclear(False, [20.0], kind="spike", length=0.04, rate=25.0) == [0]
-    assert unclear(False, [20.0], kind="spike", length=0.05, rate=20.0) == [1]
-    assert unclear(False, [20.0], kind="spike", length=0.125, rate=8.0) == [1]
-    assert unclear(False, [20.0], kind="spike", length=0.125, rate=100.0) == [0]  # filled in, reading by reading
+def test_missing_rows_that_stand_alone_may_hide_what_happened_and_those_of_a_logger_do_not() -> None:
+    assert unclear(False, [20.0]) == [1] == unclear(False, [20.0], length=0.1)
+    assert unclear(False, [20.0], length=0.02) == [0]  # too brief for a band up to 1 Hz
+    assert unclear(False, [20.0, 30.0, 50.0]) == [0]  # as often as that they have another cause
+    assert unclear(False, [20.0, 30.0, 50.0], likely=True) == [3]
+    assert unclear(False, [20.0], length=0.02, likely=True) == [1]

@@ -93,6 +93,30 @@ def test_a_channel_that_died_between_recordings_is_told(tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    ("which", "column", "told"),
+    [
+        ((0, 1), None, "channel: Ty does not respond"),
+        ((1,), None, ""),
+        ((0, 1), 0, "mapping: one column is read for two channels"),
+    ],
+)
+def test_what_a_channel_reads_that_is_dead_or_read_twice_is_no_load(tmp_path, which, column, told):
+    campaign = described(tmp_path)
+    (judged,) = campaign.requirements
+    recordings = recorded(campaign, drawn(campaign, 1), 1)
+    for place in which:
+        one, values = recordings[place], recordings[place].raw.values.copy()
+        noise = 0.002 * np.random.default_rng(place).standard_normal(len(values))
+        values[:, 4] = noise if column is None else values[:, column]
+        read = one.raw.derive(values, "read")
+        recordings[place] = replace(one, raw=read, run=replace(one.run, wrench=read))
+    found = checked(campaign, recordings)
+    assert "; ".join(found.soundness.suggestions) == told
+    assert found.doubts(judged)[0].of_failed
+
+
+@pytest.mark.slow
 def test_a_wrench_that_comes_later_than_known_is_told(tmp_path):
     campaign = described(tmp_path)
     sweep, test = recorded(campaign, drawn(campaign, 1), 1)

@@ -122,6 +122,8 @@ def command_results() -> r.Results:
             sentence="The disturbance torque at the spacecraft's centre of mass stays below 0.06 N m between 0.01 "
             "and 1 Hz: 0.0412 N m (0.0273 to 0.0474 at 95 %; Ty, EL089P00_2), a margin of 31 %.",
         ),
+        document=r.DocumentHead(number="TR-089", revision="B", operator="A. Tester", date="1995-06-15"),
+        model=r.ModelVerdict(status="correlated", sentence="The prediction explains 87 % of the variance of Ty."),
         provenance=PROVENANCE,
         requirements=(_requirement(),),
         warnings=(
@@ -175,6 +177,17 @@ def command_results() -> r.Results:
             r.Resonance(axis="about y", frequency_Hz=2.71, source="plant at 78 deg", sigma_Hz=0.08),
             r.Resonance(axis="about x", frequency_Hz=2.94, source="plant at 78 deg", sigma_Hz=0.09),
             r.Resonance(axis="about z", frequency_Hz=10.4, source="plant at 78 deg"),
+        ),
+        six_channels=tuple(
+            r.SixChannels(
+                recording=name,
+                band="lt1Hz",
+                chi_square=chi_square,
+                explained=chi_square < 2.0,
+                peak={"Tx": 0.0021, "Ty": 0.0032, "Tz": 0.0016},
+                sigma={"Tx": 0.0004, "Ty": 0.0011, "Tz": 0.0005},
+            )
+            for name, chi_square in (("EL089P00_1", 0.97), ("EL089P00_2", 11.3))
         ),
         budget=tuple(
             Budget(
@@ -350,6 +363,14 @@ def _gravity_result() -> r.Gravity:
         samples=26000,
         reduced_chi_square=1.04,
         feasible="Computed gravity compensation is feasible: its error is 0.003 N m, 5 % of the limit.",
+        ladder=tuple(
+            r.Rung(
+                name=name,
+                rms={channel: share * SCALE[channel] for channel in CHANNELS},
+                peak={channel: 3.0 * share * SCALE[channel] for channel in CHANNELS},
+            )
+            for name, share in (("masses and CoGs", 0.4), ("tilt", 0.05))
+        ),
     )
 
 

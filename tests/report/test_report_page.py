@@ -68,6 +68,7 @@ def page(six_channels: Path) -> Page:
 def test_the_verdict_comes_first_with_what_qualifies_it(page: Page) -> None:
     expected = [
         "Pass",
+        "Model correlated The prediction explains 87 % of the variance of Ty.",
         "0.0412 N m 0.0273 to 0.0474 N m 0.06 N m 0.0188 N m (31 %)",
         "0 errors · 2 warnings · 1 data loss in 1 of 3 runs · 0 of 3 sign and frame self-tests failed.",
         "412 samples of /transducer/wrench are missing",
@@ -83,6 +84,9 @@ def test_the_verdict_comes_first_with_what_qualifies_it(page: Page) -> None:
 @pytest.mark.parametrize(
     "said",
     [
+        "Document TR-089 Revision B Date of test 1995-06-15 Operator A. Tester Processed with kbs-process",
+        ", commit 0123456789ab",
+        "Tested by A. Tester Checked by Approved by",
         "Tx / N m",
         "EL089P00_2",
         "held-out",
@@ -91,6 +95,12 @@ def test_the_verdict_comes_first_with_what_qualifies_it(page: Page) -> None:
         "Standard uncertainties, EL089P00_2, below 1 Hz, spacecraft (S)",
         "Other recordings",
         "Computed gravity compensation is feasible",
+        "What each part of the model is worth",
+        "and tilt",
+        "Is the prediction pessimistic?",
+        "Peak torque at the spacecraft from all six channels at once, below 1 Hz",
+        "0.0032 ± 0.0011",
+        "11 something else pulls",
         "The largest coupling takes 0.9 N m",
         "encoder quantisation and noise",
         "63.200 to 63.612 s",
@@ -125,6 +135,12 @@ def test_every_recording_band_and_frame_is_in_the_interactive_figure(page: Page)
     assert [channel["name"] for channel in first["channels"]] == list(sample.CHANNELS)
     assert [channel["limit"] for channel in first["channels"]] == [None] * 3 + [0.06] * 3
     assert first["shaded"][0][0] == 0.0
+
+
+def test_the_torques_at_the_transducer_are_drawn_in_every_band(page: Page) -> None:
+    drawn = [str(image["alt"]) for image in page.all("img")]
+    for band in ("below 1 Hz", "below 2 Hz", "unfiltered"):
+        assert any(f"EL089P00_2, {band}, transducer (T): measured and predicted" in alt for alt in drawn)
 
 
 def test_nothing_is_loaded_from_elsewhere(page: Page) -> None:

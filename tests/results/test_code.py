@@ -67,3 +67,10 @@ def test_an_installer_that_fetched_a_commit_says_which(tmp_path: Path, monkeypat
     assert (code.commit(package), code.source(package)) == (COMMIT, "")
     elsewhere = copy_of(package, tmp_path / "elsewhere" / "kbs_process")
     assert code.commit(elsewhere) == ""
+
+
+def test_an_archive_names_its_commit_and_its_files_as_they_may_be_changed(tmp_path: Path) -> None:
+    package = copy_of(PACKAGE, tmp_path / "kbs_process")
+    (package / "commit.txt").write_text(f"{COMMIT}\n")
+    assert code.commit(package) == COMMIT
+    assert len(code.source(package)) == 64

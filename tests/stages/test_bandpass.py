@@ -170,11 +170,11 @@ def test_a_line_across_a_gap_that_is_short_in_the_band_is_what_was_there() -> No
         lost[inside] = np.column_stack([np.interp(t[inside], t[~inside], column[~inside]) for column in x.T])
         valid[(t > start - 0.7) & (t < end + 0.7)] = False
     valid[[0, -1]] = False
-    known = bridged(signal(lost, valid), gaps, BELOW_1)
+    known = bridged(signal(lost, valid), gaps, BELOW_1, 0.7)
     unknown = (t > 73.0 - 0.7) & (t < 75.0 + 0.7)
     unknown[[0, -1]] = True
     assert np.array_equal(known.valid, ~unknown)
-    assert np.array_equal(bridged(signal(lost, valid), gaps, UNFILTERED).valid, valid)
+    assert np.array_equal(bridged(signal(lost, valid), gaps, UNFILTERED, 0.7).valid, valid)
     short = (t < 60.0)[:, None]
     filtered, truth = (
         apply(signal(np.where(short, lost, x), known.valid | ~short[:, 0]), BELOW_1),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
@@ -149,6 +149,7 @@ class Campaign:
     inputs: tuple[Path, ...]  # files of the description: campaign.toml, parameter files, CSV matrices
     mission: Path | None = None  # orbit, relay satellites and limits of a reference day
     flight_pointing: tuple[PointingRequirement, ...] = ()  # of the flight model alone
+    document: dict[str, str] = field(default_factory=dict)  # number, revision, operator, serial_number, date
     modal: Path | None = None  # modes of the article on its transducer; None: derived from the plant
     sensing: tuple[SensingLaw, ...] = ()  # acting on predictions of one recording alone
 

@@ -20,6 +20,8 @@ from kbs_process.terminal import printable
 Tree = dict[str, Any]
 Key = tuple[str | int, ...]  # ("recording", 2, "file")
 
+QUESTION = "?"  # stands where a value has still to be put in
+
 # Possessive, so that a line of blanks takes no longer than another.
 _HEADER = re.compile(r"^\s*+(\[\[?+)([^\[\]]++)\]\]?+\s*+(?:#.*)?$")
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
@@ -35,10 +37,14 @@ class Document:
     text: str
     tree: Tree
 
-    def place(self, key: Key) -> str:
-        """Return "file:line: dotted key", the line being that of the key's nearest ancestor that has one."""
+    def line(self, key: Key) -> int | None:
+        """Return the line of a key, or of its nearest ancestor that has one."""
         lines = _lines(self.text)
-        line = next((lines[key[:depth]] for depth in range(len(key), 0, -1) if key[:depth] in lines), None)
+        return next((lines[key[:depth]] for depth in range(len(key), 0, -1) if key[:depth] in lines), None)
+
+    def place(self, key: Key) -> str:
+        """Return "file:line: dotted key"."""
+        line = self.line(key)
         file = f"{shown(self.path)}:{line}" if line else shown(self.path)
         return f"{file}: {dotted(key)}" if key else file
 
@@ -99,7 +105,7 @@ def read(path: Path, *, role: str, remedy: str) -> Document:
             f"{role} cannot be read: {reason}", where=shown(path), remedy=f"{remedy}; check its permissions"
         ) from error
     try:
-        return Document(path, text, tomllib.loads(text))
+        document = Document(path, text, tomllib.loads(text))
     except tomllib.TOMLDecodeError as error:
         message, line = _decode_error(str(error), text)
         raise ConfigError(
@@ -112,6 +118,23 @@ def read(path: Path, *, role: str, remedy: str) -> Document:
         line = max(range(len(lines)), key=lambda number: sum(map(lines[number].count, "[{0123456789")))
         where = f"{shown(path)}:{line + 1}"
         raise ConfigError(what, where=where, remedy="write what the format asks for") from error
+    if questions := [_open(document, key) for key in dict.fromkeys(_questions(document.tree))]:
+        raise ConfigError(f"{len(questions)} values are still to be put in", where=shown(path), each=questions)
+    return document
+
+
+def _questions(node: Any, key: Key = ()) -> Iterator[Key]:
+    """Yield the keys of values that are still to be put in; of a list, its own key."""
+    if node == QUESTION:
+        yield key[:-1] if isinstance(key[-1], int) else key
+    for part, child in node.items() if isinstance(node, dict) else enumerate(node) if isinstance(node, list) else ():
+        yield from _questions(child, (*key, part))
+
+
+def _open(document: Document, key: Key) -> ConfigError:
+    line = document.line(key)
+    comment = document.text.splitlines()[line - 1].partition("#")[2].strip() if line else ""
+    return ConfigError(f'"{QUESTION}"', where=document.place(key), remedy=comment)
 
 
 def _decode_error(message: str, text: str) -> tuple[str, int]:

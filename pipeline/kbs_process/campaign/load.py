@@ -125,6 +125,7 @@ def _campaign(
             pointing(table, ("flight", "pointing", index), document, problems)
             for index, table in enumerate(flight_pointing)
         ),
+        document=file.document.model_dump(exclude_none=True),
         modal=modal,
         sensing=_sensing(file, document, rig, problems),
     )

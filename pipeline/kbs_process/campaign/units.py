@@ -6,11 +6,12 @@ from math import pi
 
 from kbs_process.errors import did_you_mean
 
+_LBF = 4.4482216152605  # N
 # dimension -> unit -> factor; the first unit of each dimension is the SI unit.
 DIMENSIONS: dict[str, dict[str, float]] = {
     "pure number": {"1": 1.0, "%": 1e-2},
-    "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6},
-    "mass": {"kg": 1.0, "g": 1e-3},
+    "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254, "ft": 0.3048},
+    "mass": {"kg": 1.0, "g": 1e-3, "lb": 0.45359237},
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0},
     "frequency": {"Hz": 1.0, "kHz": 1e3},
     "sweep rate": {"Hz/s": 1.0, "kHz/s": 1e3},
@@ -27,8 +28,16 @@ DIMENSIONS: dict[str, dict[str, float]] = {
     },
     "angular rate": {"rad/s": 1.0, "mrad/s": 1e-3, "deg/s": pi / 180.0, "rpm": pi / 30.0},
     "angular acceleration": {"rad/s^2": 1.0, "deg/s^2": pi / 180.0},
-    "force": {"N": 1.0, "mN": 1e-3, "kN": 1e3},
-    "torque": {"N m": 1.0, "mN m": 1e-3, "N mm": 1e-3, "N cm": 1e-2, "kN m": 1e3},
+    "force": {"N": 1.0, "mN": 1e-3, "kN": 1e3, "lbf": _LBF},
+    "torque": {
+        "N m": 1.0,
+        "mN m": 1e-3,
+        "N mm": 1e-3,
+        "N cm": 1e-2,
+        "kN m": 1e3,
+        "lbf in": _LBF * 0.0254,
+        "lbf ft": _LBF * 0.3048,
+    },
     "moment of inertia": {
         "kg m^2": 1.0,
         "kg cm^2": 1e-4,
@@ -50,8 +59,18 @@ DIMENSIONS: dict[str, dict[str, float]] = {
 }
 
 _DIMENSION_OF = {unit: dimension for dimension, units in DIMENSIONS.items() for unit in units}
-_PARTED = str.maketrans({" ": "", "*": "", "·": "", "²": "^2"})  # spelt otherwise, or not at all
-_SPELT = {unit.translate(_PARTED): unit for unit in _DIMENSION_OF}
+_PARTED = str.maketrans({" ": "", "*": "", "·": "", "-": "", "_": "", "²": "^2"})  # spelt otherwise, or not at all
+_SPELT = {unit.translate(_PARTED): unit for unit in _DIMENSION_OF} | {
+    "°": "deg",
+    "degrees": "deg",
+    "°/s": "deg/s",
+    "°C": "degC",
+    "sec": "s",
+    "inlbf": "lbf in",
+    "inlb": "lbf in",
+    "ftlbf": "lbf ft",
+    "ftlb": "lbf ft",
+}
 
 
 class UnitMismatchError(ValueError):
@@ -65,6 +84,22 @@ class UnitMismatchError(ValueError):
 def alike(unit: str, other: str) -> bool:
     """Say whether two units are of one dimension; units that are not in the table are alike if they are the same."""
     return unit == other or (unit in _DIMENSION_OF and _DIMENSION_OF[unit] == _DIMENSION_OF.get(other))
+
+
+def spelt(stated: str) -> str:
+    """Return a unit with a dimension as campaigns write it, however a file spells it ("Nm", "ft-lb"); "" if unknown."""
+    known = _SPELT.get(stated.translate(_PARTED), "")
+    return known if dimension(known) != "pure number" else ""
+
+
+def dimension(unit: str) -> str:
+    """Return a unit's dimension, "" of one that is not in the table."""
+    return _DIMENSION_OF.get(unit, "")
+
+
+def to_si(unit: str) -> float:
+    """Return the factor of a unit to the SI unit of its dimension, 0 of one that is not in the table."""
+    return DIMENSIONS.get(dimension(unit), {}).get(unit, 0.0)
 
 
 def agree(stated: str, unit: str) -> bool | None:

@@ -17,11 +17,13 @@ from kbs_process.cli.shared import (
     complain,
     conclude,
     examples,
+    json_option,
     output_option,
     pdf_option,
     progress,
     quiet_option,
     say,
+    say_json,
 )
 from kbs_process.errors import ConfigError, FitError, RecordingError, SimulationError
 
@@ -96,20 +98,30 @@ def _diagnose(campaign: Campaign, results: Path, *, progress: Progress, pdf: boo
 @click.command(epilog=examples("validate campaign/EL089", "validate campaign/EL089 --check"))
 @campaign_argument
 @check_option("a recording has losses, or the model of the rig is wrong")
+@json_option
 @quiet_option
-def validate(campaign: str, check: bool, quiet: bool) -> None:
+def validate(campaign: str, check: bool, as_json: bool, quiet: bool) -> None:
     """Check CAMPAIGN's description, read all its recordings through, and fit gravity to them.
 
+    Of what `init` began, list what is still to be put in.
     Exits with 0 if all is well or can be processed, with 2 if something cannot be read, or processing would refuse it.
     """
     from kbs_process.campaign.load import load_campaign
     from kbs_process.campaign.locate import find_campaign
+    from kbs_process.studies.convert.begin import MAPPING_FILE, check_description
     from kbs_process.studies.validate.run import describe
     from kbs_process.studies.validate.run import validate as run
 
-    loaded = load_campaign(find_campaign(campaign))
+    folder = find_campaign(campaign)
+    if (folder / MAPPING_FILE).is_file():
+        say(*check_description(folder))
+        return
+    loaded = load_campaign(folder)
     found = run(loaded, progress(quiet))
-    say(*describe(loaded, found))
+    if as_json:
+        say_json(found)
+    else:
+        say(*describe(loaded, found))
     if found.refused:
         sys.exit(BAD_INPUT)
     if check and (

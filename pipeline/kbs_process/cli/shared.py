@@ -26,6 +26,7 @@ FOLDER = click.Path(path_type=Path, file_okay=False)
 
 campaign_argument = click.argument("campaign")
 quiet_option = click.option("--quiet", "-q", is_flag=True, help="No progress.")
+json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON, for programs.")
 pdf_option = click.option(
     "--pdf/--no-pdf", default=None, help="A report.pdf beside the page [default: if WeasyPrint is installed]."
 )
@@ -84,6 +85,13 @@ def say(*lines: str) -> None:
     """Print lines."""
     for line in lines:
         click.echo(printable(line))
+
+
+def say_json(found: object) -> None:
+    """Print what was found for a program: one JSON document, in which what is no number is null."""
+    import msgspec
+
+    click.echo(msgspec.json.format(msgspec.json.encode(found, enc_hook=str)))
 
 
 def complain(*lines: str) -> None:

@@ -18,7 +18,7 @@ from kbs_process.estimation.tensors import Tensors
 from kbs_process.signals.records import Array
 
 Residual = Callable[[Array], Array]
-_MAX_ITERATIONS = 60
+MAX_ITERATIONS = 60
 _LARGEST_DAMPING = 1e12
 _PROMISE = 1e-8  # of the cost, where 1 is a sigma: a step that promises less is not taken, and ends the search
 _SINGULAR = 1e-11  # of the greatest singular value, columns scaled to unit length
@@ -135,7 +135,7 @@ def fit_map(
     jacobian: Callable[[Array], Array] | None = None,
     scores: Callable[[Array, Array], Array] | None = None,
     start: Array | None = None,
-    iterations: int = _MAX_ITERATIONS,
+    iterations: int = MAX_ITERATIONS,
 ) -> Fit:
     """Fit `parameters` to a residual (n,) that is measured less modelled over its standard deviation.
 
@@ -192,9 +192,7 @@ def difference_jacobian(residual: Residual, theta: Array, scale: Array) -> Array
     return np.stack(columns, axis=1)
 
 
-def minimise(
-    problem: Problem, parameters: Parameters, start: Array, most: int = _MAX_ITERATIONS
-) -> tuple[Array, Check]:
+def minimise(problem: Problem, parameters: Parameters, start: Array, most: int = MAX_ITERATIONS) -> tuple[Array, Check]:
     """Search from `start` until a step promises nothing that matters, by the slopes, or `most` are taken."""
     root = 1.0 / parameters.sigma
 

@@ -133,7 +133,7 @@ class Port(Acts):
         "joint",
     )
     TRANSMISSION = (
-        "torque of the gear on the output, N m; the rotor gets -1/ratio of it",
+        "torque of the gear on the output, N m; the rotor gets -1/ratio of it, and what the slope of an error adds",
         "transmission",
         _INSIDE,
         SIGNALS,
@@ -385,8 +385,12 @@ class Law:
     @property
     def arguments(self) -> tuple[str, ...]:
         """Names that the equation's arguments are wired to, in order."""
+        return self.arguments_of(self.equation)
+
+    def arguments_of(self, equation: Callable[..., Any]) -> tuple[str, ...]:
+        """Return the names that the arguments of one of its functions are wired to, in order."""
         wires = dict(self.wires)
-        asked = tuple(wires.get(name, name) for name in _asked(self.equation))
+        asked = tuple(wires.get(name, name) for name in _asked(equation))
         if not self.tag:
             return asked
         own = {name.removesuffix(self.tag): name for name in self.own}
@@ -450,6 +454,7 @@ class Effect(Law):
     axis that is along gravity. What is `recorded` is in the record of the field, and leaves nothing to find where there
     is one. A `delay` of the field is exact in the plant. An effect can act several times: see `instance`. Effects that
     share an equation say with `wires` what its arguments are for each.
+    `slope` is what a gear's output turns for its rotor beyond 1/ratio: the rotor bears that share of the gear's torque.
     """
 
     port: Port
@@ -463,6 +468,7 @@ class Effect(Law):
     of_set_points: bool = False  # a delay of where cycles begin, between which the field goes straight
     measured: bool = False  # a curve without a name: a model can contain it, and no search tries it
     apart: str = ""  # word for where it acts, if that is not its port's
+    slope: Callable[..., float] | None = None  # 1, of signals and parameters
 
     def __post_init__(self) -> None:
         where = f"effect '{self.name}'"
@@ -472,7 +478,8 @@ class Effect(Law):
         own = self.own
         if clash := (set(own) & set(signals)) | {name for name in own if own.count(name) > 1}:
             raise TypeError(f"{where}: {sorted(clash)} declared twice, or named like a signal of the plant")
-        if unknown := set(self.arguments) - set(signals) - set(own):
+        asked = {*self.arguments, *(self.arguments_of(self.slope) if self.slope else ())}
+        if unknown := asked - set(signals) - set(own):
             raise TypeError(f"{where}: {sorted(unknown)} is neither a signal ({', '.join(signals)}) nor declared")
         if unused := set(own) - set(self.arguments):
             raise TypeError(f"{where}: {sorted(unused)} is declared, but not an argument of the equation")
@@ -526,6 +533,10 @@ class Effect(Law):
         result = self.equation(*(numbers[name] for name in self.arguments))
         whole = result if isinstance(result, tuple) else (result,)
         return whole[: self.port.components]
+
+    def slope_at(self, known: Mapping[str, float]) -> float:
+        """Return its `slope` for numbers by name, 1."""
+        return 0.0 if self.slope is None else self.slope(*(known[name] for name in self.arguments_of(self.slope)))
 
 
 @cache

@@ -42,7 +42,7 @@ class Analysis:
     motion: Motion
     static: Static  # the fitted static loads along the motion, with their uncertainty
     misfits: tuple[Misfit, ...]  # of the static loads, channel by channel
-    residual: Signal  # decoupled less static
+    residual: Signal  # decoupled less static; gaps that are short in the narrowest band are bridged
     predicted: Run | None
     pairs: Mapping[tuple[str, str], Pair]  # by frame and band
 
@@ -51,6 +51,11 @@ def bands_of(settings: Bands) -> tuple[Band, ...]:
     """Return the bands of a campaign, the unfiltered one first."""
     high_pass = settings.high_pass or None
     return (UNFILTERED, *(Band(f"lt{low:g}Hz", high_pass, low) for low in settings.low_pass))
+
+
+def banded(signal: Signal, run: Run, band: Band) -> Signal:
+    """Return what a signal made of a run's readings has in a band; gaps that are short in it are bridged."""
+    return bandpass.apply(bandpass.bridged(signal, run.gaps, band, run.reach), band)
 
 
 def passband(band: Band, rate: float) -> tuple[float, float]:
@@ -86,9 +91,9 @@ def analyse(
         motion=motion,
         static=static,
         misfits=misfits(sample, model, taring, _cords(campaign, entry, wrench, motion)),
-        residual=residual,
+        residual=bandpass.bridged(residual, run.gaps, Band("", None, min(campaign.bands.low_pass)), run.reach),
         predicted=predicted,
-        pairs=_pairs(campaign, residual, disturbance, run.gaps),
+        pairs=_pairs(campaign, residual, disturbance, run),
     )
 
 
@@ -121,14 +126,14 @@ def _predict(
     return predicted, select(left, _loads(run).channels)
 
 
-def _pairs(
-    campaign: Campaign, residual: Signal, disturbance: Signal | None, gaps: Array
-) -> dict[tuple[str, str], Pair]:
+def _pairs(campaign: Campaign, residual: Signal, disturbance: Signal | None, run: Run) -> dict[tuple[str, str], Pair]:
     spacecraft = campaign.rig.spacecraft
     pairs = {}
     for band in bands_of(campaign.bands):
-        measured = bandpass.apply(bandpass.bridged(residual, gaps, band), band)
-        predicted = None if disturbance is None else bandpass.apply(disturbance, band)
+        measured, predicted = banded(residual, run, band), None
+        if disturbance is not None:  # what commands drive has no gaps of the readings
+            of_angles = campaign.drive == "motion"
+            predicted = banded(disturbance, run, band) if of_angles else bandpass.apply(disturbance, band)
         pairs[campaign.rig.frame, band.name] = Pair(measured, predicted)
         if spacecraft is not None and set(WRENCH_CHANNELS) <= set(measured.channels):
             whole, foreseen = (

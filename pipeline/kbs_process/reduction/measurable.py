@@ -12,17 +12,19 @@ from kbs_process.campaign.config import Campaign, RecordingEntry, Requirement
 from kbs_process.errors import ConfigError
 from kbs_process.results.judged import Doubt
 from kbs_process.rig.model import Amplifier, Rig
-from kbs_process.signals.records import COPY, SPIKE, WRENCH_CHANNELS, Mask, Run, Stretch
+from kbs_process.signals.records import COPY, MISSING, WRENCH_CHANNELS, Mask, Run, Stretch
 from kbs_process.stages.align.readings import Readings
 from kbs_process.stages.align.spikes import GAP
 from kbs_process.stages.bandpass import Band, bridged, too_long
 from kbs_process.stages.repeats import lag, motion_of
 
 SHOWN = 0.4  # of the rate of distinct readings: the highest frequency that they show
+HELD = 0.125  # likewise, of readings of which each comes several times: that takes 3 % off
 UNSEEN = 0.05  # share of a recording that may be unknown: an interval at 95 % leaves out as much
 ENDS_S, ENDS = 4.0, 40  # that filters and the beginning of streams may cost: seconds, or samples
 SEEN = 0.25  # of a band's shortest period: what lasts for as long shows in it
-SINGLE = 0.049  # likewise, of a single reading: 20 a second are few for a band up to 1 Hz, as any clock counts them
+BRIEF = 0.025  # likewise, of missing rows: what hides in less shows in the band at a twentieth of its size
+OFTEN = 3  # stretches of missing rows that are alike, from which on a logger drops rows
 SHORTEST = 0.25  # of an amplifier's corner's period: what it passes lasts for longer
 TOGETHER_S = 0.05  # what repeats have at the same instant, more often than by chance, has a cause
 AMPLIFIED = 0.05  # part of a reading that an amplifier may take off at a band's upper edge
@@ -82,19 +84,19 @@ def hidden(
 ) -> Iterator[Doubt]:
     """Yield what a recording's samples cannot show of a requirement; `moving` (n,): where its angles are known."""
     edge, channels = requirement.band[1], needed_channels(requirement, campaign.rig)
-    needed = edge / SHOWN
     for key, readings in streams.items():
+        needed = edge / (HELD if key != "angle" and readings.held else SHOWN)
         share, rate = readings.slow(needed, at_rest=key == "angle")
         if share > UNSEEN:
             stream = "encoder" if key == "angle" else key
             yield Doubt(
-                f"{stream} has {rate:.3g} distinct readings a second in {100.0 * share:.0f} % of {name}, and a band up "
-                f"to {edge:g} Hz needs {needed:.3g}"
+                f"readings of {stream} are new only {rate:.3g} times a second in {100.0 * share:.0f} % of {name}, and "
+                f"a band up to {edge:g} Hz needs {needed:.3g}"
             )
     loads = run.loads
     assert loads is not None  # every recording that is judged has some
     band = Band("", None, edge)
-    known = bridged(replace(loads, valid=loads.valid & moving), run.gaps, band).valid
+    known = bridged(replace(loads, valid=loads.valid & moving), run.gaps, band, run.reach).valid
     # Where filters lean on what lies beyond an end, samples of a slow stream are known, and not those between.
     slowest = min((run.rates[key] for key in streams if key in run.rates), default=loads.rate)
     edges = np.flatnonzero(np.diff(np.concatenate(([True], known, [True])).astype(np.int8)))
@@ -104,13 +106,13 @@ def hidden(
         share = 100.0 * lacking / len(known)
         yield Doubt(f"in {share:.0f} % of {name} readings or angles are missing", of_failed=False)
     first, last = loads.t[known][[0, -1]] if known.any() else (0.0, 0.0)
-    inside = run.gaps[(run.gaps[:, 1] > first) & (run.gaps[:, 0] < last)]
+    inside = run.gaps[(run.gaps[:, 1] > first) & (run.gaps[:, 0] < last) & np.isfinite(run.gaps).all(axis=1)]
     if len(gaps := too_long(inside, band)):
         start, end = gaps[np.argmax(np.diff(gaps)[:, 0])]
         where = f"readings or angles are missing in {name}, from {start:.2f} s to {end:.2f} s at the longest"
         yield Doubt(f"{where}: what there was up to {edge:g} Hz is not known", of_failed=False)
     within = [one for one in run.stretches if first < one.start + one.length and one.start < last]
-    if missing := [one for one in within if one.kind != SPIKE]:
+    if missing := [one for one in within if one.kind == MISSING]:  # others are judged with and without
         longest = max(missing, key=lambda one: one.length)
         times = f"{len(missing)} times, " if len(missing) > 1 else ""
         where = f"readings are missing in {name}, {times}for {longest.length:.3g} s at {longest.start:.2f} s"
@@ -127,17 +129,24 @@ def doubtful(
     campaign: Campaign, recordings: Sequence[tuple[RecordingEntry, Run]], edge: float
 ) -> dict[str, list[Stretch]]:
     """What was bridged, by recording, and may be what happened: it is likely, lasts as long as a band up to `edge`, Hz,
-    shows (single readings of a slow stream do), or comes at the same instant of repeats. Nothing is that no amplifier
-    passes.
+    shows, or comes at the same instant of repeats; of missing rows, if they stand alone. Nothing is that no amplifier
+    passes, nor are missing rows that are brief in the band.
     """
     amplifier = campaign.rig.transducer.amplifier
     shortest = 0.0 if amplifier is None else SHORTEST / float(amplifier.corner)
-    long = {entry.name: [one for one in run.stretches if one.length > shortest] for entry, run in recordings}
+    long = {
+        entry.name: [
+            one
+            for one in run.stretches
+            if one.length > shortest and (one.likely or one.kind != MISSING or one.length * edge > BRIEF)
+        ]
+        for entry, run in recordings
+    }
     found = {
         entry.name: [
             one
             for one in long[entry.name]
-            if one.likely or (one.kind == SPIKE and one.length * edge >= _least(one, run))
+            if one.likely or (_alone(one, run) if one.kind == MISSING else one.length * edge >= SEEN)
         ]
         for entry, run in recordings
     }
@@ -156,9 +165,10 @@ def doubtful(
     return found
 
 
-def _least(one: Stretch, run: Run) -> float:
-    """Share of a band's shortest period from which a stretch shows in it: less is enough of a single reading."""
-    return SINGLE if one.length * max(run.load_rates) < GAP else SEEN
+def _alone(one: Stretch, run: Run) -> bool:
+    """Whether several rows are missing, and seldom as many or half of them: a logger that drops rows does so often."""
+    like = sum(other.kind == MISSING and 2.0 * other.length > one.length for other in run.stretches)
+    return one.length * max(run.load_rates) > GAP and like < OFTEN
 
 
 def rounding(campaign: Campaign, streams: Mapping[str, Readings]) -> dict[str, float]:

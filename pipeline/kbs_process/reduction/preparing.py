@@ -75,22 +75,31 @@ def fit_gravity(campaign: Campaign, prepared: Sequence[Prepared], progress: Prog
     A rig that is driven by its motion has its inertia fitted too; its commands, if any, drive nothing.
     """
     with progress.task("Fitting gravity and centres of gravity"):
-        fitted = [one for one in prepared if one.entry.role != "held-out"]
-        free = [one for one in fitted if not forces_in(campaign, one.entry)]
-        samples = [
-            Sample(
-                one.entry.name,
-                one.motion,
-                without_effects(campaign, one.entry, one.motion, loads, campaign.rig),
-                calibration=one.entry.role == "calibration",
-                lost=foremost(one.run.losses),
-            )
-            for one in free or fitted
-            if (loads := relieved(campaign, one.entry, one.run, one.motion).loads) is not None
-        ]
         return gravity.fit(
-            samples, campaign.rig, include_inertia=campaign.drive == "motion", settings=gravity_settings(campaign)
+            samples(campaign, prepared),
+            campaign.rig,
+            include_inertia=campaign.drive == "motion",
+            settings=gravity_settings(campaign),
         )
+
+
+def samples(campaign: Campaign, prepared: Sequence[Prepared]) -> list[Sample]:
+    """Return what gravity is fitted to; see `fit_gravity`."""
+    fitted = [one for one in prepared if one.entry.role != "held-out"]
+    free = [one for one in fitted if not forces_in(campaign, one.entry)]
+    return [
+        Sample(
+            one.entry.name,
+            one.motion,
+            without_effects(campaign, one.entry, one.motion, loads, campaign.rig),
+            calibration=one.entry.role == "calibration",
+            lost=foremost(one.run.losses),
+            gaps=one.run.gaps,
+            reach=one.run.reach,
+        )
+        for one in free or fitted
+        if (loads := relieved(campaign, one.entry, one.run, one.motion).loads) is not None
+    ]
 
 
 def tare(
@@ -102,7 +111,7 @@ def tare(
     """
     assert run.loads is not None  # `prepare` demands them
     loads = without_effects(campaign, entry, motion, run.loads, model.rig)
-    sample = Sample(entry.name, motion, loads, lost=foremost(run.losses))
+    sample = Sample(entry.name, motion, loads, lost=foremost(run.losses), gaps=run.gaps, reach=run.reach)
     return sample, gravity.tare(sample, model)
 
 

@@ -34,7 +34,7 @@ from kbs_process.stages.align.readings import white
 from kbs_process.stages.align.spectrum import OCTAVES, quietest
 from kbs_process.stages.conventions import (
     BEYOND,
-    OF_ENCODER,
+    OF_CHANNEL,
     SignCheck,
     check_encoder_sense,
     check_gravity_sign,
@@ -51,10 +51,12 @@ from kbs_process.stages.repeats import commanded, copies, motion_of
 
 LEFT = 0.1  # of the weight, and of the torque that it can make: a calibration leaves less, whatever rubs or pulls
 UNLIKE = 3.0  # times less noise than is stated, or more, however well it is known
+SILENT = 0.1  # slope, against computed loads, of a channel that does not respond
 RATED = 1.1  # times: angles that change by more, or by less than its inverse, do not follow their rates
 _SCALE = "clock: the times of all streams run too fast or too slow, or rates are in another unit"
 _TOLD = 1e-3  # rad: a joint that commands move by less rests
 _STUCK = "encoder: it is not read, or does not turn with its joint"
+_TWICE = "mapping: one column is read for two channels"
 _LATE = "clock: the wrench is {:+.2g} s late, by its timestamps or a filter"
 _UNEXPLAINED = (
     "no single simple fault (gain, unit, sign, axis, zero, swapped channels, one number) explains it: look for what "
@@ -149,24 +151,28 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
         hidden = {one.name: tuple(_hidden(campaign, one, recordings, model)) for one in campaign.requirements}
         timed = tuple(mistimed(campaign, recordings))
         still = tuple(stuck(recordings, instants, model))
+        twice = tuple(repeated(recordings))
         reasons = (
             *timed,
             *still,
-            *repeated(recordings),
+            *twice,
             *_far(found.beyond, found.probability),
             *(f"{one.check} is {one.found}, expected {one.expected}" for one in conventions if not one.ok),
             *_left(model, most),
         )
         judged = {key for one in campaign.requirements for key in measurable.judged_channels(one, campaign.rig)}
-        mute = tuple(key for key in _mute(equation, [read for read, _, _ in shown]) if key in judged)
+        mute = tuple(_mute(equation, [read for read, _, _ in shown]))
+        failed = [one.check.split() for one in conventions if not one.ok and abs(one.slope or 0.0) < SILENT]
+        dead = [key for key in mute if any(key in words for words in failed)]
         gains = shown_gains(equation, instants)
         soundness = Soundness(probability=found.probability, gains=gains)
         tests = [one.entry.name for one in recordings if one.entry.role != "calibration"]
         if reasons:
             shifted = [one for one in found.beyond if one in lags]
             told = [_SCALE for _ in timed[:1]] + [_STUCK for _ in still[:1]]
-            told += [_LATE.format(one.value) for one in shifted[:1]]
-            if reasons != (*timed, *still, *_far(shifted, 1.0)):
+            told += [_LATE.format(one.value) for one in shifted[:1]] + [_TWICE for _ in twice[:1]]
+            told += [f"channel: {key} does not respond" for key in dead]
+            if not (twice or dead) and reasons != (*timed, *still, *_far(shifted, 1.0)):
                 told += [_in_words(one, equation) for one in explanations(equation, instants, most)]
             soundness = Soundness(
                 sound=False,
@@ -175,14 +181,14 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
                 beyond=tuple(_beyond(one, model) for one in found.beyond),
                 reasons=reasons,
                 suggestions=tuple(told),
-                calibrated=not (timed or still or shifted)
+                calibrated=not (timed or still or shifted or twice)
                 and _calibrated(campaign, samples, model, most)
                 and all(
-                    one.ok or (one.check.rpartition(", ")[2] in tests and not one.check.startswith(OF_ENCODER))
+                    one.ok or (one.check.rpartition(", ")[2] in tests and one.check.startswith(OF_CHANNEL))
                     for one in conventions
                 ),
             )
-        return Checked(soundness, conventions, hidden, rounding, noise, mute)
+        return Checked(soundness, conventions, hidden, rounding, noise, tuple(key for key in mute if key in judged))
 
 
 def _hidden(

@@ -181,3 +181,5 @@ class Head:
     conclusion: Conclusion
     version: str  # of what made the results
     headline: str = ""  # in place of the conclusion's status, where a report does not judge requirements
+    model: tuple[str, str] = ("", "")  # a second verdict, on the model: in a word, and in a sentence
+    document: tuple[tuple[str, str], ...] = ()  # what identifies it: label, value

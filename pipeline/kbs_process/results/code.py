@@ -18,9 +18,10 @@ CHANGED = "+"  # after a commit from which the files differ
 def commit(package: Path = Path(kbs_process.__file__).parent) -> str:
     """Return the commit of the package's files, `CHANGED` where they differ from it; empty where none is known.
 
-    It is that of the checkout that they are in, or the one that an installer says it fetched them from.
+    It is that of the checkout that they are in, the one that an installer says it fetched them from, or the one that
+    the archive or the wheel was made of.
     """
-    return _of_checkout(package) or _of_installation(package)
+    return _of_checkout(package) or _of_installation(package) or _of_archive(package)
 
 
 def source(package: Path = Path(kbs_process.__file__).parent) -> str:
@@ -28,7 +29,7 @@ def source(package: Path = Path(kbs_process.__file__).parent) -> str:
 
     Of names and contents in the order of the names: a checkout and what is installed from it give the same.
     """
-    known = commit(package)
+    known = _of_checkout(package) or _of_installation(package)  # who unpacks an archive may change its files
     return "" if known and not known.endswith(CHANGED) else _digest(package)
 
 
@@ -72,3 +73,12 @@ def _of_installation(package: Path) -> str:
         return ""  # another copy than the one that runs
     url = json.loads(installed.read_text("direct_url.json") or "{}")
     return str(url.get("vcs_info", {}).get("commit_id", ""))
+
+
+def _of_archive(package: Path) -> str:
+    """The commit in the file that git fills in as it makes an archive, and setup.py as it builds."""
+    try:
+        text = (package / "commit.txt").read_text(encoding="ascii").strip()
+    except OSError:
+        return ""
+    return "" if text.startswith("$") else text

@@ -108,6 +108,7 @@ PUT_IN_ORDER = "put in order"  # messages that came after younger ones: told, al
 ROUNDED = "rounded stamps"  # behind which a regular rate was found: likewise
 COPY = "copy"  # of another recording, whose readings it has
 DROPOUT = "dropout"  # a channel that stood still off all its other readings: left out, likewise
+MISSING = "gap"  # rows that are not there, or no numbers
 SPIKE = "spike"  # single samples off their neighbours: interpolated, and the figures with them are told as well
 TRUNCATED = "truncated"  # the loss of a file that breaks off: all that would have followed
 
@@ -197,7 +198,8 @@ class Run:
     stretches: tuple[Stretch, ...] = ()  # that were bridged
     gaps: Array = dataclasses.field(
         default_factory=lambda: np.zeros((0, 2))
-    )  # s, from when to when samples are made up
+    )  # s, from when to when samples are made up; infinite beyond the ends of a stream
+    reach: float = 0.0  # s beside these in which filters to the working rate lean on them
 
     @property
     def loads(self) -> Signal | None:

@@ -97,28 +97,59 @@ def apply(signal: Signal, band: Band) -> Signal:
 
 def too_long(gaps: Array, band: Band) -> Array:
     """Return those of gaps (k, 2), s from when to when, in which a band's signal is not known."""
-    return gaps[np.diff(gaps)[:, 0] > BRIDGED / (band.low_pass_Hz or np.inf)]
+    long: Array = gaps[_short(gaps, band) == 0.0]
+    return long
 
 
-def bridged(signal: Signal, gaps: Array, band: Band) -> Signal:
-    """Take samples in gaps (k, 2), s, that are short in a band as they were interpolated; those at the ends are not."""
-    valid = signal.valid.copy()
-    edges = np.flatnonzero(np.diff(np.concatenate(([True], valid, [True])).astype(np.int8))).reshape(-1, 2)
-    for start, stop in edges[(edges[:, 0] > 0) & (edges[:, 1] < len(valid))]:
-        after, before = (signal.t0 + signal.dt * place for place in (start - 1, stop))
-        within = gaps[(gaps[:, 0] < before) & (gaps[:, 1] > after)]
-        valid[start:stop] = len(within) > 0 and len(too_long(within, band)) == 0
-    return replace(signal, valid=valid)
+def _short(gaps: Array, band: Band) -> Array:
+    """Lengths (k,) of gaps (k, 2), in periods of a band's upper edge; zero of those that no line bridges."""
+    lengths: Array = np.diff(gaps)[:, 0] * (band.low_pass_Hz or np.inf)
+    lengths[lengths > BRIDGED] = 0.0
+    return lengths
+
+
+def bridged(signal: Signal, gaps: Array, band: Band, reach: float) -> Signal:
+    """Take samples within `reach`, s, of gaps (k, 2), s, that are short in a band as they were interpolated.
+
+    Those within the reach of longer gaps, and of what is beyond the ends, are not.
+    """
+    long = too_long(gaps, band)
+    known = signal.valid | (_within(signal, gaps, reach) & ~_within(signal, long, reach))
+    return replace(signal, valid=known)
+
+
+def _within(signal: Signal, spans: Array, reach: float) -> Mask:
+    """Which samples (n,) are within `reach`, s, of spans (k, 2), s."""
+    edges = (spans + np.array([-reach, reach]) - signal.t0) / signal.dt
+    begin, end = np.clip(np.ceil(edges), 0, len(signal)).astype(np.intp).T
+    inside = np.bincount(begin, minlength=len(signal) + 1) - np.bincount(end, minlength=len(signal) + 1)
+    return np.asarray(np.cumsum(inside)[:-1] > 0)
 
 
 def bridging_error(gaps: Array, band: Band) -> float:
-    """Return by how much of a band's largest tone its short gaps (k, 2), s, may let it err, most of them alone.
+    """Return by how much of a band's largest tone its short gaps (k, 2), s, may let it err: those of half a period.
 
     A line across T is (2 pi f T)^2 / 8 off a tone at its crest, of which as much is in the band as T is of half its
     shortest period.
     """
-    lengths = np.setdiff1d(np.diff(gaps), np.diff(too_long(gaps, band))) * (band.low_pass_Hz or 0.0)
-    return float(np.max((2.0 * np.pi * lengths) ** 2 / 8.0 * 2.0 * lengths, initial=0.0))
+    return _together((np.pi * _short(gaps, band)) ** 2 * _short(gaps, band), gaps, band)
+
+
+def bridging_noise(gaps: Array, band: Band, rate: float) -> float:
+    """Return the factor by which a band's noise, of samples at `rate`, Hz, is more next to its short gaps (k, 2), s.
+
+    A line across T has the noise of its two ends, sigma / sqrt(2) in the mean; in a band up to f that is 2 f T of it,
+    next to sigma sqrt(2 f / rate).
+    """
+    return float(np.sqrt(1.0 + _together(_short(gaps, band) ** 2, gaps, band) * rate / (band.low_pass_Hz or np.inf)))
+
+
+def _together(each: Array, gaps: Array, band: Band) -> float:
+    """The largest sum of what gaps (k, 2) do, `each` (k,), that begin within half a band's shortest period."""
+    begin, order = np.sort(gaps[:, 0]), np.argsort(gaps[:, 0])
+    total = np.concatenate(([0.0], np.cumsum(each[order])))
+    last = np.searchsorted(begin, begin + 0.5 / (band.low_pass_Hz or np.inf), side="right")
+    return float(np.max(total[last] - total[:-1], initial=0.0))
 
 
 def _bridged(values: Array, valid: Mask, dt: float) -> Array:

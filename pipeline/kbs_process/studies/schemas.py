@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 
 from kbs_process.campaign.formats import schemas as formats
+from kbs_process.errors import ConfigError, did_you_mean
 from kbs_process.results.records import schema_of
 from kbs_process.studies.convert.mapping_file import MappingFile
 from kbs_process.studies.documents import DOCUMENTS
@@ -14,6 +15,8 @@ FORMATS = formats.FORMATS | {"import": MappingFile}
 
 def schema_text(kind: str) -> str:
     """Return the JSON Schema of a kind of results, or of a format."""
+    if kind not in FORMATS | DOCUMENTS:
+        raise ConfigError(f"there is no schema '{kind}'", remedy=did_you_mean(kind, FORMATS | DOCUMENTS))
     if kind in FORMATS:
         schema = formats.schema_of(kind, FORMATS[kind])
     else:

@@ -331,7 +331,8 @@ def test_when_samples_were_made_up_is_known() -> None:
     streams["wrench"] = rows(streams["wrench"], np.delete(np.arange(6000), lost))
     streams["angle"].values[4000:4010] = np.nan
     run = run_of(streams)
-    expected = [(19.99, 20.01), (29.99, 30.5), (39.99, 40.1)]
+    ends = [(-np.inf, 0.0), (59.99, np.inf)]
+    expected = [ends[0], (19.99, 20.01), (29.99, 30.5), ends[1], ends[0], (39.99, 40.1), ends[1]]
     assert run.gaps == pytest.approx(np.array(expected), abs=2e-3)
     streams = recording(5.0)
     streams["wrench"].values[150:153, 0] += 10.0
@@ -343,25 +344,15 @@ def bridged(run: Run) -> list[tuple[str, float, float, bool]]:
     return [(one.kind, round(one.start, 3), round(one.length, 3), one.likely) for one in run.stretches]
 
 
-@pytest.mark.parametrize(("length", "likely"), [(1, False), (3, True)])
-def test_several_messages_in_a_row_without_a_number_may_lack_it_for_what_happened(length: int, likely: bool) -> None:
-    streams = recording()
-    streams["wrench"].values[4000 : 4000 + length, 0] = np.nan
-    streams["angle"].values[2000:2010] = np.nan  # which hides no load
-    assert bridged(run_of(streams)) == [("non-finite", 40.0, round(0.01 * length, 3), likely)]
-
-
 @pytest.mark.parametrize(
     ("knock", "likely"),
     [
-        ([[0.0, 5.0]], [False]),
+        ([[0.0, 5.0]], [True]),
         ([[0.0, 2.0], [0.0, 3.0], [0.0, 2.1]], [True]),  # three samples of one channel
         ([[4.0, 5.0]], [True, True]),  # one of two
     ],
 )
-def test_a_bad_sample_is_one_of_one_channel_and_more_may_be_a_knock(
-    knock: list[list[float]], likely: list[bool]
-) -> None:
+def test_what_is_off_its_neighbours_may_be_a_knock(knock: list[list[float]], likely: list[bool]) -> None:
     streams = recording()
     streams["wrench"].values[3000 : 3000 + len(knock)] += knock
     run = run_of(streams)
@@ -378,15 +369,46 @@ def test_what_a_driver_fills_in_is_no_knock() -> None:
         assert {one[3] for one in bridged(run_of(streams))} == {False}
     streams["wrench"].values[3000:3008] = 0.0  # longer than a knock that is taken for bad samples
     assert {one[0] for one in bridged(run_of(streams))} == {"dropout"}
+    streams = recording(5.0)
+    streams["wrench"].values[150, 0] = 0.0  # of one channel
+    assert bridged(run_of(streams)) == [("spike", 30.0, 0.2, False)]
 
 
 @pytest.mark.parametrize("lost", [1, 2, 5])
-def test_messages_that_are_lost_are_judged_as_those_without_a_number(lost: int) -> None:
+@pytest.mark.parametrize("lacking", ["rows", "numbers"])
+@pytest.mark.parametrize("shaken", [False, True])
+def test_rows_that_are_missing_may_hide_what_happened_where_those_beside_them_are_shaken(
+    lost: int, lacking: str, shaken: bool
+) -> None:
     streams, gone = recording(), range(3000, 3000 + lost)
-    without = {**streams, "wrench": rows(streams["wrench"], np.delete(np.arange(6000), gone))}
-    assert [one[2:] for one in bridged(run_of(without))] == [(round(0.01 * lost, 3), True)] * (lost > 1)
-    streams["wrench"].values[gone] = np.nan
-    assert [one[2:] for one in bridged(run_of(streams))] == [(round(0.01 * lost, 3), lost > 1)]
+    streams["angle"].values[2000:2010] = np.nan  # which hides no load
+    streams["wrench"].values[2999 : 3001 + lost, 1] += 20.0 * NOISE * shaken  # what rises and falls, its top is lost
+    if lacking == "rows":
+        streams["wrench"] = rows(streams["wrench"], np.delete(np.arange(6000), gone))
+    else:
+        streams["wrench"].values[gone] = np.nan
+    assert bridged(run_of(streams)) == [("gap", 29.99, round(0.01 * lost, 3), shaken)]
+
+
+@pytest.mark.parametrize(("key", "span"), [("angle", 0.25), ("wrench", 1.5)])
+def test_numbers_that_are_too_short_for_what_they_hold_are_refused(key: str, span: float) -> None:
+    streams = recording()
+    streams[key].values[:] = np.mod(streams[key].values, span)
+    with pytest.raises(RecordingError, match="which is all that it spans"):
+        run_of(streams)
+
+
+def test_a_load_that_is_put_on_and_off_is_none_of_them() -> None:
+    streams = recording()
+    streams["wrench"].values[:, 0] += 50.0 * (np.arange(6000) // 700 % 2)
+    assert not told(run_of(streams), "spike")
+
+
+@pytest.mark.parametrize("times", [10, 20, 100])
+def test_readings_that_a_logger_holds_are_not_lost(times: int) -> None:
+    streams = recording()
+    streams["wrench"].values[:] = streams["wrench"].values[np.arange(6000) // times * times]
+    assert not told(run_of(streams), "dropout") and not told(run_of(streams), "spike")
 
 
 def test_bursts_that_were_stamped_on_arrival_are_refused_by_name() -> None:

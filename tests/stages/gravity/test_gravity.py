@@ -103,7 +103,7 @@ def test_a_motion_too_small_to_learn_from_is_refused():
     t = np.arange(int(60 * FINE)) / FINE
     tiny = np.stack([0.3 + 2e-5 * np.sin(0.3 * t), 1.2 + 2e-5 * np.sin(0.4 * t)], axis=1)
     run = record(rig, "tiny", tiny, np.random.default_rng(0))
-    with pytest.raises(FitError, match="say less about the rig .* zeros of the readings hide even what they show best"):
+    with pytest.raises(FitError, match=r"say less about the rig .* zeros of the readings hide even"):
         gravity.fit([sample(run, rig)], rig, include_inertia=False)
 
 

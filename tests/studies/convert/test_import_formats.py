@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from kbs_process.errors import ConfigError
 from kbs_process.recordings import tables
 from kbs_process.recordings.formats import Text
 from kbs_process.recordings.formats.text import TextTable
@@ -225,3 +227,69 @@ def test_campaign_keeps_the_template_and_says_where_it_comes_from(tmp_path: Path
     assert [str(path) for path in files] == [LIST, "campaign.toml", "parameters/rig.toml", "recordings/turn_1.mcap"]
     for path in files:
         assert (one / path).read_bytes() == (two / path).read_bytes()
+
+
+TWO_LOGGERS = MAPPING.replace('source = "SOURCE"', 'source = "wrench.csv"\nfile = { encoder = "angle.csv" }')
+
+
+def write_two_loggers(folder: Path, rows: int = 200) -> dict[str, np.ndarray]:
+    """A wrench from one logger and an angle from another, which began 12.5 s later, writes commas and counts from 0."""
+    columns = signals(rows)
+    write_csv(folder / "wrench.csv", {name: columns[name] for name in ("t", "Fx", "Fy", "Fz")})
+    write_european(folder / "angle.csv", {"t": columns["t"] - columns["t"][0], "angle": columns["angle"]})
+    return columns
+
+
+def test_scale_and_offset_are_applied_in_the_unit_of_the_file(tmp_path: Path) -> None:
+    columns = {"t": np.arange(20) * 0.1, "Fx": np.arange(20.0), "Fy": np.ones(20), "Fz": np.ones(20)}
+    write_csv(tmp_path / "run.csv", columns | {"angle": np.arange(20.0)})
+    text = MAPPING.replace('column = "Fx", unit = "N"', 'column = "Fx", unit = "kN", scale = 2.0, offset = -0.5')
+    campaign = import_recordings(write_mapping(tmp_path, "run.csv", text), tmp_path, tmp_path / "campaign")
+    fx = read_back(campaign, "turn_1")["wrench"][1][:, 0]
+    np.testing.assert_allclose(fx, 2000.0 * np.arange(20.0) - 500.0)
+
+
+def test_a_recording_of_two_loggers(tmp_path: Path) -> None:
+    columns = write_two_loggers(tmp_path)
+    text = (
+        TWO_LOGGERS.replace("repeat = 1", "repeat = 1\nshift_s = { encoder = 12.5 }")
+        + '\n[text.encoder]\ndecimal = ","'
+    )
+    campaign = import_recordings(write_mapping(tmp_path, "", text), tmp_path, tmp_path / "campaign")
+    streams = read_back(campaign, "turn_1")
+    np.testing.assert_array_equal(streams["wrench"][1], np.stack([columns[n] for n in ("Fx", "Fy", "Fz")], axis=1))
+    np.testing.assert_array_equal(streams["encoder"][1][:, 0], columns["angle"])
+    begin = round((columns["t"][0] - 12.5) * 1e9)
+    np.testing.assert_allclose(streams["encoder"][0], np.rint(columns["t"] * 1e9) - begin, atol=1.0)
+    sources = tomllib.loads((campaign / "campaign.toml").read_text())["source"]["file"]
+    assert [one["name"] for one in sources] == ["wrench.csv", "angle.csv"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("", "", "'wrench.csv' and 'angle.csv' have a clock each: nothing says how they stand to each"),
+        ("encoder = ", "rate = ", "file.rate: is not mapped\n  -> add [rate]"),
+        ('"angle.csv"', '"../angle.csv"', "'../angle.csv' is no file of the source folder"),
+    ],
+)
+def test_two_loggers_are_not_put_together_by_guess(tmp_path: Path, old: str, new: str, said: str) -> None:
+    write_two_loggers(tmp_path)
+    mapping = write_mapping(tmp_path, "", TWO_LOGGERS.replace(old, new, 1) if old else TWO_LOGGERS)
+    with pytest.raises(ConfigError) as caught:
+        import_recordings(mapping, tmp_path, tmp_path / "campaign")
+    assert said in str(caught.value)
+
+
+def test_the_clocks_of_two_loggers_that_write_dates_are_one(tmp_path: Path) -> None:
+    write_two_loggers(tmp_path)
+    stamps = pd.date_range("2026-01-31T12:00:00Z", periods=200, freq="10ms")
+    for name, late in (("wrench.csv", 0), ("angle.csv", 5)):
+        separator = "," if name == "wrench.csv" else ";"
+        table = pd.read_csv(tmp_path / name, sep=separator, decimal="." if separator == "," else ",")
+        table["t"] = stamps + pd.Timedelta(late, "ms")
+        table.to_csv(tmp_path / name, index=False)
+    text = TWO_LOGGERS.replace('unit = "s"', 'unit = "datetime"', 1)
+    campaign = import_recordings(write_mapping(tmp_path, "", text), tmp_path, tmp_path / "campaign")
+    streams = read_back(campaign, "turn_1")
+    assert set(streams["encoder"][0] - streams["wrench"][0]) == {5_000_000}

@@ -19,7 +19,7 @@ from reduction.arm import described, drawn, recorded
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("size", "channels"), [(0.0, []), (0.05, ["Ty"])])
+@pytest.mark.parametrize(("size", "channels"), [(0.0, []), (0.002, []), (0.004, ["Ty"]), (0.05, ["Ty"])])
 def test_a_disturbance_in_a_calibration_is_told(tmp_path: Path, size: float, channels: list[str]) -> None:
     campaign = described(tmp_path / "arm")
     recordings = recorded(campaign, drawn(campaign, 1), 1)

@@ -195,6 +195,16 @@ class SourceTable(Table):
     file: list[SourceFileTable] = Field([])
 
 
+class DocumentTable(Table):
+    """What stands at the head of the report, beside name and title."""
+
+    number: Text | None = Field(None, description="of the report, as a document")
+    revision: Text | None = None
+    operator: Text | None = Field(None, description="who ran the test")
+    serial_number: Text | None = Field(None, description="of the article")
+    date: Text | None = Field(None, description="of the test; default: what the recordings say")
+
+
 class CampaignFile(Table):
     """All of campaign.toml."""
 
@@ -206,6 +216,7 @@ class CampaignFile(Table):
     title: Text = Field(description="what was tested, in one line")
     article: str = Field("", description="hardware under test")
     configuration: str = Field("", description="how it was set up")
+    document: DocumentTable = DocumentTable.model_construct()
     drive: DrivenBy = Field(
         description='"command": the plant is driven by the commands; "motion": by the measured angles or rates'
     )

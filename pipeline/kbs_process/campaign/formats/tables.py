@@ -14,9 +14,11 @@ from kbs_process.campaign.formats.kind import Kind
 NAME = "^[A-Za-z0-9][A-Za-z0-9._-]*$"
 LINK = "^[A-Za-z][A-Za-z0-9_-]*$"
 SHA256 = "^[0-9a-f]{64}$"
+STREAM = "^(wrench|effort|encoder|rate|command|field|temperature)$"
 FORMS = {
     NAME: "letters, digits, '.', '_' and '-', a letter or digit first",
     LINK: "letters, digits, '_' and '-', a letter first",
+    STREAM: "wrench, effort, encoder, rate, command, field or temperature",
     SHA256: "the 64 hexadecimal digits of a SHA-256, in small letters",
 }
 

@@ -45,8 +45,10 @@ def _head(structure: Structure) -> list[str]:
         "    plate_moment, plate_rates, rotate, rotor_moment, screw, triple, velocity_at, yielding,",
         ")",
         *[f"from {e.equation.__module__} import {e.equation.__qualname__} as _{e.name}" for e in called],
+        *[f"from {e.slope.__module__} import {e.slope.__qualname__} as _slope_{e.name}" for e in called if e.slope],
         "",
         *[f"effect_{e.name} = compiled_effect(_{e.name})" for e in called],
+        *[f"slope_{e.name} = compiled_effect(_slope_{e.name})" for e in called if e.slope],
         "",
         "",
     ]
@@ -66,10 +68,11 @@ def _drive(structure: Structure) -> list[str]:
         "@compiled",
         "def drive(field, rotor_angle, rotor_rate, rotor_travel, joint_angle, joint_rate,",
         f"          {'other_angle, other_rate, ' * structure.crossed}ratio, time, z, p, k):",
-        '    """Motor torque, Coulomb limit, gear torque, joint torque, then the rates of the states."""',
+        '    """Motor torque less what slopes bear, Coulomb limit, gear and joint torque, then the states\' rates."""',
         *[f"    {total} = 0.0" for total in [*totals.values(), *ground]],
     ]
     rates: list[str] = []
+    borne = []
     for effect, wires in _wired(structure):
         if effect.port is Port.FIELD:
             continue
@@ -82,7 +85,10 @@ def _drive(structure: Structure) -> list[str]:
         lines.append(f"    {', '.join(['value', *results])} = {call}")
         lines.append(f"    {totals.get(effect.port, 'joint')} += value")
         lines += ["    ground += value"] * (effect.port is Port.GROUND_TORQUE)
-    return [*lines, f"    return {', '.join([*totals.values(), *rates, *ground])}", "", ""]
+        if effect.slope:
+            given = ", ".join(wires.get(name, name) for name in effect.arguments_of(effect.slope))
+            borne.append(f"    motor -= gear * slope_{effect.name}({given})")
+    return [*lines, *borne, f"    return {', '.join([*totals.values(), *rates, *ground])}", "", ""]
 
 
 def _wired(structure: Structure) -> Iterator[tuple[Effect, dict[str, str]]]:

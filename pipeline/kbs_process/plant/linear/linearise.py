@@ -178,7 +178,8 @@ def _torques(drive: Drive, effects: Sequence[Effect]) -> Callable[[Mapping[str, 
         for effect in acting:
             totals[effect.port] += effect.value(known)[0]
         gear = totals[Port.TRANSMISSION]
-        return np.array([gear + totals[Port.JOINT_TORQUE], ratio * totals[Port.MOTOR_TORQUE] - gear])
+        share = 1.0 + ratio * sum(effect.slope_at(known) for effect in acting)
+        return np.array([gear + totals[Port.JOINT_TORQUE], ratio * totals[Port.MOTOR_TORQUE] - share * gear])
 
     return torques
 

@@ -85,8 +85,8 @@ class TextTable:
             yield tuple(self._cells(frame[name]) for name in names)
 
     def _rows(self, width: int) -> Iterator[str]:
-        """Yield the lines that are rows of the table, and count those that are none."""
-        delimiter = self._delimiter
+        """Yield the lines that are rows of the table, and count those that are none; most are, or it is another."""
+        delimiter, kept, out = self._delimiter, 0, 0
         left = self._options.rows
         for place, line in self._lines(self._first_data_row):
             if '"' in line or delimiter == " ":
@@ -98,13 +98,20 @@ class TextTable:
             if count != width or line == "" or "\0" in line:
                 first = f"lines are no rows of {width} cells, left out (the first is line {place + 1})"
                 known = next((what for what in self.odd if what.startswith("lines are no rows")), first)
-                self.odd[known] += 1
+                self.odd[known] = out = out + 1
                 continue
             if left is not None:
                 if not left:
                     return
                 left -= 1
+            kept += 1
             yield line
+        if out > kept:
+            raise RecordingError(
+                f"{out} of {out + kept} {known.replace(', left out', '')}",
+                where=str(self.path),
+                remedy="say where the table begins and ends: skip_rows and rows in the mapping's [text]",
+            )
 
     def _parsed(self, lines: Sequence[str], names: Sequence[str]) -> pd.DataFrame:
         import pandas as pd

@@ -147,7 +147,9 @@ def _far(stamp: Stamps, good: Mask, least: int, *, first: bool, last: bool) -> t
     for known, reach, order in ((first, steps, index), (last, steps[::-1], index[::-1])):
         at = int(np.argmax(reach[:LONE]))
         apart = int(reach[at])
-        if known and apart > max(least, 10.0 * float(reach[:at].sum()), 100.0 * usual):
+        own, others = stamp[order[: at + 1]], stamp[order[at + 1 :]]
+        among = np.any((own >= others.min()) & (own <= others.max()))
+        if known and apart > max(least, 10.0 * float(reach[:at].sum()), 100.0 * usual) and not among:
             far[order[: at + 1]], most = True, max(most, apart)
     return far, most
 

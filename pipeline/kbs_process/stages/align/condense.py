@@ -158,6 +158,7 @@ def condense(
             if key in LOADS or (kind == SPIKE and key != "pointing")
         ),
         gaps=np.concatenate([_on_axis(sampled[key].gaps(), clocks[key]) for key in kept if key != "pointing"]),
+        reach=max(one.design.leaning(DOUBT) for one in kept.values()),
     )
 
 

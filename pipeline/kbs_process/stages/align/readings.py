@@ -54,6 +54,11 @@ class Readings:
         rows = np.concatenate(self.head) if self.head else np.zeros((0, 0))
         return np.array([_step(column) for column in rows.T])
 
+    @property
+    def held(self) -> bool:
+        """Whether each reading comes several times, which no rounding makes it do."""
+        return sum(self.stamped.values()) >= 2 * sum(self.changed.values()) and not self._rounded()
+
     def slow(self, needed: float, *, at_rest: bool) -> tuple[float, float]:
         """Share of the time in which there are fewer than `needed` distinct readings a second, and the rate there.
 

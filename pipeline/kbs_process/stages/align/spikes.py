@@ -27,11 +27,13 @@ CODES = 3.0  # of the least difference between readings that was met
 STEP_LARGEST = 4.0  # a step's share of the largest second difference of the whole recording
 FASTEST = 100.0  # rad/s^2 that no antenna reaches
 SLOWEST_S = 0.05  # period of samples, beyond which a rig may well get from one place to another in between
+WRAPS = 0.05  # part of its span by which a channel's jump back may differ from it
 MOST_STEPS = 3  # more of them are how the signal is
 LISTED = 1000
 CLUSTER = 16  # samples, among which some are off and the others go on as before
 CROWDED = 10  # of the nearest, that are suspect as well: all that is near gives M then
 AGREE = 0.35  # of what spikes are off by, that all beside them agree within
+FEW = 5  # times as many the same as a logger repeats each reading are lost
 HELD_S = 0.5  # longer than any channel with noise shows one and the same reading
 GAP = 1.5  # periods
 PUSHED_S = 2.0
@@ -102,7 +104,7 @@ class Oddity:
     last: int  # ns
     by: float  # largest deviation; the reading that stands still
     count: int = 1  # samples
-    likely: bool = False  # several samples or channels that read differently: it may be what happened
+    likely: bool = False  # nothing that a driver filled in: it may be what happened; a step: against all around it
 
 
 @dataclass(slots=True)
@@ -117,6 +119,7 @@ class Spikes:
     blows: list[Oddity] = field(default_factory=list)  # of several channels and samples at once: kept
     steps: list[Oddity] = field(default_factory=list)
     lost: list[Oddity] = field(default_factory=list)  # stretches that stand still: left out
+    gaps: list[Oddity] = field(default_factory=list)  # likely: readings beside them move as nowhere around
     changing: dict[int, Oddity] = field(default_factory=dict)  # channels whose samples change to and fro
     beating: set[int] = field(default_factory=set)  # of these, tones
     samples: int = 0
@@ -124,6 +127,7 @@ class Spikes:
     _code: Array | None = None  # (c,) least difference between readings
     _largest: Array | None = None  # (c,) second difference beside spikes and steps
     _fastest: Array | None = None  # (c,) first difference
+    _span: Array | None = None  # (2, c) least and greatest readings
     _gaps: list[Oddity] = field(default_factory=list)  # changes across gaps: `count` periods
     _last: Array | None = None  # (c,) reading that stands still; NaN
     _stamp: Stamps | None = None
@@ -165,6 +169,9 @@ class Spikes:
         gap = steps > GAP
         found: list[tuple[int, int, int, float]] = []
         before, gone = x, np.zeros(len(x), dtype=np.bool_)
+        new = np.flatnonzero((x[1:] != x[:-1]).any(axis=1))
+        repeated = len(new) > NEAR and not self.turning.any()
+        least = max(LONGEST, int(FEW * np.median(np.diff(new)))) if repeated else LONGEST
         for channel in range(channels) if end > done else ():
             column = np.ascontiguousarray(x[:, channel])
             step = np.abs(np.diff(column[max(done - 1, 0) :]))
@@ -174,7 +181,7 @@ class Spikes:
             dead = np.zeros(len(x), dtype=np.bool_)
             if self.lively:
                 edges = (self.samples == 0, last)
-                dead = find_dead(column, steps, turn, done, end, floor, self._held, still[channel], edges)
+                dead = find_dead(column, steps, turn, done, end, floor, (least, self._held), still[channel], edges)
                 self._note_lost(channel, stamp, column, dead, done, end)
                 still[channel] = column[end - 1] if dead[end - 1] else np.nan
                 gone |= dead
@@ -191,6 +198,13 @@ class Spikes:
                 before = x.copy() if before is x else before
                 x[:, channel] = column
         self._note(found, stamp, steps, x, before)
+        read = x[done:end] if self._span is None else np.concatenate([self._span, x[done:end]])
+        self._span = np.stack([read.min(axis=0), read.max(axis=0)]) if len(read) else None
+        for at in np.flatnonzero(gap[done:end]).tolist() if not self.turning.any() else ():
+            first, stop = done + at - 1, done + at
+            if len(self.gaps) < LISTED:
+                shaken = _shaken(before, steps, stop, stop, set())
+                self.gaps.append(Oddity(0, int(stamp[first]), int(stamp[stop]), 0.0, likely=shaken))
         self._last = still
         self.samples += end - done
         kept = slice(done, end) if self.keep else done + np.flatnonzero(~gone[done:end])
@@ -233,10 +247,14 @@ class Spikes:
             several = {other for other, begin, end, _ in found if first < abs(end) and begin < stop}
             rows = before[first : max(stop, first), channel]
             read = before[first : max(stop, first)][:, sorted(several)]
-            likely = bool((read != read[:1, :1]).any())  # what a driver fills in for what it lost is all the same
+            # What a driver fills in for what it lost is zero, or all the same.
+            likely = bool((read != read[:1, :1]).any() if read.size > 1 else read.any())
             one = Oddity(channel, int(stamp[first]), int(stamp[abs(stop) - 1]), by, abs(stop) - first, likely)
             if stop < 0:
                 kind = self.steps
+                around = (slice(max(first - NEAR, 0), first), slice(first, first + NEAR))
+                against = all(np.median(np.diff(before[own, channel])) * by < 0.0 for own in around)
+                one = replace(one, likely=against)
             elif not self.turning.any() and (
                 (len(rows) > 1 and len(several) > 1 and not (rows == rows[0]).all())
                 or _shaken(before, steps, first, stop, {c for c, begin, _, _ in found if abs(begin - first) < NEAR})
@@ -253,6 +271,15 @@ class Spikes:
     def mixed(self) -> Oddity | None:
         """A channel that two sources bring by turns."""
         return next((one for channel, one in self.changing.items() if channel not in self.beating), None)
+
+    @property
+    def wrapped(self) -> Oddity | None:
+        """A channel that jumps back by all that it spans, each time that it comes to an end of that."""
+        for channel, span in enumerate(() if self._span is None else (self._span[1] - self._span[0]).tolist()):
+            own = [one for one in self.steps if one.channel == channel]
+            if len(own) > 1 and all(one.likely and abs(abs(one.by) / span - 1.0) < WRAPS for one in own):
+                return own[0]
+        return None
 
     def noisy(self) -> tuple[int, int] | None:
         """A channel with more spikes than a signal has, and how many samples they are."""
@@ -351,16 +378,17 @@ def find_dead(
     begin: int,
     end: int,
     floor: float,
-    held: int,
+    lengths: tuple[int, int],
     last: float,
     edges: tuple[bool, bool],
 ) -> Mask:
     """Mark samples up to `end` that stand still off all others: a channel that was lost for a while.
 
-    They begin and end with a jump; or, where the channel has noise, stand still for `held` samples. `last` is the
-    reading that stood still up to `begin`, or NaN; `edges` says whether x begins and ends with the recording.
+    They are as many as the first of `lengths`, and begin and end with a jump; or, where the channel has noise, stand
+    still for as many as the second. `last` is the reading that stood still up to `begin`, or NaN; `edges` says whether
+    x begins and ends with the recording.
     """
-    n = len(x)
+    n, (least, held) = len(x), lengths
     d, dd = _differences(x, steps, period)
     dead = np.zeros(n, dtype=np.bool_)
     a = begin
@@ -372,7 +400,7 @@ def find_dead(
         b = a
         while b + 1 < n and x[b + 1] == x[a]:
             b += 1
-        if b - a >= LONGEST:
+        if b - a >= least:
             before, after = _scale(dd, a - AROUND, a - 1), _scale(dd, b + 2, b + 2 + AROUND)
             jump_in = _turned(x[a] - x[a - 1], period) - d[a - 1] if a >= 2 else 0.0
             jump_out = d[b + 1] - d[b + 2] if b + 2 < n else 0.0

@@ -8,7 +8,19 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from kbs_process.errors import RecordingError
-from kbs_process.signals.records import BLOW, DROPOUT, PUT_IN_ORDER, ROUNDED, SPIKE, Array, Block, Loss, Mask, Stamps
+from kbs_process.signals.records import (
+    BLOW,
+    DROPOUT,
+    MISSING,
+    PUT_IN_ORDER,
+    ROUNDED,
+    SPIKE,
+    Array,
+    Block,
+    Loss,
+    Mask,
+    Stamps,
+)
 from kbs_process.stages.align.arrival import REGULAR, Arrival
 from kbs_process.stages.align.clocks import ClockData, FloorStep, LatencyFloor
 from kbs_process.stages.align.envelope import MinMax
@@ -26,7 +38,7 @@ from kbs_process.stages.align.grid import (
 from kbs_process.stages.align.ordering import Orderer, Reblock, concatenate, finite_rows, judge
 from kbs_process.stages.align.resample import Kept, Reducer, design
 from kbs_process.stages.align.spectrum import Welch
-from kbs_process.stages.align.spikes import LISTED, Oddity, Spikes
+from kbs_process.stages.align.spikes import Oddity, Spikes
 
 TIMES = 10  # of single bad samples, one by one
 GAPS_LISTED = 5  # one by one; more of them in one line
@@ -80,7 +92,6 @@ class Timeline:
     regular: bool = True  # whether most steps are like their median
     spikes: Spikes | None = None
     _non_finite_in: dict[str, int] = field(default_factory=dict)  # by channel
-    _non_finite_at: list[Stamps] = field(default_factory=list)
     _reblock: Reblock = field(default_factory=Reblock)
     _arrival: Arrival = field(default_factory=Arrival)
     _ready: Reblock = field(default_factory=Reblock)
@@ -267,6 +278,13 @@ class Timeline:
                 where=self.file or self.where,
                 remedy=TWO_SOURCES,
             )
+        if self.spikes is not None and (wrapped := self.spikes.wrapped) is not None:
+            raise RecordingError(
+                f"{self.channels[wrapped.channel]} jumps back by {abs(wrapped.by):.4g}, which is all that it spans, "
+                f"{self.own_one(wrapped.first):.6g} s after the first sample and again: it begins anew there",
+                where=self.file or self.where,
+                remedy="export it in more bits; of an angle, give `unwrap` in the mapping of its import",
+            )
         if self.spikes is not None and (noisy := self.spikes.noisy()) is not None:
             raise RecordingError(
                 f"{self.channels[noisy[0]]} is off its neighbours in {noisy[1]} single samples of {self.samples}: "
@@ -292,7 +310,6 @@ class Timeline:
         if good is None:
             return block.stamp, block.values
         self.non_finite += len(good) - int(np.count_nonzero(good))
-        self._non_finite_at.append(block.stamp[~good])
         bad_in = (~np.isfinite(block.values)).sum(axis=0).tolist()
         for channel, bad in zip(self.channels, bad_in, strict=True):
             if bad:
@@ -302,24 +319,18 @@ class Timeline:
     def stretches(self) -> Iterator[tuple[str, float, float, bool]]:
         """Yield kind, start and length, s, of what was bridged, and whether what happened may be the cause.
 
-        One bad sample in one channel shows nothing that happened, nor does what a driver fills in. Where several
-        messages in a row are lost, or lack a number, that may be the cause.
+        What a driver fills in shows nothing that happened. Nor do rows that are missing, unless those beside them are
+        shaken.
         """
         if self.spikes is None or self.grid is None:
             return
-        period = self.grid.period_ns
-        at = np.concatenate([np.empty(0, dtype=np.int64), *self._non_finite_at])
-        ends = np.flatnonzero(np.diff(at) > GAP * period)
-        runs = np.stack([at[np.append(0, ends + 1)], at[np.append(ends, -1)]]).T if len(at) else at.reshape(0, 2)
-        longest = np.argsort(runs[:, 0] - runs[:, 1], kind="stable")[:LISTED]
-        found = [(SPIKE, one.first, one.last, one.likely) for one in self.spikes.spikes]
-        found += [(DROPOUT, one.first, one.last, True) for one in self.spikes.lost]
-        found += [("non-finite", first, last, last > first) for first, last in runs[longest].tolist()]
-        for kind, first, last, likely in found:
-            yield kind, self.own_one(first), 1e-9 * (last - first + period), likely
-        for gap in self.gaps:
-            if gap.missing > 1:
-                yield "gap", gap.start, gap.end - gap.start - 1e-9 * period, True
+        period = 1e-9 * self.grid.period_ns
+        found = [(SPIKE, one, period) for one in self.spikes.spikes] + [
+            (DROPOUT, one, period) for one in self.spikes.lost
+        ]
+        found += [(MISSING, one, -period) for one in self.spikes.gaps]  # between samples that are there
+        for kind, one, more in found:
+            yield kind, self.own_one(one.first), 1e-9 * (one.last - one.first) + more, kind == DROPOUT or one.likely
 
     @property
     def non_finite_channels(self) -> str:
@@ -556,11 +567,12 @@ class Uniform:
         return (np.concatenate(self._own), np.concatenate(self._values)) if self._own else None
 
     def gaps(self) -> Array:
-        """Return from when to when samples are made up (k, 2), s from the stream's first: the samples beside them."""
+        """Return from when to when samples are made up (k, 2), s from the first: also before and after all."""
         at = np.concatenate([np.zeros(0), *self._made_up])
         pieces = np.split(at, 1 + np.flatnonzero(np.diff(at) > 1.0))
         period = 1e-9 * self.line.grid.period_ns if self.line.grid is not None else 0.0
-        return np.array([(piece[0] - 1.0, piece[-1] + 1.0) for piece in pieces if len(piece)]).reshape(-1, 2) * period
+        made_up = [(piece[0] - 1.0, piece[-1] + 1.0) for piece in pieces if len(piece)]
+        return np.array([(-np.inf, 0.0), *made_up, (self._rows - 1.0, np.inf)]) * period
 
     def _take(self, block: Block) -> None:
         grid = self.line.grid

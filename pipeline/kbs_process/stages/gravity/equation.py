@@ -102,15 +102,15 @@ def blocks(p: Prepared) -> Iterator[Prepared]:
 def prepare(
     name: str, motion: Motion, wrench: Signal, low_pass: float, *, with_neighbours: bool, lost: str = ""
 ) -> Prepared:
-    """Low-pass motion and wrench alike, thin them, and drop what is invalid or near the ends."""
+    """Low-pass motion and wrench alike, thin them, and drop what is not valid in the wrench, or near the ends."""
     if len(motion) != len(wrench) or abs(motion.t0 - wrench.t0) > 0.01 * motion.dt:
         raise RecordingError(f"{name}: motion and wrench do not lie on one grid")
     edge = kernel_length(low_pass, motion.dt)
     stride = max(1, int(1.0 / (_RATE * low_pass * motion.dt)), -(-len(motion) // _MOST))
-    good = _away_from_invalid(motion.valid & wrench.valid, edge)
+    good = _away_from_invalid(wrench.valid, edge)
     at = np.arange(0, len(good), stride)[good[::stride]]
     if len(at) < 8:
-        whole = motion.dt * np.count_nonzero(motion.valid & wrench.valid)
+        whole = motion.dt * np.count_nonzero(wrench.valid)
         raise RecordingError(
             f"{name}: too short or too damaged for a gravity fit below {low_pass:g} Hz: readings and angles are whole "
             f"for {whole:.3g} s of {motion.dt * len(motion):.3g} s{lost and f', by {lost}'}",

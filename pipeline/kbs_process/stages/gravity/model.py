@@ -12,7 +12,7 @@ counts for what it is worth.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from kbs_process.estimation.fit import Fit
 from kbs_process.rig.model import Rig
 from kbs_process.signals.records import Array, Signal
 from kbs_process.signals.smoothing import smooth
+from kbs_process.stages.bandpass import Band, bridged
 from kbs_process.stages.gravity.equation import Equation, Prepared, at_rest, blocks, prepare
 from kbs_process.stages.gravity.parameters import Index
 from kbs_process.stages.gravity.solve import Rows, first_sigma, least_sigma, refuse_uninformed, residual_sigma, solve
@@ -28,6 +29,7 @@ from kbs_process.stages.gravity.taring import Taring, estimate, of_fit
 from kbs_process.stages.motion import Motion
 
 _ROUNDS = 3  # of weights
+_SLOWER = 0.5  # part of the fit's low-pass below which gravity's loads are, and a line across a gap tells of them
 STILL = 10.0  # sigma of the angle within which a joint has not moved
 _ERROR_POINTS = 1000  # of a recording at which the model's error is evaluated, linear in between
 
@@ -41,6 +43,8 @@ class Sample:
     wrench: Signal
     calibration: bool = False  # pseudo-static: fitted first, and sets the first weights
     lost: str = ""  # what most of it was lost by
+    gaps: Array = field(default_factory=lambda: np.zeros((0, 2)))  # s, from when to when samples are made up
+    reach: float = 0.0  # s beside these in which filters lean on them
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,9 +179,12 @@ def prepared(
     """The instants of a recording that the equation is compared with; see `at_rest` for a model without inertia.
 
     A low-passed wrench is not that of the low-passed motion, where products of angles and rates lie beyond the corner.
-    By how much they differ is computed with the rig's parameters `theta`, and taken off.
+    By how much they differ is computed with the rig's parameters `theta`, and taken off. Gaps that are short below
+    `low_pass_Hz` are no gaps.
     """
-    parts = sample.name, sample.motion, sample.wrench, low_pass_Hz
+    read = replace(sample.wrench, valid=sample.wrench.valid & sample.motion.valid)
+    known = bridged(read, sample.gaps, Band("", None, _SLOWER * low_pass_Hz), sample.reach)
+    parts = sample.name, sample.motion, known, low_pass_Hz
     data = prepare(*parts, with_neighbours=settings.response, lost=sample.lost)
     if not equation.include_inertia:
         return at_rest(data, equation.elements.rig)

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.polynomial.legendre import legvander
 
 from kbs_process.errors import FitError
-from kbs_process.estimation.fit import Check, Fit, Parameters, Problem, combination, minimise, stated
+from kbs_process.estimation.fit import MAX_ITERATIONS, Check, Fit, Parameters, Problem, combination, minimise, stated
 from kbs_process.estimation.flicker import flicker_scores
 from kbs_process.estimation.longrun import longrun_covariance, variance_inflation
 from kbs_process.estimation.tensors import Tensors
@@ -113,8 +113,8 @@ class Solution:
         return stated(self.problem, self.parameters, self.every, self.converged, scores)
 
 
-def solve(rows: Rows, sigmas: Sequence[Array], theta: Array) -> Solution:
-    """Solve from `theta` on."""
+def solve(rows: Rows, sigmas: Sequence[Array], theta: Array, most: int = MAX_ITERATIONS) -> Solution:
+    """Solve from `theta` on, by `most` steps."""
     equation, prepared = rows.equation, rows.prepared
     size, loose = equation.size, _loose(equation)
     bases, known = [zero_basis(p) for p in prepared], [zero_sigma(equation, p)[:, loose].T for p in prepared]
@@ -154,7 +154,7 @@ def solve(rows: Rows, sigmas: Sequence[Array], theta: Array) -> Solution:
     )
     samples = sum(p.wrench.size for p in prepared)
     problem = Problem(cost, triangle, samples, lambda full, to: with_zeros(equation.bent(full[:size], to[:size])))
-    return Solution(rows, sigmas, parameters, problem, *minimise(problem, parameters, with_zeros(theta)))
+    return Solution(rows, sigmas, parameters, problem, *minimise(problem, parameters, with_zeros(theta), most))
 
 
 def zero_priors(equation: Equation, prepared: Sequence[Prepared]) -> tuple[tuple[str, ...], Array]:

@@ -1,15 +1,13 @@
-"""What is in a source file, as the beginning of a mapping."""
+"""What is in a source file."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from kbs_process.campaign.documents import quoted
 from kbs_process.recordings.open_table import open_table
 from kbs_process.recordings.tables import Cells, Column, Table
 from kbs_process.studies.convert.clock import numbers
@@ -49,22 +47,21 @@ class Range:
         else:
             low, high = printable(self.text[:20]) or "no number", ""
         counts = f"{number:>4}  {self.rows:>9}  {self.absent:>7}"
-        return f"# {counts}  {low:>12}  {high:>12}  {printable(self.column.unit):<8}  {printable(self.column.name)}"
+        return f"{counts}  {low:>12}  {high:>12}  {printable(self.column.unit):<8}  {printable(self.column.name)}"
 
 
 def describe(source: Path) -> str:
-    """Return a mapping to be completed, whose comments list the columns of `source` with their ranges.
+    """Return a list of the columns of `source` with their ranges, and of what it holds besides.
 
     Raises RecordingError where the file cannot be read.
     """
     table = open_table(source)
     ranges = _ranges(table)
-    header = f"# {'no.':>4}  {'rows':>9}  {'no num.':>7}  {'least':>12}  {'greatest':>12}  {'unit':<8}  column"
+    header = f"{'no.':>4}  {'rows':>9}  {'no num.':>7}  {'least':>12}  {'greatest':>12}  {'unit':<8}  column"
     listing = "\n".join([header, *(entry.line(1 + index) for index, entry in enumerate(ranges))])
     told = [f"left out: {one}" for one in table.left_out] + [f"{count} {what}" for what, count in table.odd.items()]
-    notes = "".join(f"# {printable(' '.join(one.split()))}\n" for one in told)
-    head = f"#:schema import.schema.json\n# Columns of {printable(source.name)}\n"
-    return f"{head}{listing}\n{notes}\n{_skeleton(source, ranges)}"
+    notes = "".join(f"{printable(' '.join(one.split()))}\n" for one in told)
+    return f"Columns of {printable(source.name)}\n{listing}\n{notes}"
 
 
 def _ranges(table: Table) -> list[Range]:
@@ -74,34 +71,3 @@ def _ranges(table: Table) -> list[Range]:
         for entry, one in zip(ranges, cells, strict=True):
             entry.add(one)
     return ranges
-
-
-def _skeleton(source: Path, ranges: Sequence[Range]) -> str:
-    """Return the keys of a mapping; what only the user knows is marked by "..."."""
-    named = [entry.column.name for entry in ranges]
-    clocked = any(entry.column.clock for entry in ranges)
-    time = next((name for name in named if "time" in name.lower()), None)
-    if clocked:
-        clock = "# [time]: left out, the file has its own"
-    elif time is not None:
-        clock = f'[time]\ncolumn = {quoted(time)}\nunit = "s"'
-    else:
-        clock = "[time]\nrate_Hz = 1000.0  # rows a second; or give column and unit"
-    example = quoted(next((name for name in named if name != time), named[0]))
-    return f"""schema = 1
-campaign = "campaign.toml"  # its description: copy one, such as that of campaigns/EL089, with its parameter files
-
-{clock}
-
-[wrench]  # Fx ... Tz: force and moment that the unit exerts on the transducer, about and in T
-Fx = {{ column = {example}, unit = "N", scale = 1.0 }}
-
-[encoder]  # one for each joint of the rig; where rates are measured instead, [rate]
-az = {{ column = "...", unit = "deg", unwrap = false }}
-
-[[recording]]
-source = {quoted(source.name)}
-trajectory = "..."
-role = "fit"  # "calibration", "fit" or "held-out"
-repeat = 1
-"""

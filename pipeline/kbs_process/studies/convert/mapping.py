@@ -16,7 +16,16 @@ from kbs_process.errors import ConfigError, did_you_mean
 from kbs_process.recordings.formats import Text, formats
 from kbs_process.signals.records import WRENCH_CHANNELS, WRENCH_UNITS
 from kbs_process.studies.convert import PRESETS, preset_names
-from kbs_process.studies.convert.mapping_file import ColumnTable, MappingFile, Part, Source, Time, TimesTable, Turn
+from kbs_process.studies.convert.mapping_file import (
+    ColumnTable,
+    MappingFile,
+    Part,
+    Source,
+    TextTable,
+    Time,
+    TimesTable,
+    Turn,
+)
 
 KELVIN = 273.15  # 0 degC, K
 
@@ -48,7 +57,7 @@ class Mapping(msgspec.Struct, frozen=True):
     path: Path
     template: Path  # campaign.toml
     format: str | None  # of all source files; None: each by its suffix
-    text: Text
+    texts: dict[str, Text]  # by stream
     streams: tuple[StreamMap, ...]
     turn: Turn | None
     source: Source
@@ -87,20 +96,25 @@ def load_mapping(path: Path) -> Mapping:
         remedy = did_you_mean(file.format, formats())
         problems.add(document.place(("format",)), f"'{file.format}' is not allowed", remedy)
     streams = tuple(_stream(document, file, key, problems) for key in STREAMS if key in file.model_fields_set)
-    _check_parts(document, file.recording, problems)
+    _check_parts(document, file.recording, streams, problems)
     if file.turn:
-        _check_turn(document, file.turn, streams, problems)
+        _check_turn(document, file.turn, streams, file.recording, problems)
     problems.raise_any()
     return Mapping(
         path=path,
         template=path.parent / file.campaign,
         format=file.format,
-        text=Text(**file.text.model_dump(exclude_none=True)),
+        texts={key: _text(file, key) for key in STREAMS},
         streams=streams,
         turn=file.turn,
         source=file.source,
         parts=tuple(file.recording),
     )
+
+
+def _text(file: MappingFile, key: str) -> Text:
+    own: TextTable | None = getattr(file.text, key)
+    return Text(**(own or file.text).model_dump(exclude_none=True, exclude=set(STREAMS)))
 
 
 def _stream(document: Document, file: MappingFile, key: str, problems: Problems) -> StreamMap:
@@ -149,7 +163,7 @@ def _channel(
         except UnitMismatchError as error:
             problems.add(document.place((*key, "unit")), str(error), error.remedy)
     turn = 2.0 * math.pi * again if isinstance(again, bool) else abs(again * gain * scale)
-    return Channel(field, cell.column, unit, scale, si, gain * scale, offset, turn)
+    return Channel(field, cell.column, unit, scale, si, gain * scale, offset + gain * cell.offset, turn)
 
 
 def _time(document: Document, common: TimesTable, key: str, problems: Problems) -> Time | None:
@@ -169,7 +183,9 @@ def _time(document: Document, common: TimesTable, key: str, problems: Problems) 
     return Time.model_construct(**{name: getattr(table, name) for name in Time.model_fields})
 
 
-def _check_parts(document: Document, parts: Sequence[Part], problems: Problems) -> None:
+def _check_parts(document: Document, parts: Sequence[Part], streams: Sequence[StreamMap], problems: Problems) -> None:
+    mapped = [stream.key for stream in streams]
+    dated = all(one.time is None or one.time.unit == "datetime" or one.time.start for one in streams)
     stems: set[str] = set()
     for index, part in enumerate(parts):
         if part.stem in stems:
@@ -181,15 +197,30 @@ def _check_parts(document: Document, parts: Sequence[Part], problems: Problems) 
         stems.add(part.stem)
         if part.end_s <= part.start_s:
             problems.add(document.place(("recording", index, "end_s")), "is not after start_s", "give a later moment")
-        if Path(part.source).is_absolute() or ".." in Path(part.source).parts:
+        for place, name in ((("source",), part.source), *((("file", key), name) for key, name in part.file.items())):
+            if Path(name).is_absolute() or ".." in Path(name).parts:
+                problems.add(
+                    document.place(("recording", index, *place)),
+                    f"'{name}' is no file of the source folder",
+                    "name it relative to that folder; the folder is given on the command line",
+                )
+        for key in part.file:
+            if key not in mapped:
+                problems.add(document.place(("recording", index, "file", key)), "is not mapped", f"add [{key}]")
+        stated = {part.file_of(key) for key in part.shift_s}
+        unstated = [name for name in dict.fromkeys(map(part.file_of, mapped)) if name not in stated]
+        if len(unstated) > 1 and not dated:
             problems.add(
-                document.place(("recording", index, "source")),
-                f"'{part.source}' is no file of the source folder",
-                "name it relative to that folder; the folder is given on the command line",
+                document.place(("recording", index, "file")),
+                f"'{unstated[0]}' and '{unstated[1]}' have a clock each: nothing says how they stand to each other",
+                "give shift_s = { encoder = ... }, s that are added to the times of a stream, or dates in both files",
             )
 
 
-def _check_turn(document: Document, turn: Turn, streams: tuple[StreamMap, ...], problems: Problems) -> None:
+def _check_turn(
+    document: Document, turn: Turn, streams: tuple[StreamMap, ...], parts: Sequence[Part], problems: Problems
+) -> None:
+    apart = any(part.file_of("encoder") != part.file_of("wrench") for part in parts)
     mapped = {stream.key: stream for stream in streams}
     angles = mapped.get("encoder")
     fields = [channel.field for channel in angles.channels] if angles else []
@@ -202,8 +233,8 @@ def _check_turn(document: Document, turn: Turn, streams: tuple[StreamMap, ...], 
             f"no angle of '{turn.joint}' is mapped",
             did_you_mean(turn.joint, document.tree.get("encoder", {})),
         )
-    elif angles and (angles.time is None or angles.time != mapped["wrench"].time):
-        problems.add(document.place(("turn",)), "needs wrench and angle row by row", "give both the same time column")
+    elif angles and (angles.time is None or angles.time != mapped["wrench"].time or apart):
+        problems.add(document.place(("turn",)), "needs wrench and angle row by row", "give both the same file and time")
     for kind in ("F", "T"):
         given = [name for name in document.tree["wrench"] if name.startswith(kind)]
         if len(given) in (1, 2):

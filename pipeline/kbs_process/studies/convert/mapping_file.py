@@ -10,6 +10,7 @@ from pydantic import AwareDatetime, ConfigDict, Field
 from kbs_process.campaign.config import Role
 from kbs_process.campaign.formats.tables import (
     NUMBER,
+    STREAM,
     TEXT,
     TRUTH,
     Count,
@@ -29,6 +30,9 @@ Which = Annotated[Annotated[Words, TEXT] | Annotated[Count, NUMBER], by_kind]
 OneCharacter = Annotated[str, Field(min_length=1, max_length=1)]
 
 
+StreamKey = Annotated[str, Field(pattern=STREAM)]
+
+
 class TextTable(Table):
     """How delimited text is written; what is left out is found from the first lines."""
 
@@ -43,6 +47,18 @@ class TextTable(Table):
         None, description="what begins a comment"
     )
     encoding: Words | None = None
+
+
+class TextsTable(TextTable):
+    """Delimited text of all files. Streams in files of their own have tables of their own, whole."""
+
+    wrench: TextTable | None = None
+    effort: TextTable | None = None
+    encoder: TextTable | None = None
+    rate: TextTable | None = None
+    command: TextTable | None = None
+    field: TextTable | None = None
+    temperature: TextTable | None = None
 
 
 class Time(Table):
@@ -76,6 +92,7 @@ class ColumnTable(Table):
     column: Which = Field(description="a column's name, or its number counted from 1")
     unit: Words = Field(description="in which the file has it")
     scale: Magnitude = Field(1.0, description="multiplies the file's numbers; -1 turns the sign")
+    offset: Magnitude = Field(0.0, description="added after that, in `unit`")
     radius_m: Positive | None = Field(
         None,
         description="the file has the way or the speed of a surface at this radius, in a unit of length or velocity",
@@ -134,6 +151,10 @@ class Part(Table):
     """One recording, or the part of a source file that becomes one."""
 
     source: Words = Field(description="file in the source folder")
+    file: dict[StreamKey, Words] = Field({}, description="other files there, of streams that lie in one")
+    shift_s: dict[StreamKey, Magnitude] = Field(
+        {}, description="added to the times of a stream, s, so that its clock agrees with that of the other files"
+    )
     name: Name | None = Field(None, description="of the recording; default: trajectory_repeat")
     trajectory: Name
     role: Role
@@ -145,6 +166,10 @@ class Part(Table):
     def stem(self) -> str:
         """Name of the recording's file, without suffix."""
         return self.name or f"{self.trajectory}_{self.repeat}"
+
+    def file_of(self, stream: str) -> str:
+        """Name of the file that a stream is in."""
+        return self.file.get(stream, self.source)
 
 
 class MappingFile(Table):
@@ -160,7 +185,7 @@ class MappingFile(Table):
     format: Words | None = Field(
         None, description="of the source files, by name: text, hdf5, ...; default: by their suffix"
     )
-    text: TextTable = TextTable.model_construct()
+    text: TextsTable = TextsTable.model_construct()
     time: TimesTable = TimesTable.model_construct()
     wrench: WrenchTable | None = None
     turn: Turn | None = None

@@ -14,9 +14,11 @@ from kbs_process.campaign.load import load_campaign
 from kbs_process.campaign.locate import CAMPAIGN_FILE
 from kbs_process.errors import RecordingError, did_you_mean
 from kbs_process.progress import Progress, SilentProgress
+from kbs_process.recordings.formats import Text
 from kbs_process.recordings.mcap.messages.encoding import JOINT_PARTS, OutStream
 from kbs_process.recordings.mcap.writer import write_pieces
 from kbs_process.recordings.open_table import open_table
+from kbs_process.recordings.tables import Table
 from kbs_process.results.provenance import sha256
 from kbs_process.results.store import writing
 from kbs_process.signals.records import Array, Block
@@ -54,14 +56,14 @@ def import_recordings(
         findings: dict[str, tuple[str, ...]] = {}
         for part in plan.parts:
             with progress.task(f"{part.source} -> {recording_file(part.stem)}"):
-                found = _convert_part(plan, part, files[part.source], campaign, folder)
+                found = _convert_part(plan, part, files, campaign, folder)
                 checksums[part.stem] = sha256(folder / recording_file(part.stem))
             lines = tuple(f"{part.stem}: {line}" for line in found)
             findings[part.source] = findings.get(part.source, ()) + lines
             if notice:
                 for line in lines:
                     notice(f"{part.source}, {line}")
-        origins = tuple(Origin(name, sha256(path), findings[name]) for name, path in files.items())
+        origins = tuple(Origin(name, sha256(path), findings.get(name, ())) for name, path in files.items())
         write_campaign(plan, folder, checksums, origins)
         load_campaign(folder)
     return target
@@ -69,7 +71,7 @@ def import_recordings(
 
 def _source_files(mapping: Mapping, source: Path) -> dict[str, Path]:
     """Return the source files by the names that the mapping gives them."""
-    names = list(dict.fromkeys(part.source for part in mapping.parts))
+    names = list(dict.fromkeys(part.file_of(stream.key) for part in mapping.parts for stream in mapping.streams))
     if not source.is_dir() and source.exists():
         if len(names) > 1:
             raise RecordingError(
@@ -103,14 +105,21 @@ def _is_there(path: Path) -> bool:
         return False
 
 
-def _convert_part(mapping: Mapping, part: Part, path: Path, campaign: Campaign, folder: Path) -> tuple[str, ...]:
+def _convert_part(
+    mapping: Mapping, part: Part, files: MappingOf[str, Path], campaign: Campaign, folder: Path
+) -> tuple[str, ...]:
     """Write one recording; return what was found wrong with its source."""
-    table = open_table(path, mapping.format, mapping.text)
+    opened: dict[tuple[str, Text], Table] = {}
+    for key, name in ((stream.key, part.file_of(stream.key)) for stream in mapping.streams):
+        text = mapping.texts[key]
+        if (name, text) not in opened:
+            opened[name, text] = open_table(files[name], mapping.format, text)
+    tables = {stream.key: opened[part.file_of(stream.key), mapping.texts[stream.key]] for stream in mapping.streams}
     findings = Findings()
     topics = {"encoder" if topic.key == "angle" else topic.key: topic for topic in campaign.topics.present()}
     pieces = (
-        _out_stream(stream, block, topics[stream.key], path)
-        for stream, block in read_part(table, mapping, part, findings)
+        _out_stream(stream, block, topics[stream.key], tables[stream.key].path)
+        for stream, block in read_part(tables, mapping, part, findings)
     )
     write_pieces(folder / recording_file(part.stem), pieces)
     return findings.lines()
@@ -119,7 +128,7 @@ def _convert_part(mapping: Mapping, part: Part, path: Path, campaign: Campaign, 
 def _out_stream(stream: StreamMap, block: Block, topic: Topic, path: Path) -> OutStream:
     """Return the stream as messages; what the file does not have is NaN in them.
 
-    The file has one clock: recorder's and sensor's are the same.
+    A file has one clock: recorder's and sensor's are the same.
     """
     if len(block) and (int(block.stamp.min()) < 0 or int(block.stamp.max()) >= LATEST_NS):
         raise RecordingError(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from collections.abc import Mapping as MappingOf
 from dataclasses import dataclass, field
 from itertools import chain
 
@@ -57,8 +58,10 @@ class Findings:
         return tuple(f"{count} {what}" for what, count in found.most_common() if count)
 
 
-def read_part(table: Table, mapping: Mapping, part: Part, findings: Findings) -> Iterator[tuple[StreamMap, Block]]:
-    """Yield the streams of one recording a piece at a time, those of several passes side by side in time.
+def read_part(
+    tables: MappingOf[str, Table], mapping: Mapping, part: Part, findings: Findings
+) -> Iterator[tuple[StreamMap, Block]]:
+    """Yield the streams of one recording, from a table each, a piece at a time, several passes side by side in time.
 
     The first piece of each stream is empty: so all are known before the first sample. Raises RecordingError,
     at the end, for a stream without a sample.
@@ -66,7 +69,10 @@ def read_part(table: Table, mapping: Mapping, part: Part, findings: Findings) ->
     streams = {stream.key: stream for stream in mapping.streams}
     for stream in mapping.streams:
         yield stream, Block(_NO_STAMPS, _NO_STAMPS, np.empty((0, len(stream.channels))))
-    passes = [_pieces(table, mapping, shared, findings) for shared in _passes(mapping.streams)]
+    passes = [
+        _pieces(tables[shared[0].key], mapping, shared, part.shift_s, findings)
+        for shared in _passes(mapping.streams, tables, part.shift_s)
+    ]
     start, end = -(1 << 63), (1 << 63) - 1
     if part.start_s > 0.0 or np.isfinite(part.end_s):
         heads = [next(pieces, {}) for pieces in passes]
@@ -85,19 +91,21 @@ def read_part(table: Table, mapping: Mapping, part: Part, findings: Findings) ->
         ),
         ((key, last) for key, arrival in arrivals.items() if (last := arrival.flush()) is not None),
     ):
-        _check_order(arrivals[key], table, streams[key])
+        _check_order(arrivals[key], tables[key], streams[key])
         findings.check(key, inside)
         if len(inside):
             empty.discard(key)
             yield streams[key], inside
-    for what, count in table.odd.items():
-        findings.counts[what] = count
+    for table in {id(table): table for table in tables.values()}.values():
+        for what, count in table.odd.items():
+            findings.counts[what] += count
     for key, arrival in arrivals.items():
         if scattered := arrival.scattered:
-            raise RecordingError(f"time of '{key}': {scattered}", where=str(table.path), remedy=STAMP_EACH)
+            raise RecordingError(f"time of '{key}': {scattered}", where=str(tables[key].path), remedy=STAMP_EACH)
         findings.counts[f"time stamps of '{key}' do not fit where they stand, rows left out"] += arrival.odd
         findings.counts[f"time stamps of '{key}' lie far from all others, rows left out"] += arrival.lone
     for key in streams:
+        table = tables[key]
         if findings.rows[key] >= _FEWEST and 2 * findings.repeats[key] >= findings.rows[key]:
             raise RecordingError(
                 f"the times of '{key}' are too coarse: {findings.repeats[key]} of {findings.rows[key]} are those of "
@@ -159,11 +167,17 @@ def _side_by_side(passes: Sequence[Iterator[Piece]]) -> Iterator[Piece]:
         reached[behind] = max([reached[behind], *(int(b.stamp[-1]) for b in piece.values() if len(b))])
 
 
-def _passes(streams: Sequence[StreamMap]) -> list[list[StreamMap]]:
-    """Group streams that share their time: the file is read once for each group."""
+def _passes(
+    streams: Sequence[StreamMap], tables: MappingOf[str, Table], shifts: MappingOf[str, float]
+) -> list[list[StreamMap]]:
+    """Group streams that share file and time: the file is read once for each group."""
+
+    def clock(stream: StreamMap) -> tuple[object, ...]:
+        return stream.time, id(tables[stream.key]), shifts.get(stream.key)
+
     passes: list[list[StreamMap]] = []
     for stream in streams:
-        shared = next((group for group in passes if stream.time and group[0].time == stream.time), None)
+        shared = next((group for group in passes if stream.time and clock(group[0]) == clock(stream)), None)
         if shared is None:
             passes.append([stream])
         else:
@@ -171,8 +185,11 @@ def _passes(streams: Sequence[StreamMap]) -> list[list[StreamMap]]:
     return passes
 
 
-def _pieces(table: Table, mapping: Mapping, streams: Sequence[StreamMap], findings: Findings) -> Iterator[Piece]:
+def _pieces(
+    table: Table, mapping: Mapping, streams: Sequence[StreamMap], shifts: MappingOf[str, float], findings: Findings
+) -> Iterator[Piece]:
     time = streams[0].time
+    shift = round(shifts.get(streams[0].key, 0.0) * 1e9)  # ns
     channels = [channel for stream in streams for channel in stream.channels]
     columns = [find_column(table, channel.column) for channel in channels]
     if time is None:
@@ -198,15 +215,19 @@ def _pieces(table: Table, mapping: Mapping, streams: Sequence[StreamMap], findin
         named = dict(zip(wanted, cells, strict=True))
         _check_lengths(table, named)
         stamp, known = _stamps(table, time, clocks, named, rows)
+        stamp = stamp + shift
         rows += len(stamp)
         findings.counts[_TIMELESS] += int((~known).sum())
+        again = np.zeros(len(stamp), dtype=np.bool_)
+        again[1:] = np.logical_and.reduce([x[1:] == x[:-1] for x in (stamp, *named.values())])
+        findings.counts["rows are those before them again, time and all, left out"] += int((again & known).sum())
         values = {
             channel.field: _si(named[column.name], channel, carry)
             for channel, column in zip(channels, columns, strict=True)
         }
         if mapping.turn and any(stream.key == "wrench" for stream in streams):
             _turn(values, mapping.turn)
-        yield {stream.key: _select(Block(stamp, stamp, _matrix(stream, values)), known) for stream in streams}
+        yield {stream.key: _select(Block(stamp, stamp, _matrix(stream, values)), known & ~again) for stream in streams}
 
 
 def _check_unit(table: Table, column: Column, given: str, scale: float, findings: Findings) -> None:

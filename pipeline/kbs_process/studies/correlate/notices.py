@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from itertools import zip_longest
+from typing import Literal
 
 import numpy as np
 
@@ -16,7 +18,7 @@ from kbs_process.reduction.losses import lost
 from kbs_process.reduction.preparing import Prepared
 from kbs_process.reduction.soundness import extent
 from kbs_process.report.prose import Prose
-from kbs_process.results.judged import Requirement
+from kbs_process.results.judged import Requirement, Soundness
 from kbs_process.results.records import Notice, Severity
 from kbs_process.signals.records import DROPOUT, SPIKE, Run
 from kbs_process.signals.smoothing import smooth
@@ -24,12 +26,10 @@ from kbs_process.stages.align.clocks import UNKNOWN_OFFSET_S
 from kbs_process.stages.gravity.model import GravityModel
 from kbs_process.stages.leftover import description
 from kbs_process.stages.verdict import COVERAGE
-from kbs_process.studies.correlate.results import Repeatability, Results
+from kbs_process.studies.correlate.results import WEAK, Merit, ModelVerdict, Repeatability, Results
 
 # A resonance below this many times a band's edge is next to it: the band then holds part of the resonance's flank.
 NEXT_TO = 4.0
-# Predictions that explain less of the measured variance than this deserve a word.
-WEAK = 0.5
 # Repeats with less signal than this many times their noise are dominated by noise.
 NOISY = 1.0
 # Samples: where fewer are missing together, and at the ends of every record, nothing is lost that matters.
@@ -40,8 +40,6 @@ UNKNOWN_PHASE = 1.0
 LONGEST = 100.0
 # A limit is seldom this many times above all that was measured, uncertainty included.
 FAR = 100.0
-# A calibration that leaves this many times what noise and uncertainty make is not at rest.
-UNQUIET = 1.5
 LEFT_OUT = (SPIKE, DROPOUT)
 QUANTITY = {"torque": "T", "force": "F"}  # first letter of its channels
 
@@ -54,9 +52,9 @@ def notices(campaign: Campaign, analyses: Sequence[Analysis], model: GravityMode
         yield from lost(analysis.entry, [loss for loss in analysis.run.losses if loss.kind not in LEFT_OUT])
     yield from implausible(campaign, found.requirements)
     yield from _unjudged(analyses)
-    if not found.soundness.suggestions:  # which explain what gravity leaves as well
-        yield from _static_load(campaign, analyses, model)
-        yield from calibration(analyses, model)
+    told = _unexplained(analyses, found.soundness)
+    yield from _static_load(campaign, told, model)
+    yield from calibration(told, model)
     for check in model.fit.checks:
         if not check.passed:
             yield _notice("info", "fit", check=check)
@@ -131,6 +129,13 @@ def implausible(campaign: Campaign, requirements: Iterable[Requirement]) -> Iter
             yield _notice("warning", "limit", one.name, one=one, static=static if beyond else None, far=FAR)
 
 
+def _unexplained(analyses: Sequence[Analysis], soundness: Soundness) -> Sequence[Analysis]:
+    """Recordings in which what gravity leaves is not what a named fault explains: that of others, or of all."""
+    reasons = [set(re.findall(r"[\w-]+", reason)) for reason in soundness.reasons if soundness.suggestions]
+    of_some = all(any(one.entry.name in words for one in analyses) for words in reasons)
+    return [one for one in analyses if of_some and not any(one.entry.name in words for words in reasons)]
+
+
 def _static_load(campaign: Campaign, analyses: Sequence[Analysis], model: GravityModel) -> Iterable[Notice]:
     """A recording whose slow part the model leaves: what is judged or compared is then that load."""
     for analysis in analyses:
@@ -154,7 +159,7 @@ def calibration(analyses: Sequence[Analysis], model: GravityModel) -> Iterable[N
     for analysis in (one for one in analyses if one.entry.role == "calibration"):
         for misfit, unexplained, sigma in zip(analysis.misfits, model.unexplained, noise, strict=True):
             most = np.sqrt(max(misfit.explained**2 - unexplained**2, 0.0) + sigma**2)
-            if misfit.left > UNQUIET * most and sigma > 0.0:
+            if misfit.left > most and sigma > 0.0:
                 shown = _shown(analysis, misfit.channel, model)
                 facts = {"low_pass": model.settings.low_pass_Hz, "one": misfit, "most": most, "shown": shown}
                 yield _notice("info", "calibration", analysis.entry.name, **facts)
@@ -215,10 +220,34 @@ def _resonance(found: Results) -> Iterable[Notice]:
             yield _notice("info", "resonance", band.label, lowest=lowest, edge=edge)
 
 
+def model_verdict(found: Results) -> ModelVerdict | None:
+    """Whether the model predicts what was measured, where requirements judge, or else unfiltered.
+
+    Recordings held out count, where there are any. Where a disturbance would show, measured or predicted, each channel
+    has to be described; where none would show, recordings say nothing of the model.
+    """
+    compared = _of_judged(found) if found.requirements else [one for one in found.merit if one.band == "unfiltered"]
+    compared = [one for one in compared if one.role == "held-out"] or compared
+    if not compared:
+        return None
+    testable = [one for one in compared if one.testable]
+    if not testable:
+        return ModelVerdict(status="not testable", sentence=_SAYS("model_not_testable", compared=compared))
+    worst = min(testable, key=lambda one: (one.correlated, one.fraction_of_variance or 0.0))
+    status: Literal["correlated", "not correlated"] = "correlated" if worst.correlated else "not correlated"
+    label = next(band.label for band in found.bands if band.name == worst.band)
+    sentence = _SAYS("model_tested", worst=worst, label=label, testable=testable, compared=compared)
+    return ModelVerdict(status=status, sentence=sentence)
+
+
+def _of_judged(found: Results) -> list[Merit]:
+    judged = _judged(found)
+    return [merit for merit in found.merit if (merit.frame, merit.band, merit.channel[0]) in judged]
+
+
 def _predictions(found: Results) -> Iterable[Notice]:
     """Where the prediction can be tested in a requirement's band, and fails; and where it cannot be tested."""
-    judged = _judged(found)
-    of_judged = [merit for merit in found.merit if (merit.frame, merit.band, merit.channel[0]) in judged]
+    of_judged = _of_judged(found)
     noise = {merit.channel for merit in of_judged if merit.at_the_noise}
     if noise:
         yield _notice("info", "untested", channels=sorted(noise))

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from kbs_process.report import provenance
 from kbs_process.report.document import Document
-from kbs_process.report.panel import Head, Panel
+from kbs_process.report.panel import Grid, Head, Panel
 from kbs_process.report.tables import Tables
 from kbs_process.studies.correlate.results import Results
 from kbs_process.studies.correlate.sections import (
@@ -42,7 +42,33 @@ def head(results: Results) -> Head:
         about,
         results.verdict,
         results.provenance.version,
+        document=_identity(results),
+        model=(results.model.status, results.model.sentence) if results.model else ("", ""),
     )
+
+
+def _identity(results: Results) -> tuple[tuple[str, str], ...]:
+    about, made = results.document, results.provenance
+    code = (
+        f"kbs-process {made.version}, {f'commit {made.commit[:12]}' if made.commit else f'source {made.source[:12]}'}"
+    )
+    rows = {
+        "Document": about.number,
+        "Revision": about.revision,
+        "Article's serial number": about.serial_number,
+        "Date of test": about.date,
+        "Operator": about.operator,
+        "Processed with": code + ("+" if made.commit.endswith("+") else ""),
+    }
+    return tuple((label, value) for label, value in rows.items() if value)
+
+
+def _signatures(results: Results, tables: Tables) -> Panel:
+    """Room for those who stand for the report."""
+    people = ("Tested by", results.document.operator), ("Checked by", ""), ("Approved by", "")
+    rows = tuple((role, name, "", "") for role, name in people)
+    grid = Grid("Signatures", ("Role", "Name", "Date", "Signature"), rows, "llll")
+    return Panel("signatures", "Signatures", "Who stands for this report?", (grid,))
 
 
 def _on_transducer(make: Callable[[Results, Tables], Panel]) -> Callable[[Results, Tables], Panel | None]:
@@ -76,5 +102,6 @@ DOCUMENT = Document(
         _on_transducer(conventions.panel),
         methods.panel,
         _provenance,
+        _signatures,
     ),
 )

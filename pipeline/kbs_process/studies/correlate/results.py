@@ -31,6 +31,16 @@ class CampaignSummary(Record, frozen=True, kw_only=True):
     frame: Frame = "T"  # of the loads that were recorded
 
 
+class DocumentHead(Record, frozen=True, kw_only=True):
+    """What identifies the report as a document; empty where nobody says."""
+
+    number: str = ""
+    revision: str = ""
+    operator: str = ""
+    serial_number: str = ""  # of the article
+    date: str = ""  # of the test
+
+
 class Clock(Record, frozen=True, kw_only=True):
     """A stream's sensor clock against the recording's time axis: t = stamp (1 + skew) + offset."""
 
@@ -102,6 +112,25 @@ class StaticRecording(Record, frozen=True, kw_only=True):
     channels: tuple[StaticChannel, ...]
 
 
+class SixChannels(Record, frozen=True, kw_only=True):
+    """The article's torque at the spacecraft from all six channels of one recording at once, in one band."""
+
+    recording: str
+    band: str
+    chi_square: float  # of a degree of freedom
+    explained: bool  # by rigid bodies, floor and budget
+    peak: dict[str, float]  # by torque channel, N m
+    sigma: dict[str, float]  # of every instant
+
+
+class Rung(Record, frozen=True, kw_only=True):
+    """What the gravity model leaves below 0.3 Hz of the fitted recordings, with this part and those before it."""
+
+    name: str
+    rms: dict[str, float]  # by channel
+    peak: dict[str, float]
+
+
 class Gravity(Record, frozen=True, kw_only=True):
     """The gravity (and where identified, inertia) fit."""
 
@@ -113,6 +142,7 @@ class Gravity(Record, frozen=True, kw_only=True):
     feasible: str = ""  # a sentence: is computed gravity compensation feasible?
     recordings: tuple[StaticRecording, ...] = ()
     low_pass_Hz: float | None = None  # below which the model was fitted
+    ladder: tuple[Rung, ...] = ()
 
 
 class Contribution(Record, frozen=True, kw_only=True):
@@ -160,6 +190,10 @@ class Repeatability(Record, frozen=True, kw_only=True):
     n: int
 
 
+# Predictions that explain less of the measured variance than this do not describe it.
+WEAK = 0.5
+
+
 class Merit(compare.Merit, frozen=True, kw_only=True):
     """Figures of merit of a prediction on one channel of one recording, in one band."""
 
@@ -173,6 +207,24 @@ class Merit(compare.Merit, frozen=True, kw_only=True):
     def at_the_noise(self) -> bool:
         """Whether there is too little signal for these figures to say anything of the prediction."""
         return self.sigma is not None and self.measured_rms is not None and self.measured_rms < 2.0 * self.sigma
+
+    @property
+    def testable(self) -> bool:
+        """Whether the measured disturbance, or a predicted one, would show above its uncertainty."""
+        return self.sigma is not None and max(self.measured_rms or 0.0, self.predicted_rms or 0.0) >= 2.0 * self.sigma
+
+    @property
+    def correlated(self) -> bool:
+        """Whether the prediction explains half of the measured variance, or errs by no more than the uncertainty."""
+        within = self.sigma is not None and (self.residual_rms or 0.0) <= 2.0 * self.sigma
+        return within or (self.fraction_of_variance or 0.0) >= WEAK
+
+
+class ModelVerdict(Record, frozen=True, kw_only=True):
+    """Does the model predict what was measured? In a word, and in a sentence."""
+
+    status: Literal["correlated", "not correlated", "not testable"]
+    sentence: str
 
 
 class Resonance(Record, frozen=True, kw_only=True):
@@ -254,6 +306,8 @@ class Results(ResultsFile, frozen=True, kw_only=True):
 
     campaign: CampaignSummary
     kind: Literal["correlation"] = "correlation"
+    document: DocumentHead = DocumentHead()
+    model: ModelVerdict | None = None  # None: nothing was predicted
     requirements: tuple[Requirement, ...] = ()
     recordings: tuple[Recording, ...] = ()
     conventions: tuple[SignCheck, ...] = ()
@@ -266,6 +320,7 @@ class Results(ResultsFile, frozen=True, kw_only=True):
     resonances: tuple[Resonance, ...] = ()
     transducer: OnTransducer | None = None
     budget: tuple[Budget, ...] = ()
+    six_channels: tuple[SixChannels, ...] = ()
     pointing: tuple[RecordedPointing, ...] = ()
     methods: str = ""  # paragraphs, separated by empty lines
     parameters: tuple[Constant, ...] = ()

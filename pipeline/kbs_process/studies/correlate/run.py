@@ -14,7 +14,7 @@ from kbs_process.progress import Progress
 from kbs_process.reduction.analysis import Analysis, analyse
 from kbs_process.reduction.judging import decided
 from kbs_process.reduction.measurable import check_requirements
-from kbs_process.reduction.preparing import Prepared, fit_gravity, prepare, told_copies
+from kbs_process.reduction.preparing import Prepared, fit_gravity, prepare, samples, told_copies
 from kbs_process.reduction.relief import relieved
 from kbs_process.reduction.soundness import check_model
 from kbs_process.report.build import publish
@@ -24,6 +24,7 @@ from kbs_process.results.outcome import Outcome
 from kbs_process.results.store import writing
 from kbs_process.stages import decouple
 from kbs_process.stages.decouple import Decoupling
+from kbs_process.stages.gravity.ladder import ladder
 from kbs_process.stages.gravity.model import GravityModel
 from kbs_process.studies.correlate.earlier_diagnosis import keep_diagnosis
 from kbs_process.studies.correlate.notices import has_spikes, spikes, unclear
@@ -67,7 +68,8 @@ def process(
 
             found = msgspec.structs.replace(found, transducer=on_transducer and on_transducer.findings)
             serious = sum(notice.severity != "info" for notice in found.warnings)
-            more = [f"{count(serious, 'warning')}: see the top of the report"] if serious else []
+            more = [f"Model: {found.model.status}. {found.model.sentence}"] if found.model else []
+            more += [f"{count(serious, 'warning')}: see the top of the report"] if serious else []
             lossy = sum(bool(recording.lost) for recording in found.recordings)
             more += [f"{count(lossy, 'recording')} with losses"] if lossy else []
             outcome = publish(folder, target, found, DOCUMENT if page else None, pdf, *more)
@@ -88,7 +90,8 @@ def _found(
                 raise SimulationError(f"{notice.what}; {error.what}", remedy=notice.remedy) from error
         raise
     with progress.task("Comparing, summing up uncertainties"):
-        return summarise(campaign, analyses, model, decoupling, checked), analyses, model
+        rungs = ladder(samples(campaign, prepared), model) if campaign.rig.transducer.channels else ()
+        return summarise(campaign, analyses, model, decoupling, checked, rungs), analyses, model
 
 
 def _with_spikes(

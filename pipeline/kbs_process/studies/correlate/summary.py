@@ -20,20 +20,27 @@ from kbs_process.results.records import Check, Conclusion
 from kbs_process.signals.records import Signal
 from kbs_process.stages.decouple import Decoupling
 from kbs_process.stages.gravity.equation import RESPONSE
+from kbs_process.stages.gravity.ladder import Rung
 from kbs_process.stages.gravity.model import GravityModel, taring_error
 from kbs_process.stages.gravity.quality import feasibility
 from kbs_process.stages.to_cog import ASSUMPTION
 from kbs_process.studies.correlate import results
 from kbs_process.studies.correlate.findings import band, merits, repeatabilities, resonances, statements
 from kbs_process.studies.correlate.methods import methods
-from kbs_process.studies.correlate.notices import notices
-from kbs_process.studies.correlate.uncertainty import budgets
+from kbs_process.studies.correlate.notices import model_verdict, notices
+from kbs_process.studies.correlate.uncertainty import budgets, six_channels
 
+DATED_NS = 315_532_800 * 10**9  # 1980-01-01: no recording is older, but those whose clock counts from its own start
 RESPONSE_UNITS = dict(zip(RESPONSE, ("s", "s^2"), strict=True))
 
 
 def summarise(
-    campaign: Campaign, analyses: Sequence[Analysis], model: GravityModel, decoupling: Decoupling, checked: Checked
+    campaign: Campaign,
+    analyses: Sequence[Analysis],
+    model: GravityModel,
+    decoupling: Decoupling,
+    checked: Checked,
+    rungs: Sequence[Rung],
 ) -> results.Results:
     """Return the contents of results.json; calibrations serve the fit and are judged by its residual alone."""
     runs = [analysis for analysis in analyses if analysis.entry.role != "calibration"]
@@ -54,25 +61,37 @@ def summarise(
             drive=campaign.drive,
             frame="joint" if campaign.rig.frame == "joint" else "T",
         ),
+        document=results.DocumentHead(**({"date": date_of(analyses)} | campaign.document)),
         verdict=conclusion(requirements),
         provenance=provenance.made("", campaign.folder, campaign.files),
         requirements=requirements,
         recordings=tuple(_recording(analysis) for analysis in analyses),
         conventions=checked.conventions,
         soundness=checked.soundness,
-        gravity=_gravity(campaign, analyses, model),
+        gravity=_gravity(campaign, analyses, model, rungs),
         cross_coupling=_cross_coupling(analyses, decoupling) if decoupling.channels else None,
         bands=tuple(map(band, stated.values())),
         repeatability=repeated,
         merit=tuple(merits(campaign, runs, budget)),
         resonances=modes,
         budget=budget,
+        six_channels=tuple(six_channels(campaign, runs, budget)),
         pointing=tuple(recorded_pointing(analyses)),
         parameters=tuple(provenance.constants(campaign.rig)),
         notes=(ASSUMPTION,) if campaign.rig.spacecraft is not None else (),
     )
+    found = msgspec.structs.replace(found, model=model_verdict(found))
     warnings = (*checked.notices(), *notices(campaign, analyses, model, found))
     return msgspec.structs.replace(found, warnings=warnings, methods=methods(campaign, analyses, found))
+
+
+def date_of(analyses: Sequence[Analysis]) -> str:
+    """Return from which day to which recordings were made, UTC; empty where a clock counts from its own start."""
+    stamps = [analysis.run.epoch_ns for analysis in analyses]
+    if not stamps or min(stamps) < DATED_NS:
+        return ""
+    days = sorted({str(np.datetime64(stamp, "ns").astype("datetime64[D]")) for stamp in stamps})
+    return days[0] if len(days) == 1 else f"{days[0]} to {days[-1]}"
 
 
 def conclusion(requirements: Sequence[Requirement]) -> Conclusion:
@@ -122,10 +141,15 @@ def with_left_out(
         others = [_words(judged(campaign, asked, whole, rows)) for asked in campaign.requirements]
     except KbsError as error:
         others = [("undecided", f"By itself that cannot be judged: {error.what}.")] * len(found.requirements)
-    told = [
-        msgspec.structs.replace(one, left_out=f"{words} {what}", only_without=one.verdict == "pass" != verdict)
-        for one, (verdict, what) in zip(found.requirements, others, strict=True)
-    ]
+    told = []
+    for one, (verdict, what) in zip(found.requirements, others, strict=True):
+        only_without = one.verdict == "pass" != verdict
+        one = msgspec.structs.replace(one, left_out=f"{words} {what}", only_without=only_without)
+        if only_without and verdict == "fail":
+            one = msgspec.structs.replace(
+                one, verdict="undecided", doubt="what the campaign leaves out does not meet it"
+            )
+        told.append(one)
     return msgspec.structs.replace(found, requirements=tuple(told), verdict=conclusion(told))
 
 
@@ -167,7 +191,9 @@ def _recording(analysis: Analysis) -> results.Recording:
     )
 
 
-def _gravity(campaign: Campaign, analyses: Sequence[Analysis], model: GravityModel) -> results.Gravity:
+def _gravity(
+    campaign: Campaign, analyses: Sequence[Analysis], model: GravityModel, rungs: Sequence[Rung]
+) -> results.Gravity:
     fit = model.fit
     prior = model.equation.start()
     quantities = campaign.rig.quantities()
@@ -193,6 +219,14 @@ def _gravity(campaign: Campaign, analyses: Sequence[Analysis], model: GravityMod
         feasible=_feasible(campaign, model),
         recordings=tuple(_static_recording(analysis, model) for analysis in analyses),
         low_pass_Hz=model.settings.low_pass_Hz,
+        ladder=tuple(
+            results.Rung(
+                name=rung.name,
+                rms=dict(zip(model.channels, rung.rms.tolist(), strict=True)),
+                peak=dict(zip(model.channels, rung.peak.tolist(), strict=True)),
+            )
+            for rung in rungs
+        ),
     )
 
 

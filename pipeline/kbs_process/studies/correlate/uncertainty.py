@@ -8,9 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from kbs_process.campaign.config import Campaign
-from kbs_process.reduction.analysis import Analysis, bands_of, passband, select
+from kbs_process.reduction.analysis import Analysis, banded, bands_of, passband, select
 from kbs_process.reduction.relief import errors, forces_in
 from kbs_process.results.judged import Budget, BudgetItem, Frame
+from kbs_process.rig.model import LAB
 from kbs_process.signals.records import WRENCH_CHANNELS, Array, Signal
 from kbs_process.stages import bandpass, budget
 from kbs_process.stages.align.clocks import late_sigma
@@ -18,6 +19,7 @@ from kbs_process.stages.bandpass import Band, BandStatement
 from kbs_process.stages.decouple import Decoupling
 from kbs_process.stages.gravity import error as gravity_error
 from kbs_process.stages.gravity.model import GravityModel
+from kbs_process.stages.six_channels import together
 from kbs_process.stages.to_cog import sigma_at_spacecraft, sigma_of_pose
 from kbs_process.studies.correlate import results
 
@@ -60,6 +62,35 @@ def budgets(
                 yield from _rows(moved, "S", band.name, analysis.entry.name, whole)
 
 
+def six_channels(
+    campaign: Campaign, runs: Sequence[Analysis], budget: Sequence[Budget]
+) -> Iterable[results.SixChannels]:
+    """Yield the torque at the spacecraft that rigid bodies, and all six channels, make likely in every band.
+
+    Not where a hand or a cord moves the article: more acts on it than its joints.
+    """
+    spacecraft, transducer = campaign.rig.spacecraft, campaign.rig.transducer
+    if spacecraft is None or campaign.drive != "command" or transducer.on != LAB or len(campaign.rig.joints) >= 6:
+        return
+    for band in bands_of(campaign.bands)[1:]:
+        for analysis in runs:
+            name, measured = analysis.entry.name, analysis.pairs["T", band.name].measured
+            known = {b.channel: b.total for b in budget if (b.recording, b.band, b.frame) == (name, band.name, "T")}
+            sigma = np.array([known.get(channel, 0.0) for channel in WRENCH_CHANNELS])
+            if forces_in(campaign, analysis.entry) or not np.all(sigma > 0.0):
+                continue
+            found = together(select(measured, WRENCH_CHANNELS), analysis.motion.q, sigma, campaign.rig, spacecraft)
+            peaks = np.abs(found.wrench.values[measured.valid]).max(axis=0)
+            yield results.SixChannels(
+                recording=name,
+                band=band.name,
+                chi_square=found.chi_square,
+                explained=found.explained,
+                peak=dict(zip(WRENCH_CHANNELS[3:], peaks[3:].tolist(), strict=True)),
+                sigma=dict(zip(WRENCH_CHANNELS[3:], found.sigma[3:].tolist(), strict=True)),
+            )
+
+
 def _entries(
     campaign: Campaign,
     analysis: Analysis,
@@ -74,7 +105,7 @@ def _entries(
     """The budget of one recording in one band, in the frame of the recorded loads."""
 
     def cut(signal: Signal) -> Signal:
-        return bandpass.apply(signal, band)
+        return banded(signal, analysis.run, band)
 
     rig = campaign.rig
     measured = analysis.pairs[rig.frame, band.name].measured
@@ -82,7 +113,8 @@ def _entries(
     rates, width = analysis.run.load_rates, bandpass.noise_bandwidth(band, measured.dt)
     most = budget.rms(measured) / budget.sensor_noise(np.ones(len(measured.channels)), rates, width).sigma
     least = rig.loads.noise[rig.loads.index(measured.channels)]
-    sensor = budget.sensor_noise(np.maximum(least, np.minimum(noise, most)), rates, width)
+    bridged = bandpass.bridging_noise(analysis.run.gaps, band, float(np.max(rates)))
+    sensor = budget.sensor_noise(bridged * np.maximum(least, np.minimum(noise, most)), rates, width)
     late = late_sigma(analysis.run.clocks, rig.transducer.amplifier)
     entries = [
         sensor,

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from kbs_process.report import draw
-from kbs_process.report.panel import Block, Figure, Fold, Grid, Panel, Picture, Text
+from kbs_process.report.panel import Block, Cell, Figure, Fold, Grid, Panel, Picture, Text
 from kbs_process.report.prose import Prose
 from kbs_process.report.tables import Tables
 from kbs_process.report.text import frame_label, label, number, unit
 from kbs_process.results.judged import Budget
 from kbs_process.studies.correlate.choose import band_label, main_band, main_frame
-from kbs_process.studies.correlate.results import Results
+from kbs_process.studies.correlate.results import Results, SixChannels
 
 _SAYS = Prose("kbs_process.studies.correlate", "budget")
 
@@ -29,12 +29,26 @@ def panel(results: Results, tables: Tables) -> Panel:
     alt = "Share of each stage in each channel's variance"
     blocks: list[Block] = [Figure(title, (_shares(first, alt),), _SAYS.caption("shares"))]
     blocks.append(_table(results, first))
+    if together := tuple(one for one in results.six_channels if one.band == band):
+        blocks.append(_six_channels(results, together))
     elsewhere = tuple(row for row in results.budget if row.recording == recording and row not in first)
     others = tuple(row for row in here if row.recording != recording)
     for name, rows in (("Other bands and frames", elsewhere), ("Other recordings", others)):
         if rows:
             blocks.append(Fold(name, _tables(results, rows)))
     return Panel("budget", "Uncertainty", question, tuple(blocks))
+
+
+def _six_channels(results: Results, rows: tuple[SixChannels, ...]) -> Grid:
+    """The torques of each recording, and whether six channels agree on them."""
+    body: list[tuple[str | Cell, ...]] = []
+    for row in rows:
+        torques = [f"{number(row.peak[name], 2)} ± {number(row.sigma[name], 2)}" for name in row.peak]
+        shown = torques if row.explained else [Cell("something else pulls", "undecided")] * len(torques)
+        body.append((row.recording, number(row.chi_square, 2), *shown))
+    head = ("Recording", "Chi-square", *(f"{name} / N m" for name in rows[0].peak))
+    title = f"Peak torque at the spacecraft from all six channels at once, {band_label(results, rows[0].band)}"
+    return Grid(title, head, tuple(body), "kr" + "r" * len(rows[0].peak), _SAYS("six_channels_note"))
 
 
 def _shown(results: Results, rows: tuple[Budget, ...]) -> str | None:

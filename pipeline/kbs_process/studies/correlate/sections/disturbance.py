@@ -28,7 +28,7 @@ Entry = tuple[str, str, Frame, Table]  # recording, band, frame, table
 
 
 def panel(results: Results, tables: Tables) -> Panel:
-    """Interactive view of every recording, band and frame; on paper what is required, and the bursts."""
+    """Interactive view of every recording, band and frame; on paper what is required, each band, and the bursts."""
     question = "Does the predicted disturbance look like the measured one, and is it the larger of the two?"
     found = list(_found(results, tables))
     if not found:
@@ -36,12 +36,15 @@ def panel(results: Results, tables: Tables) -> Panel:
     scenes = [_scene(results, *entry) for entry in found]
     main = (main_band(results), main_frame(results))
     bursts = (_whole_band(results), results.campaign.frame)
+    filtered = [(band.name, results.campaign.frame) for band in results.bands if band.low_pass_Hz is not None]
+    plates = [entry for key in (main, bursts) for entry in _plates(found, key)]
+    plates += [entry for key in filtered for entry in _plates(found, key)[:1]]
     live = series.views(scenes)
     shown = {view.choice for view in live}
     shortcuts = {"Requirement" if results.requirements else "Narrowest band": main, "Bursts (unfiltered)": bursts}
     figure = Figure(
         "Disturbance, measured and predicted",
-        tuple(_plate(results, *entry) for key in dict.fromkeys((main, bursts)) for entry in _plates(found, key)),
+        tuple(_plate(results, *plate) for plate in {entry[:3]: entry for entry in plates}.values()),
         _SAYS.caption("histories"),
         Live(
             "disturbance",

@@ -15,7 +15,7 @@ from kbs_process.report.text import label, measure, number, unit
 from kbs_process.studies.correlate.results import FittedParameter, Gravity, Results, StaticChannel
 
 _SAYS = Prose("kbs_process.studies.correlate", "gravity")
-_ROWS = 24  # of parameters in one column  # of parameters in one column
+_ROWS = 24  # of parameters in one column
 
 
 def panel(results: Results, tables: Tables) -> Panel:
@@ -41,6 +41,8 @@ def panel(results: Results, tables: Tables) -> Panel:
         blocks.append(Figure("Fitted parameters against their priors", (picture,), _SAYS.caption("shifts")))
     if weighs:
         blocks.append(_channels(gravity))
+    if len(gravity.ladder) > 1:
+        blocks.append(_ladder(gravity))
     if any(channel.sigma for entry in gravity.recordings for channel in entry.channels):
         blocks.append(_taring(gravity))
     if gravity.recordings:
@@ -81,6 +83,19 @@ def _channels(gravity: Gravity) -> Grid:
     )
     head = ("Channel", "Static peak", "Residual rms", "σ from angles", "σ from the fit", "Unit")
     return Grid("Static wrench and what is left of it", head, rows, "lrrrrl", _SAYS("channels_note"))
+
+
+def _ladder(gravity: Gravity) -> Grid:
+    torques = [name for name in gravity.ladder[0].rms if name.startswith("T")]
+    rows = tuple(
+        (
+            "and " * bool(index) + rung.name,
+            *(f"{number(rung.rms[name], 2)} / {number(rung.peak[name], 2)}" for name in torques),
+        )
+        for index, rung in enumerate(gravity.ladder)
+    )
+    head = ("Gravity model", *(f"{name} / N m" for name in torques))
+    return Grid("What each part of the model is worth", head, rows, "l" + "r" * len(torques), _SAYS("ladder_note"))
 
 
 def _taring(gravity: Gravity) -> Grid:

@@ -34,7 +34,7 @@ def panel(results: Results, tables: Tables) -> Panel:
     if not groups:
         return Panel("merit", "Figures of merit", question, (Text("There is no prediction to judge."),))
     key, *others = groups
-    blocks: list[Block] = list(folded(_table(results, *key, groups[key]), "Further rows"))
+    blocks: list[Block] = [_pessimistic(results), *folded(_table(results, *key, groups[key]), "Further rows")]
     drawn = [row for row in groups[key] if row.measured_peak and row.predicted_peak]
     if drawn:
         title = f"Peaks, {band_label(results, key[0])}, {frame_label(key[1])}"
@@ -44,6 +44,35 @@ def panel(results: Results, tables: Tables) -> Panel:
         tables_of_others = tuple(_table(results, *other, groups[other]) for other in others)
         blocks.append(Fold("Other bands and frames", tables_of_others))
     return Panel("merit", "Figures of merit", question, tuple(blocks))
+
+
+def _pessimistic(results: Results) -> Grid:
+    """On which channels the predicted peak is no less than the measured one, wherever that is above the noise."""
+    channels = list(dict.fromkeys(row.channel for row in results.merit))
+    every = dict.fromkeys((row.band, row.frame) for row in results.merit)
+    ordered = sorted(every, key=lambda key: band_names(results).index(key[0]))
+    rows: list[tuple[str | Cell, ...]] = [
+        (
+            f"{band_label(results, band)}, {frame_label(frame)}",
+            *(
+                _answer([row for row in results.merit if (row.band, row.frame, row.channel) == (band, frame, channel)])
+                for channel in channels
+            ),
+        )
+        for band, frame in ordered
+    ]
+    head = ("Is the prediction pessimistic?", *map(label, channels))
+    return Grid("Pessimism by channel", head, tuple(rows), "l" + "c" * len(channels), _SAYS("pessimistic_note"))
+
+
+def _answer(rows: Sequence[Merit]) -> Cell:
+    known = [row for row in rows if row.sigma is not None and not row.at_the_noise]
+    ratios = [row.pessimism for row in known if row.pessimism is not None]
+    larger = sum(ratio >= 1.0 for ratio in ratios)
+    if not ratios:
+        return Cell("not testable", "muted")
+    counted = f"{larger} of {len(ratios)}"
+    return Cell(f"yes, {counted}", "pass") if larger == len(ratios) else Cell(f"no, {counted}", "undecided")
 
 
 def _rank(results: Results, row: Merit, main: tuple[str, str]) -> tuple[bool, int, str]:

@@ -1,0 +1,322 @@
+"""The beginning of a campaign from nothing but recordings: what they tell is put in, all else is a question."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, field
+from itertools import product
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import msgspec
+import numpy as np
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from kbs_process.campaign.documents import QUESTION, quoted, read, shown
+from kbs_process.campaign.locate import CAMPAIGN_FILE
+from kbs_process.campaign.units import dimension, to_si
+from kbs_process.campaign.writing.parameter_files import value_text
+from kbs_process.errors import ConfigError, KbsError, RecordingError
+from kbs_process.recordings.formats import Text
+from kbs_process.recordings.open_table import open_table
+from kbs_process.recordings.tables import Table
+from kbs_process.results.store import writing
+from kbs_process.signals.records import WRENCH_CHANNELS, Array
+from kbs_process.studies.convert.clock import nanoseconds, numbers
+from kbs_process.studies.convert.description import prepare
+from kbs_process.studies.convert.mapping import load_mapping
+from kbs_process.studies.convert.mapping_file import Time
+from kbs_process.studies.convert.naming import Meaning, by_channel, meaning, runs_of
+from kbs_process.studies.convert.shift import find_shift
+
+MAPPING_FILE = "mapping.toml"
+_PREAMBLE = 40  # lines above a table that are looked through
+_APART = 5.0  # sigmas: clocks whose shift changes by more from half to half run at different rates
+_KEPT = 4096  # rows of a piece that are kept, as averages
+_RATES = [digit * 10.0**power for power in range(-2, 6) for digit in (1, 2, 5)]
+
+
+@dataclass(slots=True)
+class Log:
+    """One file: its columns, and what of their contents is needed. Times are s of its own clock."""
+
+    path: Path
+    text: Text
+    columns: list[Meaning]
+    dated: bool = False
+    times: list[Array] = field(default_factory=list)
+    values: dict[str, list[Array]] = field(default_factory=dict)  # by column, as the file has them, averaged with times
+    noise: dict[str, float] = field(default_factory=dict)  # by column, rms of a reading
+    step: dict[str, float] = field(default_factory=dict)  # by column, least step of readings
+    rate: float = 0.0  # Hz; 0: not known
+    wraps: set[str] = field(default_factory=set)  # columns of angles that begin again at every turn
+    left_out: tuple[str, ...] = ()  # what the file holds besides, and why it has no column
+
+    def of(self, stream: str) -> list[Meaning]:
+        """Return the columns of a stream."""
+        return [one for one in self.columns if one.stream == stream]
+
+    def samples(self, stream: str) -> tuple[Array, Array]:
+        """Return times (n,), s, and the columns of a stream (n, c), in SI where the unit is known, without gaps."""
+        t = np.concatenate(self.times)
+        columns = [np.concatenate(self.values[one.column]) * (to_si(one.unit) or 1.0) for one in self.of(stream)]
+        values = np.stack(columns, axis=1)
+        good = np.isfinite(t) & np.isfinite(values).all(axis=1)
+        return t[good], values[good]
+
+    @property
+    def kind(self) -> tuple[object, ...]:
+        """What files of one logger share."""
+        return self.path.suffix, self.text, tuple(self.columns)
+
+
+def begin(target: Path, files: Sequence[Path]) -> Iterator[str]:
+    """Make a folder with campaign.toml, rig.toml and mapping.toml out of recordings; yield what was found, as lines.
+
+    Raises RecordingError where a file cannot be read, ConfigError where files do not belong together, OutputError where
+    the folder holds something already.
+    """
+    logs = [_read(path) for path in dict.fromkeys(files)]
+    loads = [log for log in logs if log.of("wrench")] or logs
+    angles = [log for log in logs if log.of("encoder")] or loads
+    for group, what in ((loads, "wrench"), (angles, "angles")):
+        if odd := next((log for log in group if log.kind != group[0].kind), None):
+            raise ConfigError(
+                f"'{odd.path.name}' has the {what} in other columns than '{group[0].path.name}'",
+                remedy="give the files of one rig and set-up; export those that differ anew",
+            )
+    facts = _facts(loads, angles)
+    environment = Environment(
+        loader=PackageLoader("kbs_process.studies.convert", "prose"),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    environment.filters["quoted"] = quoted
+    with writing(target, CAMPAIGN_FILE) as folder:
+        for name in ("campaign", "rig", "mapping"):
+            text = environment.get_template(f"{name}.j2").render(facts | {"name": target.absolute().name})
+            (folder / f"{name}.toml").write_text(text, encoding="utf-8")
+    for log in (loads[0], *angles[:1]) if angles[0] is not loads[0] else loads[:1]:
+        yield from _listing(log)
+    for run in facts["runs"]:
+        yield f"{run['name']}: {run['source']}" + (f", {run['other']}; {run['told']}" if run["other"] else "")
+    used = {run[key] for run in facts["runs"] for key in ("source", "other")}
+    yield from (f"not used: {log.path.name}" for log in logs if log.path.name not in used)
+
+
+def check_description(folder: Path) -> Iterator[str]:
+    """Check what was begun; yield what to do next. Raises ConfigError that lists every value that is still missing."""
+    faults: list[KbsError] = []
+    for path in sorted(folder.glob("*.toml")):
+        try:
+            read(path, role="the description", remedy="begin again")
+        except ConfigError as error:
+            faults += error.each or [error]
+    if faults:
+        raise ConfigError(f"{len(faults)} values are still to be put in", where=shown(folder), each=faults)
+    mapping = load_mapping(folder / MAPPING_FILE)
+    with TemporaryDirectory() as place:
+        campaign = prepare(mapping, Path(place))
+    yield f"{campaign.name}: the description is complete; {len(mapping.parts)} recordings are to be imported"
+    command = f"kbs-process import {shown(mapping.path)} FOLDER campaigns/{campaign.name}"
+    yield f"  -> {command}; FOLDER holds the recordings"
+
+
+def _read(path: Path) -> Log:
+    table, text = _opened(path)
+    log = Log(path, text, [meaning(column) for column in table.columns])
+    clock = next((one for one in table.columns if one.clock), None)
+    stamp = log.of("time")[:1]
+    log.dated, log.left_out = clock is not None, table.left_out
+    used = [one.column for one in log.columns if one.stream in ("wrench", "encoder")]
+    wanted = list(dict.fromkeys([*used, *((clock.clock,) if clock else ()), *(one.column for one in stamp)]))
+    for index, cells in enumerate(table.chunks(wanted)):
+        named = dict(zip(wanted, cells, strict=True))
+        rows = min(len(named[name]) for name in wanted) if wanted else 0
+        block = max(1, rows // _KEPT)
+        whole = rows // block * block
+        values = {name: numbers(named[name][:rows]) for name in used}
+        if index == 0:
+            turns = {
+                one.column: 2.0 * np.pi / to_si(one.unit) for one in log.of("encoder") if dimension(one.unit) == "angle"
+            }
+            log.wraps = {name for name, turn in turns.items() if np.any(np.abs(np.diff(values[name])) > 0.5 * turn)}
+            log.noise, log.step = ({name: how(x) for name, x in values.items()} for how in (_noise, _step))
+        if (seconds := _seconds(log, named, clock.clock if clock else "", stamp, rows)) is not None:
+            if index == 0 and rows > 2:
+                log.rate = 1.0 / max(float(np.nanmedian(np.diff(seconds))), 1e-9)
+            log.times.append(seconds[:whole].reshape(-1, block).mean(axis=1))
+            for name, x in values.items():
+                log.values.setdefault(name, []).append(x[:whole].reshape(-1, block).mean(axis=1))
+    return log
+
+
+def _opened(path: Path) -> tuple[Table, Text]:
+    """Open a file; of a text, look for where its table begins, for a line of units, and for its decimal mark."""
+    failed: RecordingError | None = None
+    for skip, units, decimal in product(range(_PREAMBLE), (False, True), (".", ",")):
+        text = Text(skip_rows=skip, units_row=units, decimal=decimal)  # type: ignore[arg-type]
+        try:
+            table = open_table(path, None, text)
+            first = next(iter(table.chunks([column.name for column in table.columns])))
+        except (RecordingError, StopIteration) as error:
+            failed = failed or (error if isinstance(error, RecordingError) else None)
+            continue
+        good = sum(one.dtype.kind == "M" or bool(np.isfinite(numbers(one)[:100]).mean() > 0.5) for one in first)
+        if len(first) > 1 and good >= 0.5 * len(first):
+            return table, text
+        if table.path.suffix.lower() not in (".csv", ".tsv", ".txt", ".dat", ".asc"):
+            break
+    raise failed or RecordingError(
+        "no table of numbers is found", where=str(path), remedy="see `kbs-process import --describe`"
+    )
+
+
+def _seconds(log: Log, named: dict[str, Any], clock: str, stamp: list[Meaning], rows: int) -> Array | None:
+    """Return the times of rows in s; None where nothing tells them."""
+    if not clock and not stamp:
+        return None
+    cells, unit = named[clock or stamp[0].column][:rows], "s" if clock else stamp[0].unit
+    if not clock:
+        if cells.dtype.kind == "M" or (cells.dtype.kind not in "iuf" and not np.isfinite(numbers(cells[:10])).any()):
+            unit, log.dated = "datetime", True
+            log.columns = [Meaning(one.column, "time", unit=unit) if one == stamp[0] else one for one in log.columns]
+        if unit not in ("s", "ms", "us", "ns", "min", "datetime"):
+            return None
+    ns, known = nanoseconds(cells, Time.model_construct(unit=unit), str(log.path))
+    log.dated = log.dated or bool(known.any() and ns[known].min() > 10**18)  # counted from 1970
+    return np.where(known, ns * 1e-9, np.nan)
+
+
+def _noise(x: Array) -> float:
+    """Return the rms of white noise, in the file's unit: second differences see neither value nor slope."""
+    bends = np.diff(x[np.isfinite(x)], 2)
+    return float(f"{np.sqrt((bends**2).mean() / 6.0):.2g}") if len(bends) else 0.0
+
+
+def _step(x: Array) -> float:
+    """Return the least step of readings, in the file's unit, 0 where it is finer than a millionth of their range."""
+    values = np.unique(x[np.isfinite(x)])
+    steps = np.diff(values)[np.diff(values) > 1e-6 * np.ptp(values)] if len(values) > 1 else np.empty(0)
+    return float(f"{steps.min():.4g}") if len(steps) else 0.0
+
+
+def _facts(loads: Sequence[Log], angles: Sequence[Log]) -> dict[str, Any]:
+    """Return what the files tell, as the templates ask for it."""
+    load, angle = loads[0], angles[0]
+    wrench = by_channel(load.of("wrench")) or {c: Meaning(QUESTION, "wrench", c) for c in WRENCH_CHANNELS}
+    channels = [channel for channel in WRENCH_CHANNELS if channel in wrench]
+    joints = by_channel(angle.of("encoder")) or {"joint": Meaning(QUESTION, "encoder", "joint")}
+    known = all(wrench[channel].unit != QUESTION for channel in channels)
+    slowest = min(load.rate, angle.rate)
+    streams = {"wrench": [wrench[c] for c in channels], "encoder": [*joints.values()]}
+    logs = {"": load, ".encoder": angle} if load is not angle else {"": load}
+    return {
+        "rate": max((rate for rate in _RATES if rate <= slowest / 2.0), default=None) if slowest else None,
+        "slowest": slowest,
+        "channels": channels,
+        "noise": [_three(load.noise, wrench[c]) for c in channels] if known else None,
+        "resolution": [_three(load.step, wrench[c]) for c in channels] if known else None,
+        "file": load.path.name,
+        "joints": [
+            {
+                "name": name,
+                "sliding": dimension(one.unit) == "length",
+                "unit": one.unit,
+                "step": angle.step[one.column] if one.unit != QUESTION else None,
+                "file": angle.path.name,
+            }
+            for name, one in joints.items()
+        ],
+        "clocks": {key: _clock(log) for key, log in logs.items()},
+        "texts": {
+            key: "\n".join(_text(log)) for key, log in logs.items() if any(_text(one) for one in (log, logs[""]))
+        },
+        "streams": {
+            key: [
+                asdict(one) | {"asked": QUESTION in (one.column, one.unit), "wraps": one.column in angle.wraps}
+                for one in rows
+            ]
+            for key, rows in streams.items()
+        },
+        "runs": _runs(loads, angles if load is not angle else ()),
+    }
+
+
+def _three(values: dict[str, float], one: Meaning) -> float:
+    """Return a column's value in SI, to three digits."""
+    return float(f"{values[one.column] * to_si(one.unit):.3g}")
+
+
+def _clock(log: Log) -> str:
+    """Return the keys of [time]."""
+    if stamp := log.of("time"):
+        unit = quoted(stamp[0].unit) + ("  # of the times" if stamp[0].unit == QUESTION else "")
+        return f"column = {quoted(stamp[0].column)}\nunit = {unit}"
+    return "# the file has its own" if log.dated else 'rate_Hz = "?"  # rows a second: no column is known for a time'
+
+
+def _text(log: Log) -> list[str]:
+    """Return the keys of [text]."""
+    given, usual = msgspec.to_builtins(log.text), msgspec.to_builtins(Text())
+    return [f"{key} = {value_text(value)}" for key, value in given.items() if value != usual[key]]
+
+
+def _runs(loads: Sequence[Log], angles: Sequence[Log]) -> list[dict[str, str]]:
+    """Return the recordings: a file each, or a pair of files of two loggers whose names differ in one part alone."""
+    named, others = (
+        dict(zip(runs_of([log.path.name for log in group]), group, strict=True)) for group in (loads, angles)
+    )
+    if len(loads) == len(angles) == 1:
+        others = dict(zip(named, angles, strict=True))
+    runs = []
+    for name, log in named.items():
+        other = others.get(name)
+        shift, told = _shift(log, other) if other else ("", "no file of angles has such a name" if angles else "")
+        file = other.path.name if other else QUESTION if angles else ""
+        runs.append({"name": name, "source": log.path.name, "other": file, "shift": shift, "told": told})
+    return runs
+
+
+def _shift(load: Log, angle: Log) -> tuple[str, str]:
+    """Return the keys that say how two clocks stand to each other, and the same in words."""
+    if load.dated and angle.dated:
+        return "# both files have dates: their clocks are taken to agree", "both have dates"
+    joints = angle.of("encoder")
+    found, asked = None, "the motion does not tell it"
+    if load.times and angle.times and all(one.unit != QUESTION for one in joints):
+        (t, wrench), (t_angle, q) = load.samples("wrench"), angle.samples("encoder")
+        turns = [dimension(one.unit) == "angle" for one in joints]
+        found = find_shift(t, wrench, t_angle, q, turns)
+        halves = [slice(None, len(t) // 2), slice(len(t) // 2, None)]
+        parts = [one for half in halves if (one := find_shift(t[half], wrench[half], t_angle, q, turns))]
+        if found and len(parts) == 2 and abs(parts[1][0] - parts[0][0]) > _APART * np.hypot(parts[0][1], parts[1][1]):
+            found, asked = None, f"it is {parts[0][0]:.4f} s in the first half, {parts[1][0]:.4f} s in the second"
+    if found is None:
+        told = f"how their clocks stand to each other is not known: {asked}"
+        return f'shift_s = {{ wrench = "?" }}  # s, added to the times of the wrench: {asked}', told
+    shift, sigma = found
+    later, earlier = max(shift, 0.0), max(-shift, 0.0)  # what is added to the times of the wrench, of the angles
+    starts, ends = ((t[at] + later, t_angle[at] + earlier) for at in (0, -1))
+    who = "wrench" if shift >= 0.0 else "encoder"
+    return (
+        f"shift_s = {{ {who} = {abs(shift):.4f} }}  # +- {sigma:.1g} s, found from the motion: check it\n"
+        f"start_s = {max(starts) - min(starts):.3f}  # where both loggers ran\n"
+        f"end_s = {min(ends) - min(starts):.3f}"
+    ), f"{abs(shift):.4f} s (+- {sigma:.1g} s, from the motion) are added to the times of {who}"
+
+
+def _listing(log: Log) -> Iterator[str]:
+    """Yield the table of a file's columns: what each was taken for."""
+    rate = f", {log.rate:.5g} Hz" if log.rate else ""
+    told = "".join(f", {line}" for line in _text(log))
+    yield f"{log.path.name}{rate}{told}"
+    width = max(len(one.column) for one in log.columns)
+    for one in log.columns:
+        use = f"{one.stream} {one.channel}".strip() + f" in {one.unit}" if one.stream else "not used"
+        again = ", begins again at every turn" if one.column in log.wraps else ""
+        yield f"  {one.column:<{width}}  {use}{again}"
+    yield from (f"  left out: {one}" for one in log.left_out)

@@ -1,0 +1,79 @@
+"""What a column is, by its name and unit. What these do not tell stays a question."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from kbs_process.campaign.documents import QUESTION
+from kbs_process.campaign.units import dimension, spelt
+from kbs_process.recordings.tables import Column
+
+_LONGEST = 20  # characters of a unit
+_PARTS = re.compile(r"[A-Za-z0-9]+")
+_LOAD = re.compile(r"(f|force|m|mom|moment|t|torque)([xyz])|([xyz])(force|moment|torque)", re.IGNORECASE)
+_TIMES = {"t", "time", "timestamp", "stamp", "zeit", "clock"}
+_COMMANDED = {"cmd", "command", "commanded", "demand", "desired", "ref", "reference", "set", "setpoint", "target"}
+_ANGLES = {"angle", "position", "pos", "enc", "encoder", "winkel", "az", "el", "azimuth", "elevation", "joint"}
+_WORDS = {"angle", "position", "pos", "enc", "encoder", "winkel", "actual", "meas"}
+
+
+@dataclass(frozen=True, slots=True)
+class Meaning:
+    """What a column is for; of no use to a campaign where `stream` is empty."""
+
+    column: str
+    stream: str = ""  # "time", "wrench", "encoder"
+    channel: str = ""  # "Fx", or a joint's name
+    unit: str = QUESTION  # as campaigns write it
+
+
+def meaning(column: Column) -> Meaning:
+    """Return what a column's name and unit tell."""
+    base, unit = _parted(column)
+    words = [word.lower() for word in _PARTS.findall(re.split("[/.]", base)[-1])]
+    kind = dimension(unit)
+    if set(words) & _TIMES and kind in ("time", ""):
+        return Meaning(column.name, "time", unit=unit)
+    if load := _LOAD.fullmatch("".join(words)):
+        first, axis = (load[1], load[2]) if load[1] else (load[4], load[3])
+        force = first[0].lower() == "f"
+        fits = kind == ("force" if force else "torque")
+        return Meaning(column.name, "wrench", f"{'F' if force else 'T'}{axis.lower()}", unit if fits else QUESTION)
+    moved = kind == "angle" or (kind in ("length", "") and set(words) & _ANGLES)
+    if set(words) & _COMMANDED or not moved:
+        return Meaning(column.name, unit=unit)
+    name = "_".join(word for word in words if word not in _WORDS)
+    return Meaning(column.name, "encoder", name if name[:1].isalpha() else f"joint{name}", unit)
+
+
+def _parted(column: Column) -> tuple[str, str]:
+    """Return a column's name without its unit, and the unit: of the file, in brackets, or the name's last words."""
+    name = column.name.strip()
+    opened = max(name.rfind(sign) for sign in "[({") if name.endswith(("]", ")", "}")) else -1
+    base, told = (name[:opened], name[opened + 1 : -1]) if opened >= 0 else (name, "")
+    if stated := column.unit or told:
+        return base, spelt(stated) or QUESTION
+    for cut in re.finditer(r"[\s_,/]+", name):
+        if len(name) - cut.end() <= _LONGEST and (unit := spelt(name[cut.end() :])):
+            return name[: cut.start()], unit
+    return name, QUESTION
+
+
+def by_channel(columns: Sequence[Meaning]) -> dict[str, Meaning]:
+    """Return columns by channel or joint; where several may be meant, which one is a question."""
+    found: dict[str, Meaning] = {}
+    for one in columns:
+        twice = one.channel in found
+        found[one.channel] = Meaning(QUESTION, one.stream, one.channel) if twice else one
+    return found
+
+
+def runs_of(names: Sequence[str]) -> dict[str, str]:
+    """Return the files of one logger, in their order, by what tells them apart: the name without what all share."""
+    parts = {name: re.findall(r"[A-Za-z0-9]+", name.rpartition(".")[0] or name) for name in names}
+    shared = set.intersection(*map(set, parts.values())) if len(names) > 1 else set()
+    runs = {"_".join(part for part in parts[name] if part not in shared): name for name in names}
+    told = len(runs) == len(names) and "" not in runs
+    return runs if told else {f"run{number}": name for number, name in enumerate(names, start=1)}

@@ -1,0 +1,71 @@
+"""How the clocks of two loggers stand to each other, found from what the recordings share."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from kbs_process.signals.records import Array
+
+_POINTS = 1000  # of a recording, in the search
+_EXPLAINED = 0.05  # share of a channel that may be left, or angles do not tell its static part
+_DISTINCT = 4.0  # times more is left at any other shift
+
+
+def find_shift(
+    t: Array, wrench: Array, t_angle: Array, angle: Array, turns: Sequence[bool]
+) -> tuple[float, float] | None:
+    """Return what is to be added to the times t (n,) of a wrench (n, c), and its sigma, s; None if that is not clear.
+
+    The static wrench is a function of the angles (m, j): of their sines and cosines where a joint `turns`, else of the
+    way, and of these in pairs. At the right shift least of the wrench is left beside it. The search covers all shifts
+    at which half of the shorter recording has a partner. Valid where motion does not repeat itself within these.
+    """
+    coarse = max(1, len(t) // _POINTS)
+    rows = slice(None, len(t) // coarse * coarse)
+    few = t[rows].reshape(-1, coarse).mean(1), wrench[rows].reshape(-1, coarse, wrench.shape[1]).mean(1)
+
+    def left(shift: float, times: Array, loads: Array) -> tuple[Array, Array]:
+        at = times + shift
+        inside = (at >= t_angle[0]) & (at <= t_angle[-1])
+        q = np.stack([np.interp(at[inside], t_angle, one) for one in angle.T])
+        parts = [
+            one
+            for joint, turn in zip(q, turns, strict=True)
+            for one in ((np.sin(joint), np.cos(joint)) if turn else (joint,))
+        ]
+        terms = [np.ones(inside.sum()), *parts, *(a * b for i, a in enumerate(parts) for b in parts[:i])]
+        design = np.stack(terms, axis=1)
+        there = loads[inside] - loads[inside].mean(0)
+        basis = np.linalg.qr(design)[0]
+        residual = there - basis @ (basis.T @ there)
+        return residual, (residual**2).sum(0) / np.maximum((there**2).sum(0), np.finfo(float).tiny)
+
+    half = 0.5 * min(t[-1] - t[0], t_angle[-1] - t_angle[0])
+    step = max(float(np.diff(few[0]).mean()), 2.0 * half / _POINTS)
+    shifts = np.arange(t_angle[0] - t[-1] + half, t_angle[-1] - t[0] - half, step)
+    if len(shifts) < 3:
+        return None
+    shares = np.array([left(shift, *few)[1] for shift in shifts])
+    best, channel = np.unravel_index(shares.argmin(), shares.shape)
+    curve = shares[:, channel]
+    low, high = best, best  # where the curve rises from its least value
+    while low > 0 and curve[low - 1] > curve[low]:
+        low -= 1
+    while high < len(curve) - 1 and curve[high + 1] > curve[high]:
+        high += 1
+    others = np.delete(curve, slice(low, high + 1))
+    if curve[best] > _EXPLAINED or low == high or (len(others) and others.min() < _DISTINCT * curve[best]):
+        return None
+
+    def share(shift: float) -> float:
+        return float(left(shift, t, wrench)[1][channel])
+
+    found = float(minimize_scalar(share, bounds=(shifts[best] - step, shifts[best] + step), method="bounded").x)
+    residual = left(found, t, wrench)[0][:, channel]
+    near = float((residual[1:] * residual[:-1]).sum() / (residual**2).sum())  # neighbours that err alike
+    bend = (share(found + step) - 2.0 * share(found) + share(found - step)) / step**2
+    spread = 2.0 * share(found) / (max(bend, 1e-300) * len(residual)) * (1.0 + near) / max(1.0 - near, 1e-3)
+    return found, float(np.sqrt(spread))

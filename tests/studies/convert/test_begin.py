@@ -1,0 +1,244 @@
+"""A campaign is begun from recordings: what they tell is put in, what they do not is a question."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.io import savemat
+
+from kbs_process.campaign.documents import read
+from kbs_process.campaign.load import load_campaign
+from kbs_process.errors import ConfigError, RecordingError
+from kbs_process.recordings.tables import Column
+from kbs_process.studies.convert.begin import begin, check_description
+from kbs_process.studies.convert.naming import by_channel, meaning, runs_of
+from kbs_process.studies.convert.run import import_recordings
+from kbs_process.studies.convert.shift import find_shift
+from studies.convert.importer_files import write_hdf5, write_matlab, write_mdf, write_parquet
+
+LATE = 3.724  # s: the clock of the wrench began so much later
+
+
+@pytest.mark.parametrize(
+    ("name", "stated", "stream", "channel", "unit"),
+    [
+        ("Fx [N]", "", "wrench", "Fx", "N"),
+        ("Force Y (lbf)", "", "wrench", "Fy", "lbf"),
+        ("Tx_Nm", "", "wrench", "Tx", "N m"),
+        ("Mz", "N*m", "wrench", "Tz", "N m"),
+        ("My, ft-lbf", "", "wrench", "Ty", "lbf ft"),
+        ("Fx", "", "wrench", "Fx", "?"),  # no unit is not N
+        ("Fx [Nm]", "", "wrench", "Fx", "?"),  # nor is another one
+        ("Fx [counts]", "", "wrench", "Fx", "?"),
+        ("az_deg", "", "encoder", "az", "deg"),
+        ("El angle", "mrad", "encoder", "el", "mrad"),
+        ("azimuth", "", "encoder", "azimuth", "?"),
+        ("arm rate [deg/s]", "", "", "", "deg/s"),
+        ("slide position (in)", "", "encoder", "slide", "in"),
+        ("angle [°]", "", "encoder", "joint", "deg"),
+        ("t_ms", "", "time", "", "ms"),
+        ("Time", "", "time", "", "?"),
+        ("az_cmd_deg", "", "", "", "deg"),  # what was commanded is no angle that was measured
+        ("probe A", "", "", "", "A"),
+        ("diameter_mm", "", "", "", "mm"),
+        ("status", "", "", "", "?"),
+        ("bench/Fx", "N", "wrench", "Fx", "N"),
+        ("data.az_deg", "", "encoder", "az", "deg"),
+        ("Fz/N", "", "wrench", "Fz", "N"),
+        ("wheel_rad/s", "", "", "", "rad/s"),
+    ],
+)
+def test_what_a_name_tells(name: str, stated: str, stream: str, channel: str, unit: str) -> None:
+    found = meaning(Column(name, stated))
+    assert (found.stream, found.channel, found.unit) == (stream, channel, unit)
+
+
+def test_of_two_columns_for_one_channel_none_is_chosen() -> None:
+    found = by_channel([meaning(Column("one/Fx", "N")), meaning(Column("two/Fx", "N")), meaning(Column("Fy", "N"))])
+    assert {channel: one.column for channel, one in found.items()} == {"Fx": "?", "Fy": "Fy"}
+
+
+def test_files_of_two_loggers_are_paired_by_what_tells_them_apart() -> None:
+    assert runs_of(["wrench_sweep.csv", "wrench_test_1.csv"]) == {
+        "sweep": "wrench_sweep.csv",
+        "test_1": "wrench_test_1.csv",
+    }
+    assert runs_of(["log.csv"]) == {"log": "log.csv"}
+    assert runs_of(["a-1.csv", "a_1.csv"]) == {"run1": "a-1.csv", "run2": "a_1.csv"}
+
+
+def motion(t: np.ndarray) -> np.ndarray:
+    """Go from rest to rest, rad, never twice alike."""
+    q = np.zeros_like(t)
+    for begin_s, step, seconds in ((5.0, 0.6, 6.0), (14.0, 0.5, 8.0), (25.0, -0.9, 7.0), (36.0, 0.4, 5.0)):
+        s = np.clip((t - begin_s) / seconds, 0.0, 1.0)
+        q += step * (10 * s**3 - 15 * s**4 + 6 * s**5)
+    return q
+
+
+def wrench_of(q: np.ndarray, seed: int = 1) -> np.ndarray:
+    """Weight of 50 N at 0.12 m on an arm, with noise; N and N m."""
+    none = np.zeros_like(q)
+    load = np.column_stack([none, none, none - 50.0, none, -6.0 * np.cos(q), none])
+    return load + np.random.default_rng(seed).normal(0.0, [0.02] * 3 + [0.002] * 3, load.shape)
+
+
+def test_the_shift_between_two_clocks_is_found_within_its_sigma() -> None:
+    found = []
+    for seed in range(8):
+        t, t_angle = np.arange(0.0, 44.0, 0.01), np.arange(0.0, 48.0, 0.02)
+        shift, sigma = find_shift(t, wrench_of(motion(t + LATE), seed), t_angle, motion(t_angle)[:, None], [True]) or (
+            np.nan,
+            np.nan,
+        )
+        assert sigma < 0.005
+        found.append((shift - LATE) / sigma)
+    assert 0.5 < np.std(found) < 2.0 and abs(np.mean(found)) < 1.0
+
+
+@pytest.mark.parametrize("move", [lambda t: 0.5 * np.sin(t), lambda t: 0.0 * t], ids=["periodic", "still"])
+def test_a_shift_that_the_motion_does_not_tell_is_no_number(move: Callable[[np.ndarray], np.ndarray]) -> None:
+    t = np.arange(0.0, 60.0, 0.02)
+    assert find_shift(t, wrench_of(move(t)), t, move(t)[:, None], [True]) is None
+
+
+def write_logs(folder: Path) -> list[Path]:
+    """Two runs by two loggers: the wrench at 100 Hz, the angle at 50 Hz in a German text with lines above it."""
+    for run in ("sweep", "test"):
+        t = np.arange(0.0, 44.0, 0.01)
+        names = ["Time (s)", "Fx [N]", "Fy [N]", "Fz [N]", "Mx [Nm]", "My [Nm]", "Mz [Nm]", "status"]
+        table = np.column_stack([t, wrench_of(motion(t + LATE)), 0.0 * t])
+        pd.DataFrame(table, columns=names).to_csv(folder / f"wrench_{run}.csv", index=False, float_format="%.4f")
+        t = np.arange(0.0, 48.0, 0.02)
+        angle = pd.DataFrame({"t_ms": 1000.0 * t, "arm_deg": np.round(np.degrees(motion(t)), 2)})
+        text = angle.to_csv(index=False, sep=";", decimal=",", float_format="%.2f")
+        (folder / f"angle_{run}.txt").write_text("Logger 7\nserial 12\n" + text)
+    return sorted(folder.glob("*_*.*"))
+
+
+ANSWERS = {
+    "campaign.toml": [
+        ('title = "?"', 'title = "An arm"'),
+        ('value = "?"', "value = 0.03"),
+        ('["?", "?"]', "[0.05, 1.0]"),
+        ('source = "?"', 'source = "specification"'),
+        ('high_pass_Hz = "?"', "high_pass_Hz = 0.05"),
+        ('["?"]', "[1.0]"),
+    ],
+    "rig.toml": [
+        ('sigma = "?", source = "certificate"', 'sigma = 0.001, source = "certificate"'),
+        ('sigma = "?", source = "tared"', 'sigma = 20.0, source = "tared"'),
+        ('parent = "?"', 'parent = "T"'),
+        ('axis = "?"', "axis = [0, -1, 0]"),
+        (
+            'mass = { value = "?", unit = "kg", sigma = "?", source = "?"',
+            MASS := 'mass = { value = 5, unit = "kg", sigma = 2, source = "felt"',
+        ),
+    ],
+    "mapping.toml": [('role = "?"', 'role = "fit"')],
+}
+
+
+def answer(folder: Path) -> None:
+    for name, pairs in ANSWERS.items():
+        text = (folder / name).read_text()
+        for old, new in pairs:
+            assert old in text
+            text = text.replace(old, new)
+        (folder / name).write_text(text)
+
+
+def tree(path: Path) -> dict[str, Any]:
+    return tomllib.loads(path.read_text())
+
+
+def test_from_two_loggers_to_a_campaign(tmp_path: Path) -> None:
+    files = write_logs(tmp_path)
+    lines = "\n".join(begin(tmp_path / "arm", files))
+    assert "  My [Nm]   wrench Ty in N m\n" in lines and "  status    not used" in lines
+    assert 'angle_sweep.txt, 50 Hz, skip_rows = 2, decimal = ","\n' in lines
+    mapping = tree(tmp_path / "arm" / "mapping.toml")
+    assert mapping["text"] == {"encoder": {"skip_rows": 2, "decimal": ","}}
+    assert [one["shift_s"]["wrench"] for one in mapping["recording"]] == pytest.approx([LATE, LATE], abs=0.003)
+    rig = tree(tmp_path / "arm" / "rig.toml")
+    assert rig["transducer"]["noise"]["value"] == pytest.approx([0.02] * 3 + [0.002] * 3, rel=0.1)
+    assert rig["joint"]["arm"]["encoder"]["step"]["value"] == pytest.approx(0.01)
+    assert tree(tmp_path / "arm" / "campaign.toml")["bands"]["working_rate_Hz"] == 20.0
+
+    with pytest.raises(ConfigError) as caught:
+        list(check_description(tmp_path / "arm"))
+    told = str(caught.value)
+    assert "15 values are still to be put in" in told
+    assert 'rig.toml:17: joint.arm.axis: "?"\n  -> direction of positive turning in the parent\'s axes' in told
+
+    answer(tmp_path / "arm")
+    said = list(check_description(tmp_path / "arm"))
+    assert said[0] == "arm: the description is complete; 2 recordings are to be imported"
+    campaign = load_campaign(import_recordings(tmp_path / "arm" / "mapping.toml", tmp_path, tmp_path / "made"))
+    assert [one.name for one in campaign.recordings] == ["sweep_1", "test_1"]
+
+
+def test_clocks_that_run_apart_have_no_shift(tmp_path: Path) -> None:
+    files = write_logs(tmp_path)
+    for path in tmp_path.glob("angle_*.txt"):
+        *head, table = path.read_text().split("\n", 3)
+        rows = [line.split(";") for line in table.split()]
+        late = [f"{float(t.replace(',', '.')) * 1.002:.2f}".replace(".", ",") + f";{angle}" for t, angle in rows]
+        path.write_text("\n".join([*head, *late]) + "\n")
+    lines = "\n".join(begin(tmp_path / "arm", files))
+    assert "how their clocks stand to each other is not known: it is 3.7" in lines
+    mapping = (tmp_path / "arm" / "mapping.toml").read_text()
+    assert mapping.count('shift_s = { wrench = "?" }  # s, added to the times of the wrench: it is 3.7') == 2
+
+
+def test_a_value_that_is_still_to_be_put_in_is_refused_by_every_reader(tmp_path: Path) -> None:
+    path = tmp_path / "some.toml"
+    path.write_text('a = 1\n[b]\nc = [1, "?"]  # how much\n')
+    with pytest.raises(ConfigError, match=r'some.toml:3: b.c: "\?"\n  -> how much'):
+        read(path, role="the file", remedy="")
+
+
+@pytest.mark.parametrize(
+    ("name", "write"),
+    [("a.parquet", write_parquet), ("a.h5", write_hdf5), ("a.mat", write_matlab), ("a.mf4", write_mdf)],
+)
+def test_every_format_begins_a_campaign(tmp_path: Path, name: str, write: Callable[..., None]) -> None:
+    t = np.arange(0.0, 10.0, 0.01)
+    write(tmp_path / name, {"t": t, "Fx": t, "Fy": t, "Fz": t, "angle": 0.1 * t})
+    list(begin(tmp_path / "made", [tmp_path / name]))
+    mapping = tree(tmp_path / "made" / "mapping.toml")
+    known = name == "a.mf4"  # which alone states all units
+    units = {one["unit"] for one in [*mapping["wrench"].values(), *mapping["encoder"].values()]}
+    assert units == ({"N", "rad"} if known else {"?"})
+    assert "shift_s" not in mapping["recording"][0]
+
+
+def test_an_angle_that_begins_again_is_unwrapped_and_what_has_no_column_is_told(tmp_path: Path) -> None:
+    t = np.arange(0.0, 40.0, 0.1)
+    savemat(tmp_path / "a.mat", {"t_s": t, "Fx_N": t, "az_deg": (30.0 * t) % 360.0, "el_deg": 10.0 * t, "note": "text"})
+    lines = list(begin(tmp_path / "made", [tmp_path / "a.mat"]))
+    assert "  az_deg  encoder az in deg, begins again at every turn" in lines
+    assert "  el_deg  encoder el in deg" in lines and "  left out: note: it is text" in lines
+    encoder = tree(tmp_path / "made" / "mapping.toml")["encoder"]
+    assert {name: one.get("unwrap") for name, one in encoder.items()} == {"az": True, "el": None}
+
+
+def test_files_of_which_none_is_known_are_all_questions(tmp_path: Path) -> None:
+    pd.DataFrame({"ch1": [1.0, 2.0, 3.0], "ch2": [2.0, 1.0, 0.0]}).to_csv(tmp_path / "a.csv", index=False)
+    list(begin(tmp_path / "made", [tmp_path / "a.csv"]))
+    mapping = tree(tmp_path / "made" / "mapping.toml")
+    assert {one["column"] for one in mapping["wrench"].values()} == {"?"}
+    assert mapping["time"] == {"rate_Hz": "?"}
+
+
+def test_what_is_no_table_is_told(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("a letter\nand its end\n")
+    with pytest.raises(RecordingError):
+        list(begin(tmp_path / "made", [tmp_path / "a.csv"]))
+    assert not (tmp_path / "made").exists()
