@@ -233,6 +233,10 @@ class Quadratic:
         found = cho_solve(factor, right.reshape(len(spread), -1) * scale[:, None]) * scale[:, None]
         return np.asarray(found.reshape(right.shape))
 
+    def sigma(self, spread: Array) -> Array:
+        """Standard deviation of each unknown."""
+        return np.asarray(np.sqrt(np.diag(self.solve(spread, np.eye(len(spread))))))
+
 
 def step(problem: Problem, state: State, quadratic: Quadratic, free: NDArray[np.bool_] | None = None) -> float:
     """Take a step of Gauss and Newton; return its length in sigmas of the unknowns.

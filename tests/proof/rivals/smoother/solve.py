@@ -145,7 +145,7 @@ def _first_of_each(scored: Sequence[Scored]) -> list[Scored]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Judge:
-    """Recordings held out, at the numbers that were fitted; what is their own is free."""
+    """Recordings held out, with the numbers that were fitted, as well as they are known; what is their own is free."""
 
     problem: Problem
     state: State
@@ -158,7 +158,9 @@ class _Judge:
             return None
         problem = Problem(experiment, list(experiment.held_out))
         common = problem.own[0].start
-        problem.prior[:common], problem.spread[:common] = state.x[:common], 1e-6 * problem.spread[:common]
+        # As well as they are known by now; as if none knew of another.
+        known = Quadratic.of(fitted, state).sigma(fitted.spread)
+        problem.prior[:common], problem.spread[:common] = state.x[:common], known[:common]
         own = settled(problem, state.sigma[problem.forces])
         counted = [sum(float(r.weight.sum()) for r in p.recordings) for p in (problem, fitted)]
         return cls(problem, own, counted[0] / counted[1])
