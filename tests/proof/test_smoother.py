@@ -16,7 +16,9 @@ from kbs_process.studies.diagnose.reading import experiment_of
 from proof.rivals.smoother.balance import FIRST_JOINT, FLOOR, PLATE, needed
 from proof.rivals.smoother.fit import Quadratic, State, step
 from proof.rivals.smoother.intensities import powers
+from proof.rivals.smoother.lines import orders_in, tones_in
 from proof.rivals.smoother.problem import Problem
+from proof.rivals.smoother.screen import evidence
 from proof.rivals.smoother.solve import settled
 from proof.rivals.smoother.splines import Splines
 
@@ -36,6 +38,26 @@ def test_splines_give_values_rates_and_accelerations() -> None:
         (accelerations, [-np.sin(t), 2 + 0 * t]),
     ):
         assert found[inside] == pytest.approx(np.stack(expected, axis=1)[inside], abs=2e-4)
+
+
+def test_lines_are_found_at_their_orders_whatever_the_rates_and_at_their_frequencies_whatever_the_phases() -> None:
+    dt, rng = 0.05, np.random.default_rng(5)
+    angles = [0.02 * np.arange(1500) * dt, 0.7 * np.sin(0.1 * np.arange(1400) * dt)]
+    swept = [np.sin(19.7 * angle + 0.4) + rng.standard_normal(len(angle)) for angle in angles]
+    assert orders_in(angles, swept, dt, 500.0)[0] == pytest.approx(19.7, abs=0.5)  # a line is four wide
+    still = [np.zeros(1500)]
+    assert orders_in(still, [rng.standard_normal(1500)], dt, 500.0) == ()
+    noise = [np.cumsum(rng.standard_normal((1500, 3)), axis=0) for _ in range(2)]
+    for one, phase in zip(noise, (0.0, 2.0), strict=True):
+        one[:, 1] += 8.0 * np.sin(2 * np.pi * 1.745 * dt * np.arange(1500) + phase)
+    assert tones_in(noise, dt)[0] == pytest.approx(1.745, abs=0.005)
+
+
+def test_evidence_is_the_likelihood_of_the_best_size_of_amplitudes() -> None:
+    gain, freedom = 300.0, 10
+    g = np.geomspace(0.1, 1e4, 20001)
+    assert evidence(gain, freedom) == pytest.approx(np.max(g * gain / (1 + g) - freedom * np.log1p(g)), rel=1e-6)
+    assert evidence(9.0, 10) == 0.0  # amplitudes that mean nothing take as much
 
 
 @pytest.mark.slow
@@ -93,6 +115,12 @@ def test_a_cold_start_follows_its_readings_after_three_steps(tmp_path: Path) -> 
     for _ in range(3):
         state.idealise(problem, 0.1)
         step(problem, state, Quadratic.of(problem, state), ~problem.dynamic)
+    quadratic = Quadratic.of(problem, state)
+    # What is left is the cost once motion and unknowns have followed, less what priors pay.
+    change = quadratic.solve(problem.spread, quadratic.pull)
+    left = quadratic.parts[0].left(change[problem.local[0]])
+    paid = np.sum(((state.x + change - problem.prior) / problem.spread) ** 2)
+    assert np.sum(left**2) + paid == pytest.approx(quadratic.left - quadratic.pull @ change, rel=1e-3)
     numbers = problem.recordings[0].weight.sum() * problem.independent * problem.rows
     assert cold > 1e3 * numbers
     assert state.cost(problem) < 0.5 * numbers  # forces this loose follow some of the noise

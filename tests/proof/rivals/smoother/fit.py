@@ -134,6 +134,15 @@ class Banded:
             each[a + n - 2] += part[-1]  # the last sample sees the coefficients of the one before it
         return out
 
+    def shown(self, coefficients: Array) -> Array:
+        """What coefficients (size, 1) of the motion do to the rows (n, rows)."""
+        n, _, width = self.by_motion.shape
+        freedoms = width // LOCAL
+        each = coefficients.reshape(-1, freedoms)
+        first = np.minimum(np.arange(n), n - 2)
+        local = np.concatenate([each[first + a] for a in range(LOCAL)], axis=1)
+        return np.asarray(np.matmul(self.by_motion, local[:, :, None])[:, :, 0])
+
     def solve(self, against: Array) -> Array:
         """Coefficients (size, m) that take columns up, of their products with the motion."""
         return np.asarray(cho_solve_banded((self.factor, True), against))
@@ -173,6 +182,15 @@ class Reduced:
         columns = columns.reshape(root.size, -1)
         against = banded.against(columns)
         return cls(banded, root, columns, against, banded.solve(against))
+
+    def left(self, change: Array, column: Array | float = 0.0) -> Array:
+        """What is left of the rows (n, rows), over their sigmas, after the motion and a change of unknowns (local,).
+
+        `column` (n, rows) is what is known to be in them.
+        """
+        rest = self.columns @ np.append(-change, 1.0) - np.reshape(column, -1)
+        taken = self.motion.solve(self.motion.against(rest[:, None]))
+        return np.asarray(rest.reshape(self.root.shape) - self.motion.shown(taken))
 
     def gram(self, columns: Array) -> tuple[Array, Array]:
         """Products of columns (n rows, m) with the unknowns and the residual (m, local + 1), and with each other.
@@ -214,6 +232,10 @@ class Quadratic:
         factor = cho_factor(self.normal * np.outer(scale, scale) + np.diag((scale == 0.0).astype(float)))
         found = cho_solve(factor, right.reshape(len(spread), -1) * scale[:, None]) * scale[:, None]
         return np.asarray(found.reshape(right.shape))
+
+    def sigma(self, spread: Array) -> Array:
+        """Standard deviation of each unknown."""
+        return np.asarray(np.sqrt(np.diag(self.solve(spread, np.eye(len(spread))))))
 
 
 def step(problem: Problem, state: State, quadratic: Quadratic, free: NDArray[np.bool_] | None = None) -> float:

@@ -250,7 +250,12 @@ class Problem:
         loads = needed(rig, motion, self.recordings[k].field.rotors)
         base = self.predicted(k, x, motion, torques, rig, loads)
         slopes = np.zeros((self.recordings[k].n, self.rows, len(local)))
+        zero, common = self.recordings[k].zero, self.own[0].start
+        for channel, of_channel in enumerate(np.split(np.arange(common, len(local) - 2), 6)):
+            slopes[:, channel, of_channel] = zero  # is linear
         for column, place in enumerate(local):
+            if common <= column < len(local) - 2:
+                continue
             step = _SHARE * self.spread[place]
             moved_x = x.copy()
             moved_x[place] += step

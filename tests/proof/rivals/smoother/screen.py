@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 
 from kbs_process.diagnosis.experiments.hypothesis import Tapped
@@ -14,6 +15,7 @@ from kbs_process.diagnosis.screening.ranges import ranges_of
 from kbs_process.diagnosis.screening.signature import inputs, reduced, sensed
 from kbs_process.diagnosis.screening.suspects import Candidate, candidates
 from kbs_process.plant.compiled.taps import tap_columns
+from kbs_process.plant.effect import Parameter
 from kbs_process.plant.laws import select
 from kbs_process.plant.linear.linearise import linearise
 from kbs_process.rig.model import Rig
@@ -22,28 +24,47 @@ from proof.rivals.case import Array
 from proof.rivals.smoother.balance import FIRST_JOINT, PLATE
 from proof.rivals.smoother.drive import spring
 from proof.rivals.smoother.fit import Quadratic, State
+from proof.rivals.smoother.lines import proposed
 from proof.rivals.smoother.problem import Problem
-from proof.rivals.smoother.splines import in_band
+from proof.rivals.smoother.splines import BAND_HZ, in_band
 
 _TAPS_HZ = 100.0
 _KNOT_S = 1.0  # between poses at which ports are worked out
 _BATCH = 200  # columns at once
 _DEPENDENT = 1e-5  # of a column that all numbers leave
+_FIRST_STEP = 0.1  # of a shape's value
+_HALVINGS = 12
+_ROUNDS, _SETTLED = 4, 0.02  # through all shapes, at most, and while the gain grows by such a share
+_NEAR = 0.7  # of the gain, beside the best shape, from which on a parabola leads there
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scored:
-    """A candidate: what its best amplitudes take of the cost."""
+    """A candidate beside what is known: what the best amplitudes take of the cost."""
 
     candidate: Candidate
-    gain: float
-    amplitudes: Array  # one after the other of each recording, where they are its own
+    gain: float  # over that of the known alone
     freedom: int  # amplitudes that make a difference
+    amplitudes: Array  # of the known and this one that all recordings share, one after the other
+    likely: float = 0.0  # of amplitudes of this size, beforehand; see `_likely`
+    foreseen: float = 0.0  # what these amplitudes take on recordings held out
 
     @property
     def worth(self) -> float:
-        """Gain less what amplitudes that mean nothing would have."""
-        return self.gain - 2.0 * self.freedom
+        """Of all recordings; gain less what numbers that mean nothing would have."""
+        return evidence(self.gain, self.freedom) + self.likely + self.foreseen
+
+
+def evidence(gain: float, freedom: int) -> float:
+    """Twice the logarithm of what a hypothesis of `freedom` amplitudes makes of the data, at the best size of them.
+
+    Amplitudes are Gaussian with g times the variance that the data leave them: g gain / (1 + g) - freedom log(1 + g).
+    Source: A. Zellner, On assessing prior distributions and Bayesian regression analysis with g-prior distributions
+    (1986); E. George, D. Foster, Calibration and empirical Bayes variable selection, Biometrika 87 (2000) 731.
+    """
+    if freedom == 0 or gain <= freedom:
+        return 0.0
+    return float(gain - freedom * (1.0 + np.log(gain / freedom)))
 
 
 class Course:
@@ -118,6 +139,20 @@ class Course:
         return out
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Products:
+    """Products of a set of effects' columns, with unknowns (p, m), with the residual (m,), with each other (m, m).
+
+    What each recording has amplitudes of its own for stands there as often; `owner` (m,) says whose a column is.
+    """
+
+    unknowns: Array
+    residual: Array
+    squares: Array
+    owner: NDArray[np.intp]
+    own: NDArray[np.bool_]  # (m,) of one recording alone
+
+
 class Screen:
     """The catalogue on a state."""
 
@@ -133,70 +168,153 @@ class Screen:
         """Every effect that the model leaves out, with each shape, but those that need a recording's own times."""
         problem, experiment = self.problem, self.problem.experiment
         tapped = [course.tapped for course in self.courses]
-        ranges = ranges_of(tapped, [course.shown for course in self.courses], experiment.channels, experiment.dt)
+        lines = proposed(problem, self.state, self.unexplained())
+        shown = [course.shown for course in self.courses]
+        ranges = ranges_of(tapped, shown, experiment.channels, experiment.dt, proposed=lines)
         every = candidates(problem.rig, experiment.effects, ranges, tap_columns(problem.rig), experiment.channels)
         return [one for one in every if not one.effect.jumps]
+
+    def unexplained(self) -> list[Array]:
+        """What motion and numbers leave of each recording's rows (n, rows), over their sigmas."""
+        parts, local = self.quadratic.parts, self.problem.local
+        return [part.left(self._own[own]) for part, own in zip(parts, local, strict=True)]
 
     def scored(self, chosen: Sequence[Candidate], known: Sequence[Candidate] = ()) -> list[Scored]:
         """What each takes of the cost beside all numbers, and beside what is `known`; best first."""
         found = [one for some in _batches(chosen, known) for one in self._scored(some, known)]
         return sorted(found, key=lambda one: -one.worth)
 
-    def predicted(self, one: Scored) -> tuple[float, float]:
-        """What an effect takes of the cost with the amplitudes that it has, which were found elsewhere; what it would.
+    def refined(self, one: Scored, known: Sequence[Candidate] = ()) -> Scored:
+        """The same with its shape where it takes most, one number after the other."""
+        free = {
+            entry.name: entry for entry in one.candidate.effect.parameters if entry.role == "shape" and not entry.whole
+        }
+        places = [place for place, (name, _) in enumerate(one.candidate.shape) if name in free]
+        for _ in range(_ROUNDS if len(places) > 1 else 1):
+            before = one.gain
+            for place in places:
+                entry = free[one.candidate.shape[place][0]]
+                low, high = entry.bounds
+                one = self._along(one, known, place, (low, min(high, BAND_HZ) if entry.unit == "Hz" else high))
+            if one.gain < (1.0 + _SETTLED) * before:
+                break
+        return one
 
-        The latter, if these amplitudes were right.
+    def _along(self, one: Scored, known: Sequence[Candidate], place: int, bounds: tuple[float, float]) -> Scored:
+        def at(value: float) -> Scored:
+            shape = list(one.candidate.shape)
+            shape[place] = (shape[place][0], float(np.clip(value, *bounds)))
+            (found,) = self.scored([replace(one.candidate, shape=tuple(shape))], known)
+            return found
+
+        step, best = _FIRST_STEP * max(abs(one.candidate.shape[place][1]), _FIRST_STEP), one
+        for _ in range(_HALVINGS):
+            value = best.candidate.shape[place][1]
+            low, high = at(value - step), at(value + step)
+            if max(low.gain, high.gain) <= best.gain < min(low.gain, high.gain) / _NEAR:
+                bend = low.gain - 2.0 * best.gain + high.gain
+                if bend == 0.0:
+                    return best
+                return max(best, at(value + 0.5 * step * (low.gain - high.gain) / bend), key=lambda found: found.gain)
+            if max(low.gain, high.gain) <= best.gain:
+                step *= 0.5
+            best = max(best, low, high, key=lambda found: found.gain)
+        return best
+
+    def predicted(self, one: Scored, known: Sequence[Candidate] = ()) -> float:
+        """What effects take of the cost with the amplitudes that they have, which were found elsewhere.
+
+        Amplitudes of each recording's own are free, and count as `evidence`.
         """
-        unknowns, products, squares = (np.sum(parts, axis=0) for parts in self._sums([one.candidate]))
-        given = one.amplitudes[-len(one.candidate.amplitudes) :]
-        by = unknowns @ given
-        foretold = float(given @ squares @ given - by @ self.quadratic.solve(self.problem.spread, by))
-        return float(2.0 * (given @ products - by @ self._own)) - foretold, foretold
+        found = self._products([*known, one.candidate])
+        square, right = self._beside(found)
+        given, free = one.amplitudes, found.own
+        gained = float(2.0 * given @ right[~free] - given @ square[np.ix_(~free, ~free)] @ given)
+        if free.any():
+            rest = right[free] - square[np.ix_(free, ~free)] @ given
+            size = np.sqrt(np.maximum(np.diag(found.squares)[free], 1e-300))
+            most, _, freedom = _best(square[np.ix_(free, free)], rest, size)
+            gained += evidence(most, freedom)
+        return gained
+
+    def foretold(self, one: Scored) -> float:
+        """What an effect of common amplitudes would take, if they were right."""
+        found = self._products([one.candidate])
+        if found.own.any():
+            return 0.0
+        square, _ = self._beside(found)
+        given = one.amplitudes[-len(square) :]
+        return float(given @ square @ given)
+
+    def explained(self, one: Scored, known: Sequence[Candidate]) -> list[Array]:
+        """What is `unexplained` once the known and one more are taken off, with the amplitudes that are best."""
+        every = [*known, one.candidate]
+        found = self._products(every)
+        square, right = self._beside(found)
+        size = np.sqrt(np.maximum(np.diag(found.squares), 1e-300))
+        _, amplitudes, _ = _best(square, right, size)
+        moved = self._own - self.quadratic.solve(self.problem.spread, found.unknowns @ amplitudes)
+        out = []
+        for k, (course, part, local) in enumerate(
+            zip(self.courses, self.quadratic.parts, self.problem.local, strict=True)
+        ):
+            column = np.zeros(part.root.shape)
+            for number, candidate in enumerate(every):
+                shown = course.columns(candidate)
+                mine = amplitudes[found.owner == number]
+                if candidate.effect.each_trial:
+                    mine = mine.reshape(len(self.courses), -1)[k]
+                column += np.nan_to_num(shown) @ mine
+            out.append(part.left(moved[local], column * part.root))
+        return out
 
     def _scored(self, chosen: Sequence[Candidate], known: Sequence[Candidate]) -> Iterator[Scored]:
         every = [*known, *chosen]
-        sizes = [len(one.amplitudes) for one in every]
-        ends = np.cumsum([0, *sizes])
-        unknowns, products, squares = self._sums(every)
-        spread = self.problem.spread
+        found = self._products(every)
+        square, right = self._beside(found)
+        size = np.sqrt(np.maximum(np.diag(found.squares), 1e-300))
+        of_known = found.owner < len(known)
+        before = _best(square[np.ix_(of_known, of_known)], right[of_known], size[of_known]) if known else None
         for number, one in enumerate(chosen, start=len(known)):
-            wanted = [*range(len(known)), number]
-            places = np.concatenate([np.arange(ends[w], ends[w + 1]) for w in wanted])
-            if one.effect.each_trial:
-                places = np.concatenate([places + k * ends[-1] for k in range(len(unknowns))])
-                by, right, square = _apart(unknowns, products, squares)
-            else:
-                by, right, square = np.sum(unknowns, axis=0), np.sum(products, axis=0), np.sum(squares, axis=0)
-            by, right, square = by[:, places], right[places], square[np.ix_(places, places)]
-            size = np.sqrt(np.maximum(np.diag(square), 1e-300))
-            beside = square - by.T @ self.quadratic.solve(spread, by)
-            rest = right - by.T @ self._own
-            of_known = [k for k, w in enumerate(np.repeat(wanted, [sizes[w] for w in wanted])) if w < len(known)]
-            gain, amplitudes, freedom = _best(beside, rest, size)
-            before = _best(beside[np.ix_(of_known, of_known)], rest[of_known], size[of_known])[0] if of_known else 0.0
-            yield Scored(one, gain - before, amplitudes, freedom)
+            places = np.flatnonzero(of_known | (found.owner == number))
+            gain, amplitudes, freedom = _best(square[np.ix_(places, places)], right[places], size[places])
+            if before is not None:
+                gain, freedom = gain - before[0], freedom - before[2]
+            mine = amplitudes[found.owner[places] == number].reshape(-1, len(one.amplitudes))
+            likely = _likely(one.amplitudes, np.sqrt(np.mean(mine**2, axis=0)))
+            yield Scored(one, gain, freedom, amplitudes[~found.own[places]], likely)
 
-    def _sums(self, every: Sequence[Candidate]) -> tuple[list[Array], list[Array], list[Array]]:
-        """Of each recording: products with the unknowns (p, m), with the residual (m,), and with each other (m, m)."""
-        unknowns, products, squares = [], [], []
-        for course, part, local in zip(self.courses, self.quadratic.parts, self.problem.local, strict=True):
+    def _beside(self, found: _Products) -> tuple[Array, Array]:
+        """Squares and products with the residual, once all numbers have had their part."""
+        solved = self.quadratic.solve(self.problem.spread, found.unknowns)
+        return found.squares - found.unknowns.T @ solved, found.residual - found.unknowns.T @ self._own
+
+    def _products(self, every: Sequence[Candidate]) -> _Products:
+        sizes = [len(one.amplitudes) for one in every]
+        owner = np.repeat(np.arange(len(every)), sizes)
+        count = len(self.courses)
+        recording = np.concatenate([
+            np.repeat(np.arange(count), size) if one.effect.each_trial else np.full(size, -1)
+            for one, size in zip(every, sizes, strict=True)
+        ])  # fmt: skip
+        ends = np.cumsum([0, *sizes])
+        source = np.concatenate([
+            np.tile(np.arange(ends[k], ends[k + 1]), count if one.effect.each_trial else 1)
+            for k, one in enumerate(every)
+        ])  # fmt: skip
+        m = len(source)
+        unknowns, residual, squares = np.zeros((len(self.problem.spread), m)), np.zeros(m), np.zeros((m, m))
+        for k, (course, part, local) in enumerate(
+            zip(self.courses, self.quadratic.parts, self.problem.local, strict=True)
+        ):
             whole = np.concatenate([course.columns(one) for one in every], axis=2) * part.root[:, :, None]
             mixed, square = part.gram(np.nan_to_num(whole).reshape(-1, whole.shape[2]))
-            by = np.zeros((len(self.problem.spread), whole.shape[2]))
-            by[local] = mixed[:, :-1].T
-            unknowns.append(by)
-            products.append(mixed[:, -1])
-            squares.append(square)
-        return unknowns, products, squares
-
-
-def _apart(unknowns: list[Array], products: list[Array], squares: list[Array]) -> tuple[Array, Array, Array]:
-    """The same with amplitudes of each recording its own."""
-    m = len(products[0])
-    square = np.zeros((m * len(squares),) * 2)
-    for k, own in enumerate(squares):
-        square[k * m : (k + 1) * m, k * m : (k + 1) * m] = own
-    return np.hstack(unknowns), np.concatenate(products), square
+            there = np.flatnonzero((recording < 0) | (recording == k))
+            taken = source[there]
+            unknowns[np.ix_(local, there)] += mixed[taken, :-1].T
+            residual[there] += mixed[taken, -1]
+            squares[np.ix_(there, there)] += square[np.ix_(taken, taken)]
+        return _Products(unknowns, residual, squares, owner[source], recording >= 0)
 
 
 def _best(square: Array, right: Array, size: Array) -> tuple[float, Array, int]:
@@ -206,6 +324,16 @@ def _best(square: Array, right: Array, size: Array) -> tuple[float, Array, int]:
     along = vectors[:, seen].T @ (right / size)
     amplitudes = vectors[:, seen] @ (along / values[seen]) / size
     return float(np.sum(along**2 / values[seen])), amplitudes, int(seen.sum())
+
+
+def _likely(entries: Sequence[Parameter], size: Array) -> float:
+    """Twice the logarithm of how likely amplitudes of a `size` are, against their priors' middles, with Cauchy's tails.
+
+    A motor's torque that would turn the gear as its own error does is out of all proportion; nothing else tells them
+    apart in the band.
+    """
+    spread = np.array([entry.prior.spread for entry in entries])
+    return float(-2.0 * np.sum(np.log1p((size / spread) ** 2)))
 
 
 def _batches(chosen: Sequence[Candidate], known: Sequence[Candidate]) -> Iterator[list[Candidate]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from time import monotonic
 
@@ -33,13 +33,15 @@ SETTLED = 100.0  # sigmas of all unknowns together that a step goes, below which
 ARRIVED = 3.0  # below which it is the last
 CHANGE = (0.3, 1.5)  # of a force's sigma in a step
 KNOWN = 0.2  # of its logarithm, below which a force's sigma is known
-DETECTED = 100.0  # of the cost, that an effect takes
+DETECTED = 400.0  # of the cost, that an effect takes of all recordings: what the equations here leave out takes less
 SHARE = 0.25  # of its gain for each sample, that an effect of each recording's own has on recordings held out
 FORETOLD = 0.5  # of what another would take there, that it takes
 MOST = 3  # effects
 OFF = 4.0  # sigmas
+LEADERS = 12  # laws at a place, of which shapes are refined and recordings held out are asked
+BEHIND = 0.2  # of the first's worth, with less of which one is no leader
 NEXT = 2  # alternatives that are named
-ALIKE = 9.0  # of the cost: laws that differ by less are not told apart
+ALIKE = 9.0  # of the cost: what differs by less is not told apart
 
 
 def solve(folder: Path) -> Answer:
@@ -49,21 +51,7 @@ def solve(folder: Path) -> Answer:
     fitted = Problem(experiment, list(experiment.fit))
     state = settled(fitted)
     left = powers(fitted, state, Quadratic.of(fitted, state))
-    # What comes again and no number takes up counts as noise until an effect explains it.
-    state.sigma[fitted.forces] *= np.sqrt(np.maximum(left.of_all, 1.0))[fitted.forces]
-    screen = Screen(fitted, state)
-    judge = _held_out(experiment, fitted, state)
-    chosen, finds = screen.candidates(), []
-    known: list[Candidate] = []
-    while len(known) < MOST:
-        scored = screen.scored(chosen, known)
-        best = next((one for one in scored[:20] if judge is None or judge.confirms(one)), None)
-        if best is None or best.gain < DETECTED:
-            break
-        finds.append(_claim(best, scored))
-        known.append(best.candidate)
-        own = _suspect(best.candidate)
-        chosen = [one for one in chosen if _suspect(one) != own]  # another shape of it is no second effect
+    finds = _finds(fitted, state, _Judge.of(experiment, fitted, state), left.of_all)
     moved = _moved(fitted, state)
     return Answer(
         method=METHOD,
@@ -71,7 +59,7 @@ def solve(folder: Path) -> Answer:
         detected=bool(finds),
         verdict="physics" if finds else "parameters off" if moved else "none",
         moved=() if finds else moved,
-        finds=tuple(finds),
+        finds=finds,
         seconds=monotonic() - begin,
     )
 
@@ -82,23 +70,25 @@ def settled(problem: Problem, sigma: Array | None = None) -> State:
     What shows while the rig moves alone is held until forces are known: beside large ones nothing tells it.
     """
     state = State.of(problem, _forces(problem) if sigma is None else sigma)
-    length = wrong = np.inf
-    phase = 0 if sigma is None else 2
+    wrong, phase = np.inf, 0
+    if sigma is not None:
+        wrong, phase = 0.0, 2
     for _ in range(STEPS):
         state.idealise(problem, STIFF[phase])
         quadratic = Quadratic.of(problem, state)
         if phase and sigma is None:
-            power = powers(problem, state, quadratic).noise[problem.forces]
-            ratio = np.clip(np.sqrt(power), *CHANGE)
-            state.sigma[problem.forces] *= ratio
+            ratio = np.clip(np.sqrt(powers(problem, state, quadratic).noise[problem.forces]), *CHANGE)
             wrong = float(np.abs(np.log(ratio)).max())
-            quadratic = Quadratic.of(problem, state)
+            state.sigma[problem.forces] *= ratio
+        if phase == 1 and wrong > KNOWN:
+            state.smooth(problem)
+            continue
         length = step(problem, state, quadratic, None if phase == 2 else ~problem.dynamic)
         if phase == 0 and length < SETTLED:
             phase = 1
-        elif phase == 1 and wrong < KNOWN:
+        elif phase == 1:
             phase = 2
-        elif phase == 2 and length < ARRIVED and (sigma is not None or wrong < KNOWN):
+        elif phase == 2 and length < ARRIVED and wrong < KNOWN:
             break
     return state
 
@@ -110,31 +100,82 @@ def _forces(problem: Problem) -> Array:
     return WIDER * np.repeat([torque, OF_JOINT * torque, force / mass], [3, problem.joints, 3])
 
 
+def _finds(problem: Problem, state: State, judge: _Judge | None, power: Array) -> tuple[Claim, ...]:
+    """Effects, one after the other: each the one that recordings of the fit and those held out together show most.
+
+    `power` (rows,) is what is left in each row. What comes again and no number takes up counts as noise until an
+    effect explains it.
+    """
+    finds: list[Claim] = []
+    known: list[Candidate] = []
+    forces, base, before = problem.forces, state.sigma.copy(), 0.0
+    excess = power
+    while len(finds) < MOST:
+        state.sigma[forces] = (base * np.sqrt(np.maximum(excess, 1.0)))[forces]
+        screen = Screen(problem, state)
+        held = None if judge is None else judge.screen(state.sigma[forces])
+        taken = {_suspect(one) for one in known}  # another shape of one is no second effect
+        chosen = [one for one in screen.candidates() if _suspect(one) not in taken]
+        leaders = [screen.refined(one, known) for one in _first_of_each(screen.scored(chosen, known))]
+        if held is not None:
+            before = held.predicted(screen.scored(known[-1:], known[:-1])[0], known[:-1]) if known else 0.0
+            leaders = [replace(one, foreseen=held.predicted(one, known) - before) for one in leaders]
+            leaders = [one for one in leaders if judge.confirms(one, held)]
+        leaders.sort(key=lambda one: -one.worth)
+        if not leaders or leaders[0].worth < DETECTED:
+            break
+        best = leaders[0]
+        finds.append(_claim(best, leaders))
+        left, all_ = (
+            sum(np.sum(z**2, axis=0) for z in part) for part in (screen.explained(best, known), screen.unexplained())
+        )
+        excess = power * left / all_
+        known.append(best.candidate)
+    return tuple(finds)
+
+
+def _first_of_each(scored: Sequence[Scored]) -> list[Scored]:
+    """The best shape of each law at each place, of the first few."""
+    first: dict[tuple[str, str], Scored] = {}
+    for one in scored:
+        first.setdefault((one.candidate.name, one.candidate.site), one)
+    leaders = list(first.values())[:LEADERS]
+    return [one for one in leaders if one.worth > BEHIND * leaders[0].worth]
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class _Judge:
-    """Recordings held out, at the numbers that were fitted; what is their own is free."""
+    """Recordings held out, with the numbers that were fitted, as well as they are known; what is their own is free."""
 
-    screen: Screen
+    problem: Problem
+    state: State
     samples: float  # over those of the recordings that were fitted
 
-    def confirms(self, one: Scored) -> bool:
-        """Whether recordings held out show an effect, at the amplitudes that were fitted, as far as it shows there."""
+    @classmethod
+    def of(cls, experiment: Experiment, fitted: Problem, state: State) -> _Judge | None:
+        """None where no recording is held out."""
+        if not experiment.held_out:
+            return None
+        problem = Problem(experiment, list(experiment.held_out))
+        common = problem.own[0].start
+        # As well as they are known by now; as if none knew of another.
+        known = Quadratic.of(fitted, state).sigma(fitted.spread)
+        problem.prior[:common], problem.spread[:common] = state.x[:common], known[:common]
+        own = settled(problem, state.sigma[problem.forces])
+        counted = [sum(float(r.weight.sum()) for r in p.recordings) for p in (problem, fitted)]
+        return cls(problem, own, counted[0] / counted[1])
+
+    def screen(self, forces: Array) -> Screen:
+        """With forces of these sigmas."""
+        self.state.sigma[self.problem.forces] = forces
+        return Screen(self.problem, self.state)
+
+    def confirms(self, one: Scored, held: Screen) -> bool:
+        """Whether they show an effect, as far as it shows there."""
         if one.candidate.effect.each_trial:
-            (again,) = self.screen.scored([one.candidate])
-            return again.gain > SHARE * self.samples * one.gain
-        gained, foretold = self.screen.predicted(one)
-        return foretold < DETECTED or gained > FORETOLD * foretold
-
-
-def _held_out(experiment: Experiment, fitted: Problem, state: State) -> _Judge | None:
-    if not experiment.held_out:
-        return None
-    problem = Problem(experiment, list(experiment.held_out))
-    common = problem.own[0].start
-    problem.prior[:common], problem.spread[:common] = state.x[:common], 1e-6 * problem.spread[:common]
-    own = settled(problem, state.sigma[problem.forces])
-    counted = [sum(float(r.weight.sum()) for r in p.recordings) for p in (problem, fitted)]
-    return _Judge(Screen(problem, own), counted[0] / counted[1])
+            return one.foreseen > SHARE * self.samples * one.gain
+        foretold = held.foretold(one)
+        return foretold < ALIKE or one.foreseen > FORETOLD * foretold
 
 
 def _claim(best: Scored, scored: Sequence[Scored]) -> Claim:
