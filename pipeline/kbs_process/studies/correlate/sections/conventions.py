@@ -10,6 +10,7 @@ from kbs_process.report.panel import Block, Cell, Figure, Grid, Panel, Picture, 
 from kbs_process.report.prose import Prose
 from kbs_process.report.tables import Tables
 from kbs_process.signals.records import Array
+from kbs_process.stages.conventions import SignCheck
 from kbs_process.studies.correlate.results import Results
 
 _SAYS = Prose("kbs_process.studies.correlate", "conventions")
@@ -29,10 +30,7 @@ def panel(results: Results, tables: Tables) -> Panel:
         Text("Definitions:", tuple(map(_SAYS, names))),
         Figure("Frames and signs", (picture,), _SAYS.caption("frames")),
     ]
-    rows = tuple(
-        (entry.check, entry.expected, entry.found, Cell("ok" if entry.ok else "failed", "pass" if entry.ok else "fail"))
-        for entry in results.conventions
-    )
+    rows = tuple((entry.check, entry.expected, entry.found, _outcome(entry)) for entry in results.conventions)
     if rows:
         blocks.append(
             Grid("Self-tests on this campaign's data", ("Check", "Expected", "Found", "Outcome"), rows, "lllc")
@@ -40,6 +38,12 @@ def panel(results: Results, tables: Tables) -> Panel:
     else:
         blocks.append(Text("No self-test of signs and frames was made."))
     return Panel("conventions", "Signs and frames", "Do recorder and model mean the same by every sign?", tuple(blocks))
+
+
+def _outcome(entry: SignCheck) -> Cell:
+    if not entry.testable:
+        return Cell("not testable", "muted")
+    return Cell("ok", "pass") if entry.ok else Cell("failed", "fail")
 
 
 def _frames(alt: str, *, spacecraft: bool) -> Picture:
