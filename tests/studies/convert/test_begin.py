@@ -258,3 +258,11 @@ def test_a_folder_of_another_campaign_is_not_replaced(tmp_path: Path) -> None:
     _check_same(tmp_path, "other")
     with pytest.raises(OutputError, match="holds the campaign 'other', not 'mine'"):
         _check_same(tmp_path, "mine")
+
+
+def test_rows_that_only_the_wrench_has_tell_nothing_of_its_clock(tmp_path: Path) -> None:
+    files = write_logs(tmp_path)
+    for path in tmp_path.glob("angle_*.txt"):
+        lines = path.read_text().splitlines()
+        path.write_text("\n".join(lines[: 3 + (len(lines) - 3) * 6 // 10]) + "\n")
+    assert "are added to the times of wrench" in "\n".join(begin(tmp_path / "arm", files))
