@@ -14,11 +14,12 @@ from scipy.io import savemat
 
 from kbs_process.campaign.documents import read
 from kbs_process.campaign.load import load_campaign
-from kbs_process.errors import ConfigError, RecordingError
+from kbs_process.errors import ConfigError, OutputError, RecordingError
 from kbs_process.recordings.tables import Column
 from kbs_process.studies.convert.begin import begin, check_description
+from kbs_process.studies.convert.mapping_file import Part
 from kbs_process.studies.convert.naming import by_channel, meaning, runs_of
-from kbs_process.studies.convert.run import import_recordings
+from kbs_process.studies.convert.run import _check_same, import_recordings
 from kbs_process.studies.convert.shift import find_shift
 from studies.convert.importer_files import write_hdf5, write_matlab, write_mdf, write_parquet
 
@@ -244,3 +245,26 @@ def test_what_is_no_table_is_told(tmp_path: Path) -> None:
     with pytest.raises(RecordingError):
         list(begin(tmp_path / "made", [tmp_path / "a.csv"]))
     assert not (tmp_path / "made").exists()
+
+
+def test_streams_of_one_of_several_files_share_its_shift() -> None:
+    files = {"encoder": "angles.csv", "rate": "angles.csv"}
+    part = Part(source="a.csv", file=files, shift_s={"encoder": 2.5}, trajectory="sweep", role="fit")
+    assert [part.shift_of(key) for key in ("wrench", "encoder", "rate")] == [0.0, 2.5, 2.5]
+    one = Part(source="a.csv", shift_s={"encoder": 2.5}, trajectory="sweep", role="fit")
+    assert one.shift_of("wrench") == 0.0
+
+
+def test_a_folder_of_another_campaign_is_not_replaced(tmp_path: Path) -> None:
+    (tmp_path / "campaign.toml").write_text('name = "other"\n')
+    _check_same(tmp_path, "other")
+    with pytest.raises(OutputError, match="holds the campaign 'other', not 'mine'"):
+        _check_same(tmp_path, "mine")
+
+
+def test_rows_that_only_the_wrench_has_tell_nothing_of_its_clock(tmp_path: Path) -> None:
+    files = write_logs(tmp_path)
+    for path in tmp_path.glob("angle_*.txt"):
+        lines = path.read_text().splitlines()
+        path.write_text("\n".join(lines[: 3 + (len(lines) - 3) * 6 // 10]) + "\n")
+    assert "are added to the times of wrench" in "\n".join(begin(tmp_path / "arm", files))

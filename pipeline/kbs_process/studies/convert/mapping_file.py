@@ -175,6 +175,13 @@ class Part(Table):
         """Name of the file that a stream is in."""
         return self.file.get(stream, self.source)
 
+    def shift_of(self, stream: str) -> float:
+        """Return what is added to a stream's times, s: of several files, the streams of one share their shift."""
+        shared = (
+            shift for key, shift in self.shift_s.items() if self.file and self.file_of(key) == self.file_of(stream)
+        )
+        return self.shift_s.get(stream, next(shared, 0.0))
+
 
 class MappingFile(Table):
     """All of a mapping."""

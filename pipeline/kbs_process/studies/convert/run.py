@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from kbs_process.campaign.config import Campaign, Topic
-from kbs_process.campaign.documents import shown
+from kbs_process.campaign.documents import read, shown
 from kbs_process.campaign.load import load_campaign
 from kbs_process.campaign.locate import CAMPAIGN_FILE
-from kbs_process.errors import RecordingError, did_you_mean
+from kbs_process.errors import OutputError, RecordingError, did_you_mean
 from kbs_process.progress import Progress, SilentProgress
 from kbs_process.recordings.formats import Text
 from kbs_process.recordings.mcap.messages.encoding import JOINT_PARTS, OutStream
@@ -52,6 +52,7 @@ def import_recordings(
     files = _source_files(plan, source)
     with writing(target, CAMPAIGN_FILE) as folder:
         campaign = prepare(plan, folder)
+        _check_same(target, campaign.name)
         checksums: dict[str, str] = {}
         findings: dict[str, tuple[str, ...]] = {}
         for part in plan.parts:
@@ -67,6 +68,15 @@ def import_recordings(
         write_campaign(plan, folder, checksums, origins)
         load_campaign(folder)
     return target
+
+
+def _check_same(target: Path, name: str) -> None:
+    """Raise OutputError where the folder holds another campaign than the one of this name."""
+    remedy = "name a folder that is empty or does not exist, or move this one"
+    if (target / CAMPAIGN_FILE).is_file():
+        held = read(target / CAMPAIGN_FILE, role="campaign", remedy=remedy).tree.get("name")
+        if held != name:
+            raise OutputError(f"holds the campaign '{held}', not '{name}'", where=shown(target), remedy=remedy)
 
 
 def _source_files(mapping: Mapping, source: Path) -> dict[str, Path]:

@@ -69,9 +69,10 @@ def read_part(
     streams = {stream.key: stream for stream in mapping.streams}
     for stream in mapping.streams:
         yield stream, Block(_NO_STAMPS, _NO_STAMPS, np.empty((0, len(stream.channels))))
+    shifts = {key: part.shift_of(key) for key in streams}
     passes = [
-        _pieces(tables[shared[0].key], mapping, shared, part.shift_s, findings)
-        for shared in _passes(mapping.streams, tables, part.shift_s)
+        _pieces(tables[shared[0].key], mapping, shared, shifts, findings)
+        for shared in _passes(mapping.streams, tables, shifts)
     ]
     start, end = -(1 << 63), (1 << 63) - 1
     if part.start_s > 0.0 or np.isfinite(part.end_s):
