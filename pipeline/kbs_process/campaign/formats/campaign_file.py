@@ -165,7 +165,7 @@ class RecordingTable(Table):
     end_s: Positive | None = Field(None, description="leave out what is after, s from the recording's start")
     clock_sigma_s: NotNegative = Field(
         0.0,
-        description="standard deviation of how its streams' clocks stand to each other, s, beyond what the stamps tell",
+        description="standard deviation of how its streams' clocks stand to each other, s, beyond what timestamps tell",
     )
     without: Distinct[str] = Field(
         [], description="effects of the model that did not act in this recording, as a cord that was not attached"
