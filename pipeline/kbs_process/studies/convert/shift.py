@@ -11,6 +11,7 @@ from kbs_process.signals.records import Array
 
 _POINTS = 1000  # of a recording, in the search
 _EXPLAINED = 0.05  # share of a channel that may be left, or angles do not tell its static part
+_FEWEST = 30  # rows with a partner, fewer of which any curve fits
 _DISTINCT = 4.0  # times more is left at any other shift
 
 
@@ -23,6 +24,8 @@ def find_shift(
     way, and of these in pairs. At the right shift least of the wrench is left beside it. The search covers all shifts
     at which half of the shorter recording has a partner. Valid where motion does not repeat itself within these.
     """
+    if min(len(t), len(t_angle)) < _FEWEST:
+        return None
     coarse = max(1, len(t) // _POINTS)
     rows = slice(None, len(t) // coarse * coarse)
     few = t[rows].reshape(-1, coarse).mean(1), wrench[rows].reshape(-1, coarse, wrench.shape[1]).mean(1)
@@ -30,6 +33,8 @@ def find_shift(
     def left(shift: float, times: Array, loads: Array) -> tuple[Array, Array]:
         at = times + shift
         inside = (at >= t_angle[0]) & (at <= t_angle[-1])
+        if inside.sum() < _FEWEST:
+            return loads[:0], np.ones(loads.shape[1])
         q = np.stack([np.interp(at[inside], t_angle, one) for one in angle.T])
         parts = [
             one
