@@ -211,6 +211,17 @@ def test_what_hardly_overlaps_or_hardly_lasts_has_no_shift(tmp_path: Path, secon
     assert "how their clocks stand to each other is not known" in "\n".join(begin(tmp_path / "made", files))
 
 
+def test_a_clock_that_leaps_has_no_shift_and_costs_no_time(tmp_path: Path) -> None:
+    t, rng = np.arange(0.0, 4.0, 0.01), np.random.default_rng(3)
+    wrench = pd.DataFrame({"t [s]": t} | {f"{k} [N]": rng.standard_normal(len(t)) for k in ("Fx", "Fy", "Fz")})
+    times = np.append(t[:-1], 9e5)
+    angle = pd.DataFrame({"t [s]": times, "az [deg]": 40.0 * np.sin(t)})
+    files = [tmp_path / "wrench_a.csv", tmp_path / "angle_a.csv"]
+    for file, table in zip(files, (wrench, angle), strict=True):
+        table.to_csv(file, index=False)
+    assert "how their clocks stand to each other is not known" in "\n".join(begin(tmp_path / "made", files))
+
+
 def test_a_value_that_is_still_to_be_put_in_is_refused_by_every_reader(tmp_path: Path) -> None:
     path = tmp_path / "some.toml"
     path.write_text('a = 1\n[b]\nc = [1, "?"]  # how much\n')

@@ -291,9 +291,11 @@ def _shift(load: Log, angle: Log) -> tuple[str, str]:
         (t, wrench), (t_angle, q) = load.samples("wrench"), angle.samples("encoder")
         turns = [dimension(one.unit) == "angle" for one in joints]
         found = find_shift(t, wrench, t_angle, q, turns)
-        at = t + found[0] if found else t[:0]
-        both = np.flatnonzero((at >= t_angle[0]) & (at <= t_angle[-1]))  # rows that both loggers saw
-        halves = [both[: len(both) // 2], both[len(both) // 2 :]]
+        halves = []
+        if found:
+            at = t + found[0]
+            both = np.flatnonzero((at >= t_angle[0]) & (at <= t_angle[-1]))  # rows that both loggers saw
+            halves = [both[: len(both) // 2], both[len(both) // 2 :]]
         parts = [one for half in halves if (one := find_shift(t[half], wrench[half], t_angle, q, turns))]
         if found and len(parts) == 2 and abs(parts[1][0] - parts[0][0]) > _APART * np.hypot(parts[0][1], parts[1][1]):
             found, asked = None, f"it is {parts[0][0]:.4f} s in the first half, {parts[1][0]:.4f} s in the second"

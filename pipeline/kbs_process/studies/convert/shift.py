@@ -10,6 +10,7 @@ from scipy.optimize import minimize_scalar
 from kbs_process.signals.records import Array
 
 _POINTS = 1000  # of a recording, in the search
+_MOST = 20 * _POINTS  # shifts; one recording that lasts so much longer than the other takes too long to search
 _EXPLAINED = 0.05  # share of a channel that may be left, or angles do not tell its static part
 _FEWEST = 30  # rows with a partner, fewer of which any curve fits
 _DISTINCT = 4.0  # times more is left at any other shift
@@ -50,6 +51,8 @@ def find_shift(
 
     half = 0.5 * min(t[-1] - t[0], t_angle[-1] - t_angle[0])
     step = max(float(np.diff(few[0]).mean()), 2.0 * half / _POINTS)
+    if not t[-1] - t[0] + t_angle[-1] - t_angle[0] < _MOST * step:
+        return None
     shifts = np.arange(t_angle[0] - t[-1] + half, t_angle[-1] - t[0] - half, step)
     if len(shifts) < 3:
         return None
