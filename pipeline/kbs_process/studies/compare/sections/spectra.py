@@ -41,8 +41,9 @@ def _plate(number: int, title: str, curves: list[tuple[Table, str, str]]) -> Pic
                     label = name_of if side == "measured" else ""
                     f, density = table.columns[f"{name}.f"], table.columns[name]
                     axis.plot(f[1:], density[1:], color=color, linestyle=line, linewidth=0.8, label=label)
-        for which, (low, high) in (("x", axis.dataLim.intervalx), ("y", axis.dataLim.intervaly)):
-            draw.logarithmic(axis, which, low, high)
+        x, y = axis.dataLim.intervalx, axis.dataLim.intervaly
+        draw.logarithmic(axis, "x", *x)
+        draw.logarithmic(axis, "y", *y)
         axis.set_xlabel("frequency / Hz")
         axis.set_ylabel(f"density / ({unit(curves[0][0].unit(f'{number}.measured'))})")
         draw.legend_above(figure)
