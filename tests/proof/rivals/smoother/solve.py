@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from time import monotonic
 
@@ -132,9 +133,9 @@ def _finds(problem: Problem, state: State, judge: _Judge | None, power: Array) -
         leaders.sort(key=lambda one: -one.worth)
         if not leaders or leaders[0].worth < DETECTED:
             break
-        tried = Counter((one.name, one.site) for one in chosen)
-        alike = leaders[: sum(one.worth > leaders[0].worth - _apart(leaders[0]) for one in leaders)]
-        best = max(alike, key=lambda one: one.likely - 2.0 * np.log(tried[one.candidate.name, one.candidate.site]))
+        apart = max(ALIKE, INEXACT * leaders[0].worth)
+        alike = [one for one in leaders if one.worth > leaders[0].worth - apart]
+        best = max(alike, key=partial(_odds, apart=apart, tried=Counter((one.name, one.site) for one in chosen)))
         finds.append(_claim(best, leaders, alike, screen.estimated(best, known)))
         left, all_ = (
             sum(np.sum(z**2, axis=0) for z in part) for part in (screen.explained(best, known), screen.unexplained())
@@ -188,8 +189,14 @@ class _Judge:
         return foretold < ALIKE or one.foreseen > FORETOLD * foretold
 
 
-def _apart(best: Scored) -> float:
-    return max(ALIKE, INEXACT * best.worth)
+def _odds(one: Scored, apart: float, tried: Mapping[tuple[str, str], int]) -> float:
+    """Twice the logarithm of its odds among those that are not told apart: what was tried more often is less likely.
+
+    What sizes of amplitudes say has its part in what it is worth already, all of which counts as much less as columns
+    are inexact.
+    """
+    prior = one.likely - 2.0 * float(np.log(tried[one.candidate.name, one.candidate.site]))
+    return (one.worth - one.likely) * ALIKE / apart + prior
 
 
 def _claim(best: Scored, leaders: Sequence[Scored], alike: Sequence[Scored], numbers: tuple[Estimate, ...]) -> Claim:
