@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve, cho_solve_banded, cholesky_banded
+from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg.lapack import dtrtri
 
 from proof.rivals.case import Array
 from proof.rivals.smoother.balance import Motion
@@ -99,53 +101,74 @@ def _torques(problem: Problem, k: int, x: Array, motion: Motion, before: Array |
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Banded:
-    """What a recording's rows say of its motion, factorised."""
+    """What a recording's rows say of its motion, factorised: blocks of as many samples as see a coefficient.
 
-    by_motion: Array  # (n, rows, LOCAL freedoms) square roots of weights in it, as in all below
-    factor: Array
-    size: int
+    A block of samples sees its own coefficients and those of the next block. Of N = R R^T, the normal matrix, R has
+    triangles, and what couples a block to the one before.
+    """
+
+    seen: Array  # (blocks, LOCAL rows, 2 width) slopes by coefficients, over sigmas as all below
+    inverse: Array  # (blocks + 1, width, width) of the triangles
+    coupled: Array  # (blocks, width, width) of each but the first
+    shape: tuple[int, int]  # samples, rows
+    freedoms: int
 
     @classmethod
-    def of(cls, problem: Problem, k: int, by_motion: Array, root: Array) -> Banded:
-        """Of slopes (n, rows, freedoms, 3) and square roots of weights (n, rows)."""
-        recording, freedoms = problem.recordings[k], problem.freedoms
-        n, width = recording.n, LOCAL * problem.freedoms
-        bases = recording.splines.values.transpose(1, 2, 0)  # (n, LOCAL, 3)
-        local = np.matmul(bases[:, None], by_motion.swapaxes(2, 3)).reshape(n, problem.rows, width)
-        local *= root[:, :, None]
-        size = recording.splines.size * freedoms
-        products = np.matmul(local.swapaxes(1, 2), local)
-        banded = np.zeros((width, size))
-        for i in range(width):
-            for j in range(i + 1):
-                banded[i - j, j : j + freedoms * (n - 1) : freedoms] += products[:-1, i, j]
-                banded[i - j, j + freedoms * (n - 2)] += products[-1, i, j]
-        banded[0] = banded[0] * (1 + 1e-9) + 1e-9 * np.median(banded[0])
-        return cls(local, cholesky_banded(banded, lower=True), size)
+    def of(cls, by_motion: Array, bases: Array, root: Array) -> Banded:
+        """Of slopes (n, rows, freedoms, 3), values of splines (3, LOCAL) and square roots of weights (n, rows)."""
+        (n, rows), freedoms = root.shape, by_motion.shape[2]
+        local = np.matmul(bases.T, (by_motion * root[:, :, None, None]).swapaxes(2, 3))
+        blocks, width = -(-n // LOCAL), LOCAL * freedoms
+        seen = np.zeros((blocks, LOCAL, rows, 2 * LOCAL, freedoms))
+        for i in range(LOCAL):
+            own = local[i::LOCAL]
+            seen[: len(own), i, :, i : i + LOCAL] = own
+        seen = seen.reshape(blocks, LOCAL * rows, 2 * width)
+        products = seen.swapaxes(1, 2) @ seen
+        own = np.concatenate([products[:, :width, :width], np.zeros((1, width, width))])
+        own[1:] += products[:, width:, width:]
+        diagonal = np.diagonal(own, axis1=1, axis2=2)
+        own += np.eye(width) * (1e-9 * diagonal + 1e-9 * np.median(diagonal[:-1]))[:, None, :]
+        coupled, inverse = products[:, width:, :width], np.empty_like(own)
+        for b in range(blocks + 1):
+            if b:
+                coupled[b - 1] = coupled[b - 1] @ inverse[b - 1].T
+                own[b] -= coupled[b - 1] @ coupled[b - 1].T
+            inverse[b] = np.tril(dtrtri(np.linalg.cholesky(own[b]), lower=1)[0])
+        return cls(seen, inverse, coupled.copy(), (n, rows), freedoms)
 
     def against(self, columns: Array) -> Array:
-        """Products (size, m) of columns (n rows, m) with what the motion does."""
-        n, rows, width = self.by_motion.shape
-        products = np.matmul(self.by_motion.swapaxes(1, 2), columns.reshape(n, rows, -1))
-        out = np.zeros((self.size, products.shape[2]))
-        each = out.reshape(-1, width // LOCAL, products.shape[2])
-        for a, part in enumerate(np.split(products, LOCAL, axis=1)):
-            each[a : a + n - 1] += part[:-1]
-            each[a + n - 2] += part[-1]  # the last sample sees the coefficients of the one before it
+        """R^-1 times products of columns (n rows, m) with what the motion does, (blocks + 1, width, m)."""
+        blocks, samples, width = len(self.seen), self.seen.shape[1], self.seen.shape[2] // 2
+        padded = columns
+        if len(columns) < blocks * samples:
+            padded = np.concatenate([columns, np.zeros((blocks * samples - len(columns), columns.shape[1]))])
+        products = self.seen.swapaxes(1, 2) @ padded.reshape(blocks, samples, -1)
+        out = np.zeros((blocks + 1, width, columns.shape[1]))
+        out[:-1] = products[:, :width]
+        out[1:] += products[:, width:]
+        out[0] = self.inverse[0] @ out[0]
+        for b in range(blocks):
+            out[b + 1] = self.inverse[b + 1] @ (out[b + 1] - self.coupled[b] @ out[b])
         return out
 
-    def shown(self, coefficients: Array) -> Array:
-        """What coefficients (size, 1) of the motion do to the rows (n, rows)."""
-        n, _, width = self.by_motion.shape
-        freedoms = width // LOCAL
-        each = coefficients.reshape(-1, freedoms)
-        first = np.minimum(np.arange(n), n - 2)
-        local = np.concatenate([each[first + a] for a in range(LOCAL)], axis=1)
-        return np.asarray(np.matmul(self.by_motion, local[:, :, None])[:, :, 0])
+    def coefficients(self, against: Array) -> Array:
+        """Coefficients (size, freedoms) of the motion that take up a column, of its `against` (blocks + 1, width)."""
+        out = np.empty_like(against)
+        out[-1] = against[-1] @ self.inverse[-1]
+        for b in range(len(self.coupled) - 1, -1, -1):
+            out[b] = (against[b] - out[b + 1] @ self.coupled[b]) @ self.inverse[b]
+        return out.reshape(-1, self.freedoms)[: self.shape[0] - 1 + LOCAL]
 
-    def solve(self, against: Array) -> Array:
-        """Coefficients (size, m) that take columns up, of their products with the motion."""
-        return np.asarray(cho_solve_banded((self.factor, True), against))
+    def shown(self, against: Array) -> Array:
+        """What the motion takes up of a column (n, rows), of its `against` (blocks + 1, width)."""
+        every = np.zeros((len(self.inverse) * LOCAL, self.freedoms))
+        found = self.coefficients(against)
+        every[: len(found)] = found
+        each = every.reshape(len(self.inverse), -1)
+        both = np.concatenate([each[:-1], each[1:]], axis=1)[:, :, None]
+        n, rows = self.shape
+        return np.asarray((self.seen @ both).reshape(-1, rows)[:n])
 
 
 def _moved(
@@ -154,9 +177,9 @@ def _moved(
     """Coefficients after a step of Gauss and Newton in the motion alone, and the rotors' torques there."""
     splines, root = problem.recordings[k].splines, np.sqrt(weights)
     motion = splines.motion(coefficients)
-    banded = Banded.of(problem, k, problem.by_motion(k, x, motion, torques), root)
+    banded = Banded.of(problem.by_motion(k, x, motion, torques), splines.values, root)
     left = problem.residual(k, x, motion, torques) * root
-    coefficients = coefficients + banded.solve(banded.against(left.reshape(-1, 1))).reshape(coefficients.shape)
+    coefficients = coefficients + banded.coefficients(banded.against(left.reshape(-1, 1))[:, :, 0])
     return coefficients, _torques(problem, k, x, splines.motion(coefficients), torques)
 
 
@@ -167,21 +190,22 @@ class Reduced:
     motion: Banded
     root: Array  # (n, rows) square roots of the weights
     columns: Array  # (n rows, local + 1) unknowns, then the residual
-    against: Array  # (size, local + 1) their products with the motion
-    solved: Array
+    against: Array  # (blocks + 1, width, local + 1) of them
+    whole: Array  # (local + 1, local + 1) their products
 
     @classmethod
     def of(cls, problem: Problem, state: State, k: int) -> Reduced:
         """At a state; unknowns along the motion that the model has by itself, in which there is no noise."""
         motion = state.motion(problem, k)
         root = np.sqrt(state.weights(problem, k))
-        banded = Banded.of(problem, k, problem.by_motion(k, state.x, motion, state.torques[k]), root)
+        slopes = problem.by_motion(k, state.x, motion, state.torques[k])
+        banded = Banded.of(slopes, problem.recordings[k].splines.values, root)
         left = problem.residual(k, state.x, motion, state.torques[k])
         by_unknown = problem.by_unknown(k, state.x, state.ideal_motion(problem, k), state.ideal_torques[k])
         columns = np.concatenate([by_unknown, left[:, :, None]], axis=2) * root[:, :, None]
         columns = columns.reshape(root.size, -1)
         against = banded.against(columns)
-        return cls(banded, root, columns, against, banded.solve(against))
+        return cls(banded, root, columns, against, columns.T @ columns - _flat(against).T @ _flat(against))
 
     def left(self, change: Array, column: Array | float = 0.0) -> Array:
         """What is left of the rows (n, rows), over their sigmas, after the motion and a change of unknowns (local,).
@@ -189,24 +213,28 @@ class Reduced:
         `column` (n, rows) is what is known to be in them.
         """
         rest = self.columns @ np.append(-change, 1.0) - np.reshape(column, -1)
-        taken = self.motion.solve(self.motion.against(rest[:, None]))
-        return np.asarray(rest.reshape(self.root.shape) - self.motion.shown(taken))
+        return np.asarray(
+            rest.reshape(self.root.shape) - self.motion.shown(self.motion.against(rest[:, None])[:, :, 0])
+        )
 
     def gram(self, columns: Array) -> tuple[Array, Array]:
         """Products of columns (n rows, m) with the unknowns and the residual (m, local + 1), and with each other.
 
         The latter (m, m), both with the motion taken out.
         """
-        against = self.motion.against(columns)
-        mixed = columns.T @ self.columns - against.T @ self.solved
-        return mixed, columns.T @ columns - against.T @ self.motion.solve(against)
+        against = _flat(self.motion.against(columns))
+        return columns.T @ self.columns - against.T @ _flat(self.against), columns.T @ columns - against.T @ against
+
+
+def _flat(against: Array) -> Array:
+    return against.reshape(-1, against.shape[2])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Quadratic:
     """The cost about a state, in the unknowns alone."""
 
-    parts: list[Reduced]
+    parts: Mapping[int, Reduced]  # by recording
     normal: Array  # (p, p), priors included
     pull: Array  # (p,)
     left: float  # cost at the best motion for these unknowns
@@ -214,16 +242,19 @@ class Quadratic:
     @classmethod
     def of(cls, problem: Problem, state: State) -> Quadratic:
         """At a state."""
+        every = range(len(problem.recordings))
+        return cls.over(problem, state, {k: Reduced.of(problem, state, k) for k in every})
+
+    @classmethod
+    def over(cls, problem: Problem, state: State, parts: Mapping[int, Reduced]) -> Quadratic:
+        """Of some recordings."""
         off = (state.x - problem.prior) / problem.spread
-        normal, pull = np.diag(problem.spread**-2.0), -off / problem.spread
-        left, parts = float(off @ off), []
-        for k, local in enumerate(problem.local):
-            part = Reduced.of(problem, state, k)
-            whole = part.columns.T @ part.columns - part.against.T @ part.solved
+        normal, pull, left = np.diag(problem.spread**-2.0), -off / problem.spread, float(off @ off)
+        for k, part in parts.items():
+            local, whole = problem.local[k], part.whole
             normal[np.ix_(local, local)] += whole[:-1, :-1]
             pull[local] += whole[:-1, -1]
             left += float(whole[-1, -1])
-            parts.append(part)
         return cls(parts, normal, pull, left)
 
     def solve(self, spread: Array, right: Array, free: NDArray[np.bool_] | None = None) -> Array:
@@ -250,8 +281,8 @@ def step(problem: Problem, state: State, quadratic: Quadratic, free: NDArray[np.
     bounded[problem.of_rig] = np.maximum(bounded[problem.of_rig], problem.lower)
     change, state.x = bounded - state.x, bounded
     state.coefficients = [
-        c + (part.solved[:, -1] - part.solved[:, :-1] @ change[local]).reshape(-1, problem.freedoms)
-        for c, part, local in zip(state.coefficients, quadratic.parts, problem.local, strict=True)
+        c + part.motion.coefficients(part.against @ np.append(-change[local], 1.0))
+        for c, part, local in zip(state.coefficients, quadratic.parts.values(), problem.local, strict=True)
     ]
     state.follow(problem)
     state.smooth(problem)

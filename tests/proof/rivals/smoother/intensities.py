@@ -60,5 +60,5 @@ def _free(problem: Problem, quadratic: Quadratic, k: int) -> Array:
     every = np.arange(problem.rows)
     probes[:, every, every] = rng.choice([-1.0, 1.0], part.root.shape) * (part.root > 0.0)
     against = part.motion.against(probes.reshape(part.root.size, -1))
-    taken = np.sum(against * part.motion.solve(against), axis=0)
+    taken = np.sum(against**2, axis=(0, 1))
     return np.asarray(np.maximum(weight.sum() - taken, 1e-3 * weight.sum()))

@@ -102,10 +102,19 @@ class Problem:
     @cached_property
     def repeats(self) -> list[list[int]]:
         """Recordings of one trajectory, of each that was recorded more than once."""
+        return [own for own in self._of_trajectories if len(own) > 1]
+
+    @property
+    def first_of_each(self) -> list[int]:
+        """A recording of each trajectory."""
+        return [own[0] for own in self._of_trajectories]
+
+    @cached_property
+    def _of_trajectories(self) -> list[list[int]]:
         by_trajectory: dict[int, list[int]] = {}
         for k, recording in enumerate(self.recordings):
             by_trajectory.setdefault(self.experiment.trials[recording.trial].trajectory, []).append(k)
-        return [own for own in by_trajectory.values() if len(own) > 1]
+        return list(by_trajectory.values())
 
     @property
     def forces(self) -> slice:

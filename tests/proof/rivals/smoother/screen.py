@@ -12,6 +12,7 @@ from scipy.interpolate import make_interp_spline
 from kbs_process.diagnosis.experiments.hypothesis import Tapped
 from kbs_process.diagnosis.screening.inlets import Inlet, generalised, inlets_of
 from kbs_process.diagnosis.screening.ranges import ranges_of
+from kbs_process.diagnosis.screening.scene import courses
 from kbs_process.diagnosis.screening.signature import inputs, reduced, sensed
 from kbs_process.diagnosis.screening.suspects import Candidate, candidates
 from kbs_process.plant.compiled.taps import tap_columns
@@ -20,6 +21,7 @@ from kbs_process.plant.laws import select
 from kbs_process.plant.linear.linearise import linearise
 from kbs_process.rig.model import Rig
 from kbs_process.stages.align.resample import resample
+from proof.answer import Estimate
 from proof.rivals.case import Array
 from proof.rivals.smoother.balance import FIRST_JOINT, PLATE
 from proof.rivals.smoother.drive import spring
@@ -35,6 +37,8 @@ _DEPENDENT = 1e-5  # of a column that all numbers leave
 _FIRST_STEP = 0.1  # of a shape's value
 _HALVINGS = 12
 _ROUNDS, _SETTLED = 4, 0.02  # through all shapes, at most, and while the gain grows by such a share
+_BEND = 1e-3  # of a shape's value: step of its slope
+_NORMAL = 1.96  # sigmas of an interval of 95 %
 _NEAR = 0.7  # of the gain, beside the best shape, from which on a parabola leads there
 
 
@@ -92,6 +96,7 @@ class Course:
         readings = make_interp_spline(own, shown, k=3)(inside)
         self.tapped = Tapped(_TAPS_HZ, tap_columns(problem.rig), np.hstack(values), readings)
         self.shown = np.vstack([np.repeat(shown[:1], first, axis=0), shown])
+        self._links = courses(rig, self.tapped)
         self._place_ports(motion[0][:, joints])
 
     def _place_ports(self, angles: Array) -> None:
@@ -107,26 +112,45 @@ class Course:
         drives = [joint.drive for joint in rig.joints if joint.drive is not None]
         self._soft = np.array([float(d.parameters["Ka"]) / (float(d.ratio) ** 2 * spring(d)) for d in drives])
 
+    def columns(self, chosen: Sequence[Candidate]) -> Array:
+        """What a unit of each amplitude of each candidate does to the rows, (n, rows, amplitudes of all)."""
+        shown = [self._sensed(one) if not one.effect.in_plant else self._entered(one) for one in chosen]
+        entered = [column for one in shown if isinstance(one, list) for column in one]
+        slow = iter(self._slow([means for column in entered for means in column.values()]))
+        rows = iter([self._rows({inlet: next(slow) for inlet in column}) for column in entered])
+        every = [
+            np.stack([next(rows) for _ in one], axis=2) if isinstance(one, list) else one for one in shown
+        ]  # fmt: skip
+        return np.nan_to_num(np.concatenate(every, axis=2))
+
+    def _entered(self, candidate: Candidate) -> list[dict[Inlet, Array]]:
+        return inputs(
+            candidate, self.tapped, self.rig, self.problem.experiment.effects, self._links.get(candidate.site)
+        )
+
+    def _slow(self, means: Sequence[Array]) -> Array:
+        """Series at the taps' rate as they are in the band at the working rate, (series, n)."""
+        if not means:
+            return np.zeros((0, self.recording.n))
+        n, dt, first = self.recording.n, self.recording.dt, self.recording.first
+        slow = resample(np.stack(means, axis=1), _TAPS_HZ, 1 / dt)[first : first + n]
+        slow = in_band(slow, dt)
+        return np.pad(slow, ((0, n - len(slow)), (0, 0)), mode="edge").T
+
     def _rows(self, column: Mapping[Inlet, Array]) -> Array:
-        problem, n = self.problem, self.recording.n
-        out = np.zeros((n, problem.rows))
-        for inlet, means in column.items():
-            slow = resample(means[:, None], _TAPS_HZ, 1 / self.recording.dt)[self.recording.first :, 0]
-            slow = in_band(slow, self.recording.dt)
-            slow = np.pad(slow, (0, max(n - len(slow), 0)), mode="edge")[:n, None]
+        """What enters, in the band at the working rate, as rows."""
+        problem = self.problem
+        out = np.zeros((self.recording.n, problem.rows))
+        for inlet, slow in column.items():
             place = self._inlets[inlet]
-            force = self._force[:, :, place] * slow
-            out[:, problem.wrench] += self._direct[:, :, place] * slow
+            force = self._force[:, :, place] * slow[:, None]
+            out[:, problem.wrench] += self._direct[:, :, place] * slow[:, None]
             out[:, problem.plate] -= force[:, :3]
             out[:, problem.joint] += force[:, 3 : 3 + problem.joints] + self._soft * force[:, 3 + problem.joints :]
         return out
 
-    def columns(self, candidate: Candidate) -> Array:
-        """What a unit of each of its amplitudes does to the rows, (n, rows, amplitudes)."""
+    def _sensed(self, candidate: Candidate) -> Array:
         problem, experiment = self.problem, self.problem.experiment
-        if candidate.effect.in_plant:
-            entered = inputs(candidate, self.tapped, self.rig, experiment.effects)
-            return np.stack([self._rows(column) for column in entered], axis=2)
         if candidate.effect.whole_band:
             shown = reduced(
                 candidate, self.tapped, experiment.channels, self.rig, experiment.dt, len(self.shown)
@@ -135,7 +159,8 @@ class Course:
             t = experiment.dt * np.arange(len(self.shown))
             shown = sensed(candidate, t, self.shown, experiment.channels, self.rig)
         out = np.zeros((self.recording.n, problem.rows, shown.shape[2]))
-        out[:, : problem.angles.stop] = in_band(shown[self.recording.first :][: self.recording.n], self.recording.dt)
+        acted = np.flatnonzero(shown.any(axis=(0, 2)))  # of the readings, which are the first rows
+        out[:, acted] = in_band(shown[self.recording.first :][: self.recording.n, acted], self.recording.dt)
         return out
 
 
@@ -153,16 +178,43 @@ class _Products:
     own: NDArray[np.bool_]  # (m,) of one recording alone
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Bends:
+    """Shapes of an effect that are estimated beside its amplitudes (recordings or 1, amplitudes), to first order."""
+
+    names: tuple[str, ...]
+    amplitudes: Array
+
+    def columns(self, course: Course, candidate: Candidate, amplitudes: Array) -> Array:
+        """What a unit of each shape does to the rows, (n, rows, shapes)."""
+        out = []
+        for name in self.names:
+            step = _BEND * max(abs(dict(candidate.shape)[name]), _BEND)
+            more, less = (
+                replace(candidate, shape=tuple((n, v + by * (n == name)) for n, v in candidate.shape))
+                for by in (step, -step)
+            )
+            shown = course.columns([more, less])
+            out.append((shown[:, :, : len(amplitudes)] - shown[:, :, len(amplitudes) :]) @ amplitudes / (2.0 * step))
+        return np.stack(out, axis=2) if out else np.zeros((course.recording.n, course.problem.rows, 0))
+
+
 class Screen:
     """The catalogue on a state."""
 
-    def __init__(self, problem: Problem, state: State) -> None:
+    def __init__(
+        self, problem: Problem, state: State, courses: Sequence[Course] = (), quadratic: Quadratic | None = None
+    ) -> None:
         self.problem, self.state = problem, state
         rig = problem.rig_at(state.x)
-        self.courses = [Course(problem, state, k, rig) for k in range(len(problem.recordings))]
-        self.quadratic = Quadratic.of(problem, state)
+        self.courses = courses or [Course(problem, state, k, rig) for k in range(len(problem.recordings))]
+        self.quadratic = quadratic or Quadratic.of(problem, state)
         self._own = self.quadratic.solve(problem.spread, self.quadratic.pull)
-        self.left = self.quadratic.left - float(self.quadratic.pull @ self._own)
+
+    def survey(self) -> Screen:
+        """The same on one recording of each trajectory: enough to find the few that are worth more."""
+        chosen = {k: self.quadratic.parts[k] for k in self.problem.first_of_each}
+        return Screen(self.problem, self.state, self.courses, Quadratic.over(self.problem, self.state, chosen))
 
     def candidates(self) -> list[Candidate]:
         """Every effect that the model leaves out, with each shape, but those that need a recording's own times."""
@@ -176,8 +228,7 @@ class Screen:
 
     def unexplained(self) -> list[Array]:
         """What motion and numbers leave of each recording's rows (n, rows), over their sigmas."""
-        parts, local = self.quadratic.parts, self.problem.local
-        return [part.left(self._own[own]) for part, own in zip(parts, local, strict=True)]
+        return [part.left(self._own[self.problem.local[k]]) for k, part in self.quadratic.parts.items()]
 
     def scored(self, chosen: Sequence[Candidate], known: Sequence[Candidate] = ()) -> list[Scored]:
         """What each takes of the cost beside all numbers, and beside what is `known`; best first."""
@@ -255,17 +306,15 @@ class Screen:
         _, amplitudes, _ = _best(square, right, size)
         moved = self._own - self.quadratic.solve(self.problem.spread, found.unknowns @ amplitudes)
         out = []
-        for k, (course, part, local) in enumerate(
-            zip(self.courses, self.quadratic.parts, self.problem.local, strict=True)
-        ):
+        for place, (k, part) in enumerate(self.quadratic.parts.items()):
             column = np.zeros(part.root.shape)
             for number, candidate in enumerate(every):
-                shown = course.columns(candidate)
+                shown = self.courses[k].columns([candidate])
                 mine = amplitudes[found.owner == number]
                 if candidate.effect.each_trial:
-                    mine = mine.reshape(len(self.courses), -1)[k]
-                column += np.nan_to_num(shown) @ mine
-            out.append(part.left(moved[local], column * part.root))
+                    mine = mine.reshape(len(self.quadratic.parts), -1)[place]
+                column += shown @ mine
+            out.append(part.left(moved[self.problem.local[k]], column * part.root))
         return out
 
     def _scored(self, chosen: Sequence[Candidate], known: Sequence[Candidate]) -> Iterator[Scored]:
@@ -289,27 +338,62 @@ class Screen:
         solved = self.quadratic.solve(self.problem.spread, found.unknowns)
         return found.squares - found.unknowns.T @ solved, found.residual - found.unknowns.T @ self._own
 
-    def _products(self, every: Sequence[Candidate]) -> _Products:
+    def estimated(self, one: Scored, known: Sequence[Candidate] = ()) -> tuple[Estimate, ...]:
+        """Amplitudes and shapes of an effect beside all numbers and what is known, with intervals of 95 %.
+
+        Of amplitudes of each recording's own, those of the first. A shape that was chosen from a grid has no interval.
+        """
+        candidate, chosen = one.candidate, dict(one.candidate.shape)
+        entries = {entry.name: entry for entry in candidate.effect.parameters}
+        bends = [name for name in chosen if entries[name].role == "shape" and not entries[name].whole]
+        every = [*known, candidate]
+        found = self._products(every)
+        square, right = self._beside(found)
+        _, amplitudes, _ = _best(square, right, np.sqrt(np.maximum(np.diag(found.squares), 1e-300)))
+        mine = found.owner == len(known)
+        found = self._products(every, _Bends(tuple(bends), amplitudes[mine].reshape(-1, len(candidate.amplitudes))))
+        square, right = self._beside(found)
+        size = np.sqrt(np.maximum(np.diag(found.squares), 1e-300))
+        covariance = np.linalg.pinv(square / np.outer(size, size), rcond=_DEPENDENT, hermitian=True)
+        values, sigmas = covariance @ (right / size) / size, np.sqrt(np.maximum(np.diag(covariance), 0.0)) / size
+        first = np.flatnonzero(found.owner == len(known))[: len(candidate.amplitudes)]
+        told = [(entry, values[k], sigmas[k]) for entry, k in zip(candidate.amplitudes, first, strict=True)]
+        bent = np.flatnonzero(found.owner > len(known))
+        told += [
+            (entries[name], chosen[name] + float(np.clip(values[k], -3.0 * sigmas[k], 3.0 * sigmas[k])), sigmas[k])
+            for name, k in zip(bends, bent, strict=True)
+        ]
+        return tuple(
+            Estimate(name=entry.name, unit=entry.unit, value=v, low=v - _NORMAL * s, high=v + _NORMAL * s)
+            for entry, v, s in ((entry, float(value), float(sigma)) for entry, value, sigma in told)
+        )
+
+    def _products(self, every: Sequence[Candidate], bends: _Bends | None = None) -> _Products:
         sizes = [len(one.amplitudes) for one in every]
-        owner = np.repeat(np.arange(len(every)), sizes)
-        count = len(self.courses)
+        each = [one.effect.each_trial for one in every]
+        if bends is not None:
+            sizes, each = [*sizes, *[1] * len(bends.names)], [*each, *[False] * len(bends.names)]
+        owner = np.repeat(np.arange(len(sizes)), sizes)
+        count = len(self.quadratic.parts)
         recording = np.concatenate([
-            np.repeat(np.arange(count), size) if one.effect.each_trial else np.full(size, -1)
-            for one, size in zip(every, sizes, strict=True)
+            np.repeat(np.arange(count), size) if alone else np.full(size, -1)
+            for alone, size in zip(each, sizes, strict=True)
         ])  # fmt: skip
         ends = np.cumsum([0, *sizes])
         source = np.concatenate([
-            np.tile(np.arange(ends[k], ends[k + 1]), count if one.effect.each_trial else 1)
-            for k, one in enumerate(every)
+            np.tile(np.arange(ends[k], ends[k + 1]), count if alone else 1) for k, alone in enumerate(each)
         ])  # fmt: skip
         m = len(source)
         unknowns, residual, squares = np.zeros((len(self.problem.spread), m)), np.zeros(m), np.zeros((m, m))
-        for k, (course, part, local) in enumerate(
-            zip(self.courses, self.quadratic.parts, self.problem.local, strict=True)
-        ):
-            whole = np.concatenate([course.columns(one) for one in every], axis=2) * part.root[:, :, None]
-            mixed, square = part.gram(np.nan_to_num(whole).reshape(-1, whole.shape[2]))
-            there = np.flatnonzero((recording < 0) | (recording == k))
+        for place, (k, part) in enumerate(self.quadratic.parts.items()):
+            local = self.problem.local[k]
+            whole = self.courses[k].columns(every)
+            if bends is not None:
+                own = bends.amplitudes[place % len(bends.amplitudes)]
+                whole = np.concatenate([whole, bends.columns(self.courses[k], every[-1], own)], axis=2)
+            whole = whole * part.root[:, :, None]
+            mixed, square = part.gram(whole.reshape(-1, whole.shape[2]))
+            there = np.flatnonzero((recording < 0) | (recording == place))
             taken = source[there]
             unknowns[np.ix_(local, there)] += mixed[taken, :-1].T
             residual[there] += mixed[taken, -1]

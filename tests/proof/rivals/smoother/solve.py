@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from time import monotonic
 
@@ -16,7 +18,7 @@ from kbs_process.diagnosis.screening.suspects import Candidate
 from kbs_process.plant.sensing import BY
 from kbs_process.progress import SilentProgress
 from kbs_process.studies.diagnose.reading import experiment_of
-from proof.answer import Answer, Claim, Moved, Suspect
+from proof.answer import Answer, Claim, Estimate, Moved, Suspect
 from proof.answer import Candidate as Claimed
 from proof.rivals.case import Array
 from proof.rivals.smoother.fit import Quadratic, State, step
@@ -32,6 +34,8 @@ STIFF = (0.1, 0.03, 0.01)
 SETTLED = 100.0  # sigmas of all unknowns together that a step goes, below which forces are estimated
 ARRIVED = 3.0  # below which it is the last
 CHANGE = (0.3, 1.5)  # of a force's sigma in a step
+BEYOND = 1.6  # times a step of its logarithm, at most; and by what it changes where a step went beyond, and else
+ONWARD = (0.5, 1.2)
 KNOWN = 0.2  # of its logarithm, below which a force's sigma is known
 DETECTED = 400.0  # of the cost, that an effect takes of all recordings: what the equations here leave out takes less
 SHARE = 0.25  # of its gain for each sample, that an effect of each recording's own has on recordings held out
@@ -41,7 +45,8 @@ OFF = 4.0  # sigmas
 LEADERS = 12  # laws at a place, of which shapes are refined and recordings held out are asked
 BEHIND = 0.2  # of the first's worth, with less of which one is no leader
 NEXT = 2  # alternatives that are named
-ALIKE = 9.0  # of the cost: what differs by less is not told apart
+ALIKE = 9.0  # of the cost: what differs by less is not told apart, nor
+INEXACT = 0.02  # what differs by less than this share of it: columns are right to first order
 
 
 def solve(folder: Path) -> Answer:
@@ -71,15 +76,18 @@ def settled(problem: Problem, sigma: Array | None = None) -> State:
     """
     state = State.of(problem, _forces(problem) if sigma is None else sigma)
     wrong, phase = np.inf, 0
+    reach, before = np.ones(problem.rows)[problem.forces], np.zeros(problem.rows)[problem.forces]
     if sigma is not None:
         wrong, phase = 0.0, 2
     for _ in range(STEPS):
         state.idealise(problem, STIFF[phase])
         quadratic = Quadratic.of(problem, state)
         if phase and sigma is None:
-            ratio = np.clip(np.sqrt(powers(problem, state, quadratic).noise[problem.forces]), *CHANGE)
-            wrong = float(np.abs(np.log(ratio)).max())
-            state.sigma[problem.forces] *= ratio
+            ratio = np.sqrt(powers(problem, state, quadratic).noise[problem.forces])
+            wrong = float(np.abs(np.log(np.clip(ratio, *CHANGE))).max())
+            reach *= np.where(np.log(ratio) * before < 0.0, *ONWARD)
+            before = np.log(ratio)
+            state.sigma[problem.forces] *= np.clip(ratio ** np.minimum(reach, BEYOND), *CHANGE)
         if phase == 1 and wrong > KNOWN:
             state.smooth(problem)
             continue
@@ -116,7 +124,8 @@ def _finds(problem: Problem, state: State, judge: _Judge | None, power: Array) -
         held = None if judge is None else judge.screen(state.sigma[forces])
         taken = {_suspect(one) for one in known}  # another shape of one is no second effect
         chosen = [one for one in screen.candidates() if _suspect(one) not in taken]
-        leaders = [screen.refined(one, known) for one in _first_of_each(screen.scored(chosen, known))]
+        seen = [one.candidate for one in _first_of_each(screen.survey().scored(chosen, known))]
+        leaders = [screen.refined(one, known) for one in screen.scored(seen, known)]
         if held is not None:
             before = held.predicted(screen.scored(known[-1:], known[:-1])[0], known[:-1]) if known else 0.0
             leaders = [replace(one, foreseen=held.predicted(one, known) - before) for one in leaders]
@@ -124,8 +133,10 @@ def _finds(problem: Problem, state: State, judge: _Judge | None, power: Array) -
         leaders.sort(key=lambda one: -one.worth)
         if not leaders or leaders[0].worth < DETECTED:
             break
-        best = leaders[0]
-        finds.append(_claim(best, leaders))
+        apart = max(ALIKE, INEXACT * leaders[0].worth)
+        alike = [one for one in leaders if one.worth > leaders[0].worth - apart]
+        best = max(alike, key=partial(_odds, apart=apart, tried=Counter((one.name, one.site) for one in chosen)))
+        finds.append(_claim(best, leaders, alike, screen.estimated(best, known)))
         left, all_ = (
             sum(np.sum(z**2, axis=0) for z in part) for part in (screen.explained(best, known), screen.unexplained())
         )
@@ -178,24 +189,31 @@ class _Judge:
         return foretold < ALIKE or one.foreseen > FORETOLD * foretold
 
 
-def _claim(best: Scored, scored: Sequence[Scored]) -> Claim:
-    """What is claimed of an effect, with the next best of other places or physics."""
+def _odds(one: Scored, apart: float, tried: Mapping[tuple[str, str], int]) -> float:
+    """Twice the logarithm of its odds among those that are not told apart: what was tried more often is less likely.
+
+    What sizes of amplitudes say has its part in what it is worth already, all of which counts as much less as columns
+    are inexact.
+    """
+    prior = one.likely - 2.0 * float(np.log(tried[one.candidate.name, one.candidate.site]))
+    return (one.worth - one.likely) * ALIKE / apart + prior
+
+
+def _claim(best: Scored, leaders: Sequence[Scored], alike: Sequence[Scored], numbers: tuple[Estimate, ...]) -> Claim:
+    """What is claimed of an effect, with the next best of other places or physics, and what is not told from it."""
     own = _suspect(best.candidate)
-    others: dict[Suspect, Scored] = {}
-    for one in scored:
-        told = _suspect(one.candidate)
-        if told != own and told not in others:
-            others[told] = one
-    alike = tuple(told for told, one in others.items() if best.worth - one.worth < ALIKE)
-    following = list(others)[:NEXT]
+    others = list(dict.fromkeys(told for one in leaders if (told := _suspect(one.candidate)) != own))
+    same = {_suspect(one.candidate) for one in alike}
+    following = others[:NEXT]
     return Claim(
         port=own.port,
         axis=own.axis,
         channels=own.channels,
         family=own.family,
         law=best.candidate.name,
+        parameters=numbers,
         alternatives=tuple(Claimed(**structs.asdict(one)) for one in following),
-        indistinguishable_from=alike,
+        indistinguishable_from=tuple(told for told in others if told in same),
     )
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 from scipy.linalg import cho_solve_banded, cholesky_banded
 
@@ -13,7 +12,7 @@ from proof.rivals.case import Array
 
 DEGREE = 5
 BAND_HZ = 8.0  # of what is compared: as many independent numbers twice a second
-LOCAL = DEGREE + 1  # coefficients that a sample sees
+LOCAL = DEGREE  # coefficients that a sample, at a knot, sees
 
 
 def in_band(values: Array, dt: float, undo: Callable[[Array], Array] | None = None) -> Array:
@@ -34,34 +33,31 @@ class Splines:
     """The basis on n samples dt apart; coefficients are (size, freedoms)."""
 
     def __init__(self, n: int, dt: float) -> None:
-        self.size = n - 1 + DEGREE
-        first = np.minimum(np.arange(n), n - 2)
-        self.first: NDArray[np.intp] = first  # of the coefficients that a sample sees
-        within = np.arange(n) - first
-        bell = BSpline.basis_element(np.arange(LOCAL + 1.0))
+        self.size = n - 1 + LOCAL
+        bell = BSpline.basis_element(np.arange(DEGREE + 2.0))
         slopes = [bell, bell.derivative(1), bell.derivative(2)]
-        at = np.clip(within[:, None] + DEGREE - np.arange(LOCAL), 1e-12, LOCAL - 1e-12)
-        self.values = np.stack([slope(at) / dt**k for k, slope in enumerate(slopes)])  # (3, n, LOCAL)
-        self._seen = first[:, None] + np.arange(LOCAL)
+        self.values = np.stack([slope(DEGREE - np.arange(LOCAL)) / dt**k for k, slope in enumerate(slopes)])
+        self._n = n
 
     def motion(self, coefficients: Array) -> tuple[Array, Array, Array]:
         """Values, rates and accelerations (n, freedoms)."""
-        local = coefficients[self._seen]
-        values, rates, accelerations = (np.einsum("na,nad->nd", basis, local) for basis in self.values)
+        values, rates, accelerations = (
+            sum(basis[a] * coefficients[a : a + self._n] for a in range(LOCAL)) for basis in self.values
+        )
         return values, rates, accelerations
 
     def fitted(self, values: Array) -> Array:
         """Coefficients whose values at the samples are `values` (n, freedoms)."""
-        basis = self.values[0]
+        basis, n = self.values[0], len(values)
         banded = np.zeros((LOCAL, self.size))
         for a in range(LOCAL):
             for b in range(a, LOCAL):
-                np.add.at(banded[b - a], self._seen[:, a], basis[:, a] * basis[:, b])
+                banded[b - a, a : a + n] += basis[a] * basis[b]
         banded[0] += 1e-7 * banded[0].max()
-        middle = np.arange(self.size) - (DEGREE - 1) / 2
-        near = np.stack([np.interp(middle, np.arange(len(values)), column) for column in values.T], axis=1)
-        left = values - np.einsum("na,nad->nd", basis, near[self._seen])
+        middle = np.arange(self.size) - (LOCAL - 1) / 2
+        near = np.stack([np.interp(middle, np.arange(n), column) for column in values.T], axis=1)
+        left = values - sum(basis[a] * near[a : a + n] for a in range(LOCAL))
         right = np.zeros_like(near)
         for a in range(LOCAL):
-            np.add.at(right, self._seen[:, a], basis[:, a, None] * left)
+            right[a : a + n] += basis[a] * left
         return np.asarray(near + cho_solve_banded((cholesky_banded(banded, lower=True), True), right))
