@@ -70,9 +70,9 @@ def test_a_mismatch_is_diagnosed_and_linked(
     monkeypatch.setattr(diagnosing, "diagnose", answered)
     assert run(finished) == 0
     told = capsys.readouterr().out
-    assert "differ by 3 times the repeatability floor (rms), all together." in told
-    assert "With known numbers refitted within their uncertainties: Left out: a harness." in told
-    assert "Floor: what the data sheets say." in told
+    assert "differ by 3 times the repeatability (rms), all together." in told
+    assert "With nominal parameters refitted within their uncertainties: Left out: a harness." in told
+    assert "Repeatability: what the data sheets say." in told
     assert f"Diagnosis: {finished / 'diagnosis' / 'index.html'}" in told
     page = (finished / "index.html").read_text()
     assert LINK in page

@@ -122,7 +122,7 @@ def test_what_recordings_that_were_not_used_do_not_show_falls_when_no_more_is_fo
     assert kept == [] and left.known.names == begun.known.names
     (one,) = fallen
     assert one.identity == cable.find.identity
-    assert any("r2 exceeds the floor by" in reason for reason in one.reasons)
+    assert any("of the excess of r2" in reason for reason in one.reasons)
 
 
 def test_finds_of_one_law_at_one_place_stand_or_fall_together(made: Experiment) -> None:

@@ -71,7 +71,7 @@ def test_a_law_that_takes_as_much_as_searches_differ_by_is_none(made: Experiment
     before, after = standing(weaker(made, cabled, float(share))), standing(made)
     assert not detected(before, floor, made.fit).left
     (reason,) = too_little(before, after, floor)
-    assert "of the floor's power" in reason
+    assert "of the repeatability's power" in reason
 
 
 @pytest.mark.parametrize(("gained", "reasons"), [(0.9 * LEAST_RHO**2, 1), (1.1 * LEAST_RHO**2, 0)])
@@ -121,7 +121,7 @@ def test_a_law_has_to_take_as_much_of_recordings_that_were_not_used(cabled: Expe
     before, after = standing(cabled), standing(with_cable(made, (2,)))
     assert too_little(before, after, declared(cabled)) == ()  # another law may be what the held-out one shows
     (reason,) = missed(before.known, after.known)
-    assert reason == "takes 0 % of what r2 exceeds the floor by"
+    assert reason == "takes 0 % of the excess of r2"
 
 
 @pytest.mark.parametrize(("strength", "verdict"), [(0.0, "none"), (8.0, "undecided")])

@@ -118,12 +118,12 @@ def written(outcome: Outcome, tmp_path_factory: pytest.TempPathFactory) -> Path:
     write_corrected(campaign, replace(outcome, finds=discs), target.parent / "discs")
     off = replace(outcome, finds=(), moved=(OFF,))
     told_off = write_diagnosis(campaign, declared(experiment), off, target, False, None, "")
-    nothing = "Model with its known numbers refitted, to which nothing was added"
+    nothing = "Model with its nominal parameters refitted, and nothing added"
     assert told_off.verdict_lines[1] == f"{nothing}: {target / 'corrected'}"
     assert nothing in (target / "index.html").read_text().replace("\u00a0", " ")
     command = load(target, DiagnosisResults).provenance.command
     assert command == "kbs-process campaign/EL089", "of a diagnosis at the end of processing"
-    assert told_off.verdict_lines[0].startswith("Known parameters are off (joint.el.drive.Ka +5.0 sigma): with that")
+    assert told_off.verdict_lines[0].startswith("Nominal parameters are off (joint.el.drive.Ka +5.0 sigma): with that")
     assert "would look the same" in told_off.verdict_lines[0] and "{" not in told_off.verdict_lines[0]
     hidden = replace(outcome, finds=(), bent=True)
     assert hidden.verdict == "undecided" and replace(hidden, moved=off.moved).verdict == "parameters off"
@@ -134,7 +134,7 @@ def written(outcome: Outcome, tmp_path_factory: pytest.TempPathFactory) -> Path:
     assert cut_short.verdict == "undecided" and replace(cut_short, moved=()).verdict == "none"
     told_cut = write_diagnosis(campaign, declared(experiment), cut_short, target, False, None, "")
     assert told_cut.verdict_lines[0].startswith(
-        "Known parameters that are off (joint.el.drive.Ka +5.0 sigma) would explain all: with that"
+        "Nominal parameters that are off (joint.el.drive.Ka +5.0 sigma) would explain all: with that"
     )
     assert "is open, as the search ended before all were tried." in told_cut.verdict_lines[0]
     more = write_diagnosis(
@@ -143,14 +143,14 @@ def written(outcome: Outcome, tmp_path_factory: pytest.TempPathFactory) -> Path:
     assert "The model lacks: curve" in more.verdict_lines[0]
     shown = max(trial.corrected for trial in load(target, DiagnosisResults).trials)
     assert shown > 1.2, "by what the folder of the corrected model predicts"
-    assert f"{shown:.3g} times the floor (rms) is left: more is missing, or" in more.verdict_lines[0]
+    assert f"{shown:.3g} times the repeatability (rms) is left: more is missing, or" in more.verdict_lines[0]
     much = write_diagnosis(
         campaign, declared(experiment), replace(outcome, after=Detection((), -80.0, 2.25)), target, False, proposal
     )
     assert much.verdict_lines[0].startswith(
-        "Nearest to what the model lacks, of the laws known: curve over joint angle"
+        "Nearest to what the model lacks, of the effects tried: curve over joint angle"
     )
-    assert f"{shown:.3g} times the floor (rms) is left: more is missing, or" in much.verdict_lines[0]
+    assert f"{shown:.3g} times the repeatability (rms) is left: more is missing, or" in much.verdict_lines[0]
     assert "<strong>Undecided</strong>" in (target / "index.html").read_text()
     there = outcome.standing.known
     stated = np.where(there.stated, there.parameters.sigma, 0.0)
@@ -166,28 +166,28 @@ def written(outcome: Outcome, tmp_path_factory: pytest.TempPathFactory) -> Path:
     assert replace(open_yet, finds=(far,)).verdict == "physics"
     assert replace(open_yet, finds=outcome.finds).verdict == "physics", "the rival is at the same place"
     disputed = write_diagnosis(campaign, declared(experiment), open_yet, target, False, None)
-    assert disputed.verdict_lines[0].startswith("Nearest to what the model lacks, of the laws known: curve over")
+    assert disputed.verdict_lines[0].startswith("Nearest to what the model lacks, of the effects tried: curve over")
     assert "joint viscous (joint torque, el) does nearly the same" in disputed.verdict_lines[0]
     named = replace(open_yet, finds=(far,), ended=True)
     strained = write_diagnosis(campaign, declared(experiment), named, target, False, None)
     assert strained.verdict_lines[0].startswith("The model lacks: curve over")
-    assert "Beside that known parameters are together farther from what" in strained.verdict_lines[0]
-    assert "Beside that" not in disputed.verdict_lines[0]
-    assert "as much work as it may cost" in (target / "results.json").read_text()
+    assert "In addition, nominal parameters are together farther from what" in strained.verdict_lines[0]
+    assert "In addition" not in disputed.verdict_lines[0]
+    assert "ended at its limit on simulations" in (target / "results.json").read_text()
     write_diagnosis(campaign, declared(experiment), replace(outcome, ended=True), target, False, None)
-    assert "as much work as it may cost" in (target / "results.json").read_text()
+    assert "ended at its limit on simulations" in (target / "results.json").read_text()
     assert campaign.topics.command is not None and "commanded one" not in (target / "results.json").read_text()
     without = replace(campaign, topics=replace(campaign.topics, angle=campaign.topics.command))
     write_diagnosis(without, declared(experiment), outcome, target, False, None)
     assert "the motion is the commanded one" in (target / "results.json").read_text()
-    assert "as much work" not in (target / "results.json").read_text()
+    assert "limit on simulations" not in (target / "results.json").read_text()
     faint = replace(outcome, finds=(), after=Detection((), -80.0, 1.02))
     (little, *_) = write_diagnosis(campaign, declared(experiment), faint, target, False, None).verdict_lines
     assert (
         "all together by 2 % of its power: too little" in little
         and "Nearest is ground cable (external wrench, el), which" in little
     )
-    assert "leaves 1.1 times the floor (rms) of what was fitted, but: r1 predicted no better." in little
+    assert "leaves 1.1 times the repeatability (rms) in fitted recordings, but: r1 predicted no better." in little
     told = write_diagnosis(campaign, declared(experiment), outcome, target, False, proposal)
     assert told.verdict_lines[0] == "The model lacks: curve over joint angle or ground cable (external wrench, el)."
     assert told.verdict_lines[1] == f"Corrected model: {target / 'corrected'}"
@@ -227,7 +227,7 @@ def test_results_read_back_and_the_page_tells_them(written: Path) -> None:
     assert results.next_test.sigma is None
     page = (written / "index.html").read_text()
     assert "<strong>Physics left out</strong>" in page
-    assert "cannot tell curve over joint angle" in page.replace("\u00a0", " ")
+    assert "do not distinguish curve over joint angle" in page.replace("\u00a0", " ")
     for kind in ("residual", "residual_spectrum"):
         assert {path.stem for path in (written / "tables" / kind).iterdir()} == {"r0", "r1"}
 
@@ -296,7 +296,7 @@ def test_a_number_that_went_as_far_as_it_was_let_go_is_told(outcome: Outcome, si
     moved = replace(known, value=value)
     assert moved.stopped == ((name,) if told else ())
     nothing = replace(outcome, finds=(), standing=replace(outcome.standing, known=moved))
-    assert (f"{name} went as far as chance may have it" in answer(nothing, (), (), FLOOR)) == told
+    assert (f"{name} moved as far as chance allows" in answer(nothing, (), (), FLOOR)) == told
 
 
 def test_numbers_that_are_known_to_differ_from_zero_are_told_first(outcome: Outcome, written: Path) -> None:

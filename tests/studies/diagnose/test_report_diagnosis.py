@@ -124,7 +124,7 @@ def test_a_find_is_told_with_its_law_its_gate_and_its_rivals(tmp_path: Path) -> 
 
 
 def test_nothing_found_is_said(tmp_path: Path) -> None:
-    assert "No law passed the gate" in page(tmp_path, results())
+    assert "No effect passed the acceptance test" in page(tmp_path, results())
 
 
 def test_it_is_headed_by_its_answer(tmp_path: Path) -> None:
@@ -158,7 +158,7 @@ def next_test(**changed: object) -> d.NextTest:
 
 def test_the_next_test_is_told_with_its_power(tmp_path: Path) -> None:
     told = page(tmp_path / "rivals", msgspec.structs.replace(results(find()), next_test=next_test()))
-    for said in ("next-test.csv", "3.1", "6.0 %", "3 recordings", "cannot tell harness"):
+    for said in ("next-test.csv", "3.1", "6.0 %", "3 recordings", "do not distinguish harness"):
         assert said in told.replace("\u00a0", " "), said
     weak = next_test(rivals=(), distance=None, p_wrong=None, recordings=1, sigma=0.25)
     told = page(tmp_path / "weak", msgspec.structs.replace(results(find()), next_test=weak))
@@ -173,7 +173,7 @@ def test_where_the_residual_lives_is_a_map_of_each_trajectory(tmp_path: Path) ->
     units = dict.fromkeys(columns, "1")
     write_table(tmp_path / "tables" / "residual_map" / "SWEEP.parquet", columns, units, frame="T", recording="run_1")
     told = page(tmp_path, results(find()))
-    assert "Where the residual lives" in told
+    assert "Where the residual is" in told
     assert "before at most 10" in told.replace("\u00a0", " ")
 
 

@@ -48,15 +48,15 @@ def too_little(
     reasons = []
     share = taken(there, here)
     if not (more or share >= TAKEN):
-        reasons.append(f"takes {100.0 * share:.0f} % of what exceeds the floor: it follows what something else does")
+        reasons.append(f"takes {100.0 * share:.0f} % of what exceeds the repeatability: it follows another cause")
     left = here.ratios
     most = max(ratio - left[trajectory] for trajectory, ratio in there.ratios.items())
     # What known numbers had taken up shows where they are.
     relieved = before.known.strained and not after.known.strained
     if searched(experiment) and not (most >= TOLERATED or sigmas >= EVERYWHERE or relieved):
-        reasons.append(f"takes {100.0 * most:.1f} % of the floor's power: {_DIFFER}")
+        reasons.append(f"takes {100.0 * most:.1f} % of the repeatability's power: {_DIFFER}")
     elif not there.left and not before.known.cost - after.known.cost >= LEAST_RHO**2:
-        reasons.append("known numbers alone are as likely")
+        reasons.append("nominal parameters alone are as likely")
     return tuple(reasons)
 
 
@@ -71,7 +71,7 @@ def missed(before: Known, after: Known, blind: Collection[int] = ()) -> tuple[st
         left, gained = after.chi2[k] - after.rows[k], before.chi2[k] - after.chi2[k]
         if left > UNFORESEEN * after.rows[k] and not gained >= TAKEN_UNUSED * (left + gained):
             share = 100.0 * gained / (left + gained)
-            reasons.append(f"takes {share:.0f} % of what {after.experiment.trials[k].name} exceeds the floor by")
+            reasons.append(f"takes {share:.0f} % of the excess of {after.experiment.trials[k].name}")
     return tuple(reasons)
 
 
@@ -85,10 +85,10 @@ def promises_little(view: View, there: Detection) -> str:
     most = max(found.score.gain for found in view.able) / min(there.rows.values())
     if most >= (1.0 - LEAD) * TOLERATED:
         return ""
-    return f"would take {100.0 * most:.1f} % of the floor's power at most: {_DIFFER}"
+    return f"would take {100.0 * most:.1f} % of the repeatability's power at most: {_DIFFER}"
 
 
-_DIFFER = "minima of the known parameters differ by as much"
+_DIFFER = "minima of the nominal parameters differ by as much"
 
 
 def blind(standing: Standing, own: Own, simulate: Simulate) -> frozenset[int]:

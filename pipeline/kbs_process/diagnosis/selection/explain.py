@@ -52,24 +52,24 @@ class Explained:
 def explain(experiment: Experiment, simulate: Simulate, task: Task) -> Explained:
     """Floor, refit of the known parameters, detection of what they leave."""
     nominal = Hypothesis(experiment.rig, experiment.effects)
-    with task("Repeatability floor"):
+    with task("Repeatability"):
         begun = predicted_by(experiment, nominal, simulate)
         floor = floor_of(experiment, begun)
     with task("Phases of cogging, friction and tooth contact"):
         start = phasing.begin(experiment, nominal, floor, simulate)
     slopes, leaps = None, 1
     if not _driven_alike(experiment):
-        with task("The floor, with a model that is about right"):
+        with task("Repeatability, with a better model"):
             rough = refit(experiment, start, floor, simulate, reach=NEAR, leaps=1)
             rough = _moved_on(_stood(rough, floor), floor, simulate, LEAPS // 2).known
             start, slopes, leaps = rough.hypothesis, rough.slopes, 0
             floor = smaller(floor, floor_of(experiment, predicted_by(experiment, start, simulate)))
-    with task("Refitting the known parameters, near what is known of them"):
+    with task("Refitting nominal parameters, near their priors"):
         held = refit(experiment, start, floor, simulate, reach=NEAR, slopes=slopes, leaps=leaps)
         stood = _moved_on(_stood(held, floor), floor, simulate, LEAPS)
     near: Known | None = None
     if stood.after.left and (stood.known.gross or stood.known.stopped):
-        with task("Refitting the known parameters, free"):
+        with task("Refitting nominal parameters, free"):
             known = stood.known
             start = eased(known, simulate) if known.gross else known.hypothesis
             free = refit(experiment, start, floor, simulate, leaps=0)
@@ -88,7 +88,7 @@ def explain(experiment: Experiment, simulate: Simulate, task: Task) -> Explained
                 near = replace(stood.known, chi2_before=_squares(stood.known, begun))
             stood = freed
     elif stood.known.stopped:
-        with task("Refitting the known parameters, free"):
+        with task("Refitting nominal parameters, free"):
             # What a number cannot reach, a law would do for it.
             free = refit(experiment, stood.known.hypothesis, floor, simulate, leaps=0)
         freed = _moved_on(_stood(free, floor), floor, simulate, LEAPS)
@@ -100,7 +100,7 @@ def explain(experiment: Experiment, simulate: Simulate, task: Task) -> Explained
             stood = _rephased(stood, floor, simulate)
     beside: Known | None = None
     if near is None and stood.after.left and stood.known.gross and searched(experiment):
-        with task("Refitting the known parameters beside a clock that may be wrong"):
+        with task("Refitting nominal parameters, with a clock that may be wrong"):
             beside = by_another_clock(stood.known, floor, simulate)
         if beside is not None:
             near = replace(beside, chi2_before=_squares(beside, begun))

@@ -38,10 +38,10 @@ def diagnose_results(
     diagnosis is done, and whatever becomes of it.
     """
     experiment = experiment_of(campaign, progress)
-    with progress.task("Is the repeatability floor exceeded?"):
+    with progress.task("Is the repeatability exceeded?"):
         noise, found = _detected(experiment)
-    told = [f"Floor: {noise.statement}."] if noise.source == "declared" else []
-    ratio = f"{np.sqrt(max(found.ratio, 0.0)):.3g} times the repeatability floor (rms)"
+    told = [f"Repeatability: {noise.statement}."] if noise.source == "declared" else []
+    ratio = f"{np.sqrt(max(found.ratio, 0.0)):.3g} times the repeatability (rms)"
     if found.log_p > np.log(DETECTED):
         return (*told, f"Prediction and recordings differ by {ratio}: there is nothing to diagnose.")
     with revising(results, without=(FOLDER, "index.html", "report.pdf")) as folder:
@@ -50,7 +50,7 @@ def diagnose_results(
     return (
         *told,
         f"With the parameter files' numbers, prediction and recordings differ by {ratio}, all together.",
-        f"With known numbers refitted within their uncertainties: {outcome.verdict_lines[0]}",
+        f"With nominal parameters refitted within their uncertainties: {outcome.verdict_lines[0]}",
         f"Diagnosis: {results / FOLDER / outcome.report.name}",
     )
 

@@ -25,10 +25,7 @@ from kbs_process.studies.diagnose.reading import PASSED_OVER, passed_over
 _TOLD = Prose("kbs_process.studies.diagnose", "answer")
 _NOTICES = Prose("kbs_process.studies.diagnose", "notices")
 _NOTES = ("floor", "refit", "gate", "order")  # on how to read the results
-_FLOOR = {
-    "repeats": "what repeats of one trajectory differ by",
-    "declared": "what their sensors' stated noise explains",
-}
+_FLOOR = {"repeats": "the difference between repeats of one trajectory", "declared": "the sensors' stated noise"}
 
 
 def rms(ratio: float) -> float:

@@ -173,4 +173,4 @@ class DiagnosisResults(ResultsFile, frozen=True, kw_only=True):
     @property
     def model(self) -> str:
         """What the folder of the corrected model holds, in words."""
-        return "Corrected model" if self.finds else "Model with its known numbers refitted, to which nothing was added"
+        return "Corrected model" if self.finds else "Model with its nominal parameters refitted, and nothing added"

@@ -32,7 +32,7 @@ def diagnose(
     experiment = experiment or experiment_of(campaign, progress)
     with simulating(experiment) as simulate:
         explained = explain(experiment, simulate, progress.task)
-        with progress.task("Suspects: what the known parameters leave"):
+        with progress.task("Candidate effects for the residual"):
             outcome = rounds.diagnose(
                 explained.known, explained.floor, simulate, explained.after, explained.near, beside=explained.beside
             )

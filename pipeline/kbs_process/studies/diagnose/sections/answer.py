@@ -12,11 +12,11 @@ from kbs_process.report.text import MISSING, chance, label, number, percent
 from kbs_process.studies.diagnose.results import DiagnosisResults, Find, Trial, Unexplained
 
 _TRIALS = Caption(
-    shown="Whitened residual over the floor, rms, of every recording: with the parameter files' numbers (phases, of "
-    "which these say nothing, as found), with known parameters refitted under their priors, and with what was found. "
-    "Held-out recordings were used by neither.",
-    good="Corrected bars end at the floor (dashed), those of held-out recordings as well.",
-    bad="A held-out bar far above those of the fit: what was found does not carry over. All above: something is left.",
+    shown="Whitened residual over the repeatability, rms, of every recording: with the parameter files' numbers "
+    "(unknown phases as found), with nominal parameters refitted within their priors, and with the corrected model. "
+    "Neither fit used held-out recordings.",
+    good="Corrected bars end at 1 (dashed), those of held-out recordings as well.",
+    bad="A held-out bar far above those of the fit: the effect does not carry over. All above: a mismatch is left.",
     do="See what remains, and record the trajectory where it is strongest.",
 )
 AT_FLOOR = 1.1
@@ -33,12 +33,12 @@ def panel(results: DiagnosisResults, tables: Tables) -> Panel:
         )
     if results.finds:
         blocks.append(_finds(results.finds, results.answer))
-    blocks.append(Figure("Residual over the floor", (_bars(results.trials),), _TRIALS))
+    blocks.append(Figure("Residual over the repeatability", (_bars(results.trials),), _TRIALS))
     blocks.append(_trials(results.trials))
     if results.requirements:
         blocks.append(_requirements(results.requirements))
     blocks.append(
-        Text(f"Floor: {results.floor}. Chance of what the known parameters leave: {chance(results.log10_p)}.")
+        Text(f"Repeatability: {results.floor}. Chance of what nominal parameters leave: {chance(results.log10_p)}.")
     )
     if results.files:
         blocks.append(
@@ -63,8 +63,8 @@ def _finds(finds: tuple[Find, ...], answer: Answer) -> Grid:
         )
         for find in finds
     )
-    head = ("Find", "Physics", "Enters at", "Seen in", "Probability", "Distance / sigma", "Of the held-out excess")
-    title = "Nearest to what was left out" if answer == "undecided" else "Physics that was left out"
+    head = ("Effect", "Physics", "Enters at", "Seen in", "Probability", "Distance / sigma", "Of the held-out excess")
+    title = "Nearest to what the model lacks" if answer == "undecided" else "Physics that was left out"
     return Grid(title, head, rows, "klllrrr")
 
 
@@ -79,8 +79,8 @@ def _trials(trials: tuple[Trial, ...]) -> Grid:
         )
         for entry in trials
     )
-    head = ("Recording", "Role", "Nominal", "Known refitted", "Corrected")
-    return Grid("Residual over the floor, rms", head, rows, "klrrr")
+    head = ("Recording", "Role", "Nominal", "Nominal refitted", "Corrected")
+    return Grid("Residual over the repeatability, rms", head, rows, "klrrr")
 
 
 def _requirements(requirements: tuple[Unexplained, ...]) -> Grid:
@@ -96,8 +96,8 @@ def _requirements(requirements: tuple[Unexplained, ...]) -> Grid:
         )
         for entry in requirements
     )
-    head = ("Requirement", "As", "Limit", "Known refitted", "Corrected", "Of the limit", "Where")
-    return Grid("What is left, noise included, as requirements count it", head, rows, "klrrrrl")
+    head = ("Requirement", "As", "Limit", "Nominal refitted", "Corrected", "Of the limit", "Where")
+    return Grid("Remaining difference, noise included, by requirement", head, rows, "klrrrrl")
 
 
 def _bars(entries: tuple[Trial, ...]) -> Picture:
@@ -108,13 +108,13 @@ def _bars(entries: tuple[Trial, ...]) -> Picture:
         for index, (step, color) in enumerate(_STEPS.items()):
             values = [getattr(entry, step) for entry in entries]
             axis.barh(places + (1 - index) * _WIDTH, values, _WIDTH, color=color, label=step, left=0.0)
-        axis.axvline(1.0, color=draw.LIMIT, linewidth=0.8, linestyle="--", label="floor")
+        axis.axvline(1.0, color=draw.LIMIT, linewidth=0.8, linestyle="--", label="repeatability")
         most = max(max(entry.nominal, entry.known, entry.corrected) for entry in entries)
         draw.logarithmic(axis, "x", 0.5, 1.3 * max(most, 2.0))
         axis.set_yticks(places, [f"{label(entry.recording, 24)} ({entry.role})" for entry in entries])
         axis.grid(visible=False, axis="y")
-        axis.set_xlabel("residual over floor, rms")
+        axis.set_xlabel("residual over repeatability, rms")
         axis.legend(ncols=4, loc="lower right", bbox_to_anchor=(1.0, 1.0))
         worst = max(entries, key=lambda entry: entry.corrected)
-        alt = f"Residual over floor of {len(entries)} recordings; corrected, at most {number(worst.corrected)}"
+        alt = f"Residual of {len(entries)} recordings over repeatability; corrected, at most {number(worst.corrected)}"
         return draw.picture(figure, alt)

@@ -15,10 +15,10 @@ from kbs_process.report.text import number, percent, unit
 from kbs_process.studies.diagnose.results import Curve, DiagnosisResults, Find, Rival
 
 _LAW = Caption(
-    shown="What enters at the port, estimated from the residual without presuming a law, against what orders it, and "
-    "the law that was put into the plant.",
-    good="The law within the band everywhere.",
-    bad="A stretch of the band that the law leaves: it holds elsewhere only.",
+    shown="Input at the port, estimated from the residual without an assumed equation, against its regressor, and the "
+    "effect as the plant has it.",
+    good="The effect within the band everywhere.",
+    bad="A stretch in which the effect leaves the band: there its equation is wrong.",
     do="Take the measured curve there, or widen the motion.",
 )
 
@@ -26,16 +26,16 @@ _LAW = Caption(
 def panel(results: DiagnosisResults, tables: Tables) -> Panel:
     """A find after the other: law, parameters, gate, rivals."""
     blocks = tuple(block for find in results.finds for block in _find(find))
-    nothing = Text("No law passed the gate: nothing is claimed to have been left out.")
-    return Panel("finds", "Finds", "What law is it, and what else could it be?", blocks or (nothing,))
+    nothing = Text("No effect passed the acceptance test on held-out data: none is reported.")
+    return Panel("finds", "Detections", "Which effect is it, and what else could it be?", blocks or (nothing,))
 
 
 def _find(find: Find) -> Iterator[Block]:
-    known = "" if find.named else " No effect of the catalogue passed the gate: the law is as measured."
-    alike = f" These channels cannot tell that port from {', '.join(find.same_ports)}." if find.same_ports else ""
+    known = "" if find.named else " No effect of the catalogue passed the acceptance test: the curve is as measured."
+    alike = f" The channels do not distinguish that port from {', '.join(find.same_ports)}." if find.same_ports else ""
     digits = 2 if find.absorbed < 0.99 else 4  # what a weight leaves of a cord is not nothing
     yield Text(
-        f"{find.name}, {find.place.words}.{known} Known parameters could have taken up "
+        f"{find.name}, {find.place.words}.{known} Nominal parameters could have taken up "
         f"{percent(find.absorbed, digits)} of its signature.{alike}"
     )
     if find.equation:
@@ -55,7 +55,7 @@ def _find(find: Find) -> Iterator[Block]:
     if rows:
         yield Grid(f"{find.name}: parameters", ("Parameter", "Unit", "Value", "Sigma", "95 %"), rows, "klrrr")
     if find.curve is not None:
-        yield Figure(f"{find.name}: the law", (_band(find, find.curve),), _LAW)
+        yield Figure(f"{find.name}: the effect", (_band(find, find.curve),), _LAW)
     gate = tuple(
         (
             entry.recording,
@@ -66,13 +66,13 @@ def _find(find: Find) -> Iterator[Block]:
         )
         for entry in find.gate
     )
-    note = "Held-out recordings decide: each of them has to be predicted better."
+    note = "Held-out recordings decide: each has to be predicted better."
     head = ("Recording", "Role", "Before", "After", "Gain (-2 log likelihood)")
-    yield Grid(f"{find.name}: residual over the floor, without and with it", head, gate, "klrrr", note)
+    yield Grid(f"{find.name}: residual over the repeatability, without and with it", head, gate, "klrrr", note)
     if find.rivals:
         yield Grid(
-            f"{find.name}: other laws",
-            ("Law", "Physics", "Enters at", "Simulated", "Distance / sigma", "Probability"),
+            f"{find.name}: rivals",
+            ("Effect", "Physics", "Enters at", "Simulated", "Distance / sigma", "Probability"),
             tuple(
                 (
                     rival.name,
@@ -85,8 +85,8 @@ def _find(find: Find) -> Iterator[Block]:
                 for rival in find.rivals
             ),
             "kllcrr",
-            "Laws that are marked cannot be told from it by these recordings: they are nearer than "
-            f"{RIVALS} sigma, or than {SHADE} of what it does (those simulated): nature's formula is neither's.",
+            f"These recordings do not distinguish marked rivals from it: they are nearer than {RIVALS} sigma, or "
+            f"(those simulated) than {SHADE} of its own distance. Such a difference may come from the formulas.",
         )
 
 

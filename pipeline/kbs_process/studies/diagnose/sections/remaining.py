@@ -12,36 +12,36 @@ from kbs_process.report.text import label, number
 from kbs_process.studies.diagnose.results import DiagnosisResults, Trial
 
 _CHANNELS = Caption(
-    shown="What is left of each channel over the floor, with everything that was found in the plant.",
+    shown="Residual of each channel over the repeatability, with the corrected model.",
     good="About 1 everywhere.",
     bad="One channel far above the others: its own sensor. One axis' channels: physics of that axis.",
     do="Look at that channel's spectrum and history below.",
 )
 _SPECTRA = Caption(
-    shown="Power spectral density of what is unexplained, over that of the floor (dashed): known parameters refitted "
-    "(before), with the finds (after).",
-    good="After lies on the floor at all frequencies.",
-    bad="A hump above the floor: physics that is still left out.",
+    shown="Power spectral density of the residual, and that of the repeatability (dashed): nominal parameters refitted "
+    "(before), corrected model (after).",
+    good="After lies on the repeatability at all frequencies.",
+    bad="A hump above the repeatability: an effect that is still missing.",
     do="Find the motor order or resonance at the hump.",
 )
 _HISTORIES = Caption(
     shown="The same in time, in the channels' units.",
-    good="After looks like noise, whatever the drives do; what an encoder's code rounds (half a step at most) is the "
-    "floor's, and moves with the drives.",
-    bad="Bursts that come again with position, rate or time.",
+    good="After looks like noise, whatever the drives do. Rounding of an encoder (half a step at most) belongs to the "
+    "repeatability, and moves with the drives.",
+    bad="Bursts that recur with position, rate or time.",
     do="Compare their instants with the commands.",
 )
 
 
 def panel(results: DiagnosisResults, tables: Tables) -> Panel:
     """Channels of all recordings, spectra and histories of those held out."""
-    blocks: list[Block] = [Figure("What is left, channel by channel", (_levels(results.trials),), _CHANNELS)]
+    blocks: list[Block] = [Figure("Residual, channel by channel", (_levels(results.trials),), _CHANNELS)]
     shown = [entry for entry in results.trials if entry.role == "held-out"] or list(results.trials)
     spectra, histories = [], []
     for entry in shown:
         channels = tuple(entry.channels)
         if (table := tables.read("residual_spectrum", entry.recording)) is not None:
-            spectra.append(curves.spectra(table, channels, entry.recording, below="floor"))
+            spectra.append(curves.spectra(table, channels, entry.recording, below="repeatability"))
         if (table := tables.read("residual", entry.recording)) is not None:
             histories.append(curves.histories(table, channels, entry.recording))
     if spectra:
@@ -49,7 +49,7 @@ def panel(results: DiagnosisResults, tables: Tables) -> Panel:
     if histories:
         blocks.append(Figure("Histories of the residual", tuple(histories), _HISTORIES))
     blocks += [Text(note) for note in results.notes]
-    return Panel("remaining", "What remains", "What is left, and where does it live?", tuple(blocks))
+    return Panel("remaining", "What remains", "How large is the residual, and where is it?", tuple(blocks))
 
 
 def _levels(entries: tuple[Trial, ...]) -> Picture:
@@ -68,5 +68,5 @@ def _levels(entries: tuple[Trial, ...]) -> Picture:
             value = values[row, column]
             color = "white" if value > 0.5 * (1.0 + top) else draw.INK
             axis.text(column, row, number(value), ha="center", va="center", color=color, fontsize=6)
-        figure.colorbar(image, ax=axis, label="over floor")
-        return draw.picture(figure, f"Residual over floor by channel, at most {number(float(np.nanmax(values)))}")
+        figure.colorbar(image, ax=axis, label="over repeatability")
+        return draw.picture(figure, f"Residual over repeatability by channel, up to {number(float(np.nanmax(values)))}")

@@ -16,8 +16,8 @@ from kbs_process.studies.diagnose.results import DiagnosisResults, PortTest, Sus
 
 _FAR = 3.0  # sigma
 _MAPS = Caption(
-    shown="Mean residual of each trajectory's repeats, over the floor, in windows of time by frequencies: known "
-    "parameters refitted (before), with the finds (after). Dots: cells that chance does not explain.",
+    shown="Mean residual of each trajectory's repeats, over the repeatability, by windows of time and frequency: "
+    "nominal parameters refitted (before), corrected model (after). Dots: cells that chance does not explain.",
     good="White after, everywhere.",
     bad="A line along time: a resonance or a tone. One that follows the rate: a motor order. A column: a place or "
     "an event.",
@@ -30,9 +30,9 @@ def panel(results: DiagnosisResults, tables: Tables) -> Panel:
     blocks: list[Block] = []
     far = tuple(entry for entry in results.moved if entry.sigmas is not None and abs(entry.sigmas) > _FAR)
     if far:
-        blocks.append(_moved(f"Known parameters that moved by more than {_FAR:g} sigma", far))
+        blocks.append(_moved(f"Nominal parameters that moved by more than {_FAR:g} sigma", far))
     if maps := _maps(results, tables):
-        blocks.append(Figure("Where the residual lives", maps, _MAPS))
+        blocks.append(Figure("Where the residual is", maps, _MAPS))
     if results.ports and results.answer != "none":  # where nothing is left, every port explains that
         blocks.append(_ports(results.ports))
     if results.suspects:
@@ -44,8 +44,8 @@ def panel(results: DiagnosisResults, tables: Tables) -> Panel:
     if checks:
         blocks.append(Grid("Checks of the refit", ("Check", "Passed", "Detail"), checks, "kcl"))
     if results.moved:
-        title = f"All known parameters ({count(len(results.moved), 'number')})"
-        blocks.append(Fold(title, (_moved("Known parameters", results.moved),)))
+        title = f"All nominal parameters ({count(len(results.moved), 'number')})"
+        blocks.append(Fold(title, (_moved("Nominal parameters", results.moved),)))
     return Panel("search", "Search", "Where does it enter, and what was tried?", tuple(blocks))
 
 
@@ -70,7 +70,7 @@ def _ports(entries: tuple[PortTest, ...]) -> Grid:
         )
         for entry in entries
     )
-    note = "An input that is free to be anything at one port: if it cannot explain the residual, no law there can."
+    note = "An arbitrary input at one port: if it cannot explain the residual, no effect there can."
     head = ("Port", "Takes up of the excess", "p", "Suffices", "Looks the same as")
     return Grid("Where it enters", head, rows, "krrcl", note)
 
@@ -87,9 +87,9 @@ def _suspects(entries: tuple[Suspect, ...]) -> Grid:
         )
         for entry in entries
     )
-    head = ("Suspect", "Physics", "Enters at", "Distance / sigma", "Absorbed", "Outcome")
-    note = "Distance: the whitened size of its signature, without what known parameters can take up."
-    return Grid("Suspects, strongest first", head, rows, "kllrrl", note)
+    head = ("Candidate effect", "Physics", "Enters at", "Distance / sigma", "Absorbed", "Outcome")
+    note = "Distance: whitened size of the signature, without the part that nominal parameters can take up."
+    return Grid("Candidate effects, strongest first", head, rows, "kllrrl", note)
 
 
 def _moved(title: str, entries: tuple[Moved, ...]) -> Grid:
@@ -137,7 +137,7 @@ def _map(table: Table, title: str) -> Picture:
         scale = figure.colorbar(image, ax=axes, label="over floor")
         draw.logarithmic(scale.ax, "y", 1.0, most)
         worst = number(float(np.nanmax(grids["before"])))
-        alt = f"{title}: residual over floor by time and frequency, before at most {worst}"
+        alt = f"{title}: residual over repeatability by time and frequency, before at most {worst}"
         return draw.picture(figure, alt, title)
 
 
