@@ -146,7 +146,7 @@ def test_the_discussion_says_what_the_numbers_say() -> None:
     quiet = [made_up(one, (1e-4, 1e-4 / (1 + place)), 0.002) for place, one in enumerate(bare)]
     text = " ".join(discussion(campaign.rig, quiet))
     assert "They end -150 to +0 s" in text
-    assert "takes 150 s where the table allots 300 s" in text
+    assert "takes 150 s; the table has 300 s" in text
     assert "ours reach 0.002 N m" in text and "ours are no bound for a flexible mast" in text
     loud = [made_up(one, (1e-4, 1e-4), 0.08) for one in bare]
     assert "no bound" not in " ".join(discussion(campaign.rig, loud))
