@@ -95,7 +95,7 @@ def test_the_verdict_comes_first_with_what_qualifies_it(page: Page) -> None:
         "Standard uncertainties, EL089P00_2, below 1 Hz, spacecraft (S)",
         "Other recordings",
         "Computed gravity compensation is feasible",
-        "What each part of the model is worth",
+        "Residual after each part of the model",
         "and tilt",
         "Is the prediction pessimistic?",
         "Peak torque at the spacecraft from all six channels at once, below 1 Hz",

@@ -23,7 +23,7 @@ def panel(results: ComparisonResults, tables: Tables) -> Panel:
     blocks: list[Block] = [grid("Numbers that differ", apart)] if apart else [Text(_SAYS("numbers_alike", far=FAR))]
     if others:
         blocks.append(Fold("Numbers that agree", (grid("Numbers that agree", others),)))
-    return Panel("numbers", "Fitted numbers", "Is it still the same rig, by what gravity shows of it?", tuple(blocks))
+    return Panel("numbers", "Fitted numbers", "Does gravity show the same rig each time?", tuple(blocks))
 
 
 def _row(one: Number) -> tuple[str | Cell, ...]:

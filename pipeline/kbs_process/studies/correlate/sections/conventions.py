@@ -37,7 +37,7 @@ def panel(results: Results, tables: Tables) -> Panel:
         )
     else:
         blocks.append(Text("No self-test of signs and frames was made."))
-    return Panel("conventions", "Signs and frames", "Do recorder and model mean the same by every sign?", tuple(blocks))
+    return Panel("conventions", "Signs and frames", "Do recorder and model use the same signs?", tuple(blocks))
 
 
 def _outcome(entry: SignCheck) -> Cell:

@@ -28,7 +28,7 @@ def panel(results: Results, tables: Tables) -> Panel:
     ]
     if found.contributions:
         rows = tuple((entry.channel, number(entry.value), unit(entry.unit)) for entry in found.contributions)
-        blocks.append(Grid("Taken away by decoupling, rms", ("Channel", "rms", "Unit"), rows, "lrl"))
+        blocks.append(Grid("Removed by decoupling, rms", ("Channel", "rms", "Unit"), rows, "lrl"))
     return Panel("coupling", "Cross-coupling", question, tuple(blocks))
 
 

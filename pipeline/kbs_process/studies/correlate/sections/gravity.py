@@ -82,7 +82,7 @@ def _channels(gravity: Gravity) -> Grid:
         for entry in gravity.channels
     )
     head = ("Channel", "Static peak", "Residual rms", "σ from angles", "σ from the fit", "Unit")
-    return Grid("Static wrench and what is left of it", head, rows, "lrrrrl", _SAYS("channels_note"))
+    return Grid("Static wrench and residual", head, rows, "lrrrrl", _SAYS("channels_note"))
 
 
 def _ladder(gravity: Gravity) -> Grid:
@@ -95,7 +95,7 @@ def _ladder(gravity: Gravity) -> Grid:
         for index, rung in enumerate(gravity.ladder)
     )
     head = ("Gravity model", *(f"{name} / N m" for name in torques))
-    return Grid("What each part of the model is worth", head, rows, "l" + "r" * len(torques), _SAYS("ladder_note"))
+    return Grid("Residual after each part of the model", head, rows, "l" + "r" * len(torques), _SAYS("ladder_note"))
 
 
 def _taring(gravity: Gravity) -> Grid:

@@ -21,7 +21,7 @@ def panel(results: Results, tables: Tables) -> Panel:
     question = "How well did the article point, as its encoders and an external instrument saw it?"
     rows = results.pointing
     if not rows:
-        text = Text("No recording has both commands and angles: nothing can be said of pointing.")
+        text = Text("No recording has both commands and angles: nothing can be said about pointing.")
         return Panel("pointing", "Pointing", question, (text,))
     blocks: list[Block] = []
     pictures = _densities(rows, tables)

@@ -22,7 +22,7 @@ def panel(results: Results, tables: Tables) -> Panel:
     question = "Is what was measured the mechanism's, or noise?"
     rows = results.repeatability
     if not rows:
-        text = Text("No trajectory was recorded more than once: signal and noise cannot be told apart by repeats.")
+        text = Text("No trajectory was recorded more than once: repeats cannot separate signal and noise.")
         return Panel("repeatability", "Repeatability", question, (text,))
     band, frame = main_band(results), main_frame(results)
     first = tuple(row for row in rows if (row.band, row.frame) == (band, frame)) or rows

@@ -1,4 +1,4 @@
-"""When does the disturbance come, and in how many units?"""
+"""When does the disturbance occur, and in how many units?"""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def panel(results: FlightResults, tables: Tables) -> Panel:
     return Panel(
         "histories",
         "Time histories",
-        "When does the disturbance come, and in how many units?",
+        "When does the disturbance occur, and in how many units?",
         tuple(blocks) or (Text("The tables of the histories are not in this folder."),),
     )
 

@@ -1,4 +1,4 @@
-"""Which torque does the unit exert on the spacecraft?"""
+"""What torque does the unit exert on the spacecraft?"""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def panel(results: ReferenceDayResults, tables: Tables) -> Panel:
     if found:
         picture = _torques(found, min(limits, default=None))
         blocks.append(Figure("Disturbance torque over the day", (picture,), _SAYS.caption("torque")))
-    return Panel("torque", "Torque", "Which torque does the unit exert on the spacecraft?", tuple(blocks))
+    return Panel("torque", "Torque", "What torque does the unit exert on the spacecraft?", tuple(blocks))
 
 
 def _torques(tables: Sequence[tuple[str, Table]], limit: float | None) -> Picture:

@@ -1,4 +1,4 @@
-"""Which satellite is tracked when, and by which angles?"""
+"""Which satellite is tracked when, and at which angles?"""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def panel(results: ReferenceDayResults, tables: Tables) -> Panel:
         for phase in results.phases
     )
     blocks.append(Grid("Phases", ("Mode", "Satellite", "From / s", "To / s", "Duration / s"), rows, "llrrr"))
-    return Panel("trajectory", "Trajectory", "Which satellite is tracked when, and by which angles?", tuple(blocks))
+    return Panel("trajectory", "Trajectory", "Which satellite is tracked when, and at which angles?", tuple(blocks))
 
 
 def _trajectory(table: Table, phases: Sequence[Phase], sections: Sequence[Section]) -> Picture:

@@ -66,7 +66,7 @@ def _sensitivities(results: StabilityResults) -> Grid:
     rows = tuple((entry.name, number(entry.sigma_of_factor, 2)) for entry in results.sensitivities[:8])
     total = f"all together: {number(results.worst_sigma, 2)}, at {number(math.degrees(results.worst_angle_rad))}°"
     note = f"First order, every uncertain number of the rig moved by one standard deviation; {total}."
-    return Grid("What the critical factor hangs on", ("Parameter", "Its sigma moves the factor by"), rows, "lr", note)
+    return Grid("What the critical factor depends on", ("Parameter", "Its sigma moves the factor by"), rows, "lr", note)
 
 
 def _decibel(value: float | None) -> str:

@@ -25,7 +25,7 @@ def panel(results: StabilityResults, tables: Tables) -> Panel:
         nyquist = 0.5 / results.cycle_s
         words = (
             f"The controller sees one sample a cycle: a mode above {number(nyquist)} Hz appears to it, and among the "
-            "closed loop's poles, folded at that frequency."
+            "closed loop's poles, aliased below that frequency."
         )
         alt = "Frequency and damping of poles over the angle of the swept joint"
         picture = _poles(table, results.joint, nyquist, alt)
