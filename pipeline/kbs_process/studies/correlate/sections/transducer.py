@@ -137,9 +137,7 @@ def _agreement_table(results: Results, found: OnTransducer) -> Grid:
         )
         for e in found.agreement
     )
-    return Grid(
-        f"Modal, coupled, {frame_label('T')}", head, rows, "kkrrrrrr", _SAYS("agreement_note", source=found.source)
-    )
+    return Grid(f"Two models, {frame_label('T')}", head, rows, "kkrrrrrr", _SAYS("agreement_note", source=found.source))
 
 
 def _mode_table(found: OnTransducer) -> Grid:
