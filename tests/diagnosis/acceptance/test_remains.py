@@ -112,7 +112,7 @@ def test_a_law_that_leaves_most_follows_something_else(cabled: Experiment, made:
     share = 1.0 - np.sqrt(1.0 - 0.5 * TAKEN)
     before, after = standing(cabled), standing(weaker(made, cabled, float(1.0 - share)))
     (reason,) = too_little(before, after, floor)
-    assert "follows what something else does" in reason
+    assert "follows another cause" in reason
     assert too_little(before, after, floor, more=True) == ()  # one more action of what that is
     assert missed(before.known, after.known) == ()  # an eighth of what was not fitted is enough
 
