@@ -153,6 +153,7 @@ class Campaign:
     document: dict[str, str] = field(default_factory=dict)  # number, revision, operator, serial_number, date
     modal: Path | None = None  # modes of the article on its transducer; None: derived from the plant
     sensing: tuple[SensingLaw, ...] = ()  # acting on predictions of one recording alone
+    sources: Mapping[str, str] = field(default_factory=dict)  # SHA-256 of the files that recordings were imported from
 
     @property
     def files(self) -> tuple[Path, ...]:

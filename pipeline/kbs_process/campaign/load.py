@@ -131,6 +131,7 @@ def _campaign(
         document=file.document.model_dump(exclude_none=True),
         modal=modal,
         sensing=_sensing(file, document, rig, problems),
+        sources={one.name: one.sha256 for one in file.source.file} if file.source else {},
     )
 
 

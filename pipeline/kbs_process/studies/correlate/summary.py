@@ -16,7 +16,7 @@ from kbs_process.reduction.pointing import recorded_pointing
 from kbs_process.reduction.soundness import Checked
 from kbs_process.results import provenance
 from kbs_process.results.judged import Requirement
-from kbs_process.results.records import Check, Conclusion
+from kbs_process.results.records import Check, Conclusion, InputFile
 from kbs_process.signals.records import Signal
 from kbs_process.stages.decouple import Decoupling
 from kbs_process.stages.gravity.equation import RESPONSE
@@ -47,9 +47,10 @@ def summarise(
     stated = statements(bands_of(campaign.bands), runs)
     repeated = tuple(repeatabilities(runs))
     modes = resonances(campaign, runs, model)
-    budget = tuple(budgets(campaign, runs, model, decoupling, stated, repeated, modes, checked.noise))
+    budget = tuple(budgets(campaign, runs, model, decoupling, stated, repeated, modes, checked.noise, checked.late))
+    told = checked.rounding, checked.mute, checked.unconfirmed
     requirements = tuple(
-        judged(campaign, requirement, runs, budget, checked.doubts(requirement), checked.rounding, checked.mute)
+        judged(campaign, requirement, runs, budget, checked.doubts(requirement), *told)
         for requirement in campaign.requirements
     )
     found = results.Results(
@@ -60,6 +61,7 @@ def summarise(
             configuration=campaign.configuration,
             drive=campaign.drive,
             frame="joint" if campaign.rig.frame == "joint" else "T",
+            sources=tuple(InputFile(file=name, sha256=digest) for name, digest in campaign.sources.items()),
         ),
         document=results.DocumentHead(**({"date": date_of(analyses)} | campaign.document)),
         verdict=conclusion(requirements),
@@ -103,6 +105,8 @@ def conclusion(requirements: Sequence[Requirement]) -> Conclusion:
     words["undecided"] = f"undecided: {worst.doubt}" if worst.doubt else words["undecided"]
     value, low, high = (figure or 0.0 for figure in (worst.value, worst.low, worst.high))
     unshown = f" Nothing shows a response of {', '.join(worst.mute)}, only noise." if worst.mute else ""
+    if worst.untested:
+        unshown += " No sign and no axis was tested: the loads change too little for what the files leave open."
     axes = ", ".join(worst.axes)
     least = f"{low:.4f}" if low > 0.0 else "0"
     sentence = (
@@ -137,7 +141,7 @@ def with_left_out(
         every = [replace(one.entry, role="calibration", start=None, end=None) for one in left]
         whole = [one if one.entry == entry else read(entry) for one, entry in zip(left, every, strict=True)]
         stated = statements(bands_of(campaign.bands), whole)
-        rows = tuple(budgets(campaign, whole, model, decoupling, stated, found.repeatability, found.resonances, {}))
+        rows = tuple(budgets(campaign, whole, model, decoupling, stated, found.repeatability, found.resonances, {}, {}))
         others = [_words(judged(campaign, asked, whole, rows)) for asked in campaign.requirements]
     except KbsError as error:
         others = [("undecided", f"By itself that cannot be judged: {error.what}.")] * len(found.requirements)
