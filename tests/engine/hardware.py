@@ -22,7 +22,7 @@ AXES = ("az", "el")
 BODIES = ("base", "azimuth", "antenna")
 
 # Factor to SI of every unit that the archive's parameter files use; another one is a KeyError.
-_SI = {"mrad": 1e-3, "deg": np.pi / 180, "mm": 1e-3} | dict.fromkeys(
+_SI = {"mrad": 1e-3, "deg": np.pi / 180, "deg/s^2": np.pi / 180, "mm": 1e-3} | dict.fromkeys(
     (
         "1", "rad", "m", "s", "kg", "N", "N m", "Hz", "1/s", "m/s^2", "rad/s", "kg m^2", "N m/rad", "N/m",
         "N m s/rad", "SI by channel pair",

@@ -15,10 +15,8 @@ from kbs_process.signals.records import Signal
 from kbs_process.stages import pointing
 from kbs_process.stages.align.clocks import late_sigma
 from kbs_process.stages.pointing import MIN_SAMPLES, PointingStatistics
-from kbs_process.stages.verdict import COVERAGE, Judgement, judge, peak_coverage
+from kbs_process.stages.verdict import COVERAGE, SEVERITY, judge, peak_coverage
 
-SEVERITY: tuple[Judgement, ...] = ("pass", "undecided", "fail")
-NOTHING = "no recording has both commands and angles"
 NOT_AN_ORBIT = "a recording is shorter than an orbit, and can only show that the variation is too large"
 
 SMOOTHING = 10.0  # s, divides slow variation from random error
@@ -51,15 +49,15 @@ def judged_pointing(campaign: Campaign, analyses: Sequence[Analysis], doubt: str
                 unread = 0.0 if instrument == "external" else _misread(campaign.rig, analysis, one.axis)
                 sigma = float(np.hypot(getattr(one, f"{requirement.statistic}_sigma"), unread))
                 below = peak_coverage(one.samples) if orbit else COVERAGE  # noise widens a range
-                rank = SEVERITY.index(judge(value, sigma, requirement.limit, below))
+                rank = SEVERITY[judge(value, sigma, requirement.limit, below)]
                 found.append((rank, value, sigma, f"{one.axis} in {analysis.entry.name}, by {instrument}"))
         rank, value, sigma, where = max(found, key=lambda one: (one[0], one[1] + one[2]), default=(1, 0.0, 0.0, ""))
-        why = (doubt or (NOT_AN_ORBIT if orbit else "")) if found else NOTHING
+        why = (doubt or (NOT_AN_ORBIT if orbit else "")) if found else "no recording has both commands and angles"
         yield JudgedPointing(
             name=requirement.name,
             statistic=requirement.statistic,
             limit=requirement.limit,
-            verdict="undecided" if why and rank < 2 else SEVERITY[rank],
+            verdict="undecided" if why and rank < 2 else list(SEVERITY)[rank],
             value=value if found else None,
             sigma=sigma if found else None,
             where=where,
@@ -71,11 +69,10 @@ def judged_pointing(campaign: Campaign, analyses: Sequence[Analysis], doubt: str
 def _misread(rig: Rig, analysis: Analysis, axis: str) -> float:
     """What an encoder may misread, rad, one standard deviation."""
     index = rig.joint_names.index(axis)
-    encoder = rig.joints[index].encoder
-    offset, step = (0.0, 0.0) if encoder is None else (float(encoder.offset.sigma), float(encoder.step))
+    encoder, rate = rig.joints[index].encoder, analysis.motion.qd[:, index]
+    own = (0.0, 0.0) if encoder is None else (float(encoder.offset.sigma), float(encoder.step) / 12.0**0.5)
     late = late_sigma(analysis.run.clocks, None, analysis.entry.clock_sigma)
-    rate = float(np.sqrt(np.mean(analysis.motion.qd[:, index] ** 2)))
-    return float(np.sqrt(offset**2 + step**2 / 12.0 + (late * rate) ** 2))
+    return float(np.linalg.norm([*own, late * np.sqrt(np.mean(rate**2))]))
 
 
 def _statistics(analysis: Analysis) -> Iterator[tuple[Instrument, PointingStatistics]]:
@@ -84,10 +81,8 @@ def _statistics(analysis: Analysis) -> Iterator[tuple[Instrument, PointingStatis
     if analysis.entry.role == "calibration" or command is None:
         return
     predicted = None if analysis.predicted is None else analysis.predicted.angle
-    sources: tuple[tuple[Instrument, Signal | None], ...] = (
-        ("encoder", run.angle), ("external", run.pointing), ("predicted", predicted)
-    )  # fmt: skip
-    for instrument, actual in sources:
+    sources: dict[Instrument, Signal | None] = {"encoder": run.angle, "external": run.pointing, "predicted": predicted}
+    for instrument, actual in sources.items():
         if actual is None or not set(actual.channels) <= set(command.channels):
             continue
         desired = command.values[:, [command.channels.index(name) for name in actual.channels]]

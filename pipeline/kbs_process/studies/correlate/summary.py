@@ -25,6 +25,7 @@ from kbs_process.stages.gravity.ladder import Rung
 from kbs_process.stages.gravity.model import GravityModel, taring_error
 from kbs_process.stages.gravity.quality import feasibility
 from kbs_process.stages.to_cog import ASSUMPTION
+from kbs_process.stages.verdict import SEVERITY
 from kbs_process.studies.correlate import results
 from kbs_process.studies.correlate.findings import band, merits, repeatabilities, resonances, statements
 from kbs_process.studies.correlate.methods import methods
@@ -100,10 +101,9 @@ def date_of(analyses: Sequence[Analysis]) -> str:
 
 def conclusion(requirements: Sequence[Requirement], pointed: Sequence[JudgedPointing] = ()) -> Conclusion:
     """Return what the worst verdict says, in a sentence; on the disturbance, unless one on pointing is worse."""
-    order = ("pass", "undecided", "fail")
-    worst = max(requirements, key=lambda one: (order.index(one.verdict), one.only_without), default=None)
-    pointing = max(pointed, key=lambda one: order.index(one.verdict), default=None)
-    if pointing and (worst is None or order.index(pointing.verdict) > order.index(worst.verdict)):
+    worst = max(requirements, key=lambda one: (SEVERITY[one.verdict], one.only_without), default=None)
+    pointing = max(pointed, key=lambda one: SEVERITY[one.verdict], default=None)
+    if pointing and (worst is None or SEVERITY[pointing.verdict] > SEVERITY[worst.verdict]):
         return Conclusion(status=pointing.verdict, sentence=_of_pointing(pointing))
     if worst is None:
         return Conclusion(status="none", sentence="The campaign states no requirement.")
