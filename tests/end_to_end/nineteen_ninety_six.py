@@ -35,6 +35,11 @@ def main() -> None:
         print("Below 1 Hz, rms / N m: measured, noise of the transducer, all that is not known")
         for recording, channel, rms, noise, total in noises(campaign):
             print(f"  {recording:12} {channel} {rms:.5f} {noise:.5f} {total:.5f}, noise {noise / rms:.0%}")
+        print("Torque read over torque on a rigid base, and what the matrix of the transducer leaves")
+        for gain in resonance(campaign):
+            print(f"  {gain}")
+        for channel, share in coupling(campaign):
+            print(f"  {channel} of EL089P00_1 below 1 Hz: {share:.4f} of all that is not known")
         print("EL089P00_1, Tx below 1 Hz, rms / N m")
         for what, rms in encoders(campaign).items():
             print(f"  {what}: {rms:.5f}")
@@ -60,6 +65,22 @@ def noises(campaign: Processed) -> Iterator[tuple[str, str, float, float, float]
                 noise,
                 row["total"],
             )
+
+
+def resonance(campaign: Processed) -> Iterator[str]:
+    """Gains of the torques at the bands' edges and the first pose."""
+    gains = campaign.results["transducer"]["gains"]
+    for one in gains:
+        if one["angle_rad"] == gains[0]["angle_rad"]:
+            yield f"{one['channel']} at {one['frequency_Hz']:g} Hz: {one['gain']:.2f}"
+
+
+def coupling(campaign: Processed) -> Iterator[tuple[str, float]]:
+    """Share of the whole uncertainty at the spacecraft that cross-coupling has, in EL089P00_1 below 1 Hz."""
+    for row in campaign.results["budget"]:
+        if (row["recording"], row["band"], row["frame"]) == ("EL089P00_1", "lt1Hz", "S"):
+            part = next(item["sigma"] for item in row["contributions"] if item["stage"] == "cross-coupling")
+            yield row["channel"], part / row["total"]
 
 
 def encoders(campaign: Processed) -> dict[str, float]:

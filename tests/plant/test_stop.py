@@ -63,6 +63,11 @@ def test_what_stays_within_the_range_is_left_alone() -> None:
     np.testing.assert_array_equal(stopped(path, controller(), np.inf).position, path.position)
 
 
+def test_a_request_that_is_no_time_stops_at_once() -> None:
+    made = stopped(commands("EL089P00"), controller(), np.nan)
+    np.testing.assert_array_equal(made.position, np.tile(made.position[0], (len(made.t), 1)))
+
+
 def test_a_stop_needs_an_acceleration() -> None:
     with pytest.raises(SimulationError, match="nothing says how fast"):
         stopped(commands("EL089P00"), replace(controller(), acceleration=None), 5.0)

@@ -33,7 +33,7 @@ def stopped(schedule: Schedule, controller: Controller | None, request: float) -
     which that is within its range. Raises SimulationError for a request without a stated acceleration.
     """
     if controller is None or controller.acceleration is None:
-        if request < np.inf:
+        if request != np.inf:
             raise SimulationError("nothing says how fast the controller stops", remedy="state controller.acceleration")
         return schedule
     most, t, position, rate = controller.acceleration.value, schedule.t, schedule.position.copy(), schedule.rate.copy()
@@ -41,7 +41,7 @@ def stopped(schedule: Schedule, controller: Controller | None, request: float) -
     high = np.inf if controller.highest is None else controller.highest.value
     rest = position + rate * np.abs(rate) / (2.0 * most)  # where it would come to
     out = (rest < low) | (rest > high)
-    stops = np.vstack([out[1:], out[-1:]]) | (t >= request)[:, None]
+    stops = np.vstack([out[1:], out[-1:]]) | ~(t < request)[:, None]
     for joint in np.flatnonzero(stops.any(axis=0)):
         first = int(np.argmax(stops[:, joint]))
         speed, brake = rate[first, joint], np.copysign(most[joint], rate[first, joint])

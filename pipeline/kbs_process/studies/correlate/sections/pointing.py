@@ -16,18 +16,18 @@ from kbs_process.studies.correlate.results import Results
 _SAYS = Prose("kbs_process.studies.correlate", "pointing")
 
 
-def panel(results: Results, tables: Tables) -> Panel:
-    """Densities of the first recordings, and the statistics of all."""
-    question = "How well did the article point, as its encoders and an external instrument saw it?"
-    rows = results.pointing
-    if not rows:
-        text = Text("No recording has both commands and angles: nothing can be said of pointing.")
-        return Panel("pointing", "Pointing", question, (text,))
+def panel(results: Results, tables: Tables) -> Panel | None:
+    """Densities of the first recordings, the statistics of all, and what they must meet."""
+    rows, judged = results.pointing, results.judged_pointing
+    if results.campaign.frame != "T" and not judged:
+        return None
     blocks: list[Block] = []
     pictures = _densities(rows, tables)
     if pictures:
         blocks.append(Figure("Distribution of the pointing error", pictures, _SAYS.caption("density")))
-    blocks += [_table(rows), *([_judged(results)] if results.judged_pointing else [])]
+    nothing = Text("No recording has both commands and angles: nothing can be said of pointing.")
+    blocks += [_table(rows) if rows else nothing, *([_judged(results)] if judged else [])]
+    question = "How well did the article point, as its encoders and an external instrument saw it?"
     return Panel("pointing", "Pointing", question, tuple(blocks))
 
 
