@@ -53,7 +53,8 @@ def recorded() -> Run:
 
 def analysis(run: Run, role: str = "fit", predicted: Run | None = None) -> Analysis:
     entry = SimpleNamespace(role=role, name="R1", clock_sigma=0.0)
-    motion = SimpleNamespace(qd=np.tile([0.005, -0.002], (10, 1)))
+    assert run.angle is not None
+    motion = SimpleNamespace(qd=np.tile([0.005, -0.002], (len(run.angle), 1)))
     return cast(Analysis, SimpleNamespace(entry=entry, run=run, predicted=predicted, motion=motion))
 
 
@@ -115,6 +116,18 @@ def test_an_encoder_is_believed_as_far_as_its_offset_and_rounding_are_known() ->
     assert near.value == pytest.approx(OFFSET, rel=1e-3)
     assert near.sigma == pytest.approx(sigma, rel=0.02)
     assert judged("bias", 1e-3, external=False).verdict == "pass"
+
+
+def test_nothing_is_met_by_an_instrument_that_lacks_readings() -> None:
+    run = recorded()
+    assert run.pointing is not None
+    lacking = run.pointing.valid.copy()
+    lacking[len(lacking) // 2] = False
+    holed = replace(run, pointing=replace(run.pointing, valid=lacking))
+    asked = PointingRequirement("bias", "bias", 2.0 * MISREAD, "")
+    stated = cast(Campaign, SimpleNamespace(pointing=(asked,), rig=archived.rig()))
+    (one,) = judged_pointing(stated, [analysis(holed)], "")
+    assert (one.verdict, one.where[2:]) == ("undecided", " in R1, by external, which lacks readings")
 
 
 def test_nothing_is_met_where_the_rig_is_in_doubt_or_nothing_was_recorded() -> None:

@@ -25,7 +25,7 @@ SMOOTHING = 10.0  # s, divides slow variation from random error
 def recorded_pointing(analyses: Sequence[Analysis]) -> Iterator[RecordedPointing]:
     """Yield the statistics of every axis of every recording that was commanded; calibrations move to stand still."""
     for analysis in analyses:
-        for instrument, one in _statistics(analysis):
+        for instrument, one, _ in _statistics(analysis):
             yield RecordedPointing(recording=analysis.entry.name, instrument=instrument, estimate=estimate(one))
 
 
@@ -35,13 +35,13 @@ def judged_pointing(campaign: Campaign, analyses: Sequence[Analysis], doubt: str
     An external instrument is believed before the encoder. By an encoder, a statistic may be wrong by its offset, by
     its rounding, and by the rate times what is not known of its clock.
     """
-    rows = [(analysis, instrument, one) for analysis in analyses for instrument, one in _statistics(analysis)]
-    external = {(analysis.entry.name, one.axis) for analysis, instrument, one in rows if instrument == "external"}
+    rows = [(analysis, *row) for analysis in analyses for row in _statistics(analysis)]
+    external = {(analysis.entry.name, one.axis) for analysis, instrument, one, _ in rows if instrument == "external"}
     for requirement in campaign.pointing:
         orbit = requirement.statistic == "orbit"
         found: list[tuple[int, float, float, str]] = []
         predicted: list[float] = []
-        for analysis, instrument, one in rows:
+        for analysis, instrument, one, whole in rows:
             value = abs(getattr(one, requirement.statistic))
             if instrument == "predicted":
                 predicted.append(value)
@@ -49,8 +49,11 @@ def judged_pointing(campaign: Campaign, analyses: Sequence[Analysis], doubt: str
                 unread = 0.0 if instrument == "external" else _misread(campaign.rig, analysis, one.axis)
                 sigma = float(np.hypot(getattr(one, f"{requirement.statistic}_sigma"), unread))
                 below = peak_coverage(one.samples) if orbit else COVERAGE  # noise widens a range
-                rank = SEVERITY[judge(value, sigma, requirement.limit, below)]
-                found.append((rank, value, sigma, f"{one.axis} in {analysis.entry.name}, by {instrument}"))
+                rank = max(SEVERITY[judge(value, sigma, requirement.limit, below)], int(not whole))
+                where = (
+                    f"{one.axis} in {analysis.entry.name}, by {instrument}{'' if whole else ', which lacks readings'}"
+                )
+                found.append((rank, value, sigma, where))
         rank, value, sigma, where = max(found, key=lambda one: (one[0], one[1] + one[2]), default=(1, 0.0, 0.0, ""))
         why = (doubt or (NOT_AN_ORBIT if orbit else "")) if found else "no recording has both commands and angles"
         yield JudgedPointing(
@@ -75,8 +78,8 @@ def _misread(rig: Rig, analysis: Analysis, axis: str) -> float:
     return float(np.linalg.norm([*own, late * np.sqrt(np.mean(rate**2))]))
 
 
-def _statistics(analysis: Analysis) -> Iterator[tuple[Instrument, PointingStatistics]]:
-    """Statistics of every axis by every instrument, and as predicted; none of a calibration."""
+def _statistics(analysis: Analysis) -> Iterator[tuple[Instrument, PointingStatistics, bool]]:
+    """Statistics of every axis by every instrument, and as predicted, and if none lacks; none of a calibration."""
     run, command = analysis.run, analysis.run.command
     if analysis.entry.role == "calibration" or command is None:
         return
@@ -89,7 +92,7 @@ def _statistics(analysis: Analysis) -> Iterator[tuple[Instrument, PointingStatis
         error = pointing.error(actual, command.t, desired)
         if error.valid.sum() >= MIN_SAMPLES:
             for one in pointing.statistics(error, period=len(error) * error.dt, smoothing=SMOOTHING):
-                yield instrument, one
+                yield instrument, one, bool(np.ptp(np.flatnonzero(error.valid)) < error.valid.sum())
 
 
 def estimate(one: PointingStatistics) -> PointingEstimate:

@@ -54,8 +54,11 @@ def summarise(
         judged(campaign, requirement, runs, budget, checked.doubts(requirement), checked.rounding, checked.mute)
         for requirement in campaign.requirements
     )
-    unsound = "" if checked.soundness.sound and all(one.ok for one in checked.conventions) else WRONG
-    pointed = tuple(judged_pointing(campaign, analyses, unsound))
+    cut = any(one.start is not None or one.end is not None for one in campaign.recordings)
+    doubt = "" if checked.soundness.sound and all(one.ok for one in checked.conventions) else WRONG
+    pointed = tuple(
+        judged_pointing(campaign, analyses, doubt or ("a part that is cut off is not judged" if cut else ""))
+    )
     found = results.Results(
         campaign=results.CampaignSummary(
             name=campaign.name,
