@@ -18,11 +18,10 @@ from kbs_process.results.judged import Doubt
 from kbs_process.signals.records import Signal
 from kbs_process.stages import bandpass
 from kbs_process.stages.bandpass import Band, bridging_error, crossing_rate
-from kbs_process.stages.verdict import COVERAGE, Extreme, Judgement, extremes, interval, judge, peak_coverage
+from kbs_process.stages.verdict import COVERAGE, SEVERITY, Extreme, Judgement, extremes, interval, judge, peak_coverage
 
 _NONE: Mapping[str, float] = {}
 MOSTLY = 0.25  # of a band's filter may lean on what is not known, where a value still tells that something was there
-SEVERITY: dict[Judgement, int] = {"pass": 0, "undecided": 1, "fail": 2}
 
 
 @dataclass(frozen=True, slots=True)

@@ -94,7 +94,7 @@ DOCUMENT = Document(
         _on_transducer(coupling.panel),
         repeatability.panel,
         budget.panel,
-        _on_transducer(pointing.panel),
+        pointing.panel,
         recordings.panel,
         _on_transducer(conventions.panel),
         methods.panel,

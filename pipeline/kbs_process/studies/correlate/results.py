@@ -11,7 +11,7 @@ from typing import Literal
 import msgspec
 
 from kbs_process.results.judged import Budget, Frame, Requirement, Soundness
-from kbs_process.results.pointing import RecordedPointing
+from kbs_process.results.pointing import JudgedPointing, RecordedPointing
 from kbs_process.results.records import Check, Constant, InputFile, Record, ResultsFile
 from kbs_process.signals.records import Loss
 from kbs_process.stages import compare
@@ -310,6 +310,7 @@ class Results(ResultsFile, frozen=True, kw_only=True):
     document: DocumentHead = DocumentHead()
     model: ModelVerdict | None = None  # None: nothing was predicted
     requirements: tuple[Requirement, ...] = ()
+    judged_pointing: tuple[JudgedPointing, ...] = ()
     recordings: tuple[Recording, ...] = ()
     conventions: tuple[SignCheck, ...] = ()
     soundness: Soundness = Soundness()
