@@ -12,6 +12,7 @@ from scipy.linalg.lapack import dtrtri
 
 from proof.rivals.case import Array
 from proof.rivals.smoother.balance import Motion
+from proof.rivals.smoother.course import Course
 from proof.rivals.smoother.problem import Problem
 from proof.rivals.smoother.splines import LOCAL
 
@@ -58,6 +59,8 @@ class State:
         sigma = self.sigma.copy()
         sigma[problem.forces] *= stiff
         for k in range(len(self.ideal)):
+            if problem.present:
+                problem.acting[k] = self.course(problem, k).columns(problem.present)
             for _ in range(_RUNS):
                 self.ideal[k], self.ideal_torques[k] = _moved(
                     problem, k, self.x, self.ideal[k], self.ideal_torques[k], self.weights(problem, k, sigma)
@@ -73,6 +76,10 @@ class State:
     def ideal_motion(self, problem: Problem, k: int) -> Motion:
         """The motion that the model has by itself."""
         return problem.recordings[k].splines.motion(self.ideal[k])
+
+    def course(self, problem: Problem, k: int) -> Course:
+        """What effects do along that motion."""
+        return Course(problem, k, self.x, self.ideal_motion(problem, k), self.ideal_torques[k])
 
     def weights(self, problem: Problem, k: int, sigma: Array | None = None) -> Array:
         """(n, rows) one over the variance of each row, as far as samples are independent."""

@@ -11,6 +11,7 @@ A row's weight is one over its variance; where recordings say nothing, it has no
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -21,21 +22,25 @@ from scipy.ndimage import binary_erosion
 
 from kbs_process.diagnosis.experiments.experiment import Experiment
 from kbs_process.diagnosis.experiments.hypothesis import decoupling
+from kbs_process.diagnosis.screening.suspects import Candidate, own_values
+from kbs_process.plant.laws import select
 from kbs_process.rig.model import Amplifier, Rig
 from kbs_process.stages.gravity.parameters import RigElements
 from proof.rivals.case import Array
 from proof.rivals.smoother.balance import FIRST_JOINT, FLOOR, PLATE, Loads, Motion, needed
-from proof.rivals.smoother.drive import Field, priors, spring
+from proof.rivals.smoother.drive import WRITTEN, Field, priors, spring
 from proof.rivals.smoother.splines import BAND_HZ, Splines, in_band
 
 _ENDS = 1.0  # s left out at a recording's ends, and half of it beside gaps
 _LINES = 3  # first terms of a channel's zero: constant, slope, curvature
 _DRIFT = 0.05  # of the bias's sigma: what they drift by
 _PINK_HZ = 0.1  # up to which a channel's noise may be 1/f, as large as its white noise there
+_WAVES = 24  # of a zero at most: of a long recording the slowest, where 1/f noise is most
 _CLOCK = 3e-3  # s, of a clock against the field's
 _LEAST = 0.1  # of its value: what a stiffness, a damping or an inertia is at least
 _STEPS = (1e-6, 1e-6, 1e-4)  # of values, rates and accelerations, for slopes
 _FLOOR_STEP = 1e-3  # m/s^2
+_EXACT = 1e-6  # of an amplitude that is known without a sigma: its sigma, of itself
 _SHARE = 1e-3  # of a sigma: step of an unknown
 _OF_RIG = ("body.", "transducer.tilt", "transducer.stiffness", "transducer.damping")
 _OF_JOINT = (".origin", ".misalignment", ".Ka", ".fsv", ".Tmax")
@@ -68,7 +73,7 @@ class Recording:
 
     @property
     def _waves(self) -> NDArray[np.int_]:
-        return np.arange(_LINES, int(2 * _PINK_HZ * self.n * self.dt) + 1)
+        return np.arange(_LINES, min(int(2 * _PINK_HZ * self.n * self.dt), _WAVES) + 1)
 
     def spread(self, bias: Array, white: Array) -> Array:
         """Sigmas (channels, terms) of a zero: `bias` is the constant's, `white` the noise, one-sided, per Hz."""
@@ -97,6 +102,11 @@ class Problem:
         self.sigma[self.wrench] = noise / np.sqrt(rate * dt)
         self.sigma[self.angles] = [float(j.encoder.step) / np.sqrt(12) for j in self.rig.joints if j.encoder]
         self.independent = 2 * BAND_HZ * dt  # numbers a sample
+        self.present = present(self.rig, experiment.effects)
+        # What a unit of each of their amplitudes does to the rows of each recording, along the motion that is its own.
+        self.acting = [
+            np.zeros((r.n, self.rows, sum(len(c.amplitudes) for c in self.present))) for r in self.recordings
+        ]
         self._place_unknowns()
 
     @cached_property
@@ -142,12 +152,14 @@ class Problem:
             (np.concatenate([value for value, _ in drives]), np.concatenate([sigma for _, sigma in drives])),
             (np.zeros(len(self.coupled)), np.array([X.sigma[place] for place in self.coupled])),
             (np.zeros(len(offsets)), np.array(offsets)),
+            _amplitudes(self.rig, self.present),
             *[(np.zeros(len(one)), one) for one in own],
         ]
         self.prior, self.spread = (np.concatenate([block[k] for block in blocks]) for k in (0, 1))
         ends = np.cumsum([0, *(len(value) for value, _ in blocks)])
-        of_rig, numbers, coupling, offset, *each = (slice(a, b) for a, b in pairwise(ends))
+        of_rig, numbers, coupling, offset, given, *each = (slice(a, b) for a, b in pairwise(ends))
         self.of_rig, self.numbers, self.coupling, self.offsets, self.own = of_rig, numbers, coupling, offset, each
+        self.given = given
         common = np.arange(each[0].start)
         self.local = [np.concatenate([common, np.arange(one.start, one.stop)]) for one in each]
         scales = (".Ka", ".fsv", ".Tmax", ".inertia[0]", ".inertia[1]", ".inertia[2]")
@@ -228,7 +240,7 @@ class Problem:
             wound, winding = rotor - angle[:, FIRST_JOINT + j], field.rate[:, j] / ratio - rate[:, FIRST_JOINT + j]
             out[:, self.joint.start + j] = float(numbers["Ka"]) * wound + float(numbers["fsv"]) * winding - torque
         out[:, self.floor] = angle[:, FLOOR]
-        return out
+        return out + self.acting[k] @ x[self.given]
 
     def residual(self, k: int, x: Array, motion: Motion, torques: Array) -> Array:
         """Measured less predicted (n, rows); the balances' measured is zero."""
@@ -265,12 +277,49 @@ class Problem:
         for column, place in enumerate(local):
             if common <= column < len(local) - 2:
                 continue
+            if self.given.start <= place < self.given.stop:
+                slopes[:, :, column] = self.acting[k][:, :, place - self.given.start]
+                continue
             step = _SHARE * self.spread[place]
             moved_x = x.copy()
             moved_x[place] += step
             same = (None, None) if place < self.of_rig.stop else (rig, loads)
             slopes[:, :, column] = (self.predicted(k, moved_x, motion, torques, *same) - base) / step
         return slopes
+
+
+def present(rig: Rig, effects: Sequence[str]) -> list[Candidate]:
+    """Effects that the model has beside those of a drive that are written here, at every place where they act."""
+    found = []
+    for effect in select([name for name in effects if name not in WRITTEN]):
+        sites = (
+            [joint.name for joint in rig.joints if joint.drive and effect.parameters[0].name in joint.drive.parameters]
+            if effect.port.of_drive
+            else [load.on for load in rig.external if load.name == effect.name]
+        )
+        for site in sites:
+            own = own_values(rig, site)
+            load = next((one for one in rig.external if one.name == effect.name), None)
+            point = None if load is None or load.point is None else tuple(map(float, load.point.value))
+            shape = tuple((one.name, own[one.name]) for one in effect.parameters if one.role != "amplitude")
+            found.append(Candidate(effect, site, shape, point))
+    return found
+
+
+def _amplitudes(rig: Rig, present: Sequence[Candidate]) -> tuple[Array, Array]:
+    """Values and sigmas of what they are linear in; one that is known exactly hardly moves."""
+    known = {
+        (site, name): quantity
+        for site, numbers in (
+            *((joint.name, joint.drive.parameters) for joint in rig.joints if joint.drive),
+            *((load.on, load.parameters) for load in rig.external),
+        )
+        for name, quantity in numbers.items()
+    }
+    own = [known[one.site, entry.name] for one in present for entry in one.amplitudes]
+    value = np.array([float(quantity) for quantity in own])
+    sigma = np.array([float(quantity.sigma) for quantity in own])
+    return value, np.maximum(sigma, _EXACT * np.maximum(np.abs(value), _EXACT))
 
 
 def _recording(experiment: Experiment, k: int) -> Recording:

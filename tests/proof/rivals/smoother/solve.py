@@ -33,6 +33,7 @@ STEPS = 25
 STIFF = (0.1, 0.03, 0.01)
 SETTLED = 100.0  # sigmas of all unknowns together that a step goes, below which forces are estimated
 ARRIVED = 3.0  # below which it is the last
+LEAST = 1e-3  # of what they are to begin with: smaller ones are nothing beside a reading's noise
 CHANGE = (0.3, 1.5)  # of a force's sigma in a step
 BEYOND = 1.6  # times a step of its logarithm, at most; and by what it changes where a step went beyond, and else
 ONWARD = (0.5, 1.2)
@@ -56,7 +57,7 @@ def solve(folder: Path) -> Answer:
     fitted = Problem(experiment, list(experiment.fit))
     state = settled(fitted)
     left = powers(fitted, state, Quadratic.of(fitted, state))
-    finds = _finds(fitted, state, _Judge.of(experiment, fitted, state), left.of_all)
+    finds, after = _finds(fitted, state, _Judge.of(experiment, fitted, state), left.of_all)
     moved = _moved(fitted, state)
     return Answer(
         method=METHOD,
@@ -76,6 +77,7 @@ def settled(problem: Problem, sigma: Array | None = None) -> State:
     """
     state = State.of(problem, _forces(problem) if sigma is None else sigma)
     wrong, phase = np.inf, 0
+    least = LEAST * _forces(problem)
     reach, before = np.ones(problem.rows)[problem.forces], np.zeros(problem.rows)[problem.forces]
     if sigma is not None:
         wrong, phase = 0.0, 2
@@ -84,6 +86,7 @@ def settled(problem: Problem, sigma: Array | None = None) -> State:
         quadratic = Quadratic.of(problem, state)
         if phase and sigma is None:
             ratio = np.sqrt(powers(problem, state, quadratic).noise[problem.forces])
+            ratio = np.maximum(ratio, least / state.sigma[problem.forces])
             wrong = float(np.abs(np.log(np.clip(ratio, *CHANGE))).max())
             reach *= np.where(np.log(ratio) * before < 0.0, *ONWARD)
             before = np.log(ratio)
@@ -108,11 +111,11 @@ def _forces(problem: Problem) -> Array:
     return WIDER * np.repeat([torque, OF_JOINT * torque, force / mass], [3, problem.joints, 3])
 
 
-def _finds(problem: Problem, state: State, judge: _Judge | None, power: Array) -> tuple[Claim, ...]:
+def _finds(problem: Problem, state: State, judge: _Judge | None, power: Array) -> tuple[tuple[Claim, ...], Array]:
     """Effects, one after the other: each the one that recordings of the fit and those held out together show most.
 
-    `power` (rows,) is what is left in each row. What comes again and no number takes up counts as noise until an
-    effect explains it.
+    And the power (rows,) that they leave. `power` is what is left in each row without any. What comes again and no
+    number takes up counts as noise until an effect explains it.
     """
     finds: list[Claim] = []
     known: list[Candidate] = []
@@ -142,7 +145,7 @@ def _finds(problem: Problem, state: State, judge: _Judge | None, power: Array) -
         )
         excess = power * left / all_
         known.append(best.candidate)
-    return tuple(finds)
+    return tuple(finds), excess
 
 
 def _first_of_each(scored: Sequence[Scored]) -> list[Scored]:
