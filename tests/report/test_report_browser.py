@@ -37,6 +37,22 @@ SPLIT_WORDS = """[...document.querySelectorAll('td')].filter(cell => cell.offset
   }
   return found;
 })"""
+# WCAG 2's contrast of each visible text against the ground under it; below 4.5 it is hard to read.
+FAINT_TEXTS = """(() => {
+  const numbers = (color) => color.match(/[\\d.]+/g).map(Number);
+  const light = (color) => numbers(color).slice(0, 3).map((part) => part / 255)
+    .map((part) => (part <= 0.04045 ? part / 12.92 : ((part + 0.055) / 1.055) ** 2.4))
+    .reduce((sum, part, i) => sum + part * [0.2126, 0.7152, 0.0722][i], 0);
+  const ground = (element) => {
+    const own = getComputedStyle(element).backgroundColor;
+    return numbers(own)[3] === 0 ? ground(element.parentElement) : own;
+  };
+  return [...document.querySelectorAll('body *')].filter((element) => element.offsetParent
+    && [...element.childNodes].some((node) => node.nodeType === 3 && node.data.trim())).filter((element) => {
+    const [low, high] = [light(getComputedStyle(element).color), light(ground(element))].sort((a, b) => a - b);
+    return (high + 0.05) / (low + 0.05) < 4.5;
+  }).map((element) => element.textContent.slice(0, 40));
+})()"""
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(CHROMIUM is None, reason="no chromium on this machine")]
 
@@ -201,6 +217,25 @@ def test_zooming_one_channel_zooms_all_and_another_recording_can_be_chosen(opene
     assert browser.complaints == []
 
 
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_text_is_easy_to_read_in_either_scheme(opened: Callable[[int], Browser], scheme: str) -> None:
+    browser = opened(1280)
+    browser.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
+    assert browser.evaluate(FAINT_TEXTS) == []
+    browser.call("Emulation.setEmulatedMedia", features=[])
+
+
+def test_plots_are_drawn_anew_in_the_dark(opened: Callable[[int], Browser]) -> None:
+    browser = opened(1280)
+    in_the_light = _pixels(browser)
+    browser.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": "dark"}])
+    browser.evaluate("new Promise(done => setTimeout(done, 300))")
+    assert all(now != then for now, then in zip(_pixels(browser), in_the_light, strict=True))
+    assert browser.evaluate(PREPARED) == 12
+    browser.call("Emulation.setEmulatedMedia", features=[])
+    assert browser.complaints == []
+
+
 def test_a_mark_gives_differences(opened: Callable[[int], Browser]) -> None:
     browser = opened(1280)
     over = "document.querySelector('.live .u-over')"
@@ -211,6 +246,38 @@ def test_a_mark_gives_differences(opened: Callable[[int], Browser]) -> None:
     reading = browser.evaluate("document.querySelector('.reading').textContent")
     assert reading.startswith("From the mark: Δt ")
     assert "ΔTz" in reading
+
+
+def test_keys_move_and_zoom_all_channels(opened: Callable[[int], Browser]) -> None:
+    browser = opened(1280)
+    whole = _pixels(browser)
+    browser.evaluate("document.querySelector('.plots').focus()")
+
+    def press(key: str) -> list[str]:
+        browser.evaluate(
+            f"document.activeElement.dispatchEvent(new KeyboardEvent('keydown', {{key: '{key}', bubbles: true}}))"
+        )
+        browser.evaluate("new Promise(done => setTimeout(done, 200))")
+        return _pixels(browser)
+
+    nearer = press("+")
+    later = press("ArrowRight")
+    assert all(one != other for one, other in zip(nearer, whole, strict=True))
+    assert all(one != other for one, other in zip(later, nearer, strict=True))
+    assert press("0") == whole
+
+
+def test_a_table_is_saved_as_numbers_that_programs_read(opened: Callable[[int], Browser]) -> None:
+    browser = opened(1280)
+    browser.evaluate(
+        "(() => { const cell = document.querySelector('.grid td.r');"
+        "cell.textContent = '−1.50\u00a0×\u00a010⁻³'; cell.nextElementSibling.textContent = 'a \"b\", c';"
+        "window.saved = []; URL.createObjectURL = (blob) => { window.saved.push(blob); return '#'; };"
+        "cell.closest('.grid').previousElementSibling.querySelector('.save').click(); })()"
+    )
+    lines = browser.evaluate("window.saved[0].text()").split("\r\n")
+    assert lines[0].startswith("Requirement,Band,Measured")
+    assert '-1.50e-3,"a ""b"", c"' in lines[1]
 
 
 def _pixels(browser: Browser) -> list[str]:

@@ -144,3 +144,19 @@ def report(results: Path, pdf: bool | None) -> None:
     if stale:
         say(f"{results / 'report.pdf'} showed the report of before, and is gone: --pdf makes it again")
     say(f"Report: {results / page.name}")
+
+
+@click.command(epilog=examples("compare results/EL089 results/EL089_FM", "compare results/2026-*/EL089"))
+@click.argument("results", nargs=-1, required=True, type=click.Path(path_type=Path))
+@output_option("results/comparison")
+@pdf_option
+def compare(results: tuple[Path, ...], output: Path | None, pdf: bool | None) -> None:
+    """Compare RESULTS of several campaigns, tests or versions of a model: requirements, fitted numbers, spectra.
+
+    They are shown in the order of their tests' dates.
+    """
+    from kbs_process.studies.compare.run import compare as run
+
+    if len(results) < 2:
+        raise click.UsageError("Give at least two folders of results.")
+    conclude(run(results, output or Path("results/comparison"), pdf))

@@ -29,6 +29,13 @@ def panel(made: Provenance, recorded: Mapping[str, str] | None = None) -> Panel:
     return Panel("provenance", "Provenance", "What made these results, and from what?", tuple(blocks))
 
 
+def maker(made: Provenance) -> str:
+    """Return the program's version, and the commit or the source that it was."""
+    changed = "+" if made.commit.endswith("+") else ""
+    code = f"commit {made.commit[:12]}{changed}" if made.commit else f"source {made.source[:12]}"
+    return f"kbs-process {made.version}, {code}"
+
+
 def section(results: ResultsFile, tables: Tables) -> Panel:
     """The section, as the last one of a document."""
     return panel(results.provenance)

@@ -9,6 +9,7 @@ from kbs_process.errors import OutputError, did_you_mean
 from kbs_process.report.build import build
 from kbs_process.report.document import Document
 from kbs_process.results.records import FILE, kind_of
+from kbs_process.studies.compare import report as compare
 from kbs_process.studies.correlate import report as correlate
 from kbs_process.studies.diagnose import report as diagnose
 from kbs_process.studies.flight import report as flight
@@ -17,6 +18,7 @@ from kbs_process.studies.reference_day import report as reference_day
 from kbs_process.studies.stability import report as stability
 
 DOCUMENTS: dict[str, Document[Any]] = {
+    "comparison": compare.DOCUMENT,
     "correlation": correlate.DOCUMENT,
     "diagnosis": diagnose.DOCUMENT,
     "flight": flight.DOCUMENT,

@@ -3,11 +3,13 @@
 (() => {
   // The computed curve is broad and pale under the measured one, so that both show where they agree.
   const LOOKS = {
-    measured: { stroke: "#1f4e79", width: 1 },
-    static: { stroke: "#f0a94a", width: 2.5 },
-    predicted: { stroke: "#f0a94a", width: 2.5 },
-    residual: { stroke: "#7c8591", width: 1 },
+    measured: { color: "measured", width: 1 },
+    static: { color: "predicted", width: 2.5 },
+    predicted: { color: "predicted", width: 2.5 },
+    residual: { color: "residual", width: 1 },
   };
+  // Colours are the page's, light or dark, at the time that something is drawn.
+  const color = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
   const LOWEST_FIRST = [1, 0, 2]; // computed, measured, residual: the order in which curves are drawn
   const ABSENT = -32768;
   const WHEEL = 0.8;
@@ -65,7 +67,7 @@
       ctx.beginPath();
       ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
       ctx.clip();
-      ctx.fillStyle = "#e6e9ed";
+      ctx.fillStyle = color("shade");
       for (const [start, end] of view.shaded) {
         const left = plot.valToPos(start, "x", true);
         ctx.fillRect(left, bbox.top, Math.max(1, plot.valToPos(end, "x", true) - left), bbox.height);
@@ -90,11 +92,11 @@
       ctx.lineWidth = devicePixelRatio;
       for (const level of limit === null ? [] : [-limit, limit]) {
         const y = plot.valToPos(level, "y", true);
-        line(bbox.left, y, bbox.left + bbox.width, y, "#b3261e", [6, 4]);
+        line(bbox.left, y, bbox.left + bbox.width, y, color("fail"), [6, 4]);
       }
       if (mark !== null) {
         const x = plot.valToPos(plot.data[0][mark], "x", true);
-        line(x, bbox.top, x, bbox.top + bbox.height, "#20262e", [2, 3]);
+        line(x, bbox.top, x, bbox.top + bbox.height, color("ink"), [2, 3]);
       }
       ctx.restore();
     };
@@ -147,7 +149,7 @@
         const span = top - bottom || Math.abs(top) || 1;
         return [bottom - below * span, top + above * span];
       };
-      const axis = { grid: { stroke: "#eceff2", width: 1 }, font: "11px sans-serif", labelFont: "12px sans-serif", labelSize: 20, stroke: "#3a434d" };
+      const axis = { grid: { stroke: color("faint"), width: 1 }, font: "11px sans-serif", labelFont: "12px sans-serif", labelSize: 20, stroke: color("ink"), ticks: { stroke: color("rule"), width: 1 } };
       const plot = new uPlot({
         width: box.clientWidth,
         height: view.channels.length === 1 ? 300 : last ? 176 : 146,
@@ -156,7 +158,8 @@
         series: [
           { label: "t / s", value: (_, v) => (v === null ? "–" : v.toFixed(2)) },
           ...order.map((i) => ({
-            ...LOOKS[names[i]],
+            stroke: color(LOOKS[names[i]].color),
+            width: LOOKS[names[i]].width,
             label: names[i],
             scale: apart && i === 2 ? "r" : "y",
             points: { show: false },
@@ -166,7 +169,7 @@
         axes: [
           { ...axis, label: last ? "time / s" : undefined, size: last ? 34 : 24 },
           { ...axis, label: `${channel.name} / ${tidy(channel.unit)}`, size: 62 },
-          ...(apart ? [{ ...axis, scale: "r", side: 1, label: "residual", size: 62, grid: { show: false }, stroke: "#7c8591", filter: (_, splits) => splits.map((v) => (v > highest ? null : v)) }] : []),
+          ...(apart ? [{ ...axis, scale: "r", side: 1, label: "residual", size: 62, grid: { show: false }, stroke: color("residual"), filter: (_, splits) => splits.map((v) => (v > highest ? null : v)) }] : []),
         ],
         hooks: { drawClear: [under], draw: [(plot) => over(plot, limit)], setCursor: [(plot) => read(plot.cursor.idx)] },
       }, [t, ...curves], box);
@@ -207,10 +210,25 @@
       });
       return jump;
     });
+    // Of the width that is shown: where its ends go.
+    const KEYS = { ArrowLeft: [-0.2, -0.2], ArrowRight: [0.2, 0.2], "+": [0.2, -0.2], "=": [0.2, -0.2], "-": [-0.3, 0.3] };
+    box.addEventListener("keydown", (event) => {
+      if (!plots.length || event.ctrlKey || event.metaKey || event.altKey) return;
+      if (event.key === "0") return void all.click();
+      if (!(event.key in KEYS)) return;
+      event.preventDefault();
+      const t = plots[0].data[0];
+      const { min, max } = plots[0].scales.x;
+      let [low, high] = KEYS[event.key].map((part, i) => [min, max][i] + part * (max - min));
+      if (low < t[0]) [low, high] = [t[0], high - low + t[0]];
+      if (high > t.at(-1)) [low, high] = [Math.max(t[0], low - high + t.at(-1)), t.at(-1)];
+      zoom(low, high);
+    });
     root.querySelector(".choices").append(recordings.frame, choices.frame, all, ...jumps, notes);
     root.hidden = false;
     root.parentElement.classList.add("live-on");
     show();
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", show);
     new ResizeObserver(() => plots.forEach((plot) => plot.setSize({ width: box.clientWidth, height: plot.height }))).observe(box);
   }
 
@@ -220,6 +238,29 @@
     figure(entry.target.querySelector(".live"));
   }), { rootMargin: "600px" });
   document.querySelectorAll(".live").forEach((root) => watcher.observe(root.parentElement));
+
+  // Every table can be taken along as CSV, with its numbers as a program reads them.
+  const plain = (text) => {
+    const told = text.trim().replaceAll("\u00a0", " ").replaceAll("−", "-");
+    const digits = { "⁻": "-", "⁰": "0", "¹": "1", "²": "2", "³": "3", "⁴": "4", "⁵": "5", "⁶": "6", "⁷": "7", "⁸": "8", "⁹": "9" };
+    const number = told.replace(/ × 10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)/g, (_, power) => `e${[...power].map((letter) => digits[letter]).join("")}`);
+    return /[",\n]/.test(number) ? `"${number.replaceAll('"', '""')}"` : number;
+  };
+  document.querySelectorAll(".grid table").forEach((table) => {
+    const title = document.getElementById(table.getAttribute("aria-labelledby"));
+    const save = element("button", "CSV", "save");
+    save.type = "button";
+    save.title = "Save this table as CSV";
+    save.addEventListener("click", () => {
+      const lines = [...table.rows].map((row) => [...row.cells].map((cell) => plain(cell.textContent)).join(","));
+      const link = element("a");
+      link.href = URL.createObjectURL(new Blob([lines.join("\r\n"), "\r\n"], { type: "text/csv" }));
+      link.download = `${title.id}.csv`;
+      link.click();
+      setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+    });
+    title.append(" ", save);
+  });
 
   addEventListener("beforeprint", () => document.querySelectorAll("details").forEach((fold) => { fold.open = true; }));
 })();

@@ -48,17 +48,14 @@ def head(results: Results) -> Head:
 
 
 def _identity(results: Results) -> tuple[tuple[str, str], ...]:
-    about, made = results.document, results.provenance
-    code = (
-        f"kbs-process {made.version}, {f'commit {made.commit[:12]}' if made.commit else f'source {made.source[:12]}'}"
-    )
+    about = results.document
     rows = {
         "Document": about.number,
         "Revision": about.revision,
         "Article's serial number": about.serial_number,
         "Date of test": about.date,
         "Operator": about.operator,
-        "Processed with": code + ("+" if made.commit.endswith("+") else ""),
+        "Processed with": provenance.maker(results.provenance),
     }
     return tuple((label, value) for label, value in rows.items() if value)
 
