@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +39,20 @@ class State:
         state = cls(problem.prior.copy(), [problem.start(k) for k in range(len(problem.recordings))], sigma)
         state.follow(problem)
         return state
+
+    def joined(self, before: Problem, problem: Problem) -> State:
+        """The same for a problem that has one effect more than the one `before`."""
+        x = problem.prior.copy()
+        shared = before.own[0].start
+        x[:shared] = self.x[:shared]
+        for old, new in zip(before.own, problem.own, strict=True):
+            clocks = old.stop - 2
+            x[new.start : new.start + clocks - old.start] = self.x[old.start : clocks]
+            x[new.stop - 2 : new.stop] = self.x[clocks : old.stop]
+        return replace(
+            self, x=x, coefficients=[*self.coefficients], sigma=self.sigma.copy(), torques=[*self.torques],
+            ideal=[*self.ideal], ideal_torques=[*self.ideal_torques],
+        )  # fmt: skip
 
     def motion(self, problem: Problem, k: int) -> Motion:
         """The motion of a recording."""

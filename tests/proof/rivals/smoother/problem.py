@@ -12,6 +12,7 @@ A row's weight is one over its variance; where recordings say nothing, it has no
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -102,12 +103,21 @@ class Problem:
         self.sigma[self.wrench] = noise / np.sqrt(rate * dt)
         self.sigma[self.angles] = [float(j.encoder.step) / np.sqrt(12) for j in self.rig.joints if j.encoder]
         self.independent = 2 * BAND_HZ * dt  # numbers a sample
-        self.present = present(self.rig, experiment.effects)
-        # What a unit of each of their amplitudes does to the rows of each recording, along the motion that is its own.
-        self.acting = [
-            np.zeros((r.n, self.rows, sum(len(c.amplitudes) for c in self.present))) for r in self.recordings
-        ]
+        self.given = present(self.rig, experiment.effects)
+        self.found: list[Candidate] = []
         self._place_unknowns()
+
+    def joined(self, candidate: Candidate) -> Problem:
+        """The same with an effect that was found, of which nothing is known but its bounds."""
+        new = copy(self)
+        new.found = [*self.found, candidate]
+        new._place_unknowns()
+        return new
+
+    @property
+    def present(self) -> list[Candidate]:
+        """Effects beside those of a drive that are written here."""
+        return [*self.given, *self.found]
 
     @cached_property
     def repeats(self) -> list[list[int]]:
@@ -146,22 +156,29 @@ class Problem:
         offsets = [float(joint.encoder.offset.sigma) for joint in self.rig.joints if joint.encoder is not None]
         bias = self.rig.transducer.bias.sigma
         white = 2.0 * self.sigma[self.wrench] ** 2 * self.experiment.dt
-        own = [np.append(one.spread(bias, white).ravel(), [_CLOCK, _CLOCK]) for one in self.recordings]
+        each = np.concatenate([_widths(one) for one in self.found if one.effect.each_trial] or [np.zeros(0)])
+        common = np.concatenate([_widths(one) for one in self.found if not one.effect.each_trial] or [np.zeros(0)])
+        own = [np.concatenate([one.spread(bias, white).ravel(), each, [_CLOCK, _CLOCK]]) for one in self.recordings]
         blocks = [
             (self.elements.value, self.elements.sigma),
             (np.concatenate([value for value, _ in drives]), np.concatenate([sigma for _, sigma in drives])),
             (np.zeros(len(self.coupled)), np.array([X.sigma[place] for place in self.coupled])),
             (np.zeros(len(offsets)), np.array(offsets)),
-            _amplitudes(self.rig, self.present),
+            _amplitudes(self.rig, self.given),
+            (np.zeros(len(common)), common),
             *[(np.zeros(len(one)), one) for one in own],
         ]
         self.prior, self.spread = (np.concatenate([block[k] for block in blocks]) for k in (0, 1))
         ends = np.cumsum([0, *(len(value) for value, _ in blocks)])
-        of_rig, numbers, coupling, offset, given, *each = (slice(a, b) for a, b in pairwise(ends))
-        self.of_rig, self.numbers, self.coupling, self.offsets, self.own = of_rig, numbers, coupling, offset, each
-        self.given = given
-        common = np.arange(each[0].start)
-        self.local = [np.concatenate([common, np.arange(one.start, one.stop)]) for one in each]
+        of_rig, numbers, coupling, offset, given, found, *owned = (slice(a, b) for a, b in pairwise(ends))
+        self.of_rig, self.numbers, self.coupling, self.offsets, self.own = of_rig, numbers, coupling, offset, owned
+        shared = np.arange(owned[0].start)
+        self.local = [np.concatenate([shared, np.arange(one.start, one.stop)]) for one in owned]
+        # Amplitudes of what is present, of each recording, and what a unit of each does to its rows along its motion.
+        self.amplitudes = [self._placed(given, found, one.stop - 2 - len(each)) for one in owned]
+        self.acting = [
+            np.zeros((r.n, self.rows, len(own))) for r, own in zip(self.recordings, self.amplitudes, strict=True)
+        ]
         scales = (".Ka", ".fsv", ".Tmax", ".inertia[0]", ".inertia[1]", ".inertia[2]")
         positive = [
             name.endswith(scales) or name.startswith(("transducer.stiffness", "transducer.damping"))
@@ -170,6 +187,20 @@ class Problem:
         self.dynamic = np.zeros(len(self.prior), dtype=bool)  # numbers that scale a balance, and show while it moves
         self.dynamic[: len(positive)] = np.array(positive) | [".inertia[" in name for name in self.elements.names]
         self.lower = np.where(positive, _LEAST * self.elements.value, self.elements.lower)
+
+    def _placed(self, given: slice, found: slice, own: int) -> NDArray[np.intp]:
+        """Where unknowns are that what is present is linear in; those of a recording's own begin at `own`."""
+        places = list(range(given.start, given.stop))
+        common, alone = found.start, own
+        for one in self.found:
+            count = len(one.amplitudes)
+            if one.effect.each_trial:
+                places += range(alone, alone + count)
+                alone += count
+            else:
+                places += range(common, common + count)
+                common += count
+        return np.array(places, dtype=np.intp)
 
     def rig_at(self, x: Array) -> Rig:
         """The rig with its elements at x."""
@@ -221,7 +252,7 @@ class Problem:
         for place, value in zip(self.coupled, x[self.coupling], strict=True):
             dX[place] = value
         out[:, self.wrench] = wrench @ (np.eye(6) + self._undone @ dX).T
-        out[:, self.wrench] += recording.zero @ own[:-2].reshape(6, -1).T
+        out[:, self.wrench] += recording.zero @ own[: 6 * recording.zero.shape[1]].reshape(6, -1).T
         out[:, self.angles] = angle[:, FIRST_JOINT:] + x[self.offsets]
         slope = np.gradient(recording.reading, recording.dt, axis=0)
         out[:, self.wrench] -= own[-2] * slope[:, self.wrench]
@@ -240,7 +271,7 @@ class Problem:
             wound, winding = rotor - angle[:, FIRST_JOINT + j], field.rate[:, j] / ratio - rate[:, FIRST_JOINT + j]
             out[:, self.joint.start + j] = float(numbers["Ka"]) * wound + float(numbers["fsv"]) * winding - torque
         out[:, self.floor] = angle[:, FLOOR]
-        return out + self.acting[k] @ x[self.given]
+        return out + self.acting[k] @ x[self.amplitudes[k]]
 
     def residual(self, k: int, x: Array, motion: Motion, torques: Array) -> Array:
         """Measured less predicted (n, rows); the balances' measured is zero."""
@@ -272,13 +303,14 @@ class Problem:
         base = self.predicted(k, x, motion, torques, rig, loads)
         slopes = np.zeros((self.recordings[k].n, self.rows, len(local)))
         zero, common = self.recordings[k].zero, self.own[0].start
-        for channel, of_channel in enumerate(np.split(np.arange(common, len(local) - 2), 6)):
-            slopes[:, channel, of_channel] = zero  # is linear
+        linear = np.arange(common, common + 6 * zero.shape[1])
+        for channel, of_channel in enumerate(np.split(linear, 6)):
+            slopes[:, channel, of_channel] = zero
+        acting = np.searchsorted(local, self.amplitudes[k])
+        slopes[:, :, acting] = self.acting[k]
+        exact = {*linear.tolist(), *acting.tolist()}
         for column, place in enumerate(local):
-            if common <= column < len(local) - 2:
-                continue
-            if self.given.start <= place < self.given.stop:
-                slopes[:, :, column] = self.acting[k][:, :, place - self.given.start]
+            if column in exact:
                 continue
             step = _SHARE * self.spread[place]
             moved_x = x.copy()
@@ -320,6 +352,11 @@ def _amplitudes(rig: Rig, present: Sequence[Candidate]) -> tuple[Array, Array]:
     value = np.array([float(quantity) for quantity in own])
     sigma = np.array([float(quantity.sigma) for quantity in own])
     return value, np.maximum(sigma, _EXACT * np.maximum(np.abs(value), _EXACT))
+
+
+def _widths(candidate: Candidate) -> Array:
+    """How large amplitudes may be."""
+    return np.array([max(abs(bound) for bound in entry.bounds) for entry in candidate.amplitudes])
 
 
 def _recording(experiment: Experiment, k: int) -> Recording:

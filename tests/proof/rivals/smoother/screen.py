@@ -32,12 +32,12 @@ _NEAR = 0.7  # of the gain, beside the best shape, from which on a parabola lead
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scored:
-    """A candidate beside what is known: what the best amplitudes take of the cost."""
+    """A candidate: what the best amplitudes take of the cost."""
 
     candidate: Candidate
-    gain: float  # over that of the known alone
+    gain: float
     freedom: int  # amplitudes that make a difference
-    amplitudes: Array  # of the known and this one that all recordings share, one after the other
+    amplitudes: Array  # that all recordings share
     likely: float = 0.0  # of amplitudes of this size, beforehand; see `_likely`
     foreseen: float = 0.0  # what these amplitudes take on recordings held out
 
@@ -124,12 +124,12 @@ class Screen:
         """What motion and numbers leave of each recording's rows (n, rows), over their sigmas."""
         return [part.left(self._own[self.problem.local[k]]) for k, part in self.quadratic.parts.items()]
 
-    def scored(self, chosen: Sequence[Candidate], known: Sequence[Candidate] = ()) -> list[Scored]:
-        """What each takes of the cost beside all numbers, and beside what is `known`; best first."""
-        found = [one for some in _batches(chosen, known) for one in self._scored(some, known)]
+    def scored(self, chosen: Sequence[Candidate]) -> list[Scored]:
+        """What each takes of the cost beside all numbers; best first."""
+        found = [one for some in _batches(chosen) for one in self._scored(some)]
         return sorted(found, key=lambda one: -one.worth)
 
-    def refined(self, one: Scored, known: Sequence[Candidate] = ()) -> Scored:
+    def refined(self, one: Scored) -> Scored:
         """The same with its shape where it takes most, one number after the other."""
         free = {
             entry.name: entry for entry in one.candidate.effect.parameters if entry.role == "shape" and not entry.whole
@@ -140,16 +140,16 @@ class Screen:
             for place in places:
                 entry = free[one.candidate.shape[place][0]]
                 low, high = entry.bounds
-                one = self._along(one, known, place, (low, min(high, BAND_HZ) if entry.unit == "Hz" else high))
+                one = self._along(one, place, (low, min(high, BAND_HZ) if entry.unit == "Hz" else high))
             if one.gain < (1.0 + _SETTLED) * before:
                 break
         return one
 
-    def _along(self, one: Scored, known: Sequence[Candidate], place: int, bounds: tuple[float, float]) -> Scored:
+    def _along(self, one: Scored, place: int, bounds: tuple[float, float]) -> Scored:
         def at(value: float) -> Scored:
             shape = list(one.candidate.shape)
             shape[place] = (shape[place][0], float(np.clip(value, *bounds)))
-            (found,) = self.scored([replace(one.candidate, shape=tuple(shape))], known)
+            (found,) = self.scored([replace(one.candidate, shape=tuple(shape))])
             return found
 
         step, best = _FIRST_STEP * max(abs(one.candidate.shape[place][1]), _FIRST_STEP), one
@@ -166,12 +166,12 @@ class Screen:
             best = max(best, low, high, key=lambda found: found.gain)
         return best
 
-    def predicted(self, one: Scored, known: Sequence[Candidate] = ()) -> float:
-        """What effects take of the cost with the amplitudes that they have, which were found elsewhere.
+    def predicted(self, one: Scored) -> float:
+        """What an effect takes of the cost with the amplitudes that it has, which were found elsewhere.
 
         Amplitudes of each recording's own are free, and count as `evidence`.
         """
-        found = self._products([*known, one.candidate])
+        found = self._products([one.candidate])
         square, right = self._beside(found)
         given, free = one.amplitudes, found.own
         gained = float(2.0 * given @ right[~free] - given @ square[np.ix_(~free, ~free)] @ given)
@@ -191,40 +191,15 @@ class Screen:
         given = one.amplitudes[-len(square) :]
         return float(given @ square @ given)
 
-    def explained(self, one: Scored, known: Sequence[Candidate]) -> list[Array]:
-        """What is `unexplained` once the known and one more are taken off, with the amplitudes that are best."""
-        every = [*known, one.candidate]
-        found = self._products(every)
+    def _scored(self, chosen: Sequence[Candidate]) -> Iterator[Scored]:
+        found = self._products(chosen)
         square, right = self._beside(found)
         size = np.sqrt(np.maximum(np.diag(found.squares), 1e-300))
-        _, amplitudes, _ = _best(square, right, size)
-        moved = self._own - self.quadratic.solve(self.problem.spread, found.unknowns @ amplitudes)
-        out = []
-        for place, (k, part) in enumerate(self.quadratic.parts.items()):
-            column = np.zeros(part.root.shape)
-            for number, candidate in enumerate(every):
-                shown = self.courses[k].columns([candidate])
-                mine = amplitudes[found.owner == number]
-                if candidate.effect.each_trial:
-                    mine = mine.reshape(len(self.quadratic.parts), -1)[place]
-                column += shown @ mine
-            out.append(part.left(moved[self.problem.local[k]], column * part.root))
-        return out
-
-    def _scored(self, chosen: Sequence[Candidate], known: Sequence[Candidate]) -> Iterator[Scored]:
-        every = [*known, *chosen]
-        found = self._products(every)
-        square, right = self._beside(found)
-        size = np.sqrt(np.maximum(np.diag(found.squares), 1e-300))
-        of_known = found.owner < len(known)
-        before = _best(square[np.ix_(of_known, of_known)], right[of_known], size[of_known]) if known else None
-        for number, one in enumerate(chosen, start=len(known)):
-            places = np.flatnonzero(of_known | (found.owner == number))
+        for number, one in enumerate(chosen):
+            places = np.flatnonzero(found.owner == number)
             gain, amplitudes, freedom = _best(square[np.ix_(places, places)], right[places], size[places])
-            if before is not None:
-                gain, freedom = gain - before[0], freedom - before[2]
-            mine = amplitudes[found.owner[places] == number].reshape(-1, len(one.amplitudes))
-            likely = _likely(one.amplitudes, np.sqrt(np.mean(mine**2, axis=0)))
+            each = amplitudes.reshape(-1, len(one.amplitudes))
+            likely = _likely(one.amplitudes, np.sqrt(np.mean(each**2, axis=0)))
             yield Scored(one, gain, freedom, amplitudes[~found.own[places]], likely)
 
     def _beside(self, found: _Products) -> tuple[Array, Array]:
@@ -232,35 +207,30 @@ class Screen:
         solved = self.quadratic.solve(self.problem.spread, found.unknowns)
         return found.squares - found.unknowns.T @ solved, found.residual - found.unknowns.T @ self._own
 
-    def estimated(self, one: Scored, known: Sequence[Candidate] = ()) -> tuple[Estimate, ...]:
-        """Amplitudes and shapes of an effect beside all numbers and what is known, with intervals of 95 %.
+    def estimated(self, one: Scored) -> tuple[Estimate, ...]:
+        """Amplitudes and shapes of an effect beside all numbers, with intervals of 95 %.
 
         Of amplitudes of each recording's own, those of the first. A shape that was chosen from a grid has no interval.
         """
         candidate, chosen = one.candidate, dict(one.candidate.shape)
         entries = {entry.name: entry for entry in candidate.effect.parameters}
         bends = [name for name in chosen if entries[name].role == "shape" and not entries[name].whole]
-        every = [*known, candidate]
-        found = self._products(every)
+        found = self._products([candidate])
         square, right = self._beside(found)
         _, amplitudes, _ = _best(square, right, np.sqrt(np.maximum(np.diag(found.squares), 1e-300)))
-        mine = found.owner == len(known)
-        found = self._products(every, _Bends(tuple(bends), amplitudes[mine].reshape(-1, len(candidate.amplitudes))))
+        found = self._products([candidate], _Bends(tuple(bends), amplitudes.reshape(-1, len(candidate.amplitudes))))
         square, right = self._beside(found)
         size = np.sqrt(np.maximum(np.diag(found.squares), 1e-300))
         covariance = np.linalg.pinv(square / np.outer(size, size), rcond=_DEPENDENT, hermitian=True)
         values, sigmas = covariance @ (right / size) / size, np.sqrt(np.maximum(np.diag(covariance), 0.0)) / size
-        first = np.flatnonzero(found.owner == len(known))[: len(candidate.amplitudes)]
+        first = np.arange(len(candidate.amplitudes))
         told = [(entry, values[k], sigmas[k]) for entry, k in zip(candidate.amplitudes, first, strict=True)]
-        bent = np.flatnonzero(found.owner > len(known))
+        bent = np.flatnonzero(found.owner > 0)
         told += [
             (entries[name], chosen[name] + float(np.clip(values[k], -3.0 * sigmas[k], 3.0 * sigmas[k])), sigmas[k])
             for name, k in zip(bends, bent, strict=True)
         ]
-        return tuple(
-            Estimate(name=entry.name, unit=entry.unit, value=v, low=v - _NORMAL * s, high=v + _NORMAL * s)
-            for entry, v, s in ((entry, float(value), float(sigma)) for entry, value, sigma in told)
-        )
+        return tuple(estimate(entry.name, entry.unit, float(value), float(sigma)) for entry, value, sigma in told)
 
     def _products(self, every: Sequence[Candidate], bends: _Bends | None = None) -> _Products:
         sizes = [len(one.amplitudes) for one in every]
@@ -295,6 +265,11 @@ class Screen:
         return _Products(unknowns, residual, squares, owner[source], recording >= 0)
 
 
+def estimate(name: str, unit: str, value: float, sigma: float) -> Estimate:
+    """Return a number with its interval of 95 %."""
+    return Estimate(name=name, unit=unit, value=value, low=value - _NORMAL * sigma, high=value + _NORMAL * sigma)
+
+
 def _best(square: Array, right: Array, size: Array) -> tuple[float, Array, int]:
     """Gain, amplitudes and freedom of columns of `size` (m,) with their products."""
     values, vectors = np.linalg.eigh(square / np.outer(size, size))
@@ -314,7 +289,7 @@ def _likely(entries: Sequence[Parameter], size: Array) -> float:
     return float(-2.0 * np.sum(np.log1p((size / spread) ** 2)))
 
 
-def _batches(chosen: Sequence[Candidate], known: Sequence[Candidate]) -> Iterator[list[Candidate]]:
+def _batches(chosen: Sequence[Candidate]) -> Iterator[list[Candidate]]:
     batch: list[Candidate] = []
     for one in chosen:
         batch.append(one)
