@@ -34,7 +34,6 @@ from kbs_process.stages.align.readings import white
 from kbs_process.stages.align.spectrum import OCTAVES, quietest
 from kbs_process.stages.conventions import (
     BEYOND,
-    OF_CHANNEL,
     SignCheck,
     check_encoder_sense,
     check_gravity_sign,
@@ -188,12 +187,9 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
                 suggestions=tuple(told),
                 calibrated=not (timed or still or shifted or twice)
                 and _calibrated(campaign, samples, model, most)
-                and all(
-                    one.ok or (one.check.rpartition(", ")[2] in tests and one.check.startswith(OF_CHANNEL))
-                    for one in conventions
-                ),
+                and all(one.ok or (one.channel and one.check.rpartition(", ")[2] in tests) for one in conventions),
             )
-        tested = {one.check.split()[3] for one in conventions if one.testable and one.check.startswith(OF_CHANNEL)}
+        tested = {one.channel for one in conventions if one.testable}
         silent = tuple(key for key in mute if key in judged)
         unconfirmed = tuple(key for key in equation.channels if key not in tested)
         lag_of = {own.recording: abs(own.value) for _, own in lags if abs(own.value) > BEYOND * own.chance}
