@@ -5,6 +5,7 @@ They print nothing, and show how far they are only if asked to. What they comput
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -200,6 +201,7 @@ def simulate(
     *,
     commands: DataFrame | str | Path | None = None,
     rate_Hz: float | None = None,
+    stop: float = math.inf,
     show_progress: bool = False,
 ) -> dict[str, DataFrame]:
     """Run a campaign's plant on commands alone, through its controller; return a table for each stream.
@@ -209,26 +211,23 @@ def simulate(
 
     The commands are those recorded in the first run of `trajectory` (by default the last one listed), or those of a
     table, or of a CSV or Parquet file. The wrench comes at `rate_Hz`: by default at the recording's rate, and for a
-    table at 100 Hz. Only if `target` is given, the simulation is kept in that folder.
+    table at 100 Hz. A stop is requested at `stop`, s. Only if `target` is given, the simulation is kept in that folder.
     """
     from kbs_process.studies.predict.run import simulate_commands, simulate_trajectory
 
     if trajectory is not None and commands is not None:
         raise ConfigError("both a trajectory and commands are given", remedy="give one of them")
     loaded = _loaded(campaign, recordings=commands is None)
-    progress = _progress(show_progress)
+    how: dict[str, Any] = {"progress": _progress(show_progress), "stop": stop}
     if commands is None:
-        return _streams(
-            loaded, target, lambda to: simulate_trajectory(loaded, trajectory, to, rate_Hz=rate_Hz, progress=progress)
-        )
-    rate = rate_Hz or 100.0
+        return _streams(loaded, target, lambda to: simulate_trajectory(loaded, trajectory, to, rate_Hz=rate_Hz, **how))
     with TemporaryDirectory() as private:
         path = Path(private) / "commands.parquet"
         if isinstance(commands, str | Path):
             path = Path(commands)
         else:
             commands.to_parquet(path)
-        return _streams(loaded, target, lambda to: simulate_commands(loaded, path, to, rate_Hz=rate, progress=progress))
+        return _streams(loaded, target, lambda to: simulate_commands(loaded, path, to, rate_Hz=rate_Hz or 100.0, **how))
 
 
 def _prepared(campaign: Campaign | str | Path, target: str | Path | None, suffix: str) -> tuple[Campaign, Path]:

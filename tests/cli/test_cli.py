@@ -218,6 +218,17 @@ def test_wrong_words_are_status_2(arguments: tuple[str, ...], words: str, capsys
     assert "Traceback" not in message
 
 
+def test_validate_of_what_was_begun_is_json_where_that_is_asked(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    said = ["complete", "import"]
+    monkeypatch.setattr("kbs_process.studies.convert.begin.check_description", lambda folder: iter(said))
+    for name in ("campaign", "mapping"):
+        (tmp_path / f"{name}.toml").touch()
+    assert run("validate", str(tmp_path), "--json") == 0
+    assert json.loads(capsys.readouterr().out) == said
+
+
 @pytest.fixture
 def processable(tmp_path: Path) -> CampaignFolder:
     """The example's description with recordings of its rig that are long enough for the gravity fit."""

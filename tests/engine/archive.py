@@ -38,6 +38,9 @@ def make(campaign: Campaign, index: int, commands: Commands | None = None) -> Re
         epoch_ns=FIRST_DAY_NS + campaign.day * DAY_NS + index * RUN_NS,
         wrench_hz=run.wrench_hz,
         encoder_hz=run.encoder_hz,
+        laboratory=campaign.laboratory,
+        encoders=campaign.encoders,
+        over_a_turn=campaign.over_a_turn(),
     )
     for stream, start, end in run.gaps:
         recording = recording.with_gap(stream, start, end)
@@ -77,6 +80,8 @@ def finish(campaign: Campaign, runs: list[dict[str, Any]]) -> None:
         "hardware": {key: value.tolist() for key, value in article.values.items()},
         "recordings": runs,
     }
+    if (drawn := campaign.over_a_turn()) is not None:
+        truth["encoders over a turn"] = drawn.tolist()
     TRUTH_FOLDER.mkdir(parents=True, exist_ok=True)
     text = json.dumps(truth, indent=1)
     text = re.sub(r"\[[\s\d.,eE+-]+\]", lambda numbers: " ".join(numbers[0].split()), text)

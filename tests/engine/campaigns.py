@@ -5,12 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from engine.hardware import Bungee, Hardware
+from engine.encoders import PERFECT, Encoders
+from engine.hardware import Array, Bungee, Hardware
+from engine.laboratory import QUIET, Laboratory
 from engine.mcap_file import Format
 
 CAMPAIGNS_FOLDER = Path(__file__).resolve().parents[2] / "campaigns"
 
 SMALL = Format(message_index=False)
+SMALLER = Format(message_index=False, chunk_s=100.0)
 
 # The cord hangs from 3 m above the CoG that the nominal numbers give at az = el = 0 and carries
 # the antenna's weight, 137 N, there.
@@ -40,6 +43,9 @@ class Campaign:
     seed: int
     day: int  # of the test programme
     runs: tuple[Run, ...]
+    drawn_around: tuple[str, ...] = ()  # parameter files, where they are not the nominal ones
+    laboratory: Laboratory = QUIET
+    encoders: Encoders = PERFECT
 
     @property
     def folder(self) -> Path:
@@ -47,7 +53,11 @@ class Campaign:
 
     def hardware(self) -> Hardware:
         """Return the campaign's true hardware."""
-        return Hardware.from_campaign(self.folder, seed=self.seed)
+        return Hardware.from_campaign(self.folder, seed=self.seed, files=self.drawn_around)
+
+    def over_a_turn(self) -> Array | None:
+        """Return what the encoders of this article are off by over a turn, if they do more than round."""
+        return None if self.encoders == PERFECT else self.encoders.over_a_turn(self.seed)
 
 
 _CALIBRATION = Run("AZPS_ATA.mcap", "AZPS_ATA", wrench_hz=50.0, encoder_hz=20.0)
@@ -179,6 +189,20 @@ _ALL = (
             Run("AL012M00_1.mcap", "AL012M00", hung=True),
             Run("AL012M00_2.mcap", "AL012M00", hung=True),
         ),
+    ),
+    Campaign(
+        "EL089_1996",
+        seed=113,
+        day=13,
+        runs=(
+            Run("AZPS_ATA.mcap", "AZPS_RESTS", wrench_hz=20.0, encoder_hz=5.0, form=SMALLER),
+            Run("EL089P00_1.mcap", "EL089_AZ90", wrench_hz=25.0, encoder_hz=10.0, form=SMALLER),
+            Run("EL089P00_2.mcap", "EL089_AZ90", wrench_hz=25.0, encoder_hz=10.0, form=SMALLER),
+            Run("ACQ600_1.mcap", "ACQ600_FAR", wrench_hz=40.0, encoder_hz=5.0, form=SMALLER),
+        ),
+        drawn_around=("parameters/rig.toml", "parameters/expected.toml"),
+        laboratory=Laboratory(floor=2e-4, tilt=3e-6, joints=2e-3, motors=5e-5),
+        encoders=Encoders(once=(1e-4, 1e-4), twice=(5e-5, 5e-5), bit=(1e-4, 0.0), noise=(1e-4, 0.0)),
     ),
 )
 

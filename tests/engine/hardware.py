@@ -8,7 +8,7 @@ Everything is SI.
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -22,7 +22,7 @@ AXES = ("az", "el")
 BODIES = ("base", "azimuth", "antenna")
 
 # Factor to SI of every unit that the archive's parameter files use; another one is a KeyError.
-_SI = {"mrad": 1e-3, "deg": np.pi / 180, "mm": 1e-3} | dict.fromkeys(
+_SI = {"mrad": 1e-3, "deg": np.pi / 180, "deg/s^2": np.pi / 180, "mm": 1e-3} | dict.fromkeys(
     (
         "1", "rad", "m", "s", "kg", "N", "N m", "Hz", "1/s", "m/s^2", "rad/s", "kg m^2", "N m/rad", "N/m",
         "N m s/rad", "SI by channel pair",
@@ -65,15 +65,20 @@ class Hardware:
 
     @classmethod
     def from_campaign(
-        cls, folder: Path | str, overrides: Mapping[str, Any] | None = None, *, seed: int | None = None
+        cls,
+        folder: Path | str,
+        overrides: Mapping[str, Any] | None = None,
+        *,
+        seed: int | None = None,
+        files: Sequence[str] = (),
     ) -> Hardware:
-        """Return the campaign's nominal hardware, or one drawn around it.
+        """Return the campaign's nominal hardware, or one drawn around it; or of other parameter `files` in its folder.
 
         With a `seed`, each number is drawn from a normal distribution with the stated sigma, cut
         at two sigmas; phases (`phi_*`) are drawn from the whole circle. `overrides` (SI, by dotted
         name; also `loop`, `latency`, `bungee`) come last and are taken as they are.
         """
-        files = tomllib.loads((Path(folder) / "campaign.toml").read_text())["parameters"]["files"]
+        files = files or tomllib.loads((Path(folder) / "campaign.toml").read_text())["parameters"]["files"]
         tree: dict[str, Any] = {}
         for file in files:
             _merge(tree, tomllib.loads((Path(folder) / file).read_text()))

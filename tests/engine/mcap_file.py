@@ -33,7 +33,6 @@ from engine.ros2 import DEFINITIONS, JOINT_STATE, JSON_SCHEMAS, WRENCH_STAMPED, 
 from engine.sensors import Recording
 
 MAGIC = b"\x89MCAP0\r\n"
-CHUNK_NS = 10_000_000_000
 _ZSTD_LEVEL = 19
 
 
@@ -44,6 +43,7 @@ class Format:
     encoding: str = "cdr"  # or "json"
     compression: str = "zstd"  # or "lz4", or "" for none
     message_index: bool = True  # 16 bytes a message: a third of a small file
+    chunk_s: float = 10.0
     kept: float = 1.0  # part of the file that a recorder without power leaves behind
 
 
@@ -91,7 +91,7 @@ def _file(schemas: list[Schema], channels: list[Channel], arrivals: list[_Arriva
     out += _packed([Header(profile="ros2" if form.encoding == "cdr" else "", library="kbs engine")])
     indexes: list[ChunkIndex] = []
     declared = _packed([*schemas, *channels])  # the first chunk declares them, as recorders do
-    for group in _by_time(arrivals):
+    for group in _by_time(arrivals, round(1e9 * form.chunk_s)):
         indexes.append(_append_chunk(out, declared, group, form))
         declared = b""
     out += _packed([DataEnd(data_section_crc=0)])
@@ -128,10 +128,10 @@ def _file(schemas: list[Schema], channels: list[Channel], arrivals: list[_Arriva
     return bytes(out)
 
 
-def _by_time(arrivals: list[_Arrival]) -> Iterable[list[_Arrival]]:
+def _by_time(arrivals: list[_Arrival], chunk_ns: int) -> Iterable[list[_Arrival]]:
     group: list[_Arrival] = []
     for arrival in arrivals:
-        if group and arrival.log - group[0].log >= CHUNK_NS:
+        if group and arrival.log - group[0].log >= chunk_ns:
             yield group
             group = []
         group.append(arrival)

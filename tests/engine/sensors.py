@@ -13,7 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from engine.encoders import PERFECT, Encoders
 from engine.hardware import AXES, Array, Hardware
+from engine.laboratory import QUIET, Laboratory
 from engine.ports import NONE, Extra
 from engine.simulation import TIME_STEP, integrate, sample
 from engine.trajectories import Commands
@@ -86,16 +88,25 @@ def record(
     wrench_hz: float = 100.0,
     encoder_hz: float = 100.0,
     time_step: float = TIME_STEP,
+    laboratory: Laboratory = QUIET,
+    encoders: Encoders = PERFECT,
+    over_a_turn: Array | None = None,
 ) -> Recording:
-    """Simulate one run and record it. The same arguments give the same recording, bit by bit."""
-    run, clocks, noise, *arrivals = (np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(7))
+    """Simulate one run and record it. The same arguments give the same recording, bit by bit.
+
+    `over_a_turn` is what was drawn of the `encoders`; without it they only round.
+    """
+    run, clocks, noise, *others = (np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(10))
+    arrivals, (chance, looped, recorded) = others[:4], others[4:]
     hardware = vary(hardware, run)
     wrench_clock, encoder_clock = draw_clock(clocks, wrench_hz), draw_clock(clocks, encoder_hz)
-    dense = integrate(hardware, commands, time_step=time_step)
     duration = float(commands.t[-1])
+    extra = Extra(disturbance=laboratory.disturbance(duration, chance))
+    reads = [None if over_a_turn is None else encoders.change(over_a_turn, rng) for rng in (looped, recorded)]
+    dense = integrate(hardware, commands, time_step=time_step, extra=replace(extra, encoder=reads[0]))
     wrench_reading, wrench_t = ticks(wrench_clock, wrench_hz, duration)
     encoder_reading, encoder_t = ticks(encoder_clock, encoder_hz, duration)
-    result = sample(hardware, dense, wrench_t, encoder_t)
+    result = sample(hardware, dense, wrench_t, encoder_t, extra=replace(extra, encoder=reads[1]))
     drift = DRIFT_SPREAD * hardware.sigmas["transducer.bias"] * run.standard_normal(6)
     raw = read_transducer(hardware, wrench_t, result.wrench, drift, noise)
     command_values = np.hstack([commands.position, commands.rate])

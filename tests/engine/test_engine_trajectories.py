@@ -8,7 +8,9 @@ import pytest
 from engine import TRAJECTORIES
 
 # deg/s^2, out of the flight's envelope
-QUICK = {"AZPS_ATA": 0.15, "AL012M00": 0.25, "ALSTPP00": 0.25, "SWPAZ000": 0.03, "SWPEL000": 0.03}
+QUICK = {
+    "AZPS_ATA": 0.15, "AZPS_RESTS": 0.4, "AL012M00": 0.25, "ALSTPP00": 0.25, "SWPAZ000": 0.03, "SWPEL000": 0.03
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", TRAJECTORIES)
@@ -40,3 +42,10 @@ def test_calibration_covers_three_elevations_and_azimuth() -> None:
     az, el = np.degrees(path.position).T
     for elevation, least in ((70.0, 290.0), (78.5, 145.0), (87.0, 145.0)):
         assert np.ptp(az[np.abs(el - elevation) < 0.01]) > least
+
+
+def test_a_pseudo_static_calibration_rests_at_nine_poses() -> None:
+    path = TRAJECTORIES["AZPS_RESTS"]()
+    still = np.all(path.rate == 0.0, axis=1)
+    assert np.mean(still) > 0.25
+    assert len(np.unique(np.round(np.degrees(path.position[still])), axis=0)) == 9

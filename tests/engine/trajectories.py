@@ -136,6 +136,19 @@ def azps_ata() -> Commands:
     return commands(az, el, az.duration())
 
 
+def azps_rests() -> Commands:
+    """Rests of 8 s at nine poses: elevations 70, 78.5 and 87 deg at each of three azimuths, 120 deg apart."""
+    quick = 0.4  # deg/s^2, between the rests only
+    az, el = Axis(-120.0), Axis(70.0).rest(8.0)
+    for turn, step in ((120.0, 8.5), (120.0, -8.5), (0.0, 8.5)):
+        for _ in range(2):
+            el = el.move(step, acceleration=quick).rest(8.0)
+        if turn:
+            az = az.rest(el.duration() - az.duration()).move(turn, acceleration=quick)
+            el = el.rest(az.duration() - el.duration() + 8.0)
+    return commands(az, el, el.duration())
+
+
 def _aesing() -> tuple[Axis, Axis]:
     az = Axis(-60.0).rest(10.0).move(120.0)
     half = np.sqrt(120.0 / ACCELERATION_LIMIT)  # s: azimuth is fastest when elevation is highest
@@ -164,6 +177,11 @@ def el089p00() -> Commands:
     return commands(*_el089(), 200.0)
 
 
+def el089_az90() -> Commands:
+    """Elevation 70 to 87 deg as fast as 0.015 deg/s^2 lets it, azimuth at 90 deg: gravity's torque moves on Tx."""
+    return commands(Axis(90.0), Axis(70.0).rest(20.0).move(17.0), 110.0)
+
+
 def elstpp00() -> Commands:
     """EL089P00 with a stop in the middle of the coasting part."""
     az, el = _el089()
@@ -176,6 +194,15 @@ def acq600() -> Commands:
     az = az.accelerate(-0.03).rest(60.0)
     el = Axis(74.0).rest(20.0).accelerate(0.03).rest(38.0).accelerate(0.0).move(10.0, rate=0.4)
     return commands(az, el.accelerate(0.02).rest(60.0), 240.0)
+
+
+def acq600_far() -> Commands:
+    """Pre-pointing from one relay satellite to the other, 270 deg apart.
+
+    Azimuth turns at 1.6 deg/s: two a motor turn are then 0.89 Hz, nearly as fast as the band of 1 Hz shows.
+    """
+    az = Axis(-135.0).rest(10.0).move(270.0, rate=1.6).rest(10.0)
+    return commands(az, Axis(76.0).rest(60.0).move(8.0), az.duration())
 
 
 _BUNGEE_ACCELERATION = 0.25  # deg/s^2: the paper, too, left the flight's limit to reach 2 deg/s within +-12 deg
@@ -241,4 +268,7 @@ TRAJECTORIES: dict[str, Callable[[], Commands]] = {
     "SWPAZ000": swpaz000,
     "SWPEL000": swpel000,
     "TRKL0000": trkl0000,
+    "AZPS_RESTS": azps_rests,
+    "EL089_AZ90": el089_az90,
+    "ACQ600_FAR": acq600_far,
 }

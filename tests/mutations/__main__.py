@@ -13,11 +13,11 @@ from collections.abc import Iterator, Sequence
 from importlib import import_module
 from pathlib import Path
 
-from mutations import descriptions, recordings, tables
+from mutations import beginnings, descriptions, recordings, tables
 from mutations.process import Tried, try_one
 from mutations.subject import BAD, OUTCOMES, Subject
 
-SUBJECTS: tuple[Subject, ...] = (*descriptions.SUBJECTS, *recordings.SUBJECTS, *tables.SUBJECTS)
+SUBJECTS: tuple[Subject, ...] = (*descriptions.SUBJECTS, *recordings.SUBJECTS, *tables.SUBJECTS, *beginnings.SUBJECTS)
 # Imported before processes fork, which then need not.
 _LIBRARIES = ("asammdf", "h5py", "nptdms", "scipy.io", "pyarrow.parquet", "mcap_ros2.decoder", "matplotlib.figure")
 

@@ -18,7 +18,7 @@ from studies.convert import importer_files as files
 NAMES = ("t", "Fx", "Fy", "Fz", "angle")
 _ROWS = 300
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
-_CELLS = (
+CELLS = (
     "",
     " ",
     "nan",
@@ -29,6 +29,8 @@ _CELLS = (
     "1.2.3",
     "0x10",
     "1e400",
+    "1e308",
+    "-1e200",
     "-1e-400",
     '"',
     '"1',
@@ -156,7 +158,7 @@ def _mutate(name: str, file: str) -> Callable[[random.Random, Path], str]:
         data = path.read_bytes()
         if text and rng.random() < 0.5:
             lines = [line.split(",") for line in data.decode().splitlines()]
-            row, column, cell = rng.randrange(len(lines)), rng.randrange(len(NAMES)), rng.choice(_CELLS)
+            row, column, cell = rng.randrange(len(lines)), rng.randrange(len(NAMES)), rng.choice(CELLS)
             lines[row][column] = cell
             path.write_text("\n".join(",".join(line) for line in lines) + "\n", encoding="utf-8")
             return f"cell {column} of line {row} is {cell[:20]!r}"

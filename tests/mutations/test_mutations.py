@@ -19,7 +19,7 @@ from mutations.subject import Outcome, Subject, damaged
 pytestmark = pytest.mark.slow
 
 TESTS = Path(__file__).parents[1]
-QUICK = ("toml", "csv", "npy", "mcap ros2", "mcap ros2, no checksums", "mcap json, no checksums", "schemas")
+QUICK = ("toml", "init", "csv", "npy", "mcap ros2", "mcap ros2, no checksums", "mcap json, no checksums", "schemas")
 # Run in a process without threads, as the judges fork.
 PROBE = """
 import sys

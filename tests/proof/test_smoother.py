@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 
 from kbs_process.campaign.load import load_campaign
+from kbs_process.diagnosis.screening.suspects import Candidate
+from kbs_process.plant.laws import CATALOGUE
 from kbs_process.plant.rigid import inverse_dynamics, joint_efforts, kinematics, static_wrench
 from kbs_process.progress import SilentProgress
 from kbs_process.studies.diagnose.reading import experiment_of
@@ -124,6 +126,25 @@ def test_a_cold_start_follows_its_readings_after_three_steps(tmp_path: Path) -> 
     numbers = problem.recordings[0].weight.sum() * problem.independent * problem.rows
     assert cold > 1e3 * numbers
     assert state.cost(problem) < 0.5 * numbers  # forces this loose follow some of the noise
+
+
+@pytest.mark.slow
+def test_an_effect_that_joins_is_nothing_until_it_has_a_size_and_then_its_torque(tmp_path: Path) -> None:
+    problem = _null(tmp_path, [1])
+    state = State.of(problem, np.repeat([0.05, 0.2, 0.01], [3, 2, 3]))
+    (viscous,) = (law for law in CATALOGUE if law.name == "joint_viscous")
+    wider = problem.joined(Candidate(viscous, "el", ()))
+    joined = state.joined(problem, wider)
+    assert joined.cost(wider) == pytest.approx(state.cost(problem), rel=1e-12)
+    joined.idealise(wider, 0.1)
+    motion, torques = joined.ideal_motion(wider, 0), joined.ideal_torques[0]
+    (own,) = wider.amplitudes[0]
+    rubbing = joined.x.copy()
+    rubbing[own] = 2.0  # N m s/rad
+    change = wider.predicted(0, rubbing, motion, torques) - wider.predicted(0, joined.x, motion, torques)
+    rate, inside = motion[1][:, FIRST_JOINT + 1], slice(30, -30)
+    assert np.abs(rate).max() > 1e-3
+    assert change[inside, wider.joint.start + 1] == pytest.approx(-2.0 * rate[inside], abs=0.02 * np.abs(rate).max())
 
 
 @pytest.mark.validation

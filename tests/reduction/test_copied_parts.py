@@ -56,6 +56,14 @@ def test_a_part_of_another_recording_is_found_at_any_offset(columns):
     assert found(first, second, roles=("calibration", "calibration")) == []
 
 
+@pytest.mark.parametrize("step", [1e-6, 1e-4])
+def test_a_part_that_is_turned_round_in_time_is_found(step):
+    first, second = noise(1), noise(2)
+    second[3013:3313] = np.round(first[1000:1300][::-1] / step) * step
+    (why,) = found(first, second)
+    assert "Ty" in why and " in b, from 30." in why and "s to 32." in why and "come in a as well" in why
+
+
 def test_a_part_that_comes_again_in_the_same_recording_is_found():
     values = noise(3)
     values[4001:4301] = values[1000:1300]

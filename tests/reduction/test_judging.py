@@ -54,6 +54,27 @@ def test_a_channel_that_nothing_shows_to_respond_is_said_beside_the_verdict() ->
     assert "response" not in conclusion([broken]).sentence
 
 
+def test_a_verdict_for_which_no_sign_was_tested_says_so() -> None:
+    campaign = archived.campaign("EL089")
+    runs, budgets = [recorded("test", 0.01)], stated("test", 0.001)
+    blind = judged(campaign, campaign.requirements[0], runs, budgets, unconfirmed=WRENCH_CHANNELS)
+    assert "No sign and no axis was tested" in conclusion([blind]).sentence
+    seen = judged(campaign, campaign.requirements[0], runs, budgets, unconfirmed=WRENCH_CHANNELS[:5])
+    assert "No sign" not in conclusion([seen]).sentence
+
+
+def test_a_silent_channel_that_may_be_swapped_with_a_loud_one_meets_nothing() -> None:
+    campaign = archived.campaign("EL089")
+    about_x = replace(campaign.requirements[0], limit=0.06, axes=("x", "z"))
+    runs, budgets = [recorded("test", 0.07)], stated("test", 0.001)
+    found = judged(campaign, about_x, runs, budgets, mute=("Tx",), unconfirmed=("Tx", "Ty"))
+    assert found.verdict == "undecided" and "Tx, and Ty, which is not judged" in found.doubt
+    assert judged(campaign, about_x, runs, budgets, mute=("Tx",), unconfirmed=("Tx",)).verdict == "pass", (
+        "gravity is Ty"
+    )
+    assert judged(campaign, about_x, runs, budgets, unconfirmed=("Tx", "Ty")).verdict == "pass", "Tx responds"
+
+
 def test_a_lower_peak_that_is_less_well_known_decides() -> None:
     found = verdict((0.05, 0.001), (0.04, 0.02))
     assert (found.verdict, found.recording, found.channel) == ("undecided", "noisy", "Ty")

@@ -130,6 +130,17 @@ def test_a_wrench_that_comes_later_than_known_is_told(tmp_path):
 
 
 @pytest.mark.slow
+def test_a_lag_that_clocks_do_not_tell_is_shown_by_gravity(tmp_path):
+    campaign = described(tmp_path)
+    sweep, test = recorded(campaign, drawn(campaign, 1), 1)
+    t, wrench = test.raw.t, test.raw.values
+    late = test.raw.derive(np.column_stack([np.interp(t - 0.01, t, x) for x in wrench.T]), "10 ms late")
+    found = checked(campaign, [sweep, replace(test, raw=late, run=replace(test.run, wrench=late))])
+    assert found.soundness.sound
+    assert found.late == {"test": pytest.approx(0.01, rel=0.1)}
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("samples", [6, 20])
 def test_a_wrench_that_comes_later_in_all_recordings_is_told(samples, tmp_path):
     campaign = described(tmp_path)

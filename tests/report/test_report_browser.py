@@ -248,6 +248,38 @@ def test_a_mark_gives_differences(opened: Callable[[int], Browser]) -> None:
     assert "ΔTz" in reading
 
 
+def test_keys_move_and_zoom_all_channels(opened: Callable[[int], Browser]) -> None:
+    browser = opened(1280)
+    whole = _pixels(browser)
+    browser.evaluate("document.querySelector('.plots').focus()")
+
+    def press(key: str) -> list[str]:
+        browser.evaluate(
+            f"document.activeElement.dispatchEvent(new KeyboardEvent('keydown', {{key: '{key}', bubbles: true}}))"
+        )
+        browser.evaluate("new Promise(done => setTimeout(done, 200))")
+        return _pixels(browser)
+
+    nearer = press("+")
+    later = press("ArrowRight")
+    assert all(one != other for one, other in zip(nearer, whole, strict=True))
+    assert all(one != other for one, other in zip(later, nearer, strict=True))
+    assert press("0") == whole
+
+
+def test_a_table_is_saved_as_numbers_that_programs_read(opened: Callable[[int], Browser]) -> None:
+    browser = opened(1280)
+    browser.evaluate(
+        "(() => { const cell = document.querySelector('.grid td.r');"
+        "cell.textContent = '−1.50\u00a0×\u00a010⁻³'; cell.nextElementSibling.textContent = 'a \"b\", c';"
+        "window.saved = []; URL.createObjectURL = (blob) => { window.saved.push(blob); return '#'; };"
+        "cell.closest('.grid').previousElementSibling.querySelector('.save').click(); })()"
+    )
+    lines = browser.evaluate("window.saved[0].text()").split("\r\n")
+    assert lines[0].startswith("Requirement,Band,Measured")
+    assert '-1.50e-3,"a ""b"", c"' in lines[1]
+
+
 def _pixels(browser: Browser) -> list[str]:
     """What is drawn on each canvas of the first figure, as a digest-like string."""
     found: list[str] = browser.evaluate(

@@ -12,10 +12,13 @@ import msgspec
 import pytest
 
 from kbs_process.errors import OutputError
+from kbs_process.report import provenance
 from kbs_process.report.build import publish
-from kbs_process.results.records import Conclusion, decode, encode, load, schema_of
+from kbs_process.report.panel import Grid
+from kbs_process.results.records import Conclusion, InputFile, decode, encode, load, schema_of
 from kbs_process.results.versions import VERSION
 from kbs_process.studies.correlate import results as r
+from kbs_process.studies.correlate.report import _provenance
 from kbs_process.studies.documents import DOCUMENTS
 from kbs_process.studies.documents import render as build
 from report import sample
@@ -133,3 +136,19 @@ def test_what_is_undecided_is_not_met(tmp_path: Path, status: str, met: bool | N
     verdict = msgspec.structs.replace(found.verdict, status=status)
     told = publish(tmp_path, tmp_path, msgspec.structs.replace(found, verdict=verdict), None, None)
     assert told.requirement_met is met
+
+
+def test_every_input_is_told_once_and_so_are_the_loggers_files() -> None:
+    given = msgspec.structs.replace(
+        sample.PROVENANCE,
+        inputs=(InputFile(file="campaign.toml", sha256="a"), InputFile(file="recordings/x.mcap", sha256="b")),
+    )
+    grid = provenance.panel(given, (InputFile(file="x.csv", sha256="c"),)).blocks[2]
+    assert isinstance(grid, Grid)
+    assert grid.rows == (("campaign.toml", "a"), ("recordings/x.mcap", "b"), ("x.csv, imported", "c"))
+    results = sample.command_results()
+    campaign = msgspec.structs.replace(results.campaign, sources=(InputFile(file="x.csv", sha256="c"),))
+    found = _provenance(msgspec.structs.replace(results, campaign=campaign), None).blocks[2]  # type: ignore[arg-type]
+    assert isinstance(found, Grid)
+    names = [row[0] for row in found.rows]
+    assert len(names) == len(set(names)) and names[-1] == "x.csv, imported"

@@ -149,10 +149,12 @@ class Campaign:
     rig: Rig
     inputs: tuple[Path, ...]  # files of the description: campaign.toml, parameter files, CSV matrices
     mission: Path | None = None  # orbit, relay satellites and limits of a reference day
+    pointing: tuple[PointingRequirement, ...] = ()  # of recordings
     flight_pointing: tuple[PointingRequirement, ...] = ()  # of the flight model alone
     document: dict[str, str] = field(default_factory=dict)  # number, revision, operator, serial_number, date
     modal: Path | None = None  # modes of the article on its transducer; None: derived from the plant
     sensing: tuple[SensingLaw, ...] = ()  # acting on predictions of one recording alone
+    sources: Mapping[str, str] = field(default_factory=dict)  # SHA-256 of the files that recordings were imported from
 
     @property
     def files(self) -> tuple[Path, ...]:

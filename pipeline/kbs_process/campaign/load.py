@@ -99,7 +99,6 @@ def _campaign(
     requirements = (
         disturbance(table, ("requirement", index), document, problems) for index, table in enumerate(file.requirement)
     )
-    flight_pointing = file.flight.pointing if file.flight else ()
     return Campaign(
         folder=folder,
         name=file.name,
@@ -124,13 +123,14 @@ def _campaign(
             *(() if modal is None else (modal,)),
         ),
         mission=within(folder, file.mission.file, where=document.place(("mission", "file"))) if file.mission else None,
-        flight_pointing=tuple(
-            pointing(table, ("flight", "pointing", index), document, problems)
-            for index, table in enumerate(flight_pointing)
+        pointing=pointing(file.pointing, ("pointing",), document, problems),
+        flight_pointing=pointing(
+            file.flight.pointing if file.flight else (), ("flight", "pointing"), document, problems
         ),
         document=file.document.model_dump(exclude_none=True),
         modal=modal,
         sensing=_sensing(file, document, rig, problems),
+        sources={one.name: one.sha256 for one in file.source.file} if file.source else {},
     )
 
 

@@ -56,9 +56,7 @@ def load_day(campaign: Campaign) -> Day:
     limits = _limits(reader, file.limits)
     day = reader.numbers(file.day, "day")
     hand_overs = [reader.numbers(one, "hand_over", index)["begin"] for index, one in enumerate(file.hand_over)]
-    requirements = tuple(
-        pointing(table, ("requirement", index), document, problems) for index, table in enumerate(file.requirement)
-    )
+    requirements = pointing(file.requirement, ("requirement",), document, problems)
     problems.raise_any()
     return Day(
         path=document.path,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from kbs_process.campaign.config import PointingRequirement, Requirement
@@ -12,8 +13,7 @@ from kbs_process.campaign.units import UnitMismatchError, factor
 
 if TYPE_CHECKING:
     from kbs_process.campaign.formats.campaign_file import PointingTable, RequirementTable
-    from kbs_process.campaign.formats.mission_file import DayRequirementTable
-    from kbs_process.campaign.formats.tables import LimitTable
+    from kbs_process.campaign.formats.tables import LimitTable, PointingLimitTable
 
 
 def disturbance(table: RequirementTable, key: Key, document: Document, problems: Problems) -> Requirement:
@@ -34,11 +34,14 @@ def disturbance(table: RequirementTable, key: Key, document: Document, problems:
 
 
 def pointing(
-    table: PointingTable | DayRequirementTable, key: Key, document: Document, problems: Problems
-) -> PointingRequirement:
-    """Return the limit on a pointing error that `table` states at `key` of its file."""
-    limit = _limit(table.limit, "rad", key, document, problems)
-    return PointingRequirement(table.name, table.statistic, limit, table.source)
+    tables: Sequence[PointingTable | PointingLimitTable], key: Key, document: Document, problems: Problems
+) -> tuple[PointingRequirement, ...]:
+    """Return the limits on pointing errors that `tables` state at `key` of their file."""
+    limits = [_limit(table.limit, "rad", (*key, index), document, problems) for index, table in enumerate(tables)]
+    return tuple(
+        PointingRequirement(table.name, table.statistic, limit, table.source)
+        for table, limit in zip(tables, limits, strict=True)
+    )
 
 
 def _limit(limit: LimitTable, unit: str, key: Key, document: Document, problems: Problems) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
         metavar="HZ",
         help="Sampling rate of the wrench [default: the recording's; 100 with --command].",
     ),
+    click.option("--stop", type=float, default=math.inf, metavar="S", help="Request a stop then."),
     example=("simulate campaign/EL089 --trajectory EL089P00", "simulate campaign/EL089 --command slew.csv --rate 200"),
     output="results/NAME-simulated",
     checksums=False,
@@ -34,6 +36,7 @@ def simulate(
     trajectory: str | None,
     command: Path | None,
     rate: float | None,
+    stop: float,
     target: Path,
     progress: Progress,
 ) -> tuple[str, ...]:
@@ -44,9 +47,9 @@ def simulate(
     from kbs_process.studies.predict.run import simulate_commands, simulate_trajectory
 
     if command is not None:
-        written = simulate_commands(campaign, command, target, rate_Hz=rate or 100.0, progress=progress)
+        written = simulate_commands(campaign, command, target, rate_Hz=rate or 100.0, progress=progress, stop=stop)
     else:
-        written = simulate_trajectory(campaign, trajectory, target, rate_Hz=rate, progress=progress)
+        written = simulate_trajectory(campaign, trajectory, target, rate_Hz=rate, progress=progress, stop=stop)
     return (f"Simulated: {written}",)
 
 

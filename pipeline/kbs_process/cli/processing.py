@@ -114,7 +114,7 @@ def validate(campaign: str, check: bool, as_json: bool, quiet: bool) -> None:
 
     folder = find_campaign(campaign)
     if (folder / MAPPING_FILE).is_file():
-        say(*check_description(folder))
+        say_json([*check_description(folder)]) if as_json else say(*check_description(folder))
         return
     loaded = load_campaign(folder, mission_alone=True)
     found = run(loaded, progress(quiet))

@@ -120,16 +120,6 @@ def regressor(rig: Rig, q: Array, qd: Array, qdd: Array) -> Array:
     return Y
 
 
-def inertial_parameters(rig: Rig) -> Array:
-    """theta (10 bodies,) of `regressor`."""
-    theta = []
-    for body in rig.bodies:
-        m, c = float(body.mass), body.cog.value
-        origin = inertia_matrix(body.inertia.value) + m * (c @ c * np.eye(3) - np.outer(c, c))
-        theta += [m, *(m * c), *np.diag(origin), origin[0, 1], origin[0, 2], origin[1, 2]]
-    return np.array(theta)
-
-
 def inertia_matrix(elements: Array) -> Array:
     """Symmetric tensor (3, 3) from its elements xx, yy, zz, xy, xz, yz."""
     xx, yy, zz, xy, xz, yz = elements

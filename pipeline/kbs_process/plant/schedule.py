@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
 from kbs_process.errors import SimulationError
+from kbs_process.rig.model import Controller
 from kbs_process.signals.records import Array
 
 
@@ -23,6 +24,31 @@ class Schedule:
     rate: Array  # (n, joints) rad/s, desired
     field: Array | None = None  # (n, joints) motor rad
     encoder: Array | None = None  # (n, joints) rad, readings at the cycles' starts
+
+
+def stopped(schedule: Schedule, controller: Controller | None, request: float) -> Schedule:
+    """Return commands in which every joint ramps to rest once a stop is requested (s), or where its range would end.
+
+    A joint stops as fast as the controller's `acceleration` allows: from the request on, or from the last cycle from
+    which that is within its range. Raises SimulationError for a request without a stated acceleration.
+    """
+    if controller is None or controller.acceleration is None:
+        if request != np.inf:
+            raise SimulationError("nothing says how fast the controller stops", remedy="state controller.acceleration")
+        return schedule
+    most, t, position, rate = controller.acceleration.value, schedule.t, schedule.position.copy(), schedule.rate.copy()
+    low = -np.inf if controller.lowest is None else controller.lowest.value
+    high = np.inf if controller.highest is None else controller.highest.value
+    rest = position + rate * np.abs(rate) / (2.0 * most)  # where it would come to
+    out = (rest < low) | (rest > high)
+    stops = np.vstack([out[1:], out[-1:]]) | ~(t < request)[:, None]
+    for joint in np.flatnonzero(stops.any(axis=0)):
+        first = int(np.argmax(stops[:, joint]))
+        speed, brake = rate[first, joint], np.copysign(most[joint], rate[first, joint])
+        since = np.minimum(t[first:] - t[first], speed / brake)
+        position[first:, joint] = position[first, joint] + speed * since - 0.5 * brake * since**2
+        rate[first:, joint] = speed - brake * since
+    return replace(schedule, position=position, rate=rate)
 
 
 def covering(schedule: Schedule, joints: int, cycle: float | None, end: float) -> Schedule:

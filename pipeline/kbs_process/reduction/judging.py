@@ -18,11 +18,10 @@ from kbs_process.results.judged import Doubt
 from kbs_process.signals.records import Signal
 from kbs_process.stages import bandpass
 from kbs_process.stages.bandpass import Band, bridging_error, crossing_rate
-from kbs_process.stages.verdict import COVERAGE, Extreme, Judgement, extremes, interval, judge, peak_coverage
+from kbs_process.stages.verdict import COVERAGE, SEVERITY, Extreme, Judgement, extremes, interval, judge, peak_coverage
 
 _NONE: Mapping[str, float] = {}
 MOSTLY = 0.25  # of a band's filter may lean on what is not known, where a value still tells that something was there
-SEVERITY: dict[Judgement, int] = {"pass": 0, "undecided": 1, "fail": 2}
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,11 +54,12 @@ def judged(
     doubts: Sequence[Doubt] = (),
     rounding: Mapping[str, float] = _NONE,
     mute: Sequence[str] = (),
+    unconfirmed: Sequence[str] = (),
 ) -> results.Requirement:
     """Judge a requirement by the channel and recording that are closest to failing it, if no doubt forbids it.
 
     `rounding`: standard deviation, by channel, of readings that are rounded more coarsely than is stated.
-    `mute`: channels that no recording shows to respond.
+    `mute`: channels that no recording shows to respond; `unconfirmed`: those whose slope no load tests.
     """
     band = band_of(requirement, bands_of(campaign.bands))
     key = (requirement.frame, band.name)
@@ -105,6 +105,13 @@ def judged(
         if requirement.statistic == "peak" and (extreme.recording, extreme.channel) in own
     ]
     doubts = (*doubts, *(_unsure(one, requirement.unit) for one in beside if one.verdict != "pass"))
+    silent = tuple(channel for channel in channels if channel in mute)
+    others = [key for key in unconfirmed if key[0] == channels[0][0] and key not in channels]
+    beyond = [one for one in extremes(signals, others, requirement.statistic) if one.value > requirement.limit]
+    if silent and beyond:
+        read = f"{beyond[0].channel}, which is not judged, is beyond the limit in {beyond[0].recording}"
+        why = f"nothing shows a response of {', '.join(silent)}, and {read}: they may be swapped"
+        doubts = (*doubts, Doubt(why, of_failed=False))
     doubt = next((one.why for one in doubts if one.of_failed or worst.verdict != "fail"), "")
     return results.Requirement(
         name=requirement.name,
@@ -131,7 +138,8 @@ def judged(
             for channel in channels
             if any(one.extreme.channel == channel for one in measured)
         ),
-        mute=tuple(channel for channel in channels if channel in mute),
+        mute=silent,
+        untested=set(campaign.rig.channels) <= set(unconfirmed),
         source=requirement.source,
         axes=requirement.axes,
         lever_m=None

@@ -34,7 +34,6 @@ from kbs_process.stages.align.readings import white
 from kbs_process.stages.align.spectrum import OCTAVES, quietest
 from kbs_process.stages.conventions import (
     BEYOND,
-    OF_CHANNEL,
     SignCheck,
     check_encoder_sense,
     check_gravity_sign,
@@ -88,6 +87,8 @@ class Checked:
     rounding: Mapping[str, float]  # by channel, of readings that are coarser than stated
     noise: Mapping[str, Mapping[str, float]]  # of a sample, rms, by recording and channel, as measured
     mute: tuple[str, ...]  # channels that are judged, and that no recording shows to respond
+    unconfirmed: tuple[str, ...]  # channels whose slope against computed loads no recording tests
+    late: Mapping[str, float]  # s, by recording: the wrench's lag behind the angles, as gravity shows it
 
     def doubts(self, requirement: Requirement) -> tuple[Doubt, ...]:
         """Why a requirement is not judged, worst first.
@@ -138,14 +139,15 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
         shown = [_read_and_due(one, data, model) for one, data in zip(recordings, instants, strict=True)]
         conventions = (*check_weight(campaign.rig), *_conventions(recordings, instants, model, zeros, shown))
         amplifier = campaign.rig.transducer.amplifier
-        each = zip(recordings, instants, strict=True)
-        lags = [lag(model, data, late_sigma(one.run.clocks, amplifier, one.entry.clock_sigma)) for one, data in each]
-        found = tension(model, {sample.name: taring for sample, taring in tared}, [one for one in lags if one])
+        lags = [(one, own) for one, data in zip(recordings, instants, strict=True) if (own := lag(model, data))]
+        known = [late_sigma(one.run.clocks, amplifier, one.entry.clock_sigma) for one, _ in lags]
+        late = [own.moved(sigma) for (_, own), sigma in zip(lags, known, strict=True) if own.taken >= TAKEN]
+        found = tension(model, {sample.name: taring for sample, taring in tared}, late)
         most = _most(equation)
         rounding = {key: x for one in recordings for key, x in measurable.rounding(campaign, one.readings).items()}
-        own = model.rig.transducer.channels
+        channels = model.rig.transducer.channels
         noise = {
-            one.entry.name: dict(zip(own, measured_noise(model.rig, one)[1].tolist(), strict=True))
+            one.entry.name: dict(zip(channels, measured_noise(model.rig, one)[1].tolist(), strict=True))
             for one in recordings
         }
         hidden = {one.name: tuple(_hidden(campaign, one, recordings, model)) for one in campaign.requirements}
@@ -168,12 +170,14 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
         soundness = Soundness(probability=found.probability, gains=gains)
         tests = [one.entry.name for one in recordings if one.entry.role != "calibration"]
         if reasons:
-            shifted = [one for one in found.beyond if one in lags]
+            shifted = [one for one in found.beyond if one in late]
             told = [_SCALE for _ in timed[:1]] + [_STUCK for _ in still[:1]]
             told += [_LATE.format(one.value) for one in shifted[:1]] + [_TWICE for _ in twice[:1]]
-            told += [f"channel: {key} does not respond" for key in dead]
-            if not (twice or dead) and reasons != (*timed, *still, *_far(shifted, 1.0)):
-                told += [_in_words(one, equation) for one in explanations(equation, instants, most)]
+            more = not twice and reasons != (*timed, *still, *_far(shifted, 1.0))
+            causes = explanations(equation, instants, most) if more else ()
+            if dead and not any(one.fault.kind in ("swapped", "axes") for one in causes):  # which leave one silent
+                causes, told = (), told + [f"channel: {key} does not respond" for key in dead]
+            told += [_in_words(one, equation) for one in causes]
             soundness = Soundness(
                 sound=False,
                 probability=found.probability,
@@ -183,12 +187,13 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
                 suggestions=tuple(told),
                 calibrated=not (timed or still or shifted or twice)
                 and _calibrated(campaign, samples, model, most)
-                and all(
-                    one.ok or (one.check.rpartition(", ")[2] in tests and one.check.startswith(OF_CHANNEL))
-                    for one in conventions
-                ),
+                and all(one.ok or (one.channel and one.check.rpartition(", ")[2] in tests) for one in conventions),
             )
-        return Checked(soundness, conventions, hidden, rounding, noise, tuple(key for key in mute if key in judged))
+        tested = {one.channel for one in conventions if one.testable}
+        silent = tuple(key for key in mute if key in judged)
+        unconfirmed = tuple(key for key in equation.channels if key not in tested)
+        lag_of = {own.recording: abs(own.value) for _, own in lags if abs(own.value) > BEYOND * own.chance}
+        return Checked(soundness, conventions, hidden, rounding, noise, silent, unconfirmed, lag_of)
 
 
 def _hidden(

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from kbs_process.report.panel import Block, Fold, Grid, Panel, Text
 from kbs_process.report.tables import Tables
 from kbs_process.report.text import count, measure, unit
-from kbs_process.results.records import Constant, Provenance, ResultsFile
+from kbs_process.results.records import Constant, InputFile, Provenance, ResultsFile
 
 
-def panel(made: Provenance, recorded: Mapping[str, str] | None = None) -> Panel:
-    """Return the section for any kind of results; `recorded` gives checksums of recordings by file."""
+def panel(made: Provenance, imported: Sequence[InputFile] = ()) -> Panel:
+    """Return the section for any kind of results; `imported`: the loggers' files that recordings were made from."""
     software = (
         ("kbs-process", made.version),
         *((("commit", made.commit),) if made.commit else ()),
@@ -20,11 +20,13 @@ def panel(made: Provenance, recorded: Mapping[str, str] | None = None) -> Panel:
         ("platform", made.platform),
         *made.libraries.items(),
     )
-    inputs = dict(recorded or {}) | {entry.file: entry.sha256 for entry in made.inputs}
+    inputs = [(one.file, one.sha256) for one in made.inputs] + [
+        (f"{one.file}, imported", one.sha256) for one in imported
+    ]
     blocks: list[Block] = [
         Text(f"Made by: {made.command}"),
         Grid("Software", ("Component", "Version"), software, "ll"),
-        Grid("Inputs", ("File", "SHA-256"), tuple(inputs.items()), "lk"),
+        Grid("Inputs", ("File", "SHA-256"), tuple(inputs), "lk"),
     ]
     return Panel("provenance", "Provenance", "What made these results, and from what?", tuple(blocks))
 

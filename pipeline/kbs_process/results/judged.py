@@ -54,6 +54,7 @@ class Requirement(Record, frozen=True, kw_only=True):
     high: float | None = None
     doubt: str = ""  # why it is undecided, whatever the figures are
     mute: tuple[str, ...] = ()  # channels that no recording shows to respond
+    untested: bool = False  # whether no load tests the sign and axis of any channel
     axes: tuple[str, ...] = ("x", "y", "z")  # that it is about
     left_out: str = ""  # what the campaign leaves out of all this, and the figure of that
     only_without: bool = False  # whether it is met, and what is left out would not be, or is not known to be

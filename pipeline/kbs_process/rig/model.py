@@ -201,6 +201,9 @@ class Controller:
     Kp: Quantity  # (joints,)
     Ki: Quantity  # (joints,) 1/s
     latency: int  # cycles
+    acceleration: Quantity | None = None  # (joints,) rad/s^2, greatest, with which it stops
+    lowest: Quantity | None = None  # (joints,) rad, ends of the range within which it stops
+    highest: Quantity | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

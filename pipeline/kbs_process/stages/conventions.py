@@ -25,6 +25,7 @@ class SignCheck(Record, frozen=True, kw_only=True):
     """What was expected, what was found."""
 
     check: str
+    channel: str = ""  # whose slope against its computed load is tested; of no other check
     expected: str
     found: str
     ok: bool
@@ -78,6 +79,7 @@ def check_gravity_sign(
         tests.append(
             SignCheck(
                 check=f"{OF_CHANNEL} {channel} against its computed load",
+                channel=channel,
                 expected="+1",
                 found=f"{slope:+.3f} ± {sigma:.2g}" if testable else "this load hardly changes here",
                 ok=bool(not testable or abs(slope - 1.0) < np.clip(BEYOND * sigma, _EXACT, _HALF)),

@@ -13,22 +13,30 @@ _WINDOW = 0.1  # of a recording
 _POWERS = 3  # of an angle
 
 
-def description(x: Array, valid: Mask, dt: float, q: Array, joints: Sequence[str]) -> str:
-    """Describe a history x (n,) along angles q (n, joints) by what holds most of its power, if that is half of it."""
+def description(x: Array, valid: Mask, dt: float, q: Array, joints: Sequence[str], load: Array) -> str:
+    """Describe a history x (n,) along angles q (n, joints) by what holds most of its power, if that is half of it.
+
+    `load` (n,) is what the model has taken off.
+    """
     t = dt * np.arange(len(x))
-    t, x, q = t[valid], x[valid], q[valid]
+    later = -np.gradient(load, dt)
+    t, x, q, later = t[valid], x[valid], q[valid], later[valid]
+    later -= later.mean() if len(later) else 0.0
     centred: Array = x - x.mean() if len(x) > 8 else np.zeros(1)
     if not centred.any():
         return "too little of it is known to say more"
-    share, words = max(_shares(t.astype(np.float64), centred, dt, q, joints))
+    share, words = max(_shares(t.astype(np.float64), centred, dt, q, joints, later))
     if share < HALF:
         return "no one frequency, angle, step, drift or time holds half of it"
     return f"{100.0 * share:.0f} % of its power is {words}"
 
 
-def _shares(t: Array, x: Array, dt: float, q: Array, joints: Sequence[str]) -> Iterator[tuple[float, str]]:
-    """Yield shares of the power of x (n,), about its mean, and what each is."""
+def _shares(t: Array, x: Array, dt: float, q: Array, joints: Sequence[str], late: Array) -> Iterator[tuple[float, str]]:
+    """Yield shares of the power of x (n,), about its mean, and what each is; `late`: what a lag of 1 s would leave."""
     power = float(x @ x)
+    if late.any():
+        lag = float(x @ late) / float(late @ late)
+        yield _held(x, late[:, None]), f"a lag of {lag:.2g} s behind the angles: clocks, or a filter"
     yield _held(x, np.vander((t - t[0]) / (t[-1] - t[0]), 2)), "a drift with time"
     before = np.cumsum(x)[:-1]
     count = np.arange(1.0, len(x))

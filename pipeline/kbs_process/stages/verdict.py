@@ -15,6 +15,7 @@ COVERAGE = 2.0
 ONE_SIDED = 0.0228  # probability beyond +2 sigma of a normal error
 
 Judgement = Literal["pass", "fail", "undecided"]
+SEVERITY: dict[Judgement, int] = {"pass": 0, "undecided": 1, "fail": 2}
 
 
 @dataclass(frozen=True, slots=True)

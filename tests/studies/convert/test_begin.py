@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ from kbs_process.campaign.documents import read
 from kbs_process.campaign.load import load_campaign
 from kbs_process.errors import ConfigError, OutputError, RecordingError
 from kbs_process.recordings.tables import Column
+from kbs_process.results.store import writing
 from kbs_process.studies.convert.begin import begin, check_description
 from kbs_process.studies.convert.mapping_file import Part
 from kbs_process.studies.convert.naming import by_channel, meaning, runs_of
@@ -107,6 +109,15 @@ def test_the_shift_between_two_clocks_is_found_within_its_sigma() -> None:
 def test_a_shift_that_the_motion_does_not_tell_is_no_number(move: Callable[[np.ndarray], np.ndarray]) -> None:
     t = np.arange(0.0, 60.0, 0.02)
     assert find_shift(t, wrench_of(move(t)), t, move(t)[:, None], [True]) is None
+
+
+def test_angles_are_not_made_up_where_none_are_recorded() -> None:
+    t = np.arange(0.0, 20.0, 0.02)
+    turn = lambda t: 0.6 - 0.6 * np.cos(0.2 * t**1.2)  # noqa: E731
+    angle, wrench = turn(t), wrench_of(turn(t + 1.25))
+    t_angle = np.append(t[:-1], 22.0)  # the last stamp is 2 s late
+    found = find_shift(t, wrench, t_angle, angle[:, None], [True])
+    assert found is not None and found[0] == pytest.approx(1.25, abs=0.01)
 
 
 def write_logs(folder: Path) -> list[Path]:
@@ -279,9 +290,55 @@ def test_streams_of_one_of_several_files_share_its_shift() -> None:
 
 def test_a_folder_of_another_campaign_is_not_replaced(tmp_path: Path) -> None:
     (tmp_path / "campaign.toml").write_text('name = "other"\n')
-    _check_same(tmp_path, "other")
+    with pytest.raises(OutputError, match="holds the campaign 'other', not 'other' of these files"):
+        _check_same(tmp_path, "other", {"test.csv": 64 * "a"})
     with pytest.raises(OutputError, match="holds the campaign 'other', not 'mine'"):
-        _check_same(tmp_path, "mine")
+        _check_same(tmp_path, "mine", {"test.csv": 64 * "b"})
+    with (tmp_path / "campaign.toml").open("a") as file:
+        file.write(f'[[source.file]]\nname = "run.csv"\nsha256 = "{64 * "b"}"\n')
+    _check_same(tmp_path, "other", {"test.csv": 64 * "b"})
+
+
+def test_what_was_imported_is_no_place_to_begin(tmp_path: Path) -> None:
+    with writing(tmp_path / "arm", "campaign.toml") as folder:
+        (folder / "campaign.toml").write_text('name = "arm"\n')
+    with pytest.raises(OutputError, match="or as something else"):
+        list(begin(tmp_path / "arm", write_logs(tmp_path)))
+    assert (tmp_path / "arm" / "campaign.toml").read_text() == 'name = "arm"\n'
+
+
+def test_a_text_of_western_windows_is_read_and_told(tmp_path: Path) -> None:
+    files = write_logs(tmp_path)
+    for path in tmp_path.glob("angle_*.txt"):
+        path.write_bytes(path.read_text().replace("arm_deg", "Arm für (°)").encode("cp1252"))
+    lines = "\n".join(begin(tmp_path / "arm", files))
+    assert 'decimal = ",", encoding = "cp1252"\n' in lines and "Arm für (°)" in lines
+    assert tree(tmp_path / "arm" / "mapping.toml")["text"]["encoder"]["encoding"] == "cp1252"
+
+
+@pytest.mark.parametrize("cell", ["1e200", "1e308", "-1e305"])
+@pytest.mark.parametrize("column", [0, 3])
+def test_numbers_that_nothing_measures_are_left_out_without_a_warning(tmp_path: Path, cell: str, column: int) -> None:
+    files = write_logs(tmp_path)
+    lines = files[2].read_text().splitlines()
+    lines[700] = ",".join(cell if at == column else x for at, x in enumerate(lines[700].split(",")))
+    files[2].write_text("\n".join(lines) + "\n")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        list(begin(tmp_path / "arm", files))
+    assert tree(tmp_path / "arm" / "rig.toml")["transducer"]["noise"]["value"] == pytest.approx(
+        [0.02] * 3 + [0.002] * 3, rel=0.1
+    )
+
+
+@pytest.mark.parametrize(("row", "time"), [(1, "-9000"), (900, "1000"), (-1, "9000"), (-1, "1e9")])
+def test_a_stamp_far_from_all_others_leaves_the_shift_a_question(tmp_path: Path, row: int, time: str) -> None:
+    files = write_logs(tmp_path)
+    lines = files[2].read_text().splitlines()
+    lines[row] = ",".join([time, *lines[row].split(",")[1:]])
+    files[2].write_text("\n".join(lines) + "\n")
+    told = "\n".join(begin(tmp_path / "arm", files))
+    assert told.count("how their clocks stand to each other is not known: motion and times do not tell it") == 1
 
 
 def test_rows_that_only_the_wrench_has_tell_nothing_of_its_clock(tmp_path: Path) -> None:

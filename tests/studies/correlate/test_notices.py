@@ -13,6 +13,7 @@ import archived
 from kbs_process.progress import SilentProgress
 from kbs_process.reduction.analysis import analyse
 from kbs_process.reduction.preparing import fit_gravity
+from kbs_process.report.prose import Prose
 from kbs_process.signals.records import Stretch
 from kbs_process.studies.correlate.notices import calibration, unclear
 from reduction.arm import described, drawn, recorded
@@ -46,3 +47,9 @@ def test_readings_that_may_be_a_knock_are_named() -> None:
 
     assert told(Stretch("spike", 20.0, 0.03, likely=False), Stretch("gap", 30.0, 0.05, likely=True)) == ""
     assert told(Stretch("spike", 20.0, 0.03, likely=True)).endswith("may be bad ones: test at 20.0000 s")
+
+
+@pytest.mark.parametrize(("driven", "said"), [(True, True), (False, False)])
+def test_phases_of_drives_are_no_matter_where_none_is_modelled(driven: bool, said: bool) -> None:
+    remedy = Prose("kbs_process.studies.correlate", "notices")("weak_prediction_remedy", driven=driven)
+    assert remedy.startswith("see figures of merit") and ("cogging" in remedy) is said

@@ -19,7 +19,8 @@ def answer(*rows: tuple[float, float], sigma: float | None = 1.0) -> str:
     first = next(row for row in sample.command_results().merit if (row.channel, row.frame) == ("Tx", "T"))
 
     def row(index: int, ratio: float, signal: float) -> Merit:
-        changes = {"recording": str(index), "pessimism": ratio, "measured_rms": signal, "sigma": sigma}
+        changes = {"recording": str(index), "measured_rms": signal, "sigma": sigma}
+        changes |= {"measured_peak": 10.0, "predicted_peak": 10.0 * ratio}
         return msgspec.structs.replace(first, **changes)
 
     merit = tuple(row(index, *each) for index, each in enumerate(rows))
@@ -34,7 +35,8 @@ def answer(*rows: tuple[float, float], sigma: float | None = 1.0) -> str:
     ("rows", "said"),
     [
         ([(1.2, 5.0), (1.0, 5.0)], "yes, 2 of 2"),
-        ([(1.2, 5.0), (0.9, 5.0)], "no, 1 of 2"),
+        ([(1.2, 5.0), (0.7, 5.0)], "no, 1 of 2"),
+        ([(1.2, 5.0), (0.9, 5.0)], "open, 1 of 2"),  # 9 is below 10 +- 1 by less than noise can make it
         ([(1.2, 5.0), (0.1, 1.5)], "yes, 1 of 1"),  # the second is at the noise
         ([(1.2, 1.0), (0.1, 1.5)], "not testable"),
     ],

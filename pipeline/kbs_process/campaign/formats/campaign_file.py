@@ -17,6 +17,7 @@ from kbs_process.campaign.formats.tables import (
     Name,
     NotNegative,
     PlainQuantity,
+    PointingLimitTable,
     Positive,
     Some,
     SomeDistinct,
@@ -226,6 +227,9 @@ class CampaignFile(Table):
     )
     requirement: list[RequirementTable] = Field(
         [], description="what the article must meet; the compliance table has one row each"
+    )
+    pointing: list[PointingLimitTable] = Field(
+        [], description="what the pointing error of its recordings must meet, against what was commanded"
     )
     bands: BandsTable
     topics: TopicsTable

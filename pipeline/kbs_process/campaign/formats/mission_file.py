@@ -8,19 +8,17 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, AwareDatetime, ConfigDict, Field
 from pydantic_core import PydanticCustomError
 
-from kbs_process.campaign.config import PointingStatistic
 from kbs_process.campaign.formats.kind import Kind
 from kbs_process.campaign.formats.tables import (
     Count,
-    LimitTable,
     LinkName,
     Magnitude,
     Name,
     PlainQuantity,
+    PointingLimitTable,
     Positive,
     Some,
     Table,
-    Text,
 )
 
 
@@ -93,18 +91,6 @@ class HandOverTable(Table):
     begin: Time = Field(description="when; at once after a bridge over the zenith, if that is under way")
 
 
-class DayRequirementTable(Table):
-    """A limit on the pointing error."""
-
-    name: Text
-    statistic: PointingStatistic = Field(
-        description="2 sigma about the bias; mean; slow variation within one orbit, peak; 95 % of the magnitude; of "
-        "each axis, in each section"
-    )
-    limit: LimitTable
-    source: Text
-
-
 class Published(Table):
     """A published table's figures for this section, shown beside ours."""
 
@@ -141,5 +127,5 @@ class MissionFile(Table):
     limits: LimitsTable
     day: DayTable
     hand_over: list[HandOverTable] = Field([], description="planned; without any, a satellite is held until lost")
-    requirement: list[DayRequirementTable] = Field([])
+    requirement: list[PointingLimitTable] = Field([])
     section: Some[SectionEntry]

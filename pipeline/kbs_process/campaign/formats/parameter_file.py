@@ -66,6 +66,9 @@ class ControllerTable(SpreadTable):
     Kp: Annotated[QuantityTable, Kind("1", each_joint=True)]
     Ki: Annotated[QuantityTable, Kind("1/s", each_joint=True)]
     latency: Annotated[int, Field(ge=0, le=1_000_000)] = Field(description="of the encoder in the loop, cycles")
+    acceleration: Annotated[QuantityTable | None, Kind("rad/s^2", each_joint=True, low=0.0, strict=True)] = None
+    lowest: Annotated[QuantityTable | None, Kind("rad", each_joint=True)] = None
+    highest: Annotated[QuantityTable | None, Kind("rad", each_joint=True)] = None
 
 
 class SpacecraftTable(SpreadTable):

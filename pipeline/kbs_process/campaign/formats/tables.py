@@ -8,6 +8,7 @@ from typing import Annotated, Any, ClassVar, Self, TypeVar
 from pydantic import AfterValidator, BaseModel, ConfigDict, Discriminator, Field, Tag, model_validator
 from pydantic_core import PydanticCustomError
 
+from kbs_process.campaign.config import PointingStatistic
 from kbs_process.campaign.formats.kind import Kind
 
 # Patterns of texts, and what they ask for in words.
@@ -154,3 +155,15 @@ class LimitTable(Table):
 
     value: Annotated[float, Field(gt=0.0)]
     unit: Text
+
+
+class PointingLimitTable(Table):
+    """A limit on the pointing error."""
+
+    name: Text
+    statistic: PointingStatistic = Field(
+        description="2 sigma about the bias; mean; slow variation within one orbit, peak; 95 % of the magnitude; of "
+        "each axis, in each section or recording"
+    )
+    limit: LimitTable
+    source: Text

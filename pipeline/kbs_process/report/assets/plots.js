@@ -210,6 +210,20 @@
       });
       return jump;
     });
+    // Of the width that is shown: where its ends go.
+    const KEYS = { ArrowLeft: [-0.2, -0.2], ArrowRight: [0.2, 0.2], "+": [0.2, -0.2], "=": [0.2, -0.2], "-": [-0.3, 0.3] };
+    box.addEventListener("keydown", (event) => {
+      if (!plots.length || event.ctrlKey || event.metaKey || event.altKey) return;
+      if (event.key === "0") return void all.click();
+      if (!(event.key in KEYS)) return;
+      event.preventDefault();
+      const t = plots[0].data[0];
+      const { min, max } = plots[0].scales.x;
+      let [low, high] = KEYS[event.key].map((part, i) => [min, max][i] + part * (max - min));
+      if (low < t[0]) [low, high] = [t[0], high - low + t[0]];
+      if (high > t.at(-1)) [low, high] = [Math.max(t[0], low - high + t.at(-1)), t.at(-1)];
+      zoom(low, high);
+    });
     root.querySelector(".choices").append(recordings.frame, choices.frame, all, ...jumps, notes);
     root.hidden = false;
     root.parentElement.classList.add("live-on");
@@ -224,6 +238,29 @@
     figure(entry.target.querySelector(".live"));
   }), { rootMargin: "600px" });
   document.querySelectorAll(".live").forEach((root) => watcher.observe(root.parentElement));
+
+  // Every table can be taken along as CSV, with its numbers as a program reads them.
+  const plain = (text) => {
+    const told = text.trim().replaceAll("\u00a0", " ").replaceAll("−", "-");
+    const digits = { "⁻": "-", "⁰": "0", "¹": "1", "²": "2", "³": "3", "⁴": "4", "⁵": "5", "⁶": "6", "⁷": "7", "⁸": "8", "⁹": "9" };
+    const number = told.replace(/ × 10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)/g, (_, power) => `e${[...power].map((letter) => digits[letter]).join("")}`);
+    return /[",\n]/.test(number) ? `"${number.replaceAll('"', '""')}"` : number;
+  };
+  document.querySelectorAll(".grid table").forEach((table) => {
+    const title = document.getElementById(table.getAttribute("aria-labelledby"));
+    const save = element("button", "CSV", "save");
+    save.type = "button";
+    save.title = "Save this table as CSV";
+    save.addEventListener("click", () => {
+      const lines = [...table.rows].map((row) => [...row.cells].map((cell) => plain(cell.textContent)).join(","));
+      const link = element("a");
+      link.href = URL.createObjectURL(new Blob([lines.join("\r\n"), "\r\n"], { type: "text/csv" }));
+      link.download = `${title.id}.csv`;
+      link.click();
+      setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+    });
+    title.append(" ", save);
+  });
 
   addEventListener("beforeprint", () => document.querySelectorAll("details").forEach((fold) => { fold.open = true; }));
 })();

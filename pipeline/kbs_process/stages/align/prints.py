@@ -1,8 +1,9 @@
-"""Prints of runs of successive readings, by which a part of a recording is found again, rounded anew or not.
+"""Prints of runs of successive readings, by which a part of a recording is found again, rounded or turned, or not.
 
-A print is the signs of a run's third differences: what moves slowly, a zero and a gain are not in it, and rounding
-seldom changes it. Of all prints those with the least values are kept, the same in every recording, each with its
-readings: these tell whether two runs with the same print are the same but for rounding.
+A print is the signs of a run's fourth differences: what moves slowly, a zero and a gain are not in it, and rounding
+seldom changes it. Backwards it has the same signs: of both ways the lesser counts. Of all prints those with the least
+values are kept, the same in every recording, each with its readings: these tell whether two runs with the same print
+are the same but for rounding.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 from kbs_process.signals.records import Array, Block, Mask, Stamps
 from kbs_process.stages.align.ordering import concatenate, select
 
-ORDER, DOUBLINGS = 3, 5
+ORDER, DOUBLINGS = 4, 5  # an even order has no sense of time
 RUN = 2**DOUBLINGS + ORDER  # readings: of noise of a step and more, no two runs are the same by chance
 KEPT = 1024  # prints of a channel: they find what is some thousandths of a recording
 _STEPS = (*(m * 10.0**k for k in range(-12, 2) for m in (1.0, 2.0, 5.0)), *(2.0**k for k in range(-40, 4)))
@@ -35,10 +36,12 @@ class Prints:
 
     def push(self, stamp: Stamps, x: Array) -> None:
         """Take the runs of readings (n,) at `stamp` (n,), ns."""
-        words = (np.diff(x, ORDER) > 0.0).astype(np.uint64)
+        words = turned = (np.diff(x, ORDER) > 0.0).astype(np.uint64)
         for doubling in range(DOUBLINGS):
             width = 2**doubling
             words = (words[:-width] << np.uint64(width)) | words[width:]
+            turned = (turned[width:] << np.uint64(width)) | turned[:-width]
+        backwards, words = turned < words, np.minimum(words, turned)
         words *= _FACTOR
         words ^= words >> np.uint64(29)
         words *= _FACTOR
@@ -52,6 +55,7 @@ class Prints:
         self.words = np.concatenate([words[before], words[new]])
         new = few[new - old]
         runs = sliding_window_view(x, RUN)[new]
+        runs = np.where(backwards[new, None], runs[:, ::-1], runs)
         self.at = np.concatenate([self.at[before], stamp[new]])
         self.runs = np.concatenate([self.runs[before], runs - runs[:, :1]])
 

@@ -23,7 +23,7 @@ from kbs_process.stages.gravity.taring import Taring
 BEYOND = 4.0  # sigma
 BY_CHANCE = 1e-4
 KNOWN_S = 0.02  # to which a delay between two recorders can be known at best
-TAKEN = 0.25  # part of the power of what is left that a lag explains, or it is none
+TAKEN = 0.25  # part of the power of what is left that a lag explains, or something else may follow the rates
 _ROUNDS = 4  # of weights
 _INFORMED = 0.1  # part of the prior's variance that the data take away: less says nothing of the prior
 
@@ -42,6 +42,22 @@ class Moved:
     def distance(self) -> float:
         """How far it has moved, in standard deviations of such moves."""
         return (self.value - self.prior) / self.chance
+
+
+@dataclass(frozen=True, slots=True)
+class Lag:
+    """How late a recording's wrench is behind its angles (s), beyond what the model has, and by how much by chance."""
+
+    recording: str
+    value: float
+    chance: float  # standard deviation, by what coloured residuals leave uncertain
+    taken: float  # part of the power of what is left that it explains
+
+    def moved(self, sigma: float) -> Moved:
+        """The same, of two recorders that are known to agree to `sigma`, s."""
+        known = max(sigma, KNOWN_S)
+        name = f"the wrench's lag (s) behind the angles in {self.recording}"
+        return Moved(name, 0.0, known, self.value, float(np.hypot(known, self.chance)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,18 +95,13 @@ def tension(model: GravityModel, tarings: Mapping[str, Taring], lags: Sequence[M
     return Tension((*moved, *_zeros(model, tarings), *lags), together(fit.moved[known] / scale, C))
 
 
-def lag(model: GravityModel, data: Prepared, sigma: float) -> Moved | None:
-    """How late a recording's wrench is behind its angles (s), beyond what the model has, known to be 0 +- `sigma`.
-
-    Chance is what coloured residuals leave it uncertain by. None where it takes away less than `TAKEN` of what is left:
-    something else may follow the angles' rates.
-    """
+def lag(model: GravityModel, data: Prepared) -> Lag | None:
+    """The lag of a recording's wrench, by what gravity leaves of it; None where there is no wrench."""
     equation = model.equation
     wrench = [at for at, channel in enumerate(equation.channels) if channel in WRENCH_CHANNELS]
     expected = equation.predict(model.fit.value[: equation.size], data)[:, wrench]
     if not wrench:
         return None
-    sigma = max(sigma, KNOWN_S)
     left = data.wrench[:, wrench] - expected
     late = -np.gradient(expected, data.t, axis=0)
     rest = left = left - left.mean(axis=0)
@@ -101,13 +112,10 @@ def lag(model: GravityModel, data: Prepared, sigma: float) -> Moved | None:
         power = max(float(np.sum(late**2 * weight)), 1e-300)
         value = float(np.sum(late * left * weight)) / power
         rest = left - value * late
-    if float(np.sum(rest**2 * weight)) > (1.0 - TAKEN) * float(np.sum(left**2 * weight)):
-        return None
     scores = np.sum(late * rest * weight, axis=1, keepdims=True)
     chance = float(np.sqrt(longrun_covariance(scores)[0, 0])) / power
-    return Moved(
-        f"the wrench's lag (s) behind the angles in {data.name}", 0.0, sigma, value, float(np.hypot(sigma, chance))
-    )
+    taken = 1.0 - float(np.sum(rest**2 * weight)) / max(float(np.sum(left**2 * weight)), 1e-300)
+    return Lag(data.name, value, chance, taken)
 
 
 def by_chance(names: Sequence[str], prior: Array, value: Array, sigma: Array, covariance: Array) -> tuple[Moved, ...]:

@@ -14,7 +14,6 @@ import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from kbs_process.campaign.documents import QUESTION, quoted, read, shown
-from kbs_process.campaign.locate import CAMPAIGN_FILE
 from kbs_process.campaign.units import dimension, to_si
 from kbs_process.campaign.writing.parameter_files import value_text
 from kbs_process.errors import ConfigError, KbsError, RecordingError
@@ -33,6 +32,8 @@ from kbs_process.studies.convert.shift import find_shift
 MAPPING_FILE = "mapping.toml"
 _PREAMBLE = 40  # lines above a table that are looked through
 _APART = 5.0  # sigmas: clocks whose shift changes by more from half to half run at different rates
+_ENCODINGS = (Text().encoding, "cp1252")  # the latter is what Windows writes in Western Europe
+_MOST = 1e100  # a greater number is no reading
 _KEPT = 4096  # rows of a piece that are kept, as averages
 _RATES = [digit * 10.0**power for power in range(-2, 6) for digit in (1, 2, 5)]
 
@@ -95,7 +96,7 @@ def begin(target: Path, files: Sequence[Path]) -> Iterator[str]:
         keep_trailing_newline=True,
     )
     environment.filters["quoted"] = quoted
-    with writing(target, CAMPAIGN_FILE) as folder:
+    with writing(target, MAPPING_FILE) as folder:
         for name in ("campaign", "rig", "mapping"):
             text = environment.get_template(f"{name}.j2").render(facts | {"name": target.absolute().name})
             (folder / f"{name}.toml").write_text(text, encoding="utf-8")
@@ -138,7 +139,7 @@ def _read(path: Path) -> Log:
         rows = min(len(named[name]) for name in wanted) if wanted else 0
         block = max(1, rows // _KEPT)
         whole = rows // block * block
-        values = {name: numbers(named[name][:rows]) for name in used}
+        values = {name: np.where(np.abs(x := numbers(named[name][:rows])) < _MOST, x, np.nan) for name in used}
         if index == 0:
             turns = {
                 one.column: 2.0 * np.pi / to_si(one.unit) for one in log.of("encoder") if dimension(one.unit) == "angle"
@@ -157,8 +158,8 @@ def _read(path: Path) -> Log:
 def _opened(path: Path) -> tuple[Table, Text]:
     """Open a file; of a text, look for where its table begins, for a line of units, and for its decimal mark."""
     failed: RecordingError | None = None
-    for skip, units, decimal in product(range(_PREAMBLE), (False, True), (".", ",")):
-        text = Text(skip_rows=skip, units_row=units, decimal=decimal)  # type: ignore[arg-type]
+    for encoding, skip, units, decimal in product(_ENCODINGS, range(_PREAMBLE), (False, True), (".", ",")):
+        text = Text(skip_rows=skip, units_row=units, decimal=decimal, encoding=encoding)  # type: ignore[arg-type]
         try:
             table = open_table(path, None, text)
             first = next(iter(table.chunks([column.name for column in table.columns])))
@@ -286,7 +287,7 @@ def _shift(load: Log, angle: Log) -> tuple[str, str]:
     if load.dated and angle.dated:
         return "# both files have dates: their clocks are taken to agree", "both have dates"
     joints = angle.of("encoder")
-    found, asked = None, "the motion does not tell it"
+    found, asked = None, "motion and times do not tell it"
     if load.times and angle.times and all(one.unit != QUESTION for one in joints):
         (t, wrench), (t_angle, q) = load.samples("wrench"), angle.samples("encoder")
         turns = [dimension(one.unit) == "angle" for one in joints]

@@ -49,7 +49,8 @@ def nanoseconds(cells: Cells, time: Time, where: str) -> tuple[Stamps, Mask]:
     scale = _NS[time.unit]
     if cells.dtype.kind in "iu" and np.abs(cells.astype(np.float64)).max(initial=0.0) * scale < _GREATEST:
         return cells.astype(np.int64) * scale + start, np.ones(len(cells), dtype=np.bool_)
-    return _rounded(numbers(cells) * scale, start)
+    with np.errstate(over="ignore"):  # infinity is no time either
+        return _rounded(numbers(cells) * scale, start)
 
 
 def epoch_ns(start: datetime | None) -> int:

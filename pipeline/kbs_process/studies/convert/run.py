@@ -52,7 +52,8 @@ def import_recordings(
     files = _source_files(plan, source)
     with writing(target, CAMPAIGN_FILE) as folder:
         campaign = prepare(plan, folder)
-        _check_same(target, campaign.name)
+        sources = {name: sha256(path) for name, path in files.items()}
+        _check_same(target, campaign.name, sources)
         checksums: dict[str, str] = {}
         findings: dict[str, tuple[str, ...]] = {}
         for part in plan.parts:
@@ -64,19 +65,20 @@ def import_recordings(
             if notice:
                 for line in lines:
                     notice(f"{part.source}, {line}")
-        origins = tuple(Origin(name, sha256(path), findings.get(name, ())) for name, path in files.items())
+        origins = tuple(Origin(name, digest, findings.get(name, ())) for name, digest in sources.items())
         write_campaign(plan, folder, checksums, origins)
         load_campaign(folder)
     return target
 
 
-def _check_same(target: Path, name: str) -> None:
-    """Raise OutputError where the folder holds another campaign than the one of this name."""
+def _check_same(target: Path, name: str, sources: MappingOf[str, str]) -> None:
+    """Raise OutputError where the folder holds another campaign: of another name, or of none of these files."""
     remedy = "name a folder that is empty or does not exist, or move this one"
     if (target / CAMPAIGN_FILE).is_file():
-        held = read(target / CAMPAIGN_FILE, role="campaign", remedy=remedy).tree.get("name")
-        if held != name:
-            raise OutputError(f"holds the campaign '{held}', not '{name}'", where=shown(target), remedy=remedy)
+        held = read(target / CAMPAIGN_FILE, role="campaign", remedy=remedy).tree
+        what = f"holds the campaign '{held.get('name')}', not '{name}' of these files"
+        if held.get("name") != name or not any(digest in str(held.get("source")) for digest in sources.values()):
+            raise OutputError(what, where=shown(target), remedy=remedy)
 
 
 def _source_files(mapping: Mapping, source: Path) -> dict[str, Path]:

@@ -13,6 +13,7 @@ _POINTS = 1000  # of a recording, in the search
 _MOST = 20 * _POINTS  # shifts; one recording that lasts so much longer than the other takes too long to search
 _EXPLAINED = 0.05  # share of a channel that may be left, or angles do not tell its static part
 _FEWEST = 30  # rows with a partner, fewer of which any curve fits
+_BRIDGED = 10.0  # times their usual interval: angles that are farther apart tell nothing of what is between
 _DISTINCT = 4.0  # times more is left at any other shift
 
 
@@ -23,17 +24,23 @@ def find_shift(
 
     The static wrench is a function of the angles (m, j): of their sines and cosines where a joint `turns`, else of the
     way, and of these in pairs. At the right shift least of the wrench is left beside it. The search covers all shifts
-    at which half of the shorter recording has a partner. Valid where motion does not repeat itself within these.
+    at which half of the shorter recording has a partner. Valid where motion does not repeat itself within these. None
+    where times go back, or leap by as much as they take otherwise.
     """
     if min(len(t), len(t_angle)) < _FEWEST:
         return None
     coarse = max(1, len(t) // _POINTS)
     rows = slice(None, len(t) // coarse * coarse)
     few = t[rows].reshape(-1, coarse).mean(1), wrench[rows].reshape(-1, coarse, wrench.shape[1]).mean(1)
+    steps = np.diff(t_angle)
+    if any(each.min() < 0.0 or 2.0 * each.max() > each.sum() for each in (steps, np.diff(t))):
+        return None
+    known = steps <= _BRIDGED * np.median(steps)
 
     def left(shift: float, times: Array, loads: Array) -> tuple[Array, Array]:
         at = times + shift
-        inside = (at >= t_angle[0]) & (at <= t_angle[-1])
+        after = np.searchsorted(t_angle, at)
+        inside = (at >= t_angle[0]) & (at <= t_angle[-1]) & known[after.clip(1, len(known)) - 1]
         if inside.sum() < _FEWEST:
             return loads[:0], np.ones(loads.shape[1])
         q = np.stack([np.interp(at[inside], t_angle, one) for one in angle.T])

@@ -94,7 +94,7 @@ def unclear(campaign: Campaign, prepared: Sequence[Prepared], requirement: Requi
 
 def _notice(severity: Severity, name: str, where: str = "", **facts: object) -> Notice:
     """A notice in the words of its template."""
-    return Notice(severity=severity, what=_SAYS(name, **facts), where=where, remedy=_SAYS(f"{name}_remedy"))
+    return Notice(severity=severity, what=_SAYS(name, **facts), where=where, remedy=_SAYS(f"{name}_remedy", **facts))
 
 
 def _unjudged(analyses: Sequence[Analysis]) -> Iterable[Notice]:
@@ -169,7 +169,8 @@ def _shown(analysis: Analysis, channel: str, model: GravityModel) -> str:
     """What the data show of what a channel leaves below the fit's low-pass."""
     residual, joints = analysis.residual, [joint.name for joint in model.rig.joints]
     slow = smooth(residual.column(channel)[:, None], residual.dt, model.settings.low_pass_Hz)[:, 0]
-    return f"{channel}: {description(slow, residual.valid, residual.dt, analysis.motion.q, joints)}"
+    load = analysis.static.wrench.column(channel)
+    return f"{channel}: {description(slow, residual.valid, residual.dt, analysis.motion.q, joints, load)}"
 
 
 def _taring(analyses: Sequence[Analysis]) -> Iterable[Notice]:
@@ -256,7 +257,8 @@ def _predictions(found: Results) -> Iterable[Notice]:
         explained = merit.fraction_of_variance
         if not merit.at_the_noise and explained is not None and explained < WEAK:
             where = f"{merit.recording}, {labels[merit.band]}, frame {merit.frame}"
-            yield _notice("warning", "weak_prediction", where, explained=explained, channel=merit.channel)
+            facts = {"explained": explained, "channel": merit.channel, "driven": found.campaign.drive == "command"}
+            yield _notice("warning", "weak_prediction", where, **facts)
 
 
 def _phases(campaign: Campaign, analyses: Sequence[Analysis]) -> Iterable[Notice]:

@@ -75,7 +75,7 @@ def _on_transducer(make: Callable[[Results, Tables], Panel]) -> Callable[[Result
 
 def _provenance(results: Results, tables: Tables) -> Panel:
     """The command, the software, and the checksum of every input."""
-    return provenance.panel(results.provenance, {entry.file: entry.sha256 for entry in results.recordings})
+    return provenance.panel(results.provenance, results.campaign.sources)
 
 
 DOCUMENT = Document(
@@ -94,7 +94,7 @@ DOCUMENT = Document(
         _on_transducer(coupling.panel),
         repeatability.panel,
         budget.panel,
-        _on_transducer(pointing.panel),
+        pointing.panel,
         recordings.panel,
         _on_transducer(conventions.panel),
         methods.panel,

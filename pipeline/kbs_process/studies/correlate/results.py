@@ -11,8 +11,8 @@ from typing import Literal
 import msgspec
 
 from kbs_process.results.judged import Budget, Frame, Requirement, Soundness
-from kbs_process.results.pointing import RecordedPointing
-from kbs_process.results.records import Check, Constant, Record, ResultsFile
+from kbs_process.results.pointing import JudgedPointing, RecordedPointing
+from kbs_process.results.records import Check, Constant, InputFile, Record, ResultsFile
 from kbs_process.signals.records import Loss
 from kbs_process.stages import compare
 from kbs_process.stages.conventions import SignCheck
@@ -29,6 +29,7 @@ class CampaignSummary(Record, frozen=True, kw_only=True):
     configuration: str
     drive: Literal["command", "motion"]  # what drives the plant: the commands, or the measured angles
     frame: Frame = "T"  # of the loads that were recorded
+    sources: tuple[InputFile, ...] = ()  # the loggers' files that recordings were imported from
 
 
 class DocumentHead(Record, frozen=True, kw_only=True):
@@ -309,6 +310,7 @@ class Results(ResultsFile, frozen=True, kw_only=True):
     document: DocumentHead = DocumentHead()
     model: ModelVerdict | None = None  # None: nothing was predicted
     requirements: tuple[Requirement, ...] = ()
+    judged_pointing: tuple[JudgedPointing, ...] = ()
     recordings: tuple[Recording, ...] = ()
     conventions: tuple[SignCheck, ...] = ()
     soundness: Soundness = Soundness()

@@ -51,9 +51,8 @@ def process(
             kept = _with_spikes(campaign, prepared, decoupling, progress) if found.requirements else ()
             told = spikes(analyses, found.requirements, kept)
             judged = decided(found.requirements, kept, [unclear(campaign, prepared, one) for one in found.requirements])
-            found = msgspec.structs.replace(
-                found, warnings=(*told, *found.warnings), requirements=judged, verdict=conclusion(judged)
-            )
+            said = conclusion(judged, found.judged_pointing)
+            found = msgspec.structs.replace(found, warnings=(*told, *found.warnings), requirements=judged, verdict=said)
 
         def read(entry: RecordingEntry) -> Analysis:
             return _analyse(campaign, prepare(campaign, entry, decoupling, progress), model, progress)

@@ -12,11 +12,12 @@ from kbs_process.campaign.config import Campaign, RecordingEntry
 from kbs_process.errors import KbsError
 from kbs_process.reduction.analysis import Analysis, bands_of, select
 from kbs_process.reduction.judging import judged
-from kbs_process.reduction.pointing import recorded_pointing
+from kbs_process.reduction.pointing import judged_pointing, recorded_pointing
 from kbs_process.reduction.soundness import Checked
 from kbs_process.results import provenance
-from kbs_process.results.judged import Requirement
-from kbs_process.results.records import Check, Conclusion
+from kbs_process.results.judged import WRONG, Requirement
+from kbs_process.results.pointing import JudgedPointing
+from kbs_process.results.records import Check, Conclusion, InputFile
 from kbs_process.signals.records import Signal
 from kbs_process.stages.decouple import Decoupling
 from kbs_process.stages.gravity.equation import RESPONSE
@@ -24,6 +25,7 @@ from kbs_process.stages.gravity.ladder import Rung
 from kbs_process.stages.gravity.model import GravityModel, taring_error
 from kbs_process.stages.gravity.quality import feasibility
 from kbs_process.stages.to_cog import ASSUMPTION
+from kbs_process.stages.verdict import SEVERITY
 from kbs_process.studies.correlate import results
 from kbs_process.studies.correlate.findings import band, merits, repeatabilities, resonances, statements
 from kbs_process.studies.correlate.methods import methods
@@ -47,10 +49,16 @@ def summarise(
     stated = statements(bands_of(campaign.bands), runs)
     repeated = tuple(repeatabilities(runs))
     modes = resonances(campaign, runs, model)
-    budget = tuple(budgets(campaign, runs, model, decoupling, stated, repeated, modes, checked.noise))
+    budget = tuple(budgets(campaign, runs, model, decoupling, stated, repeated, modes, checked.noise, checked.late))
+    told = checked.rounding, checked.mute, checked.unconfirmed
     requirements = tuple(
-        judged(campaign, requirement, runs, budget, checked.doubts(requirement), checked.rounding, checked.mute)
+        judged(campaign, requirement, runs, budget, checked.doubts(requirement), *told)
         for requirement in campaign.requirements
+    )
+    cut = any(one.start is not None or one.end is not None for one in campaign.recordings)
+    doubt = "" if checked.soundness.sound and all(one.ok for one in checked.conventions) else WRONG
+    pointed = tuple(
+        judged_pointing(campaign, analyses, doubt or ("a part that is cut off is not judged" if cut else ""))
     )
     found = results.Results(
         campaign=results.CampaignSummary(
@@ -60,11 +68,13 @@ def summarise(
             configuration=campaign.configuration,
             drive=campaign.drive,
             frame="joint" if campaign.rig.frame == "joint" else "T",
+            sources=tuple(InputFile(file=name, sha256=digest) for name, digest in campaign.sources.items()),
         ),
         document=results.DocumentHead(**({"date": date_of(analyses)} | campaign.document)),
-        verdict=conclusion(requirements),
+        verdict=conclusion(requirements, pointed),
         provenance=provenance.made("", campaign.folder, campaign.files),
         requirements=requirements,
+        judged_pointing=pointed,
         recordings=tuple(_recording(analysis) for analysis in analyses),
         conventions=checked.conventions,
         soundness=checked.soundness,
@@ -94,19 +104,23 @@ def date_of(analyses: Sequence[Analysis]) -> str:
     return days[0] if len(days) == 1 else f"{days[0]} to {days[-1]}"
 
 
-def conclusion(requirements: Sequence[Requirement]) -> Conclusion:
-    """Return what the worst verdict says, in a sentence."""
-    if not requirements:
+def conclusion(requirements: Sequence[Requirement], pointed: Sequence[JudgedPointing] = ()) -> Conclusion:
+    """Return what the worst verdict says, in a sentence; on the disturbance, unless one on pointing is worse."""
+    worst = max(requirements, key=lambda one: (SEVERITY[one.verdict], one.only_without), default=None)
+    pointing = max(pointed, key=lambda one: SEVERITY[one.verdict], default=None)
+    if pointing and (worst is None or SEVERITY[pointing.verdict] > SEVERITY[worst.verdict]):
+        return Conclusion(status=pointing.verdict, sentence=_of_pointing(pointing))
+    if worst is None:
         return Conclusion(status="none", sentence="The campaign states no requirement.")
-    worst = max(requirements, key=lambda one: (("pass", "undecided", "fail").index(one.verdict), one.only_without))
-    words = {"pass": "met", "fail": "not met", "undecided": "neither met nor broken within the uncertainty"}
-    words["undecided"] = f"undecided: {worst.doubt}" if worst.doubt else words["undecided"]
+    word = _word(worst)
     value, low, high = (figure or 0.0 for figure in (worst.value, worst.low, worst.high))
     unshown = f" Nothing shows a response of {', '.join(worst.mute)}, only noise." if worst.mute else ""
+    if worst.untested:
+        unshown += " No sign and no axis was tested: the loads change too little for what the files leave open."
     axes = ", ".join(worst.axes)
     least = f"{low:.4f}" if low > 0.0 else "0"
     sentence = (
-        f"{worst.name}: {words[worst.verdict]}. {worst.statistic.capitalize()} {value:.4f} {worst.unit} "
+        f"{worst.name}: {word}. {worst.statistic.capitalize()} {value:.4f} {worst.unit} "
         f"({least} to {high:.4f} at 95 %) on {worst.channel} in {worst.recording}, "
         f"{worst.band_Hz[0] or 0:g} to {worst.band_Hz[1] or 0:g} Hz; limit {worst.limit:g} {worst.unit}"
         f"{'' if worst.lever_m is None else f', {worst.lever_m:.3g} m from the transducer'}."
@@ -115,6 +129,17 @@ def conclusion(requirements: Sequence[Requirement]) -> Conclusion:
         f"{f' {worst.left_out}' if worst.only_without else ''}"
     )
     return Conclusion(status=worst.verdict, sentence=sentence)
+
+
+def _word(one: Requirement | JudgedPointing) -> str:
+    if one.verdict == "undecided":
+        return f"undecided: {one.doubt}" if one.doubt else "neither met nor broken within the uncertainty"
+    return "met" if one.verdict == "pass" else "not met"
+
+
+def _of_pointing(one: JudgedPointing) -> str:
+    value, sigma, limit = (float(np.degrees(angle or 0.0)) for angle in (one.value, one.sigma, one.limit))
+    return f"{one.name}: {_word(one)}. {one.where}: {value:.4f} +- {sigma:.2g} deg; limit {limit:.4g} deg."
 
 
 def with_left_out(
@@ -137,7 +162,7 @@ def with_left_out(
         every = [replace(one.entry, role="calibration", start=None, end=None) for one in left]
         whole = [one if one.entry == entry else read(entry) for one, entry in zip(left, every, strict=True)]
         stated = statements(bands_of(campaign.bands), whole)
-        rows = tuple(budgets(campaign, whole, model, decoupling, stated, found.repeatability, found.resonances, {}))
+        rows = tuple(budgets(campaign, whole, model, decoupling, stated, found.repeatability, found.resonances, {}, {}))
         others = [_words(judged(campaign, asked, whole, rows)) for asked in campaign.requirements]
     except KbsError as error:
         others = [("undecided", f"By itself that cannot be judged: {error.what}.")] * len(found.requirements)
@@ -150,7 +175,7 @@ def with_left_out(
                 one, verdict="undecided", doubt="what the campaign leaves out does not meet it"
             )
         told.append(one)
-    return msgspec.structs.replace(found, requirements=tuple(told), verdict=conclusion(told))
+    return msgspec.structs.replace(found, requirements=tuple(told), verdict=conclusion(told, found.judged_pointing))
 
 
 def _words(one: Requirement) -> tuple[str, str]:

@@ -33,11 +33,13 @@ def budgets(
     repeated: Sequence[results.Repeatability],
     resonances: Sequence[results.Resonance],
     noise: Mapping[str, Mapping[str, float]],
+    late: Mapping[str, float],
 ) -> Iterable[Budget]:
     """Yield every recording's own budget; where nothing of a recording is known in a band, there is none.
 
     `noise`: of a sample, rms, by recording and channel, as measured; what is stated counts where it is more, and no
-    noise is more than all that is read in the band.
+    noise is more than all that is read in the band. `late`: s, by recording: what its clocks are off by, as gravity
+    shows it.
     """
     lowest = min((mode.frequency_Hz for mode in resonances), default=None)
     spacecraft, own = campaign.rig.spacecraft, campaign.rig.frame
@@ -50,7 +52,8 @@ def budgets(
             repeats = _repeat_noise(of_band, measured.channels, analysis.entry.trajectory)
             shown = np.nan_to_num([noise.get(analysis.entry.name, {}).get(key, 0.0) for key in measured.channels])
             edges = statements[band.name]
-            entries = _entries(campaign, analysis, model, decoupling, band, edges, shown, repeats, lowest)
+            known = float(np.hypot(analysis.entry.clock_sigma, late.get(analysis.entry.name, 0.0)))
+            entries = _entries(campaign, analysis, model, decoupling, band, edges, shown, repeats, lowest, known)
             frame: Frame = "joint" if own == "joint" else "T"
             yield from _rows(entries, frame, band.name, analysis.entry.name, measured)
             if spacecraft is not None and set(WRENCH_CHANNELS) <= set(measured.channels):
@@ -101,6 +104,7 @@ def _entries(
     noise: Array,
     repeat_noise: Array | None,
     resonance: float | None,
+    clocks: float,
 ) -> list[budget.Entry]:
     """The budget of one recording in one band, in the frame of the recorded loads."""
 
@@ -115,7 +119,7 @@ def _entries(
     least = rig.loads.noise[rig.loads.index(measured.channels)]
     bridged = bandpass.bridging_noise(analysis.run.gaps, band, float(np.max(rates)))
     sensor = budget.sensor_noise(bridged * np.maximum(least, np.minimum(noise, most)), rates, width)
-    late = late_sigma(analysis.run.clocks, rig.transducer.amplifier, analysis.entry.clock_sigma)
+    late = late_sigma(analysis.run.clocks, rig.transducer.amplifier, clocks)
     entries = [
         sensor,
         *([_cross_coupling(analysis, model, decoupling, band)] if rig.transducer.channels else []),

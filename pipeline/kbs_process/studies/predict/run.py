@@ -13,6 +13,7 @@ from kbs_process.plant.laws import select
 from kbs_process.plant.moved import added_loads
 from kbs_process.plant.predict import Schedule, predict
 from kbs_process.plant.rigid import loads
+from kbs_process.plant.schedule import stopped
 from kbs_process.progress import Progress
 from kbs_process.reduction.commands import of_table, of_trajectory
 from kbs_process.reduction.predicting import approached, schedule_of
@@ -26,7 +27,9 @@ from kbs_process.studies.predict.files import write_prediction
 TABLES = (".csv", ".parquet")  # of commands, by the file's name
 
 
-def simulate_commands(campaign: Campaign, commands: Path, target: Path, *, rate_Hz: float, progress: Progress) -> Path:
+def simulate_commands(
+    campaign: Campaign, commands: Path, target: Path, *, rate_Hz: float, progress: Progress, stop: float
+) -> Path:
     """Simulate the commands of a CSV or Parquet file through the controller; return `target`."""
     _require_commands(campaign)
     given = of_table(commands, campaign.rig)
@@ -34,7 +37,7 @@ def simulate_commands(campaign: Campaign, commands: Path, target: Path, *, rate_
         streams = predict(
             campaign.rig,
             campaign.effects,
-            given.schedule,
+            stopped(given.schedule, campaign.rig.controller, stop),
             rate_Hz=rate_Hz,
             angle_rate_Hz=rate_Hz,
             duration_s=float(given.schedule.t[-1]),
@@ -44,7 +47,7 @@ def simulate_commands(campaign: Campaign, commands: Path, target: Path, *, rate_
 
 
 def simulate_trajectory(
-    campaign: Campaign, trajectory: str | None, target: Path, *, rate_Hz: float | None, progress: Progress
+    campaign: Campaign, trajectory: str | None, target: Path, *, rate_Hz: float | None, progress: Progress, stop: float
 ) -> Path:
     """Simulate the commands recorded in a trajectory's first run (default: the last one listed)."""
     _require_commands(campaign)
@@ -52,7 +55,8 @@ def simulate_trajectory(
     run = given.run
     assert run is not None  # a recording's
     with progress.task(f"Simulating {given.name}") as task:
-        streams = _as_recorded(campaign, campaign.effects, given.schedule, run, task.update, rate_Hz)
+        path = stopped(given.schedule, campaign.rig.controller, stop)
+        streams = _as_recorded(campaign, campaign.effects, path, run, task.update, rate_Hz)
         return write_prediction(
             campaign, streams, target, "simulated", given.name, (given.source,), epoch_ns=run.epoch_ns
         )
@@ -81,7 +85,7 @@ def predict_with(model: Campaign, recording: str, target: Path, *, rate_Hz: floa
     """Predict a recording, or commands of a CSV or Parquet file, with a model; return `target`."""
     path = Path(recording)
     if path.suffix.lower() in TABLES and path.exists():
-        return simulate_commands(model, path, target, rate_Hz=rate_Hz, progress=progress)
+        return simulate_commands(model, path, target, rate_Hz=rate_Hz, progress=progress, stop=np.inf)
     return predict_recording(model, recording, target, progress=progress)
 
 

@@ -138,12 +138,9 @@ def _pointing_judged(
     else:
         for section in sections:
             for one, offset in zip((section.azimuth, section.elevation), offsets, strict=True):
-                value, sigma = {
-                    "bias": (abs(one.bias), float(np.hypot(one.bias_sigma, offset))),
-                    "random": (one.random, one.random_sigma),
-                    "percentile": (one.percentile, one.percentile_sigma),
-                }[requirement.statistic]
-                candidates.append((value, sigma, f"{one.axis}, section {section.name}"))
+                value, sigma = getattr(one, requirement.statistic), getattr(one, f"{requirement.statistic}_sigma")
+                sigma = float(np.hypot(sigma, offset if requirement.statistic == "bias" else 0.0))
+                candidates.append((abs(value), sigma, f"{one.axis}, section {section.name}"))
     value, sigma, where = max(candidates)
     return Judged(
         name=requirement.name,

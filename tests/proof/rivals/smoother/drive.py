@@ -21,6 +21,9 @@ from proof.rivals.smoother.splines import in_band
 FINE = 1000.0  # Hz, at which torques along the field are taken
 _PARTS = 8  # of a fine step, over which whole microsteps are averaged
 _REVERSAL = 2e-3  # rad/s of the motor over which friction changes its sign
+WRITTEN = frozenset(
+    {"synchronous_motor", "cogging", "motor_viscous", "dynamic_friction", "tooth_stiction", "flexspline"}
+)
 NUMBERS = ("b_m", "d0", "cog s", "cog c", "dyn s", "dyn c", "stat s", "stat c", "stat 2s", "stat 2c", "stat")
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,7 @@ from scipy.linalg.lapack import dtrtri
 
 from proof.rivals.case import Array
 from proof.rivals.smoother.balance import Motion
+from proof.rivals.smoother.course import Course
 from proof.rivals.smoother.problem import Problem
 from proof.rivals.smoother.splines import LOCAL
 
@@ -39,6 +40,20 @@ class State:
         state.follow(problem)
         return state
 
+    def joined(self, before: Problem, problem: Problem) -> State:
+        """The same for a problem that has one effect more than the one `before`."""
+        x = problem.prior.copy()
+        shared = before.own[0].start
+        x[:shared] = self.x[:shared]
+        for old, new in zip(before.own, problem.own, strict=True):
+            clocks = old.stop - 2
+            x[new.start : new.start + clocks - old.start] = self.x[old.start : clocks]
+            x[new.stop - 2 : new.stop] = self.x[clocks : old.stop]
+        return replace(
+            self, x=x, coefficients=[*self.coefficients], sigma=self.sigma.copy(), torques=[*self.torques],
+            ideal=[*self.ideal], ideal_torques=[*self.ideal_torques],
+        )  # fmt: skip
+
     def motion(self, problem: Problem, k: int) -> Motion:
         """The motion of a recording."""
         return problem.recordings[k].splines.motion(self.coefficients[k])
@@ -58,6 +73,8 @@ class State:
         sigma = self.sigma.copy()
         sigma[problem.forces] *= stiff
         for k in range(len(self.ideal)):
+            if problem.present:
+                problem.acting[k] = self.course(problem, k).columns(problem.present)
             for _ in range(_RUNS):
                 self.ideal[k], self.ideal_torques[k] = _moved(
                     problem, k, self.x, self.ideal[k], self.ideal_torques[k], self.weights(problem, k, sigma)
@@ -73,6 +90,10 @@ class State:
     def ideal_motion(self, problem: Problem, k: int) -> Motion:
         """The motion that the model has by itself."""
         return problem.recordings[k].splines.motion(self.ideal[k])
+
+    def course(self, problem: Problem, k: int) -> Course:
+        """What effects do along that motion."""
+        return Course(problem, k, self.x, self.ideal_motion(problem, k), self.ideal_torques[k])
 
     def weights(self, problem: Problem, k: int, sigma: Array | None = None) -> Array:
         """(n, rows) one over the variance of each row, as far as samples are independent."""

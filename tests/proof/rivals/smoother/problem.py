@@ -11,6 +11,8 @@ A row's weight is one over its variance; where recordings say nothing, it has no
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -21,21 +23,25 @@ from scipy.ndimage import binary_erosion
 
 from kbs_process.diagnosis.experiments.experiment import Experiment
 from kbs_process.diagnosis.experiments.hypothesis import decoupling
+from kbs_process.diagnosis.screening.suspects import Candidate, own_values
+from kbs_process.plant.laws import select
 from kbs_process.rig.model import Amplifier, Rig
 from kbs_process.stages.gravity.parameters import RigElements
 from proof.rivals.case import Array
 from proof.rivals.smoother.balance import FIRST_JOINT, FLOOR, PLATE, Loads, Motion, needed
-from proof.rivals.smoother.drive import Field, priors, spring
+from proof.rivals.smoother.drive import WRITTEN, Field, priors, spring
 from proof.rivals.smoother.splines import BAND_HZ, Splines, in_band
 
 _ENDS = 1.0  # s left out at a recording's ends, and half of it beside gaps
 _LINES = 3  # first terms of a channel's zero: constant, slope, curvature
 _DRIFT = 0.05  # of the bias's sigma: what they drift by
 _PINK_HZ = 0.1  # up to which a channel's noise may be 1/f, as large as its white noise there
+_WAVES = 24  # of a zero at most: of a long recording the slowest, where 1/f noise is most
 _CLOCK = 3e-3  # s, of a clock against the field's
 _LEAST = 0.1  # of its value: what a stiffness, a damping or an inertia is at least
 _STEPS = (1e-6, 1e-6, 1e-4)  # of values, rates and accelerations, for slopes
 _FLOOR_STEP = 1e-3  # m/s^2
+_EXACT = 1e-6  # of an amplitude that is known without a sigma: its sigma, of itself
 _SHARE = 1e-3  # of a sigma: step of an unknown
 _OF_RIG = ("body.", "transducer.tilt", "transducer.stiffness", "transducer.damping")
 _OF_JOINT = (".origin", ".misalignment", ".Ka", ".fsv", ".Tmax")
@@ -68,7 +74,7 @@ class Recording:
 
     @property
     def _waves(self) -> NDArray[np.int_]:
-        return np.arange(_LINES, int(2 * _PINK_HZ * self.n * self.dt) + 1)
+        return np.arange(_LINES, min(int(2 * _PINK_HZ * self.n * self.dt), _WAVES) + 1)
 
     def spread(self, bias: Array, white: Array) -> Array:
         """Sigmas (channels, terms) of a zero: `bias` is the constant's, `white` the noise, one-sided, per Hz."""
@@ -97,7 +103,21 @@ class Problem:
         self.sigma[self.wrench] = noise / np.sqrt(rate * dt)
         self.sigma[self.angles] = [float(j.encoder.step) / np.sqrt(12) for j in self.rig.joints if j.encoder]
         self.independent = 2 * BAND_HZ * dt  # numbers a sample
+        self.given = present(self.rig, experiment.effects)
+        self.found: list[Candidate] = []
         self._place_unknowns()
+
+    def joined(self, candidate: Candidate) -> Problem:
+        """The same with an effect that was found, of which nothing is known but its bounds."""
+        new = copy(self)
+        new.found = [*self.found, candidate]
+        new._place_unknowns()
+        return new
+
+    @property
+    def present(self) -> list[Candidate]:
+        """Effects beside those of a drive that are written here."""
+        return [*self.given, *self.found]
 
     @cached_property
     def repeats(self) -> list[list[int]]:
@@ -136,20 +156,29 @@ class Problem:
         offsets = [float(joint.encoder.offset.sigma) for joint in self.rig.joints if joint.encoder is not None]
         bias = self.rig.transducer.bias.sigma
         white = 2.0 * self.sigma[self.wrench] ** 2 * self.experiment.dt
-        own = [np.append(one.spread(bias, white).ravel(), [_CLOCK, _CLOCK]) for one in self.recordings]
+        each = np.concatenate([_widths(one) for one in self.found if one.effect.each_trial] or [np.zeros(0)])
+        common = np.concatenate([_widths(one) for one in self.found if not one.effect.each_trial] or [np.zeros(0)])
+        own = [np.concatenate([one.spread(bias, white).ravel(), each, [_CLOCK, _CLOCK]]) for one in self.recordings]
         blocks = [
             (self.elements.value, self.elements.sigma),
             (np.concatenate([value for value, _ in drives]), np.concatenate([sigma for _, sigma in drives])),
             (np.zeros(len(self.coupled)), np.array([X.sigma[place] for place in self.coupled])),
             (np.zeros(len(offsets)), np.array(offsets)),
+            _amplitudes(self.rig, self.given),
+            (np.zeros(len(common)), common),
             *[(np.zeros(len(one)), one) for one in own],
         ]
         self.prior, self.spread = (np.concatenate([block[k] for block in blocks]) for k in (0, 1))
         ends = np.cumsum([0, *(len(value) for value, _ in blocks)])
-        of_rig, numbers, coupling, offset, *each = (slice(a, b) for a, b in pairwise(ends))
-        self.of_rig, self.numbers, self.coupling, self.offsets, self.own = of_rig, numbers, coupling, offset, each
-        common = np.arange(each[0].start)
-        self.local = [np.concatenate([common, np.arange(one.start, one.stop)]) for one in each]
+        of_rig, numbers, coupling, offset, given, found, *owned = (slice(a, b) for a, b in pairwise(ends))
+        self.of_rig, self.numbers, self.coupling, self.offsets, self.own = of_rig, numbers, coupling, offset, owned
+        shared = np.arange(owned[0].start)
+        self.local = [np.concatenate([shared, np.arange(one.start, one.stop)]) for one in owned]
+        # Amplitudes of what is present, of each recording, and what a unit of each does to its rows along its motion.
+        self.amplitudes = [self._placed(given, found, one.stop - 2 - len(each)) for one in owned]
+        self.acting = [
+            np.zeros((r.n, self.rows, len(own))) for r, own in zip(self.recordings, self.amplitudes, strict=True)
+        ]
         scales = (".Ka", ".fsv", ".Tmax", ".inertia[0]", ".inertia[1]", ".inertia[2]")
         positive = [
             name.endswith(scales) or name.startswith(("transducer.stiffness", "transducer.damping"))
@@ -158,6 +187,20 @@ class Problem:
         self.dynamic = np.zeros(len(self.prior), dtype=bool)  # numbers that scale a balance, and show while it moves
         self.dynamic[: len(positive)] = np.array(positive) | [".inertia[" in name for name in self.elements.names]
         self.lower = np.where(positive, _LEAST * self.elements.value, self.elements.lower)
+
+    def _placed(self, given: slice, found: slice, own: int) -> NDArray[np.intp]:
+        """Where unknowns are that what is present is linear in; those of a recording's own begin at `own`."""
+        places = list(range(given.start, given.stop))
+        common, alone = found.start, own
+        for one in self.found:
+            count = len(one.amplitudes)
+            if one.effect.each_trial:
+                places += range(alone, alone + count)
+                alone += count
+            else:
+                places += range(common, common + count)
+                common += count
+        return np.array(places, dtype=np.intp)
 
     def rig_at(self, x: Array) -> Rig:
         """The rig with its elements at x."""
@@ -209,7 +252,7 @@ class Problem:
         for place, value in zip(self.coupled, x[self.coupling], strict=True):
             dX[place] = value
         out[:, self.wrench] = wrench @ (np.eye(6) + self._undone @ dX).T
-        out[:, self.wrench] += recording.zero @ own[:-2].reshape(6, -1).T
+        out[:, self.wrench] += recording.zero @ own[: 6 * recording.zero.shape[1]].reshape(6, -1).T
         out[:, self.angles] = angle[:, FIRST_JOINT:] + x[self.offsets]
         slope = np.gradient(recording.reading, recording.dt, axis=0)
         out[:, self.wrench] -= own[-2] * slope[:, self.wrench]
@@ -228,7 +271,7 @@ class Problem:
             wound, winding = rotor - angle[:, FIRST_JOINT + j], field.rate[:, j] / ratio - rate[:, FIRST_JOINT + j]
             out[:, self.joint.start + j] = float(numbers["Ka"]) * wound + float(numbers["fsv"]) * winding - torque
         out[:, self.floor] = angle[:, FLOOR]
-        return out
+        return out + self.acting[k] @ x[self.amplitudes[k]]
 
     def residual(self, k: int, x: Array, motion: Motion, torques: Array) -> Array:
         """Measured less predicted (n, rows); the balances' measured is zero."""
@@ -260,10 +303,14 @@ class Problem:
         base = self.predicted(k, x, motion, torques, rig, loads)
         slopes = np.zeros((self.recordings[k].n, self.rows, len(local)))
         zero, common = self.recordings[k].zero, self.own[0].start
-        for channel, of_channel in enumerate(np.split(np.arange(common, len(local) - 2), 6)):
-            slopes[:, channel, of_channel] = zero  # is linear
+        linear = np.arange(common, common + 6 * zero.shape[1])
+        for channel, of_channel in enumerate(np.split(linear, 6)):
+            slopes[:, channel, of_channel] = zero
+        acting = np.searchsorted(local, self.amplitudes[k])
+        slopes[:, :, acting] = self.acting[k]
+        exact = {*linear.tolist(), *acting.tolist()}
         for column, place in enumerate(local):
-            if common <= column < len(local) - 2:
+            if column in exact:
                 continue
             step = _SHARE * self.spread[place]
             moved_x = x.copy()
@@ -271,6 +318,45 @@ class Problem:
             same = (None, None) if place < self.of_rig.stop else (rig, loads)
             slopes[:, :, column] = (self.predicted(k, moved_x, motion, torques, *same) - base) / step
         return slopes
+
+
+def present(rig: Rig, effects: Sequence[str]) -> list[Candidate]:
+    """Effects that the model has beside those of a drive that are written here, at every place where they act."""
+    found = []
+    for effect in select([name for name in effects if name not in WRITTEN]):
+        sites = (
+            [joint.name for joint in rig.joints if joint.drive and effect.parameters[0].name in joint.drive.parameters]
+            if effect.port.of_drive
+            else [load.on for load in rig.external if load.name == effect.name]
+        )
+        for site in sites:
+            own = own_values(rig, site)
+            load = next((one for one in rig.external if one.name == effect.name), None)
+            point = None if load is None or load.point is None else tuple(map(float, load.point.value))
+            shape = tuple((one.name, own[one.name]) for one in effect.parameters if one.role != "amplitude")
+            found.append(Candidate(effect, site, shape, point))
+    return found
+
+
+def _amplitudes(rig: Rig, present: Sequence[Candidate]) -> tuple[Array, Array]:
+    """Values and sigmas of what they are linear in; one that is known exactly hardly moves."""
+    known = {
+        (site, name): quantity
+        for site, numbers in (
+            *((joint.name, joint.drive.parameters) for joint in rig.joints if joint.drive),
+            *((load.on, load.parameters) for load in rig.external),
+        )
+        for name, quantity in numbers.items()
+    }
+    own = [known[one.site, entry.name] for one in present for entry in one.amplitudes]
+    value = np.array([float(quantity) for quantity in own])
+    sigma = np.array([float(quantity.sigma) for quantity in own])
+    return value, np.maximum(sigma, _EXACT * np.maximum(np.abs(value), _EXACT))
+
+
+def _widths(candidate: Candidate) -> Array:
+    """How large amplitudes may be."""
+    return np.array([max(abs(bound) for bound in entry.bounds) for entry in candidate.amplitudes])
 
 
 def _recording(experiment: Experiment, k: int) -> Recording:

@@ -2,36 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import make_interp_spline
 
-from kbs_process.diagnosis.experiments.hypothesis import Tapped
-from kbs_process.diagnosis.screening.inlets import Inlet, generalised, inlets_of
 from kbs_process.diagnosis.screening.ranges import ranges_of
-from kbs_process.diagnosis.screening.scene import courses
-from kbs_process.diagnosis.screening.signature import inputs, reduced, sensed
 from kbs_process.diagnosis.screening.suspects import Candidate, candidates
 from kbs_process.plant.compiled.taps import tap_columns
 from kbs_process.plant.effect import Parameter
-from kbs_process.plant.laws import select
-from kbs_process.plant.linear.linearise import linearise
-from kbs_process.rig.model import Rig
-from kbs_process.stages.align.resample import resample
 from proof.answer import Estimate
 from proof.rivals.case import Array
-from proof.rivals.smoother.balance import FIRST_JOINT, PLATE
-from proof.rivals.smoother.drive import spring
+from proof.rivals.smoother.course import Course
 from proof.rivals.smoother.fit import Quadratic, State
 from proof.rivals.smoother.lines import proposed
 from proof.rivals.smoother.problem import Problem
-from proof.rivals.smoother.splines import BAND_HZ, in_band
+from proof.rivals.smoother.splines import BAND_HZ
 
-_TAPS_HZ = 100.0
-_KNOT_S = 1.0  # between poses at which ports are worked out
 _BATCH = 200  # columns at once
 _DEPENDENT = 1e-5  # of a column that all numbers leave
 _FIRST_STEP = 0.1  # of a shape's value
@@ -44,12 +32,12 @@ _NEAR = 0.7  # of the gain, beside the best shape, from which on a parabola lead
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scored:
-    """A candidate beside what is known: what the best amplitudes take of the cost."""
+    """A candidate: what the best amplitudes take of the cost."""
 
     candidate: Candidate
-    gain: float  # over that of the known alone
+    gain: float
     freedom: int  # amplitudes that make a difference
-    amplitudes: Array  # of the known and this one that all recordings share, one after the other
+    amplitudes: Array  # that all recordings share
     likely: float = 0.0  # of amplitudes of this size, beforehand; see `_likely`
     foreseen: float = 0.0  # what these amplitudes take on recordings held out
 
@@ -69,99 +57,6 @@ def evidence(gain: float, freedom: int) -> float:
     if freedom == 0 or gain <= freedom:
         return 0.0
     return float(gain - freedom * (1.0 + np.log(gain / freedom)))
-
-
-class Course:
-    """A recording's motion as signals of the plant, and what enters at a port as rows."""
-
-    def __init__(self, problem: Problem, state: State, k: int, rig: Rig) -> None:
-        recording, motion = problem.recordings[k], state.ideal_motion(problem, k)
-        self.problem, self.rig, self.recording = problem, rig, recording
-        dt, n, first = recording.dt, recording.n, recording.first
-        own = dt * (first + np.arange(n))
-        t = np.arange(round((first + n) * dt * _TAPS_HZ)) / _TAPS_HZ
-        inside = np.clip(t, own[0], own[-1])
-        angle, rate = (make_interp_spline(own, part, k=3)(inside) for part in motion[:2])
-        field = recording.field
-        whole, smooth = (
-            np.stack([np.interp(t, field.t, column) for column in part.T], axis=1)
-            for part in (field.whole, field.smooth)
-        )
-        behind = problem.behind(k, state.x, motion, state.ideal_torques[k])
-        rotor = smooth - make_interp_spline(own, behind, k=3)(inside)
-        turning = np.gradient(rotor, axis=0) * _TAPS_HZ
-        joints = slice(FIRST_JOINT, None)
-        values = [whole, rotor, turning, angle[:, joints], rate[:, joints], angle[:, PLATE], rate[:, PLATE]]
-        shown = problem.predicted(k, state.x, motion, state.ideal_torques[k])[:, : problem.angles.stop]
-        readings = make_interp_spline(own, shown, k=3)(inside)
-        self.tapped = Tapped(_TAPS_HZ, tap_columns(problem.rig), np.hstack(values), readings)
-        self.shown = np.vstack([np.repeat(shown[:1], first, axis=0), shown])
-        self._links = courses(rig, self.tapped)
-        self._place_ports(motion[0][:, joints])
-
-    def _place_ports(self, angles: Array) -> None:
-        problem, rig = self.problem, self.rig
-        self._inlets = {inlet: column for column, inlet in enumerate(inlets_of(rig))}
-        outside = [effect for effect in select(problem.experiment.effects) if not effect.port.internal]
-        n, every = len(angles), round(_KNOT_S / self.recording.dt)
-        knots = np.unique(np.append(np.arange(0, n, every), n - 1))
-        found = [generalised(rig, linearise(rig, outside, angles[at]), tuple(self._inlets), angles[at]) for at in knots]
-        self._force, self._direct = (
-            make_interp_spline(knots, np.stack([one[part] for one in found]), k=1)(np.arange(n)) for part in (0, 1)
-        )
-        drives = [joint.drive for joint in rig.joints if joint.drive is not None]
-        self._soft = np.array([float(d.parameters["Ka"]) / (float(d.ratio) ** 2 * spring(d)) for d in drives])
-
-    def columns(self, chosen: Sequence[Candidate]) -> Array:
-        """What a unit of each amplitude of each candidate does to the rows, (n, rows, amplitudes of all)."""
-        shown = [self._sensed(one) if not one.effect.in_plant else self._entered(one) for one in chosen]
-        entered = [column for one in shown if isinstance(one, list) for column in one]
-        slow = iter(self._slow([means for column in entered for means in column.values()]))
-        rows = iter([self._rows({inlet: next(slow) for inlet in column}) for column in entered])
-        every = [
-            np.stack([next(rows) for _ in one], axis=2) if isinstance(one, list) else one for one in shown
-        ]  # fmt: skip
-        return np.nan_to_num(np.concatenate(every, axis=2))
-
-    def _entered(self, candidate: Candidate) -> list[dict[Inlet, Array]]:
-        return inputs(
-            candidate, self.tapped, self.rig, self.problem.experiment.effects, self._links.get(candidate.site)
-        )
-
-    def _slow(self, means: Sequence[Array]) -> Array:
-        """Series at the taps' rate as they are in the band at the working rate, (series, n)."""
-        if not means:
-            return np.zeros((0, self.recording.n))
-        n, dt, first = self.recording.n, self.recording.dt, self.recording.first
-        slow = resample(np.stack(means, axis=1), _TAPS_HZ, 1 / dt)[first : first + n]
-        slow = in_band(slow, dt)
-        return np.pad(slow, ((0, n - len(slow)), (0, 0)), mode="edge").T
-
-    def _rows(self, column: Mapping[Inlet, Array]) -> Array:
-        """What enters, in the band at the working rate, as rows."""
-        problem = self.problem
-        out = np.zeros((self.recording.n, problem.rows))
-        for inlet, slow in column.items():
-            place = self._inlets[inlet]
-            force = self._force[:, :, place] * slow[:, None]
-            out[:, problem.wrench] += self._direct[:, :, place] * slow[:, None]
-            out[:, problem.plate] -= force[:, :3]
-            out[:, problem.joint] += force[:, 3 : 3 + problem.joints] + self._soft * force[:, 3 + problem.joints :]
-        return out
-
-    def _sensed(self, candidate: Candidate) -> Array:
-        problem, experiment = self.problem, self.problem.experiment
-        if candidate.effect.whole_band:
-            shown = reduced(
-                candidate, self.tapped, experiment.channels, self.rig, experiment.dt, len(self.shown)
-            )  # fmt: skip
-        else:
-            t = experiment.dt * np.arange(len(self.shown))
-            shown = sensed(candidate, t, self.shown, experiment.channels, self.rig)
-        out = np.zeros((self.recording.n, problem.rows, shown.shape[2]))
-        acted = np.flatnonzero(shown.any(axis=(0, 2)))  # of the readings, which are the first rows
-        out[:, acted] = in_band(shown[self.recording.first :][: self.recording.n, acted], self.recording.dt)
-        return out
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -206,8 +101,7 @@ class Screen:
         self, problem: Problem, state: State, courses: Sequence[Course] = (), quadratic: Quadratic | None = None
     ) -> None:
         self.problem, self.state = problem, state
-        rig = problem.rig_at(state.x)
-        self.courses = courses or [Course(problem, state, k, rig) for k in range(len(problem.recordings))]
+        self.courses = courses or [state.course(problem, k) for k in range(len(problem.recordings))]
         self.quadratic = quadratic or Quadratic.of(problem, state)
         self._own = self.quadratic.solve(problem.spread, self.quadratic.pull)
 
@@ -230,12 +124,12 @@ class Screen:
         """What motion and numbers leave of each recording's rows (n, rows), over their sigmas."""
         return [part.left(self._own[self.problem.local[k]]) for k, part in self.quadratic.parts.items()]
 
-    def scored(self, chosen: Sequence[Candidate], known: Sequence[Candidate] = ()) -> list[Scored]:
-        """What each takes of the cost beside all numbers, and beside what is `known`; best first."""
-        found = [one for some in _batches(chosen, known) for one in self._scored(some, known)]
+    def scored(self, chosen: Sequence[Candidate]) -> list[Scored]:
+        """What each takes of the cost beside all numbers; best first."""
+        found = [one for some in _batches(chosen) for one in self._scored(some)]
         return sorted(found, key=lambda one: -one.worth)
 
-    def refined(self, one: Scored, known: Sequence[Candidate] = ()) -> Scored:
+    def refined(self, one: Scored) -> Scored:
         """The same with its shape where it takes most, one number after the other."""
         free = {
             entry.name: entry for entry in one.candidate.effect.parameters if entry.role == "shape" and not entry.whole
@@ -246,16 +140,16 @@ class Screen:
             for place in places:
                 entry = free[one.candidate.shape[place][0]]
                 low, high = entry.bounds
-                one = self._along(one, known, place, (low, min(high, BAND_HZ) if entry.unit == "Hz" else high))
+                one = self._along(one, place, (low, min(high, BAND_HZ) if entry.unit == "Hz" else high))
             if one.gain < (1.0 + _SETTLED) * before:
                 break
         return one
 
-    def _along(self, one: Scored, known: Sequence[Candidate], place: int, bounds: tuple[float, float]) -> Scored:
+    def _along(self, one: Scored, place: int, bounds: tuple[float, float]) -> Scored:
         def at(value: float) -> Scored:
             shape = list(one.candidate.shape)
             shape[place] = (shape[place][0], float(np.clip(value, *bounds)))
-            (found,) = self.scored([replace(one.candidate, shape=tuple(shape))], known)
+            (found,) = self.scored([replace(one.candidate, shape=tuple(shape))])
             return found
 
         step, best = _FIRST_STEP * max(abs(one.candidate.shape[place][1]), _FIRST_STEP), one
@@ -272,12 +166,12 @@ class Screen:
             best = max(best, low, high, key=lambda found: found.gain)
         return best
 
-    def predicted(self, one: Scored, known: Sequence[Candidate] = ()) -> float:
-        """What effects take of the cost with the amplitudes that they have, which were found elsewhere.
+    def predicted(self, one: Scored) -> float:
+        """What an effect takes of the cost with the amplitudes that it has, which were found elsewhere.
 
         Amplitudes of each recording's own are free, and count as `evidence`.
         """
-        found = self._products([*known, one.candidate])
+        found = self._products([one.candidate])
         square, right = self._beside(found)
         given, free = one.amplitudes, found.own
         gained = float(2.0 * given @ right[~free] - given @ square[np.ix_(~free, ~free)] @ given)
@@ -297,40 +191,15 @@ class Screen:
         given = one.amplitudes[-len(square) :]
         return float(given @ square @ given)
 
-    def explained(self, one: Scored, known: Sequence[Candidate]) -> list[Array]:
-        """What is `unexplained` once the known and one more are taken off, with the amplitudes that are best."""
-        every = [*known, one.candidate]
-        found = self._products(every)
+    def _scored(self, chosen: Sequence[Candidate]) -> Iterator[Scored]:
+        found = self._products(chosen)
         square, right = self._beside(found)
         size = np.sqrt(np.maximum(np.diag(found.squares), 1e-300))
-        _, amplitudes, _ = _best(square, right, size)
-        moved = self._own - self.quadratic.solve(self.problem.spread, found.unknowns @ amplitudes)
-        out = []
-        for place, (k, part) in enumerate(self.quadratic.parts.items()):
-            column = np.zeros(part.root.shape)
-            for number, candidate in enumerate(every):
-                shown = self.courses[k].columns([candidate])
-                mine = amplitudes[found.owner == number]
-                if candidate.effect.each_trial:
-                    mine = mine.reshape(len(self.quadratic.parts), -1)[place]
-                column += shown @ mine
-            out.append(part.left(moved[self.problem.local[k]], column * part.root))
-        return out
-
-    def _scored(self, chosen: Sequence[Candidate], known: Sequence[Candidate]) -> Iterator[Scored]:
-        every = [*known, *chosen]
-        found = self._products(every)
-        square, right = self._beside(found)
-        size = np.sqrt(np.maximum(np.diag(found.squares), 1e-300))
-        of_known = found.owner < len(known)
-        before = _best(square[np.ix_(of_known, of_known)], right[of_known], size[of_known]) if known else None
-        for number, one in enumerate(chosen, start=len(known)):
-            places = np.flatnonzero(of_known | (found.owner == number))
+        for number, one in enumerate(chosen):
+            places = np.flatnonzero(found.owner == number)
             gain, amplitudes, freedom = _best(square[np.ix_(places, places)], right[places], size[places])
-            if before is not None:
-                gain, freedom = gain - before[0], freedom - before[2]
-            mine = amplitudes[found.owner[places] == number].reshape(-1, len(one.amplitudes))
-            likely = _likely(one.amplitudes, np.sqrt(np.mean(mine**2, axis=0)))
+            each = amplitudes.reshape(-1, len(one.amplitudes))
+            likely = _likely(one.amplitudes, np.sqrt(np.mean(each**2, axis=0)))
             yield Scored(one, gain, freedom, amplitudes[~found.own[places]], likely)
 
     def _beside(self, found: _Products) -> tuple[Array, Array]:
@@ -338,35 +207,30 @@ class Screen:
         solved = self.quadratic.solve(self.problem.spread, found.unknowns)
         return found.squares - found.unknowns.T @ solved, found.residual - found.unknowns.T @ self._own
 
-    def estimated(self, one: Scored, known: Sequence[Candidate] = ()) -> tuple[Estimate, ...]:
-        """Amplitudes and shapes of an effect beside all numbers and what is known, with intervals of 95 %.
+    def estimated(self, one: Scored) -> tuple[Estimate, ...]:
+        """Amplitudes and shapes of an effect beside all numbers, with intervals of 95 %.
 
         Of amplitudes of each recording's own, those of the first. A shape that was chosen from a grid has no interval.
         """
         candidate, chosen = one.candidate, dict(one.candidate.shape)
         entries = {entry.name: entry for entry in candidate.effect.parameters}
         bends = [name for name in chosen if entries[name].role == "shape" and not entries[name].whole]
-        every = [*known, candidate]
-        found = self._products(every)
+        found = self._products([candidate])
         square, right = self._beside(found)
         _, amplitudes, _ = _best(square, right, np.sqrt(np.maximum(np.diag(found.squares), 1e-300)))
-        mine = found.owner == len(known)
-        found = self._products(every, _Bends(tuple(bends), amplitudes[mine].reshape(-1, len(candidate.amplitudes))))
+        found = self._products([candidate], _Bends(tuple(bends), amplitudes.reshape(-1, len(candidate.amplitudes))))
         square, right = self._beside(found)
         size = np.sqrt(np.maximum(np.diag(found.squares), 1e-300))
         covariance = np.linalg.pinv(square / np.outer(size, size), rcond=_DEPENDENT, hermitian=True)
         values, sigmas = covariance @ (right / size) / size, np.sqrt(np.maximum(np.diag(covariance), 0.0)) / size
-        first = np.flatnonzero(found.owner == len(known))[: len(candidate.amplitudes)]
+        first = np.arange(len(candidate.amplitudes))
         told = [(entry, values[k], sigmas[k]) for entry, k in zip(candidate.amplitudes, first, strict=True)]
-        bent = np.flatnonzero(found.owner > len(known))
+        bent = np.flatnonzero(found.owner > 0)
         told += [
             (entries[name], chosen[name] + float(np.clip(values[k], -3.0 * sigmas[k], 3.0 * sigmas[k])), sigmas[k])
             for name, k in zip(bends, bent, strict=True)
         ]
-        return tuple(
-            Estimate(name=entry.name, unit=entry.unit, value=v, low=v - _NORMAL * s, high=v + _NORMAL * s)
-            for entry, v, s in ((entry, float(value), float(sigma)) for entry, value, sigma in told)
-        )
+        return tuple(estimate(entry.name, entry.unit, float(value), float(sigma)) for entry, value, sigma in told)
 
     def _products(self, every: Sequence[Candidate], bends: _Bends | None = None) -> _Products:
         sizes = [len(one.amplitudes) for one in every]
@@ -401,6 +265,11 @@ class Screen:
         return _Products(unknowns, residual, squares, owner[source], recording >= 0)
 
 
+def estimate(name: str, unit: str, value: float, sigma: float) -> Estimate:
+    """Return a number with its interval of 95 %."""
+    return Estimate(name=name, unit=unit, value=value, low=value - _NORMAL * sigma, high=value + _NORMAL * sigma)
+
+
 def _best(square: Array, right: Array, size: Array) -> tuple[float, Array, int]:
     """Gain, amplitudes and freedom of columns of `size` (m,) with their products."""
     values, vectors = np.linalg.eigh(square / np.outer(size, size))
@@ -420,7 +289,7 @@ def _likely(entries: Sequence[Parameter], size: Array) -> float:
     return float(-2.0 * np.sum(np.log1p((size / spread) ** 2)))
 
 
-def _batches(chosen: Sequence[Candidate], known: Sequence[Candidate]) -> Iterator[list[Candidate]]:
+def _batches(chosen: Sequence[Candidate]) -> Iterator[list[Candidate]]:
     batch: list[Candidate] = []
     for one in chosen:
         batch.append(one)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from time import monotonic
 
@@ -24,7 +23,7 @@ from proof.rivals.case import Array
 from proof.rivals.smoother.fit import Quadratic, State, step
 from proof.rivals.smoother.intensities import powers
 from proof.rivals.smoother.problem import Problem
-from proof.rivals.smoother.screen import Scored, Screen
+from proof.rivals.smoother.screen import Scored, Screen, estimate
 
 METHOD = "smoother"
 WIDER, OF_JOINT = 10.0, 3.0  # times a reading's noise that forces are, to begin with; those of joints times as much
@@ -33,6 +32,7 @@ STEPS = 25
 STIFF = (0.1, 0.03, 0.01)
 SETTLED = 100.0  # sigmas of all unknowns together that a step goes, below which forces are estimated
 ARRIVED = 3.0  # below which it is the last
+LEAST = 1e-3  # of what they are to begin with: smaller ones are nothing beside a reading's noise
 CHANGE = (0.3, 1.5)  # of a force's sigma in a step
 BEYOND = 1.6  # times a step of its logarithm, at most; and by what it changes where a step went beyond, and else
 ONWARD = (0.5, 1.2)
@@ -45,8 +45,9 @@ OFF = 4.0  # sigmas
 LEADERS = 12  # laws at a place, of which shapes are refined and recordings held out are asked
 BEHIND = 0.2  # of the first's worth, with less of which one is no leader
 NEXT = 2  # alternatives that are named
-ALIKE = 9.0  # of the cost: what differs by less is not told apart, nor
-INEXACT = 0.02  # what differs by less than this share of it: columns are right to first order
+ALIKE = 9.0  # of the cost: what differs by less is not told apart
+INEXACT = 0.02  # of what an effect is worth: what differs by less is fitted, as columns are right to first order
+RIVALS = 3  # of other places or physics, that are
 
 
 def solve(folder: Path) -> Answer:
@@ -55,9 +56,8 @@ def solve(folder: Path) -> Answer:
     experiment = experiment_of(load_campaign(folder, checksums=False), SilentProgress())
     fitted = Problem(experiment, list(experiment.fit))
     state = settled(fitted)
-    left = powers(fitted, state, Quadratic.of(fitted, state))
-    finds = _finds(fitted, state, _Judge.of(experiment, fitted, state), left.of_all)
     moved = _moved(fitted, state)
+    finds = _finds(fitted, state, _Judge.of(experiment, fitted, state))
     return Answer(
         method=METHOD,
         trial=folder.name,
@@ -69,21 +69,23 @@ def solve(folder: Path) -> Answer:
     )
 
 
-def settled(problem: Problem, sigma: Array | None = None) -> State:
+def settled(problem: Problem, sigma: Array | None = None, begun: State | None = None) -> State:
     """Fit with forces of `sigma`; without, with large ones first, then with those that repeats differ by.
 
-    What shows while the rig moves alone is held until forces are known: beside large ones nothing tells it.
+    What shows while the rig moves alone is held until forces are known: beside large ones nothing tells it. A fit that
+    has `begun` goes on from there, with forces as they are.
     """
-    state = State.of(problem, _forces(problem) if sigma is None else sigma)
-    wrong, phase = np.inf, 0
+    state = begun or State.of(problem, _forces(problem) if sigma is None else sigma)
+    known = sigma is not None or begun is not None
+    wrong, phase = (0.0, 2) if known else (np.inf, 0)
+    least = LEAST * _forces(problem)
     reach, before = np.ones(problem.rows)[problem.forces], np.zeros(problem.rows)[problem.forces]
-    if sigma is not None:
-        wrong, phase = 0.0, 2
     for _ in range(STEPS):
         state.idealise(problem, STIFF[phase])
         quadratic = Quadratic.of(problem, state)
-        if phase and sigma is None:
+        if phase and not known:
             ratio = np.sqrt(powers(problem, state, quadratic).noise[problem.forces])
+            ratio = np.maximum(ratio, least / state.sigma[problem.forces])
             wrong = float(np.abs(np.log(np.clip(ratio, *CHANGE))).max())
             reach *= np.where(np.log(ratio) * before < 0.0, *ONWARD)
             before = np.log(ratio)
@@ -108,41 +110,79 @@ def _forces(problem: Problem) -> Array:
     return WIDER * np.repeat([torque, OF_JOINT * torque, force / mass], [3, problem.joints, 3])
 
 
-def _finds(problem: Problem, state: State, judge: _Judge | None, power: Array) -> tuple[Claim, ...]:
+def _finds(problem: Problem, state: State, judge: _Judge | None) -> tuple[Claim, ...]:
     """Effects, one after the other: each the one that recordings of the fit and those held out together show most.
 
-    `power` (rows,) is what is left in each row. What comes again and no number takes up counts as noise until an
+    Beside each that is found all numbers settle again. What comes again and no number takes up counts as noise until an
     effect explains it.
     """
     finds: list[Claim] = []
-    known: list[Candidate] = []
-    forces, base, before = problem.forces, state.sigma.copy(), 0.0
-    excess = power
+    forces, noise = problem.forces, state.sigma.copy()
     while len(finds) < MOST:
-        state.sigma[forces] = (base * np.sqrt(np.maximum(excess, 1.0)))[forces]
+        excess = powers(problem, state, Quadratic.of(problem, state)).of_all
+        state.sigma[forces] = (noise * np.sqrt(np.maximum(excess, 1.0)))[forces]
         screen = Screen(problem, state)
-        held = None if judge is None else judge.screen(state.sigma[forces])
-        taken = {_suspect(one) for one in known}  # another shape of one is no second effect
+        taken = {_suspect(one) for one in problem.found}  # another shape of one is no second effect
         chosen = [one for one in screen.candidates() if _suspect(one) not in taken]
-        seen = [one.candidate for one in _first_of_each(screen.survey().scored(chosen, known))]
-        leaders = [screen.refined(one, known) for one in screen.scored(seen, known)]
-        if held is not None:
-            before = held.predicted(screen.scored(known[-1:], known[:-1])[0], known[:-1]) if known else 0.0
-            leaders = [replace(one, foreseen=held.predicted(one, known) - before) for one in leaders]
+        seen = [one.candidate for one in _first_of_each(screen.survey().scored(chosen))]
+        leaders = [screen.refined(one) for one in screen.scored(seen)]
+        if judge is not None:
+            held = judge.screen(state.sigma[forces])
+            leaders = [replace(one, foreseen=held.predicted(one)) for one in leaders]
             leaders = [one for one in leaders if judge.confirms(one, held)]
         leaders.sort(key=lambda one: -one.worth)
         if not leaders or leaders[0].worth < DETECTED:
             break
-        apart = max(ALIKE, INEXACT * leaders[0].worth)
-        alike = [one for one in leaders if one.worth > leaders[0].worth - apart]
-        best = max(alike, key=partial(_odds, apart=apart, tried=Counter((one.name, one.site) for one in chosen)))
-        finds.append(_claim(best, leaders, alike, screen.estimated(best, known)))
-        left, all_ = (
-            sum(np.sum(z**2, axis=0) for z in part) for part in (screen.explained(best, known), screen.unexplained())
-        )
-        excess = power * left / all_
-        known.append(best.candidate)
-    return tuple(finds)
+        state.sigma[forces] = noise[forces]
+        tried = Counter((one.name, one.site) for one in chosen)
+        every = sorted((_beside(problem, state, one, tried) for one in _alike(leaders)), key=lambda one: one.cost)
+        best, problem, state = every[0].scored, every[0].problem, every[0].state
+        alike = [one.scored for one in every if one.cost < every[0].cost + ALIKE]
+        finds.append(_claim(best, leaders, alike, screen.estimated(best)))
+        judge = None if judge is None else judge.joined(best.candidate, problem, state)
+    return _as_fitted(finds, problem, state)
+
+
+def _as_fitted(finds: Sequence[Claim], problem: Problem, state: State) -> tuple[Claim, ...]:
+    """Finds with their amplitudes as all numbers together have them; those of a recording's own are the first's."""
+    sigma = Quadratic.of(problem, state).sigma(problem.spread)
+    places = iter(problem.amplitudes[0][sum(len(one.amplitudes) for one in problem.given) :])
+    told = []
+    for claim, candidate in zip(finds, problem.found, strict=True):
+        own = {entry.name: next(places) for entry in candidate.amplitudes}
+        numbers = [
+            estimate(one.name, one.unit, float(state.x[own[one.name]]), float(sigma[own[one.name]]))
+            if one.name in own
+            else one
+            for one in claim.parameters
+        ]
+        told.append(structs.replace(claim, parameters=tuple(numbers)))
+    return tuple(told)
+
+
+def _alike(leaders: Sequence[Scored]) -> list[Scored]:
+    """The first, and those of other places or physics that columns do not tell from it."""
+    first: dict[Suspect, Scored] = {}
+    for one in leaders:
+        if one.worth > leaders[0].worth - max(ALIKE, INEXACT * leaders[0].worth):
+            first.setdefault(_suspect(one.candidate), one)
+    return list(first.values())[:RIVALS]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Fitted:
+    scored: Scored
+    problem: Problem
+    state: State
+    cost: float  # twice the negative logarithm of its odds, less a constant
+
+
+def _beside(problem: Problem, state: State, one: Scored, tried: Mapping[tuple[str, str], int]) -> _Fitted:
+    """All numbers settled beside an effect; what was tried more often is less likely beforehand."""
+    wider = problem.joined(one.candidate)
+    begun = settled(wider, begun=state.joined(problem, wider))
+    often = tried[one.candidate.name, one.candidate.site]
+    return _Fitted(one, wider, begun, begun.cost(wider) + 2.0 * float(np.log(often)) - one.likely)
 
 
 def _first_of_each(scored: Sequence[Scored]) -> list[Scored]:
@@ -168,13 +208,20 @@ class _Judge:
         if not experiment.held_out:
             return None
         problem = Problem(experiment, list(experiment.held_out))
-        common = problem.own[0].start
-        # As well as they are known by now; as if none knew of another.
-        known = Quadratic.of(fitted, state).sigma(fitted.spread)
-        problem.prior[:common], problem.spread[:common] = state.x[:common], known[:common]
+        _know(problem, fitted, state)
         own = settled(problem, state.sigma[problem.forces])
         counted = [sum(float(r.weight.sum()) for r in p.recordings) for p in (problem, fitted)]
         return cls(problem, own, counted[0] / counted[1])
+
+    def joined(self, candidate: Candidate, fitted: Problem, state: State) -> _Judge:
+        """The same with one effect more, and numbers as they are fitted beside it."""
+        problem = self.problem.joined(candidate)
+        _know(problem, fitted, state)
+        begun = self.state.joined(self.problem, problem)
+        common = problem.own[0].start
+        begun.x[:common] = problem.prior[:common]
+        begun.sigma[problem.forces] = state.sigma[problem.forces]
+        return replace(self, problem=problem, state=settled(problem, begun=begun))
 
     def screen(self, forces: Array) -> Screen:
         """With forces of these sigmas."""
@@ -189,14 +236,11 @@ class _Judge:
         return foretold < ALIKE or one.foreseen > FORETOLD * foretold
 
 
-def _odds(one: Scored, apart: float, tried: Mapping[tuple[str, str], int]) -> float:
-    """Twice the logarithm of its odds among those that are not told apart: what was tried more often is less likely.
-
-    What sizes of amplitudes say has its part in what it is worth already, all of which counts as much less as columns
-    are inexact.
-    """
-    prior = one.likely - 2.0 * float(np.log(tried[one.candidate.name, one.candidate.site]))
-    return (one.worth - one.likely) * ALIKE / apart + prior
+def _know(problem: Problem, fitted: Problem, state: State) -> None:
+    """Common numbers are those that were fitted, as well as they are known by now; as if none knew of another."""
+    common = problem.own[0].start
+    known = Quadratic.of(fitted, state).sigma(fitted.spread)
+    problem.prior[:common], problem.spread[:common] = state.x[:common], known[:common]
 
 
 def _claim(best: Scored, leaders: Sequence[Scored], alike: Sequence[Scored], numbers: tuple[Estimate, ...]) -> Claim:

@@ -76,6 +76,10 @@ def _table(results: Results, rows: tuple[Budget, ...]) -> Grid:
     stages = dict.fromkeys((item.stage, item.source) for row in rows for item in row.contributions)
     body = [(stage, source, *(number(_sigma(row, stage, source), 2) for row in rows)) for stage, source in stages]
     body.append(("Total", "root sum of squares", *(number(row.total, 2) for row in rows)))
+    place = rows[0].recording, rows[0].band, rows[0].frame
+    measured = {one.channel: one.measured_rms for one in results.merit if (one.recording, one.band, one.frame) == place}
+    if measured:
+        body.append(("Measured", "rms, to compare with", *(number(measured.get(row.channel), 2) for row in rows)))
     head = ("Stage", "Source", *(f"{row.channel} / {unit(row.unit)}" for row in rows))
     title = f"Standard uncertainties, {_label(results, rows[0])}"
     return Grid(title, head, tuple(body), "ll" + "r" * len(rows))

@@ -21,7 +21,7 @@ _SAYS = Prose("kbs_process.studies.correlate", "compliance")
 def panel(results: Results, tables: Tables) -> Panel:
     """Compliance table, warnings and data losses right under it, and the channels behind the verdict."""
     blocks: list[Block] = [_table(results)] if results.requirements else []
-    if not results.requirements:
+    if not results.requirements and not results.judged_pointing:
         blocks.append(Text("This campaign states no requirement; the report compares, and gives no verdict."))
     for entry in results.requirements:
         tone: Tone = "undecided" if entry.only_without else ""

@@ -49,7 +49,7 @@ def panel(results: Results, tables: Tables) -> Panel:
         blocks.append(_left(gravity))
     if gravity.checks:
         rows = tuple(
-            (entry.name, Cell("ok" if entry.ok else "not met", "pass" if entry.ok else "fail"), entry.detail)
+            (entry.name, Cell("ok" if entry.ok else "see detail", "pass" if entry.ok else "undecided"), entry.detail)
             for entry in gravity.checks
         )
         blocks.append(Grid("Checks on the fit", ("Check", "Outcome", "Detail"), rows, "lcl"))

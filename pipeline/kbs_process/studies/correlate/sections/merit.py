@@ -66,13 +66,19 @@ def _pessimistic(results: Results) -> Grid:
 
 
 def _answer(rows: Sequence[Merit]) -> Cell:
-    known = [row for row in rows if row.sigma is not None and not row.at_the_noise]
-    ratios = [row.pessimism for row in known if row.pessimism is not None]
-    larger = sum(ratio >= 1.0 for ratio in ratios)
-    if not ratios:
+    short = [
+        (row.measured_peak - row.predicted_peak, 2.0 * row.sigma)
+        for row in rows
+        if row.sigma is not None and not row.at_the_noise
+        if row.measured_peak is not None and row.predicted_peak is not None
+    ]
+    if not short:
         return Cell("not testable", "muted")
-    counted = f"{larger} of {len(ratios)}"
-    return Cell(f"yes, {counted}", "pass") if larger == len(ratios) else Cell(f"no, {counted}", "undecided")
+    larger = sum(by <= 0.0 for by, _ in short)
+    counted = f"{larger} of {len(short)}"
+    if larger == len(short):
+        return Cell(f"yes, {counted}", "pass")
+    return Cell(f"no, {counted}", "undecided") if any(by > most for by, most in short) else Cell(f"open, {counted}")
 
 
 def _rank(results: Results, row: Merit, main: tuple[str, str]) -> tuple[bool, int, str]:

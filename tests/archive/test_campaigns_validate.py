@@ -1,0 +1,20 @@
+"""Every archived campaign, with recordings or with a mission alone, is one in which `validate` finds no fault."""
+
+from __future__ import annotations
+
+import pytest
+
+from archived import CAMPAIGNS
+from kbs_process.cli import main
+
+pytestmark = pytest.mark.slow
+
+NAMES = sorted(path.parent.name for path in CAMPAIGNS.glob("*/campaign.toml"))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_validates(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    main(["validate", str(CAMPAIGNS / name)])  # exits where there is one
+    told = capsys.readouterr().out
+    assert told.startswith(f"{name}: ")
+    assert " 0 unreadable" in told

@@ -1,0 +1,119 @@
+"""A recording's motion as signals of the plant, and what effects along it do to the rows."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from scipy.interpolate import make_interp_spline
+
+from kbs_process.diagnosis.experiments.hypothesis import Tapped
+from kbs_process.diagnosis.screening.inlets import Inlet, generalised, inlets_of
+from kbs_process.diagnosis.screening.scene import courses
+from kbs_process.diagnosis.screening.signature import inputs, reduced, sensed
+from kbs_process.diagnosis.screening.suspects import Candidate
+from kbs_process.plant.compiled.taps import tap_columns
+from kbs_process.plant.laws import select
+from kbs_process.plant.linear.linearise import linearise
+from kbs_process.stages.align.resample import resample
+from proof.rivals.case import Array
+from proof.rivals.smoother.balance import FIRST_JOINT, PLATE, Motion
+from proof.rivals.smoother.drive import spring
+from proof.rivals.smoother.problem import Problem
+from proof.rivals.smoother.splines import in_band
+
+_TAPS_HZ = 100.0
+_KNOT_S = 1.0  # between poses at which ports are worked out
+
+
+class Course:
+    """A recording's motion as signals of the plant, and what enters at a port as rows."""
+
+    def __init__(self, problem: Problem, k: int, x: Array, motion: Motion, torques: Array) -> None:
+        recording, rig = problem.recordings[k], problem.rig_at(x)
+        self.problem, self.rig, self.recording = problem, rig, recording
+        dt, n, first = recording.dt, recording.n, recording.first
+        own = dt * (first + np.arange(n))
+        t = np.arange(round((first + n) * dt * _TAPS_HZ)) / _TAPS_HZ
+        inside = np.clip(t, own[0], own[-1])
+        angle, rate = (make_interp_spline(own, part, k=3)(inside) for part in motion[:2])
+        field = recording.field
+        whole, smooth = (
+            np.stack([np.interp(t, field.t, column) for column in part.T], axis=1)
+            for part in (field.whole, field.smooth)
+        )
+        behind = problem.behind(k, x, motion, torques)
+        rotor = smooth - make_interp_spline(own, behind, k=3)(inside)
+        turning = np.gradient(rotor, axis=0) * _TAPS_HZ
+        joints = slice(FIRST_JOINT, None)
+        values = [whole, rotor, turning, angle[:, joints], rate[:, joints], angle[:, PLATE], rate[:, PLATE]]
+        shown = problem.predicted(k, x, motion, torques)[:, : problem.angles.stop]
+        readings = make_interp_spline(own, shown, k=3)(inside)
+        self.tapped = Tapped(_TAPS_HZ, tap_columns(problem.rig), np.hstack(values), readings)
+        self.shown = np.vstack([np.repeat(shown[:1], first, axis=0), shown])
+        self._links = courses(rig, self.tapped)
+        self._place_ports(motion[0][:, joints])
+
+    def _place_ports(self, angles: Array) -> None:
+        problem, rig = self.problem, self.rig
+        self._inlets = {inlet: column for column, inlet in enumerate(inlets_of(rig))}
+        outside = [effect for effect in select(problem.experiment.effects) if not effect.port.internal]
+        n, every = len(angles), round(_KNOT_S / self.recording.dt)
+        knots = np.unique(np.append(np.arange(0, n, every), n - 1))
+        found = [generalised(rig, linearise(rig, outside, angles[at]), tuple(self._inlets), angles[at]) for at in knots]
+        self._force, self._direct = (
+            make_interp_spline(knots, np.stack([one[part] for one in found]), k=1)(np.arange(n)) for part in (0, 1)
+        )
+        drives = [joint.drive for joint in rig.joints if joint.drive is not None]
+        self._soft = np.array([float(d.parameters["Ka"]) / (float(d.ratio) ** 2 * spring(d)) for d in drives])
+
+    def columns(self, chosen: Sequence[Candidate]) -> Array:
+        """What a unit of each amplitude of each candidate does to the rows, (n, rows, amplitudes of all)."""
+        shown = [self._sensed(one) if not one.effect.in_plant else self._entered(one) for one in chosen]
+        entered = [column for one in shown if isinstance(one, list) for column in one]
+        slow = iter(self._slow([means for column in entered for means in column.values()]))
+        rows = iter([self._rows({inlet: next(slow) for inlet in column}) for column in entered])
+        every = [
+            np.stack([next(rows) for _ in one], axis=2) if isinstance(one, list) else one for one in shown
+        ]  # fmt: skip
+        return np.nan_to_num(np.concatenate(every, axis=2))
+
+    def _entered(self, candidate: Candidate) -> list[dict[Inlet, Array]]:
+        return inputs(
+            candidate, self.tapped, self.rig, self.problem.experiment.effects, self._links.get(candidate.site)
+        )
+
+    def _slow(self, means: Sequence[Array]) -> Array:
+        """Series at the taps' rate as they are in the band at the working rate, (series, n)."""
+        if not means:
+            return np.zeros((0, self.recording.n))
+        n, dt, first = self.recording.n, self.recording.dt, self.recording.first
+        slow = resample(np.stack(means, axis=1), _TAPS_HZ, 1 / dt)[first : first + n]
+        slow = in_band(slow, dt)
+        return np.pad(slow, ((0, n - len(slow)), (0, 0)), mode="edge").T
+
+    def _rows(self, column: Mapping[Inlet, Array]) -> Array:
+        """What enters, in the band at the working rate, as rows."""
+        problem = self.problem
+        out = np.zeros((self.recording.n, problem.rows))
+        for inlet, slow in column.items():
+            place = self._inlets[inlet]
+            force = self._force[:, :, place] * slow[:, None]
+            out[:, problem.wrench] += self._direct[:, :, place] * slow[:, None]
+            out[:, problem.plate] -= force[:, :3]
+            out[:, problem.joint] += force[:, 3 : 3 + problem.joints] + self._soft * force[:, 3 + problem.joints :]
+        return out
+
+    def _sensed(self, candidate: Candidate) -> Array:
+        problem, experiment = self.problem, self.problem.experiment
+        if candidate.effect.whole_band:
+            shown = reduced(
+                candidate, self.tapped, experiment.channels, self.rig, experiment.dt, len(self.shown)
+            )  # fmt: skip
+        else:
+            t = experiment.dt * np.arange(len(self.shown))
+            shown = sensed(candidate, t, self.shown, experiment.channels, self.rig)
+        out = np.zeros((self.recording.n, problem.rows, shown.shape[2]))
+        acted = np.flatnonzero(shown.any(axis=(0, 2)))  # of the readings, which are the first rows
+        out[:, acted] = in_band(shown[self.recording.first :][: self.recording.n, acted], self.recording.dt)
+        return out
