@@ -1,8 +1,9 @@
 """Prints of runs of successive readings, by which a part of a recording is found again, rounded or turned, or not.
 
 A print is the signs of a run's fourth differences: what moves slowly, a zero and a gain are not in it, and rounding
-seldom changes it. Backwards it has the same signs: of both ways the lesser counts. Of all prints those with the least values are kept, the same in every recording, each with its
-readings: these tell whether two runs with the same print are the same but for rounding.
+seldom changes it. Backwards it has the same signs: of both ways the lesser counts. Of all prints those with the least
+values are kept, the same in every recording, each with its readings: these tell whether two runs with the same print
+are the same but for rounding.
 """
 
 from __future__ import annotations
