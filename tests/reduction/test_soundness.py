@@ -15,7 +15,7 @@ from kbs_process.campaign.config import Campaign
 from kbs_process.campaign.load import load_campaign
 from kbs_process.progress import SilentProgress
 from kbs_process.reduction.preparing import fit_gravity
-from kbs_process.reduction.soundness import check_model, extent, mistimed, repeated
+from kbs_process.reduction.soundness import _moved_alone, check_model, extent, mistimed, repeated
 from kbs_process.signals.records import Events, Signal
 from reduction.arm import checked, described, drawn, recorded
 
@@ -156,6 +156,42 @@ def test_a_wrench_that_comes_later_in_all_recordings_is_told(samples, tmp_path):
     (suggestion,) = found.soundness.suggestions
     assert suggestion.startswith("clock: the wrench is +") and " s late" in suggestion
     assert found.doubts(judged)[0].of_failed, "what is late leaves gravity in the figures"
+
+
+@pytest.mark.parametrize(("size", "moved"), [(0.01, False), (5.0, True)])
+def test_a_zero_has_moved_by_more_than_noise_or_not_at_all(size, moved):
+    rig = SimpleNamespace(loads=SimpleNamespace(noise=np.full(6, 0.02)))
+    equation = SimpleNamespace(bias_sigma=np.full(6, 20.0), index=list(range(6)), elements=SimpleNamespace(rig=rig))
+    zeros = np.full((2, 6), [[0.0], [1e-4]])
+    zeros[1, 1] = size
+    assert _moved_alone(equation, zeros)[:, 1].tolist() == [moved, moved]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("axis", "sound"), [("[0, -1, 0]", True), ("[1, 0, 0]", False)])
+def test_vague_files_hide_no_wrong_axis(tmp_path, axis, sound):
+    """What `init` leaves wide: no slope can be tested, and a calibration has to be gravity's all the same."""
+    campaign = described(tmp_path)
+    recordings = recorded(campaign, drawn(campaign, 1), 1)
+    rig = tmp_path / "rig.toml"
+    text = rig.read_text().replace("axis = [0, -1, 0]", f"axis = {axis}")
+    for known, vague in (
+        ("sigma = [1, 1, 1, 0.1, 0.1, 0.1]", "sigma = 20.0"),
+        ('sigma = 0.1, source = "scales"', 'sigma = 2.0, source = "felt"'),
+        ("sigma = 0.003", "sigma = 0.3"),
+        ("sigma = 0.002", "sigma = 0.3"),
+        ("sigma = 0.0005", "sigma = 0.3"),
+        ('unit = "mrad", sigma = 0.5', 'unit = "mrad", sigma = 5.0'),
+    ):
+        assert known in text
+        text = text.replace(known, vague)
+    rig.write_text(text)
+    vague_campaign = load_campaign(tmp_path, checksums=False)
+    found = checked(vague_campaign, recordings)
+    assert set(found.unconfirmed) == set(vague_campaign.rig.channels)
+    assert found.soundness.sound is sound, found.soundness.reasons
+    (judged,) = vague_campaign.requirements
+    assert [doubt.of_failed for doubt in found.doubts(judged)] == ([] if sound else [True])
 
 
 @pytest.mark.slow

@@ -14,11 +14,12 @@ import pytest
 from kbs_process.errors import OutputError
 from kbs_process.report import provenance
 from kbs_process.report.build import publish
-from kbs_process.report.panel import Grid
-from kbs_process.results.records import Conclusion, InputFile, decode, encode, load, schema_of
+from kbs_process.report.panel import Cell, Grid
+from kbs_process.results.records import Check, Conclusion, InputFile, decode, encode, load, schema_of
 from kbs_process.results.versions import VERSION
 from kbs_process.studies.correlate import results as r
 from kbs_process.studies.correlate.report import _provenance
+from kbs_process.studies.correlate.sections import gravity
 from kbs_process.studies.documents import DOCUMENTS
 from kbs_process.studies.documents import render as build
 from report import sample
@@ -152,3 +153,12 @@ def test_every_input_is_told_once_and_so_are_the_loggers_files() -> None:
     assert isinstance(found, Grid)
     names = [row[0] for row in found.rows]
     assert len(names) == len(set(names)) and names[-1] == "x.csv, imported"
+
+
+def test_a_check_of_a_fit_is_told_apart_from_a_verdict() -> None:
+    checks = (Check(name="within bounds", ok=False), Check(name="converged", ok=True))
+    results = sample.command_results()
+    results = msgspec.structs.replace(results, gravity=msgspec.structs.replace(results.gravity, checks=checks))
+    grid = gravity.panel(results, None).blocks[-1]  # type: ignore[arg-type]
+    assert isinstance(grid, Grid)
+    assert [row[1] for row in grid.rows] == [Cell("see detail", "undecided"), Cell("ok", "pass")]

@@ -143,7 +143,13 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
         known = [late_sigma(one.run.clocks, amplifier, one.entry.clock_sigma) for one, _ in lags]
         late = [own.moved(sigma) for (_, own), sigma in zip(lags, known, strict=True) if own.taken >= TAKEN]
         found = tension(model, {sample.name: taring for sample, taring in tared}, late)
+        tested = {one.channel for one in conventions if one.testable}
         most = _most(equation)
+        if not tested:  # what gravity leaves may be gravity about another axis
+            spread = np.max([read.std(axis=0) for read, _, _ in shown], axis=0)
+            most = np.minimum(
+                most, np.maximum(LEFT * spread, BEYOND * equation.elements.rig.loads.noise[equation.index])
+            )
         rounding = {key: x for one in recordings for key, x in measurable.rounding(campaign, one.readings).items()}
         channels = model.rig.transducer.channels
         noise = {
@@ -189,7 +195,6 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
                 and _calibrated(campaign, samples, model, most)
                 and all(one.ok or (one.channel and one.check.rpartition(", ")[2] in tests) for one in conventions),
             )
-        tested = {one.channel for one in conventions if one.testable}
         silent = tuple(key for key in mute if key in judged)
         unconfirmed = tuple(key for key in equation.channels if key not in tested)
         lag_of = {own.recording: abs(own.value) for _, own in lags if abs(own.value) > BEYOND * own.chance}
@@ -359,11 +364,12 @@ def _power(x: Array) -> float:
 
 
 def _moved_alone(equation: Equation, zeros: Array) -> Mask:
-    """Which channel's zero (recordings, c) differs from another recording's far more than that of any other channel."""
+    """Which channel's zero (recordings, c) is off another recording's, far more than that of any other channel."""
     stated = np.maximum(equation.bias_sigma, 1e-12)
     moved = np.array([np.abs((zeros - own) / stated).max(axis=0) for own in zeros])
     others = np.array([np.delete(moved, column, axis=1).max(axis=1, initial=0.0) for column in range(moved.shape[1])])
-    alone: Mask = (moved > BEYOND * others.T) & (others.T > 0.0)
+    noise = equation.elements.rig.loads.noise[equation.index]
+    alone: Mask = (moved > BEYOND * others.T) & (others.T > 0.0) & (moved * stated > BEYOND * noise)
     return alone
 
 

@@ -14,10 +14,7 @@ _POWERS = 3  # of an angle
 
 
 def description(x: Array, valid: Mask, dt: float, q: Array, joints: Sequence[str], load: Array) -> str:
-    """Describe a history x (n,) along angles q (n, joints) by what holds most of its power, if that is half of it.
-
-    `load` (n,) is what the model has taken off.
-    """
+    """Describe a history x (n,), left of a `load` (n,) along angles q (n, joints), by what holds half of its power."""
     t = dt * np.arange(len(x))
     later = -np.gradient(load, dt)
     t, x, q, later = t[valid], x[valid], q[valid], later[valid]

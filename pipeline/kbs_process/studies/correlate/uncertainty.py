@@ -38,8 +38,7 @@ def budgets(
     """Yield every recording's own budget; where nothing of a recording is known in a band, there is none.
 
     `noise`: of a sample, rms, by recording and channel, as measured; what is stated counts where it is more, and no
-    noise is more than all that is read in the band. `late`: s, by recording: what its clocks are off by, as gravity
-    shows it.
+    noise is more than all that is read in the band. `late`: s, by recording, what clocks are off by as gravity shows.
     """
     lowest = min((mode.frequency_Hz for mode in resonances), default=None)
     spacecraft, own = campaign.rig.spacecraft, campaign.rig.frame
