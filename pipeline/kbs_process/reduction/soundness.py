@@ -143,7 +143,7 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
         known = [late_sigma(one.run.clocks, amplifier, one.entry.clock_sigma) for one, _ in lags]
         late = [own.moved(sigma) for (_, own), sigma in zip(lags, known, strict=True) if own.taken >= TAKEN]
         found = tension(model, {sample.name: taring for sample, taring in tared}, late)
-        tested = {one.channel for one in conventions if one.testable}
+        tested = {one.channel for one in conventions if one.testable and one.channel}
         most = _most(equation)
         if not tested:  # what gravity leaves may be gravity about another axis
             spread = np.max([read.std(axis=0) for read, _, _ in shown], axis=0)
