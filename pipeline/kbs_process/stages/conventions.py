@@ -16,7 +16,7 @@ from kbs_process.signals.records import Array, Signal
 BEYOND = 4.0
 # No calibration promises less; and whatever disturbs it, a channel that is off by more does not follow gravity.
 _EXACT, _HALF = 1e-3, 0.5
-OF_CHANNEL, OF_ENCODER = "slope of measured", "slope of encoder"  # how their checks begin
+OF_ENCODER = "slope of encoder"  # how its checks begin
 # A plate that is inclined by less than this (rad) is called level.
 LEVEL = 0.1
 
@@ -78,7 +78,7 @@ def check_gravity_sign(
         testable = BEYOND * np.sqrt(noisy + stated) / power < _HALF
         tests.append(
             SignCheck(
-                check=f"{OF_CHANNEL} {channel} against its computed load",
+                check=f"slope of measured {channel} against its computed load",
                 channel=channel,
                 expected="+1",
                 found=f"{slope:+.3f} ± {sigma:.2g}" if testable else "this load hardly changes here",
