@@ -14,6 +14,7 @@ import numpy as np
 
 import kbs_process
 from kbs_process.errors import RecordingError
+from kbs_process.files import regular
 from kbs_process.results import code
 from kbs_process.results.records import Constant, InputFile, Provenance
 from kbs_process.rig.model import Quantity, Rig
@@ -25,7 +26,7 @@ LIBRARIES = ("numpy", "scipy", "numba", "pandas", "pyarrow", "mcap", "zstandard"
 def sha256(path: Path) -> str:
     """Return the file's SHA-256 in hexadecimal; a file that has not changed is read once."""
     try:
-        status = path.stat()
+        status = regular(path).stat()
         return _sha256(path, status.st_size, status.st_mtime_ns)
     except OSError as error:
         raise RecordingError(
