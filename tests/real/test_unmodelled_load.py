@@ -23,7 +23,7 @@ def test_recordings_with_a_bungee_are_named_with_channels_and_a_remedy(archived:
     for notice in told:
         assert "Tx" in notice["what"]
         assert "Ty" in notice["what"]
-        assert "The verdict holds that load as well as the article's own disturbance" in " ".join(
+        assert "The verdict contains that load as well as the article's own disturbance" in " ".join(
             notice["what"].split()
         )
         assert "take it off, describe it, or judge a recording without it" in notice["remedy"]

@@ -147,7 +147,7 @@ def _lock(path: Path, target: Path) -> int | None:
     foreign = OutputError(
         "is no lock of kbs-process, and stands where that has to be",
         where=str(path),
-        remedy="move it, or name another folder",
+        remedy="move it, or name another folder (of results: --output)",
     )
     try:
         descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK, 0o644)
@@ -172,7 +172,7 @@ def _lock(path: Path, target: Path) -> int | None:
         raise OutputError(
             f"{said.decode(errors='replace') or 'another process'} is writing results there",
             where=str(target),
-            remedy="wait until it is done, or name another folder",
+            remedy="wait until it is done, or name another folder (of results: --output)",
         ) from error
     except BaseException:
         os.close(descriptor)
@@ -230,7 +230,7 @@ def _files_of_the_user(target: Path, made: str, *, revised: Collection[str] | No
             raise OutputError(
                 "was changed since kbs-process wrote it, and would be lost",
                 where=str(target / name),
-                remedy="move it out of the folder, or name another folder",
+                remedy="move it out of the folder, or name another folder (of results: --output)",
             )
     return users
 
@@ -275,7 +275,7 @@ def _keep(source: Path, target: Path) -> None:
         raise OutputError(
             "is not of kbs-process, and stands where a result has to be",
             where=str(source),
-            remedy="move it, or name another folder",
+            remedy="move it, or name another folder (of results: --output)",
         )
     target.parent.mkdir(parents=True, exist_ok=True)
     _link(str(source), str(target))
@@ -341,11 +341,13 @@ def _explaining(target: Path) -> Iterator[None]:
             raise OutputError(
                 f"the disk is full ({reason}); the results of before are whole",
                 where=str(target),
-                remedy="make room, or name a folder on another disk",
+                remedy="make room, or name a folder on another disk (of results: --output)",
             ) from error
         if cause.errno in _REFUSED and _concerns(cause, target):
             raise OutputError(
-                f"cannot be written: {reason}", where=str(target), remedy="name a folder that you may write to"
+                f"cannot be written: {reason}",
+                where=str(target),
+                remedy="name a folder that you may write to (of results: --output)",
             ) from error
         raise
 
