@@ -105,6 +105,16 @@ def test_the_shift_between_two_clocks_is_found_within_its_sigma() -> None:
     assert 0.5 < np.std(found) < 2.0 and abs(np.mean(found)) < 1.0
 
 
+@pytest.mark.parametrize("rows", [1, 3, 40])
+@pytest.mark.parametrize(("first", "value"), [(150, 17.0), (1200, 0.0), (2300, 17.0)])
+def test_angles_that_leap_there_and_back_tell_no_wrong_shift(first: int, value: float, rows: int) -> None:
+    t, t_angle = np.arange(0.0, 44.0, 0.01), np.arange(0.0, 48.0, 0.02)
+    angle = motion(t_angle)
+    angle[first : first + rows] = value
+    found = find_shift(t, wrench_of(motion(t + LATE)), t_angle, angle[:, None], [True])
+    assert found is None or abs(found[0] - LATE) < 5.0 * found[1]
+
+
 @pytest.mark.parametrize("move", [lambda t: 0.5 * np.sin(t), lambda t: 0.0 * t], ids=["periodic", "still"])
 def test_a_shift_that_the_motion_does_not_tell_is_no_number(move: Callable[[np.ndarray], np.ndarray]) -> None:
     t = np.arange(0.0, 60.0, 0.02)

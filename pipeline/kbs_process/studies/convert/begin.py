@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, field
-from itertools import product
+from itertools import combinations, product
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -298,8 +298,9 @@ def _shift(load: Log, angle: Log) -> tuple[str, str]:
             both = np.flatnonzero((at >= t_angle[0]) & (at <= t_angle[-1]))  # rows that both loggers saw
             halves = [both[: len(both) // 2], both[len(both) // 2 :]]
         parts = [one for half in halves if (one := find_shift(t[half], wrench[half], t_angle, q, turns))]
-        if found and len(parts) == 2 and abs(parts[1][0] - parts[0][0]) > _APART * np.hypot(parts[0][1], parts[1][1]):
-            found, asked = None, f"it is {parts[0][0]:.4f} s in the first half, {parts[1][0]:.4f} s in the second"
+        for one, other in combinations([found, *parts] if found else [], 2):
+            if abs(one[0] - other[0]) > _APART * np.hypot(one[1], other[1]):
+                found, asked = None, f"it is {one[0]:.4f} s in one part, {other[0]:.4f} s in another"
     if found is None:
         told = f"how their clocks stand to each other is not known: {asked}"
         return f'shift_s = {{ wrench = "?" }}  # s, added to the times of the wrench: {asked}', told

@@ -7,13 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from kbs_process.signals.records import Array
+from kbs_process.signals.records import Array, Mask
 
 _POINTS = 1000  # of a recording, in the search
 _MOST = 20 * _POINTS  # shifts; one recording that lasts so much longer than the other takes too long to search
 _EXPLAINED = 0.05  # share of a channel that may be left, or angles do not tell its static part
 _FEWEST = 30  # rows with a partner, fewer of which any curve fits
-_BRIDGED = 10.0  # times their usual interval: angles that are farther apart tell nothing of what is between
+_BRIDGED = 10.0  # times their usual interval, or change: angles that are farther apart tell nothing of what is between
+_PIECE = 0.1  # of all rows, fewer of which between two leaps are no motion
 _DISTINCT = 4.0  # times more is left at any other shift
 
 
@@ -24,8 +25,9 @@ def find_shift(
 
     The static wrench is a function of the angles (m, j): of their sines and cosines where a joint `turns`, else of the
     way, and of these in pairs. At the right shift least of the wrench is left beside it. The search covers all shifts
-    at which half of the shorter recording has a partner. Valid where motion does not repeat itself within these. None
-    where times go back, or leap by as much as they take otherwise.
+    at which half of the shorter recording has a partner. Valid where motion does not repeat itself within these.
+    Angles that leap there and back for less than a tenth of the rows are left out. None where times go back, or leap by
+    as much as they take otherwise.
     """
     if min(len(t), len(t_angle)) < _FEWEST:
         return None
@@ -35,7 +37,7 @@ def find_shift(
     steps = np.diff(t_angle)
     if any(each.min() < 0.0 or 2.0 * each.max() > each.sum() for each in (steps, np.diff(t))):
         return None
-    known = steps <= _BRIDGED * np.median(steps)
+    known = (steps <= _BRIDGED * np.median(steps)) & _between(angle)
 
     def left(shift: float, times: Array, loads: Array) -> tuple[Array, Array]:
         at = times + shift
@@ -84,3 +86,14 @@ def find_shift(
     bend = (share(found + step) - 2.0 * share(found) + share(found - step)) / step**2
     spread = 2.0 * share(found) / (max(bend, 1e-300) * len(residual)) * (1.0 + near) / max(1.0 - near, 1e-3)
     return found, float(np.sqrt(spread))
+
+
+def _between(angle: Array) -> Mask:
+    """Between which successive angles (m - 1,) a joint moves: not where one leaps, nor in what two leaps cut out."""
+    leaps = np.zeros(len(angle) - 1, dtype=np.bool_)
+    for changes in np.abs(np.diff(angle, axis=0)).T:
+        if changes.any():
+            leaps |= changes > _BRIDGED * np.quantile(changes[changes > 0.0], 0.99)
+    piece = np.concatenate([[0], np.cumsum(leaps)])
+    whole = np.bincount(piece)[piece] >= _PIECE * len(angle)
+    return np.asarray(whole[1:] & whole[:-1] & ~leaps)
