@@ -46,6 +46,19 @@ def test_a_damaged_cache_is_made_anew(tmp_path: Path, suffix: str, damage: bytes
 
 
 @pytest.mark.slow
+def test_machine_code_with_one_wrong_bit_is_not_run(tmp_path: Path) -> None:
+    """It loads: what it does then is anybody's guess."""
+    (tmp_path / "kernel.py").write_text(KERNEL)
+    run(tmp_path)
+    for path in (tmp_path / "__pycache__").glob("*.nbc"):
+        code = bytearray(path.read_bytes())
+        code[len(code) // 2] ^= 1
+        path.write_bytes(code)
+    assert run(tmp_path) == ["42.0", "42.0", "0", "0"]
+    assert run(tmp_path) == ["42.0", "42.0", "1", "1"]
+
+
+@pytest.mark.slow
 def test_where_nothing_can_be_kept_it_is_compiled(tmp_path: Path) -> None:
     """As on a full disk: what is in the way here are folders of the files' names."""
     (tmp_path / "kernel.py").write_text(KERNEL)

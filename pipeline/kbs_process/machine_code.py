@@ -1,23 +1,45 @@
 """numba's `njit`, with a cache of machine code that is made anew where it does not load.
 
 A cache is damaged by a full disk, a copy that ends early or a kill at the wrong time; numba raises whatever unpickling
-raises then, at every later start. Whoever compiles takes `njit` from here.
+raises then, at every later start, and runs machine code as it finds it. So code is kept with its SHA-256. Whoever
+compiles takes `njit` from here.
 """
 
 from __future__ import annotations
 
+import pickle
 from contextlib import suppress
+from hashlib import sha256
 from typing import Any
 
 from numba import njit
 from numba.core import dispatcher
-from numba.core.caching import FunctionCache
+from numba.core.caching import CompileResultCacheImpl, FunctionCache
+from numba.core.serialize import dumps
 
 __all__ = ["njit"]
 
 
+class _Proven(CompileResultCacheImpl):
+    """What is kept of one function, with its SHA-256."""
+
+    def reduce(self, data: Any) -> tuple[bytes, bytes]:
+        """Return the digest of what is kept, and that."""
+        kept: bytes = dumps(super().reduce(data))  # type: ignore[no-untyped-call]
+        return sha256(kept).digest(), kept
+
+    def rebuild(self, target_context: Any, payload: tuple[bytes, bytes]) -> Any:
+        """Return what was kept, if it is as it was."""
+        digest, kept = payload
+        if sha256(kept).digest() != digest:
+            raise ValueError("damaged machine code")
+        return super().rebuild(target_context, pickle.loads(kept))  # type: ignore[no-untyped-call]
+
+
 class _RenewedCache(FunctionCache):
     """The cache of one function."""
+
+    _impl_class = _Proven
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return what is kept for a signature, or None: then it is compiled, and kept."""

@@ -154,11 +154,13 @@ def test_clocks_are_late() -> None:
     np.testing.assert_allclose(wander, 0.01 * np.sin(2.0 * np.pi * T / 40.0), atol=1e-15)
     dropped = changed(law("clock_drops"), dropped=0.02, drop_time=50.0)
     np.testing.assert_array_equal(dropped, np.where(T > 50.0, -0.02, 0.0))
-    cold = changed(law("clock_warmup"), cold_skew=1e-3, cold_time=20.0)
+    cold = changed(law("clock_warmup"), cold_skew=1e-3, cold_time=20.0, right_at=0.0)
     assert cold[0] == 0.0 and cold[-1] == pytest.approx(0.02, rel=0.01)
     np.testing.assert_allclose(np.diff(cold)[:3] / np.diff(T)[:3], 1e-3, rtol=0.01)
+    settling = changed(law("clock_warmup"), cold_skew=-1e-3, cold_time=20.0, right_at=1e4)
+    np.testing.assert_allclose(settling, 0.02 * np.exp(-T / 20.0), atol=1e-15)
     # One that settles at once is set wrong, one that never does runs fast.
-    slow = changed(law("clock_warmup"), cold_skew=1e-3, cold_time=1e5)
+    slow = changed(law("clock_warmup"), cold_skew=1e-3, cold_time=1e5, right_at=0.0)
     np.testing.assert_allclose(slow, 1e-3 * T, rtol=1e-3)
 
 

@@ -72,8 +72,9 @@ def timed(bench: Bench, found: Found, among: Sequence[Suspect]) -> Found:
     grid = [one for one in among if isinstance(one, Catalogued) and one.family == family]
     nothing = height_of(bench, bench.background.z)
     suspect, late, height = min((_latest(bench, one) for one in grid), key=lambda one: one[2])
-    for steps in _NEARER if bends(suspect.candidate, suspect.scene.hypothesis.rig) else ():
-        near = [_latest(bench, moved(suspect, [one]), late) for one in (-steps, steps)]
+    ways = np.eye(len(bends(suspect.candidate, suspect.scene.hypothesis.rig)))
+    for steps in _NEARER if len(ways) else ():
+        near = [_latest(bench, moved(suspect, one * steps), late) for one in (*-ways, *ways)]
         suspect, late, height = min([(suspect, late, height), *near], key=lambda one: one[2])
     size = late / _greatest(_units(bench, suspect))
     gain = nothing - height

@@ -22,15 +22,17 @@ def since_set(time: Array, skew: float, set_at: float) -> Array:
     return np.asarray(skew * (time - set_at), dtype=np.float64)
 
 
-def until_warm(time: Array, cold_skew: float, cold_time: float) -> Array:
+def until_warm(time: Array, cold_skew: float, cold_time: float, right_at: float) -> Array:
     r"""By how much the stamps of a clock are late whose rate settles as it warms up.
 
-    Equation: $y_\mathrm{read}(t) = y(t - s_0 \theta (1 - e^{-t/\theta}))$.
-    Units: s, 1, s -> s.
+    Equation: $y_\mathrm{read}(t) = y(t - s_0 \theta (e^{-t_0/\theta} - e^{-t/\theta}))$, $t_0$ being when it was
+        right, after a recording's start: long after it, of a clock that settles on the right time.
+    Units: s, 1, s, s -> s.
     Validity: a rate that is off by $s_0$ at the start of every recording, one time constant.
     Source: D. W. Allan, N. Ashby, C. C. Hodge, The science of timekeeping, Hewlett-Packard AN 1289 (1997).
     """
-    return np.asarray(cold_skew * cold_time * -np.expm1(-time / cold_time), dtype=np.float64)
+    settled = np.exp(-right_at / cold_time) - np.exp(-time / cold_time)
+    return np.asarray(cold_skew * cold_time * settled, dtype=np.float64)
 
 
 CLOCK_SKEW = Sensing(
@@ -65,6 +67,15 @@ CLOCK_WARMUP = Sensing(
             "time constant of its warming up",
             (1.0, 1e5),
             grid=(0.15, 0.5, 1.5),
+            over="time.span",
+        ),
+        Parameter(
+            "right_at",
+            "s",
+            Normal(0.0, 30.0),
+            "when it was right, after the recording's start",
+            (0.0, 1e5),
+            grid=(0.0, 1.0, 3.0),
             over="time.span",
         ),
     ),
