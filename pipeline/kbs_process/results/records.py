@@ -6,6 +6,7 @@ be determined is None (null), never NaN. Every `sigma` is one standard deviation
 
 from __future__ import annotations
 
+from collections.abc import Sized
 from pathlib import Path
 from typing import Any, Literal, TypeVar
 
@@ -23,6 +24,13 @@ Severity = Literal["info", "warning", "error"]
 
 class Record(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """An immutable entry of results.json; an unknown key is an error."""
+
+
+def check_lengths(first: Sized, *others: Sized) -> None:
+    """Raise ValueError for lists that belong together, entry by entry, and are not as long as each other."""
+    lengths = sorted({len(one) for one in (first, *others)})
+    if len(lengths) > 1:
+        raise ValueError(f"lists that belong together have {' and '.join(map(str, lengths))} entries")
 
 
 class Conclusion(Record, frozen=True, kw_only=True):

@@ -12,7 +12,7 @@ import msgspec
 
 from kbs_process.results.judged import Budget, Frame, Requirement, Soundness
 from kbs_process.results.pointing import JudgedPointing, RecordedPointing
-from kbs_process.results.records import Check, Constant, InputFile, Record, ResultsFile
+from kbs_process.results.records import Check, Constant, InputFile, Record, ResultsFile, check_lengths
 from kbs_process.signals.records import Loss
 from kbs_process.stages import compare
 from kbs_process.stages.conventions import SignCheck
@@ -162,6 +162,9 @@ class CrossCoupling(Record, frozen=True, kw_only=True):
     sigma: tuple[tuple[float, ...], ...]
     largest: str  # a sentence: the largest coupling and its effect
     contributions: tuple[Contribution, ...] = ()  # rms taken away from each channel
+
+    def __post_init__(self) -> None:
+        check_lengths(self.channels, self.matrix, *self.matrix, self.sigma, *self.sigma)
 
 
 class Band(Record, frozen=True, kw_only=True):

@@ -10,7 +10,7 @@ from typing import Literal
 
 from kbs_process.diagnosis.facts import Answer, Moved, Planned
 from kbs_process.diagnosis.facts import Place as Place
-from kbs_process.results.records import Check, Conclusion, Notice, Provenance, Record, ResultsFile
+from kbs_process.results.records import Check, Conclusion, Notice, Provenance, Record, ResultsFile, check_lengths
 
 
 class Fitted(Record, frozen=True, kw_only=True):
@@ -45,6 +45,9 @@ class Curve(Record, frozen=True, kw_only=True):
     y: tuple[float, ...]
     sigma: tuple[float, ...]
     fitted: tuple[float, ...] = ()  # the accepted law at x
+
+    def __post_init__(self) -> None:
+        check_lengths(self.x, self.y, self.sigma, self.fitted or self.x)
 
 
 class Gated(Record, frozen=True, kw_only=True):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from kbs_process.results.records import Check, Record, ResultsFile
+from kbs_process.results.records import Check, Record, ResultsFile, check_lengths
 
 
 class Interval(Record, frozen=True, kw_only=True):
@@ -14,6 +14,9 @@ class Interval(Record, frozen=True, kw_only=True):
     high: float
     x: tuple[float, ...]
     D: tuple[float, ...]  # -2 log likelihood above the least
+
+    def __post_init__(self) -> None:
+        check_lengths(self.x, self.D)
 
 
 class Identified(Record, frozen=True, kw_only=True):
@@ -55,6 +58,9 @@ class Correlations(Record, frozen=True, kw_only=True):
 
     names: tuple[str, ...]
     matrix: tuple[tuple[float, ...], ...]
+
+    def __post_init__(self) -> None:
+        check_lengths(self.names, self.matrix, *self.matrix)
 
 
 class IdentifyResults(ResultsFile, frozen=True, kw_only=True):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from kbs_process.results.records import Constant, Record, ResultsFile
+from kbs_process.results.records import Constant, Record, ResultsFile, check_lengths
 
 
 class LoopMargins(Record, frozen=True, kw_only=True):
@@ -90,3 +90,6 @@ class StabilityResults(ResultsFile, frozen=True, kw_only=True):
     limit_cycles: tuple[LimitCycle, ...] = ()
     sensitivities: tuple[Sensitivity, ...] = ()
     parameters: tuple[Constant, ...] = ()
+
+    def __post_init__(self) -> None:
+        check_lengths(self.joints, self.Kp, self.Ki)
