@@ -15,7 +15,7 @@ from kbs_process.plant.laws import CATALOGUE
 from kbs_process.plant.rigid import inverse_dynamics, joint_efforts, kinematics, static_wrench
 from kbs_process.progress import SilentProgress
 from kbs_process.studies.diagnose.reading import experiment_of
-from proof.rivals.smoother.balance import FIRST_JOINT, FLOOR, PLATE, needed
+from proof.rivals.smoother.balance import FIRST_JOINT, FLOOR, PLATE, STILL, needed
 from proof.rivals.smoother.fit import Quadratic, State, step
 from proof.rivals.smoother.intensities import powers
 from proof.rivals.smoother.lines import orders_in, tones_in
@@ -33,13 +33,25 @@ def test_splines_give_values_rates_and_accelerations() -> None:
     t = dt * np.arange(n)
     splines = Splines(n, dt)
     values, rates, accelerations = splines.motion(splines.fitted(np.stack([np.sin(t), t**2], axis=1)))
-    inside = slice(30, -30)
+    inside = slice(65, -65)
     for found, expected in (
         (values, [np.sin(t), t**2]),
         (rates, [np.cos(t), 2 * t]),
         (accelerations, [-np.sin(t), 2 + 0 * t]),
     ):
         assert found[inside] == pytest.approx(np.stack(expected, axis=1)[inside], abs=2e-4)
+
+
+def test_rates_and_accelerations_are_right_up_to_the_band_s_end() -> None:
+    dt, n = 0.05, 600
+    t, inside = dt * np.arange(n), slice(100, -100)
+    splines = Splines(n, dt)
+    for f in (0.5, 2.0, 5.0, 7.0, 8.0):
+        w = 2.0 * np.pi * f
+        values, rates, accelerations = splines.motion(splines.fitted(np.sin(w * t)[:, None]))
+        assert values[inside, 0] == pytest.approx(np.sin(w * t)[inside], abs=1e-4)
+        assert rates[inside, 0] == pytest.approx(w * np.cos(w * t)[inside], abs=0.007 * w)
+        assert accelerations[inside, 0] == pytest.approx(-(w**2) * np.sin(w * t)[inside], abs=0.007 * w**2)
 
 
 def test_lines_are_found_at_their_orders_whatever_the_rates_and_at_their_frequencies_whatever_the_phases() -> None:
@@ -77,7 +89,7 @@ def test_what_a_motion_needs_is_the_sagged_weight_and_what_the_floor_adds() -> N
     # The mounting carries what the transducer feels, about axes that the plate's small angles hardly turn.
     assert -efforts[:, :3] == pytest.approx(wrench[:, 3:], abs=0.05)
     raised = x.copy()
-    raised[:, FLOOR] = [0.0, 0.0, 0.1]
+    raised[:, FLOOR] = [0.0, 0.0, 0.1 / STILL]
     heavier, _ = needed(rig, (raised, still, still), rest)
     assert heavier[:, 2] / wrench[:, 2] == pytest.approx(1 + 0.1 / float(rig.gravity), rel=1e-4)
 

@@ -1,7 +1,8 @@
 """What a motion needs, by inverse dynamics of the rig with floor and base as further joints.
 
-Freedoms: the floor's acceleration along x, y, z (m/s^2), which shows by itself and not by where it takes the floor;
-the plate's angles about x, then y, then z; the rig's joints. Compiled, as slopes ask for it hundreds of times.
+Freedoms: what the floor's acceleration along x, y, z is made of, a = dz/dt + `STILL` z (z in m/s, white where a floor
+is usual), which shows by itself and not by where it takes the floor; the plate's angles about x, then y, then z; the
+rig's joints. Compiled, as slopes ask for it hundreds of times.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from kbs_process.signals.frames import from_rotation_vector, from_tilt
 from proof.rivals.case import Array
 
 FLOOR, PLATE = slice(0, 3), slice(3, 6)
+STILL = 2.0 * np.pi  # rad/s: above it a floor shakes with velocities of one density, below with accelerations
 FIRST_JOINT = 6
 Motion = tuple[Array, Array, Array]  # values, rates, accelerations (n, freedoms)
 Loads = tuple[Array, Array]
@@ -67,7 +69,10 @@ def needed(rig: Rig, motion: Motion, rotors: tuple[Array, Array]) -> Loads:
     the rates and accelerations (n, joints) of motors on their carriers: they follow the field, not what rings behind
     the gear.
     """
-    return _needed(*chain(rig), *motion, *rotors)  # type: ignore[no-any-return]
+    angle, rate, acceleration = motion
+    shaken = angle.copy()
+    shaken[:, FLOOR] = rate[:, FLOOR] + STILL * angle[:, FLOOR]
+    return _needed(*chain(rig), shaken, rate, acceleration, *rotors)  # type: ignore[no-any-return]
 
 
 @njit(cache=True, inline="always")

@@ -4,7 +4,7 @@
     angle    reading = joint + offset + clock                          rounding
     plate    W's moment on the plate - its springs = force             weak: `intensity`
     joint    gear's torque at the field - torque needed = -force       weak
-    floor    acceleration = force                                      weak
+    floor    velocity, as the balance has it = force                   weak
 
 A row's weight is one over its variance; where recordings say nothing, it has none.
 """
@@ -40,7 +40,7 @@ _WAVES = 24  # of a zero at most: of a long recording the slowest, where 1/f noi
 _CLOCK = 3e-3  # s, of a clock against the field's
 _LEAST = 0.1  # of its value: what a stiffness, a damping or an inertia is at least
 _STEPS = (1e-6, 1e-6, 1e-4)  # of values, rates and accelerations, for slopes
-_FLOOR_STEP = 1e-3  # m/s^2
+_FLOOR_STEP = 1e-3  # m/s
 _EXACT = 1e-6  # of an amplitude that is known without a sigma: its sigma, of itself
 _SHARE = 1e-3  # of a sigma: step of an unknown
 _OF_RIG = ("body.", "transducer.tilt", "transducer.stiffness", "transducer.damping")
@@ -288,7 +288,7 @@ class Problem:
             for order, step in enumerate(_STEPS):
                 if d < FLOOR.stop:
                     step = _FLOOR_STEP
-                    if order:
+                    if order == 2:
                         continue
                 moved = [part.copy() if o == order else part for o, part in enumerate(motion)]
                 moved[order][:, d] += step

@@ -27,6 +27,7 @@ from proof.rivals.smoother.screen import Scored, Screen, estimate
 
 METHOD = "smoother"
 WIDER, OF_JOINT = 10.0, 3.0  # times a reading's noise that forces are, to begin with; those of joints times as much
+SHAKEN = 25.0  # rad/s, at which the floor shakes a plate most
 STEPS = 25
 # Of a fit's phases: all is statics; forces are estimated; all is free. The share that forces have of a model by itself.
 STIFF = (0.1, 0.03, 0.01)
@@ -107,7 +108,7 @@ def _forces(problem: Problem) -> Array:
     """Sigmas (forces,) to begin with: what a reading's noise is as a force."""
     force, torque = problem.sigma[:3].mean(), problem.sigma[3:6].mean()
     mass = sum(float(body.mass) for body in problem.rig.bodies)
-    return WIDER * np.repeat([torque, OF_JOINT * torque, force / mass], [3, problem.joints, 3])
+    return WIDER * np.repeat([torque, OF_JOINT * torque, force / mass / SHAKEN], [3, problem.joints, 3])
 
 
 def _finds(problem: Problem, state: State, judge: _Judge | None) -> tuple[Claim, ...]:
