@@ -39,6 +39,12 @@ def test_a_few_of_each_kind_are_refused_right_or_reported() -> None:
     assert all(name in ended.stdout for name in QUICK)
 
 
+def test_a_message_that_a_byte_too_many_has_pushed_out_of_its_place_is_not_delivered() -> None:
+    """Of a number below zero the byte that is pushed out looks like the opcode of an application's record."""
+    ended = run("-m", "mutations", "1", "--seed", "20000029", "--only", "mcap ros2, no checksums")
+    assert ended.returncode == 0, ended.stdout + ended.stderr
+
+
 def _refuses(_: Path) -> None:
     raise RecordingError("no")
 

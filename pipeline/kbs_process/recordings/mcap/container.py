@@ -150,11 +150,15 @@ class Container:
             self._pass_over(file, opcode, length)
 
     def _breaks(self, head: bytes, at: int) -> bool:
-        """Whether a head, so many bytes on, is of no record; one that is cut off, or not whole, may be."""
+        """Whether a head, so many bytes on, is of no record; one that is cut off, or not whole, may be.
+
+        An application's record that the file has no room for is none: it is what a byte too many has pushed there.
+        """
         if len(head) < mcap.RECORD_HEAD.size:
             return False
         opcode, length = mcap.RECORD_HEAD.unpack_from(head)
-        huge = length > LARGEST and self._at + at + mcap.RECORD_HEAD.size + length > self.size
+        over = self._at + at + mcap.RECORD_HEAD.size + length > self.size
+        huge = over and (length > LARGEST or opcode >= mcap.PRIVATE_OP)
         unknown = opcode == 0 or mcap.DATA_END_OP < opcode < mcap.PRIVATE_OP
         return bool(unknown or huge or (opcode == mcap.MESSAGE_OP and length < 22))
 
