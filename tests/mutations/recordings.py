@@ -17,6 +17,7 @@ from kbs_process.recordings.mcap.messages.encoding import OutStream
 from kbs_process.recordings.mcap.source import open_recording
 from kbs_process.recordings.mcap.streams import Stream
 from kbs_process.reduction.inspection import inspect_recording
+from kbs_process.signals.records import Loss
 from mutations.subject import Subject, Tell, damaged
 from recordings.mcap.mcap_files import FORCE, rewrite
 from recordings.mcap.message_encodings import Encoding, write_encoded
@@ -60,7 +61,7 @@ def sound() -> list[OutStream]:
     ]
 
 
-def _rows() -> set[tuple[str, int, tuple[float, ...]]]:
+def sound_rows() -> set[tuple[str, int, tuple[float, ...]]]:
     return {
         (one.key, int(stamp), tuple(values))
         for one, stream in zip(_STREAMS, sound(), strict=True)
@@ -132,11 +133,9 @@ def _judge(*, by_schema: bool = False) -> Callable[[Path, Tell], None]:
     def judge(folder: Path, tell: Tell) -> None:
         path = folder / FILE
         inspection = inspect_recording(path)
-        source, every = open_recording(path), Rows()
-        for key, block in source.read(_STREAMS):
-            every += [(key, int(s), tuple(v)) for s, v in zip(block.stamp, block.values.tolist(), strict=True)]
-        base = _rows()
-        lossy = bool(source.losses) or inspection.state != "clean"
+        every, losses = rows_of(path)
+        base = sound_rows()
+        lossy = bool(losses) or inspection.state != "clean"
         # A number that is none says nothing false, where the loss is told.
         got = [row for row in every if not (lossy and np.isnan(row[2]).any())]
         if len(got) == len(base) and set(got) == base:
@@ -153,6 +152,14 @@ def _judge(*, by_schema: bool = False) -> Callable[[Path, Tell], None]:
             tell("reported")
 
     return judge
+
+
+def rows_of(path: Path) -> tuple[Rows, list[Loss]]:
+    """Return what a recording holds, and what is lost of it."""
+    source, every = open_recording(path), Rows()
+    for key, block in source.read(_STREAMS):
+        every += [(key, int(s), tuple(v)) for s, v in zip(block.stamp, block.values.tolist(), strict=True)]
+    return every, list(source.losses)
 
 
 def _others(path: Path) -> Iterator[tuple[str, int, tuple[float, ...]]]:

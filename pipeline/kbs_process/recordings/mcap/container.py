@@ -7,6 +7,7 @@ resumes at the next chunk (or message outside a chunk) that is consistent in its
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Generator, Iterator
 from dataclasses import dataclass
@@ -26,6 +27,7 @@ from kbs_process.signals.records import TRUNCATED, Loss
 WINDOW = 1 << 20  # bytes read at a time: they stay in the processor's cache until used
 CANDIDATE = re.compile(rb"(?=([\x05\x06]).{5}\x00\x00\x00)", re.DOTALL)  # a chunk or message below 2^40 bytes
 MOST_ENTRIES = 1 << 17  # schemas and channels that one chunk may hold: all numbers there are
+_APPLICATIONS = 8  # records of applications in a row, of which the last shows that the first is one
 OPCODE, CHANNEL, LOG, AT, SIZE = range(5)  # rows of the table that `walk` returns
 
 
@@ -94,15 +96,20 @@ class Container:
             while (stop := self._fill(file)) > 0:
                 end, table = self._walk(self._buffer, stop, chunk=False)
                 ends = np.flatnonzero((table[OPCODE] == mcap.DATA_END_OP) & (table[SIZE] >= 4))
-                sure = len(ends) > 0 or not self._breaks(self._buffer[end:stop][: mcap.RECORD_HEAD.size].tobytes(), end)
-                yield from self._window(table[:, : ends[0]] if len(ends) else table, sure=sure)
+                broken = not len(ends) and self._breaks(file, self._at + end)
+                pushed = _last_of_applications(table) if broken else 0
+                if pushed:  # what an application seems to have written leads to no record: no more is it one
+                    end, table = int(table[AT, -pushed]) - mcap.RECORD_HEAD.size, table[:, :-pushed]
+                yield from self._window(table[:, : ends[0]] if len(ends) else table, sure=not broken)
                 if len(ends):
                     self._check_data_section(int(table[AT, ends[0]]))
                     return
-                if end == 0:
-                    self._oversized(file, stop)
-                else:
+                if end or pushed:
                     self._carry(end, stop)
+                else:
+                    self._oversized(file, stop)
+                if pushed:
+                    self._resume(file, self._head(stop - end))
         self._truncated(self._at, b"")
 
     @staticmethod
@@ -129,16 +136,20 @@ class Container:
         view[: self._left] = view[end:stop]  # unlike numpy's arrays, moved without a copy where they overlap
         self._at += end
 
+    def _head(self, stop: int) -> bytes:
+        """The beginning of the first record in the window, of so many bytes."""
+        return self._buffer[: min(stop, mcap.CHUNK_HEAD_MAX + mcap.RECORD_HEAD.size)].tobytes()
+
     def _oversized(self, file: BinaryIO, stop: int) -> None:
         """Deal with a first record that does not fit the window: too long, cut off, or none at all."""
-        head = self._buffer[: min(stop, mcap.CHUNK_HEAD_MAX + mcap.RECORD_HEAD.size)].tobytes()
+        head = self._head(stop)
         if stop < mcap.RECORD_HEAD.size:
             self._truncated(self._at, head)
             self._seek(file, self.size)
             return
         opcode, length = mcap.RECORD_HEAD.unpack_from(head)
         end = self._at + mcap.RECORD_HEAD.size + length
-        if opcode == 0 or end > self.size or (opcode == mcap.MESSAGE_OP and length < 22):
+        if end > self.size or self._breaks(file, self._at):
             self._resume(file, head)
         elif stop == len(self._buffer) and length <= LARGEST:
             self._buffer = np.zeros(mcap.RECORD_HEAD.size + length, dtype=np.uint8)
@@ -149,18 +160,25 @@ class Container:
         else:
             self._pass_over(file, opcode, length)
 
-    def _breaks(self, head: bytes, at: int) -> bool:
-        """Whether a head, so many bytes on, is of no record; one that is cut off, or not whole, may be.
+    def _breaks(self, file: BinaryIO, at: int) -> bool:
+        """Whether no record is at a byte of the file; one that is cut off, or not whole, may be.
 
-        An application's record that the file has no room for is none: it is what a byte too many has pushed there.
+        An application's record is one if another follows it, or the file ends there: a byte too many before it pushes
+        a number's last byte to the place of an opcode, where it may look like an application's.
         """
-        if len(head) < mcap.RECORD_HEAD.size:
-            return False
-        opcode, length = mcap.RECORD_HEAD.unpack_from(head)
-        over = self._at + at + mcap.RECORD_HEAD.size + length > self.size
-        huge = over and (length > LARGEST or opcode >= mcap.PRIVATE_OP)
-        unknown = opcode == 0 or mcap.DATA_END_OP < opcode < mcap.PRIVATE_OP
-        return bool(unknown or huge or (opcode == mcap.MESSAGE_OP and length < 22))
+        for _ in range(_APPLICATIONS):
+            head = os.pread(file.fileno(), mcap.RECORD_HEAD.size, at)
+            if len(head) < mcap.RECORD_HEAD.size:
+                return False
+            opcode, length = mcap.RECORD_HEAD.unpack(head)
+            at += mcap.RECORD_HEAD.size + length
+            if opcode < mcap.PRIVATE_OP:
+                unknown = opcode == 0 or opcode > mcap.DATA_END_OP
+                huge = length > LARGEST and at > self.size
+                return bool(unknown or huge or (opcode == mcap.MESSAGE_OP and length < 22))
+            if at > self.size:
+                return True
+        return False
 
     def _pass_over(self, file: BinaryIO, opcode: int, length: int) -> None:
         """Check an attachment that is too large for memory; anything else of that size is lost."""
@@ -349,3 +367,9 @@ class Container:
         if len(head) >= mcap.RECORD_HEAD.size + mcap.CHUNK_HEAD.size and head[0] == mcap.CHUNK_OP:
             end = mcap.CHUNK_HEAD.unpack_from(head, mcap.RECORD_HEAD.size)[1]
         self.lose(TRUNCATED, f"{self.size - at} bytes unread; the file was not closed", start=self._last, end=end)
+
+
+def _last_of_applications(table: Words) -> int:
+    """How many of the last records are applications' own."""
+    others = np.flatnonzero(table[OPCODE] < mcap.PRIVATE_OP)
+    return int(table.shape[1] - 1 - others[-1]) if len(others) else table.shape[1]
