@@ -16,13 +16,13 @@ from kbs_process.plant.rigid import inverse_dynamics, joint_efforts, kinematics,
 from kbs_process.progress import SilentProgress
 from kbs_process.studies.diagnose.reading import experiment_of
 from proof.rivals.smoother.balance import FIRST_JOINT, FLOOR, PLATE, STILL, needed
+from proof.rivals.smoother.basis import Basis
 from proof.rivals.smoother.fit import Quadratic, State, step
 from proof.rivals.smoother.intensities import powers
 from proof.rivals.smoother.lines import orders_in, tones_in
 from proof.rivals.smoother.problem import Problem
 from proof.rivals.smoother.screen import evidence
 from proof.rivals.smoother.solve import settled
-from proof.rivals.smoother.splines import Splines
 
 CAMPAIGN = Path(__file__).parents[2] / "campaigns" / "EL089"
 NULL = Path(__file__).with_name("small") / "T00000000A1.tar"
@@ -31,8 +31,8 @@ NULL = Path(__file__).with_name("small") / "T00000000A1.tar"
 def test_splines_give_values_rates_and_accelerations() -> None:
     dt, n = 0.05, 200
     t = dt * np.arange(n)
-    splines = Splines(n, dt)
-    values, rates, accelerations = splines.motion(splines.fitted(np.stack([np.sin(t), t**2], axis=1)))
+    basis = Basis(n, dt)
+    values, rates, accelerations = basis.motion(basis.fitted(np.stack([np.sin(t), t**2], axis=1)))
     inside = slice(65, -65)
     for found, expected in (
         (values, [np.sin(t), t**2]),
@@ -45,10 +45,10 @@ def test_splines_give_values_rates_and_accelerations() -> None:
 def test_rates_and_accelerations_are_right_up_to_the_band_s_end() -> None:
     dt, n = 0.05, 600
     t, inside = dt * np.arange(n), slice(100, -100)
-    splines = Splines(n, dt)
+    basis = Basis(n, dt)
     for f in (0.5, 2.0, 5.0, 7.0, 8.0):
         w = 2.0 * np.pi * f
-        values, rates, accelerations = splines.motion(splines.fitted(np.sin(w * t)[:, None]))
+        values, rates, accelerations = basis.motion(basis.fitted(np.sin(w * t)[:, None]))
         assert values[inside, 0] == pytest.approx(np.sin(w * t)[inside], abs=1e-4)
         assert rates[inside, 0] == pytest.approx(w * np.cos(w * t)[inside], abs=0.007 * w)
         assert accelerations[inside, 0] == pytest.approx(-(w**2) * np.sin(w * t)[inside], abs=0.007 * w**2)

@@ -1,14 +1,14 @@
 """Smoothing with forces at ports: motion follows the recordings, and what the equations lack shows as a force there.
 
 A plant that is run from a recording's start has to have its phases right before anything fits; here nothing is run.
-The motion of floor, base and joints is sought as splines, beside the rig's numbers, such that readings agree to their
-noise and balances of forces to a force of known size (weak constraints, errors in equations). All is nearly
-quadratic: some steps of Gauss and Newton. What pulls a number is taken along the motion that the model has by itself,
-which holds no noise: along the smoothed one all that scales a balance would shrink. A left-out effect is then a column
-along that motion in the row of its port, and every effect of the catalogue at every port is scored by one
+The motion of floor, base and joints is sought by local coefficients, beside the rig's numbers, such that readings
+agree to their noise and balances of forces to a force of known size (weak constraints, errors in equations). All is
+nearly quadratic: some steps of Gauss and Newton. What pulls a number is taken along the motion that the model has by
+itself, which holds no noise: along the smoothed one all that scales a balance would shrink. A left-out effect is then
+a column along that motion in the row of its port, and every effect of the catalogue at every port is scored by one
 factorisation, beside all numbers.
 
-    splines.py    motion as splines
+    basis.py      motion by local coefficients
     balance.py    readings and forces that a motion needs, by inverse dynamics
     drive.py      what motor and gear give for a field
     problem.py    rows, unknowns, priors of a campaign

@@ -18,9 +18,9 @@ from kbs_process.plant.linear.linearise import linearise
 from kbs_process.stages.align.resample import resample
 from proof.rivals.case import Array
 from proof.rivals.smoother.balance import FIRST_JOINT, PLATE, Motion
+from proof.rivals.smoother.basis import in_band
 from proof.rivals.smoother.drive import spring
 from proof.rivals.smoother.problem import Problem
-from proof.rivals.smoother.splines import in_band
 
 _TAPS_HZ = 100.0
 _KNOT_S = 1.0  # between poses at which ports are worked out

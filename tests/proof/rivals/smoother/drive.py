@@ -16,7 +16,7 @@ from kbs_process.plant.schedule import Schedule, covering
 from kbs_process.rig.model import Drive, Rig
 from kbs_process.stages.align.resample import resample
 from proof.rivals.case import Array
-from proof.rivals.smoother.splines import in_band
+from proof.rivals.smoother.basis import in_band
 
 FINE = 1000.0  # Hz, at which torques along the field are taken
 _PARTS = 8  # of a fine step, over which whole microsteps are averaged

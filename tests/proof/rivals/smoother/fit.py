@@ -12,9 +12,9 @@ from scipy.linalg.lapack import dtrtri
 
 from proof.rivals.case import Array
 from proof.rivals.smoother.balance import Motion
+from proof.rivals.smoother.basis import LOCAL
 from proof.rivals.smoother.course import Course
 from proof.rivals.smoother.problem import Problem
-from proof.rivals.smoother.splines import LOCAL
 
 _FAR = 4.0  # prior sigmas that a step goes at most
 _RUNS = 2  # steps in which a motion follows unknowns that moved
@@ -56,7 +56,7 @@ class State:
 
     def motion(self, problem: Problem, k: int) -> Motion:
         """The motion of a recording."""
-        return problem.recordings[k].splines.motion(self.coefficients[k])
+        return problem.recordings[k].basis.motion(self.coefficients[k])
 
     def follow(self, problem: Problem) -> None:
         """Take the rotors' torques where the motion is now."""
@@ -89,7 +89,7 @@ class State:
 
     def ideal_motion(self, problem: Problem, k: int) -> Motion:
         """The motion that the model has by itself."""
-        return problem.recordings[k].splines.motion(self.ideal[k])
+        return problem.recordings[k].basis.motion(self.ideal[k])
 
     def course(self, problem: Problem, k: int) -> Course:
         """What effects do along that motion."""
@@ -136,7 +136,7 @@ class Banded:
 
     @classmethod
     def of(cls, by_motion: Array, bases: Array, root: Array) -> Banded:
-        """Of slopes (n, rows, freedoms, 3), values of splines (3, LOCAL) and square roots of weights (n, rows)."""
+        """Of slopes (n, rows, freedoms, 3), the basis (3, LOCAL) and square roots of weights (n, rows)."""
         (n, rows), freedoms = root.shape, by_motion.shape[2]
         local = np.matmul(bases.T, (by_motion * root[:, :, None, None]).swapaxes(2, 3))
         blocks, width = -(-n // LOCAL), LOCAL * freedoms
@@ -196,12 +196,12 @@ def _moved(
     problem: Problem, k: int, x: Array, coefficients: Array, torques: Array, weights: Array
 ) -> tuple[Array, Array]:
     """Coefficients after a step of Gauss and Newton in the motion alone, and the rotors' torques there."""
-    splines, root = problem.recordings[k].splines, np.sqrt(weights)
-    motion = splines.motion(coefficients)
-    banded = Banded.of(problem.by_motion(k, x, motion, torques), splines.values, root)
+    basis, root = problem.recordings[k].basis, np.sqrt(weights)
+    motion = basis.motion(coefficients)
+    banded = Banded.of(problem.by_motion(k, x, motion, torques), basis.values, root)
     left = problem.residual(k, x, motion, torques) * root
     coefficients = coefficients + banded.coefficients(banded.against(left.reshape(-1, 1))[:, :, 0])
-    return coefficients, _torques(problem, k, x, splines.motion(coefficients), torques)
+    return coefficients, _torques(problem, k, x, basis.motion(coefficients), torques)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -220,7 +220,7 @@ class Reduced:
         motion = state.motion(problem, k)
         root = np.sqrt(state.weights(problem, k))
         slopes = problem.by_motion(k, state.x, motion, state.torques[k])
-        banded = Banded.of(slopes, problem.recordings[k].splines.values, root)
+        banded = Banded.of(slopes, problem.recordings[k].basis.values, root)
         left = problem.residual(k, state.x, motion, state.torques[k])
         by_unknown = problem.by_unknown(k, state.x, state.ideal_motion(problem, k), state.ideal_torques[k])
         columns = np.concatenate([by_unknown, left[:, :, None]], axis=2) * root[:, :, None]

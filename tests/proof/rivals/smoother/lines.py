@@ -11,9 +11,9 @@ from scipy.ndimage import median_filter
 from kbs_process.plant.laws import CATALOGUE, SENSING
 from proof.rivals.case import Array
 from proof.rivals.smoother.balance import FIRST_JOINT
+from proof.rivals.smoother.basis import BAND_HZ
 from proof.rivals.smoother.fit import State
 from proof.rivals.smoother.problem import Problem
-from proof.rivals.smoother.splines import BAND_HZ
 
 _LINES = 3  # of each kind and joint
 _CELLS = 20  # of an angle to a turn of the highest order

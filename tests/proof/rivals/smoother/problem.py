@@ -29,8 +29,8 @@ from kbs_process.rig.model import Amplifier, Rig
 from kbs_process.stages.gravity.parameters import RigElements
 from proof.rivals.case import Array
 from proof.rivals.smoother.balance import FIRST_JOINT, FLOOR, PLATE, Loads, Motion, needed
+from proof.rivals.smoother.basis import BAND_HZ, Basis, in_band
 from proof.rivals.smoother.drive import WRITTEN, Field, priors, spring
-from proof.rivals.smoother.splines import BAND_HZ, Splines, in_band
 
 _ENDS = 1.0  # s left out at a recording's ends, and half of it beside gaps
 _LINES = 3  # first terms of a channel's zero: constant, slope, curvature
@@ -58,7 +58,7 @@ class Recording:
     weight: Array  # (n,) 1 where it counts, else 0
     turning: Array  # (n, joints) share of an angle's samples that are rounded apart: codes crossed in one of them
     field: Field
-    splines: Splines
+    basis: Basis
 
     @property
     def n(self) -> int:
@@ -220,7 +220,7 @@ class Problem:
             for j, drive in enumerate(drives):
                 wound = efforts[:, 3 + j] / float(drive.parameters["Ka"])
                 x[:, FIRST_JOINT + j] = recording.field.angle[:, j] / float(drive.ratio) - wound
-        return recording.splines.fitted(x)
+        return recording.basis.fitted(x)
 
     def behind(self, k: int, x: Array, motion: Motion, torques: Array | None) -> Array:
         """How far each rotor (n, joints) is behind its field, motor rad."""
@@ -378,7 +378,7 @@ def _recording(experiment: Experiment, k: int) -> Recording:
     steps = np.array([float(j.encoder.step) for j in experiment.rig.joints if j.encoder is not None])
     ratios = np.array([float(j.drive.ratio) for j in experiment.rig.joints if j.drive is not None])
     turning = np.clip(np.abs(field.rate) / ratios / steps / (2 * BAND_HZ), 0.0, 1.0)
-    return Recording(k, first, dt, reading, weight, turning, field, Splines(n, dt))
+    return Recording(k, first, dt, reading, weight, turning, field, Basis(n, dt))
 
 
 def _undone(wrench: Array, amplifier: Amplifier | None, dt: float) -> Array:

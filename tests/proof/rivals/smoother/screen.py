@@ -14,11 +14,11 @@ from kbs_process.plant.compiled.taps import tap_columns
 from kbs_process.plant.effect import Parameter
 from proof.answer import Estimate
 from proof.rivals.case import Array
+from proof.rivals.smoother.basis import BAND_HZ
 from proof.rivals.smoother.course import Course
 from proof.rivals.smoother.fit import Quadratic, State
 from proof.rivals.smoother.lines import proposed
 from proof.rivals.smoother.problem import Problem
-from proof.rivals.smoother.splines import BAND_HZ
 
 _BATCH = 200  # columns at once
 _DEPENDENT = 1e-5  # of a column that all numbers leave

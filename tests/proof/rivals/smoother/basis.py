@@ -36,7 +36,7 @@ def in_band(values: Array, dt: float, undo: Callable[[Array], Array] | None = No
     return np.asarray(np.fft.irfft(spectrum * factors.reshape(-1, *rest), 2 * n, axis=0)[:n] + line)
 
 
-class Splines:
+class Basis:
     """The basis on n samples dt apart; coefficients are (size, freedoms)."""
 
     def __init__(self, n: int, dt: float) -> None:
