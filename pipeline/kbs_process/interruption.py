@@ -1,7 +1,8 @@
 """An interrupt that is not lost.
 
-Python raises KeyboardInterrupt wherever it happens to be, and in a callback of foreign code, as a compiler's while it
-loads machine code, nobody passes it on. So it is remembered, and raised again at the next check.
+Python raises KeyboardInterrupt wherever it happens to be. In a callback of foreign code, as a compiler's while it loads
+machine code, nobody passes it on, and the foreign code goes on with half an answer. So an interrupt is remembered, and
+raised at the next check; at once, too, outside the compiler.
 """
 
 from __future__ import annotations
@@ -11,6 +12,9 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
+
+COMPILER = "llvmlite"
+"""The package whose callbacks have to end."""
 
 _asked = threading.Event()
 
@@ -37,4 +41,8 @@ def check() -> None:
 
 def _remember(number: int, frame: FrameType | None) -> None:
     _asked.set()
+    while frame is not None:
+        if frame.f_globals.get("__name__", "").partition(".")[0] == COMPILER:
+            return
+        frame = frame.f_back
     raise KeyboardInterrupt

@@ -17,6 +17,8 @@ from numba.core import dispatcher
 from numba.core.caching import CompileResultCacheImpl, FunctionCache
 from numba.core.serialize import dumps
 
+from kbs_process import interruption
+
 __all__ = ["njit"]
 
 
@@ -43,6 +45,7 @@ class _RenewedCache(FunctionCache):
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return what is kept for a signature, or None: then it is compiled, and kept."""
+        interruption.check()
         try:
             return super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
         except Exception:  # noqa: BLE001 - unpickling damaged bytes raises anything at all
