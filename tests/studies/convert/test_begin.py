@@ -283,6 +283,18 @@ def test_files_of_which_none_is_known_are_all_questions(tmp_path: Path) -> None:
     assert mapping["time"] == {"rate_Hz": "?"}
 
 
+def test_the_sections_of_a_log_are_recordings_each(tmp_path: Path) -> None:
+    rows = "".join(f"{0.1 * k:.1f},{k},{k * k % 7}\n" for k in range(9))
+    (tmp_path / "log.txt").write_text(
+        "Log 2.5\n" + 2 * f"Begins at 9\nt [s],Fz [N],az [deg]\nINFO: settling\n{rows}\nEnds\n"
+    )
+    lines = list(begin(tmp_path / "made", [tmp_path / "log.txt"]))
+    assert "section1: log.txt, section 1" in lines and "section2: log.txt, section 2" in lines
+    mapping = tree(tmp_path / "made" / "mapping.toml")
+    assert mapping["text"] == {"skip_rows": 2} and mapping["encoder"]["az"]["unit"] == "deg"
+    assert [one["section"] for one in mapping["recording"]] == [1, 2]
+
+
 def test_what_is_no_table_is_told(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("a letter\nand its end\n")
     with pytest.raises(RecordingError):

@@ -213,6 +213,19 @@ def test_parts_of_one_file_share_no_sample(tmp_path: Path) -> None:
     np.testing.assert_array_equal(np.concatenate([part[:, 0] for part in parts]), columns["Fx"])
 
 
+def test_sections_of_a_log_become_recordings(tmp_path: Path) -> None:
+    runs = [signals(300, seed) for seed in (1, 2)]
+    for number, columns in enumerate(runs):
+        write_csv(tmp_path / f"{number}.csv", columns)
+    (tmp_path / "run.csv").write_text("".join((tmp_path / f"{number}.csv").read_text() for number in range(2)))
+    one = MAPPING[MAPPING.index("[[recording]]") :]
+    sections = [one + f"section = {number}\n" for number in (1, 2)]
+    text = MAPPING.replace(one, sections[0] + sections[1].replace("repeat = 1", "repeat = 2"))
+    campaign = import_recordings(write_mapping(tmp_path, "run.csv", text), tmp_path, tmp_path / "made")
+    for number, columns in enumerate(runs, start=1):
+        np.testing.assert_array_equal(read_back(campaign, f"turn_{number}")["encoder"][1][:, 0], columns["angle"])
+
+
 def test_campaign_keeps_the_template_and_says_where_it_comes_from(tmp_path: Path) -> None:
     write_csv(tmp_path / "run.csv", signals(50))
     mapping = MAPPING + '\n[source]\norigin = "a \\"quoted\\" bench"\n'

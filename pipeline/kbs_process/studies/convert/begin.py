@@ -12,12 +12,14 @@ from typing import Any
 import msgspec
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
+from msgspec.structs import replace
 
 from kbs_process.campaign.documents import QUESTION, quoted, read, shown
 from kbs_process.campaign.units import dimension, to_si
 from kbs_process.campaign.writing.parameter_files import value_text
 from kbs_process.errors import ConfigError, KbsError, RecordingError
-from kbs_process.recordings.formats import Text
+from kbs_process.recordings.formats import Text, format_named
+from kbs_process.recordings.formats.text import TextTable
 from kbs_process.recordings.open_table import open_table
 from kbs_process.recordings.tables import Table
 from kbs_process.results.store import writing
@@ -45,6 +47,7 @@ class Log:
     path: Path
     text: Text
     columns: list[Meaning]
+    section: int | None = None  # of a text that has several
     dated: bool = False
     times: list[Array] = field(default_factory=list)
     values: dict[str, list[Array]] = field(default_factory=dict)  # by column, as the file has them, averaged with times
@@ -67,6 +70,11 @@ class Log:
         return t[good], values[good]
 
     @property
+    def name(self) -> str:
+        """The file, and which section of it."""
+        return self.path.name if self.section is None else f"{self.path.stem}_section{self.section}{self.path.suffix}"
+
+    @property
     def kind(self) -> tuple[object, ...]:
         """What files of one logger share."""
         return self.path.suffix, self.text, tuple(self.columns)
@@ -78,7 +86,7 @@ def begin(target: Path, files: Sequence[Path]) -> Iterator[str]:
     Raises RecordingError where a file cannot be read, ConfigError where files do not belong together, OutputError where
     the folder holds something already.
     """
-    logs = [_read(path) for path in dict.fromkeys(files)]
+    logs = [log for path in dict.fromkeys(files) for log in _logs(path)]
     loads = [log for log in logs if log.of("wrench")] or logs
     angles = [log for log in logs if log.of("encoder")] or loads
     for group, what in ((loads, "wrench"), (angles, "angles")):
@@ -103,7 +111,8 @@ def begin(target: Path, files: Sequence[Path]) -> Iterator[str]:
     for log in (loads[0], *angles[:1]) if angles[0] is not loads[0] else loads[:1]:
         yield from _listing(log)
     for run in facts["runs"]:
-        yield f"{run['name']}: {run['source']}" + (f", {run['other']}; {run['told']}" if run["other"] else "")
+        part = f", section {run['section']}" if run["section"] else ""
+        yield f"{run['name']}: {run['source']}{part}" + (f", {run['other']}; {run['told']}" if run["other"] else "")
     used = {run[key] for run in facts["runs"] for key in ("source", "other")}
     yield from (f"not used: {log.path.name}" for log in logs if log.path.name not in used)
 
@@ -126,9 +135,16 @@ def check_description(folder: Path) -> Iterator[str]:
     yield f"  -> {command}; FOLDER holds the recordings"
 
 
-def _read(path: Path) -> Log:
+def _logs(path: Path) -> Iterator[Log]:
+    """Yield the logs of a file: one, or one a section."""
     table, text = _opened(path)
-    log = Log(path, text, [meaning(column) for column in table.columns])
+    count = table.sections() if isinstance(table, TextTable) else 1
+    for section in range(1, count + 1) if count > 1 else (None,):
+        part = open_table(path, None, replace(text, section=section)) if section else table
+        yield _read(part, Log(path, text, [meaning(column) for column in part.columns], section))
+
+
+def _read(table: Table, log: Log) -> Log:
     clock = next((one for one in table.columns if one.clock), None)
     stamp = log.of("time")[:1]
     log.dated, log.left_out = clock is not None, table.left_out
@@ -158,8 +174,11 @@ def _read(path: Path) -> Log:
 def _opened(path: Path) -> tuple[Table, Text]:
     """Open a file; of a text, look for where its table begins, for a line of units, and for its decimal mark."""
     failed: RecordingError | None = None
-    for encoding, skip, units, decimal in product(_ENCODINGS, range(_PREAMBLE), (False, True), (".", ",")):
-        text = Text(skip_rows=skip, units_row=units, decimal=decimal, encoding=encoding)  # type: ignore[arg-type]
+    ways = (
+        Text(skip_rows=skip, units_row=units, decimal=decimal, encoding=encoding)  # type: ignore[arg-type]
+        for encoding, skip, units, decimal in product(_ENCODINGS, range(_PREAMBLE), (False, True), (".", ","))
+    )
+    for text in ways if path.suffix.lower() in format_named("text").suffixes else [Text()]:
         try:
             table = open_table(path, None, text)
             first = next(iter(table.chunks([column.name for column in table.columns])))
@@ -169,8 +188,6 @@ def _opened(path: Path) -> tuple[Table, Text]:
         good = sum(one.dtype.kind == "M" or bool(np.isfinite(numbers(one)[:100]).mean() > 0.5) for one in first)
         if len(first) > 1 and good >= 0.5 * len(first):
             return table, text
-        if table.path.suffix.lower() not in (".csv", ".tsv", ".txt", ".dat", ".asc"):
-            break
     raise failed or RecordingError(
         "no table of numbers is found", where=str(path), remedy="see `kbs-process import --describe`"
     )
@@ -266,11 +283,9 @@ def _text(log: Log) -> list[str]:
     return [f"{key} = {value_text(value)}" for key, value in given.items() if value != usual[key]]
 
 
-def _runs(loads: Sequence[Log], angles: Sequence[Log]) -> list[dict[str, str]]:
+def _runs(loads: Sequence[Log], angles: Sequence[Log]) -> list[dict[str, Any]]:
     """Return the recordings: a file each, or a pair of files of two loggers whose names differ in one part alone."""
-    named, others = (
-        dict(zip(runs_of([log.path.name for log in group]), group, strict=True)) for group in (loads, angles)
-    )
+    named, others = (dict(zip(runs_of([log.name for log in group]), group, strict=True)) for group in (loads, angles))
     if len(loads) == len(angles) == 1:
         others = dict(zip(named, angles, strict=True))
     runs = []
@@ -278,7 +293,9 @@ def _runs(loads: Sequence[Log], angles: Sequence[Log]) -> list[dict[str, str]]:
         other = others.get(name)
         shift, told = _shift(log, other) if other else ("", "no file of angles has such a name" if angles else "")
         file = other.path.name if other else QUESTION if angles else ""
-        runs.append({"name": name, "source": log.path.name, "other": file, "shift": shift, "told": told})
+        section = log.section or ""
+        run = {"name": name, "source": log.path.name, "section": section, "other": file, "shift": shift, "told": told}
+        runs.append(run)
     return runs
 
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping as MappingOf
 from pathlib import Path
 
 import numpy as np
+from msgspec.structs import replace
 
 from kbs_process.campaign.config import Campaign, Topic
 from kbs_process.campaign.documents import read, shown
@@ -122,11 +123,11 @@ def _convert_part(
 ) -> tuple[str, ...]:
     """Write one recording; return what was found wrong with its source."""
     opened: dict[tuple[str, Text], Table] = {}
+    texts = {key: replace(text, section=part.section) for key, text in mapping.texts.items()}
     for key, name in ((stream.key, part.file_of(stream.key)) for stream in mapping.streams):
-        text = mapping.texts[key]
-        if (name, text) not in opened:
-            opened[name, text] = open_table(files[name], mapping.format, text)
-    tables = {stream.key: opened[part.file_of(stream.key), mapping.texts[stream.key]] for stream in mapping.streams}
+        if (name, texts[key]) not in opened:
+            opened[name, texts[key]] = open_table(files[name], mapping.format, texts[key])
+    tables = {stream.key: opened[part.file_of(stream.key), texts[stream.key]] for stream in mapping.streams}
     findings = Findings()
     topics = {"encoder" if topic.key == "angle" else topic.key: topic for topic in campaign.topics.present()}
     pieces = (

@@ -141,8 +141,9 @@ def _check_order(arrival: Arrival, table: Table, stream: StreamMap) -> None:
         f"time of '{stream.key}' goes back by {by * 1e-9:.6g} s at sample {number + 1}, and goes on from there: "
         + (near[0] if near else "the clock was set back, or the logger started again"),
         where=str(table.path),
-        remedy="split the file there (of a text file, skip_rows and rows in the mapping's [text] take one part), and "
-        "import each part as a recording of its own; or give rate_Hz",
+        remedy="split the file there (of a text file, skip_rows and rows in the mapping's [text] take one part, and "
+        "section in [[recording]] one where the names come again), and import each part as a recording of its own; or "
+        "give rate_Hz",
     )
 
 
