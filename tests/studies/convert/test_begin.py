@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from scipy.io import savemat
+from scipy.spatial.transform import Rotation
 
 from kbs_process.campaign.documents import read
 from kbs_process.campaign.load import load_campaign
@@ -25,6 +26,7 @@ from kbs_process.studies.convert.run import _check_same, import_recordings
 from kbs_process.studies.convert.shift import find_shift
 from studies.convert.importer_files import write_hdf5, write_matlab, write_mdf, write_parquet
 
+LOADS = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
 LATE = 3.724  # s: the clock of the wrench began so much later
 
 
@@ -55,6 +57,17 @@ LATE = 3.724  # s: the clock of the wrench began so much later
         ("data.az_deg", "", "encoder", "az", "deg"),
         ("Fz/N", "", "wrench", "Fz", "N"),
         ("wheel_rad/s", "", "", "", "rad/s"),
+        ("Joint_state.positions[2]", "", "encoder", "joint2", "?"),
+        ("Joint_state.torques[2]", "", "", "", "?"),
+        ("/joints.position[arm]", "rad", "encoder", "arm", "rad"),
+        ("/joints.velocity[arm]", "", "", "", "?"),
+        ("/command.position[arm]", "", "", "", "?"),
+        ("/ft.wrench.torque.y", "N m", "wrench", "Ty", "N m"),
+        ("/imu.orientation.w", "", "orientation", "w", "?"),
+        ("q_x", "", "orientation", "x", "?"),
+        ("R12", "", "orientation", "12", "?"),
+        ("quat[3]", "", "orientation", "3", "?"),
+        ("q1 [deg]", "", "encoder", "q1", "deg"),
     ],
 )
 def test_what_a_name_tells(name: str, stated: str, stream: str, channel: str, unit: str) -> None:
@@ -263,6 +276,33 @@ def test_every_format_begins_a_campaign(tmp_path: Path, name: str, write: Callab
     units = {one["unit"] for one in [*mapping["wrench"].values(), *mapping["encoder"].values()]}
     assert units == ({"N", "rad"} if known else {"?"})
     assert "shift_s" not in mapping["recording"][0]
+
+
+@pytest.mark.parametrize("names", ["qw qx qy qz", "q0 q1 q2 q3", "R11 R12 R13 R21 R22 R23 R31 R32 R33"])
+@pytest.mark.slow
+def test_an_orientation_begins_a_campaign_with_a_clock_of_its_own(tmp_path: Path, names: str) -> None:
+    t = np.arange(0.0, 44.0, 0.01)
+    load = pd.DataFrame(wrench_of(motion(t + LATE)), columns=[f"{c} [{'N' if c[0] == 'F' else 'Nm'}]" for c in LOADS])
+    load.insert(0, "t [s]", t)
+    t = np.arange(0.0, 48.0, 0.02)
+    R = Rotation.from_rotvec(motion(t)[:, None] * [0.0, -1.0, 0.0])
+    sign = np.where(np.arange(len(t)) % 700 < 350, 1.0, -1.0)[:, None]
+    numbers = R.as_matrix().reshape(-1, 9) if "R11" in names else sign * R.as_quat(scalar_first=True)
+    turned = pd.DataFrame(np.column_stack([t, numbers]), columns=["t [s]", *names.split()])
+    files = [tmp_path / "wrench.csv", tmp_path / "imu.csv"]
+    for file, table in zip(files, (load, turned), strict=True):
+        table.to_csv(file, index=False)
+    list(begin(tmp_path / "made", files))
+    mapping = tree(tmp_path / "made" / "mapping.toml")
+    (one,) = mapping["orientation"]
+    assert one["joints"] == list(tree(tmp_path / "made" / "rig.toml")["joint"]) == ["joint"] and one["maps"] == "?"
+    if "R11" in names:
+        assert one["matrix"][1] == ["R21", "R22", "R23"]
+    else:
+        known = dict(zip("wxyz", names.split(), strict=True)) if "qw" in names else dict.fromkeys("wxyz", "?")
+        assert one["quaternion"] == known
+    shift = mapping["recording"][0]["shift_s"]["wrench"]  # found where the numbers are known
+    assert shift == ("?" if "q0" in names else pytest.approx(LATE, abs=0.005))
 
 
 def test_an_angle_that_begins_again_is_unwrapped_and_what_has_no_column_is_told(tmp_path: Path) -> None:

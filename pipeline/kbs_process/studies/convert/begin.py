@@ -28,7 +28,8 @@ from kbs_process.studies.convert.clock import nanoseconds, numbers
 from kbs_process.studies.convert.description import prepare
 from kbs_process.studies.convert.mapping import load_mapping
 from kbs_process.studies.convert.mapping_file import Time
-from kbs_process.studies.convert.naming import Meaning, by_channel, meaning, runs_of
+from kbs_process.studies.convert.naming import Meaning, by_channel, meaning, rotation, runs_of
+from kbs_process.studies.convert.orientation import elements, written
 from kbs_process.studies.convert.shift import find_shift
 
 MAPPING_FILE = "mapping.toml"
@@ -61,11 +62,17 @@ class Log:
         """Return the columns of a stream."""
         return [one for one in self.columns if one.stream == stream]
 
+    @property
+    def motion(self) -> str:
+        """The stream that tells how joints move."""
+        return "encoder" if self.of("encoder") or not rotation(self.of("orientation")) else "orientation"
+
     def samples(self, stream: str) -> tuple[Array, Array]:
         """Return times (n,), s, and the columns of a stream (n, c), in SI where the unit is known, without gaps."""
         t = np.concatenate(self.times)
         columns = [np.concatenate(self.values[one.column]) * (to_si(one.unit) or 1.0) for one in self.of(stream)]
         values = np.stack(columns, axis=1)
+        values = elements(values) if stream == "orientation" else values
         good = np.isfinite(t) & np.isfinite(values).all(axis=1)
         return t[good], values[good]
 
@@ -88,7 +95,7 @@ def begin(target: Path, files: Sequence[Path]) -> Iterator[str]:
     """
     logs = [log for path in dict.fromkeys(files) for log in _logs(path)]
     loads = [log for log in logs if log.of("wrench")] or logs
-    angles = [log for log in logs if log.of("encoder")] or loads
+    angles = [log for log in logs if log.of(log.motion)] or loads
     for group, what in ((loads, "wrench"), (angles, "angles")):
         if odd := next((log for log in group if log.kind != group[0].kind), None):
             raise ConfigError(
@@ -148,7 +155,7 @@ def _read(table: Table, log: Log) -> Log:
     clock = next((one for one in table.columns if one.clock), None)
     stamp = log.of("time")[:1]
     log.dated, log.left_out = clock is not None, table.left_out
-    used = [one.column for one in log.columns if one.stream in ("wrench", "encoder")]
+    used = [one.column for one in log.columns if one.stream in ("wrench", log.motion)]
     wanted = list(dict.fromkeys([*used, *((clock.clock,) if clock else ()), *(one.column for one in stamp)]))
     for index, cells in enumerate(table.chunks(wanted)):
         named = dict(zip(wanted, cells, strict=True))
@@ -230,7 +237,7 @@ def _facts(loads: Sequence[Log], angles: Sequence[Log]) -> dict[str, Any]:
     joints = by_channel(angle.of("encoder")) or {"joint": Meaning(QUESTION, "encoder", "joint")}
     known = all(wrench[channel].unit != QUESTION for channel in channels)
     slowest = min(load.rate, angle.rate)
-    streams = {"wrench": [wrench[c] for c in channels], "encoder": [*joints.values()]}
+    streams = {"wrench": [wrench[c] for c in channels], angle.motion: [*joints.values()]}
     logs = {"": load, ".encoder": angle} if load is not angle else {"": load}
     return {
         "rate": max((rate for rate in _RATES if rate <= slowest / 2.0), default=None) if slowest else None,
@@ -260,6 +267,8 @@ def _facts(loads: Sequence[Log], angles: Sequence[Log]) -> dict[str, Any]:
             ]
             for key, rows in streams.items()
         },
+        "orientation": written([quoted(column) for column in rotation(angle.of("orientation"))]),
+        "numbered": ", ".join(one.column for one in angle.of("orientation")),
         "runs": _runs(loads, angles if load is not angle else ()),
     }
 
@@ -303,10 +312,12 @@ def _shift(load: Log, angle: Log) -> tuple[str, str]:
     """Return the keys that say how two clocks stand to each other, and the same in words."""
     if load.dated and angle.dated:
         return "# both files have dates: their clocks are taken to agree", "both have dates"
-    joints = angle.of("encoder")
+    turned = angle.motion == "orientation"
+    joints = [] if turned else angle.of("encoder")
+    asked_of = rotation(angle.of("orientation")) if turned else [one.unit for one in joints]
     found, asked = None, "motion and times do not tell it"
-    if load.times and angle.times and all(one.unit != QUESTION for one in joints):
-        (t, wrench), (t_angle, q) = load.samples("wrench"), angle.samples("encoder")
+    if load.times and angle.times and QUESTION not in asked_of:
+        (t, wrench), (t_angle, q) = load.samples("wrench"), angle.samples(angle.motion)
         turns = [dimension(one.unit) == "angle" for one in joints]
         found = find_shift(t, wrench, t_angle, q, turns)
         halves = []

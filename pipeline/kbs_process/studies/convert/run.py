@@ -26,6 +26,7 @@ from kbs_process.signals.records import Array, Block
 from kbs_process.studies.convert.description import Origin, prepare, recording_file, write_campaign
 from kbs_process.studies.convert.mapping import WRENCH_FIELDS, Mapping, StreamMap, find_mapping, load_mapping
 from kbs_process.studies.convert.mapping_file import Part
+from kbs_process.studies.convert.orientation import Attitude
 from kbs_process.studies.convert.streams import Findings, read_part
 
 LATEST_NS = (1 << 31) * 1_000_000_000  # the seconds of a ROS 2 time stamp are a signed 32-bit number
@@ -130,9 +131,11 @@ def _convert_part(
     tables = {stream.key: opened[part.file_of(stream.key), texts[stream.key]] for stream in mapping.streams}
     findings = Findings()
     topics = {"encoder" if topic.key == "angle" else topic.key: topic for topic in campaign.topics.present()}
+    orientations = (one for stream in mapping.streams for one in stream.orientations)
+    attitudes = [Attitude(one, campaign.rig, shown(mapping.path)) for one in orientations]
     pieces = (
         _out_stream(stream, block, topics[stream.key], tables[stream.key].path)
-        for stream, block in read_part(tables, mapping, part, findings)
+        for stream, block in read_part(tables, mapping, part, findings, attitudes)
     )
     write_pieces(folder / recording_file(part.stem), pieces)
     return findings.lines()
@@ -151,7 +154,7 @@ def _out_stream(stream: StreamMap, block: Block, topic: Topic, path: Path) -> Ou
             remedy="check column and unit in [time]; where times begin below zero, give the date of time "
             "zero, such as start = 2026-01-31T12:00:00Z",
         )
-    columns = {channel.field: block.values[:, i] for i, channel in enumerate(stream.channels)}
+    columns = dict(zip(stream.units, block.values.T, strict=True))
     match stream.key:
         case "wrench":
             values = _columns(columns, list(WRENCH_FIELDS.values()), len(block))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import chain
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -24,9 +25,10 @@ def find_shift(
     """Return what is to be added to the times t (n,) of a wrench (n, c), and its sigma, s; None if that is not clear.
 
     The static wrench is a function of the angles (m, j): of their sines and cosines where a joint `turns`, else of the
-    way, and of these in pairs. At the right shift least of the wrench is left beside it. The search covers all shifts
-    at which half of the shorter recording has a partner. Valid where motion does not repeat itself within these.
-    Angles that leap there and back for less than a tenth of the rows are left out. None where times go back, or leap by
+    way, and of these in pairs; without `turns`, of the numbers themselves (elements of a rotation matrix). At the
+    right shift least of the wrench is left beside it. The search covers all shifts at which half of the shorter
+    recording has a partner. Valid where motion does not repeat itself within these. Angles that leap there and back for
+    less than a tenth of the rows are left out. None where times go back, or leap by
     as much as they take otherwise.
     """
     if min(len(t), len(t_angle)) < _FEWEST:
@@ -48,10 +50,11 @@ def find_shift(
         q = np.stack([np.interp(at[inside], t_angle, one) for one in angle.T])
         parts = [
             one
-            for joint, turn in zip(q, turns, strict=True)
+            for joint, turn in zip(q, turns, strict=bool(turns))
             for one in ((np.sin(joint), np.cos(joint)) if turn else (joint,))
         ]
-        terms = [np.ones(inside.sum()), *parts, *(a * b for i, a in enumerate(parts) for b in parts[:i])]
+        pairs = (a * b for i, a in enumerate(parts) for b in parts[:i])
+        terms = [np.ones(inside.sum()), *(chain(parts, pairs) if turns else q)]
         design = np.stack(terms, axis=1)
         there = loads[inside] - loads[inside].mean(0)
         basis = np.linalg.qr(design)[0]
