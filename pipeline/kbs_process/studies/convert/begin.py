@@ -50,11 +50,12 @@ class Log:
     columns: list[Meaning]
     section: int | None = None  # of a text that has several
     dated: bool = False
-    times: list[Array] = field(default_factory=list)
+    clocked: bool = False  # by the file itself
+    times: dict[str, list[Array]] = field(default_factory=dict)  # by stream
     values: dict[str, list[Array]] = field(default_factory=dict)  # by column, as the file has them, averaged with times
     noise: dict[str, float] = field(default_factory=dict)  # by column, rms of a reading
     step: dict[str, float] = field(default_factory=dict)  # by column, least step of readings
-    rate: float = 0.0  # Hz; 0: not known
+    rates: dict[str, float] = field(default_factory=dict)  # by stream, Hz; 0: not known
     wraps: set[str] = field(default_factory=set)  # columns of angles that begin again at every turn
     left_out: tuple[str, ...] = ()  # what the file holds besides, and why it has no column
 
@@ -69,7 +70,7 @@ class Log:
 
     def samples(self, stream: str) -> tuple[Array, Array]:
         """Return times (n,), s, and the columns of a stream (n, c), in SI where the unit is known, without gaps."""
-        t = np.concatenate(self.times)
+        t = np.concatenate(self.times[stream])
         columns = [np.concatenate(self.values[one.column]) * (to_si(one.unit) or 1.0) for one in self.of(stream)]
         values = np.stack(columns, axis=1)
         values = elements(values) if stream == "orientation" else values
@@ -148,44 +149,67 @@ def _logs(path: Path) -> Iterator[Log]:
     count = table.sections() if isinstance(table, TextTable) else 1
     for section in range(1, count + 1) if count > 1 else (None,):
         part = open_table(path, None, replace(text, section=section)) if section else table
-        yield _read(part, Log(path, text, [meaning(column) for column in part.columns], section))
+        clocks = {name for column in part.columns for name in (column.clock, column.written)}
+        columns = [meaning(column) for column in part.columns if column.name not in clocks]
+        yield _read(part, Log(path, text, columns, section))
 
 
 def _read(table: Table, log: Log) -> Log:
-    clock = next((one for one in table.columns if one.clock), None)
-    stamp = log.of("time")[:1]
-    log.dated, log.left_out = clock is not None, table.left_out
-    used = [one.column for one in log.columns if one.stream in ("wrench", log.motion)]
-    wanted = list(dict.fromkeys([*used, *((clock.clock,) if clock else ()), *(one.column for one in stamp)]))
-    for index, cells in enumerate(table.chunks(wanted)):
+    """Read the wrench and what tells the motion, each by its own clock, those of one clock together."""
+    clocks = {column.name: column.clock for column in table.columns}
+    together: dict[str, list[str]] = {}  # streams by clock
+    for stream in [one for one in ("wrench", log.motion) if log.of(one)] or ["wrench"]:
+        own = [clocks[one.column] for one in log.of(stream)] or list(clocks.values())
+        together.setdefault(next(filter(None, own), ""), []).append(stream)
+    log.clocked, log.left_out = all(together), table.left_out
+    for clock, streams in together.items():
+        _read_together(table, log, clock, streams)
+    log.dated = log.dated or log.clocked
+    return log
+
+
+def _read_together(table: Table, log: Log, clock: str, streams: Sequence[str]) -> None:
+    used = [one.column for stream in streams for one in log.of(stream)]
+    stamp = [] if clock else log.of("time")[:1]
+    wanted = list(dict.fromkeys([*used, *([clock] if clock else ()), *(one.column for one in stamp)]))
+    known = False
+    for cells in table.chunks(wanted):
         named = dict(zip(wanted, cells, strict=True))
         rows = min(len(named[name]) for name in wanted) if wanted else 0
         block = max(1, rows // _KEPT)
         whole = rows // block * block
         values = {name: np.where(np.abs(x := numbers(named[name][:rows])) < _MOST, x, np.nan) for name in used}
-        if index == 0:
+        first, known = not known and rows > 0, known or rows > 0
+        if first:
             turns = {
                 one.column: 2.0 * np.pi / to_si(one.unit) for one in log.of("encoder") if dimension(one.unit) == "angle"
             }
-            log.wraps = {name for name, turn in turns.items() if np.any(np.abs(np.diff(values[name])) > 0.5 * turn)}
-            log.noise, log.step = ({name: how(x) for name, x in values.items()} for how in (_noise, _step))
-        if (seconds := _seconds(log, named, clock.clock if clock else "", stamp, rows)) is not None:
-            if index == 0 and rows > 2:
-                log.rate = 1.0 / max(float(np.nanmedian(np.diff(seconds))), 1e-9)
-            log.times.append(seconds[:whole].reshape(-1, block).mean(axis=1))
+            log.wraps |= {
+                name
+                for name, turn in turns.items()
+                if name in values and np.any(np.abs(np.diff(values[name])) > 0.5 * turn)
+            }
+            log.noise |= {name: _noise(x) for name, x in values.items()}
+            log.step |= {name: _step(x) for name, x in values.items()}
+        if (seconds := _seconds(log, named, clock, stamp, rows)) is not None:
+            for stream in streams:
+                if first and rows > 2:
+                    log.rates[stream] = 1.0 / max(float(np.nanmedian(np.diff(seconds))), 1e-9)
+                log.times.setdefault(stream, []).append(seconds[:whole].reshape(-1, block).mean(axis=1))
             for name, x in values.items():
                 log.values.setdefault(name, []).append(x[:whole].reshape(-1, block).mean(axis=1))
-    return log
 
 
 def _opened(path: Path) -> tuple[Table, Text]:
     """Open a file; of a text, look for where its table begins, for a line of units, and for its decimal mark."""
+    if path.suffix.lower() not in format_named("text").suffixes:
+        return open_table(path), Text()
     failed: RecordingError | None = None
     ways = (
         Text(skip_rows=skip, units_row=units, decimal=decimal, encoding=encoding)  # type: ignore[arg-type]
         for encoding, skip, units, decimal in product(_ENCODINGS, range(_PREAMBLE), (False, True), (".", ","))
     )
-    for text in ways if path.suffix.lower() in format_named("text").suffixes else [Text()]:
+    for text in ways:
         try:
             table = open_table(path, None, text)
             first = next(iter(table.chunks([column.name for column in table.columns])))
@@ -236,7 +260,7 @@ def _facts(loads: Sequence[Log], angles: Sequence[Log]) -> dict[str, Any]:
     channels = [channel for channel in WRENCH_CHANNELS if channel in wrench]
     joints = by_channel(angle.of("encoder")) or {"joint": Meaning(QUESTION, "encoder", "joint")}
     known = all(wrench[channel].unit != QUESTION for channel in channels)
-    slowest = min(load.rate, angle.rate)
+    slowest = min(load.rates.get("wrench", 0.0), angle.rates.get(angle.motion, 0.0))
     streams = {"wrench": [wrench[c] for c in channels], angle.motion: [*joints.values()]}
     logs = {"": load, ".encoder": angle} if load is not angle else {"": load}
     return {
@@ -280,10 +304,12 @@ def _three(values: dict[str, float], one: Meaning) -> float:
 
 def _clock(log: Log) -> str:
     """Return the keys of [time]."""
+    if log.clocked:
+        return "# the file has its own"
     if stamp := log.of("time"):
         unit = quoted(stamp[0].unit) + ("  # of the times" if stamp[0].unit == QUESTION else "")
         return f"column = {quoted(stamp[0].column)}\nunit = {unit}"
-    return "# the file has its own" if log.dated else 'rate_Hz = "?"  # rows a second: no column is known for a time'
+    return 'rate_Hz = "?"  # rows a second: no column is known for a time'
 
 
 def _text(log: Log) -> list[str]:
@@ -316,7 +342,7 @@ def _shift(load: Log, angle: Log) -> tuple[str, str]:
     joints = [] if turned else angle.of("encoder")
     asked_of = rotation(angle.of("orientation")) if turned else [one.unit for one in joints]
     found, asked = None, "motion and times do not tell it"
-    if load.times and angle.times and QUESTION not in asked_of:
+    if "wrench" in load.times and angle.motion in angle.times and QUESTION not in asked_of:
         (t, wrench), (t_angle, q) = load.samples("wrench"), angle.samples(angle.motion)
         turns = [dimension(one.unit) == "angle" for one in joints]
         found = find_shift(t, wrench, t_angle, q, turns)
@@ -346,7 +372,7 @@ def _shift(load: Log, angle: Log) -> tuple[str, str]:
 
 def _listing(log: Log) -> Iterator[str]:
     """Yield the table of a file's columns: what each was taken for."""
-    rate = f", {log.rate:.5g} Hz" if log.rate else ""
+    rate = "".join(f", {one:.5g} Hz" for one in dict.fromkeys(log.rates.values()))
     told = "".join(f", {line}" for line in _text(log))
     yield f"{log.path.name}{rate}{told}"
     width = max(len(one.column) for one in log.columns)

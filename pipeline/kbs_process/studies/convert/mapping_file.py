@@ -186,7 +186,7 @@ class Part(Table):
 
     source: Words = Field(description="file in the source folder")
     file: dict[StreamKey, Words] = Field({}, description="other files there, of streams that lie in one")
-    shift_s: dict[StreamKey, Magnitude] = Field(
+    shift_s: dict[StreamKey, Annotated[float, Field(ge=-4e9, le=4e9)]] = Field(
         {}, description="added to the times of a stream, s, so that its clock agrees with that of the other files"
     )
     shift_sigma_s: NotNegative = Field(

@@ -53,7 +53,7 @@ def meaning(column: Column) -> Meaning:
     if (turned := _ROTATION.fullmatch("".join(words))) and not kind:
         return Meaning(column.name, "orientation", next(filter(None, turned.groups())))
     moved = kind == "angle" or (kind in ("length", "") and around & _ANGLES and not around & _RATES)
-    if set(words) & _COMMANDED or around & _COMMANDED - {"set"} or not moved:
+    if set(words) & _COMMANDED or around & (_COMMANDED - {"set"} | {"field"}) or not moved:
         return Meaning(column.name, unit=unit)
     name = "_".join(word for word in words if word not in _WORDS)
     return Meaning(column.name, "encoder", name if name[:1].isalpha() else f"joint{name}", unit)

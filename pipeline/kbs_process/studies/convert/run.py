@@ -142,10 +142,7 @@ def _convert_part(
 
 
 def _out_stream(stream: StreamMap, block: Block, topic: Topic, path: Path) -> OutStream:
-    """Return the stream as messages; what the file does not have is NaN in them.
-
-    A file has one clock: recorder's and sensor's are the same.
-    """
+    """Return the stream as messages; what the file does not have is NaN in them."""
     if len(block) and (int(block.stamp.min()) < 0 or int(block.stamp.max()) >= LATEST_NS):
         raise RecordingError(
             f"times of '{stream.key}' reach from {block.stamp.min() / 1e9:g} s to {block.stamp.max() / 1e9:g} s "

@@ -33,6 +33,8 @@ def find_shift(
     """
     if min(len(t), len(t_angle)) < _FEWEST:
         return None
+    zero = float(t_angle[0] - t[0])  # one may count from 1970
+    t, t_angle = t - t[0], t_angle - t_angle[0]
     coarse = max(1, len(t) // _POINTS)
     rows = slice(None, len(t) // coarse * coarse)
     few = t[rows].reshape(-1, coarse).mean(1), wrench[rows].reshape(-1, coarse, wrench.shape[1]).mean(1)
@@ -88,7 +90,7 @@ def find_shift(
     near = float((residual[1:] * residual[:-1]).sum() / (residual**2).sum())  # neighbours that err alike
     bend = (share(found + step) - 2.0 * share(found) + share(found - step)) / step**2
     spread = 2.0 * share(found) / (max(bend, 1e-300) * len(residual)) * (1.0 + near) / max(1.0 - near, 1e-3)
-    return found, float(np.sqrt(spread))
+    return zero + found, float(np.sqrt(spread))
 
 
 def _between(angle: Array) -> Mask:

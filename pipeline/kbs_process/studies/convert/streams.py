@@ -214,14 +214,18 @@ def _pieces(
                 where=str(table.path),
                 remedy="say in the mapping's [time] which column holds it, or give rate_Hz",
             )
+        written = {column.written for column in timed}
     else:
+        written = {""}
         clock = None if time.column is None else find_column(table, time.column)
         clocks = [clock.name] if clock else []
         if clock and time.rate_Hz is None and clock.unit != "datetime":
             _check_unit(table, clock, time.unit, 1.0, findings)
     for channel, column in zip(channels, columns, strict=True):
         _check_unit(table, column, channel.given, channel.scale, findings)
-    wanted = list(dict.fromkeys([*(column.name for column in columns), *chain(*parts), *clocks]))
+    recorder = written.pop() if len(written) == 1 else ""
+    others = [*clocks, *([recorder] if recorder else [])]
+    wanted = list(dict.fromkeys([*(column.name for column in columns), *chain(*parts), *others]))
     carry: dict[str, float] = {}
     rows = 0
     for cells in table.chunks(wanted):
@@ -229,6 +233,7 @@ def _pieces(
         _check_lengths(table, named)
         stamp, known = _stamps(table, time, clocks, named, rows)
         stamp = stamp + shift
+        log = nanoseconds(named[recorder], Time.model_construct(), recorder)[0] + shift if recorder else stamp
         rows += len(stamp)
         findings.counts[_TIMELESS] += int((~known).sum())
         again = np.zeros(len(stamp), dtype=np.bool_)
@@ -243,7 +248,7 @@ def _pieces(
             values |= zip(attitude.orientation.fields, attitude.angles(cells_of, str(table.path)).T, strict=True)
         if mapping.turn and any(stream.key == "wrench" for stream in streams):
             _turn(values, mapping.turn)
-        yield {stream.key: _select(Block(stamp, stamp, _matrix(stream, values)), known & ~again) for stream in streams}
+        yield {stream.key: _select(Block(stamp, log, _matrix(stream, values)), known & ~again) for stream in streams}
 
 
 def _check_unit(table: Table, column: Column, given: str, scale: float, findings: Findings) -> None:
