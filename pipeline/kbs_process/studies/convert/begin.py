@@ -34,6 +34,7 @@ from kbs_process.studies.convert.shift import find_shift
 
 MAPPING_FILE = "mapping.toml"
 _PREAMBLE = 40  # lines above a table that are looked through
+_YEAR_NS = 31_536_000 * 10**9  # a file's own times within a year of 1970 count from the file's begin
 _APART = 5.0  # sigmas: clocks whose shift changes by more from half to half run at different rates
 _ENCODINGS = (Text().encoding, "cp1252")  # the latter is what Windows writes in Western Europe
 _MOST = 1e100  # a greater number is no reading
@@ -164,7 +165,6 @@ def _read(table: Table, log: Log) -> Log:
     log.clocked, log.left_out = all(together), table.left_out
     for clock, streams in together.items():
         _read_together(table, log, clock, streams)
-    log.dated = log.dated or log.clocked
     return log
 
 
@@ -236,7 +236,8 @@ def _seconds(log: Log, named: dict[str, Any], clock: str, stamp: list[Meaning], 
         if unit not in ("s", "ms", "us", "ns", "min", "datetime"):
             return None
     ns, known = nanoseconds(cells, Time.model_construct(unit=unit), str(log.path))
-    log.dated = log.dated or bool(known.any() and ns[known].min() > 10**18)  # counted from 1970
+    least = _YEAR_NS if clock else 10**18  # a number of a column may be large
+    log.dated = log.dated or bool(known.any() and ns[known].min() > least)  # counted from 1970
     return np.where(known, ns * 1e-9, np.nan)
 
 
