@@ -277,6 +277,23 @@ def test_matlab_tables_and_timetables(tmp_path: Path, version: str) -> None:
     assert told(table, "tb.word") and "timeseries" in told(table, "ts") and "x.Time" in told(table, "ts")
 
 
+@pytest.mark.filterwarnings("ignore")
+def test_the_units_of_a_timetable_are_read(tmp_path: Path) -> None:
+    matio = pytest.importorskip("matio")
+    import pandas as pd
+    from matio.utils import MatlabOpaque
+    from matio.utils.converters.mattables import timetable_to_mat
+
+    since = pd.Index(pd.to_timedelta(T, unit="s"), name="Time")
+    made = timetable_to_mat(pd.DataFrame({"Fx": T, "Ty": -T}, index=since))
+    units = np.empty((1, 2), dtype=object)
+    units[0] = ["N", "N*m"]
+    made["any"][0, 0]["varUnits"] = units
+    opaque = MatlabOpaque(properties=made, classname="timetable")
+    matio.save_to_mat(tmp_path / "a.mat", {"tt": opaque}, saveobj_classes=["timetable"])
+    assert [one.unit for one in read(tmp_path / "a.mat", "matlab").columns] == ["datetime", "N", "N*m"]
+
+
 def element(kind: int, data: bytes) -> bytes:
     """An element of a .mat file of version 5."""
     return np.array([kind, len(data)], "<u4").tobytes() + data + bytes(-len(data) % 8)

@@ -32,7 +32,4 @@ def open_table(path: Path, name: str | None = None, text: Text | None = None) ->
             remedy=f"give format = {', '.join(others)} or {last} in the mapping, or rename the file",
         )
     entry = formats()[found]
-    if entry.isolated and text and text.section:
-        remedy = "leave out `section` in the mapping's [[recording]]; start_s and end_s take a part of a file"
-        raise RecordingError("only delimited text has sections", where=str(path), remedy=remedy)
     return IsolatedTable(path, found, entry) if entry.isolated else entry.read(path, text or Text())

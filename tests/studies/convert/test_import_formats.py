@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from kbs_process.errors import ConfigError
+from kbs_process.errors import ConfigError, RecordingError
 from kbs_process.recordings import tables
 from kbs_process.recordings.formats import Text
 from kbs_process.recordings.formats.text import TextTable
@@ -224,6 +224,9 @@ def test_sections_of_a_log_become_recordings(tmp_path: Path) -> None:
     campaign = import_recordings(write_mapping(tmp_path, "run.csv", text), tmp_path, tmp_path / "made")
     for number, columns in enumerate(runs, start=1):
         np.testing.assert_array_equal(read_back(campaign, f"turn_{number}")["encoder"][1][:, 0], columns["angle"])
+    write_numpy(tmp_path / "run.npy", runs[0])
+    with pytest.raises(RecordingError, match="only delimited text has sections"):
+        import_recordings(write_mapping(tmp_path, "run.npy", text), tmp_path, tmp_path / "other")
 
 
 def test_campaign_keeps_the_template_and_says_where_it_comes_from(tmp_path: Path) -> None:

@@ -197,7 +197,7 @@ class Part(Table):
     role: Role
     repeat: Count = 1
     section: Count | None = Field(
-        None, description="of a text that repeats its line of names, counted from 1; holds for each of its files"
+        None, description="of a text that repeats its line of names, counted from 1; holds for each of its texts"
     )
     start_s: NotNegative = Field(0.0, description="leave out what is before, s from the file's first sample")
     end_s: Positive = Field(inf, description="leave out this moment and what is after")

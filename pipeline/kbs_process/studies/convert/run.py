@@ -16,6 +16,7 @@ from kbs_process.campaign.locate import CAMPAIGN_FILE
 from kbs_process.errors import OutputError, RecordingError, did_you_mean
 from kbs_process.progress import Progress, SilentProgress
 from kbs_process.recordings.formats import Text
+from kbs_process.recordings.formats.text import TextTable
 from kbs_process.recordings.mcap.messages.encoding import JOINT_PARTS, OutStream
 from kbs_process.recordings.mcap.writer import write_pieces
 from kbs_process.recordings.open_table import open_table
@@ -128,6 +129,9 @@ def _convert_part(
     for key, name in ((stream.key, part.file_of(stream.key)) for stream in mapping.streams):
         if (name, texts[key]) not in opened:
             opened[name, texts[key]] = open_table(files[name], mapping.format, texts[key])
+    if part.section and not any(isinstance(table, TextTable) for table in opened.values()):
+        remedy = f"leave out `section` of '{part.stem}' in the mapping; start_s and end_s take a part of a file"
+        raise RecordingError("only delimited text has sections", where=shown(files[part.source]), remedy=remedy)
     tables = {stream.key: opened[part.file_of(stream.key), texts[stream.key]] for stream in mapping.streams}
     findings = Findings()
     topics = {"encoder" if topic.key == "angle" else topic.key: topic for topic in campaign.topics.present()}
