@@ -320,16 +320,20 @@ def _text(log: Log) -> list[str]:
 
 
 def _runs(loads: Sequence[Log], angles: Sequence[Log]) -> list[dict[str, Any]]:
-    """Return the recordings: a file each, or a pair of files of two loggers whose names differ in one part alone."""
+    """Return the recordings: a file each, or a pair of files of two loggers whose names differ in one part alone.
+
+    The sections of a log have no names: they are taken in the order of the other logger's files.
+    """
     named, others = (dict(zip(runs_of([log.name for log in group]), group, strict=True)) for group in (loads, angles))
-    if len(loads) == len(angles) == 1:
+    in_order = len(loads) == 1 or any(log.section for log in (*loads, *angles))
+    if in_order and len(loads) == len(angles) and not named.keys() & others.keys():
         others = dict(zip(named, angles, strict=True))
     runs = []
     for name, log in named.items():
         other = others.get(name)
         shift, told = _shift(log, other) if other else ("", "no file of angles has such a name" if angles else "")
         file = other.path.name if other else QUESTION if angles else ""
-        section = log.section or ""
+        section = log.section or (other.section if other else None)
         run = {"name": name, "source": log.path.name, "section": section, "other": file, "shift": shift, "told": told}
         runs.append(run)
     return runs

@@ -51,7 +51,7 @@ def meaning(column: Column) -> Meaning:
         fits = kind == ("force" if force else "torque")
         return Meaning(column.name, "wrench", f"{'F' if force else 'T'}{axis.lower()}", unit if fits else QUESTION)
     if (turned := _ROTATION.fullmatch("".join(words))) and not kind:
-        return Meaning(column.name, "orientation", next(filter(None, turned.groups())))
+        return Meaning(column.name, "orientation", next(filter(None, turned.groups())), "1")
     moved = kind == "angle" or (kind in ("length", "") and around & _ANGLES and not around & _RATES)
     if set(words) & _COMMANDED or around & (_COMMANDED - {"set"} | {"field"}) or not moved:
         return Meaning(column.name, unit=unit)
