@@ -170,7 +170,7 @@ def test_matlab_kinds(tmp_path: Path, version: str) -> None:
     plain = {"x": T, "big": T.astype(">f8"), "n": T.astype("i2"), "c": "text", "z": T + 1j}
     others = {
         "Joint": {"angle": np.vstack([T, 2 * T]), "in": {"t": T}},
-        "many": np.array([(1.0,), (2.0,)], dtype=[("a", "O")]),
+        "many": np.array([(1.0, T), (2.0, -T)], dtype=[("a", "O"), ("x", "O")]),
         "cell": np.array([T, "a"], dtype=object),
         "flag": T > 2,
         "empty": np.empty((0, 0)),
@@ -186,7 +186,8 @@ def test_matlab_kinds(tmp_path: Path, version: str) -> None:
         np.testing.assert_array_equal(column(table, "Joint.angle[2]"), 2 * T)
         np.testing.assert_array_equal(column(table, "Joint.in.t"), T)
         np.testing.assert_array_equal(column(table, "flag"), T > 2)
-        assert "structures" in told(table, "many")
+        np.testing.assert_array_equal(column(table, "many.a"), [1.0, 2.0])
+        np.testing.assert_array_equal(column(table, "many(2).x"), -T)
         assert "cells" in told(table, "cell")
         assert not told(table, "empty")
 
@@ -200,14 +201,21 @@ def test_matlab_7_3_kinds(tmp_path: Path) -> None:
             ("word", np.frombuffer("Ada Lovelace".encode("utf-16-le"), "u2")[:, None], "char"),
             ("none", np.array([0, 0], dtype="u8"), "double"),
             ("s/data", T, "double"),
-            ("#refs#/a", T, "double"),
+            ("#refs#/a", T[None, :], "double"),
+            ("#refs#/b", -T[None, :], "double"),
+            ("#refs#/c", np.array([[3.0]]), "double"),
         ):
             file[name] = data
             file[name].attrs["MATLAB_class"] = np.bytes_(kind)
+        for field, places in (("x", "ab"), ("n", "cc")):
+            cells = file.create_dataset(f"many/{field}", (2, 1), h5py.ref_dtype)
+            cells[:, 0] = [file[f"#refs#/{place}"].ref for place in places]
         file["none"].attrs["MATLAB_empty"] = np.uint8(1)
         file["s"].attrs["MATLAB_sparse"] = np.uint64(20)
     table = read(tmp_path / "a.mat", "matlab")
-    assert names(table) == ["Joint.angle[1]", "Joint.angle[2]", "t"]
+    assert names(table) == ["Joint.angle[1]", "Joint.angle[2]", "many.n", "many(1).x", "many(2).x", "t"]
+    np.testing.assert_array_equal(column(table, "many(2).x"), -T)
+    np.testing.assert_array_equal(column(table, "many.n"), [3.0, 3.0])
     np.testing.assert_array_equal(column(table, "Joint.angle[2]"), 2 * T)
     assert told(table, "word")
     assert "sparse" in told(table, "s.data")
@@ -234,6 +242,56 @@ def test_a_square_matrix_has_the_same_columns_in_every_version(tmp_path: Path) -
         file["m"] = square.T
     for version in ("5", "7.3"):
         np.testing.assert_array_equal(column(read(tmp_path / f"{version}.mat", "matlab"), "m[1]"), [0.0, 3.0, 6.0])
+
+
+@pytest.mark.parametrize("version", ["v7", "v7.3"])
+@pytest.mark.filterwarnings("ignore")
+def test_matlab_tables_and_timetables(tmp_path: Path, version: str) -> None:
+    matio = pytest.importorskip("matio")
+    matio_utils = pytest.importorskip("matio.utils")
+    import pandas as pd
+
+    since = pd.Index(pd.to_timedelta(T, unit="s"), name="Time")
+    dated = pd.Index(pd.Timestamp("2026-01-31T12:00:00.000125") + since, name="when")
+    timetable = pd.DataFrame({"Fx": 3.0 * T, "n": np.arange(20, dtype=np.int32)}, index=since)
+    series = matio_utils.MatlabOpaque(properties={"Data_": T}, classname="timeseries")
+    variables = {
+        "x": T,
+        "tt": timetable,
+        "run": {"dt": timetable.set_index(dated), "y": -T},
+        "tb": pd.DataFrame({"t": T, "after": since, "word": ["a"] * 20}),
+        "ts": series,
+    }
+    matio.save_to_mat(tmp_path / "a.mat", variables, version=version)
+    table = read(tmp_path / "a.mat", "matlab")
+    np.testing.assert_array_equal(column(table, "x"), T)
+    np.testing.assert_array_equal(column(table, "run.y"), -T)
+    np.testing.assert_array_equal(column(table, "tt.Fx"), 3.0 * T)
+    np.testing.assert_array_equal(cells(table, "run.dt.n"), np.arange(20))
+    np.testing.assert_array_equal(column(table, "tb.after"), T)
+    clocks = {one.name: one.clock for one in table.columns}
+    assert (clocks["tt.Fx"], clocks["run.dt.Fx"], clocks["tb.t"]) == ("tt.Time", "run.dt.when", "")
+    np.testing.assert_array_equal(cells(table, "tt.Time").astype("i8"), np.rint(T * 1e9))
+    exact = np.datetime64("2026-01-31T12:00:00.500125", "ns")
+    assert abs(cells(table, "run.dt.when")[1] - exact) < np.timedelta64(300, "ns")  # as doubles of ms have it
+    assert told(table, "tb.word") and "timeseries" in told(table, "ts") and "x.Time" in told(table, "ts")
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_the_units_of_a_timetable_are_read(tmp_path: Path) -> None:
+    matio = pytest.importorskip("matio")
+    import pandas as pd
+    from matio.utils import MatlabOpaque
+    from matio.utils.converters.mattables import timetable_to_mat
+
+    since = pd.Index(pd.to_timedelta(T, unit="s"), name="Time")
+    made = timetable_to_mat(pd.DataFrame({"Fx": T, "Ty": -T}, index=since))
+    units = np.empty((1, 2), dtype=object)
+    units[0] = ["N", "N*m"]
+    made["any"][0, 0]["varUnits"] = units
+    opaque = MatlabOpaque(properties=made, classname="timetable")
+    matio.save_to_mat(tmp_path / "a.mat", {"tt": opaque}, saveobj_classes=["timetable"])
+    assert [one.unit for one in read(tmp_path / "a.mat", "matlab").columns] == ["datetime", "N", "N*m"]
 
 
 def element(kind: int, data: bytes) -> bytes:

@@ -91,6 +91,24 @@ def test_sections_of_a_log_are_taken_by_their_lines(tmp_path: Path) -> None:
     assert column(found, "t") == [0, 1, 2, 3, 4]
 
 
+def test_sections_below_repeated_names_are_read_one_by_one(tmp_path: Path) -> None:
+    log = "Log 2.5\n" + "".join(
+        "Begins\nt,a,b\ns,V,V\nINFO: settling, now\n"
+        + "".join(f"{t},{k},{k}\n" for t in range(rows))
+        + "End, of a section, it is, here\n\n"
+        for k, rows in ((1, 6), (5, 5), (7, 5))
+    )
+    options = {"skip_rows": 2, "units_row": True}
+    found = [table(tmp_path, log, section=k, **options) for k in (1, 2, 3)]
+    assert [column(one, "t") for one in found] == [[*range(6)], [*range(5)], [*range(5)]]
+    assert [column(one, "b")[0] for one in found] == [1, 5, 7]
+    whole = table(tmp_path, log, **options)
+    assert whole.sections() == 3 and column(whole, "t") == [*range(6), *range(5), *range(5)]
+    assert next(count for what, count in whole.odd.items() if "section = 1, 2" in what) == 2
+    with pytest.raises(RecordingError, match="there is no section 4: its line of names is there 3 times"):
+        column(table(tmp_path, log, section=4, **options), "t")
+
+
 def test_a_long_cell_costs_what_it_is_long(tmp_path: Path) -> None:
     found = table(tmp_path, "t,a\n" + "0,1\n" * 2000 + "1," + "x" * 60_000 + "\n")
     tracemalloc.start()

@@ -16,6 +16,7 @@ import tempfile
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import astuple
 from importlib.util import find_spec
 from pathlib import Path
 from threading import Timer
@@ -164,7 +165,7 @@ def main(name: str, path: Path, names: Sequence[str]) -> None:
         _limit_costs(path)
         table = format_named(name).read(path, Text())
         if not names:
-            entries = [(column.name, column.unit, column.clock) for column in table.columns]
+            entries = list(map(astuple, table.columns))
             out.write(json.dumps((entries, table.left_out)).encode() + b"\n")
             return
         for cells in table.chunks(names):

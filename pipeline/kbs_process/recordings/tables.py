@@ -72,6 +72,7 @@ class Column:
     name: str
     unit: str = ""  # as the file states it; "" where it states none
     clock: str = ""  # name of the column that carries this one's own time; "" where the format has none
+    written: str = ""  # name of the column that carries when it was written, by a recorder's clock; "" where unknown
 
 
 class Table(Protocol):

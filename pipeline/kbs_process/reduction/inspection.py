@@ -8,14 +8,12 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from itertools import islice
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
 from kbs_process.errors import RecordingError, SchemaError
-from kbs_process.recordings.mcap.messages.fields import STAMPS
 from kbs_process.recordings.mcap.source import Source, TopicSummary, open_recording
 from kbs_process.recordings.mcap.streams import Sample, Stream
 from kbs_process.signals.records import Block, Loss
@@ -24,7 +22,6 @@ from kbs_process.stages.align.grid import longest_bridged
 from kbs_process.stages.align.stream import Timeline
 
 TOGETHER = 4096  # topics read in one pass: each keeps some 10 kB until its end, and a file may have 65,535
-LONGEST_ARRAY = 64  # elements of a sequence whose ranges are given
 # Of these readings the single samples are judged; of others the stamps alone, as steps of them may be meant.
 READINGS = ("wrench.", "position[")
 
@@ -200,21 +197,7 @@ def _plan(sample: Sample | RecordingError | None) -> _Plan:
         return _Plan(note=sample.what, damaged=isinstance(sample, SchemaError))
     if fault := sample.fault():
         return _Plan(note=fault, damaged=True)
-    fields: list[str] = []
-    names: tuple[str, ...] = ()
-    for entry in sample.type.fields:
-        if entry.path.startswith(STAMPS):
-            continue
-        if entry.count is None:
-            fields.append(entry.path)
-            continue
-        elements = sample.elements(entry.path)
-        named = entry.named and len(elements.names) >= elements.count
-        keys = elements.names if named else map(str, range(elements.count))
-        if elements.count <= LONGEST_ARRAY:
-            fields += [f"{entry.path}[{key}]" for key in islice(keys, elements.count)]
-        names = elements.names if entry.named else names
-    return _Plan(tuple(fields), names)
+    return _Plan(tuple(sample.numbers()), sample.names())
 
 
 def _conclude(topic: TopicSummary, plan: _Plan, gathered: _Gathered) -> TopicInspection:

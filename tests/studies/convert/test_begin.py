@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from scipy.io import savemat
+from scipy.spatial.transform import Rotation
 
 from kbs_process.campaign.documents import read
 from kbs_process.campaign.load import load_campaign
@@ -25,6 +26,7 @@ from kbs_process.studies.convert.run import _check_same, import_recordings
 from kbs_process.studies.convert.shift import find_shift
 from studies.convert.importer_files import write_hdf5, write_matlab, write_mdf, write_parquet
 
+LOADS = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
 LATE = 3.724  # s: the clock of the wrench began so much later
 
 
@@ -55,6 +57,17 @@ LATE = 3.724  # s: the clock of the wrench began so much later
         ("data.az_deg", "", "encoder", "az", "deg"),
         ("Fz/N", "", "wrench", "Fz", "N"),
         ("wheel_rad/s", "", "", "", "rad/s"),
+        ("Joint_state.positions[2]", "", "encoder", "joint2", "?"),
+        ("Joint_state.torques[2]", "", "", "", "?"),
+        ("/joints.position[arm]", "rad", "encoder", "arm", "rad"),
+        ("/joints.velocity[arm]", "", "", "", "?"),
+        ("/command.position[arm]", "", "", "", "?"),
+        ("/ft.wrench.torque.y", "N m", "wrench", "Ty", "N m"),
+        ("/imu.orientation.w", "", "orientation", "w", "1"),
+        ("q_x", "", "orientation", "x", "1"),
+        ("R12", "", "orientation", "12", "1"),
+        ("quat[3]", "", "orientation", "3", "1"),
+        ("q1 [deg]", "", "encoder", "q1", "deg"),
     ],
 )
 def test_what_a_name_tells(name: str, stated: str, stream: str, channel: str, unit: str) -> None:
@@ -265,6 +278,33 @@ def test_every_format_begins_a_campaign(tmp_path: Path, name: str, write: Callab
     assert "shift_s" not in mapping["recording"][0]
 
 
+@pytest.mark.parametrize("names", ["qw qx qy qz", "q0 q1 q2 q3", "R11 R12 R13 R21 R22 R23 R31 R32 R33"])
+@pytest.mark.slow
+def test_an_orientation_begins_a_campaign_with_a_clock_of_its_own(tmp_path: Path, names: str) -> None:
+    t = np.arange(0.0, 44.0, 0.01)
+    load = pd.DataFrame(wrench_of(motion(t + LATE)), columns=[f"{c} [{'N' if c[0] == 'F' else 'Nm'}]" for c in LOADS])
+    load.insert(0, "t [s]", t)
+    t = np.arange(0.0, 48.0, 0.02)
+    R = Rotation.from_rotvec(motion(t)[:, None] * [0.0, -1.0, 0.0])
+    sign = np.where(np.arange(len(t)) % 700 < 350, 1.0, -1.0)[:, None]
+    numbers = R.as_matrix().reshape(-1, 9) if "R11" in names else sign * R.as_quat(scalar_first=True)
+    turned = pd.DataFrame(np.column_stack([t, numbers]), columns=["t [s]", *names.split()])
+    files = [tmp_path / "wrench.csv", tmp_path / "imu.csv"]
+    for file, table in zip(files, (load, turned), strict=True):
+        table.to_csv(file, index=False)
+    list(begin(tmp_path / "made", files))
+    mapping = tree(tmp_path / "made" / "mapping.toml")
+    (one,) = mapping["orientation"]
+    assert one["joints"] == list(tree(tmp_path / "made" / "rig.toml")["joint"]) == ["joint"] and one["maps"] == "?"
+    if "R11" in names:
+        assert one["matrix"][1] == ["R21", "R22", "R23"]
+    else:
+        known = dict(zip("wxyz", names.split(), strict=True)) if "qw" in names else dict.fromkeys("wxyz", "?")
+        assert one["quaternion"] == known
+    shift = mapping["recording"][0]["shift_s"]["wrench"]  # found where the numbers are known
+    assert shift == ("?" if "q0" in names else pytest.approx(LATE, abs=0.005))
+
+
 def test_an_angle_that_begins_again_is_unwrapped_and_what_has_no_column_is_told(tmp_path: Path) -> None:
     t = np.arange(0.0, 40.0, 0.1)
     savemat(tmp_path / "a.mat", {"t_s": t, "Fx_N": t, "az_deg": (30.0 * t) % 360.0, "el_deg": 10.0 * t, "note": "text"})
@@ -281,6 +321,18 @@ def test_files_of_which_none_is_known_are_all_questions(tmp_path: Path) -> None:
     mapping = tree(tmp_path / "made" / "mapping.toml")
     assert {one["column"] for one in mapping["wrench"].values()} == {"?"}
     assert mapping["time"] == {"rate_Hz": "?"}
+
+
+def test_the_sections_of_a_log_are_recordings_each(tmp_path: Path) -> None:
+    rows = "".join(f"{0.1 * k:.1f},{k},{k * k % 7}\n" for k in range(9))
+    (tmp_path / "log.txt").write_text(
+        "Log 2.5\n" + 2 * f"Begins at 9\nt [s],Fz [N],az [deg]\nINFO: settling\n{rows}\nEnds\n"
+    )
+    lines = list(begin(tmp_path / "made", [tmp_path / "log.txt"]))
+    assert "section1: log.txt, section 1" in lines and "section2: log.txt, section 2" in lines
+    mapping = tree(tmp_path / "made" / "mapping.toml")
+    assert mapping["text"] == {"skip_rows": 2} and mapping["encoder"]["az"]["unit"] == "deg"
+    assert [one["section"] for one in mapping["recording"]] == [1, 2]
 
 
 def test_what_is_no_table_is_told(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from kbs_process.errors import ConfigError
+from kbs_process.errors import ConfigError, RecordingError
 from kbs_process.recordings import tables
 from kbs_process.recordings.formats import Text
 from kbs_process.recordings.formats.text import TextTable
@@ -211,6 +211,22 @@ def test_parts_of_one_file_share_no_sample(tmp_path: Path) -> None:
     parts = [read_back(folder, name)["wrench"][1] for name in ("turn_1", "turn_2")]
     assert [len(part) for part in parts] == [400, 600]
     np.testing.assert_array_equal(np.concatenate([part[:, 0] for part in parts]), columns["Fx"])
+
+
+def test_sections_of_a_log_become_recordings(tmp_path: Path) -> None:
+    runs = [signals(300, seed) for seed in (1, 2)]
+    for number, columns in enumerate(runs):
+        write_csv(tmp_path / f"{number}.csv", columns)
+    (tmp_path / "run.csv").write_text("".join((tmp_path / f"{number}.csv").read_text() for number in range(2)))
+    one = MAPPING[MAPPING.index("[[recording]]") :]
+    sections = [one + f"section = {number}\n" for number in (1, 2)]
+    text = MAPPING.replace(one, sections[0] + sections[1].replace("repeat = 1", "repeat = 2"))
+    campaign = import_recordings(write_mapping(tmp_path, "run.csv", text), tmp_path, tmp_path / "made")
+    for number, columns in enumerate(runs, start=1):
+        np.testing.assert_array_equal(read_back(campaign, f"turn_{number}")["encoder"][1][:, 0], columns["angle"])
+    write_numpy(tmp_path / "run.npy", runs[0])
+    with pytest.raises(RecordingError, match="only delimited text has sections"):
+        import_recordings(write_mapping(tmp_path, "run.npy", text), tmp_path, tmp_path / "other")
 
 
 def test_campaign_keeps_the_template_and_says_where_it_comes_from(tmp_path: Path) -> None:

@@ -28,6 +28,7 @@ class Text(msgspec.Struct, frozen=True):
     units_row: bool = False
     skip_rows: int = 0
     rows: int | None = None
+    section: int | None = None  # of a log that repeats its line of names, counted from 1
     decimal: Literal[".", ","] = "."
     thousands: str | None = None
     comment: str | None = None

@@ -7,7 +7,7 @@ The conventions of netCDF are kept: what `scale_factor` and `add_offset` pack is
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -34,6 +34,7 @@ _VALUES = {"scale_factor": 1, "add_offset": 1, "valid_min": 1, "valid_max": 1, "
 _VALUES |= {"_FillValue": 0, "missing_value": 0}
 # Classes of MATLAB; what others write has none.
 _MATLAB_NUMBERS = re.compile("|double|single|logical|u?int(8|16|32|64)")
+ELEMENTS = 1 << 16  # of an array of structures
 _BLOCK_CELLS = 1 << 22  # of a matrix, read together for its columns
 _UNWRITTEN = 1 << 26  # bytes of a data set that may be fill values alone
 
@@ -58,10 +59,32 @@ def datasets(path: Path, separator: str = "/", classes: bool = False) -> Iterato
         try:
             if why := _why_not(data, classes) or ("it is a sparse matrix" if name.startswith(sparse) else ""):
                 yield f"{label}: {why}"
+            elif classes and h5py.check_ref_dtype(data.dtype) is h5py.Reference:
+                yield from _elements([file[one] for one in np.ravel(data[()])], label)
             elif not data.attrs.get("MATLAB_empty"):
                 yield from _columns(data, label, classes)
         except (LookupError, OSError, RuntimeError, TypeError, ValueError):  # what h5py raises for odd types and damage
             yield f"{label}: its type, or an attribute of it, cannot be read: write it anew as numbers"
+
+
+def _elements(fields: Sequence[Any], label: str) -> Iterator[Item]:
+    """Yield the columns of one field of MATLAB's arrays of structures, of which each is a data set of its own."""
+    import h5py
+
+    name, _, field = label.rpartition(".")
+    if all(isinstance(one, h5py.Dataset) and one.size == 1 and one.dtype.kind in "iufb" for one in fields):
+        yield from series_of(np.concatenate([np.ravel(one[()]) for one in fields]), label)
+        return
+    for index, one in enumerate(fields, start=1):
+        part = f"{name}({index}).{field}"
+        if (
+            why := _why_not(one, True)
+            if isinstance(one, h5py.Dataset)
+            else "it is a structure within several: save each"
+        ):
+            yield f"{part}: {why}"
+        elif not one.attrs.get("MATLAB_empty"):
+            yield from _columns(one, part, True)
 
 
 def _why_not(data: Any, classes: bool) -> str:
@@ -77,7 +100,10 @@ def _why_not(data: Any, classes: bool) -> str:
         return f"it is a {_text(kind)}: save numbers"
     if data.size * data.dtype.itemsize > UNPACKED * data.id.get_storage_size() + _UNWRITTEN:
         return f"next to none of its {data.size} numbers was written"
-    if data.dtype.kind == "O" and not (h5py.check_string_dtype(data.dtype) and data.ndim == 1):
+    several = classes and h5py.check_ref_dtype(data.dtype) is h5py.Reference and data.parent.name != "/"
+    if several and data.size > ELEMENTS:
+        return f"it is a field of {data.size} structures: save it as numbers"
+    if data.dtype.kind == "O" and not several and not (h5py.check_string_dtype(data.dtype) and data.ndim == 1):
         return "it has no numbers"
     return ""
 

@@ -7,7 +7,7 @@ import io
 import itertools
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -52,26 +52,30 @@ class TextTable:
         cells = [_split(line, self._delimiter) for _, line in head]
         named = not all(map(self._is_number, cells[0])) if options.header is None else options.header
         # What is read later counts every line of the file, comments and blank ones too.
-        told = named + options.units_row
-        if len(head) < 2 or told >= len(head):
+        usual = Counter(map(len, cells[named:] or cells)).most_common(1)[0][0]
+        table = [(place, row) for (place, _), row in zip(head, cells, strict=True)][named:]
+        if usual == len(cells[0]):  # then lines of other widths are no rows
+            table = [(place, row) for place, row in table if len(row) == usual]
+        if len(head) < 2 or len(table) <= options.units_row:
             raise RecordingError(
                 f"line {head[-1][0] + 1} is the last one, and no table is there: it has a row a line, below the names",
                 where=str(path),
                 remedy="export it again; " + _NO_TEXT,
             )
-        self._first_data_row = head[told][0]
-        rows = cells[told:]
+        self._first_data_row = table[0][0] + 1 if options.units_row else head[named][0]
+        rows = [row for _, row in table[options.units_row :]]
         first, second = ([cell for cell in row if cell] for row in (*rows, [], [])[:2])
         if named and first and any(map(self._is_number, second)) and not any(map(self._is_number, first)):
             raise RecordingError(
-                f"line {self._first_data_row + 1} holds no number: {', '.join(first)[:_SHOWN]}",
+                f"line {table[options.units_row][0] + 1} holds no number: {', '.join(first)[:_SHOWN]}",
                 where=str(path),
                 remedy="write units_row = true in the mapping's [text] if these are units; else take the line out",
             )
-        usual = Counter(map(len, rows or cells)).most_common(1)[0][0]
+        self._names = head[0][1] if named else ""  # as a later section of a log repeats it
+        self._units = dict(head)[table[0][0]] if options.units_row else ""
+        units = table[0][1] if options.units_row else []
         names = self._fitted(cells[0], rows) if named else [""] * usual
-        units = cells[named][: len(names)] if options.units_row and len(cells) > named else []
-        units += [""] * (len(names) - len(units))
+        units = (units + [""] * len(names))[: len(names)]
         self.columns = tuple(
             Column(name, unit.strip("()[] ")) for name, unit in zip(_unique(names), units, strict=True)
         )
@@ -84,11 +88,19 @@ class TextTable:
             frame = self._parsed(piece, every)
             yield tuple(self._cells(frame[name]) for name in names)
 
+    def sections(self) -> int:
+        """Return how many sections there are, each below the line of names."""
+        return 1 + sum(line == self._names for _, line in self._lines(self._first_data_row))
+
     def _rows(self, width: int) -> Iterator[str]:
         """Yield the lines that are rows of the table, and count those that are none; most are, or it is another."""
         delimiter, kept, out = self._delimiter, 0, 0
         left = self._options.rows
+        wanted, section = self._options.section, 1
         for place, line in self._lines(self._first_data_row):
+            section += line == self._names
+            if line in (self._names, self._units) or section != (wanted or section):
+                continue
             if '"' in line or delimiter == " ":
                 count = len(_split(line, delimiter)) if line.count('"') % 2 == 0 else 0
             else:
@@ -106,6 +118,12 @@ class TextTable:
                 left -= 1
             kept += 1
             yield line
+        if section < (wanted or 1):
+            what = f"there is no section {wanted}: its line of names is there {section} times"
+            raise RecordingError(what, where=str(self.path), remedy="correct `section` in the mapping's [[recording]]")
+        if section > 1 and not wanted:
+            again = "sections follow, below the names again: give each a [[recording]] with section = 1, 2, ..."
+            self.odd[again] = section - 1
         if out > kept:
             raise RecordingError(
                 f"{out} of {out + kept} {known.replace(', left out', '')}",
@@ -215,15 +233,19 @@ def _without_empty_end(line: str, delimiter: str, surplus: int) -> str:
 
 
 def sniff_delimiter(lines: Sequence[str], decimal: str = ".") -> str:
-    """Return the delimiter that splits all `lines` into most columns; "," where none does, " " for blanks.
+    """Return the delimiter that splits `lines` into most columns; "," where none does, " " for blanks.
 
     The `decimal` mark splits numbers, and no columns.
     """
     able = DELIMITERS.replace(decimal, "")
-    best = max(able, key=lambda delimiter: min(line.count(delimiter) for line in lines))
-    if min(line.count(best) for line in lines):
+
+    def usual(counts: Iterable[int]) -> int:  # but for a few lines, such as those between the sections of a log
+        return sorted(counts)[len(lines) // 4]
+
+    best = max(able, key=lambda delimiter: usual(line.count(delimiter) for line in lines))
+    if usual(line.count(best) for line in lines):
         return best
-    return " " if min(len(line.split()) for line in lines) > 1 else able.strip("\t|")[-1]
+    return " " if usual(len(line.split()) for line in lines) > 1 else able.strip("\t|")[-1]
 
 
 def _split(line: str, delimiter: str) -> list[str]:

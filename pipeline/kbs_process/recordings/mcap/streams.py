@@ -13,11 +13,12 @@ from kbs_process.recordings.mcap.container import AT, LOG, SIZE, Container, Desc
 from kbs_process.recordings.mcap.framing import MalformedError
 from kbs_process.recordings.mcap.kernels import NO_STAMP, Bytes, Words
 from kbs_process.recordings.mcap.messages.decoders import Decoder, MessageType, message_type
-from kbs_process.recordings.mcap.messages.fields import Elements, Step, resolve
+from kbs_process.recordings.mcap.messages.fields import STAMPS, Elements, Step, resolve
 from kbs_process.signals.records import Array, Block, Loss, Mask, Stamps
 
 CHOOSE = "several publishers bring the topic: choose one by its `channel` in campaign.toml"
 RETURNS = 2  # to a channel that was left for another of the same topic: there are two publishers
+LONGEST_ARRAY = 64  # elements of a sequence that are told one by one
 SAMPLES = 64  # messages from which the numbers of a type without schema are learnt
 _NO_STAMP = "seconds beyond 2^33, or nanoseconds outside 0 to 999999999: mend the driver, or leave its stamp out"
 
@@ -79,6 +80,27 @@ class Sample:
         except MalformedError as error:
             return str(error)
         return ""
+
+    def numbers(self) -> list[str]:
+        """Return the paths of its numbers but its stamp, elements of sequences as this message has them."""
+        found: list[str] = []
+        for entry in self.type.fields:
+            if entry.path.startswith(STAMPS):
+                continue
+            if entry.count is None:
+                found.append(entry.path)
+                continue
+            elements = self.elements(entry.path)
+            named = entry.named and len(elements.names) >= elements.count
+            keys = elements.names if named else map(str, range(elements.count))
+            if elements.count <= LONGEST_ARRAY:
+                found += [f"{entry.path}[{key}]" for key in islice(keys, elements.count)]
+        return found
+
+    def names(self) -> tuple[str, ...]:
+        """Return the names of the elements of its last named sequence."""
+        named = [entry.path for entry in self.type.fields if entry.named and entry.count is not None]
+        return self.elements(named[-1]).names if named else ()
 
     def _sequences(self) -> list[str]:
         return [field.path for field in self.type.fields if field.count is not None]

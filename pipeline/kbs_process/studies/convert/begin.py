@@ -12,12 +12,14 @@ from typing import Any
 import msgspec
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
+from msgspec.structs import replace
 
 from kbs_process.campaign.documents import QUESTION, quoted, read, shown
 from kbs_process.campaign.units import dimension, to_si
 from kbs_process.campaign.writing.parameter_files import value_text
 from kbs_process.errors import ConfigError, KbsError, RecordingError
-from kbs_process.recordings.formats import Text
+from kbs_process.recordings.formats import Text, format_named
+from kbs_process.recordings.formats.text import TextTable
 from kbs_process.recordings.open_table import open_table
 from kbs_process.recordings.tables import Table
 from kbs_process.results.store import writing
@@ -26,11 +28,13 @@ from kbs_process.studies.convert.clock import nanoseconds, numbers
 from kbs_process.studies.convert.description import prepare
 from kbs_process.studies.convert.mapping import load_mapping
 from kbs_process.studies.convert.mapping_file import Time
-from kbs_process.studies.convert.naming import Meaning, by_channel, meaning, runs_of
+from kbs_process.studies.convert.naming import Meaning, by_channel, meaning, rotation, runs_of
+from kbs_process.studies.convert.orientation import elements, written
 from kbs_process.studies.convert.shift import find_shift
 
 MAPPING_FILE = "mapping.toml"
 _PREAMBLE = 40  # lines above a table that are looked through
+_YEAR_NS = 31_536_000 * 10**9  # a file's own times within a year of 1970 count from the file's begin
 _APART = 5.0  # sigmas: clocks whose shift changes by more from half to half run at different rates
 _ENCODINGS = (Text().encoding, "cp1252")  # the latter is what Windows writes in Western Europe
 _MOST = 1e100  # a greater number is no reading
@@ -45,12 +49,14 @@ class Log:
     path: Path
     text: Text
     columns: list[Meaning]
+    section: int | None = None  # of a text that has several
     dated: bool = False
-    times: list[Array] = field(default_factory=list)
+    clocked: bool = False  # by the file itself
+    times: dict[str, list[Array]] = field(default_factory=dict)  # by stream
     values: dict[str, list[Array]] = field(default_factory=dict)  # by column, as the file has them, averaged with times
     noise: dict[str, float] = field(default_factory=dict)  # by column, rms of a reading
     step: dict[str, float] = field(default_factory=dict)  # by column, least step of readings
-    rate: float = 0.0  # Hz; 0: not known
+    rates: dict[str, float] = field(default_factory=dict)  # by stream, Hz; 0: not known
     wraps: set[str] = field(default_factory=set)  # columns of angles that begin again at every turn
     left_out: tuple[str, ...] = ()  # what the file holds besides, and why it has no column
 
@@ -58,13 +64,24 @@ class Log:
         """Return the columns of a stream."""
         return [one for one in self.columns if one.stream == stream]
 
+    @property
+    def motion(self) -> str:
+        """The stream that tells how joints move."""
+        return "encoder" if self.of("encoder") or not rotation(self.of("orientation")) else "orientation"
+
     def samples(self, stream: str) -> tuple[Array, Array]:
         """Return times (n,), s, and the columns of a stream (n, c), in SI where the unit is known, without gaps."""
-        t = np.concatenate(self.times)
+        t = np.concatenate(self.times[stream])
         columns = [np.concatenate(self.values[one.column]) * (to_si(one.unit) or 1.0) for one in self.of(stream)]
         values = np.stack(columns, axis=1)
+        values = elements(values) if stream == "orientation" else values
         good = np.isfinite(t) & np.isfinite(values).all(axis=1)
         return t[good], values[good]
+
+    @property
+    def name(self) -> str:
+        """The file, and which section of it."""
+        return self.path.name if self.section is None else f"{self.path.stem}_section{self.section}{self.path.suffix}"
 
     @property
     def kind(self) -> tuple[object, ...]:
@@ -78,9 +95,9 @@ def begin(target: Path, files: Sequence[Path]) -> Iterator[str]:
     Raises RecordingError where a file cannot be read, ConfigError where files do not belong together, OutputError where
     the folder holds something already.
     """
-    logs = [_read(path) for path in dict.fromkeys(files)]
+    logs = [log for path in dict.fromkeys(files) for log in _logs(path)]
     loads = [log for log in logs if log.of("wrench")] or logs
-    angles = [log for log in logs if log.of("encoder")] or loads
+    angles = [log for log in logs if log.of(log.motion)] or loads
     for group, what in ((loads, "wrench"), (angles, "angles")):
         if odd := next((log for log in group if log.kind != group[0].kind), None):
             raise ConfigError(
@@ -103,7 +120,8 @@ def begin(target: Path, files: Sequence[Path]) -> Iterator[str]:
     for log in (loads[0], *angles[:1]) if angles[0] is not loads[0] else loads[:1]:
         yield from _listing(log)
     for run in facts["runs"]:
-        yield f"{run['name']}: {run['source']}" + (f", {run['other']}; {run['told']}" if run["other"] else "")
+        part = f", section {run['section']}" if run["section"] else ""
+        yield f"{run['name']}: {run['source']}{part}" + (f", {run['other']}; {run['told']}" if run["other"] else "")
     used = {run[key] for run in facts["runs"] for key in ("source", "other")}
     yield from (f"not used: {log.path.name}" for log in logs if log.path.name not in used)
 
@@ -126,40 +144,72 @@ def check_description(folder: Path) -> Iterator[str]:
     yield f"  -> {command}; FOLDER holds the recordings"
 
 
-def _read(path: Path) -> Log:
+def _logs(path: Path) -> Iterator[Log]:
+    """Yield the logs of a file: one, or one a section."""
     table, text = _opened(path)
-    log = Log(path, text, [meaning(column) for column in table.columns])
-    clock = next((one for one in table.columns if one.clock), None)
-    stamp = log.of("time")[:1]
-    log.dated, log.left_out = clock is not None, table.left_out
-    used = [one.column for one in log.columns if one.stream in ("wrench", "encoder")]
-    wanted = list(dict.fromkeys([*used, *((clock.clock,) if clock else ()), *(one.column for one in stamp)]))
-    for index, cells in enumerate(table.chunks(wanted)):
+    count = table.sections() if isinstance(table, TextTable) else 1
+    for section in range(1, count + 1) if count > 1 else (None,):
+        part = open_table(path, None, replace(text, section=section)) if section else table
+        clocks = {name for column in part.columns for name in (column.clock, column.written)}
+        columns = [meaning(column) for column in part.columns if column.name not in clocks]
+        yield _read(part, Log(path, text, columns, section))
+
+
+def _read(table: Table, log: Log) -> Log:
+    """Read the wrench and what tells the motion, each by its own clock, those of one clock together."""
+    clocks = {column.name: column.clock for column in table.columns}
+    together: dict[str, list[str]] = {}  # streams by clock
+    for stream in [one for one in ("wrench", log.motion) if log.of(one)] or ["wrench"]:
+        own = [clocks[one.column] for one in log.of(stream)] or list(clocks.values())
+        together.setdefault(next(filter(None, own), ""), []).append(stream)
+    log.clocked, log.left_out = all(together), table.left_out
+    for clock, streams in together.items():
+        _read_together(table, log, clock, streams)
+    return log
+
+
+def _read_together(table: Table, log: Log, clock: str, streams: Sequence[str]) -> None:
+    used = [one.column for stream in streams for one in log.of(stream)]
+    stamp = [] if clock else log.of("time")[:1]
+    wanted = list(dict.fromkeys([*used, *([clock] if clock else ()), *(one.column for one in stamp)]))
+    known = False
+    for cells in table.chunks(wanted):
         named = dict(zip(wanted, cells, strict=True))
         rows = min(len(named[name]) for name in wanted) if wanted else 0
         block = max(1, rows // _KEPT)
         whole = rows // block * block
         values = {name: np.where(np.abs(x := numbers(named[name][:rows])) < _MOST, x, np.nan) for name in used}
-        if index == 0:
+        first, known = not known and rows > 0, known or rows > 0
+        if first:
             turns = {
                 one.column: 2.0 * np.pi / to_si(one.unit) for one in log.of("encoder") if dimension(one.unit) == "angle"
             }
-            log.wraps = {name for name, turn in turns.items() if np.any(np.abs(np.diff(values[name])) > 0.5 * turn)}
-            log.noise, log.step = ({name: how(x) for name, x in values.items()} for how in (_noise, _step))
-        if (seconds := _seconds(log, named, clock.clock if clock else "", stamp, rows)) is not None:
-            if index == 0 and rows > 2:
-                log.rate = 1.0 / max(float(np.nanmedian(np.diff(seconds))), 1e-9)
-            log.times.append(seconds[:whole].reshape(-1, block).mean(axis=1))
+            log.wraps |= {
+                name
+                for name, turn in turns.items()
+                if name in values and np.any(np.abs(np.diff(values[name])) > 0.5 * turn)
+            }
+            log.noise |= {name: _noise(x) for name, x in values.items()}
+            log.step |= {name: _step(x) for name, x in values.items()}
+        if (seconds := _seconds(log, named, clock, stamp, rows)) is not None:
+            for stream in streams:
+                if first and rows > 2:
+                    log.rates[stream] = 1.0 / max(float(np.nanmedian(np.diff(seconds))), 1e-9)
+                log.times.setdefault(stream, []).append(seconds[:whole].reshape(-1, block).mean(axis=1))
             for name, x in values.items():
                 log.values.setdefault(name, []).append(x[:whole].reshape(-1, block).mean(axis=1))
-    return log
 
 
 def _opened(path: Path) -> tuple[Table, Text]:
     """Open a file; of a text, look for where its table begins, for a line of units, and for its decimal mark."""
+    if path.suffix.lower() not in format_named("text").suffixes:
+        return open_table(path), Text()
     failed: RecordingError | None = None
-    for encoding, skip, units, decimal in product(_ENCODINGS, range(_PREAMBLE), (False, True), (".", ",")):
-        text = Text(skip_rows=skip, units_row=units, decimal=decimal, encoding=encoding)  # type: ignore[arg-type]
+    ways = (
+        Text(skip_rows=skip, units_row=units, decimal=decimal, encoding=encoding)  # type: ignore[arg-type]
+        for encoding, skip, units, decimal in product(_ENCODINGS, range(_PREAMBLE), (False, True), (".", ","))
+    )
+    for text in ways:
         try:
             table = open_table(path, None, text)
             first = next(iter(table.chunks([column.name for column in table.columns])))
@@ -169,8 +219,6 @@ def _opened(path: Path) -> tuple[Table, Text]:
         good = sum(one.dtype.kind == "M" or bool(np.isfinite(numbers(one)[:100]).mean() > 0.5) for one in first)
         if len(first) > 1 and good >= 0.5 * len(first):
             return table, text
-        if table.path.suffix.lower() not in (".csv", ".tsv", ".txt", ".dat", ".asc"):
-            break
     raise failed or RecordingError(
         "no table of numbers is found", where=str(path), remedy="see `kbs-process import --describe`"
     )
@@ -188,7 +236,8 @@ def _seconds(log: Log, named: dict[str, Any], clock: str, stamp: list[Meaning], 
         if unit not in ("s", "ms", "us", "ns", "min", "datetime"):
             return None
     ns, known = nanoseconds(cells, Time.model_construct(unit=unit), str(log.path))
-    log.dated = log.dated or bool(known.any() and ns[known].min() > 10**18)  # counted from 1970
+    least = _YEAR_NS if clock else 10**18  # a number of a column may be large
+    log.dated = log.dated or bool(known.any() and ns[known].min() > least)  # counted from 1970
     return np.where(known, ns * 1e-9, np.nan)
 
 
@@ -212,8 +261,8 @@ def _facts(loads: Sequence[Log], angles: Sequence[Log]) -> dict[str, Any]:
     channels = [channel for channel in WRENCH_CHANNELS if channel in wrench]
     joints = by_channel(angle.of("encoder")) or {"joint": Meaning(QUESTION, "encoder", "joint")}
     known = all(wrench[channel].unit != QUESTION for channel in channels)
-    slowest = min(load.rate, angle.rate)
-    streams = {"wrench": [wrench[c] for c in channels], "encoder": [*joints.values()]}
+    slowest = min(load.rates.get("wrench", 0.0), angle.rates.get(angle.motion, 0.0))
+    streams = {"wrench": [wrench[c] for c in channels], angle.motion: [*joints.values()]}
     logs = {"": load, ".encoder": angle} if load is not angle else {"": load}
     return {
         "rate": max((rate for rate in _RATES if rate <= slowest / 2.0), default=None) if slowest else None,
@@ -243,6 +292,8 @@ def _facts(loads: Sequence[Log], angles: Sequence[Log]) -> dict[str, Any]:
             ]
             for key, rows in streams.items()
         },
+        "orientation": written([quoted(column) for column in rotation(angle.of("orientation"))]),
+        "numbered": ", ".join(one.column for one in angle.of("orientation")),
         "runs": _runs(loads, angles if load is not angle else ()),
     }
 
@@ -254,10 +305,12 @@ def _three(values: dict[str, float], one: Meaning) -> float:
 
 def _clock(log: Log) -> str:
     """Return the keys of [time]."""
+    if log.clocked:
+        return "# the file has its own"
     if stamp := log.of("time"):
         unit = quoted(stamp[0].unit) + ("  # of the times" if stamp[0].unit == QUESTION else "")
         return f"column = {quoted(stamp[0].column)}\nunit = {unit}"
-    return "# the file has its own" if log.dated else 'rate_Hz = "?"  # rows a second: no column is known for a time'
+    return 'rate_Hz = "?"  # rows a second: no column is known for a time'
 
 
 def _text(log: Log) -> list[str]:
@@ -266,19 +319,23 @@ def _text(log: Log) -> list[str]:
     return [f"{key} = {value_text(value)}" for key, value in given.items() if value != usual[key]]
 
 
-def _runs(loads: Sequence[Log], angles: Sequence[Log]) -> list[dict[str, str]]:
-    """Return the recordings: a file each, or a pair of files of two loggers whose names differ in one part alone."""
-    named, others = (
-        dict(zip(runs_of([log.path.name for log in group]), group, strict=True)) for group in (loads, angles)
-    )
-    if len(loads) == len(angles) == 1:
+def _runs(loads: Sequence[Log], angles: Sequence[Log]) -> list[dict[str, Any]]:
+    """Return the recordings: a file each, or a pair of files of two loggers whose names differ in one part alone.
+
+    The sections of a log have no names: they are taken in the order of the other logger's files.
+    """
+    named, others = (dict(zip(runs_of([log.name for log in group]), group, strict=True)) for group in (loads, angles))
+    in_order = len(loads) == 1 or any(log.section for log in (*loads, *angles))
+    if in_order and len(loads) == len(angles) and not named.keys() & others.keys():
         others = dict(zip(named, angles, strict=True))
     runs = []
     for name, log in named.items():
         other = others.get(name)
         shift, told = _shift(log, other) if other else ("", "no file of angles has such a name" if angles else "")
         file = other.path.name if other else QUESTION if angles else ""
-        runs.append({"name": name, "source": log.path.name, "other": file, "shift": shift, "told": told})
+        section = log.section or (other.section if other else None)
+        run = {"name": name, "source": log.path.name, "section": section, "other": file, "shift": shift, "told": told}
+        runs.append(run)
     return runs
 
 
@@ -286,10 +343,12 @@ def _shift(load: Log, angle: Log) -> tuple[str, str]:
     """Return the keys that say how two clocks stand to each other, and the same in words."""
     if load.dated and angle.dated:
         return "# both files have dates: their clocks are taken to agree", "both have dates"
-    joints = angle.of("encoder")
+    turned = angle.motion == "orientation"
+    joints = [] if turned else angle.of("encoder")
+    asked_of = rotation(angle.of("orientation")) if turned else [one.unit for one in joints]
     found, asked = None, "motion and times do not tell it"
-    if load.times and angle.times and all(one.unit != QUESTION for one in joints):
-        (t, wrench), (t_angle, q) = load.samples("wrench"), angle.samples("encoder")
+    if "wrench" in load.times and angle.motion in angle.times and QUESTION not in asked_of:
+        (t, wrench), (t_angle, q) = load.samples("wrench"), angle.samples(angle.motion)
         turns = [dimension(one.unit) == "angle" for one in joints]
         found = find_shift(t, wrench, t_angle, q, turns)
         halves = []
@@ -318,7 +377,7 @@ def _shift(load: Log, angle: Log) -> tuple[str, str]:
 
 def _listing(log: Log) -> Iterator[str]:
     """Yield the table of a file's columns: what each was taken for."""
-    rate = f", {log.rate:.5g} Hz" if log.rate else ""
+    rate = "".join(f", {one:.5g} Hz" for one in dict.fromkeys(log.rates.values()))
     told = "".join(f", {line}" for line in _text(log))
     yield f"{log.path.name}{rate}{told}"
     width = max(len(one.column) for one in log.columns)

@@ -21,6 +21,7 @@ from kbs_process.errors import ConfigError, KbsError, did_you_mean
 from kbs_process.files import regular
 from kbs_process.reduction.reading import OPTIONAL_STREAMS
 from kbs_process.studies.convert.mapping import Mapping
+from kbs_process.studies.convert.orientation import Attitude
 
 _HEADER = re.compile(r"^\s*\[")
 _REPLACED = re.compile(r"^\s*\[\[?\s*(recording|source)\s*[\].]")
@@ -66,6 +67,8 @@ def prepare(mapping: Mapping, folder: Path) -> Campaign:
         # The user knows the template, whose lines are the same, not our private folder.
         raise _elsewhere(error, shown(folder), shown(mapping.template.parent)) from error
     _check_streams(mapping, campaign)
+    for one in (one for stream in mapping.streams for one in stream.orientations):
+        Attitude(one, campaign.rig, shown(mapping.path))
     return campaign
 
 
@@ -171,7 +174,7 @@ def _check_streams(mapping: Mapping, campaign: Campaign) -> None:
     topics = campaign.topics
     read = {"encoder" if topic.key == "angle" else topic.key: topic for topic in topics.present()}
     wanted = {key: topic.fields for key, topic in read.items()}
-    given = {stream.key: {channel.field for channel in stream.channels} for stream in mapping.streams}
+    given = {stream.key: set(stream.units) for stream in mapping.streams}
     named = Counter(topic.topic for topic in topics.present())
     if shared := [name for name, count in named.items() if count > 1]:
         raise ConfigError(
@@ -201,11 +204,10 @@ def _check_streams(mapping: Mapping, campaign: Campaign) -> None:
     for stream in mapping.streams:
         topic = read[stream.key]
         units = dict(zip(topic.fields, topic.units, strict=True))
-        for channel in stream.channels:
-            if channel.unit != units[channel.field]:
+        for field, unit in stream.units.items():
+            if unit != units[field]:
                 raise ConfigError(
-                    f"[{stream.key}] gives {channel.field} in {channel.unit}, which the campaign reads in "
-                    f"{units[channel.field]}",
+                    f"[{stream.key}] gives {field} in {unit}, which the campaign reads in {units[field]}",
                     where=shown(mapping.path),
                     remedy="correct unit and scale, or the joint's type or effort in the rig of "
                     f"{shown(mapping.template)}",

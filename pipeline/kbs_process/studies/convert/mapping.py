@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -19,6 +20,7 @@ from kbs_process.studies.convert import PRESETS, preset_names
 from kbs_process.studies.convert.mapping_file import (
     ColumnTable,
     MappingFile,
+    OrientationTable,
     Part,
     Source,
     TextTable,
@@ -26,6 +28,7 @@ from kbs_process.studies.convert.mapping_file import (
     TimesTable,
     Turn,
 )
+from kbs_process.studies.convert.orientation import Orientation
 
 KELVIN = 273.15  # 0 degC, K
 
@@ -49,6 +52,13 @@ class StreamMap(msgspec.Struct, frozen=True):
     key: str  # as in campaign.toml's [topics]: "wrench", "encoder", ...
     time: Time | None  # None: the file's own
     channels: tuple[Channel, ...]
+    orientations: tuple[Orientation, ...] = ()
+
+    @property
+    def units(self) -> dict[str, str]:
+        """SI units of all numbers, by their places in the message."""
+        angles = {field: "rad" for one in self.orientations for field in one.fields}
+        return {channel.field: channel.unit for channel in self.channels} | angles
 
 
 class Mapping(msgspec.Struct, frozen=True):
@@ -95,7 +105,8 @@ def load_mapping(path: Path) -> Mapping:
     if file.format is not None and file.format not in formats():
         remedy = did_you_mean(file.format, formats())
         problems.add(document.place(("format",)), f"'{file.format}' is not allowed", remedy)
-    streams = tuple(_stream(document, file, key, problems) for key in STREAMS if key in file.model_fields_set)
+    given = file.model_fields_set | ({"encoder"} if file.orientation else set())
+    streams = tuple(_stream(document, file, key, problems) for key in STREAMS if key in given)
     _check_parts(document, file.recording, streams, problems)
     if file.turn:
         _check_turn(document, file.turn, streams, file.recording, problems)
@@ -137,9 +148,33 @@ def _stream(document: Document, file: MappingFile, key: str, problems: Problems)
             rows = [((key,), "temperature", ("degC",), table)]
         case _:
             part = {"rate": "velocity", "effort": "effort"}.get(key, "position")
-            rows = [((key, joint), f"{part}[{joint}]", JOINT_UNITS[part], cell) for joint, cell in table.items()]
+            rows = [
+                ((key, joint), f"{part}[{joint}]", JOINT_UNITS[part], cell) for joint, cell in (table or {}).items()
+            ]
     channels = tuple(_channel(document, *row, problems) for row in rows)
-    return StreamMap(key, _time(document, file.time, key, problems), channels)
+    orientations = [
+        _orientation(document, index, one, problems)
+        for index, one in enumerate(file.orientation or ())
+        if key == "encoder"
+    ]
+    stream = StreamMap(key, _time(document, file.time, key, problems), channels, tuple(orientations))
+    fields = [*(channel.field for channel in channels), *(field for one in orientations for field in one.fields)]
+    if twice := [field for field, count in Counter(fields).items() if count > 1]:
+        problems.add(document.place(("orientation",)), f"{twice[0]} is mapped twice", "give each joint's angle once")
+    return stream
+
+
+def _orientation(document: Document, index: int, one: OrientationTable, problems: Problems) -> Orientation:
+    q, matrix = one.quaternion, one.matrix
+    columns = [] if q is None else [q.w, q.x, q.y, q.z]
+    columns += [] if matrix is None else [column for row in matrix for column in row]
+    if (q is None) == (matrix is None):
+        remedy = "give quaternion = { w, x, y, z } or matrix"
+        problems.add(document.place(("orientation", index)), "has no columns, or those of two", remedy)
+    elif one.at_zero and len(one.at_zero) != len(columns):
+        remedy = "w, x, y, z of a quaternion, a matrix row by row"
+        problems.add(document.place(("orientation", index, "at_zero")), f"has not {len(columns)} numbers", remedy)
+    return Orientation(tuple(one.joints), tuple(columns), one.maps == "base to link", tuple(one.at_zero or ()))
 
 
 def _channel(
@@ -223,7 +258,7 @@ def _check_turn(
     apart = any(part.file_of("encoder") != part.file_of("wrench") for part in parts)
     mapped = {stream.key: stream for stream in streams}
     angles = mapped.get("encoder")
-    fields = [channel.field for channel in angles.channels] if angles else []
+    fields = angles.units if angles else {}
     if "wrench" not in mapped:
         problems.add(document.place(("turn",)), "no wrench is mapped, and only that is turned", "delete [turn]")
         return
@@ -231,7 +266,7 @@ def _check_turn(
         problems.add(
             document.place(("turn", "joint")),
             f"no angle of '{turn.joint}' is mapped",
-            did_you_mean(turn.joint, document.tree.get("encoder", {})),
+            did_you_mean(turn.joint, [field[9:-1] for field in fields]),
         )
     elif angles and (angles.time is None or angles.time != mapped["wrench"].time or apart):
         problems.add(document.place(("turn",)), "needs wrench and angle row by row", "give both the same file and time")

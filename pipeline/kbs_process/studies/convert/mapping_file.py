@@ -20,6 +20,7 @@ from kbs_process.campaign.formats.tables import (
     NotNegative,
     Positive,
     Some,
+    SomeDistinct,
     Table,
     Version,
     by_kind,
@@ -130,6 +131,38 @@ class CommandTable(Table):
     velocity: Joints | None = Field(None, description="desired rate of each joint")
 
 
+class QuaternionTable(Table):
+    """Columns of a quaternion."""
+
+    w: Which = Field(description="the scalar: cos of half the angle")
+    x: Which
+    y: Which
+    z: Which
+
+
+Row = Annotated[list[Which], Field(min_length=3, max_length=3)]
+
+
+class OrientationTable(Table):
+    """Angles of joints from the orientation of the link that the last one carries, against what carries the first."""
+
+    joints: Annotated[SomeDistinct[LinkName], Field(max_length=3)] = Field(
+        description="from the laboratory outwards: all that turn between the two"
+    )
+    quaternion: QuaternionTable | None = None
+    matrix: Annotated[list[Row], Field(min_length=3, max_length=3)] | None = Field(
+        None, description="columns of a rotation matrix, row by row"
+    )
+    maps: Literal["link to base", "base to link"] = Field(
+        description="whose axes a vector is given in, and gets components in; the base carries the first joint"
+    )
+    at_zero: Annotated[list[Magnitude], Field(min_length=4, max_length=9)] | None = Field(
+        None,
+        description="w, x, y, z or the matrix row by row, as the file has it where all joints are at zero, however the "
+        "sensor is mounted; default: no rotation",
+    )
+
+
 class Turn(Table):
     """For a file whose forces and moments are in the axes of a link that does not turn with the transducer."""
 
@@ -153,7 +186,7 @@ class Part(Table):
 
     source: Words = Field(description="file in the source folder")
     file: dict[StreamKey, Words] = Field({}, description="other files there, of streams that lie in one")
-    shift_s: dict[StreamKey, Magnitude] = Field(
+    shift_s: dict[StreamKey, Annotated[float, Field(ge=-4e9, le=4e9)]] = Field(
         {}, description="added to the times of a stream, s, so that its clock agrees with that of the other files"
     )
     shift_sigma_s: NotNegative = Field(
@@ -163,6 +196,9 @@ class Part(Table):
     trajectory: Name
     role: Role
     repeat: Count = 1
+    section: Count | None = Field(
+        None, description="of a text that repeats its line of names, counted from 1; holds for each of its texts"
+    )
     start_s: NotNegative = Field(0.0, description="leave out what is before, s from the file's first sample")
     end_s: Positive = Field(inf, description="leave out this moment and what is after")
 
@@ -206,6 +242,7 @@ class MappingFile(Table):
         "after scale",
     )
     encoder: Joints | None = Field(None, description="angle of each joint, or way of a prismatic one")
+    orientation: Some[OrientationTable] | None = Field(None, description="of links, instead of their joints' angles")
     rate: Joints | None = Field(None, description="rate of each joint")
     command: CommandTable | None = None
     field: Joints | None = Field(None, description="position of each motor's field")

@@ -15,8 +15,13 @@ _PARTS = re.compile(r"[A-Za-z0-9]+")
 _LOAD = re.compile(r"(f|force|m|mom|moment|t|torque)([xyz])|([xyz])(force|moment|torque)", re.IGNORECASE)
 _TIMES = {"t", "time", "timestamp", "stamp", "zeit", "clock"}
 _COMMANDED = {"cmd", "command", "commanded", "demand", "desired", "ref", "reference", "set", "setpoint", "target"}
-_ANGLES = {"angle", "position", "pos", "enc", "encoder", "winkel", "az", "el", "azimuth", "elevation", "joint"}
-_WORDS = {"angle", "position", "pos", "enc", "encoder", "winkel", "actual", "meas"}
+_WORDS = {"angle", "angles", "position", "positions", "pos", "enc", "encoder", "winkel", "actual", "meas"}
+_ANGLES = _WORDS - {"actual", "meas"} | {"az", "el", "azimuth", "elevation", "joint"}
+_RATES = {"velocity", "velocities", "vel", "rate", "speed", "effort", "torque", "torques", "current", "acceleration"}
+_ROTATION = re.compile(
+    r"(?:q|quat|quaternion|orientation|attitude)([wxyz])|(?:r|rot|rotation|dcm|matrix)([1-3][1-3])"
+    r"|(?:q|quat|quaternion|orientation|attitude|rotation|dcm|matrix)(\d)"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,15 +29,19 @@ class Meaning:
     """What a column is for; of no use to a campaign where `stream` is empty."""
 
     column: str
-    stream: str = ""  # "time", "wrench", "encoder"
-    channel: str = ""  # "Fx", or a joint's name
+    stream: str = ""  # "time", "wrench", "encoder", "orientation"
+    channel: str = ""  # "Fx", a joint's name, "w" of a quaternion, "12" of a matrix, or a number "3" in either
     unit: str = QUESTION  # as campaigns write it
 
 
 def meaning(column: Column) -> Meaning:
     """Return what a column's name and unit tell."""
     base, unit = _parted(column)
-    words = [word.lower() for word in _PARTS.findall(re.split("[/.]", base)[-1])]
+    path = [[word.lower() for word in _PARTS.findall(part)] for part in re.split(r"[/.\[]", base)]
+    words = path[-1]
+    if len(path) > 1 and len("".join(words)) == 1:  # an axis, or a place: of what, the part before says
+        words = path[-2] + words
+    around = {word for part in path for word in part}
     kind = dimension(unit)
     if set(words) & _TIMES and kind in ("time", ""):
         return Meaning(column.name, "time", unit=unit)
@@ -41,8 +50,10 @@ def meaning(column: Column) -> Meaning:
         force = first[0].lower() == "f"
         fits = kind == ("force" if force else "torque")
         return Meaning(column.name, "wrench", f"{'F' if force else 'T'}{axis.lower()}", unit if fits else QUESTION)
-    moved = kind == "angle" or (kind in ("length", "") and set(words) & _ANGLES)
-    if set(words) & _COMMANDED or not moved:
+    if (turned := _ROTATION.fullmatch("".join(words))) and not kind:
+        return Meaning(column.name, "orientation", next(filter(None, turned.groups())), "1")
+    moved = kind == "angle" or (kind in ("length", "") and around & _ANGLES and not around & _RATES)
+    if set(words) & _COMMANDED or around & (_COMMANDED - {"set"} | {"field"}) or not moved:
         return Meaning(column.name, unit=unit)
     name = "_".join(word for word in words if word not in _WORDS)
     return Meaning(column.name, "encoder", name if name[:1].isalpha() else f"joint{name}", unit)
@@ -52,7 +63,10 @@ def _parted(column: Column) -> tuple[str, str]:
     """Return a column's name without its unit, and the unit: of the file, in brackets, or the name's last words."""
     name = column.name.strip()
     opened = max(name.rfind(sign) for sign in "[({") if name.endswith(("]", ")", "}")) else -1
-    base, told = (name[:opened], name[opened + 1 : -1]) if opened >= 0 else (name, "")
+    told = name[opened + 1 : -1] if opened >= 0 else ""
+    if name[opened : opened + 1] == "[" and name[opened - 1].strip() and not spelt(told):
+        told = ""  # "position[az]" is an element of something
+    base = name[:opened] if told else name
     if stated := column.unit or told:
         return base, spelt(stated) or QUESTION
     for cut in re.finditer(r"[\s_,/]+", name):
@@ -68,6 +82,22 @@ def by_channel(columns: Sequence[Meaning]) -> dict[str, Meaning]:
         twice = one.channel in found
         found[one.channel] = Meaning(QUESTION, one.stream, one.channel) if twice else one
     return found
+
+
+def rotation(columns: Sequence[Meaning]) -> tuple[str, ...]:
+    """Return columns as an orientation: w, x, y, z or a matrix row by row; none where they are not all, or too many.
+
+    Which of four numbered ones is the scalar is a question; nine are taken by rows, as else the inverse is meant.
+    """
+    found = {one.channel: one.column for one in columns}
+    if len(found) < len(columns):
+        return ()
+    if sorted(found) == sorted("wxyz"):
+        return tuple(found[axis] for axis in "wxyz")
+    numbered = len(found) in (4, 9) and all(len(channel) == 1 for channel in found)
+    if numbered and len(found) == 4:
+        return (QUESTION,) * 4
+    return tuple(found[place] for place in sorted(found)) if len(found) == 9 else ()
 
 
 def runs_of(names: Sequence[str]) -> dict[str, str]:

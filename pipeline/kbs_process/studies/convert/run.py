@@ -7,6 +7,7 @@ from collections.abc import Mapping as MappingOf
 from pathlib import Path
 
 import numpy as np
+from msgspec.structs import replace
 
 from kbs_process.campaign.config import Campaign, Topic
 from kbs_process.campaign.documents import read, shown
@@ -15,6 +16,7 @@ from kbs_process.campaign.locate import CAMPAIGN_FILE
 from kbs_process.errors import OutputError, RecordingError, did_you_mean
 from kbs_process.progress import Progress, SilentProgress
 from kbs_process.recordings.formats import Text
+from kbs_process.recordings.formats.text import TextTable
 from kbs_process.recordings.mcap.messages.encoding import JOINT_PARTS, OutStream
 from kbs_process.recordings.mcap.writer import write_pieces
 from kbs_process.recordings.open_table import open_table
@@ -25,6 +27,7 @@ from kbs_process.signals.records import Array, Block
 from kbs_process.studies.convert.description import Origin, prepare, recording_file, write_campaign
 from kbs_process.studies.convert.mapping import WRENCH_FIELDS, Mapping, StreamMap, find_mapping, load_mapping
 from kbs_process.studies.convert.mapping_file import Part
+from kbs_process.studies.convert.orientation import Attitude
 from kbs_process.studies.convert.streams import Findings, read_part
 
 LATEST_NS = (1 << 31) * 1_000_000_000  # the seconds of a ROS 2 time stamp are a signed 32-bit number
@@ -122,26 +125,28 @@ def _convert_part(
 ) -> tuple[str, ...]:
     """Write one recording; return what was found wrong with its source."""
     opened: dict[tuple[str, Text], Table] = {}
+    texts = {key: replace(text, section=part.section) for key, text in mapping.texts.items()}
     for key, name in ((stream.key, part.file_of(stream.key)) for stream in mapping.streams):
-        text = mapping.texts[key]
-        if (name, text) not in opened:
-            opened[name, text] = open_table(files[name], mapping.format, text)
-    tables = {stream.key: opened[part.file_of(stream.key), mapping.texts[stream.key]] for stream in mapping.streams}
+        if (name, texts[key]) not in opened:
+            opened[name, texts[key]] = open_table(files[name], mapping.format, texts[key])
+    if part.section and not any(isinstance(table, TextTable) for table in opened.values()):
+        remedy = f"leave out `section` of '{part.stem}' in the mapping; start_s and end_s take a part of a file"
+        raise RecordingError("only delimited text has sections", where=shown(files[part.source]), remedy=remedy)
+    tables = {stream.key: opened[part.file_of(stream.key), texts[stream.key]] for stream in mapping.streams}
     findings = Findings()
     topics = {"encoder" if topic.key == "angle" else topic.key: topic for topic in campaign.topics.present()}
+    orientations = (one for stream in mapping.streams for one in stream.orientations)
+    attitudes = [Attitude(one, campaign.rig, shown(mapping.path)) for one in orientations]
     pieces = (
         _out_stream(stream, block, topics[stream.key], tables[stream.key].path)
-        for stream, block in read_part(tables, mapping, part, findings)
+        for stream, block in read_part(tables, mapping, part, findings, attitudes)
     )
     write_pieces(folder / recording_file(part.stem), pieces)
     return findings.lines()
 
 
 def _out_stream(stream: StreamMap, block: Block, topic: Topic, path: Path) -> OutStream:
-    """Return the stream as messages; what the file does not have is NaN in them.
-
-    A file has one clock: recorder's and sensor's are the same.
-    """
+    """Return the stream as messages; what the file does not have is NaN in them."""
     if len(block) and (int(block.stamp.min()) < 0 or int(block.stamp.max()) >= LATEST_NS):
         raise RecordingError(
             f"times of '{stream.key}' reach from {block.stamp.min() / 1e9:g} s to {block.stamp.max() / 1e9:g} s "
@@ -150,7 +155,7 @@ def _out_stream(stream: StreamMap, block: Block, topic: Topic, path: Path) -> Ou
             remedy="check column and unit in [time]; where times begin below zero, give the date of time "
             "zero, such as start = 2026-01-31T12:00:00Z",
         )
-    columns = {channel.field: block.values[:, i] for i, channel in enumerate(stream.channels)}
+    columns = dict(zip(stream.units, block.values.T, strict=True))
     match stream.key:
         case "wrench":
             values = _columns(columns, list(WRENCH_FIELDS.values()), len(block))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import chain
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -24,13 +25,16 @@ def find_shift(
     """Return what is to be added to the times t (n,) of a wrench (n, c), and its sigma, s; None if that is not clear.
 
     The static wrench is a function of the angles (m, j): of their sines and cosines where a joint `turns`, else of the
-    way, and of these in pairs. At the right shift least of the wrench is left beside it. The search covers all shifts
-    at which half of the shorter recording has a partner. Valid where motion does not repeat itself within these.
-    Angles that leap there and back for less than a tenth of the rows are left out. None where times go back, or leap by
+    way, and of these in pairs; without `turns`, of the numbers themselves (elements of a rotation matrix). At the
+    right shift least of the wrench is left beside it. The search covers all shifts at which half of the shorter
+    recording has a partner. Valid where motion does not repeat itself within these. Angles that leap there and back for
+    less than a tenth of the rows are left out. None where times go back, or leap by
     as much as they take otherwise.
     """
     if min(len(t), len(t_angle)) < _FEWEST:
         return None
+    zero = float(t_angle[0] - t[0])  # one may count from 1970
+    t, t_angle = t - t[0], t_angle - t_angle[0]
     coarse = max(1, len(t) // _POINTS)
     rows = slice(None, len(t) // coarse * coarse)
     few = t[rows].reshape(-1, coarse).mean(1), wrench[rows].reshape(-1, coarse, wrench.shape[1]).mean(1)
@@ -48,10 +52,11 @@ def find_shift(
         q = np.stack([np.interp(at[inside], t_angle, one) for one in angle.T])
         parts = [
             one
-            for joint, turn in zip(q, turns, strict=True)
+            for joint, turn in zip(q, turns, strict=bool(turns))
             for one in ((np.sin(joint), np.cos(joint)) if turn else (joint,))
         ]
-        terms = [np.ones(inside.sum()), *parts, *(a * b for i, a in enumerate(parts) for b in parts[:i])]
+        pairs = (a * b for i, a in enumerate(parts) for b in parts[:i])
+        terms = [np.ones(inside.sum()), *(chain(parts, pairs) if turns else q)]
         design = np.stack(terms, axis=1)
         there = loads[inside] - loads[inside].mean(0)
         basis = np.linalg.qr(design)[0]
@@ -85,7 +90,7 @@ def find_shift(
     near = float((residual[1:] * residual[:-1]).sum() / (residual**2).sum())  # neighbours that err alike
     bend = (share(found + step) - 2.0 * share(found) + share(found - step)) / step**2
     spread = 2.0 * share(found) / (max(bend, 1e-300) * len(residual)) * (1.0 + near) / max(1.0 - near, 1e-3)
-    return found, float(np.sqrt(spread))
+    return zero + found, float(np.sqrt(spread))
 
 
 def _between(angle: Array) -> Mask:

@@ -20,6 +20,7 @@ from kbs_process.stages.align.stream import FAR_SLOW_NS, STAMP_EACH
 from kbs_process.studies.convert.clock import nanoseconds, numbers
 from kbs_process.studies.convert.mapping import Channel, Mapping, StreamMap
 from kbs_process.studies.convert.mapping_file import Part, Time, Turn
+from kbs_process.studies.convert.orientation import Attitude
 
 _NO_STAMPS = np.empty(0, dtype=np.int64)
 _SET_BACK = {3600.0: "clocks went from summer to winter time", 43200.0: "it has twelve hours, without a.m. and p.m."}
@@ -59,7 +60,7 @@ class Findings:
 
 
 def read_part(
-    tables: MappingOf[str, Table], mapping: Mapping, part: Part, findings: Findings
+    tables: MappingOf[str, Table], mapping: Mapping, part: Part, findings: Findings, attitudes: Sequence[Attitude] = ()
 ) -> Iterator[tuple[StreamMap, Block]]:
     """Yield the streams of one recording, from a table each, a piece at a time, several passes side by side in time.
 
@@ -68,10 +69,10 @@ def read_part(
     """
     streams = {stream.key: stream for stream in mapping.streams}
     for stream in mapping.streams:
-        yield stream, Block(_NO_STAMPS, _NO_STAMPS, np.empty((0, len(stream.channels))))
+        yield stream, Block(_NO_STAMPS, _NO_STAMPS, np.empty((0, len(stream.units))))
     shifts = {key: part.shift_of(key) for key in streams}
     passes = [
-        _pieces(tables[shared[0].key], mapping, shared, shifts, findings)
+        _pieces(tables[shared[0].key], mapping, shared, shifts, findings, attitudes)
         for shared in _passes(mapping.streams, tables, shifts)
     ]
     start, end = -(1 << 63), (1 << 63) - 1
@@ -105,6 +106,8 @@ def read_part(
             raise RecordingError(f"time of '{key}': {scattered}", where=str(tables[key].path), remedy=STAMP_EACH)
         findings.counts[f"time stamps of '{key}' do not fit where they stand, rows left out"] += arrival.odd
         findings.counts[f"time stamps of '{key}' lie far from all others, rows left out"] += arrival.lone
+    for attitude in attitudes:
+        findings.counts += attitude.conclude(str(tables["encoder"].path))
     for key in streams:
         table = tables[key]
         if findings.rows[key] >= _FEWEST and 2 * findings.repeats[key] >= findings.rows[key]:
@@ -141,8 +144,9 @@ def _check_order(arrival: Arrival, table: Table, stream: StreamMap) -> None:
         f"time of '{stream.key}' goes back by {by * 1e-9:.6g} s at sample {number + 1}, and goes on from there: "
         + (near[0] if near else "the clock was set back, or the logger started again"),
         where=str(table.path),
-        remedy="split the file there (of a text file, skip_rows and rows in the mapping's [text] take one part), and "
-        "import each part as a recording of its own; or give rate_Hz",
+        remedy="split the file there (of a text file, skip_rows and rows in the mapping's [text] take one part, and "
+        "section in [[recording]] one where the names come again), and import each part as a recording of its own; or "
+        "give rate_Hz",
     )
 
 
@@ -187,29 +191,41 @@ def _passes(
 
 
 def _pieces(
-    table: Table, mapping: Mapping, streams: Sequence[StreamMap], shifts: MappingOf[str, float], findings: Findings
+    table: Table,
+    mapping: Mapping,
+    streams: Sequence[StreamMap],
+    shifts: MappingOf[str, float],
+    findings: Findings,
+    attitudes: Sequence[Attitude],
 ) -> Iterator[Piece]:
     time = streams[0].time
     shift = round(shifts.get(streams[0].key, 0.0) * 1e9)  # ns
     channels = [channel for stream in streams for channel in stream.channels]
+    turning = [one for one in attitudes if any(one.orientation in stream.orientations for stream in streams)]
+    parts = [[find_column(table, column).name for column in one.orientation.columns] for one in turning]
     columns = [find_column(table, channel.column) for channel in channels]
     if time is None:
-        clocks = [column.clock for column in columns]
+        timed = [*columns, *(find_column(table, name) for name in chain(*parts))]
+        clocks = [column.clock for column in timed]
         if not all(clocks):
             why = "; ".join(one for one in table.left_out if ": time: " in one)
             raise RecordingError(
-                f"'{columns[clocks.index('')].name}' comes without a time of its own" + (f" ({why})" if why else ""),
+                f"'{timed[clocks.index('')].name}' comes without a time of its own" + (f" ({why})" if why else ""),
                 where=str(table.path),
                 remedy="say in the mapping's [time] which column holds it, or give rate_Hz",
             )
+        written = {column.written for column in timed}
     else:
+        written = {""}
         clock = None if time.column is None else find_column(table, time.column)
         clocks = [clock.name] if clock else []
         if clock and time.rate_Hz is None and clock.unit != "datetime":
             _check_unit(table, clock, time.unit, 1.0, findings)
     for channel, column in zip(channels, columns, strict=True):
         _check_unit(table, column, channel.given, channel.scale, findings)
-    wanted = list(dict.fromkeys([column.name for column in columns] + clocks))
+    recorder = written.pop() if len(written) == 1 else ""
+    others = [*clocks, *([recorder] if recorder else [])]
+    wanted = list(dict.fromkeys([*(column.name for column in columns), *chain(*parts), *others]))
     carry: dict[str, float] = {}
     rows = 0
     for cells in table.chunks(wanted):
@@ -217,6 +233,7 @@ def _pieces(
         _check_lengths(table, named)
         stamp, known = _stamps(table, time, clocks, named, rows)
         stamp = stamp + shift
+        log = nanoseconds(named[recorder], Time.model_construct(), recorder)[0] + shift if recorder else stamp
         rows += len(stamp)
         findings.counts[_TIMELESS] += int((~known).sum())
         again = np.zeros(len(stamp), dtype=np.bool_)
@@ -226,9 +243,12 @@ def _pieces(
             channel.field: _si(named[column.name], channel, carry)
             for channel, column in zip(channels, columns, strict=True)
         }
+        for attitude, names in zip(turning, parts, strict=True):
+            cells_of = np.column_stack([numbers(named[name]) for name in names])
+            values |= zip(attitude.orientation.fields, attitude.angles(cells_of, str(table.path)).T, strict=True)
         if mapping.turn and any(stream.key == "wrench" for stream in streams):
             _turn(values, mapping.turn)
-        yield {stream.key: _select(Block(stamp, stamp, _matrix(stream, values)), known & ~again) for stream in streams}
+        yield {stream.key: _select(Block(stamp, log, _matrix(stream, values)), known & ~again) for stream in streams}
 
 
 def _check_unit(table: Table, column: Column, given: str, scale: float, findings: Findings) -> None:
@@ -299,7 +319,7 @@ def _turn(values: dict[str, Array], turn: Turn) -> None:
 
 
 def _matrix(stream: StreamMap, values: dict[str, Array]) -> Array:
-    return np.column_stack([values[channel.field] for channel in stream.channels])
+    return np.column_stack([values[field] for field in stream.units])
 
 
 def _select(block: Block, mask: Mask) -> Block:
