@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import archived
-from kbs_process.reduction.soundness import copied
+from kbs_process.reduction.soundness.streams import copied
 from kbs_process.signals.records import WRENCH_CHANNELS, Block, Signal
 from kbs_process.stages.align.prints import Printed, Prints
 from kbs_process.stages.align.readings import Watch

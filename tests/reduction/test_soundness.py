@@ -15,7 +15,8 @@ from kbs_process.campaign.config import Campaign
 from kbs_process.campaign.load import load_campaign
 from kbs_process.progress import SilentProgress
 from kbs_process.reduction.preparing import fit_gravity
-from kbs_process.reduction.soundness import _moved_alone, check_model, extent, mistimed, repeated
+from kbs_process.reduction.soundness.checking import _moved_alone, check_model, extent
+from kbs_process.reduction.soundness.streams import mistimed, repeated
 from kbs_process.signals.records import Events, Signal
 from reduction.arm import checked, described, drawn, recorded
 
