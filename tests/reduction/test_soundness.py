@@ -98,7 +98,7 @@ def test_a_channel_that_died_between_recordings_is_told(tmp_path):
     ("which", "column", "told"),
     [
         ((0, 1), None, "channel: Ty does not respond"),
-        ((1,), None, ""),
+        ((1,), None, "channel: Ty does not respond in test"),
         ((0, 1), 0, "mapping: one column is read for two channels"),
     ],
 )
@@ -115,6 +115,30 @@ def test_what_a_channel_reads_that_is_dead_or_read_twice_is_no_load(tmp_path, wh
     found = checked(campaign, recordings)
     assert "; ".join(found.soundness.suggestions) == told
     assert found.doubts(judged)[0].of_failed
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("gain", [0.6, 1.5])
+def test_a_gain_of_one_recording_is_told_and_nothing_is_judged_by_it(tmp_path, gain):
+    campaign = described(tmp_path)
+    sweep, test = recorded(campaign, drawn(campaign, 1), 1)
+    read = test.raw.derive(test.raw.values * np.array([1.0, 1.0, 1.0, 1.0, gain, 1.0]), "read")
+    found = checked(campaign, [sweep, replace(test, raw=read, run=replace(test.run, wrench=read))])
+    (told,) = found.soundness.suggestions
+    assert told.startswith("gain: Ty read ") and told.endswith(" of what acts in test")
+    assert float(told.split()[3]) == pytest.approx(gain, rel=0.02)
+    assert found.doubts(campaign.requirements[0])[0].of_failed, "what is read beyond the limit was not there"
+
+
+@pytest.mark.slow
+def test_a_pull_that_goes_its_own_way_is_judged(tmp_path):
+    campaign = described(tmp_path)
+    sweep, test = recorded(campaign, drawn(campaign, 1), 1)
+    pulled = test.raw.values.copy()
+    pulled[:, 4] += 2.0 * np.sin(0.7 * np.arange(len(pulled)) * test.raw.dt)
+    read = test.raw.derive(pulled, "read")
+    found = checked(campaign, [sweep, replace(test, raw=read, run=replace(test.run, wrench=read))])
+    assert not any(doubt.of_failed for doubt in found.doubts(campaign.requirements[0]))
 
 
 @pytest.mark.slow

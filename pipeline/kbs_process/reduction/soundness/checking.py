@@ -46,6 +46,7 @@ from kbs_process.stages.gravity.tension import TAKEN, lag, tension
 from kbs_process.stages.repeats import commanded
 
 LEFT = 0.1  # of the weight, and of the torque that it can make: a calibration leaves less, whatever rubs or pulls
+FOLLOWED = 0.5  # share of what is left of a channel that follows its computed load: a gain, or what looks like one
 SILENT = 0.1  # slope, against computed loads, of a channel that does not respond
 
 
@@ -153,8 +154,16 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
             told += [words.LATE.format(one.value) for one in shifted[:1]] + [words.TWICE for _ in twice[:1]]
             more = not twice and reasons != (*timed, *still, *words.far(shifted, 1.0))
             causes = explanations(equation, instants, most) if more else ()
-            if dead and not any(one.fault.kind in ("swapped", "axes") for one in causes):  # which leave one silent
+            off = [one for one in conventions if not one.ok]
+            alone = not (timed or still or shifted or twice) and _calibrated(campaign, samples, model, most)
+            alone = alone and all(one.check.rpartition(", ")[2] in tests for one in off)
+            regained = [one for one in off if one.followed > FOLLOWED]
+            if dead and not any(
+                one.fault.kind in ("swapped", "axes", "clock") for one in causes
+            ):  # which leave one silent
                 causes, told = (), told + [f"channel: {key} does not respond" for key in dead]
+            elif alone and regained:
+                causes, told = (), told + [words.regained(one, SILENT) for one in regained]
             told += [words.cause(one, equation) for one in causes]
             soundness = Soundness(
                 sound=False,
@@ -163,9 +172,7 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
                 beyond=tuple(words.beyond(one, model) for one in found.beyond),
                 reasons=reasons,
                 suggestions=tuple(told),
-                calibrated=not (timed or still or shifted or twice)
-                and _calibrated(campaign, samples, model, most)
-                and all(one.ok or (one.channel and one.check.rpartition(", ")[2] in tests) for one in conventions),
+                calibrated=alone and not regained and all(one.channel for one in off),
             )
         silent = tuple(key for key in mute if key in judged)
         unconfirmed = tuple(key for key in equation.channels if key not in tested)

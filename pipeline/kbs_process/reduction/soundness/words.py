@@ -8,6 +8,7 @@ import numpy as np
 
 from kbs_process.results.judged import Beyond
 from kbs_process.signals.records import Array
+from kbs_process.stages.conventions import SignCheck
 from kbs_process.stages.gravity.equation import Equation
 from kbs_process.stages.gravity.hypotheses import Explained
 from kbs_process.stages.gravity.model import GravityModel
@@ -78,6 +79,14 @@ def cause(one: Explained, equation: Equation) -> str:
             return f"zero: that of {fault.what} is not as stated ({_values(found)} for {_values(one.stated)})"
         case _:
             return f"{fault.what} is {_values(found)}, for {_values(one.stated)} as stated"
+
+
+def regained(one: SignCheck, silent: float) -> str:
+    """The gain that a slope of one recording shows, or that it is less than `silent`."""
+    slope, recording = one.slope or 0.0, one.check.rpartition(", ")[2]
+    if abs(slope) < silent:
+        return f"channel: {one.channel} does not respond in {recording}"
+    return f"{gain(one.channel, [one.channel], slope)} in {recording}"
 
 
 def gain(what: str, channels: Sequence[str], gain: float) -> str:
