@@ -40,13 +40,15 @@ from kbs_process.stages.conventions import (
 from kbs_process.stages.gravity import model as gravity
 from kbs_process.stages.gravity.equation import Equation
 from kbs_process.stages.gravity.equation import Prepared as Instants
-from kbs_process.stages.gravity.hypotheses import explanations, shown_gains
+from kbs_process.stages.gravity.hypotheses import explanations, shown_gains, turned
 from kbs_process.stages.gravity.model import GravityModel, Sample, prepared
-from kbs_process.stages.gravity.tension import TAKEN, lag, tension
+from kbs_process.stages.gravity.tension import TAKEN, Moved, lag, tension
 from kbs_process.stages.repeats import commanded
 
 LEFT = 0.1  # of the weight, and of the torque that it can make: a calibration leaves less, whatever rubs or pulls
 FOLLOWED = 0.5  # share of what is left of a channel that follows its computed load: a gain, or what looks like one
+NEAR = 0.1  # of the article's reach from the transducer: no spacecraft's centre of mass is there
+SHOWN = 0.2  # relative error of a gain that the other channels show: beyond, the equation is no line any more
 SILENT = 0.1  # slope, against computed loads, of a channel that does not respond
 
 
@@ -115,7 +117,9 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
         lags = [(one, own) for one, data in zip(recordings, instants, strict=True) if (own := lag(model, data))]
         known = [late_sigma(one.run.clocks, amplifier, one.entry.clock_sigma) for one, _ in lags]
         late = [own.moved(sigma) for (_, own), sigma in zip(lags, known, strict=True) if own.taken >= TAKEN]
-        found = tension(model, {sample.name: taring for sample, taring in tared}, late)
+        gains = shown_gains(equation, instants)
+        read = tuple(_read_gains(equation, gains))
+        found = tension(model, {sample.name: taring for sample, taring in tared}, (*late, *read))
         tested = {one.channel for one in conventions if one.testable and one.channel}
         most = _most(equation)
         if not tested:  # what gravity leaves may be gravity about another axis
@@ -140,13 +144,16 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
             *words.far(found.beyond, found.probability),
             *(f"{one.check} is {one.found}, expected {one.expected}" for one in conventions if not one.ok),
             *_left(model, most),
+            *(
+                words.TURNED.format(joint, np.exp(min(0.5 * rather, 300.0)))
+                for joint, rather in turned(equation, instants)
+            ),
         )
         judged = {key for one in campaign.requirements for key in measurable.judged_channels(one, campaign.rig)}
         mute = tuple(_mute(equation, [read for read, _, _ in shown]))
         failed = [one.check.split() for one in conventions if not one.ok and abs(one.slope or 0.0) < SILENT]
         dead = [key for key in mute if any(key in words for words in failed)]
-        gains = shown_gains(equation, instants)
-        soundness = Soundness(probability=found.probability, gains=gains)
+        soundness = Soundness(probability=found.probability, gains={key: sigma for key, (_, sigma) in gains.items()})
         tests = [one.entry.name for one in recordings if one.entry.role != "calibration"]
         if reasons:
             shifted = [one for one in found.beyond if one in late]
@@ -168,7 +175,7 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
             soundness = Soundness(
                 sound=False,
                 probability=found.probability,
-                gains=gains,
+                gains=soundness.gains,
                 beyond=tuple(words.beyond(one, model) for one in found.beyond),
                 reasons=reasons,
                 suggestions=tuple(told),
@@ -183,7 +190,11 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
 def _hidden(
     campaign: Campaign, requirement: Requirement, recordings: Sequence[Prepared], model: GravityModel
 ) -> Iterator[Doubt]:
-    """What the samples cannot show of a requirement."""
+    """What the samples cannot show of a requirement, and where it cannot be judged."""
+    spacecraft = campaign.rig.spacecraft
+    arm = np.inf if spacecraft is None else float(np.linalg.norm(spacecraft.position.value))
+    if requirement.frame == "S" and 0.0 < arm < NEAR * extent(campaign.rig)[1]:
+        yield Doubt(f"spacecraft.position is {arm:.3g} m from the transducer, within the article: look at its unit")
     yield from measurable.unrecorded(requirement, campaign.rig)
     judged = [one for one in recordings if one.entry.role != "calibration"]
     unclear = measurable.doubtful(campaign, [(one.entry, one.run) for one in judged], requirement.band[1])
@@ -254,6 +265,17 @@ def _read_and_due(one: Prepared, data: Instants, model: GravityModel) -> tuple[A
     C = model.fit.covariance[: equation.size, : equation.size]
     error = np.sqrt(np.maximum(np.einsum("nci,ij,ncj->c", slopes, C, slopes), 0.0) / len(slopes))
     return read, read - (data.wrench - equation.predict(theta, data)) @ reads.T, error
+
+
+def _read_gains(equation: Equation, gains: Mapping[str, tuple[float, float]]) -> Iterator[Moved]:
+    """What each channel reads of what acts, by all other channels, next to its calibration."""
+    rig = equation.elements.rig
+    stated = np.diag(rig.transducer.cross_coupling.sigma)
+    for key, (value, sigma) in gains.items():
+        known = float(stated[WRENCH_CHANNELS.index(key)])
+        chance = float(np.hypot(known, value * sigma))
+        if sigma < SHOWN:
+            yield Moved(f"the gain of {key} by the other channels", 1.0, known, value, chance)
 
 
 def _left(model: GravityModel, most: Array) -> Iterator[str]:

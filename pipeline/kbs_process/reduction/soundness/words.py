@@ -12,12 +12,14 @@ from kbs_process.stages.conventions import SignCheck
 from kbs_process.stages.gravity.equation import Equation
 from kbs_process.stages.gravity.hypotheses import Explained
 from kbs_process.stages.gravity.model import GravityModel
+from kbs_process.stages.gravity.parameters import CROSS_COUPLING
 from kbs_process.stages.gravity.tension import BY_CHANCE, Moved
 
 SCALE = "clock: the times of all streams run too fast or too slow, or rates are in another unit"
 STUCK = "encoder: it is not read, or does not turn with its joint"
 TWICE = "mapping: one column is read for two channels"
 LATE = "clock: the wrench is {:+.2g} s late, by its timestamps or a filter"
+TURNED = "the recordings are {1:.0e} times as likely if {0} turns the other way"
 UNEXPLAINED = (
     "no single simple fault (gain, unit, sign, axis, zero, swapped channels, one number) explains it: look for what "
     "else pulls or rubs, and compare the parameter files with the rig"
@@ -38,7 +40,8 @@ _TORQUES = {
 def far(beyond: Sequence[Moved], probability: float) -> Iterator[str]:
     for one in beyond[:_SHOWN]:
         known = f"{one.prior:.4g} +- {one.prior_sigma:.2g} by what is known"
-        yield f"{one.name} is {one.value:.4g} by the fit, {known}: {abs(one.distance):.1f} sigma"
+        name = f"{one.name} less its certificate" if one.name.startswith(CROSS_COUPLING) else one.name
+        yield f"{name} is {one.value:.4g} by the fit, {known}: {abs(one.distance):.1f} sigma"
     if len(beyond) > _SHOWN:
         yield f"{len(beyond) - _SHOWN} other numbers are as far off"
     if probability < BY_CHANCE and not beyond:
@@ -86,7 +89,9 @@ def regained(one: SignCheck, silent: float) -> str:
     slope, recording = one.slope or 0.0, one.check.rpartition(", ")[2]
     if abs(slope) < silent:
         return f"channel: {one.channel} does not respond in {recording}"
-    return f"{gain(one.channel, [one.channel], slope)} in {recording}"
+    return (
+        f"{gain(one.channel, [one.channel], slope)} in {recording}, unless a load that goes with the angle pulls there"
+    )
 
 
 def gain(what: str, channels: Sequence[str], gain: float) -> str:
