@@ -26,6 +26,8 @@ from kbs_process.stages.gravity.tension import TAKEN
 from kbs_process.stages.repeats import commanded, copies, motion_of
 
 RATED = 1.1  # times: angles that change by more, or by less than its inverse, do not follow their rates
+LEAST_S = 5.0  # for which an angle has to stand still to be called stuck
+_CREEP = 0.05  # of how far a still angle may change, from one instant to the next
 _PART = 0.1  # of the load that a turn would change: less is something else
 _TOLD = 1e-3  # rad: a joint that commands move by less rests
 _TURN = 72  # angles of a turn
@@ -68,11 +70,11 @@ def _same(one: Prepared, other: Prepared) -> bool:
 
 
 def stuck(recordings: Sequence[Prepared], instants: Sequence[Instants], model: GravityModel) -> Iterator[str]:
-    """Turning joints whose angle stands still, while the load changes as it would if they turned.
+    """Turning joints whose angle stands still for a time, while the load changes as it would if they turned.
 
-    What gravity leaves (n, c), over the noise, is far more than in other recordings, is such as a turn of the joint
-    changes, and a good part of that: a blow is less, and what pulls or pushes has a force. A joint that was told to
-    rest does.
+    What gravity leaves then (n, c), over the noise, is far more than in another recording, is such as a turn of the
+    joint changes, and a good part of that: a blow is less, and what pulls or pushes has a force. A joint that was told
+    to rest does.
     """
     equation, rig = model.equation, model.rig
     channels = rig.transducer.channels
@@ -80,15 +82,17 @@ def stuck(recordings: Sequence[Prepared], instants: Sequence[Instants], model: G
     noise = np.maximum(rig.transducer.noise.value[index], 1e-12)
     elsewhere = {name: _power(rms[None, : len(channels)] / noise) for name, rms in model.residual_rms.items()}
     for one, data in zip(recordings, instants, strict=True):
-        left = data.wrench - equation.predict(model.fit.value[: equation.size], data)
-        left = (left - left.mean(axis=0))[:, : len(channels)] / noise
-        power = _power(left)
-        least = BEYOND**2 * max((x for name, x in elsewhere.items() if name != one.entry.name), default=0.0)
+        whole = (data.wrench - equation.predict(model.fit.value[: equation.size], data))[:, : len(channels)] / noise
+        least = BEYOND**2 * min((x for name, x in elsewhere.items() if name != one.entry.name), default=0.0)
         for j, joint in enumerate(rig.joints):
-            moved = np.ptp(data.q[:, j]) > gravity.STILL * max(float(data.sigma_q[:, j].max()), 1e-6)
-            if moved or _rests(joint.name, one.run) or joint.type != "revolute" or power <= least:
+            rows = _still(data.q[:, j], gravity.STILL * max(float(data.sigma_q[:, j].max()), 1e-6))
+            if joint.type != "revolute" or np.ptp(data.t[rows]) < LEAST_S:
                 continue
-            poses = np.tile(data.q.mean(axis=0) - encoder_offsets(rig), (_TURN, 1))
+            left = whole[rows] - whole[rows].mean(axis=0)
+            power = _power(left)
+            if power <= least or _rests(joint.name, one.run, *data.t[rows][[0, -1]].tolist()):
+                continue
+            poses = np.tile(data.q[rows].mean(axis=0) - encoder_offsets(rig), (_TURN, 1))
             poses[:, j] += 2.0 * np.pi * np.arange(_TURN) / _TURN
             turned = static_wrench(rig, poses)[:, index] / noise
             turned -= turned.mean(axis=0)
@@ -96,13 +100,27 @@ def stuck(recordings: Sequence[Prepared], instants: Sequence[Instants], model: G
             along = along[size > _UNCHANGED * size[0]]
             within = _PART**2 * _power(turned) < power <= float(np.max(np.sum(turned**2, axis=1)))
             if within and _power(left - left @ along.T @ along) < TAKEN * power:
-                yield f"the angle of {joint.name} is still in {one.entry.name}, and the load changes as if it turned"
+                whole_run = len(left) == len(data.t)
+                span = "" if whole_run else f" from {data.t[rows][0]:.0f} s to {data.t[rows][-1]:.0f} s"
+                where = f"{joint.name} is still in {one.entry.name}{span}"
+                yield f"the angle of {where}, and the load changes as if it turned"
 
 
-def _rests(joint: str, run: Run) -> bool:
-    """Whether commands say that a joint does not turn."""
+def _still(q: Array, apart: float) -> slice:
+    """The longest stretch of angles (n,) that do not change, and are no more than `apart`."""
+    same = np.concatenate([[False], np.abs(np.diff(q)) <= _CREEP * apart, [False]])
+    edges = np.flatnonzero(same[1:] != same[:-1]).reshape(-1, 2)
+    still = [slice(start, end + 1) for start, end in edges if np.ptp(q[start : end + 1]) <= apart]
+    return max(still, key=lambda rows: int(rows.stop - rows.start), default=slice(0, 1))
+
+
+def _rests(joint: str, run: Run, begin: float, end: float) -> bool:
+    """Whether commands say that a joint does not turn from `begin` to `end`, s."""
     told = commanded(run)
-    return told is not None and joint in told.channels and bool(np.ptp(told.column(joint)) < _TOLD)
+    if told is None or joint not in told.channels:
+        return False
+    then = told.column(joint)[(told.t >= begin) & (told.t <= end)]
+    return bool(np.ptp(then) < _TOLD) if len(then) else False
 
 
 def _power(x: Array) -> float:

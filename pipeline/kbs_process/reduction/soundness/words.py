@@ -18,7 +18,7 @@ from kbs_process.stages.gravity.tension import BY_CHANCE, Moved
 SCALE = "clock: the times of all streams run too fast or too slow, or rates are in another unit"
 STUCK = "encoder: it is not read, or does not turn with its joint"
 TWICE = "mapping: one column is read for two channels"
-LATE = "clock: the wrench is {:+.2g} s late, by its timestamps or a filter"
+LATE = "clock: the wrench is {:+.2g} s late, or more, by its timestamps or a filter"
 TURNED = "the recordings are {1:.0e} times as likely if {0} turns the other way"
 UNEXPLAINED = (
     "no single simple fault (gain, unit, sign, axis, zero, swapped channels, one number) explains it: look for what "

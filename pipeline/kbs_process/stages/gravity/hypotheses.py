@@ -31,7 +31,6 @@ _STEPS = 3  # of the equation, made linear anew about what was found
 _FREE = 1e3  # times its sigma, a number that is set free may move
 _AS_GOOD = 20.0  # twice the logarithm of a likelihood ratio
 _RATHER = 100.0  # of the same, by which data have to prefer what nothing else makes doubtful
-_NEAR = 400.0  # of the same, within which a fault is solved again, made linear about what was found
 _MOST = 4  # faults named
 _ANGLES = {  # rad, of what was taken for a radian
     "degrees": np.pi / 180.0,
@@ -74,9 +73,8 @@ def explanations(equation: Equation, prepared: Sequence[Prepared], most: Array) 
     data = _linear(equation, [p.rows(_spread(len(p.q))) for p in prepared[:_RECORDINGS]])
     tried = [_solve(data, fault, most, anew=False) for fault in _faults(data)]
     nearest = min((one.cost for one in tried if one.sound), default=np.inf)
-    near = [one for one in tried if one.cost < nearest or (one.sound and one.cost < nearest + _NEAR)]
-    nearest_first = sorted(near, key=lambda one: one.cost)[:_AGAIN]
-    again = [_solve(data, one.fault, most, anew=True) for one in near if one in nearest_first]
+    near = sorted((one for one in tried if one.sound or one.cost < nearest), key=lambda one: one.cost)[:_AGAIN]
+    again = [_solve(data, one.fault, most, anew=True) for one in tried if one in near]
     best = min((one.cost for one in again if one.sound), default=0.0) + _AS_GOOD
     return tuple(one for one in again if one.sound and one.cost < best)[:_MOST]
 
