@@ -56,6 +56,15 @@ def test_what_is_drawn_is_left_out_and_told(curve: str, decimals: int, piece: in
     assert not gone and "drawn between others" in loss.detail
 
 
+@pytest.mark.parametrize("piece", [70, 2000])
+def test_readings_that_a_logger_repeats_in_all_channels_are_missing_for_as_long(piece: int) -> None:
+    """Also where a channel that is cut off is judged: a load holds no six channels at once."""
+    values = swing()
+    values[DRAWN] = values[DRAWN.start]
+    gone, losses = passed(values, keep=True, piece=piece)
+    assert gone == set(range(DRAWN.start, DRAWN.stop)) and losses == ()
+
+
 @pytest.mark.parametrize("decimals", [3, 5, 15])
 @pytest.mark.parametrize("noise", [1.0, 0.0])
 def test_noise_as_stated_and_none_at_all_are_not_drawn(noise: float, decimals: int) -> None:
