@@ -12,7 +12,7 @@ from kbs_process.campaign.load import load_campaign
 from kbs_process.progress import SilentProgress
 from kbs_process.reduction.preparing import Prepared, fit_gravity
 from kbs_process.reduction.settings import motion_settings
-from kbs_process.reduction.soundness import Checked, check_model
+from kbs_process.reduction.soundness.checking import Checked, check_model
 from kbs_process.rig.model import Rig
 from kbs_process.signals.records import Array
 from kbs_process.stages import decouple, motion

@@ -6,9 +6,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.signal import butter, lfilter
 
 import archived
-from kbs_process.reduction.soundness import copied
+from kbs_process.reduction.soundness.streams import copied
 from kbs_process.signals.records import WRENCH_CHANNELS, Block, Signal
 from kbs_process.stages.align.prints import Printed, Prints
 from kbs_process.stages.align.readings import Watch
@@ -62,6 +63,16 @@ def test_a_part_that_is_turned_round_in_time_is_found(step):
     second[3013:3313] = np.round(first[1000:1300][::-1] / step) * step
     (why,) = found(first, second)
     assert "Ty" in why and " in b, from 30." in why and "s to 32." in why and "come in a as well" in why
+
+
+def test_what_is_smooth_may_be_the_same_by_chance():
+    """Filtered below a hertz and rounded to a microunit, at rest; and a straight line that somebody drew."""
+    still = [np.round(lfilter(*butter(2, 0.3, fs=RATE), noise(seed), axis=0), 5) for seed in (1, 2)]
+    assert found(*still) == []
+    first, second = noise(1), noise(2)
+    for values in (first, second):
+        values[3000:3400] = np.round(np.linspace(values[3000], values[3400], 400), 6)
+    assert found(first, second) == []
 
 
 def test_a_part_that_comes_again_in_the_same_recording_is_found():

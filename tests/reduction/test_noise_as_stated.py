@@ -10,7 +10,7 @@ import pytest
 from scipy.signal import lfilter
 
 import archived
-from kbs_process.reduction.soundness import unlike_stated
+from kbs_process.reduction.soundness.noise import unlike_stated
 from kbs_process.signals.records import Block
 from kbs_process.stages.align.readings import Readings
 from kbs_process.stages.align.spectrum import Welch

@@ -15,8 +15,12 @@ from kbs_process.campaign.config import Campaign
 from kbs_process.campaign.load import load_campaign
 from kbs_process.progress import SilentProgress
 from kbs_process.reduction.preparing import fit_gravity
-from kbs_process.reduction.soundness import _moved_alone, check_model, extent, mistimed, repeated
+from kbs_process.reduction.settings import motion_settings
+from kbs_process.reduction.soundness.checking import _moved_alone, check_model, extent
+from kbs_process.reduction.soundness.streams import mistimed, repeated
+from kbs_process.rig.model import Quantity, Spacecraft
 from kbs_process.signals.records import Events, Signal
+from kbs_process.stages import motion
 from reduction.arm import checked, described, drawn, recorded
 
 UNIT = np.eye(6)
@@ -30,6 +34,7 @@ FAULTS = {
     "sign: Fz negated": {"reads": np.diag([1.0, 1.0, -1.0, 1.0, 1.0, 1.0])},
     "swapped: Fx and Fz": {"reads": UNIT[[2, 1, 0, 3, 4, 5]]},
     "swapped: Tx and Ty": {"reads": UNIT[[0, 1, 2, 4, 3, 5]]},
+    "swapped: x and y, of forces and torques": {"reads": UNIT[[1, 0, 2, 4, 3, 5]]},
     "unit: angles of arm": {"angle": np.degrees(1.0)},
     "zero: the angle of arm": {"zero": 0.3},
 }
@@ -97,7 +102,7 @@ def test_a_channel_that_died_between_recordings_is_told(tmp_path):
     ("which", "column", "told"),
     [
         ((0, 1), None, "channel: Ty does not respond"),
-        ((1,), None, ""),
+        ((1,), None, "channel: Ty does not respond in test"),
         ((0, 1), 0, "mapping: one column is read for two channels"),
     ],
 )
@@ -114,6 +119,100 @@ def test_what_a_channel_reads_that_is_dead_or_read_twice_is_no_load(tmp_path, wh
     found = checked(campaign, recordings)
     assert "; ".join(found.soundness.suggestions) == told
     assert found.doubts(judged)[0].of_failed
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("gain", [0.6, 1.5])
+def test_a_gain_of_one_recording_is_told_and_nothing_is_judged_by_it(tmp_path, gain):
+    campaign = described(tmp_path)
+    sweep, test = recorded(campaign, drawn(campaign, 1), 1)
+    read = test.raw.derive(test.raw.values * np.array([1.0, 1.0, 1.0, 1.0, gain, 1.0]), "read")
+    found = checked(campaign, [sweep, replace(test, raw=read, run=replace(test.run, wrench=read))])
+    (told,) = found.soundness.suggestions
+    assert told.startswith("gain: Ty read ") and " of what acts in test, unless a load" in told
+    assert float(told.split()[3]) == pytest.approx(gain, rel=0.02)
+    assert found.doubts(campaign.requirements[0])[0].of_failed, "what is read beyond the limit was not there"
+
+
+def vague(folder):
+    """An arm of which only the joint's axis is known well, as `init` writes it."""
+    campaign = described(folder)
+    text = (folder / "rig.toml").read_text()
+    for name, sigma in (("mass", "1.0"), ("cog", "0.3"), ("inertia", "0.3")):
+        text = re.sub(rf"(?m)^({name} = .*sigma = )[^,]*", rf"\g<1>{sigma}", text)
+    (folder / "rig.toml").write_text(text)
+    return load_campaign(folder, checksums=False), drawn(campaign, 1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("gain", "told"), [(0.6, True), (1.0, False)])
+def test_inertia_forces_show_a_gain_that_vague_files_hide(tmp_path, gain, told):
+    """A gain of Ty alone moves the centre of gravity, and the forces of motion do not follow."""
+    campaign, arm = vague(tmp_path)
+    reads = np.diag([1.0, 1.0, 1.0, 1.0, gain, 1.0])
+    found = checked(campaign, recorded(campaign, arm, 1, reads=reads, period=8.0))
+    assert found.soundness.sound is not told, found.soundness.reasons
+    assert any(one.startswith("gain: Ty read 0.6") for one in found.soundness.suggestions) is told
+    assert any("the gain of Ty by the other channels is 0.6" in one for one in found.soundness.reasons) is told
+
+
+@pytest.mark.slow
+def test_forces_of_motion_show_which_way_a_joint_turns_that_vague_files_hide(tmp_path):
+    campaign, arm = vague(tmp_path)
+    found = checked(campaign, recorded(campaign, arm, 1, angle=-1.0, period=8.0)).soundness
+    assert any(one.endswith("times as likely if arm turns the other way") for one in found.reasons), found.reasons
+    assert any(one.startswith("sign: the angle of arm") for one in found.suggestions)
+
+
+@pytest.mark.slow
+def test_a_spacecraft_s_centre_of_mass_within_the_article_is_not_judged_about(tmp_path):
+    campaign, doubts = described(tmp_path), {}
+    recordings = recorded(campaign, drawn(campaign, 1), 1)
+    model = fit_gravity(campaign, recordings, SilentProgress())
+    for arm in (1.8e-3, 1.8):
+        position = Quantity("spacecraft.position", np.array([0.0, 0.0, -arm]), "m", np.zeros(3), "drawing")
+        attitude = Quantity("spacecraft.attitude", np.zeros(3), "rad", np.zeros(3), "drawing")
+        judged = replace(campaign.requirements[0], frame="S")
+        there = replace(campaign.rig, spacecraft=Spacecraft(position, attitude))
+        of = replace(campaign, rig=there, requirements=(judged,))
+        found = check_model(of, recordings, model, SilentProgress()).doubts(judged)
+        doubts[arm] = [one.why for one in found]
+    assert doubts == {
+        1.8e-3: ["spacecraft.position is 0.0018 m from the transducer, within the article: look at its unit"],
+        1.8: [],
+    }
+
+
+@pytest.mark.slow
+def test_an_encoder_that_stops_on_the_way_is_told_in_each_recording(tmp_path):
+    campaign = described(tmp_path)
+    names = ("sweep", "test", "again")
+    campaign = replace(
+        campaign, recordings=tuple(replace(campaign.recordings[min(k, 1)], name=name) for k, name in enumerate(names))
+    )
+    recordings = recorded(campaign, drawn(campaign, 1), 1)
+    for place in (1, 2):
+        one = recordings[place]
+        angle = one.run.angle.values.copy()
+        stop = int(50.0 / one.run.angle.dt)
+        angle[stop:] = angle[stop]
+        run = replace(one.run, angle=one.run.angle.derive(angle, "stopped"))
+        recordings[place] = replace(one, run=run, motion=motion.estimate(run, campaign.rig, motion_settings(campaign)))
+    found = checked(campaign, recordings).soundness
+    stopped = [one for one in found.reasons if one.startswith("the angle of arm is still in")]
+    assert [one.split()[7] for one in stopped] == ["test", "again"] and "from 5" in stopped[0], found.reasons
+    assert found.suggestions[0].startswith("encoder: it is not read")
+
+
+@pytest.mark.slow
+def test_a_pull_that_goes_its_own_way_is_judged(tmp_path):
+    campaign = described(tmp_path)
+    sweep, test = recorded(campaign, drawn(campaign, 1), 1)
+    pulled = test.raw.values.copy()
+    pulled[:, 4] += 2.0 * np.sin(0.7 * np.arange(len(pulled)) * test.raw.dt)
+    read = test.raw.derive(pulled, "read")
+    found = checked(campaign, [sweep, replace(test, raw=read, run=replace(test.run, wrench=read))])
+    assert not any(doubt.of_failed for doubt in found.doubts(campaign.requirements[0]))
 
 
 @pytest.mark.slow

@@ -382,6 +382,14 @@ def test_revising_keeps_what_it_does_not_replace(tmp_path: Path) -> None:
     assert content(target) == whole("old") | {"index.html": "new page"}
 
 
+def test_an_error_while_revising_names_the_folder_that_stays(tmp_path: Path) -> None:
+    target = tmp_path / "A"
+    write(target, "old")
+    with pytest.raises(OutputError) as refused, revising(target) as folder:
+        raise OutputError("is damaged", where=str(folder / MARKER))
+    assert refused.value.where == str(target / MARKER)
+
+
 def test_results_are_as_readable_as_any_folder(tmp_path: Path) -> None:
     target, other = tmp_path / "A", tmp_path / "B"
     write(target, "new")

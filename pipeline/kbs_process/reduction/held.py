@@ -1,9 +1,10 @@
-"""Readings that a transducer's channel holds although it has noise: saturated, cut off or dead.
+"""Readings that a transducer's channel holds although it has noise, saturated, cut off or dead; and drawn ones.
 
 A channel holds a reading for longer than chance would have it: readings with noise sigma in steps of D are the same
 with a probability of up to erf(D / (sqrt(8) sigma)). Where the noise is less than half a step, as stated or as readings
 around show, they are coarse, and none is held. Where none show the noise, only half a second and more is held.
-What is held is left out as if it were missing.
+Readings that lie on a parabola to within their steps, for `HELD_S` and for longer than chance would have it, were drawn
+between others: they have no noise, either. What is held or drawn is left out as if it were missing.
 A joint's effort may be what was commanded, or zero behind a brake, and is not looked at.
 """
 
@@ -41,8 +42,8 @@ def noisy(rig: Rig) -> dict[str, float]:
 class Alive:
     """Passes the blocks of a recording on, without rows in which a channel is held; tells what it has left out.
 
-    With `keep` it leaves out only where all channels are held for less than `HELD_S`, and tells of all the rest: a peak
-    that was cut off was no smaller.
+    With `keep` it leaves out only where all channels are held at once, which no load does, and tells of all the rest: a
+    peak that was cut off was no smaller.
     """
 
     def __init__(self, rig: Rig, entry: RecordingEntry, *, keep: bool = False) -> None:
@@ -94,6 +95,7 @@ class _Stream:
     counts: dict[int, int] = field(default_factory=dict)
     spans: dict[int, tuple[int, int]] = field(default_factory=dict)  # ns
     reading: dict[int, float] = field(default_factory=dict)
+    drawn: set[int] = field(default_factory=set)
     step: dict[int, float] = field(default_factory=dict)  # the least that readings differed by
     own: dict[int, float] = field(default_factory=dict)  # the noise that readings show, at most
     repeats: float = np.inf  # rows of one reading of all channels
@@ -121,8 +123,7 @@ class _Stream:
         every = {column: self._held(column, block.values[:, column], least) for column in self.channels}
         gone = np.logical_or.reduce([held[part] for held in every.values()])
         if self.keep:
-            gone = np.logical_and.reduce(list(every.values())) & (len(every) > 1)
-            gone = (gone & ~_same(np.where(gone, 0.0, np.nan), least))[part]
+            gone = (np.logical_and.reduce(list(every.values())) & (len(every) > 1))[part]
         for column, held in every.items():
             told = held[part] & ~gone if self.keep else held[part]
             if told.any():
@@ -137,18 +138,19 @@ class _Stream:
         """(n,) where a channel holds what it reads."""
         size = np.abs(np.diff(x[np.isfinite(x)]))
         step = min(self.step.get(column, np.inf), float(size[size > 0.0].min(initial=np.inf)))
-        held = _same(x, least)
+        held, few = _same(x, least), least
         if np.isfinite(step):
             self.step[column] = step
             free = x[~held & np.isfinite(x)]
             if len(free) >= FREE:
                 own = float(np.sqrt(max(float(white(free)) ** 2 - step**2 / 12.0, 0.0)))
                 self.own[column] = max(own, self.own.get(column, 0.0))
-                least = int(min(least, FEW * self.repeats))
+                few = int(min(least, FEW * self.repeats))
             noise = min(self.noise[column], self.own.get(column, np.inf))
             chance = max(erf(step / (np.sqrt(8.0) * max(noise, 0.5 * step))), CHANCE)
-            held = _same(x, max(least, 1 + int(np.ceil(np.log(CHANCE) / np.log(chance)))))
+            held = _same(x, max(few, 1 + int(np.ceil(np.log(CHANCE) / np.log(chance)))))
             held &= noise >= 0.5 * step
+            held |= _drawn(x, step, noise, least)
         return held
 
     def _note(self, column: int, block: Block, held: Mask) -> None:
@@ -157,6 +159,8 @@ class _Stream:
         begin = self.spans.get(column, (int(stamps[0]), 0))[0]
         self.spans[column] = begin, int(stamps[-1])
         self.reading[column] = float(block.values[held, column][-1])
+        if len(stamps) > 2 and np.all(np.diff(block.values[held, column][-3:]) != 0.0):
+            self.drawn.add(column)
 
     def check(self, entry: RecordingEntry) -> None:
         for column, count in self._counted():
@@ -178,7 +182,9 @@ class _Stream:
         for column, count in self._counted():
             begin, end = ((stamp - self.first) * 1e-9 for stamp in self.spans[column])
             detail = "one reading without noise: saturated or cut off"
-            if count == self.rows:
+            if column in self.drawn:
+                detail = "readings on a smooth line without noise: drawn between others, not measured"
+            elif count == self.rows:
                 detail = "one reading throughout: not connected, or in steps that are greater than its noise"
             yield Loss("held", self.channels[column], count, begin, end, detail)
 
@@ -201,4 +207,23 @@ def _same(x: Array, least: int) -> Mask:
     found = np.zeros(len(x), dtype=np.bool_)
     for start, end in edges[edges[:, 1] - edges[:, 0] + 1 >= least]:
         found[start : end + 1] = True
+    return found
+
+
+def _drawn(x: Array, step: float, noise: float, least: int) -> Mask:
+    """(n,) where `least` or more readings in a row, in steps of `step`, lie on a parabola as noise would not have them.
+
+    Third differences take a parabola off, and rounding leaves four steps of them at most. Noise leaves no more in k of
+    them with a probability of about erf(4 step / (sqrt(2) noise))**k, whose logarithms' mean gain is one.
+    """
+    found = np.zeros(len(x), dtype=np.bool_)
+    chance = erf(4.0 * step / (np.sqrt(2.0) * noise)) if noise > 0.0 else 1.0
+    needed = np.inf if chance >= 1.0 else np.log(CHANCE) / np.log(chance) if chance > 0.0 else 1.0
+    if needed > max(least, FREE) or len(x) < 4:
+        return found
+    least = max(least - 3, int(np.ceil(needed)))
+    smooth = np.concatenate([[False], np.abs(np.diff(x, n=3)) <= 4.0 * step, [False]])
+    edges = np.flatnonzero(smooth[1:] != smooth[:-1]).reshape(-1, 2)
+    for start, end in edges[edges[:, 1] - edges[:, 0] >= least]:
+        found[start : end + 3] = True
     return found

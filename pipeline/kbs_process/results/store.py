@@ -30,7 +30,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from kbs_process import interruption
-from kbs_process.errors import OutputError
+from kbs_process.errors import KbsError, OutputError
 
 RESULTS = "results.json"  # a folder that holds this file holds results
 LIST = ".kbs-process.sha256"  # the list of what was written, in a folder of results
@@ -100,6 +100,9 @@ def _replacing(target: Path, made: str, *, revised: Collection[str] | None = Non
                 _flush(private)
                 interruption.check()
                 _put_in_place(private, target)
+            except KbsError as error:
+                error.where = error.where.replace(str(private), str(target))  # which stays
+                raise
             finally:
                 shutil.rmtree(private, ignore_errors=True)
 
@@ -207,6 +210,15 @@ def _recover(target: Path) -> None:
 def _is_ours(folder: Path) -> bool:
     """Whether this program made a folder."""
     return folder.is_dir() and not folder.is_symlink() and (folder / LIST).is_file()
+
+
+def check_unchanged(folder: Path, name: str = RESULTS) -> None:
+    """Raise OutputError if a file of a results folder is not what this program wrote."""
+    written = {name: digest for digest, name in _listed(folder)}
+    if name in written and (folder / name).is_file() and _digest(folder / name) != written[name]:
+        raise OutputError(
+            "was changed since kbs-process wrote it", where=str(folder / name), remedy="process the campaign again"
+        )
 
 
 def _files_of_the_user(target: Path, made: str, *, revised: Collection[str] | None) -> list[str]:

@@ -32,6 +32,9 @@ class SignCheck(Record, frozen=True, kw_only=True):
     testable: bool = True  # whether these data could show that it is wrong
     slope: float | None = None
     sigma: float | None = None  # of the slope: by what the files do not know exactly, and by what else varies
+    followed: float = (
+        0.0  # share of what a slope of one leaves, by power, that follows the computed load as a gain has it
+    )
 
 
 def check_weight(rig: Rig) -> tuple[SignCheck, ...]:
@@ -86,6 +89,7 @@ def check_gravity_sign(
                 testable=bool(testable),
                 slope=slope,
                 sigma=sigma,
+                followed=(slope - 1.0) ** 2 * power / max(float((y - x) @ (y - x)), 1e-300),
             )
         )
     return tuple(tests)

@@ -12,6 +12,7 @@ import pytest
 
 from kbs_process.errors import OutputError
 from kbs_process.results.records import FILE, encode, load
+from kbs_process.results.store import writing
 from kbs_process.results.tables import read_table
 from kbs_process.studies.compare.results import ComparisonResults
 from kbs_process.studies.compare.run import compare
@@ -87,6 +88,17 @@ def test_spectra_of_the_deciding_channels_are_kept(tmp_path: Path) -> None:
     source = read_table(one / "tables" / "spectrum" / f"{decisive.recording}.parquet")
     kept = read_table(tmp_path / "out" / "tables" / "spectra" / "1.parquet")
     assert list(kept["0.measured"]) == list(source[f"{decisive.channel}.measured"])
+
+
+def test_results_that_were_changed_by_hand_are_refused(processed: Callable[..., Path], tmp_path: Path) -> None:
+    one, other = (processed(name, date="", mass=8.0, sigma=0.1) for name in ("ONE", "OTHER"))
+    with writing(tmp_path / "kept") as folder:
+        (folder / FILE).write_bytes((other / FILE).read_bytes())
+    compare([one, tmp_path / "kept"], tmp_path / "out", pdf=False)
+    kept = (tmp_path / "kept" / FILE).read_text()
+    (tmp_path / "kept" / FILE).write_text(kept.replace("0.06", "0.07"))
+    with pytest.raises(OutputError, match="was changed since kbs-process wrote it"):
+        compare([one, tmp_path / "kept"], tmp_path / "out", pdf=False)
 
 
 def test_results_of_another_kind_are_refused_by_name(processed: Callable[..., Path], tmp_path: Path) -> None:

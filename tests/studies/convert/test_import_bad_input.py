@@ -48,6 +48,30 @@ def _import(folder: Path, file: str, mapping: str = MAPPING, notices: list[str] 
     )
 
 
+@pytest.mark.parametrize(("name", "refused"), [("Fy [kN]", True), ("Fy (N)", False), ("Fy (bridge 4)", False)])
+def test_a_unit_in_a_column_s_name_contradicts_the_mapping(tmp_path: Path, name: str, refused: bool) -> None:
+    write_csv(tmp_path / "log.csv", signals(500))
+    text = (tmp_path / "log.csv").read_text()
+    (tmp_path / "log.csv").write_text(re.sub(r"\bFy\b", name, text, count=1))
+    mapping = MAPPING.replace('"Fy"', f'"{name}"')
+    if not refused:
+        _import(tmp_path, "log.csv", mapping)
+        return
+    with pytest.raises(RecordingError, match=r"'Fy \[kN\]' is in 'kN' as the file states it, in 'N' as"):
+        _import(tmp_path, "log.csv", mapping)
+
+
+@pytest.mark.parametrize("times", ["03/05/2026 11:59:00 PM", "03.05.2026 23:59"])
+def test_dates_that_are_no_iso_8601_are_told_how_to_be_written(tmp_path: Path, times: str) -> None:
+    write_csv(tmp_path / "log.csv", signals(500))
+    head, *rows = (tmp_path / "log.csv").read_text().splitlines()
+    place = head.split(",").index("t") if "t" in head.split(",") else 0
+    dated = [",".join(times if k == place else cell for k, cell in enumerate(row.split(","))) for row in rows]
+    (tmp_path / "log.csv").write_text("\n".join([head, *dated]))
+    with pytest.raises(RecordingError, match="a date as ISO 8601 writes it, such as 2026"):
+        _import(tmp_path, "log.csv", MAPPING.replace('unit = "s"', 'unit = "datetime"'))
+
+
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from math import comb
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -64,7 +65,8 @@ def again(prints: Sequence[Prints], noise: Array) -> dict[tuple[int, int], tuple
     """When (ns) the first and the last run of a channel begins that an earlier recording, or the same one, has as well.
 
     By places of both recordings. Two runs are the same if they differ by a constant, or by no more than
-    the steps of one, which are twice those of the other; the noise (n,) of each recording is more than that.
+    the steps of one, which are twice those of the other; the noise (n,) of each recording, and what each run has of
+    it, are more than that.
     """
     words, at = np.concatenate([one.words for one in prints]), np.concatenate([one.at for one in prints])
     runs = np.concatenate([one.runs for one in prints])
@@ -74,7 +76,8 @@ def again(prints: Sequence[Prints], noise: Array) -> dict[tuple[int, int], tuple
     a, b = np.sort(order, axis=0)
     finer, coarser = np.sort([_step(runs[a]), _step(runs[b])], axis=0)
     apart = np.where(coarser - finer < 0.5 * coarser, 2.0 * _ON_GRID, 1.0) * coarser + _STEPS[0]
-    least = np.minimum(noise[which[a]], noise[which[b]])
+    own = np.sqrt(np.mean(np.diff(runs, ORDER) ** 2, axis=1) / comb(2 * ORDER, ORDER))
+    least = np.min([noise[which[a]], noise[which[b]], own[a], own[b]], axis=0)
     same = (np.ptp(runs[a] - runs[b], axis=1) <= apart) & (coarser < least)
     found: dict[tuple[int, int], tuple[int, int]] = {}
     for one, other, when in zip(which[a[same]].tolist(), which[b[same]].tolist(), at[b[same]].tolist(), strict=True):

@@ -30,7 +30,7 @@ _ROUNDS = 4  # of weights
 _STEPS = 3  # of the equation, made linear anew about what was found
 _FREE = 1e3  # times its sigma, a number that is set free may move
 _AS_GOOD = 20.0  # twice the logarithm of a likelihood ratio
-_NEAR = 400.0  # of the same, within which a fault is solved again, made linear about what was found
+_RATHER = 100.0  # of the same, by which data have to prefer what nothing else makes doubtful
 _MOST = 4  # faults named
 _ANGLES = {  # rad, of what was taken for a radian
     "degrees": np.pi / 180.0,
@@ -73,19 +73,41 @@ def explanations(equation: Equation, prepared: Sequence[Prepared], most: Array) 
     data = _linear(equation, [p.rows(_spread(len(p.q))) for p in prepared[:_RECORDINGS]])
     tried = [_solve(data, fault, most, anew=False) for fault in _faults(data)]
     nearest = min((one.cost for one in tried if one.sound), default=np.inf)
-    near = [one for one in tried if one.cost < nearest or (one.sound and one.cost < nearest + _NEAR)]
-    nearest_first = sorted(near, key=lambda one: one.cost)[:_AGAIN]
-    again = [_solve(data, one.fault, most, anew=True) for one in near if one in nearest_first]
+    near = sorted((one for one in tried if one.sound or one.cost < nearest), key=lambda one: one.cost)[:_AGAIN]
+    again = [_solve(data, one.fault, most, anew=True) for one in tried if one in near]
     best = min((one.cost for one in again if one.sound), default=0.0) + _AS_GOOD
     return tuple(one for one in again if one.sound and one.cost < best)[:_MOST]
 
 
-def shown_gains(equation: Equation, prepared: Sequence[Prepared]) -> dict[str, float]:
-    """Standard deviation of each channel's gain, relative, if nothing is known of it but what gravity shows."""
+def shown_gains(equation: Equation, prepared: Sequence[Prepared]) -> dict[str, tuple[float, float]]:
+    """Each channel's gain, and its relative standard deviation, if nothing is known of it but what gravity shows."""
     data = _linear(equation, [p.rows(_spread(len(p.q))) for p in prepared[:_RECORDINGS]])
     most = np.full(len(equation.channels), np.inf)
-    single = (Fault("gain", key, gained=(key,)) for key in equation.channels if key in WRENCH_CHANNELS)
-    return {one.what: _solve(data, one, most, anew=False).sigma for one in single}
+    single = [Fault("gain", key, gained=(key,)) for key in equation.channels if key in WRENCH_CHANNELS]
+    solved = (_solve(data, one, most, anew=False) for one in single)
+    return {one.what: (float(found.found[0]), found.sigma) for one, found in zip(single, solved, strict=True)}
+
+
+def turned(equation: Equation, prepared: Sequence[Prepared]) -> Iterator[tuple[str, float]]:
+    """Joints that the data would rather have turn the other way, and twice the logarithm of how much rather."""
+    data = _linear(equation, [p.rows(_spread(len(p.q))) for p in prepared[:_RECORDINGS]])
+    most = np.full(len(equation.channels), np.inf)
+    none = Fault("number", "")
+    for joint, matrix in _senses(equation):
+        both = none, Fault("sense", joint, angles=matrix)
+        for anew in (False, True):  # the second takes its time
+            stated, other = (_solve(data, one, most, anew=anew) for one in both)
+            if not other.sound or stated.cost - other.cost < _RATHER:
+                break
+        else:
+            yield joint, stated.cost - other.cost
+
+
+def _senses(equation: Equation) -> Iterator[tuple[str, Array]]:
+    """Each joint, and the matrix that turns its angle the other way."""
+    joints = equation.elements.rig.joints
+    unit = np.eye(len(joints))
+    yield from ((joint.name, unit - 2.0 * np.outer(own, own)) for joint, own in zip(joints, unit, strict=True))
 
 
 def _spread(count: int) -> Index:
@@ -97,8 +119,7 @@ def _faults(data: _Data) -> Iterator[Fault]:
     yield from _gains(channels)
     yield from _mixed(channels)
     unit = np.eye(len(joints))
-    for index, joint in enumerate(joints):
-        yield Fault("sense", joint.name, angles=unit - 2.0 * np.outer(unit[index], unit[index]))
+    yield from (Fault("sense", joint, angles=matrix) for joint, matrix in _senses(data.equation))
     for a, b in itertools.combinations(range(len(joints)), 2):
         yield Fault("swapped", f"the angles of {joints[a].name} and {joints[b].name}", angles=_exchange(unit, a, b))
     turning = [index for index, joint in enumerate(joints) if joint.type == "revolute"]
@@ -139,6 +160,9 @@ def _mixed(channels: Sequence[str]) -> Iterator[Fault]:
         yield Fault("swapped", f"{channels[a]} and {channels[b]}", wrench=_exchange(unit, a, b))
     if tuple(channels[:6]) != WRENCH_CHANNELS:
         return
+    for a, b in itertools.combinations(range(3), 2):
+        both = _exchange(unit, a, b) @ _exchange(unit, a + 3, b + 3)
+        yield Fault("swapped", f"{'xyz'[a]} and {'xyz'[b]}, of forces and torques", wrench=both)
     yield Fault("swapped", "forces and torques", wrench=unit[np.r_[3:6, 0:3, 6 : len(channels)]])
     for order, signs in itertools.product(itertools.permutations(range(3)), itertools.product((1.0, -1.0), repeat=3)):
         turn = np.eye(3)[list(order)] * np.array(signs)[:, None]

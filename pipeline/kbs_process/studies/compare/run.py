@@ -19,7 +19,7 @@ from kbs_process.results import provenance
 from kbs_process.results.judged import Requirement
 from kbs_process.results.outcome import Outcome
 from kbs_process.results.records import FILE, Conclusion, Provenance, kind_of, load
-from kbs_process.results.store import writing
+from kbs_process.results.store import check_unchanged, writing
 from kbs_process.results.tables import read_columns, write_table
 from kbs_process.signals.records import Array
 from kbs_process.studies.compare.results import FAR, Compared, ComparisonResults, Judged, Number
@@ -93,6 +93,7 @@ def compare(folders: Sequence[Path], target: Path, pdf: bool | None = None) -> O
 
 
 def _read(folder: Path) -> _Processed:
+    check_unchanged(folder)
     if (kind := kind_of(folder)) != "correlation":
         raise OutputError(
             f"holds results of kind '{kind}'",

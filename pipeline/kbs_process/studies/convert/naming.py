@@ -62,17 +62,27 @@ def meaning(column: Column) -> Meaning:
 def _parted(column: Column) -> tuple[str, str]:
     """Return a column's name without its unit, and the unit: of the file, in brackets, or the name's last words."""
     name = column.name.strip()
-    opened = max(name.rfind(sign) for sign in "[({") if name.endswith(("]", ")", "}")) else -1
-    told = name[opened + 1 : -1] if opened >= 0 else ""
-    if name[opened : opened + 1] == "[" and name[opened - 1].strip() and not spelt(told):
-        told = ""  # "position[az]" is an element of something
-    base = name[:opened] if told else name
+    base, told = _in_brackets(name)
     if stated := column.unit or told:
         return base, spelt(stated) or QUESTION
     for cut in re.finditer(r"[\s_,/]+", name):
         if len(name) - cut.end() <= _LONGEST and (unit := spelt(name[cut.end() :])):
             return name[: cut.start()], unit
     return name, QUESTION
+
+
+def bracketed(name: str) -> str:
+    """Return the unit in brackets at the end of a column's name, "" where there is none that is known."""
+    return spelt(_in_brackets(name.strip())[1])
+
+
+def _in_brackets(name: str) -> tuple[str, str]:
+    """Return a name, and what is in brackets at its end; "position[az]" is an element of something, and has none."""
+    opened = max(name.rfind(sign) for sign in "[({") if name.endswith(("]", ")", "}")) else -1
+    told = name[opened + 1 : -1] if opened >= 0 else ""
+    if name[opened : opened + 1] == "[" and name[opened - 1].strip() and not spelt(told):
+        told = ""
+    return (name[:opened], told) if told else (name, "")
 
 
 def by_channel(columns: Sequence[Meaning]) -> dict[str, Meaning]:

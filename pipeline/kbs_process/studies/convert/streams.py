@@ -20,6 +20,7 @@ from kbs_process.stages.align.stream import FAR_SLOW_NS, STAMP_EACH
 from kbs_process.studies.convert.clock import nanoseconds, numbers
 from kbs_process.studies.convert.mapping import Channel, Mapping, StreamMap
 from kbs_process.studies.convert.mapping_file import Part, Time, Turn
+from kbs_process.studies.convert.naming import bracketed
 from kbs_process.studies.convert.orientation import Attitude
 
 _NO_STAMPS = np.empty(0, dtype=np.int64)
@@ -153,8 +154,9 @@ def _check_order(arrival: Arrival, table: Table, stream: StreamMap) -> None:
 def _why_empty(findings: Findings) -> str:
     if findings.counts[_TIMELESS]:
         return (
-            "no row has a time that is a number: check [time] and, of a text file, delimiter, decimal, units_row and "
-            "skip_rows in [text]; `kbs-process import --describe` shows what the columns hold"
+            "no row has a time that is a number (with unit = 'datetime': a date as ISO 8601 writes it, such as "
+            "2026-11-29T23:59:00Z): check [time] and, of a text file, delimiter, decimal, units_row and skip_rows in "
+            "[text]; `kbs-process import --describe` shows what the columns hold"
         )
     return "check start_s and end_s (s from the file's first sample), and that the file is whole"
 
@@ -253,8 +255,9 @@ def _pieces(
 
 def _check_unit(table: Table, column: Column, given: str, scale: float, findings: Findings) -> None:
     """Raise RecordingError where the file states another unit than the mapping; report what cannot be compared."""
-    same = agree(column.unit, given) if column.unit else True
-    what = f"'{column.name}' is in '{column.unit}' as the file states it, in '{given}' as the mapping does"
+    stated = column.unit or bracketed(column.name)
+    same = agree(stated, given) if stated else True
+    what = f"'{column.name}' is in '{stated}' as the file states it, in '{given}' as the mapping does"
     if same is False and abs(scale) == 1.0:
         raise RecordingError(what, where=str(table.path), remedy="correct the unit where it is wrong")
     if not same:

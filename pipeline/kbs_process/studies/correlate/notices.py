@@ -16,7 +16,7 @@ from kbs_process.reduction.analysis import Analysis, bands_of
 from kbs_process.reduction.judging import band_of, coverage_below
 from kbs_process.reduction.losses import lost
 from kbs_process.reduction.preparing import Prepared
-from kbs_process.reduction.soundness import extent
+from kbs_process.reduction.soundness.checking import extent
 from kbs_process.report.prose import Prose
 from kbs_process.results.judged import Requirement, Soundness
 from kbs_process.results.records import Notice, Severity

@@ -16,7 +16,7 @@ from kbs_process.reduction.judging import decided
 from kbs_process.reduction.measurable import check_requirements
 from kbs_process.reduction.preparing import Prepared, fit_gravity, prepare, samples, told_copies
 from kbs_process.reduction.relief import relieved
-from kbs_process.reduction.soundness import check_model
+from kbs_process.reduction.soundness.checking import check_model
 from kbs_process.report.build import publish
 from kbs_process.report.text import count
 from kbs_process.results.judged import Requirement

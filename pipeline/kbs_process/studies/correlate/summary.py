@@ -13,7 +13,7 @@ from kbs_process.errors import KbsError
 from kbs_process.reduction.analysis import Analysis, bands_of, select
 from kbs_process.reduction.judging import judged
 from kbs_process.reduction.pointing import judged_pointing, recorded_pointing
-from kbs_process.reduction.soundness import Checked
+from kbs_process.reduction.soundness.checking import Checked
 from kbs_process.results import provenance
 from kbs_process.results.judged import WRONG, Requirement
 from kbs_process.results.pointing import JudgedPointing

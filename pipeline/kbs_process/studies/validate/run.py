@@ -13,7 +13,7 @@ from kbs_process.progress import Progress
 from kbs_process.reduction.losses import in_words
 from kbs_process.reduction.measurable import check_requirements
 from kbs_process.reduction.preparing import Prepared, check_taring, fit_gravity, prepare, told_copies
-from kbs_process.reduction.soundness import check_model
+from kbs_process.reduction.soundness.checking import check_model
 from kbs_process.results.records import Notice
 from kbs_process.signals.records import Loss
 from kbs_process.stages import decouple
