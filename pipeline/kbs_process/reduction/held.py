@@ -159,7 +159,8 @@ class _Stream:
         begin = self.spans.get(column, (int(stamps[0]), 0))[0]
         self.spans[column] = begin, int(stamps[-1])
         self.reading[column] = float(block.values[held, column][-1])
-        if len(stamps) > 2 and np.all(np.diff(block.values[held, column][-3:]) != 0.0):
+        last = block.values[held, column][-3:]
+        if len(last) == 3 and np.all(last[1:] != last[:-1]):
             self.drawn.add(column)
 
     def check(self, entry: RecordingEntry) -> None:
@@ -222,7 +223,8 @@ def _drawn(x: Array, step: float, noise: float, least: int) -> Mask:
     if needed > max(least, FREE) or len(x) < 4:
         return found
     least = max(least - 3, int(np.ceil(needed)))
-    smooth = np.concatenate([[False], np.abs(np.diff(x, n=3)) <= 4.0 * step, [False]])
+    smooth = np.abs(np.diff(np.where(np.isfinite(x), x, np.nan), n=3)) <= 4.0 * step
+    smooth = np.concatenate([[False], smooth, [False]])
     edges = np.flatnonzero(smooth[1:] != smooth[:-1]).reshape(-1, 2)
     for start, end in edges[edges[:, 1] - edges[:, 0] >= least]:
         found[start : end + 3] = True
