@@ -35,7 +35,10 @@ def waterfall(track: Track, loads: Array, length: float, count: int) -> Waterfal
     over = "rate" if rates.max() > _VARIES * rates.min() else "angle"
     places = rates if over == "rate" else turns
     rows = max(1, min(_ROWS, len(places) // 2))
-    edges = np.linspace(places.min(), places.max(), rows + 1)
+    edges = np.unique(np.quantile(places, np.linspace(0.0, 1.0, rows + 1)))
+    if len(edges) < 2:
+        edges = places[0] + np.array([-0.5, 0.5]) * max(abs(places[0]), 1.0)
+    rows = len(edges) - 1
     first, last = LEAST / length, (lines.max() - 1) / (OVER * length)
     order = np.geomspace(first, max(last, 2.0 * first), _COLUMNS + 1)
     powers, counts = np.zeros((rows, _COLUMNS, loads.shape[1])), np.zeros((rows, _COLUMNS, 1))

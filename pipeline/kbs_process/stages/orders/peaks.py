@@ -1,16 +1,17 @@
 r"""Which peaks of an order spectrum are no chance, by the noise's own spectrum.
 
 Equation: the floor F(k) of a mean power P(k) is the straight line through ln P over ln k of the lines about k, those
-    that stand out left aside, plus what the mean logarithm of M exponentials lacks, ln M - psi(M). A peak counts where
+    that stand out left aside, plus what the mean logarithm of M exponentials lacks, ln M - psi(M). M is the square of
+    the sum over windows of a power by the sum of its squares: what one window has alone is no mean. A peak counts where
     P / F > q, the quantile of an F distribution with 2 M and 2 / v degrees of freedom, v the variance of ln F. Its
     probability is ALPHA over all lines and channels of a recording. Amplitude $A = \sqrt{P - F}$, standard deviation
     $\sqrt{F (1 + F / 2 A^2) / 2 M}$.
-Units: N m.
     A load that is stationary in time, with the spectrum T(f) that was seen, has the mean of T at k, weighted with the
-    spectrum R(f) that an order k of amplitude 1 has in time. A tone has all of P there, an order only $c = \sum R^2 /
-    \sum R$ of it. What has more than $\sqrt{c}$ is a tone or a resonance, and no peak. With c above one half the rate
-    varies too little to say so: the peak is `fixed`.
-Validity: noise whose power over order bends little within 8 lines.
+    spectrum R(f) that an order k of amplitude 1 has in time. Of a tone that is P, or 0.72 P where R is a line itself;
+    of an order it is $c = \sum R^2 / \sum R$ of P. What has more than the middle of c and 0.72 is a tone or a
+    resonance, and no peak. With c above 0.6 the rate varies too little to say so: the peak is `fixed`.
+Units: N m.
+Validity: noise whose power over order bends little within 8 lines, and within 16 at its ends.
 Source: P. D. Welch, The use of fast Fourier transform for the estimation of power spectra, IEEE Trans. Audio and
     Electroacoustics 15 (1967) 70; floor: ordinary least squares.
 """
@@ -28,10 +29,12 @@ from kbs_process.stages.orders.tracking import LEAST, OVER, Average, Track, in_f
 
 ALPHA = 0.01  # probability that chance makes any peak of a recording's spectra of one joint
 _ABOUT = 8 * OVER  # orders to either side that a floor rests on
+_AT_ENDS = 2 * _ABOUT  # that it rests on at least, where it has them on one side alone
 _PASSES = 3  # in which peaks are left out of their own floor
 _CORRELATED = 1.5 * OVER  # computed orders to one that is independent
 _LOBES = 2.0  # lines about a peak that are its own
-_STEADY = 0.5  # share of an order's power that would be seen of a fixed frequency: the rate varies too little
+_LINE = 0.72  # what a line behind a Hann window has of its own power, weighted with itself
+_STEADY = 0.6  # share of an order's power that would be seen of a fixed frequency: the rate varies too little
 _MOST = 16  # peaks of a channel
 
 
@@ -53,9 +56,9 @@ class Peak:
     fixed: bool
 
 
-def floor_of(spectrum: Average, power: Array, channels: int) -> Floor:
-    """Return the floor of one channel's powers (m,), where the false alarms of so many channels share ALPHA."""
-    m = spectrum.averages
+def floor_of(spectrum: Average, column: int, channels: int) -> Floor:
+    """Return the floor of one channel's powers, where the false alarms of so many channels share ALPHA."""
+    power, m = spectrum.power[:, column], spectrum.averages[:, column]
     usable = spectrum.order * spectrum.length >= LEAST
     x = np.log(np.where(usable, spectrum.order, 1.0))
     y = np.log(np.maximum(power, 1e-300)) + np.log(m) - digamma(m)
@@ -76,9 +79,12 @@ def _line(x: Array, y: Array, counts: Mask) -> tuple[Array, Array]:
 
     def about(values: Array) -> Array:
         sums = np.concatenate([[0.0], np.cumsum(values)])
-        at = np.arange(len(values))
-        found: Array = sums[np.minimum(at + _ABOUT + 1, len(values))] - sums[np.maximum(at - _ABOUT, 0)]
+        found: Array = sums[end] - sums[begin]
         return found
+
+    at, first = np.arange(len(x)), int(np.argmax(counts))
+    begin = np.maximum(np.minimum(at - _ABOUT, len(x) - _AT_ENDS), 0)
+    end = np.minimum(np.maximum(at + _ABOUT + 1, first + _AT_ENDS), len(x))
 
     n = np.maximum(about(w), 1.0)
     mean_x, mean_y = about(w * x) / n, about(w * y) / n
@@ -88,18 +94,19 @@ def _line(x: Array, y: Array, counts: Mask) -> tuple[Array, Array]:
     return np.exp(mean_y + slope * away), (1.0 + away**2 / spread) / n
 
 
-def peaks(track: Track, spectrum: Average, power: Array, tones: Array, floor: Floor) -> list[Peak]:
+def peaks(track: Track, spectrum: Average, column: int, floor: Floor) -> list[Peak]:
     """Return the peaks of one channel, the greatest first; what is a side lobe of another, or a tone, is none."""
+    power, tones = spectrum.power[:, column], spectrum.tones[:, column]
     found: list[Peak] = []
     for top in _tops(power, floor)[:_MOST]:
         order, height = _top(spectrum.order, power, top)
         seen = in_frequency(track, spectrum.length, order)
         steady = float(np.sum(seen**2) / np.sum(seen))
-        if steady < _STEADY and np.sum(seen * tones) > np.sqrt(steady) * np.sum(seen) * height:
+        if steady < _STEADY and np.sum(seen * tones) > 0.5 * (steady + _LINE) * np.sum(seen) * height:
             continue
         noise = float(floor.noise[top])
         square = max(height - noise, 0.5 * noise)
-        sigma = np.sqrt(0.5 * noise * (1.0 + 0.5 * noise / square) / spectrum.averages[top])
+        sigma = np.sqrt(0.5 * noise * (1.0 + 0.5 * noise / square) / spectrum.averages[top, column])
         found.append(Peak(order, float(np.sqrt(square)), float(sigma), steady >= _STEADY))
     return found
 

@@ -91,7 +91,7 @@ class Average:
     windows: int
     order: Array  # (m,)
     power: Array  # (m, c) amplitude squared
-    averages: Array  # (m,) windows that show an order, as many as overlapping ones are worth
+    averages: Array  # (m, c) of how many windows each power is: few, where few have most of it
     frequency: Array  # (f,) Hz
     tones: Array  # (f, c)
     rates: tuple[float, float]  # turns/s, least and greatest mean of a window
@@ -190,27 +190,33 @@ def _along(place: Array, values: Array, lines: int) -> NDArray[np.complex128]:
 
 def average(track: Track, loads: Array, length: float) -> Average:
     """Return the mean spectra of loads (n, c); each order over the windows whose rate shows it."""
-    order, tones = np.zeros((0, loads.shape[1] + 2)), np.zeros((0, loads.shape[1] + 2))
+    order = tones = np.zeros((0, 2 * loads.shape[1] + 1))
     rates: list[float] = []
     step = 0.0
     for one in windows(track, loads, length):
-        order, tones = (_added(sums, powers, one.noise) for sums, powers in ((order, one.power), (tones, one.tones)))
-        rates, step = [min([one.rate, *rates]), max([one.rate, *rates])], one.frequency_step
+        order, tones = (
+            _added(sums, powers / one.noise, 1.0 / one.noise)
+            for sums, powers in zip((order, tones), (one.power, one.tones), strict=True)
+        )
+        rates.append(one.rate)
+        step = one.frequency_step
+    sums, squares, weight = np.split(order, [loads.shape[1], 2 * loads.shape[1]], axis=1)
+    averages = np.divide(sums**2, squares, out=np.ones_like(sums), where=squares > 0.0)
     return Average(
         length=length,
-        windows=int(order[0, -1]),
+        windows=len(rates),
         order=np.arange(len(order)) / (OVER * length),
-        power=order[:, :-2] / order[:, -2:-1],
-        averages=np.maximum(order[:, -1] / _OVERLAP, 1.0),
+        power=sums / weight,
+        averages=np.maximum(averages / _OVERLAP, 1.0),
         frequency=step * np.arange(len(tones), dtype=np.float64),
-        tones=tones[:, :-2] / tones[:, -2:-1],
-        rates=(rates[0], rates[1]),
+        tones=tones[:, : loads.shape[1]] / tones[:, -1:],
+        rates=(min(rates), max(rates)),
     )
 
 
-def _added(sums: Array, power: Array, noise: float) -> Array:
-    """Add a window's powers, its weight, and 1 to sums that may be shorter or longer."""
+def _added(sums: Array, power: Array, weight: float) -> Array:
+    """Add a window's powers, their squares and its weight to sums that may be shorter or longer."""
     longer = np.zeros((max(len(sums), len(power)), sums.shape[1]))
     longer[: len(sums)] = sums
-    longer[: len(power)] += np.column_stack([power / noise, np.full((len(power), 2), (1.0 / noise, 1.0))])
+    longer[: len(power)] += np.column_stack([power, power**2, np.full(len(power), weight)])
     return longer

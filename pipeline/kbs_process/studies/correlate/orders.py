@@ -10,7 +10,6 @@ import numpy as np
 from kbs_process.campaign.config import Campaign
 from kbs_process.plant.laws import select as effects_of
 from kbs_process.reduction.analysis import Analysis, passband, select
-from kbs_process.rig.model import Joint
 from kbs_process.signals.grid import overlap
 from kbs_process.signals.records import WRENCH_CHANNELS, Array, Signal
 from kbs_process.stages.bandpass import UNFILTERED
@@ -39,31 +38,36 @@ class Study:
 def study(campaign: Campaign, analyses: Sequence[Analysis]) -> Iterator[Study]:
     """Study every joint that turns far enough, recording by recording."""
     for analysis in analyses:
+        effects = effects_of(campaign.acting(analysis.entry))
         for index, joint in enumerate(campaign.rig.joints):
             if joint.type == "revolute":
-                yield from _of(campaign, analysis, index, joint)
+                track, sides = _along(campaign, analysis, index)
+                found = follow(analysis.entry.name, joint.name, track, sides, known_orders(joint, effects))
+                yield from () if found is None else (found,)
 
 
-def _of(campaign: Campaign, analysis: Analysis, index: int, joint: Joint) -> Iterator[Study]:
-    track, sides = _along(campaign, analysis, index)
+def follow(recording: str, joint: str, track: Track, sides: Sequence[Signal], known: dict[str, float]) -> Study | None:
+    """Study the torques of one joint's track, measured and, where there is a second side, predicted.
+
+    None where the joint does not turn far enough, or no torque is recorded.
+    """
     channels = [channel for channel in sides[0].channels if channel not in _FORCES]
     length = length_of(track)
     if not channels or length == 0.0:
-        return
+        return None
     sides = [select(side, channels) for side in sides]
     loads = np.concatenate([side.values for side in sides], axis=1)
     spectrum = average(track, loads, length)
-    floors = tuple(floor_of(spectrum, power, len(channels)) for power in spectrum.power.T)
-    known = known_orders(joint, effects_of(campaign.acting(analysis.entry)))
+    floors = tuple(floor_of(spectrum, column, len(channels)) for column in range(loads.shape[1]))
     highest = float(spectrum.order[-1])
-    named = tuple(
+    named = [
         peak
         for at, channel in enumerate(channels)
         for peak in _named(track, spectrum, floors, at, len(channels), (channel, sides[0].units[at]), known)
-    )
+    ]
     findings = OrdersIn(
-        recording=analysis.entry.name,
-        joint=joint.name,
+        recording=recording,
+        joint=joint,
         windows=spectrum.windows,
         window_rad=length * _TURN,
         resolution=spectrum.resolution,
@@ -76,8 +80,8 @@ def _of(campaign: Campaign, analysis: Analysis, index: int, joint: Joint) -> Ite
         peaks=tuple(sorted(named, key=lambda one: -max(one.measured or 0.0, one.predicted or 0.0))),
         above={name: order for name, order in known.items() if order > highest},
     )
-    units = sides[0].units
-    yield Study(findings, tuple(channels), units, spectrum, floors, waterfall(track, loads, length, spectrum.windows))
+    cells = waterfall(track, loads, length, spectrum.windows)
+    return Study(findings, tuple(channels), sides[0].units, spectrum, floors, cells)
 
 
 def _along(campaign: Campaign, analysis: Analysis, index: int) -> tuple[Track, list[Signal]]:
@@ -103,12 +107,12 @@ def _named(
     known: dict[str, float],
 ) -> Iterator[OrderPeak]:
     """Peaks of a channel that are measured, then those that are predicted alone, above the noise of the measurement."""
-    measured = _peaks(track, spectrum, at, floors[at])
+    measured = peaks(track, spectrum, at, floors[at])
     predicted: list[Peak] = []
     other = at + channels
     if other < len(floors):
         quiet = np.maximum(floors[at].threshold, floors[other].threshold)
-        apart = _peaks(track, spectrum, other, Floor(floors[at].noise, quiet))
+        apart = peaks(track, spectrum, other, Floor(floors[at].noise, quiet))
         predicted = [one for one in apart if all(abs(one.order - m.order) > spectrum.resolution for m in measured)]
     for peak in (*measured, *predicted):
         foreseen = None
@@ -124,10 +128,6 @@ def _named(
             known=coincident(peak.order, spectrum.resolution, known),
             fixed=peak.fixed,
         )
-
-
-def _peaks(track: Track, spectrum: Average, column: int, floor: Floor) -> list[Peak]:
-    return peaks(track, spectrum, spectrum.power[:, column], spectrum.tones[:, column], floor)
 
 
 def tables_of(one: Study) -> dict[str, tuple[dict[str, Array], dict[str, str]]]:

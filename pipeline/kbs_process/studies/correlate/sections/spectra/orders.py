@@ -160,10 +160,12 @@ def _map(one: OrdersIn, table: Table) -> Picture:
     sides = [side for side in ("measured", "predicted") if f"{channel}.{side}" in table.columns]
     x = np.append(cells("order.from")[0], cells("order.to")[0, -1])
     y = np.degrees(np.append(cells(f"{over}.from")[:, 0], cells(f"{over}.to")[-1, 0]))
-    top = max(float(np.nanmax(cells(f"{channel}.measured"))), 1e-300)
-    levels = top * 2.0 ** np.arange(1.0 - len(_SHADES), 1.0)
+    levels = max(float(np.nanmedian(cells(f"{channel}.measured"))), 1e-300) * 2.0 ** np.arange(1.0, len(_SHADES))
     pale = [1.0 - share * (1.0 - np.array(to_rgb(color))) for color, share in _SHADES]
-    colors, norm = ListedColormap(list(map(tuple, pale))), BoundaryNorm([0.0, *levels], len(_SHADES), clip=True)
+    colors, norm = (
+        ListedColormap(list(map(tuple, pale))),
+        BoundaryNorm([0.0, *levels, 2.0 * levels[-1]], len(_SHADES), clip=True),
+    )
     colors.set_bad(draw.SHADE)
     title = f"{one.recording}, {one.joint}, {channel} / {unit(table.unit(channel))}"
     with draw.style():
