@@ -68,7 +68,7 @@ class Live:
     views: tuple[View, ...]
     two_scales: bool  # the residual has an axis of its own
     shortcuts: tuple[tuple[str, str], ...] = ()  # name and choice of the views most asked for
-    along: tuple[str, str] = ("time", "s")  # what the curves are over, and its unit
+    along: tuple[str, str, str] = ("time", "t", "s")  # what the curves are over, its symbol and unit
     choosing: str = "Band and frame"
 
 

@@ -72,7 +72,7 @@
   };
 
   function figure(root) {
-    const { key, names, views, two_scales: twoScales, shortcuts, along: [along, unit], choosing } = JSON.parse(document.getElementById(`live-${root.dataset.key}`).textContent);
+    const { key, names, views, two_scales: twoScales, shortcuts, along: [along, symbol, unit], choosing } = JSON.parse(document.getElementById(`live-${root.dataset.key}`).textContent);
     const box = root.querySelector(".plots");
     const reading = root.querySelector(".reading");
     const unique = (field) => [...new Set(views.map((view) => view[field]))];
@@ -140,7 +140,7 @@
         const channel = view.channels[i];
         return `Δ${channel.name} ${shown(between(plot.data[plot.measured]))} ${tidy(channel.unit)}`;
       });
-      reading.textContent = [`From the mark: Δ${along} ${shown(between(plots[0].data[0]))} ${unit}`, ...parts].join("  ·  ");
+      reading.textContent = [`From the mark: Δ${symbol} ${shown(between(plots[0].data[0]))} ${unit}`, ...parts].join("  ·  ");
     };
 
     const wheel = (plot) => {
@@ -190,7 +190,7 @@
         cursor: { sync: { key, setSeries: false }, drag: { x: true, y: false, dist: 4 }, points: { size: 5 } },
         scales: { x: { time: false, ...log, range: (_, low, high) => [low, high] }, y: { ...log, range: logarithmic ? decades : apart ? range(0.8, 0.06) : range(0.06, 0.06) }, r: { range: range(0.06, 2) } },
         series: [
-          { label: `${along} / ${unit}`, value: (_, v) => (logarithmic || v === null ? shown(v) : v.toFixed(2)) },
+          { label: `${symbol} / ${unit}`, value: (_, v) => (logarithmic || v === null ? shown(v) : v.toFixed(2)) },
           ...order.map((i) => ({
             stroke: color(LOOKS[names[i]].color),
             width: LOOKS[names[i]].width,

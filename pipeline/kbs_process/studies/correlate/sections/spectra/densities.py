@@ -46,7 +46,7 @@ def panel(results: Results, tables: Tables) -> Panel:
     if pictures:
         title = f"Power spectral densities, {frame_label(results.campaign.frame)}"
         views = tuple(_view(results, recording.name, table, edges) for recording, table in found)
-        live = Live("spectra", _KINDS, views, two_scales=False, along=("frequency", "Hz"), choosing="Frame")
+        live = Live("spectra", _KINDS, views, two_scales=False, along=("frequency", "f", "Hz"), choosing="Frame")
         blocks.append(Figure(title, pictures, _SAYS.caption("densities"), live))
     else:
         blocks.append(Text("No recording has a spectrum table."))

@@ -44,14 +44,12 @@ def panel(results: Results, tables: Tables) -> Panel:
         f"Amplitude over order, {frame}",
         tuple(_spectrum(one, spectrum) for one, spectrum, _ in found[:PLATES]),
         _SAYS.caption("spectra", alarm=found[0][0].false_alarm),
-        Live("orders", _KINDS, views, two_scales=False, along=("order", "1/turn"), choosing="Joint"),
+        Live("orders", _KINDS, views, two_scales=False, along=("order", "k", "1/turn"), choosing="Joint"),
     )
-    maps = Figure(
-        f"Amplitude over angle or rate, and order, {frame}",
-        tuple(_map(one, cells) for one, _, cells in found[:PLATES]),
-        _SAYS.caption("maps"),
-    )
-    return Panel("orders", "Orders", question, (*_peaks(said), spectra, maps, _limits(said)))
+    maps = tuple(_map(one, cells) for one, _, cells in found if one.peaks)[:PLATES]
+    title = f"Amplitude over angle or rate, and order, {frame}"
+    drawn = (Figure(title, maps, _SAYS.caption("maps")),) if maps else ()
+    return Panel("orders", "Orders", question, (*_peaks(said), spectra, *drawn, _limits(said)))
 
 
 def _peaks(said: list[OrdersIn]) -> tuple[Block, ...]:
@@ -166,11 +164,11 @@ def _map(one: OrdersIn, table: Table) -> Picture:
         ListedColormap(list(map(tuple, pale))),
         BoundaryNorm([0.0, *levels, 2.0 * levels[-1]], len(_SHADES), clip=True),
     )
-    colors.set_bad(draw.SHADE)
     title = f"{one.recording}, {one.joint}, {channel} / {unit(table.unit(channel))}"
     with draw.style():
         figure, axes = draw.row(2.3, len(sides), share_y=True)
         for axis, side in zip(axes, sides, strict=True):
+            axis.set_facecolor(draw.SHADE)
             mesh = axis.pcolormesh(x, y, np.ma.masked_invalid(cells(f"{channel}.{side}")), cmap=colors, norm=norm)
             draw.logarithmic(axis, "x", float(x[0]), float(x[-1]))
             axis.set(title=side, xlabel="order / cycles a turn")
