@@ -11,7 +11,7 @@ from kbs_process.report import draw, series, sheet
 from kbs_process.report.panel import Block, Figure, Grid, Live, Panel, Picture, Text, View
 from kbs_process.report.prose import Prose
 from kbs_process.report.tables import Table, Tables
-from kbs_process.report.text import MISSING, count, frame_label, measure, number, unit
+from kbs_process.report.text import MISSING, count, exact, frame_label, measure, number, unit
 from kbs_process.signals.records import Array
 from kbs_process.studies.correlate.choose import PLATES, by_role, folded
 from kbs_process.studies.correlate.results import OrderPeak, OrdersIn, Results
@@ -80,9 +80,9 @@ def _limits(said: list[OrdersIn]) -> Grid:
             f"{count(one.windows, 'window')} of {number(math.degrees(one.window_rad))}°",
             " to ".join(dict.fromkeys(number(math.degrees(rate)) for rate in one.rates)),
             f"{number(one.lowest)} to {number(one.highest)}",
-            "angle" if one.by_angle else f"{number(one.band_Hz)} Hz",
+            "angle" if one.by_angle else f"{exact(one.band_Hz)}\u00a0Hz",
             number(one.resolution),
-            ", ".join(f"{name} {number(order, 5)}" for name, order in one.above.items()) or MISSING,
+            ", ".join(f"{name} {exact(order)}" for name, order in one.above.items()) or MISSING,
         )
         for one in said
     )
