@@ -167,7 +167,7 @@ def opened(browser: Browser, six_channels: Path) -> Callable[[int], Browser]:
 def test_the_page_renders_without_error_or_overflow(opened: Callable[[int], Browser], width: int) -> None:
     browser = opened(width)
     assert browser.evaluate("document.documentElement.scrollWidth") <= width
-    assert browser.evaluate(PREPARED) == 12
+    assert browser.evaluate(PREPARED) == 18
     assert browser.evaluate(SPLIT_WORDS) == []
     assert browser.evaluate("[...document.images].every(i => i.complete && (i.naturalWidth || !i.offsetParent))")
     assert browser.complaints == []
@@ -177,7 +177,7 @@ def test_one_channel_renders_too(browser: Browser, one_channel: Path) -> None:
     browser.complaints.clear()
     browser.open(one_channel, 800)
     assert browser.evaluate("document.documentElement.scrollWidth") <= 800
-    assert browser.evaluate(PREPARED) == 2
+    assert browser.evaluate(PREPARED) == 3
     assert browser.complaints == []
 
 
@@ -212,7 +212,7 @@ def test_zooming_one_channel_zooms_all_and_another_recording_can_be_chosen(opene
         "s.dispatchEvent(new Event('change')); })()"
     )
     browser.evaluate("new Promise(done => setTimeout(done, 200))")
-    assert browser.evaluate(PREPARED) == 12
+    assert browser.evaluate(PREPARED) == 18
     assert _pixels(browser) != before
     assert browser.complaints == []
 
@@ -231,7 +231,7 @@ def test_plots_are_drawn_anew_in_the_dark(opened: Callable[[int], Browser]) -> N
     browser.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": "dark"}])
     browser.evaluate("new Promise(done => setTimeout(done, 300))")
     assert all(now != then for now, then in zip(_pixels(browser), in_the_light, strict=True))
-    assert browser.evaluate(PREPARED) == 12
+    assert browser.evaluate(PREPARED) == 18
     browser.call("Emulation.setEmulatedMedia", features=[])
     assert browser.complaints == []
 

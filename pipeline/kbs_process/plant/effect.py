@@ -469,6 +469,7 @@ class Effect(Law):
     measured: bool = False  # a curve without a name: a model can contain it, and no search tries it
     apart: str = ""  # word for where it acts, if that is not its port's
     slope: Callable[..., float] | None = None  # 1, of signals and parameters
+    periods: float = 0.0  # in a turn of the motor, where the equation has a fixed number of them
 
     def __post_init__(self) -> None:
         where = f"effect '{self.name}'"

@@ -42,6 +42,7 @@ LINES: dict[str, dict[str, Any]] = {
     "predicted": {"color": PREDICTED, "linewidth": 1.5, "zorder": 2},
     "static": {"color": PREDICTED, "linewidth": 1.5, "zorder": 2},
     "residual": {"color": RESIDUAL, "linewidth": 0.6, "zorder": 3},
+    "threshold": {"color": LIMIT, "linewidth": 0.8, "linestyle": (0, (4, 2)), "zorder": 4},
 }
 
 _STYLE: dict[Any, Any] = {

@@ -46,7 +46,7 @@ class Channel:
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """One choice of the interactive plots: a recording, in one band and frame."""
+    """One choice of the interactive plots: a recording, in one band and frame; or the spectra of one."""
 
     recording: str
     choice: str  # band and frame, in words
@@ -55,17 +55,21 @@ class View:
     bin_s: float | None  # each pair of points is the least and greatest value in so many seconds
     shaded: tuple[tuple[float, float], ...]  # s, stretches without valid samples
     channels: tuple[Channel, ...]
+    places: dict[str, object] | None = None  # of the points of spectra, in place of t0 and step, by their logarithm
+    marks: tuple[tuple[float, str], ...] = ()  # places to be marked, and the page's colour for each
 
 
 @dataclass(frozen=True, slots=True)
 class Live:
-    """Interactive time histories; the figure's pictures stand in for them on paper."""
+    """Interactive time histories or spectra; the figure's pictures stand in for them on paper."""
 
     key: str
     names: tuple[str, ...]  # of a channel's curves, in their order
     views: tuple[View, ...]
     two_scales: bool  # the residual has an axis of its own
     shortcuts: tuple[tuple[str, str], ...] = ()  # name and choice of the views most asked for
+    along: tuple[str, str, str] = ("time", "t", "s")  # what the curves are over, its symbol and unit
+    choosing: str = "Band and frame"
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,6 +13,7 @@ from kbs_process.signals.records import Array, Mask
 
 BUDGET = 800_000  # points of all curves of one figure: at most 2.1 MB of page
 FEWEST = 600  # points a curve, below which it says too little
+_STEPS = 600  # of log x, in each of which a spectrum keeps its greatest value
 
 _ABSENT = -32768  # the packed value of a sample that is not finite
 _FULL_SCALE = 32767
@@ -78,6 +79,38 @@ def pack(values: Array) -> dict[str, object]:
     codes = np.full(len(values), _ABSENT, dtype="<i2")
     codes[np.isfinite(values)] = np.rint((finite - middle) / scale)
     return {"middle": middle, "scale": scale, "codes": base64.b64encode(codes.tobytes()).decode("ascii")}
+
+
+def spectra(
+    recording: str,
+    choice: str,
+    x: Array,
+    channels: Sequence[tuple[str, str, Sequence[Array]]],
+    marks: tuple[tuple[float, str], ...],
+) -> View:
+    """Return spectra (name, unit, curves over x) for logarithmic scales, the greatest of each of many equal steps."""
+    positive = x > 0.0
+    x = x[positive]
+    steps = np.log(x / x[0]) * (_STEPS / max(np.log(x[-1] / x[0]), 1e-9))
+    starts = np.flatnonzero(np.diff(np.floor(steps), prepend=-1.0))
+    counts = np.diff([*starts, len(x)])
+
+    def packed(curve: Array) -> dict[str, object]:
+        known = np.where(np.isfinite(curve[positive]) & (curve[positive] > 0.0), curve[positive], 1e-300)
+        greatest = np.maximum.reduceat(known, starts)
+        return pack(np.where(greatest > 1e-300, np.log10(greatest), np.nan))
+
+    return View(
+        recording,
+        choice,
+        t0=0.0,
+        step=0.0,
+        bin_s=None,
+        shaded=(),
+        channels=tuple(Channel(name, unit, None, tuple(map(packed, curves))) for name, unit, curves in channels),
+        places=pack(np.log10(np.add.reduceat(x, starts) / counts)),
+        marks=tuple(mark for mark in marks if x[0] <= mark[0] <= x[-1]),
+    )
 
 
 def stretches(t: Array, mask: Mask) -> tuple[tuple[float, float], ...]:

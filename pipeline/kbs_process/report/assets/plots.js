@@ -1,16 +1,17 @@
 "use strict";
-// Interactive time histories: one uPlot a channel, all of a figure with the same time axis and cursor.
+// Interactive time histories and spectra: one uPlot a channel, all of a figure with the same axis and cursor.
 (() => {
   // The computed curve is broad and pale under the measured one, so that both show where they agree.
   const LOOKS = {
-    measured: { color: "measured", width: 1 },
     static: { color: "predicted", width: 2.5 },
     predicted: { color: "predicted", width: 2.5 },
+    measured: { color: "measured", width: 1 },
     residual: { color: "residual", width: 1 },
+    threshold: { color: "fail", width: 1, dash: [6, 4] },
   };
+  const LOWEST_FIRST = Object.keys(LOOKS); // the order in which curves are drawn
   // Colours are the page's, light or dark, at the time that something is drawn.
   const color = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
-  const LOWEST_FIRST = [1, 0, 2]; // computed, measured, residual: the order in which curves are drawn
   const ABSENT = -32768;
   const WHEEL = 0.8;
 
@@ -23,14 +24,35 @@
     });
   };
 
-  const curvesOf = (channel) => {
-    const found = channel.curves.map((packed) => packed && unpack(packed));
+  // Spectra and their places are packed by their logarithms.
+  const powers = (packed) => unpack(packed).map((v) => (v === null ? null : 10 ** v));
+
+  const curvesOf = (channel, logarithmic) => {
+    const found = channel.curves.map((packed) => packed && (logarithmic ? powers(packed) : unpack(packed)));
     // A computed curve is left out where it is what was measured less the residual.
     const computed = (v, i) => (v === null || found[2][i] === null ? null : v - found[2][i]);
     return found.map((curve) => curve || found[0].map(computed));
   };
 
   const shown = (value) => (value === null || value === undefined ? "–" : value.toPrecision(4).replace("-", "−"));
+  const SUPERSCRIPT = Object.fromEntries([..."-0123456789"].map((letter, i) => [letter, "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"[i]]));
+  const raised = (v) => [...String(v)].map((letter) => SUPERSCRIPT[letter]).join("");
+  const power = (v) => {
+    const [digits, exponent] = v.toExponential(0).split("e");
+    return v >= 0.001 && v < 1e4 ? String(+v.toPrecision(2)) : `${digits === "1" ? "" : `${digits}·`}10${raised(+exponent)}`;
+  };
+  // Ticks of a logarithmic axis: decades, their 1, 2 and 5, or over little equal steps.
+  const rounds = (low, high) => {
+    const decades = Math.log10(high / low);
+    if (decades < 0.7) {
+      const step = 10 ** Math.floor(Math.log10((high - low) / 2));
+      return Array.from({ length: Math.floor(high / step) - Math.ceil(low / step) + 1 }, (_, i) => (Math.ceil(low / step) + i) * step).filter((_, i, all) => i % Math.ceil(all.length / 5) === 0);
+    }
+    const from = Math.floor(Math.log10(low));
+    const every = Math.ceil(decades / 6);
+    const digits = decades < 2.5 ? [1, 2, 5] : [1];
+    return Array.from({ length: Math.ceil(decades) + 2 }, (_, i) => from + i).filter((e) => e % every === 0).flatMap((e) => digits.map((d) => d * 10 ** e)).filter((v) => v >= low && v <= high);
+  };
   const tidy = (unit) => unit.replace("^2", "²").replaceAll(" ", "\u00a0");
 
   const element = (name, text, className) => {
@@ -50,7 +72,7 @@
   };
 
   function figure(root) {
-    const { key, names, views, two_scales: twoScales, shortcuts } = JSON.parse(document.getElementById(`live-${root.dataset.key}`).textContent);
+    const { key, names, views, two_scales: twoScales, shortcuts, along: [along, symbol, unit], choosing } = JSON.parse(document.getElementById(`live-${root.dataset.key}`).textContent);
     const box = root.querySelector(".plots");
     const reading = root.querySelector(".reading");
     const unique = (field) => [...new Set(views.map((view) => view[field]))];
@@ -58,6 +80,9 @@
     let view = null;
     let mark = null; // index of the sample from which differences are read
 
+    // Along a logarithmic axis one moves and zooms by factors.
+    const scale = (x) => (view.places ? Math.log(x) : x);
+    const back = (x) => (view.places ? Math.exp(x) : x);
     const zoom = (min, max) => plots.forEach((plot) => plot.setScale("x", { min, max }));
     const redraw = () => plots.forEach((plot) => plot.redraw(false));
 
@@ -94,6 +119,10 @@
         const y = plot.valToPos(level, "y", true);
         line(bbox.left, y, bbox.left + bbox.width, y, color("fail"), [6, 4]);
       }
+      for (const [place, tone] of view.marks) {
+        const x = plot.valToPos(place, "x", true);
+        line(x, bbox.top, x, bbox.top + bbox.height, color(tone), tone === "ink" ? [1, 3] : [5, 4]);
+      }
       if (mark !== null) {
         const x = plot.valToPos(plot.data[0][mark], "x", true);
         line(x, bbox.top, x, bbox.top + bbox.height, color("ink"), [2, 3]);
@@ -111,7 +140,7 @@
         const channel = view.channels[i];
         return `Δ${channel.name} ${shown(between(plot.data[plot.measured]))} ${tidy(channel.unit)}`;
       });
-      reading.textContent = [`From the mark: Δt ${shown(between(plots[0].data[0]))} s`, ...parts].join("  ·  ");
+      reading.textContent = [`From the mark: Δ${symbol} ${shown(between(plots[0].data[0]))} ${unit}`, ...parts].join("  ·  ");
     };
 
     const wheel = (plot) => {
@@ -122,8 +151,8 @@
         const factor = turn < 0 ? WHEEL : 1 / WHEEL;
         const { min, max } = plot.scales.x;
         const t = plot.data[0];
-        const centre = plot.posToVal(plot.cursor.left, "x");
-        zoom(Math.max(t[0], centre - (centre - min) * factor), Math.min(t.at(-1), centre + (max - centre) * factor));
+        const [low, middle, high] = [min, plot.posToVal(plot.cursor.left, "x"), max].map(scale);
+        zoom(Math.max(t[0], back(middle - (middle - low) * factor)), Math.min(t.at(-1), back(middle + (high - middle) * factor)));
       }, { passive: false });
       let pressed = 0;
       plot.over.addEventListener("mousedown", (event) => { pressed = event.clientX; });
@@ -136,8 +165,10 @@
     };
 
     const make = (channel, t, last) => {
-      const order = LOWEST_FIRST.filter((i) => i < channel.curves.length);
-      const all = curvesOf(channel);
+      const place = (i) => LOWEST_FIRST.indexOf(names[i]);
+      const order = [...channel.curves.keys()].sort((i, j) => place(i) - place(j));
+      const logarithmic = Boolean(view.places);
+      const all = curvesOf(channel, logarithmic);
       const curves = order.map((i) => all[i]);
       const apart = twoScales && channel.curves.length === 3;
       const peak = Math.max(...curves.map((curve) => curve.reduce((most, v) => Math.max(most, Math.abs(v)), 0)));
@@ -149,17 +180,22 @@
         const span = top - bottom || Math.abs(top) || 1;
         return [bottom - below * span, top + above * span];
       };
-      const axis = { grid: { stroke: color("faint"), width: 1 }, font: "11px sans-serif", labelFont: "12px sans-serif", labelSize: 20, stroke: color("ink"), ticks: { stroke: color("rule"), width: 1 } };
+      const log = logarithmic ? { distr: 3 } : {};
+      const decades = (_, low, high) => (low > 0 ? [low / 2, high * 2] : [1, 10]); // of a plot that shows no point
+      const ticks = logarithmic ? { splits: (_, __, low, high) => rounds(low, high), filter: (_, splits) => splits, values: (_, splits) => splits.map(power) } : {};
+      const axis = { ...ticks, grid: { stroke: color("faint"), width: 1 }, font: "11px sans-serif", labelFont: "12px sans-serif", labelSize: 20, stroke: color("ink"), ticks: { stroke: color("rule"), width: 1 } };
       const plot = new uPlot({
         width: box.clientWidth,
         height: view.channels.length === 1 ? 300 : last ? 176 : 146,
         cursor: { sync: { key, setSeries: false }, drag: { x: true, y: false, dist: 4 }, points: { size: 5 } },
-        scales: { x: { time: false }, y: { range: apart ? range(0.8, 0.06) : range(0.06, 0.06) }, r: { range: range(0.06, 2) } },
+        scales: { x: { time: false, ...log, range: (_, low, high) => [low, high] }, y: { ...log, range: logarithmic ? decades : apart ? range(0.8, 0.06) : range(0.06, 0.06) }, r: { range: range(0.06, 2) } },
         series: [
-          { label: "t / s", value: (_, v) => (v === null ? "–" : v.toFixed(2)) },
+          { label: `${symbol} / ${unit}`, value: (_, v) => (logarithmic || v === null ? shown(v) : v.toFixed(2)) },
           ...order.map((i) => ({
             stroke: color(LOOKS[names[i]].color),
             width: LOOKS[names[i]].width,
+            dash: LOOKS[names[i]].dash,
+            spanGaps: logarithmic,
             label: names[i],
             scale: apart && i === 2 ? "r" : "y",
             points: { show: false },
@@ -167,7 +203,7 @@
           })),
         ],
         axes: [
-          { ...axis, label: last ? "time / s" : undefined, size: last ? 34 : 24 },
+          { ...axis, label: last ? `${along} / ${unit}` : undefined, size: last ? 34 : 24 },
           { ...axis, label: `${channel.name} / ${tidy(channel.unit)}`, size: 62 },
           ...(apart ? [{ ...axis, scale: "r", side: 1, label: "residual", size: 62, grid: { show: false }, stroke: color("residual"), filter: (_, splits) => splits.map((v) => (v > highest ? null : v)) }] : []),
         ],
@@ -190,13 +226,13 @@
         notes.textContent = "Not in this page; see the tables.";
         return;
       }
-      const t = unpack(view.channels[0].curves[0]).map((_, i) => view.t0 + i * view.step);
+      const t = view.places ? powers(view.places) : unpack(view.channels[0].curves[0]).map((_, i) => view.t0 + i * view.step);
       if (view.bin_s !== null) notes.textContent = `Each pair of points is the least and greatest value in ${view.bin_s.toPrecision(3)} s.`;
       plots = view.channels.map((channel, i) => make(channel, t, i === view.channels.length - 1));
     };
 
     const recordings = chooser("Recording", unique("recording"), show);
-    const choices = chooser("Band and frame", unique("choice"), show);
+    const choices = chooser(choosing, unique("choice"), show);
     const all = element("button", "See all");
     const notes = element("span", "", "hint");
     all.type = "button";
@@ -219,10 +255,11 @@
       event.preventDefault();
       const t = plots[0].data[0];
       const { min, max } = plots[0].scales.x;
-      let [low, high] = KEYS[event.key].map((part, i) => [min, max][i] + part * (max - min));
-      if (low < t[0]) [low, high] = [t[0], high - low + t[0]];
-      if (high > t.at(-1)) [low, high] = [Math.max(t[0], low - high + t.at(-1)), t.at(-1)];
-      zoom(low, high);
+      const [first, end, left, right] = [t[0], t.at(-1), min, max].map(scale);
+      let [low, high] = KEYS[event.key].map((part, i) => [left, right][i] + part * (right - left));
+      if (low < first) [low, high] = [first, high - low + first];
+      if (high > end) [low, high] = [Math.max(first, low - high + end), end];
+      zoom(Math.max(t[0], back(low)), Math.min(t.at(-1), back(high)));
     });
     root.querySelector(".choices").append(recordings.frame, choices.frame, all, ...jumps, notes);
     root.hidden = false;

@@ -14,18 +14,26 @@ from kbs_process.results.tables import TableWriter, write_table
 from kbs_process.signals.grid import crop
 from kbs_process.signals.records import WRENCH_CHANNELS, Signal
 from kbs_process.stages.repeats import commanded
+from kbs_process.studies.correlate import orders
 from kbs_process.studies.correlate.transducer import Study
 
 _PIECE = 2**13  # samples that are written at a time
 
 
-def write_tables(folder: Path, analyses: Sequence[Analysis], on_transducer: Study | None) -> None:
+def write_tables(
+    folder: Path, analyses: Sequence[Analysis], on_transducer: Study | None, by_angle: Sequence[orders.Study]
+) -> None:
     """Write the tables of every stage, and the processed signals as MCAP."""
     for analysis in analyses:
         _tables(TableWriter(folder, analysis.entry.name), analysis)
         _recording(folder / "processed", analysis)
     if on_transducer is not None:
         _curves(folder / "tables" / "transducer", on_transducer)
+    for one in by_angle:
+        name = one.findings.recording
+        for kind, (columns, units) in orders.tables_of(one).items():
+            path = folder / "tables" / "orders" / f"{name}.{one.findings.joint}{kind}.parquet"
+            write_table(path, columns, units, frame="T", recording=name)
 
 
 def _curves(folder: Path, found: Study) -> None:

@@ -22,10 +22,10 @@ from kbs_process.studies.correlate.sections import (
     pointing,
     recordings,
     repeatability,
-    spectra,
     static,
     transducer,
 )
+from kbs_process.studies.correlate.sections.spectra import densities, orders
 
 _DRIVE = {"command": "command-driven prediction", "motion": "motion-driven prediction"}
 
@@ -86,7 +86,8 @@ DOCUMENT = Document(
         compliance.panel,
         disturbance.panel,
         merit.panel,
-        spectra.panel,
+        densities.panel,
+        orders.panel,
         diagnosed.panel,
         _on_transducer(transducer.panel),
         _on_transducer(static.panel),

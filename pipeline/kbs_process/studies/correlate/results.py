@@ -305,6 +305,37 @@ class OnTransducer(Record, frozen=True, kw_only=True):
     agreement: tuple[BothWays, ...] = ()
 
 
+class OrderPeak(Record, frozen=True, kw_only=True):
+    """A load that is periodic in a joint's angle."""
+
+    channel: str
+    unit: str
+    order: float  # cycles in a turn of the joint
+    measured: float | None  # amplitude; None: below the noise's threshold
+    sigma: float  # of it, by the noise
+    predicted: float | None  # amplitude at the same order; None: nothing was predicted
+    known: tuple[str, ...] = ()  # what the rig's description has at this order
+    fixed: bool = False  # the rate varies too little to tell the order from a fixed frequency
+
+
+class OrdersIn(Record, frozen=True, kw_only=True):
+    """What of one recording goes with one joint's angle, at the transducer."""
+
+    recording: str
+    joint: str
+    windows: int
+    window_rad: float  # of the joint's travel
+    resolution: float  # width of a line
+    lowest: float  # order of which a window holds few periods
+    highest: float  # that the samples, or the angle's uncertainty, show at the slowest window's rate
+    by_angle: bool  # the angle's uncertainty sets it
+    band_Hz: float
+    rates: tuple[float, float]  # rad/s, least and greatest mean of a window
+    false_alarm: float  # probability that chance makes one of the peaks
+    peaks: tuple[OrderPeak, ...] = ()
+    above: dict[str, float] = msgspec.field(default_factory=dict)  # known orders beyond `highest`
+
+
 class Results(ResultsFile, frozen=True, kw_only=True):
     """results.json."""
 
@@ -324,6 +355,7 @@ class Results(ResultsFile, frozen=True, kw_only=True):
     merit: tuple[Merit, ...] = ()
     resonances: tuple[Resonance, ...] = ()
     transducer: OnTransducer | None = None
+    orders: tuple[OrdersIn, ...] = ()
     budget: tuple[Budget, ...] = ()
     six_channels: tuple[SixChannels, ...] = ()
     pointing: tuple[RecordedPointing, ...] = ()

@@ -26,6 +26,7 @@ from kbs_process.stages import decouple
 from kbs_process.stages.decouple import Decoupling
 from kbs_process.stages.gravity.ladder import ladder
 from kbs_process.stages.gravity.model import GravityModel
+from kbs_process.studies.correlate import orders
 from kbs_process.studies.correlate.earlier_diagnosis import keep_diagnosis
 from kbs_process.studies.correlate.notices import has_spikes, spikes, unclear
 from kbs_process.studies.correlate.output import write_tables
@@ -60,12 +61,15 @@ def process(
         found = with_left_out(campaign, found, analyses, model, decoupling, read)
         with progress.task("Following the transducer's resonance") as task:
             on_transducer = study(campaign, analyses, model.rig, task.update)
+        with progress.task("Following the orders of the joints"):
+            by_angle = list(orders.study(campaign, analyses))
         with progress.task("Writing the report"):
-            write_tables(folder, analyses, on_transducer)
+            write_tables(folder, analyses, on_transducer, by_angle)
             keep_diagnosis(campaign, target, folder)
             from kbs_process.studies.correlate.report import DOCUMENT  # draws: takes its time to import
 
-            found = msgspec.structs.replace(found, transducer=on_transducer and on_transducer.findings)
+            turned = tuple(one.findings for one in by_angle)
+            found = msgspec.structs.replace(found, transducer=on_transducer and on_transducer.findings, orders=turned)
             serious = sum(notice.severity != "info" for notice in found.warnings)
             more = [f"Model: {found.model.status}. {found.model.sentence}"] if found.model else []
             more += [f"{count(serious, 'warning')}: see the top of the report"] if serious else []

@@ -33,5 +33,6 @@ DYNAMIC_FRICTION = Effect(
     ),
     passive=True,
     family="friction",
+    periods=2.0,
     order=40,
 )

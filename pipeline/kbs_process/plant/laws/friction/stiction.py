@@ -56,5 +56,6 @@ TOOTH_STICTION = Effect(
     ),
     passive=True,
     family="stiction",
+    periods=200.0,
     order=50,
 )

@@ -30,5 +30,6 @@ COGGING = Effect(
         critical(phase("phi_cog", "phase of cogging")),
     ),
     family="cogging",
+    periods=200.0,
     order=20,
 )

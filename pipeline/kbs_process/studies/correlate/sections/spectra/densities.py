@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from kbs_process.report import draw, sheet
-from kbs_process.report.panel import Block, Figure, Grid, Panel, Picture, Text
+from kbs_process.report import draw, series, sheet
+from kbs_process.report.panel import Block, Figure, Grid, Live, Panel, Picture, Text, View
 from kbs_process.report.prose import Prose
 from kbs_process.report.tables import Table, Tables
 from kbs_process.report.text import frame_label, measure, number, unit
@@ -16,6 +16,7 @@ from kbs_process.studies.correlate.choose import PLATES, by_role
 from kbs_process.studies.correlate.results import Resonance, Results
 
 _SAYS = Prose("kbs_process.studies.correlate", "spectra")
+_KINDS = ("measured", "predicted")
 _BINS = 500
 _APART = 0.15  # in: resonances that are closer on the sheet share a label
 
@@ -44,7 +45,9 @@ def panel(results: Results, tables: Tables) -> Panel:
     blocks: list[Block] = []
     if pictures:
         title = f"Power spectral densities, {frame_label(results.campaign.frame)}"
-        blocks.append(Figure(title, pictures, _SAYS.caption("densities")))
+        views = tuple(_view(results, recording.name, table, edges) for recording, table in found)
+        live = Live("spectra", _KINDS, views, two_scales=False, along=("frequency", "f", "Hz"), choosing="Frame")
+        blocks.append(Figure(title, pictures, _SAYS.caption("densities"), live))
     else:
         blocks.append(Text("No recording has a spectrum table."))
     if results.resonances:
@@ -54,6 +57,17 @@ def panel(results: Results, tables: Tables) -> Panel:
         )
         blocks.append(Grid("Resonances on the transducer", ("Axis", "Frequency", "Source"), rows, "lrl"))
     return Panel("spectra", "Spectra", question, tuple(blocks))
+
+
+def _view(results: Results, name: str, table: Table, edges: list[float]) -> View:
+    resonances = ((one.frequency_Hz, "fail") for one in results.resonances)
+    channels = [
+        (channel, table.unit(channel), [table.columns[column] for column in columns])
+        for channel in table.channels
+        if (columns := [at for kind in _KINDS if (at := f"{channel}.{kind}") in table.columns])
+    ]
+    marks = (*((edge, "ink") for edge in edges), *resonances)
+    return series.spectra(name, frame_label(results.campaign.frame), table.columns["f"], channels, marks)
 
 
 def _densities(
@@ -88,7 +102,7 @@ def _curves(table: Table, channel: str) -> dict[str, tuple[Array, Array]]:
     """Return the channel's densities."""
     return {
         kind: _thinned(table.columns["f"], table.columns[f"{channel}.{kind}"])
-        for kind in ("measured", "predicted")
+        for kind in _KINDS
         if f"{channel}.{kind}" in table.columns
     }
 

@@ -1,0 +1,1 @@
+"""Sections over frequency and over order."""
