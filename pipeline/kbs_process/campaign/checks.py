@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
@@ -262,10 +261,6 @@ class _Checks:
             if name not in effects:
                 remedy = did_you_mean(name, effects) if effects else "leave it out"
                 self._note((*key, "without", position), f"the model has no '{name}'", remedy)
-        if not Path(os.path.normpath(entry.path)).is_relative_to(os.path.normpath(self.campaign.folder)):
-            what = f"the recording '{shown(entry.path)}' lies outside the campaign's folder"
-            self._note((*key, "file"), what, "move it there, or put a link to it there")
-            return
         try:
             regular(entry.path)
         except (FileNotFoundError, NotADirectoryError):

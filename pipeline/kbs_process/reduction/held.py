@@ -42,8 +42,8 @@ def noisy(rig: Rig) -> dict[str, float]:
 class Alive:
     """Passes the blocks of a recording on, without rows in which a channel is held; tells what it has left out.
 
-    With `keep` it leaves out only where all channels are held at once, which no load does, and tells of all the rest: a
-    peak that was cut off was no smaller.
+    With `keep` it leaves out only where all channels are held at once, which no load does where they have shown noise
+    before, and tells of all the rest: a peak that was cut off was no smaller.
     """
 
     def __init__(self, rig: Rig, entry: RecordingEntry, *, keep: bool = False) -> None:
@@ -123,7 +123,10 @@ class _Stream:
         every = {column: self._held(column, block.values[:, column], least) for column in self.channels}
         gone = np.logical_or.reduce([held[part] for held in every.values()])
         if self.keep:
-            gone = (np.logical_and.reduce(list(every.values())) & (len(every) > 1))[part]
+            gone = np.logical_and.reduce(list(every.values())) & (len(every) > 1)
+            if not every.keys() <= self.own.keys():  # nothing has shown noise as yet
+                gone &= ~_same(np.where(gone, 0.0, np.nan), least)
+            gone = gone[part]
         for column, held in every.items():
             told = held[part] & ~gone if self.keep else held[part]
             if told.any():
