@@ -40,7 +40,7 @@ from kbs_process.stages.conventions import (
 from kbs_process.stages.gravity import model as gravity
 from kbs_process.stages.gravity.equation import Equation
 from kbs_process.stages.gravity.equation import Prepared as Instants
-from kbs_process.stages.gravity.hypotheses import explanations, shown_gains, turned
+from kbs_process.stages.gravity.hypotheses import RATHER, explanations, shown_gains, turned
 from kbs_process.stages.gravity.model import GravityModel, Sample, prepared
 from kbs_process.stages.gravity.tension import TAKEN, Moved, lag, tension
 from kbs_process.stages.repeats import commanded
@@ -118,9 +118,10 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
         known = [late_sigma(one.run.clocks, amplifier, one.entry.clock_sigma) for one, _ in lags]
         late = [own.moved(sigma) for (_, own), sigma in zip(lags, known, strict=True) if own.taken >= TAKEN]
         gains = shown_gains(equation, instants)
-        read = tuple(_read_gains(equation, gains))
-        found = tension(model, {sample.name: taring for sample, taring in tared}, (*late, *read))
         tested = {one.channel for one in conventions if one.testable and one.channel}
+        vague = not tested and bool(gains)  # then channels are compared with each other
+        read = tuple(_read_gains(equation, gains)) if vague else ()
+        found = tension(model, {sample.name: taring for sample, taring in tared}, (*late, *read))
         most = _most(equation)
         if not tested:  # what gravity leaves may be gravity about another axis
             spread = np.max([read.std(axis=0) for read, _, _ in shown], axis=0)
@@ -146,14 +147,14 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
             *_left(model, most),
             *(
                 words.TURNED.format(joint, np.exp(min(0.5 * rather, 300.0)))
-                for joint, rather in turned(equation, instants)
+                for joint, rather in (turned(equation, instants) if vague else ())
             ),
         )
         judged = {key for one in campaign.requirements for key in measurable.judged_channels(one, campaign.rig)}
         mute = tuple(_mute(equation, [read for read, _, _ in shown]))
         failed = [one.check.split() for one in conventions if not one.ok and abs(one.slope or 0.0) < SILENT]
         dead = [key for key in mute if any(key in words for words in failed)]
-        soundness = Soundness(probability=found.probability, gains={key: sigma for key, (_, sigma) in gains.items()})
+        soundness = Soundness(probability=found.probability, gains={key: sigma for key, (_, sigma, _) in gains.items()})
         tests = [one.entry.name for one in recordings if one.entry.role != "calibration"]
         if reasons:
             shifted = [one for one in found.beyond if one in late]
@@ -267,14 +268,14 @@ def _read_and_due(one: Prepared, data: Instants, model: GravityModel) -> tuple[A
     return read, read - (data.wrench - equation.predict(theta, data)) @ reads.T, error
 
 
-def _read_gains(equation: Equation, gains: Mapping[str, tuple[float, float]]) -> Iterator[Moved]:
+def _read_gains(equation: Equation, gains: Mapping[str, tuple[float, float, float]]) -> Iterator[Moved]:
     """What each channel reads of what acts, by all other channels, next to its calibration."""
     rig = equation.elements.rig
     stated = np.diag(rig.transducer.cross_coupling.sigma)
-    for key, (value, sigma) in gains.items():
+    for key, (value, sigma, rather) in gains.items():
         known = float(stated[WRENCH_CHANNELS.index(key)])
         chance = float(np.hypot(known, value * sigma))
-        if sigma < SHOWN:
+        if sigma < SHOWN and rather > RATHER and value > 0.0:
             yield Moved(f"the gain of {key} by the other channels", 1.0, known, value, chance)
 
 

@@ -30,7 +30,7 @@ _ROUNDS = 4  # of weights
 _STEPS = 3  # of the equation, made linear anew about what was found
 _FREE = 1e3  # times its sigma, a number that is set free may move
 _AS_GOOD = 20.0  # twice the logarithm of a likelihood ratio
-_RATHER = 100.0  # of the same, by which data have to prefer what nothing else makes doubtful
+RATHER = 100.0  # of the same, by which data have to prefer what nothing else makes doubtful
 _MOST = 4  # faults named
 _ANGLES = {  # rad, of what was taken for a radian
     "degrees": np.pi / 180.0,
@@ -79,13 +79,17 @@ def explanations(equation: Equation, prepared: Sequence[Prepared], most: Array) 
     return tuple(one for one in again if one.sound and one.cost < best)[:_MOST]
 
 
-def shown_gains(equation: Equation, prepared: Sequence[Prepared]) -> dict[str, tuple[float, float]]:
-    """Each channel's gain, and its relative standard deviation, if nothing is known of it but what gravity shows."""
+def shown_gains(equation: Equation, prepared: Sequence[Prepared]) -> dict[str, tuple[float, float, float]]:
+    """Each channel's gain, its relative standard deviation, and twice the logarithm of how much likelier it is than 1.
+
+    Nothing is known of it but what gravity shows.
+    """
     data = _linear(equation, [p.rows(_spread(len(p.q))) for p in prepared[:_RECORDINGS]])
     most = np.full(len(equation.channels), np.inf)
+    stated = _solve(data, Fault("number", ""), most, anew=False).cost
     single = [Fault("gain", key, gained=(key,)) for key in equation.channels if key in WRENCH_CHANNELS]
-    solved = (_solve(data, one, most, anew=False) for one in single)
-    return {one.what: (float(found.found[0]), found.sigma) for one, found in zip(single, solved, strict=True)}
+    solved = [_solve(data, one, most, anew=False) for one in single]
+    return {one.what: (float(x.found[0]), x.sigma, stated - x.cost) for one, x in zip(single, solved, strict=True)}
 
 
 def turned(equation: Equation, prepared: Sequence[Prepared]) -> Iterator[tuple[str, float]]:
@@ -97,7 +101,7 @@ def turned(equation: Equation, prepared: Sequence[Prepared]) -> Iterator[tuple[s
         both = none, Fault("sense", joint, angles=matrix)
         for anew in (False, True):  # the second takes its time
             stated, other = (_solve(data, one, most, anew=anew) for one in both)
-            if not other.sound or stated.cost - other.cost < _RATHER:
+            if not other.sound or stated.cost - other.cost < RATHER:
                 break
         else:
             yield joint, stated.cost - other.cost
