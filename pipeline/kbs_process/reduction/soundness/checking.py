@@ -165,7 +165,7 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
             off = [one for one in conventions if not one.ok]
             alone = not (timed or still or shifted or twice) and _calibrated(campaign, samples, model, most)
             alone = alone and all(one.check.rpartition(", ")[2] in tests for one in off)
-            single = len({one.channel for one in off}) == 1  # what pulls is read by several
+            single = len({one.channel for one in off if one.channel}) == 1  # what pulls is read by several
             regained = [one for one in off if single and one.followed > FOLLOWED]
             if dead and not any(
                 one.fault.kind in ("swapped", "axes", "clock") for one in causes
