@@ -217,8 +217,9 @@ def _same(x: Array, least: int) -> Mask:
 def _drawn(x: Array, step: float, noise: float, least: int) -> Mask:
     """(n,) where `least` or more readings in a row, in steps of `step`, lie on a parabola as noise would not have them.
 
-    Third differences take a parabola off, and rounding leaves four steps of them at most. Noise leaves no more in k of
-    them with a probability of about erf(4 step / (sqrt(2) noise))**k, whose logarithms' mean gain is one.
+    Third differences take a parabola off, and rounding leaves four steps of them at most. White noise leaves no more
+    in k successive ones with a probability of about erf(4 step / (sqrt(2) noise))**k: the determinant of their
+    covariance grows no faster than a power of k.
     """
     found = np.zeros(len(x), dtype=np.bool_)
     chance = erf(4.0 * step / (np.sqrt(2.0) * noise)) if noise > 0.0 else 1.0

@@ -153,7 +153,7 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
         judged = {key for one in campaign.requirements for key in measurable.judged_channels(one, campaign.rig)}
         mute = tuple(_mute(equation, [read for read, _, _ in shown]))
         failed = [one.check.split() for one in conventions if not one.ok and abs(one.slope or 0.0) < SILENT]
-        dead = [key for key in mute if any(key in words for words in failed)]
+        dead = [key for key in mute if any(key in check for check in failed)]
         soundness = Soundness(probability=found.probability, gains={key: sigma for key, (_, sigma, _) in gains.items()})
         tests = [one.entry.name for one in recordings if one.entry.role != "calibration"]
         if reasons:
@@ -167,9 +167,8 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
             alone = alone and all(one.check.rpartition(", ")[2] in tests for one in off)
             single = len({one.channel for one in off if one.channel}) == 1  # what pulls is read by several
             regained = [one for one in off if single and one.followed > FOLLOWED]
-            if dead and not any(
-                one.fault.kind in ("swapped", "axes", "clock") for one in causes
-            ):  # which leave one silent
+            silencing = any(one.fault.kind in ("swapped", "axes", "clock") for one in causes)
+            if dead and not silencing:
                 causes, told = (), told + [f"channel: {key} does not respond" for key in dead]
             elif alone and regained:
                 causes, told = (), told + [words.regained(one, SILENT) for one in regained]
