@@ -119,8 +119,7 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
         late = [own.moved(sigma) for (_, own), sigma in zip(lags, known, strict=True) if own.taken >= TAKEN]
         gains = shown_gains(equation, instants)
         tested = {one.channel for one in conventions if one.testable and one.channel}
-        vague = not tested and bool(gains)  # then channels are compared with each other
-        read = tuple(_read_gains(equation, gains)) if vague else ()
+        read = tuple(_read_gains(equation, {key: of for key, of in gains.items() if key not in tested}))
         found = tension(model, {sample.name: taring for sample, taring in tared}, (*late, *read))
         most = _most(equation)
         if not tested:  # what gravity leaves may be gravity about another axis
@@ -147,7 +146,7 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
             *_left(model, most),
             *(
                 words.TURNED.format(joint, np.exp(min(0.5 * rather, 300.0)))
-                for joint, rather in (turned(equation, instants) if vague else ())
+                for joint, rather in turned(equation, instants)
             ),
         )
         judged = {key for one in campaign.requirements for key in measurable.judged_channels(one, campaign.rig)}
@@ -269,7 +268,7 @@ def _read_and_due(one: Prepared, data: Instants, model: GravityModel) -> tuple[A
 
 
 def _read_gains(equation: Equation, gains: Mapping[str, tuple[float, float, float]]) -> Iterator[Moved]:
-    """What each channel reads of what acts, by all other channels, next to its calibration."""
+    """What channels read of what acts, by all other channels, next to their calibration."""
     rig = equation.elements.rig
     stated = np.diag(rig.transducer.cross_coupling.sigma)
     for key, (value, sigma, rather) in gains.items():
