@@ -445,7 +445,7 @@ def test_an_interrupted_simulation_leaves_the_old_one(folder: CampaignFolder, tm
         [*command, "--command", str(tmp_path / "long.csv")], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
     assert process.stderr is not None
-    assert process.stderr.readline() == "Simulating long.csv\n"
+    assert process.stderr.readline() == "Simulating 2e+04 s of long\n"
     while process.poll() is None and not list(tmp_path.glob(".simulated.new-*")):
         time.sleep(0.01)
     process.send_signal(signal.SIGINT)
@@ -519,6 +519,13 @@ def test_the_installed_command_runs() -> None:
     command = [sys.executable, "-m", "kbs_process", "--version"]
     done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=EXAMPLE)
     assert done.stdout.startswith("kbs-process, version ")
+
+
+def test_output_that_finds_no_room_is_told() -> None:
+    command = [sys.executable, "-m", "kbs_process", "schema", "correlation"]
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert done.returncode == 2 and done.stderr.startswith("error: what is printed cannot be written"), done.stderr
 
 
 def test_inspect_and_validate_speak_to_programs(folder: CampaignFolder, capsys: pytest.CaptureFixture[str]) -> None:

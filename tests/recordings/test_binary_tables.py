@@ -77,6 +77,7 @@ def test_hdf5_numbers_never_written_and_odd_attributes(tmp_path: Path) -> None:
         for name, fill in (("said", -9999.0), ("zero", 0.0), ("half", 1e20)):
             file.create_dataset(name, (6,), "f4" if name == "half" else "f8", fillvalue=fill)[:3] = [1, 2, 3]
         file["half"].attrs["_FillValue"] = 1e20  # not as the cells have it
+        file["half"].attrs.update({"scale": 0.01, "offset": 3.0})
         for name, value in (("each", [1.0, 2.0]), ("range", [1.0])):
             file[name] = np.column_stack([PACKED, PACKED])
             file[name].attrs["scale_factor" if name == "each" else "valid_range"] = value
@@ -85,6 +86,7 @@ def test_hdf5_numbers_never_written_and_odd_attributes(tmp_path: Path) -> None:
     np.testing.assert_array_equal(column(table, "half"), [1, 2, 3, NAN, NAN, NAN])
     np.testing.assert_array_equal(column(table, "zero"), [1, 2, 3, 0, 0, 0])
     assert "scale_factor has 2 values, not 1" in told(table, "each")
+    assert list(table.odd.elements()) == 2 * ["attributes of half change no number (scale, offset): a mapping can"]
     assert "valid_range has 1 values, not 2" in told(table, "range")
 
 

@@ -104,5 +104,23 @@ def test_another_scale_of_a_channel_that_gravity_does_not_load_is_told(factor, r
     assert "Tz has " in why and remark in why and "another scale" in why
 
 
+def alternating(size: float):
+    """A second source that brings Ty by turns, without what moves it at 0.5 Hz; it moves in half of the time."""
+
+    def change(rig, values):
+        t = np.arange(len(values)) / RATE
+        found = values.copy()
+        found[1::2, TY] += (size * np.sin(np.pi * t) * (t > 30.0))[1::2]
+        return rounded(rig, found)
+
+    return change
+
+
+def test_two_sources_by_turns_are_told_of_which_one_is_filtered():
+    (why,) = told(alternating(0.2))
+    assert "Ty has " in why and "by two sources in turn" in why
+    assert told(alternating(0.002)) == []
+
+
 def test_noise_that_nobody_states_is_not_told():
     assert told(averaged, stated=0.0) == []

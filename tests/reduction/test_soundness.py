@@ -19,8 +19,10 @@ from kbs_process.reduction.settings import motion_settings
 from kbs_process.reduction.soundness.checking import _moved_alone, check_model, extent
 from kbs_process.reduction.soundness.streams import mistimed, repeated
 from kbs_process.rig.model import Quantity, Spacecraft
-from kbs_process.signals.records import Events, Signal
+from kbs_process.signals.records import WRENCH_CHANNELS, Block, Events, Signal
 from kbs_process.stages import motion
+from kbs_process.stages.align.readings import Readings
+from kbs_process.stages.align.spectrum import Welch
 from reduction.arm import checked, described, drawn, recorded
 
 UNIT = np.eye(6)
@@ -162,6 +164,59 @@ def test_forces_of_motion_show_which_way_a_joint_turns_that_vague_files_hide(tmp
     found = checked(campaign, recorded(campaign, arm, 1, angle=-1.0, period=8.0)).soundness
     assert any(one.endswith("times as likely if arm turns the other way") for one in found.reasons), found.reasons
     assert any(one.startswith("sign: the angle of arm") for one in found.suggestions)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("fault", "told"),
+    [
+        ({"zero": -0.1}, "the zero of arm's angle (degrees) in test is -5."),
+        ({"angle": -1.0}, "the sign of arm's angle in test is -1"),
+        ({"reads": np.diag([1.0, 1.0, 1.0, 1.0, 0.0, 1.0])}, "the gain of Ty in test is 0"),
+        ({}, None),
+    ],
+)
+def test_what_is_misread_in_one_recording_alone_is_named(tmp_path, fault, told):
+    """Files too vague to test anything: what the calibration has shown of the arm tells what is off in the test."""
+    campaign, arm = vague(tmp_path)
+    sweep, _ = recorded(campaign, arm, 1)
+    _, test = recorded(campaign, arm, 1, **fault)
+    found = checked(campaign, [sweep, test])
+    doubts = found.doubts(campaign.requirements[0])
+    if told is None:
+        assert found.soundness.sound and not doubts, found.soundness.reasons
+    else:
+        (cause,) = found.soundness.suggestions
+        assert cause.startswith(told) and doubts[0].of_failed, found.soundness
+
+
+@pytest.mark.slow
+def test_gravity_in_another_unit_is_named(tmp_path):
+    campaign = described(tmp_path)
+    arm = drawn(campaign, 1)
+    text = (tmp_path / "rig.toml").read_text()
+    (tmp_path / "rig.toml").write_text(
+        text.replace('value = 9.80665, unit = "m/s^2"', 'value = 980.665, unit = "mm/s^2"')
+    )
+    found = checked(campaign := load_campaign(tmp_path, checksums=False), recorded(campaign, arm, 1)).soundness
+    assert found.suggestions[0] == "unit: gravity.magnitude is 0.981 m/s^2, which is nowhere on Earth"
+
+
+@pytest.mark.slow
+def test_a_noise_that_nobody_states_is_no_load(tmp_path):
+    campaign, arm = vague(tmp_path)
+    text = (tmp_path / "rig.toml").read_text()
+    (tmp_path / "rig.toml").write_text(re.sub(r"(?m)^(noise = .*value = )[^,]*.*\], unit", r"\g<1>0.0, unit", text))
+    campaign = load_campaign(tmp_path, checksums=False)
+    recordings = []
+    for one in recorded(campaign, arm, 1):
+        stamp = np.arange(len(one.raw)) * round(1e9 * one.raw.dt)
+        readings, welch = Readings(), Welch(1.0 / one.raw.dt, 0.1, 100.0, WRENCH_CHANNELS)
+        readings.push(Block(stamp, stamp, one.raw.values))
+        welch.push(one.raw.values, None)
+        run = replace(one.run, spectrum=welch.result(), rates={"wrench": 1.0 / one.raw.dt})
+        recordings.append(replace(one, run=run, readings={"wrench": readings}))
+    assert checked(campaign, recordings).soundness.reasons == ()
 
 
 @pytest.mark.slow

@@ -6,10 +6,11 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
+import numpy as np
 import pytest
 
 from kbs_process.errors import OutputError
-from kbs_process.results.records import decode
+from kbs_process.results.records import decode, encode
 from kbs_process.studies.correlate.results import CrossCoupling, Results
 from kbs_process.studies.diagnose.results import Curve
 from kbs_process.studies.identify.results import Correlations, Interval
@@ -34,6 +35,11 @@ OVER = {"regressor": "angle", "x_unit": "rad", "y_unit": "N m"}
 def test_lists_that_belong_together_are_as_long_as_each_other(record: type[Any], told: dict[str, Any]) -> None:
     with pytest.raises(msgspec.ValidationError, match="lists that belong together have"):
         msgspec.convert(told, record)
+
+
+def test_numbers_of_numpy_are_numbers() -> None:
+    one = Curve(x=(np.float64(1.5),), y=(np.float32(2.5),), sigma=(0.1,), **OVER)
+    assert msgspec.json.decode(encode(one))["y"] == [2.5]
 
 
 def test_a_matrix_that_is_too_small_is_no_fault_of_the_program(tmp_path: Path) -> None:

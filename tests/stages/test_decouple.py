@@ -30,7 +30,7 @@ def test_mixed_channels_come_out_unmixed():
     raw = true.wrench.values @ (np.eye(6) + X).T + np.arange(6.0)
     S = np.cov(raw.T)[None].astype(complex)
     run = replace(true, wrench=true.wrench.derive(raw, "raw"))
-    object.__setattr__(run, "spectrum", Spectrum(np.zeros(1), S, true.wrench.channels, 1))
+    object.__setattr__(run, "spectrum", Spectrum(np.zeros(1), S, true.wrench.channels, 1, np.zeros(6)))
     object.__setattr__(run, "envelope", Envelope(np.zeros(1), raw.min(0)[None], raw.max(0)[None]))
     out = decouple.apply(run, decouple.fit(rig))
     np.testing.assert_allclose(out.wrench.values, true.wrench.values, atol=1e-9)

@@ -27,5 +27,11 @@ def test_what_is_left_is_told(words):
     assert words in description(x, np.ones(len(T), dtype=bool), 0.05, Q, ("arm",), LOAD)
 
 
+def test_no_lag_is_as_long_as_the_recording():
+    load = 1e-4 * Q[:, 0]
+    words = description(0.05 * np.gradient(Q[:, 0], 0.05), np.ones(len(T), dtype=bool), 0.05, Q, ("arm",), load)
+    assert "lag" not in words
+
+
 def test_nothing_is_said_of_next_to_nothing():
     assert "too little" in description(np.zeros(5), np.ones(5, dtype=bool), 0.05, Q[:5], ("arm",), LOAD[:5])

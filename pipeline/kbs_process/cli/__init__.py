@@ -5,6 +5,7 @@ Nothing that computes is imported at the top of any of its files, so that `--hel
 
 from __future__ import annotations
 
+import errno
 import io
 import os
 import sys
@@ -62,6 +63,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except Exception as error:  # the last one to speak: a user gets words, not a traceback
         if debug:
             raise
+        if isinstance(error, OSError) and error.errno == errno.ENOSPC:  # of standard output
+            complain("error: what is printed cannot be written: no space is left", "  -> make room where it goes")
+            sys.exit(BAD_INPUT)
         complain(
             f"error: {type(error).__name__}: {error}",
             "  -> this is a fault of kbs-process: please report it with what the same command prints with --debug",

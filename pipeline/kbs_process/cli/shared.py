@@ -91,7 +91,11 @@ def say_json(found: object) -> None:
     """Print what was found for a program: one JSON document, in which what is no number is null."""
     import msgspec
 
-    click.echo(msgspec.json.format(msgspec.json.encode(found, enc_hook=str)))
+    click.echo(
+        msgspec.json.format(
+            msgspec.json.encode(found, enc_hook=lambda one: one.item() if hasattr(one, "item") else str(one))
+        )
+    )
 
 
 def complain(*lines: str) -> None:

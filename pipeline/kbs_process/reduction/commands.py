@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -21,6 +22,8 @@ from kbs_process.rig.model import Rig
 from kbs_process.signals.records import Array, Run
 
 LONGEST_S = 1e6  # that commands last
+HOLE = 10.0  # times as long as between other rows
+JUMP = 10.0  # times as fast as other rows, near by and on the whole
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,12 +34,19 @@ class Commands:
     schedule: Schedule
     source: Path
     run: Run | None = None  # that they were recorded in
+    slips: tuple[str, ...] = ()  # what may be meant otherwise
+
+    @property
+    def told(self) -> str:
+        """What is run, for how long, and what of it may be a slip."""
+        return "; ".join((f"{self.schedule.t[-1]:.4g} s of {self.name}", *self.slips))
 
 
 def of_table(path: Path, rig: Rig) -> Commands:
     """Return the commands of a CSV or Parquet file."""
     schedule = read_commands(path, rig.joint_names)
-    return Commands(path.stem, replace(schedule, t=schedule.t - schedule.t[0]), path)
+    slips = tuple(_slips(schedule, rig.joint_names))
+    return Commands(path.stem, replace(schedule, t=schedule.t - schedule.t[0]), path, slips=slips)
 
 
 def of_trajectory(campaign: Campaign, trajectory: str | None, progress: Progress) -> Commands:
@@ -84,6 +94,28 @@ def read_commands(path: Path, joints: tuple[str, ...]) -> Schedule:
     else:
         rate = np.gradient(position, t, axis=0)
     return Schedule(t=t, position=position, rate=rate)
+
+
+def _slips(schedule: Schedule, joints: tuple[str, ...]) -> Iterator[str]:
+    """Holes between rows that are even otherwise, and joints that move far within one row or two, in words."""
+    t, steps = schedule.t, np.diff(schedule.t)
+    holes = np.flatnonzero(steps > HOLE * np.median(steps))
+    for row in holes[:1]:
+        yield f"no commands from {t[row]:g} to {t[row + 1]:g} s{_more(len(holes))}: a straight line leads across"
+    moves = np.abs(np.diff(schedule.position, axis=0))
+    for joint, by in zip(joints, moves.T, strict=True):
+        rate = by / steps
+        near = np.pad(rate, 3)
+        beside = np.max([near[:-6], near[1:-5], near[5:-1], near[6:]], axis=0)
+        usual = np.median(rate[rate > 0.0]) if rate.any() else 0.0
+        jumps = np.flatnonzero(rate > JUMP * np.maximum(beside, usual))
+        for row in jumps[:1]:
+            where = f"from {t[row]:g} to {t[row + 1]:g} s{_more(len(jumps))}"
+            yield f"{joint} moves by {by[row]:.3g} rad {where}: {JUMP:g} times as fast as elsewhere"
+
+
+def _more(count: int) -> str:
+    return f", and {count - 1} times more" if count > 1 else ""
 
 
 def _angle(table: pa.Table, joint: str, path: Path) -> Array:

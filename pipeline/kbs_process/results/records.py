@@ -106,9 +106,18 @@ class _Form(msgspec.Struct, frozen=True):
 R = TypeVar("R", bound=msgspec.Struct)
 
 
+def _plain(value: object) -> object:
+    """A number of numpy's as one of Python's."""
+    import numpy as np  # not before something asks for it: `--help` answers at once
+
+    if isinstance(value, np.generic):
+        return value.item()
+    raise TypeError(f"no results hold a {type(value).__name__}")
+
+
 def encode(results: Record) -> bytes:
     """Return results.json: indented, the same bytes for the same results; NaN and infinities become null."""
-    compact = msgspec.json.encode(results, order="deterministic")
+    compact = msgspec.json.encode(results, order="deterministic", enc_hook=_plain)
     return msgspec.json.format(compact, indent=2) + b"\n"
 
 
@@ -140,7 +149,7 @@ def schema_of(record: type[Record], title: str) -> dict[str, Any]:
     """Return the JSON Schema of a kind of results.json."""
     (entry,), definitions = msgspec.json.schema_components((record,), ref_template="#/$defs/{name}")
     whole = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": title, **entry, "$defs": definitions}
-    return msgspec.json.decode(msgspec.json.encode(whole), type=dict[str, Any])  # as a file holds it
+    return msgspec.json.decode(msgspec.json.encode(whole, enc_hook=_plain), type=dict[str, Any])  # as a file holds it
 
 
 def _content(folder: Path) -> bytes:

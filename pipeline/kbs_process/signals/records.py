@@ -148,6 +148,7 @@ class Spectrum:
     S: NDArray[np.complex128]  # (m, c, c), units of channel i times channel j per Hz
     channels: tuple[str, ...]
     averages: int
+    alternating: Array  # (c,) rms of what changes its sign from sample to sample, beyond noise and blows
 
 
 @dataclass(frozen=True, slots=True, eq=False)

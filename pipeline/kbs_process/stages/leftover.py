@@ -33,7 +33,8 @@ def _shares(t: Array, x: Array, dt: float, q: Array, joints: Sequence[str], late
     power = float(x @ x)
     if late.any():
         lag = float(x @ late) / float(late @ late)
-        yield _held(x, late[:, None]), f"a lag of {lag:.2g} s behind the angles: clocks, or a filter"
+        if abs(lag) < _WINDOW * (t[-1] - t[0]):
+            yield _held(x, late[:, None]), f"a lag of {lag:.2g} s behind the angles: clocks, or a filter"
     yield _held(x, np.vander((t - t[0]) / (t[-1] - t[0]), 2)), "a drift with time"
     before = np.cumsum(x)[:-1]
     count = np.arange(1.0, len(x))

@@ -18,12 +18,12 @@ N = 2000
 STEP = 10_000_000  # ns
 
 
-def write(path: Path, came: list[tuple[int, int, float]]) -> None:
+def write(path: Path, came: list[tuple[int, int, float]], publishers: tuple[str, str, str] = ("", "", "")) -> None:
     """Messages (channel, log time, x) of the topic /x."""
     with path.open("wb") as file:
         writer = Writer(file, chunk_size=4096)
         writer.start()
-        channels = [writer.register_channel("/x", "json", 0) for _ in range(3)]
+        channels = [writer.register_channel("/x", "json", 0, {"publisher": name}) for name in publishers]
         for channel, log, x in came:
             writer.add_message(channels[channel], log, json.dumps({"x": x}).encode(), log)
         writer.finish()
@@ -55,6 +55,12 @@ def test_a_publisher_that_began_again_is_one(tmp_path: Path) -> None:
     path = tmp_path / "a.mcap"
     write(path, [(k // 700, k * STEP, 1.0) for k in range(N)])
     assert by_turns(path) == {}
+
+
+def test_a_publisher_that_hands_over_to_another_is_told(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    write(path, [(k // 700, k * STEP, 1.0) for k in range(N)], ("sensor", "sensor", "filter"))
+    assert by_turns(path) == {"x": (1, 2, 3)}
 
 
 def test_messages_that_came_twice_are_one_publisher_s(tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ The conventions of netCDF are kept: what `scale_factor` and `add_offset` pack is
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -32,6 +33,7 @@ _NO_VARIABLE = "This is a netCDF dimension but not a netCDF variable"
 # How many numbers attributes have, 0 for any.
 _VALUES = {"scale_factor": 1, "add_offset": 1, "valid_min": 1, "valid_max": 1, "valid_range": 2}
 _VALUES |= {"_FillValue": 0, "missing_value": 0}
+_UNUSED = ("scale", "offset", "gain", "slope", "intercept")  # which no convention defines
 # Classes of MATLAB; what others write has none.
 _MATLAB_NUMBERS = re.compile("|double|single|logical|u?int(8|16|32|64)")
 ELEMENTS = 1 << 16  # of an array of structures
@@ -125,6 +127,8 @@ def _columns(data: Any, name: str, classes: bool) -> Iterator[Item]:
     if odd := next(filter(None, (_odd(data, *one) for one in _VALUES.items())), ""):
         yield f"{name}: its attribute {odd}"
         return
+    if unused := [key for key in _UNUSED if key in data.attrs]:
+        yield Counter({f"attributes of {name} change no number ({', '.join(unused)}): a mapping can": len(unused)})
     packing = _Packing.of(data) if data.dtype.kind in "iuf" else None
     change = None if packing is None else packing.unpacked
     if data.ndim == 2:  # MATLAB's are transposed: of a square one, too

@@ -39,6 +39,7 @@ class Described:
     topic: str
     encoding: str
     schema: mcap.Schema
+    metadata: bytes
 
 
 class Segment:
@@ -55,7 +56,9 @@ class Segment:
         # Looked up here, as the dictionary grows while others use the segment.
         known = ((number, dictionary.channels.get(number)) for number in self.counts)
         self.channels = [
-            Described(number, one.topic, one.encoding, dictionary.schema_of(one)) for number, one in known if one
+            Described(number, one.topic, one.encoding, dictionary.schema_of(one), one.metadata)
+            for number, one in known
+            if one
         ]
 
     def places(self, number: int) -> NDArray[np.int64]:

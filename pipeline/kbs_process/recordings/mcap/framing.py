@@ -44,6 +44,7 @@ class Channel:
     topic: str
     encoding: str
     schema: int
+    metadata: bytes  # as they stand
 
 
 @dataclass(slots=True)
@@ -124,7 +125,7 @@ def parse_channel(content: bytes) -> tuple[int, Channel]:
     """Return the number and content of a channel record."""
     fields = Fields(content)
     number, schema = fields.integer(2), fields.integer(2)
-    return number, Channel(fields.text(), fields.text(), schema)
+    return number, Channel(fields.text(), fields.text(), schema, fields.content[fields.at :])
 
 
 def parse_chunk_head(content: bytes, length: int) -> ChunkHead:

@@ -153,10 +153,12 @@ class Reading:
         self._heard = np.full(len(stream.fields), not stream.lenient)  # fields that had a reading, or must have
         self._where = f"{container.path.name}, {stream.topic}"
         self._turns = _Turns()
+        self._publishers: set[bytes] = set()  # by what a recorder writes of them
 
     def block(self, segment: Segment, channels: Sequence[Described]) -> Block | None:
         """Return the stream's messages in the segment, in their order; `channels` are those of its topic there."""
         channels = [one for one in channels if self.stream.channel in (None, one.number)]
+        self._publishers.update(one.metadata for one in channels)
         numbers = [channel.number for channel in channels]
         parts = [self._decode(channel, segment) for channel in channels]
         if len(parts) < 2:
@@ -176,8 +178,9 @@ class Reading:
 
     @property
     def publishers(self) -> tuple[int, ...]:
-        """The channels that bring the topic by turns; none where each ends before the next begins."""
-        return tuple(sorted(self._turns.seen)) if self._turns.returns >= RETURNS else ()
+        """The channels that bring the topic by turns; none where each is the same publisher's who began again."""
+        several = self._turns.returns >= RETURNS or (len(self._publishers) > 1 and len(self._turns.seen) > 1)
+        return tuple(sorted(self._turns.seen)) if several else ()
 
     def losses(self) -> Iterator[Loss]:
         """Yield what the stream has lost."""

@@ -40,15 +40,17 @@ from kbs_process.stages.conventions import (
 from kbs_process.stages.gravity import model as gravity
 from kbs_process.stages.gravity.equation import Equation
 from kbs_process.stages.gravity.equation import Prepared as Instants
-from kbs_process.stages.gravity.hypotheses import RATHER, explanations, shown_gains, turned
+from kbs_process.stages.gravity.hypotheses import RATHER, Explained, explanations, shown_gains, turned
 from kbs_process.stages.gravity.model import GravityModel, Sample, prepared
-from kbs_process.stages.gravity.tension import TAKEN, Moved, lag, tension
+from kbs_process.stages.gravity.tension import KNOWN_S, TAKEN, Moved, lag, misread, tension
 from kbs_process.stages.repeats import commanded
 
 LEFT = 0.1  # of the weight, and of the torque that it can make: a calibration leaves less, whatever rubs or pulls
 FOLLOWED = 0.5  # share of what is left of a channel that follows its computed load: a gain, or what looks like one
 NEAR = 0.1  # of the article's reach from the transducer: no spacecraft's centre of mass is there
 SHOWN = 0.2  # relative error of a gain that the other channels show: beyond, the equation is no line any more
+EARTH = (9.7, 9.9)  # m/s^2, of gravity
+FINEST = 0.01  # of a gain, or degrees of an angle's zero: recordings may differ by this
 SILENT = 0.1  # slope, against computed loads, of a channel that does not respond
 
 
@@ -110,29 +112,36 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
         equation = model.equation
         low_pass, theta = model.settings.low_pass_Hz, model.fit.value[: equation.size]
         instants = [prepared(sample, equation, model.settings, low_pass, theta) for sample in samples]
-        zeros = np.stack([taring.bias for _, taring in tared])
+        constants = np.stack([taring.bias for _, taring in tared])
         shown = [_read_and_due(one, data, model) for one, data in zip(recordings, instants, strict=True)]
-        conventions = (*check_weight(campaign.rig), *_conventions(recordings, instants, model, zeros, shown))
+        conventions = (*check_weight(campaign.rig), *_conventions(recordings, instants, model, constants, shown))
         amplifier = campaign.rig.transducer.amplifier
         lags = [(one, own) for one, data in zip(recordings, instants, strict=True) if (own := lag(model, data))]
-        known = [late_sigma(one.run.clocks, amplifier, one.entry.clock_sigma) for one, _ in lags]
+        known = [max(KNOWN_S, late_sigma(one.run.clocks, amplifier, one.entry.clock_sigma)) for one, _ in lags]
         late = [own.moved(sigma) for (_, own), sigma in zip(lags, known, strict=True) if own.taken >= TAKEN]
+        off = {data.name: [(own, own.moved(FINEST)) for own in misread(model, data)] for data in instants}
+        fitted = {sample.name for sample, taring in tared if taring.fitted}
+        wrongly = [] if any(off[name] for name in fitted) else [pair for own in off.values() for pair in own]
+        along = {name for own, _ in wrongly for name in own.zeros}
         gains = shown_gains(equation, instants)
         tested = {one.channel for one in conventions if one.testable and one.channel}
         read = tuple(_read_gains(equation, {key: of for key, of in gains.items() if key not in tested}))
-        found = tension(model, {sample.name: taring for sample, taring in tared}, (*late, *read))
+        found = tension(
+            model, {sample.name: taring for sample, taring in tared}, (*late, *(one for _, one in wrongly), *read)
+        )
         most = _most(equation)
-        if not tested:  # what gravity leaves may be gravity about another axis
-            spread = np.max([read.std(axis=0) for read, _, _ in shown], axis=0)
-            most = np.minimum(
-                most, np.maximum(LEFT * spread, BEYOND * equation.elements.rig.loads.noise[equation.index])
-            )
         rounding = {key: x for one in recordings for key, x in measurable.rounding(campaign, one.readings).items()}
         channels = model.rig.transducer.channels
+        white = [measured_noise(model.rig, one)[1] for one in recordings]
         noise = {
-            one.entry.name: dict(zip(channels, measured_noise(model.rig, one)[1].tolist(), strict=True))
-            for one in recordings
+            one.entry.name: dict(zip(channels, rms.tolist(), strict=True))
+            for one, rms in zip(recordings, white, strict=True)
         }
+        if not tested:  # what gravity leaves may be gravity about another axis
+            spread = np.max([read.std(axis=0) for read, _, _ in shown], axis=0)
+            floor = equation.elements.rig.loads.noise[equation.index]
+            floor[: len(channels)] = np.nanmax([floor[: len(channels)], *white], axis=0)  # stated, and as measured
+            most = np.minimum(most, np.maximum(LEFT * spread, BEYOND * floor))
         hidden = {one.name: tuple(_hidden(campaign, one, recordings, model)) for one in campaign.requirements}
         timed = tuple(mistimed(campaign, recordings))
         still = tuple(stuck(recordings, instants, model))
@@ -151,27 +160,29 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
         )
         judged = {key for one in campaign.requirements for key in measurable.judged_channels(one, campaign.rig)}
         mute = tuple(_mute(equation, [read for read, _, _ in shown]))
-        failed = [one.check.split() for one in conventions if not one.ok and abs(one.slope or 0.0) < SILENT]
-        dead = [key for key in mute if any(key in check for check in failed)]
         soundness = Soundness(probability=found.probability, gains={key: sigma for key, (_, sigma, _) in gains.items()})
         tests = [one.entry.name for one in recordings if one.entry.role != "calibration"]
         if reasons:
             shifted = [one for one in found.beyond if one in late]
             told = [words.SCALE for _ in timed[:1]] + [words.STUCK for _ in still[:1]]
+            misled = [one for _, one in wrongly if one in found.beyond]
             told += [words.LATE.format(one.value) for one in shifted[:1]] + [words.TWICE for _ in twice[:1]]
-            more = not twice and reasons != (*timed, *still, *words.far(shifted, 1.0))
-            causes = explanations(equation, instants, most) if more else ()
+            right = not (timed or still or shifted or twice) and _calibrated(campaign, samples, model, most)
             off = [one for one in conventions if not one.ok]
-            alone = not (timed or still or shifted or twice) and _calibrated(campaign, samples, model, most)
-            alone = alone and all(one.check.rpartition(", ")[2] in tests for one in off)
+            alone = right and all(one.check.rpartition(", ")[2] in tests for one in off)
             single = len({one.channel for one in off if one.channel}) == 1  # what pulls is read by several
             regained = [one for one in off if single and one.followed > FOLLOWED]
-            silencing = any(one.fault.kind in ("swapped", "axes", "clock") for one in causes)
-            if dead and not silencing:
-                causes, told = (), told + [f"channel: {key} does not respond" for key in dead]
+            causes: tuple[Explained, ...] = ()
+            if right and misled and all(one in (*misled, *read) or one.name in along for one in found.beyond):
+                told += [words.misread(one) for one in misled]
             elif alone and regained:
-                causes, told = (), told + [words.regained(one, SILENT) for one in regained]
+                told += [words.regained(one, SILENT) for one in regained]
+            elif not twice and reasons != (*timed, *still, *words.far(shifted, 1.0)):
+                causes = explanations(equation, instants, most)
             told += [words.cause(one, equation) for one in causes]
+            pull = float(model.rig.gravity.value)
+            if pull and not EARTH[0] < pull < EARTH[1]:
+                told.insert(0, words.GRAVITY.format(pull))
             soundness = Soundness(
                 sound=False,
                 probability=found.probability,
@@ -179,7 +190,7 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
                 beyond=tuple(words.beyond(one, model) for one in found.beyond),
                 reasons=reasons,
                 suggestions=tuple(told),
-                calibrated=alone and not regained and all(one.channel for one in off),
+                calibrated=alone and not misled and not regained and all(one.channel for one in off),
             )
         silent = tuple(key for key in mute if key in judged)
         unconfirmed = tuple(key for key in equation.channels if key not in tested)

@@ -25,7 +25,8 @@ def unlike_stated(requirement: Requirement, rig: Rig, recordings: Sequence[Prepa
     """Channels with far less white noise than is stated, and those with far more, unless rounding hides it (`noisy`).
 
     What averages or filters readings takes noise off as it takes off peaks: next to the band, in the octaves above it.
-    Noise is more where it is so up to half the sampling rate, and from sample to sample.
+    Noise is more where it is so up to half the sampling rate, and from sample to sample. Two sources that write one
+    stream by turns differ from sample to sample, and what is read is the mean of both.
     """
     own, stated, amplifier = rig.transducer.channels, noisy(rig), rig.transducer.amplifier
     judged = measurable.needed_channels(requirement, rig)
@@ -36,9 +37,15 @@ def unlike_stated(requirement: Requirement, rig: Rig, recordings: Sequence[Prepa
     factor = np.maximum(UNLIKE, np.exp(np.minimum(BEYOND * sigma / noise, 100.0)))  # beyond, nothing is known
     for one in recordings:
         less, more = measured_noise(rig, one, near)
+        turns = np.full(len(own), np.nan) if one.run.spectrum is None else one.run.spectrum.alternating
         for off, read, why in (
             (factor * less < noise, less, "averaged or filtered before it was stored, or in another scale"),
             (more > factor * noise, more, "disturbed, or in another scale"),
+            (
+                (turns > factor * noise) & ~(more > factor * noise),
+                turns,
+                "up and down from sample to sample, by two sources in turn, or hum",
+            ),
         ):
             told = [
                 f"{own[k]} has {read[k]:.2g} {rig.loads.units[index[k]]} rms, not {noise[k]:.2g} +- {sigma[k]:.2g}"

@@ -19,6 +19,7 @@ SCALE = "clock: the times of all streams run too fast or too slow, or rates are 
 STUCK = "encoder: it is not read, or does not turn with its joint"
 TWICE = "mapping: one column is read for two channels"
 LATE = "clock: the wrench is {:+.2g} s late, or more, by its timestamps or a filter"
+GRAVITY = "unit: gravity.magnitude is {:.3g} m/s^2, which is nowhere on Earth"
 TURNED = "the recordings are {1:.0e} times as likely if {0} turns the other way"
 UNEXPLAINED = (
     "no single simple fault (gain, unit, sign, axis, zero, swapped channels, one number) explains it: look for what "
@@ -62,6 +63,8 @@ def cause(one: Explained, equation: Equation) -> str:
     match fault.kind:
         case "gain":
             return gain(fault.what, fault.gained, float(found[0]))
+        case "silent":
+            return f"channel: {fault.what} does not respond"
         case "swapped":
             return f"swapped: {fault.what}"
         case "axes":
@@ -92,6 +95,10 @@ def regained(one: SignCheck, silent: float) -> str:
     return (
         f"{gain(one.channel, [one.channel], slope)} in {recording}, unless a load that goes with the angle pulls there"
     )
+
+
+def misread(one: Moved) -> str:
+    return f"{one.name} is {one.value:.3g}, unless a load that goes with the angle pulls there"
 
 
 def gain(what: str, channels: Sequence[str], gain: float) -> str:

@@ -11,6 +11,7 @@ from kbs_process.signals.records import Array, Mask, Spectrum
 DOUBT = 0.01  # a segment with a larger share of invented samples is left out
 OCTAVES = 3  # in which a noise is looked for
 LINES = 8  # averages counted, that tell it
+_LAST = 16  # lines up to half the sampling rate, and as many beside them
 
 
 class Welch:
@@ -61,7 +62,8 @@ class Welch:
                 self._add(rows[start : start + length], flags[start : start + length])
         if self._averages == 0:
             return None
-        return Spectrum(self._f, self._sum / self._averages, self._channels, self._averages)
+        alternating = np.sqrt(np.maximum(self._fastest, 0.0) / self._averages)
+        return Spectrum(self._f, self._sum / self._averages, self._channels, self._averages, alternating)
 
     def _setup(self, length: int) -> None:
         f = np.asarray(np.fft.rfftfreq(length, 1.0 / self._rate), dtype=np.float64)
@@ -69,6 +71,7 @@ class Welch:
         self._window: Array = get_window("hann", length)
         one_sided = np.where((self._f > 0.0) & (self._f < 0.5 * self._rate), 2.0, 1.0)
         self._scale: Array = np.asarray(one_sided / (self._rate * float(self._window @ self._window)), dtype=np.float64)
+        self._fastest = np.zeros(len(self._channels))
         self._sum = np.zeros((len(self._f), len(self._channels), len(self._channels)), dtype=np.complex128)
 
     def _add(self, rows: Array, flags: Mask) -> None:
@@ -76,7 +79,11 @@ class Welch:
             return
         x = np.ascontiguousarray(rows.T)
         x = (x - x.mean(axis=1, keepdims=True)) * self._window
-        X = np.ascontiguousarray(fft.rfft(x, axis=1)[:, : len(self._f)].T)
+        every = fft.rfft(x, axis=1)
+        X = np.ascontiguousarray(every[:, : len(self._f)].T)
+        last, beside = np.split(np.abs(every[:, : -1 - 2 * _LAST : -1]) ** 2, [_LAST], axis=1)
+        scale = 2.0 / (len(self._window) * float(self._window @ self._window))
+        self._fastest += scale * (last.sum(axis=1) - 0.5 * last[:, 0] - beside.sum(axis=1))
         self._sum += self._scale[:, None, None] * (X.conj()[:, :, None] * X[:, None, :])
         self._averages += 1
 

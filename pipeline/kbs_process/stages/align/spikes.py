@@ -39,7 +39,7 @@ GAP = 1.5  # periods
 PUSHED_S = 2.0
 PAUSE_S = 1.0  # a longer gap may be a pause, in which the rig moved
 PAUSE_RATE = 1.0  # rad/s that no antenna is turned with where its readings are missing
-MOST_BAD, LEAST_BAD = 0.01, 10  # share of samples, and number, that may be spikes
+MOST_BAD, LEAST_BAD = 0.01, 10  # spikes in samples, and number, that a signal may have
 MOST_TURNS = 1e4
 TURNS, TURNS_SHARE = 20, 0.1  # changes between two levels in a block, and their share of it
 SHAKEN = 10.0  # of the usual second difference
@@ -123,7 +123,7 @@ class Spikes:
     changing: dict[int, Oddity] = field(default_factory=dict)  # channels whose samples change to and fro
     beating: set[int] = field(default_factory=set)  # of these, tones
     samples: int = 0
-    _bad: Stamps | None = None  # (c,) samples in spikes
+    _bad: Stamps | None = None  # (c,) spikes
     _code: Array | None = None  # (c,) least difference between readings
     _largest: Array | None = None  # (c,) second difference beside spikes and steps
     _fastest: Array | None = None  # (c,) first difference
@@ -263,7 +263,7 @@ class Spikes:
                 x[first:stop, channel] = rows
             else:
                 kind = self.spikes
-                self._bad[channel] += stop - first
+                self._bad[channel] += 1
             if len(kind) < LISTED:
                 kind.append(one)
 
@@ -282,7 +282,7 @@ class Spikes:
         return None
 
     def noisy(self) -> tuple[int, int] | None:
-        """A channel with more spikes than a signal has, and how many samples they are."""
+        """A channel with more spikes than a signal has, and how many they are."""
         most = 0 if self._bad is None or self.samples == 0 else int(np.argmax(self._bad))
         count = 0 if self._bad is None else int(self._bad[most])
         return (most, count) if count > max(MOST_BAD * self.samples, LEAST_BAD) else None

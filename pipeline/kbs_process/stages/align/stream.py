@@ -240,14 +240,14 @@ class Timeline:
         if at_end and self.filled and scattered:
             raise RecordingError(
                 f"{self._scattered} of {self.samples} stamps are over a fifth of {1e-6 * grid.period_ns:.4g} ms off "
-                "a regular rate: they are times of arrival and not of sampling",
+                "a regular rate: they are times of arrival, or samples were taken unevenly",
                 where=self.file or self.where,
                 remedy=STAMP_EACH,
             )
         too_many = self.missing > MADE_UP + MADE_UP_EACH * self.samples
         if self.filled and (too_many or (at_end and self.longest > there)):
             raise RecordingError(
-                f"a gap of {self.longest:.6g} s among samples that cover {there:.4g} s: this is not one recording",
+                f"a gap of {self.longest:.6g} s, longer than all that is there: this is not one recording",
                 where=self.file or self.where,
                 remedy=ONE_PART,
             )
@@ -287,7 +287,7 @@ class Timeline:
             )
         if self.spikes is not None and (noisy := self.spikes.noisy()) is not None:
             raise RecordingError(
-                f"{self.channels[noisy[0]]} is off its neighbours in {noisy[1]} single samples of {self.samples}: "
+                f"{self.channels[noisy[0]]} is off its neighbours at {noisy[1]} places in {self.samples} samples: "
                 "that is no signal",
                 where=self.file or self.where,
                 remedy="look for a bad contact, a second source, or a driver that fills in what it has lost",

@@ -21,7 +21,7 @@ from kbs_process.stages.gravity.parameters import CROSS_COUPLING, Index
 from kbs_process.stages.gravity.solve import ZERO, least_sigma, zero_priors, zero_slopes
 from kbs_process.stages.gravity.tension import BEYOND, BY_CHANCE, by_chance, together
 
-Kind = Literal["gain", "swapped", "axes", "sense", "unit", "clock", "zero", "point", "bias", "number"]
+Kind = Literal["gain", "silent", "swapped", "axes", "sense", "unit", "clock", "zero", "point", "bias", "number"]
 
 _POINTS = 60  # instants of a recording
 _RECORDINGS = 3
@@ -154,6 +154,7 @@ def _gains(channels: Sequence[str]) -> Iterator[Fault]:
         yield Fault("gain", name, gained=members)
     for channel in channels:
         yield Fault("gain", channel, gained=(channel,))
+        yield Fault("silent", channel)
 
 
 def _mixed(channels: Sequence[str]) -> Iterator[Fault]:
@@ -257,6 +258,7 @@ def _solve(data: _Data, fault: Fault, most: Array, *, anew: bool) -> Explained:
             local = _linear(data.equation, angled, about)
         else:
             local = data
+        local = _silent(local, fault.what) if fault.kind == "silent" else local
         wrench = [_undone(data, fault, p.wrench, at, open_) for p in data.prepared]
         slopes = [_slopes(local, fault, p, base, at, open_) for p, base in zip(local.prepared, local.base, strict=True)]
         numbers, more, solved = _refit(local, fault, wrench, slopes, most)
@@ -279,6 +281,17 @@ def _solve(data: _Data, fault: Fault, most: Array, *, anew: bool) -> Explained:
         and bool(np.all(numbers[free] >= lower[free]))
         and not (fault.kind == "clock" and open_[0] <= _LEAST),
     )
+
+
+def _silent(data: _Data, channel: str) -> _Data:
+    """The same where a channel reads its zero alone."""
+    size = data.equation.size
+    heard = np.array([key != channel for key in data.equation.channels], dtype=np.float64)
+    keep = _decoupled(data, _raw(data, np.eye(len(heard))) * heard)
+    zeros = [own[:, :, size:] @ data.about[size:] for own in data.J]
+    base = tuple((x - zero) @ keep + zero for x, zero in zip(data.base, zeros, strict=True))
+    J = (np.concatenate([np.einsum("cd,nck->ndk", keep, own[:, :, :size]), own[:, :, size:]], axis=2) for own in data.J)
+    return replace(data, base=base, J=tuple(J))
 
 
 def _first_gain(data: _Data, at: list[int]) -> float:

@@ -8,7 +8,7 @@ the model, a unit or a sign is wrong, or a stated sigma too small.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import chi2
@@ -24,6 +24,9 @@ BEYOND = 4.0  # sigma
 BY_CHANCE = 1e-4
 KNOWN_S = 0.02  # to which a delay between two recorders can be known at best
 TAKEN = 0.25  # part of the power of what is left that a lag explains, or something else may follow the rates
+ALONE = 0.8  # the same of what is misread in one recording, or something else may follow the angles
+_ABOUT = 0.4  # of -1, a sign that is turned
+_LINEAR = 45.0  # degrees, to which an angle's zero is found in one step
 _ROUNDS = 4  # of weights
 _INFORMED = 0.1  # part of the prior's variance that the data take away: less says nothing of the prior
 
@@ -45,19 +48,21 @@ class Moved:
 
 
 @dataclass(frozen=True, slots=True)
-class Lag:
-    """How late a recording's wrench is behind its angles (s), beyond what the model has, and by how much by chance."""
+class Shift:
+    """What is off in one recording, by what the model leaves of it: in time, or in a joint's angle."""
 
+    what: str
     recording: str
     value: float
     chance: float  # standard deviation, by what coloured residuals leave uncertain
     taken: float  # part of the power of what is left that it explains
+    right: float = 0.0  # value where nothing is off
+    zeros: tuple[str, ...] = ()  # of channels, which it moves as well
 
-    def moved(self, sigma: float) -> Moved:
-        """The same, of two recorders that are known to agree to `sigma`, s."""
-        known = max(sigma, KNOWN_S)
-        name = f"the wrench's lag (s) behind the angles in {self.recording}"
-        return Moved(name, 0.0, known, self.value, float(np.hypot(known, self.chance)))
+    def moved(self, known: float) -> Moved:
+        """The same, of what is known to `known`."""
+        name = f"{self.what} in {self.recording}"
+        return Moved(name, self.right, known, self.value, float(np.hypot(known, self.chance)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,27 +100,58 @@ def tension(model: GravityModel, tarings: Mapping[str, Taring], lags: Sequence[M
     return Tension((*moved, *_zeros(model, tarings), *lags), together(fit.moved[known] / scale, C))
 
 
-def lag(model: GravityModel, data: Prepared) -> Lag | None:
-    """The lag of a recording's wrench, by what gravity leaves of it; None where there is no wrench."""
+def lag(model: GravityModel, data: Prepared) -> Shift | None:
+    """The lag of a recording's wrench, beyond what the model has, by what gravity leaves; None where no wrench is."""
+    expected = model.equation.predict(model.fit.value[: model.equation.size], data)
+    return _shift(model, data, "the wrench's lag (s) behind the angles", -np.gradient(expected, data.t, axis=0))
+
+
+def misread(model: GravityModel, data: Prepared) -> Iterator[Shift]:
+    """What alone makes a recording one like those that were fitted, where it takes most of what gravity leaves of it.
+
+    A channel may read another share of what acts, an encoder count from another zero (degrees), or the other way.
+    """
+    equation, joints = model.equation, model.rig.joints
+    theta = model.fit.value[: equation.size]
+    expected, slopes = equation.predict(theta, data), equation.angle_slopes(theta, data)
+    found = []
+    for index, channel in enumerate(equation.channels):
+        own = np.where(np.arange(len(equation.channels)) == index, expected, 0.0)
+        found.append(_shift(model, data, f"the gain of {channel}", own, right=1.0))
+    for index, joint in enumerate(joints):
+        sense = np.where(np.arange(len(joints)) == index, -1.0, 1.0)
+        back = replace(data, q=data.q * sense, qd=data.qd * sense, qdd=data.qdd * sense, before=None, after=None)
+        turned = 0.5 * (expected - equation.predict(theta, back))
+        sign = _shift(model, data, f"the sign of {joint.name}'s angle", turned, right=1.0)
+        zero = _shift(model, data, f"the zero of {joint.name}'s angle (degrees)", -np.radians(slopes[:, :, index]))
+        found += [sign] if sign and abs(sign.value + 1.0) < _ABOUT else []
+        found += [zero] if zero and abs(zero.value) < _LINEAR else []
+    yield from sorted((one for one in found if one and one.taken > ALONE), key=lambda one: -one.taken)[:1]
+
+
+def _shift(model: GravityModel, data: Prepared, what: str, shape: Array, right: float = 0.0) -> Shift | None:
+    """How much of a shape (n, c) the wrench holds that gravity leaves of a recording, beyond what is `right`."""
     equation = model.equation
     wrench = [at for at, channel in enumerate(equation.channels) if channel in WRENCH_CHANNELS]
-    expected = equation.predict(model.fit.value[: equation.size], data)[:, wrench]
     if not wrench:
         return None
-    left = data.wrench[:, wrench] - expected
-    late = -np.gradient(expected, data.t, axis=0)
+    expected = equation.predict(model.fit.value[: equation.size], data)
+    left, shape = (data.wrench - expected)[:, wrench], shape[:, wrench]
     rest = left = left - left.mean(axis=0)
-    late -= late.mean(axis=0)
+    middle = shape.mean(axis=0)
+    shape = shape - middle
     floor = least_sigma(data, equation.elements.rig)[wrench]
     for _ in range(_ROUNDS):
         weight = np.maximum(rest.std(axis=0), floor) ** -2
-        power = max(float(np.sum(late**2 * weight)), 1e-300)
-        value = float(np.sum(late * left * weight)) / power
-        rest = left - value * late
-    scores = np.sum(late * rest * weight, axis=1, keepdims=True)
+        power = max(float(np.sum(shape**2 * weight)), 1e-300)
+        value = float(np.sum(shape * left * weight)) / power
+        rest = left - value * shape
+    scores = np.sum(shape * rest * weight, axis=1, keepdims=True)
     chance = float(np.sqrt(longrun_covariance(scores)[0, 0])) / power
     taken = 1.0 - float(np.sum(rest**2 * weight)) / max(float(np.sum(left**2 * weight)), 1e-300)
-    return Lag(data.name, value, chance, taken)
+    moved = np.flatnonzero(np.abs(value * middle) > floor)
+    zeros = tuple(f"{ZERO[0]}[{data.name}].{equation.channels[wrench[at]]}" for at in moved)
+    return Shift(what, data.name, right + value, chance, taken, right, zeros)
 
 
 def by_chance(names: Sequence[str], prior: Array, value: Array, sigma: Array, covariance: Array) -> tuple[Moved, ...]:

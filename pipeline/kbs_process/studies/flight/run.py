@@ -53,7 +53,7 @@ def predict_flight(
     drawn = draw(numbers, samples, seed)
     base = Job(rig, campaign.effects, given.schedule, duration, campaign.bands.working_rate, judged)
     jobs = [base, *(replace(base, rig=substitute(rig, values(rig, numbers, row))) for row in drawn)]
-    with progress.task(f"Flying {samples} units along {given.name}") as task:
+    with progress.task(f"Flying {samples} units along {given.told}") as task:
         nominal, *flown = ordered_map(fly, jobs, task.update, processes=processes)
     if nominal is None:
         raise SimulationError("the nominal flight unit cannot be simulated", where=campaign.name)

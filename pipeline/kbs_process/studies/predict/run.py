@@ -33,7 +33,7 @@ def simulate_commands(
     """Simulate the commands of a CSV or Parquet file through the controller; return `target`."""
     _require_commands(campaign)
     given = of_table(commands, campaign.rig)
-    with progress.task(f"Simulating {commands.name}") as task:
+    with progress.task(f"Simulating {given.told}") as task:
         streams = predict(
             campaign.rig,
             campaign.effects,
@@ -54,7 +54,7 @@ def simulate_trajectory(
     given = of_trajectory(campaign, trajectory, progress)
     run = given.run
     assert run is not None  # a recording's
-    with progress.task(f"Simulating {given.name}") as task:
+    with progress.task(f"Simulating {given.told}") as task:
         path = stopped(given.schedule, campaign.rig.controller, stop)
         streams = _as_recorded(campaign, campaign.effects, path, run, task.update, rate_Hz)
         return write_prediction(
