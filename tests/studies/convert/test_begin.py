@@ -106,6 +106,7 @@ def wrench_of(q: np.ndarray, seed: int = 1) -> np.ndarray:
     return load + np.random.default_rng(seed).normal(0.0, [0.02] * 3 + [0.002] * 3, load.shape)
 
 
+@pytest.mark.slow
 def test_the_shift_between_two_clocks_is_found_within_its_sigma() -> None:
     found = []
     for seed in range(8):
@@ -194,6 +195,7 @@ def tree(path: Path) -> dict[str, Any]:
     return tomllib.loads(path.read_text())
 
 
+@pytest.mark.slow
 def test_from_two_loggers_to_a_campaign(tmp_path: Path) -> None:
     files = write_logs(tmp_path)
     lines = "\n".join(begin(tmp_path / "arm", files))
@@ -222,6 +224,7 @@ def test_from_two_loggers_to_a_campaign(tmp_path: Path) -> None:
     assert [one.name for one in campaign.recordings] == ["sweep_1", "test_1"]
 
 
+@pytest.mark.slow
 def test_clocks_that_run_apart_have_no_shift(tmp_path: Path) -> None:
     files = write_logs(tmp_path)
     for path in tmp_path.glob("angle_*.txt"):
@@ -394,6 +397,7 @@ def test_numbers_that_nothing_measures_are_left_out_without_a_warning(tmp_path: 
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("row", "time"), [(1, "-9000"), (900, "1000"), (-1, "9000"), (-1, "1e9")])
 def test_a_stamp_far_from_all_others_leaves_the_shift_a_question(tmp_path: Path, row: int, time: str) -> None:
     files = write_logs(tmp_path)
