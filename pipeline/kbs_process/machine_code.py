@@ -2,7 +2,8 @@
 
 A cache is damaged by a full disk, a copy that ends early or a kill at the wrong time; numba raises whatever unpickling
 raises then, at every later start, and runs machine code as it finds it. So code is kept with its SHA-256. Whoever
-compiles takes `njit` from here.
+compiles takes `njit` from here, and copies arrays number by number: for an assignment of slices numba compiles the
+text of its error as well, for ten seconds of a first start.
 """
 
 from __future__ import annotations

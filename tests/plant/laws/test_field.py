@@ -15,10 +15,11 @@ from kbs_process.plant.predict import predict, tap_columns
 from kbs_process.plant.schedule import Schedule
 from kbs_process.rig.model import Rig, substitute
 from kbs_process.signals.records import Array
-from plant.plant_rigs import NOMINAL, two_axis
+from plant.plant_rigs import two_axis
 
 pytestmark = pytest.mark.slow
 
+EFFECTS = ("synchronous_motor", "motor_viscous", "flexspline")  # what a field acts through: fewer to compile
 SECONDS, CYCLE, LATE, SCALE = 8.0, 0.05, 5e-3, 2e-3
 START, REACH = np.array([0.4, -0.3]), np.array([0.12, 0.08])
 OMEGA = 2.0 * np.pi / 8.0  # from rest to rest
@@ -63,9 +64,9 @@ def test_a_changed_field_is_that_of_a_schedule_that_was_changed(name: str, numbe
     (effect,) = select([name])
     value = LATE if name == "controller_latency" else SCALE
     with_effect = attach(rig, effect, {number: value}, joints=[rig.joint_names[1]])
-    plain = shown(rig, list(NOMINAL), schedule(way(t), t))
-    expected = shown(rig, list(NOMINAL), schedule(changed, t))
-    found = shown(with_effect, [*NOMINAL, name], schedule(way(t), t))
+    plain = shown(rig, list(EFFECTS), schedule(way(t), t))
+    expected = shown(rig, list(EFFECTS), schedule(changed, t))
+    found = shown(with_effect, [*EFFECTS, name], schedule(way(t), t))
     microstep = 2.0 * np.pi / 12800.0
     for motor, (bare, right, got) in zip((0.01, 1.0), zip(plain, expected, found, strict=True), strict=True):
         moved = right - bare
@@ -81,10 +82,10 @@ def test_a_recorded_field_has_gain_and_set_points_in_it_already() -> None:
     ratios = np.array([float(joint.drive.ratio) for joint in rig.joints if joint.drive is not None])
     recorded = Schedule(t, way(t), np.gradient(way(t), t, axis=0), way(t) * ratios)
     gain, lag, late = select(["controller_gain", "controller_lag", "controller_latency"])
-    plain, _ = shown(rig, list(NOMINAL), recorded)
-    gained, _ = shown(attach(rig, gain, {"field_gain": SCALE}), [*NOMINAL, gain.name], recorded)
-    set_late, _ = shown(attach(rig, lag, {"set_point_lag": LATE}), [*NOMINAL, lag.name], recorded)
-    lagging, _ = shown(attach(rig, late, {"field_latency": LATE}), [*NOMINAL, late.name], recorded)
+    plain, _ = shown(rig, list(EFFECTS), recorded)
+    gained, _ = shown(attach(rig, gain, {"field_gain": SCALE}), [*EFFECTS, gain.name], recorded)
+    set_late, _ = shown(attach(rig, lag, {"set_point_lag": LATE}), [*EFFECTS, lag.name], recorded)
+    lagging, _ = shown(attach(rig, late, {"field_latency": LATE}), [*EFFECTS, late.name], recorded)
     np.testing.assert_array_equal(gained, plain)
     np.testing.assert_array_equal(set_late, plain)
     assert np.abs(lagging - plain).max() > 1e-4  # the driver comes after the record
@@ -97,7 +98,7 @@ def test_cycles_that_are_late_in_turn_are_those_of_a_schedule_that_is() -> None:
     (effect,) = select(["controller_jitter"])
     numbers = {"jitter_sin": 4e-3, "jitter_cos": 3e-3, "jitter_frequency": 1.3}
     with_effect = attach(rig, effect, numbers, joints=[rig.joint_names[1]])
-    _, field = shown(with_effect, [*NOMINAL, effect.name], schedule(way(t), t))
+    _, field = shown(with_effect, [*EFFECTS, effect.name], schedule(way(t), t))
     samples = np.arange(len(field)) / 100.0
     late = 4e-3 * np.sin(2.0 * np.pi * 1.3 * samples) + 3e-3 * np.cos(2.0 * np.pi * 1.3 * samples)
     microstep = 2.0 * np.pi / 12800.0
@@ -115,7 +116,7 @@ def test_a_field_that_is_late_by_cycles_is_the_field_of_then(late: float) -> Non
     ratio = np.array([float(joint.drive.ratio) for joint in rig.joints if joint.drive is not None])
     (effect,) = select(["controller_latency"])
     with_effect = attach(rig, effect, {"field_latency": late}, joints=[rig.joint_names[1]])
-    _, field = shown(with_effect, [*NOMINAL, effect.name], schedule(way(t), t))
+    _, field = shown(with_effect, [*EFFECTS, effect.name], schedule(way(t), t))
     samples = np.arange(len(field)) / 100.0
     microstep = 2.0 * np.pi / 12800.0
     for joint, when in ((0, samples), (1, samples - late)):
@@ -131,7 +132,7 @@ def test_set_points_that_are_late_are_those_of_then_and_the_field_goes_straight_
     ratio = np.array([float(joint.drive.ratio) for joint in rig.joints if joint.drive is not None])
     (effect,) = select(["controller_lag"])
     with_effect = attach(rig, effect, {"set_point_lag": late}, joints=[rig.joint_names[1]])
-    _, field = shown(with_effect, [*NOMINAL, effect.name], schedule(way(t), t))
+    _, field = shown(with_effect, [*EFFECTS, effect.name], schedule(way(t), t))
     samples = np.arange(len(field)) / 100.0
     microstep = 2.0 * np.pi / 12800.0
     then = np.interp(t - late, t, way(t)[:, 1])
@@ -147,8 +148,8 @@ def test_set_points_that_are_late_by_a_part_of_a_cycle_are_means_of_two() -> Non
     smoothed[1:, 1] = (1.0 - part) * way(t)[1:, 1] + part * way(t)[:-1, 1]
     (effect,) = select(["controller_lag"])
     with_effect = attach(rig, effect, {"set_point_lag": part * CYCLE}, joints=[rig.joint_names[1]])
-    expected, _ = shown(rig, list(NOMINAL), schedule(smoothed, t))
-    found, _ = shown(with_effect, [*NOMINAL, effect.name], schedule(way(t), t))
+    expected, _ = shown(rig, list(EFFECTS), schedule(smoothed, t))
+    found, _ = shown(with_effect, [*EFFECTS, effect.name], schedule(way(t), t))
     np.testing.assert_allclose(found, expected, atol=1e-9)
 
 
@@ -164,7 +165,7 @@ def test_the_field_is_in_whole_microsteps_of_the_drive_s_own(steps: float, recor
     driven = schedule(way(t), t)
     if recorded:
         driven = Schedule(driven.t, driven.position, driven.rate, driven.position * ratios)
-    _, field = shown(substitute(rig, names | kangle), list(NOMINAL), driven)
+    _, field = shown(substitute(rig, names | kangle), list(EFFECTS), driven)
     codes = field * steps / (2.0 * np.pi)
     np.testing.assert_allclose(codes, np.round(codes), atol=1e-6)
     assert len(np.unique(np.round(codes[:, 0]))) > 20

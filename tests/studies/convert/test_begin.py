@@ -27,6 +27,7 @@ from kbs_process.studies.convert.shift import find_shift
 from studies.convert.importer_files import write_hdf5, write_matlab, write_mdf, write_parquet
 
 LOADS = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
+ONE = ("sweep",)  # run, which takes half as long
 LATE = 3.724  # s: the clock of the wrench began so much later
 
 
@@ -105,6 +106,7 @@ def wrench_of(q: np.ndarray, seed: int = 1) -> np.ndarray:
     return load + np.random.default_rng(seed).normal(0.0, [0.02] * 3 + [0.002] * 3, load.shape)
 
 
+@pytest.mark.slow
 def test_the_shift_between_two_clocks_is_found_within_its_sigma() -> None:
     found = []
     for seed in range(8):
@@ -143,9 +145,9 @@ def test_angles_are_not_made_up_where_none_are_recorded() -> None:
     assert found is not None and found[0] == pytest.approx(1.25, abs=0.01)
 
 
-def write_logs(folder: Path) -> list[Path]:
-    """Two runs by two loggers: the wrench at 100 Hz, the angle at 50 Hz in a German text with lines above it."""
-    for run in ("sweep", "test"):
+def write_logs(folder: Path, runs: tuple[str, ...] = ("sweep", "test")) -> list[Path]:
+    """Runs by two loggers: the wrench at 100 Hz, the angle at 50 Hz in a German text with lines above it."""
+    for run in runs:
         t = np.arange(0.0, 44.0, 0.01)
         names = ["Time (s)", "Fx [N]", "Fy [N]", "Fz [N]", "Mx [Nm]", "My [Nm]", "Mz [Nm]", "status"]
         table = np.column_stack([t, wrench_of(motion(t + LATE)), 0.0 * t])
@@ -193,6 +195,7 @@ def tree(path: Path) -> dict[str, Any]:
     return tomllib.loads(path.read_text())
 
 
+@pytest.mark.slow
 def test_from_two_loggers_to_a_campaign(tmp_path: Path) -> None:
     files = write_logs(tmp_path)
     lines = "\n".join(begin(tmp_path / "arm", files))
@@ -221,6 +224,7 @@ def test_from_two_loggers_to_a_campaign(tmp_path: Path) -> None:
     assert [one.name for one in campaign.recordings] == ["sweep_1", "test_1"]
 
 
+@pytest.mark.slow
 def test_clocks_that_run_apart_have_no_shift(tmp_path: Path) -> None:
     files = write_logs(tmp_path)
     for path in tmp_path.glob("angle_*.txt"):
@@ -365,12 +369,12 @@ def test_what_was_imported_is_no_place_to_begin(tmp_path: Path) -> None:
     with writing(tmp_path / "arm", "campaign.toml") as folder:
         (folder / "campaign.toml").write_text('name = "arm"\n')
     with pytest.raises(OutputError, match="or as something else"):
-        list(begin(tmp_path / "arm", write_logs(tmp_path)))
+        list(begin(tmp_path / "arm", write_logs(tmp_path, ONE)))
     assert (tmp_path / "arm" / "campaign.toml").read_text() == 'name = "arm"\n'
 
 
 def test_a_text_of_western_windows_is_read_and_told(tmp_path: Path) -> None:
-    files = write_logs(tmp_path)
+    files = write_logs(tmp_path, ONE)
     for path in tmp_path.glob("angle_*.txt"):
         path.write_bytes(path.read_text().replace("arm_deg", "Arm für (°)").encode("cp1252"))
     lines = "\n".join(begin(tmp_path / "arm", files))
@@ -381,10 +385,10 @@ def test_a_text_of_western_windows_is_read_and_told(tmp_path: Path) -> None:
 @pytest.mark.parametrize("cell", ["1e200", "1e308", "-1e305"])
 @pytest.mark.parametrize("column", [0, 3])
 def test_numbers_that_nothing_measures_are_left_out_without_a_warning(tmp_path: Path, cell: str, column: int) -> None:
-    files = write_logs(tmp_path)
-    lines = files[2].read_text().splitlines()
+    files = write_logs(tmp_path, ONE)
+    lines = files[-1].read_text().splitlines()
     lines[700] = ",".join(cell if at == column else x for at, x in enumerate(lines[700].split(",")))
-    files[2].write_text("\n".join(lines) + "\n")
+    files[-1].write_text("\n".join(lines) + "\n")
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         list(begin(tmp_path / "arm", files))
@@ -393,6 +397,7 @@ def test_numbers_that_nothing_measures_are_left_out_without_a_warning(tmp_path: 
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("row", "time"), [(1, "-9000"), (900, "1000"), (-1, "9000"), (-1, "1e9")])
 def test_a_stamp_far_from_all_others_leaves_the_shift_a_question(tmp_path: Path, row: int, time: str) -> None:
     files = write_logs(tmp_path)
@@ -404,7 +409,7 @@ def test_a_stamp_far_from_all_others_leaves_the_shift_a_question(tmp_path: Path,
 
 
 def test_rows_that_only_the_wrench_has_tell_nothing_of_its_clock(tmp_path: Path) -> None:
-    files = write_logs(tmp_path)
+    files = write_logs(tmp_path, ONE)
     for path in tmp_path.glob("angle_*.txt"):
         lines = path.read_text().splitlines()
         path.write_text("\n".join(lines[: 3 + (len(lines) - 3) * 6 // 10]) + "\n")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -27,7 +28,9 @@ from kbs_process.diagnosis.selection.next_test import Proposal
 from kbs_process.diagnosis.selection.trajectories import family, limits_of
 from kbs_process.plant.laws.position.measured_law import COEFFICIENTS, MEASURED
 from kbs_process.reduction.commands import read_commands
+from kbs_process.results.outcome import Outcome as Told
 from kbs_process.results.records import load
+from kbs_process.studies.diagnose import output
 from kbs_process.studies.diagnose.corrected import write_corrected
 from kbs_process.studies.diagnose.output import write_diagnosis
 from kbs_process.studies.diagnose.prose import answer, law_in_words, paragraph
@@ -107,6 +110,13 @@ def outcome() -> Outcome:
 TRIAL = Trial(recording="r", trajectory="0", role="fit", nominal=9.0, known=3.0, corrected=1.2, channels={})
 
 
+def unseen(*given: Any) -> Told:
+    """What is written but the page, which nobody looks at: drawing it takes longest."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(output, "build", lambda folder, *_: folder / "index.html")
+        return write_diagnosis(*given)
+
+
 @pytest.fixture(scope="module")
 def written(outcome: Outcome, tmp_path_factory: pytest.TempPathFactory) -> Path:
     (find,), experiment = outcome.finds, outcome.known.experiment
@@ -127,17 +137,17 @@ def written(outcome: Outcome, tmp_path_factory: pytest.TempPathFactory) -> Path:
     assert "would look the same" in told_off.verdict_lines[0] and "{" not in told_off.verdict_lines[0]
     hidden = replace(outcome, finds=(), bent=True)
     assert hidden.verdict == "undecided" and replace(hidden, moved=off.moved).verdict == "parameters off"
-    told_hidden = write_diagnosis(campaign, declared(experiment), hidden, target, False, None, "")
+    told_hidden = unseen(campaign, declared(experiment), hidden, target, False, None, "")
     assert "together farther from what the files say" in told_hidden.verdict_lines[0]
     assert "most: " in told_hidden.verdict_lines[0] and "Check these at their source" in told_hidden.verdict_lines[0]
     cut_short = replace(off, ended=True)
     assert cut_short.verdict == "undecided" and replace(cut_short, moved=()).verdict == "none"
-    told_cut = write_diagnosis(campaign, declared(experiment), cut_short, target, False, None, "")
+    told_cut = unseen(campaign, declared(experiment), cut_short, target, False, None, "")
     assert told_cut.verdict_lines[0].startswith(
         "Nominal parameters that are off (joint.el.drive.Ka +5.0 sigma) would explain all: with that"
     )
     assert "is open, as the search ended before all were tried." in told_cut.verdict_lines[0]
-    more = write_diagnosis(
+    more = unseen(
         campaign, declared(experiment), replace(outcome, after=Detection((), -80.0, 1.44)), target, False, proposal
     )
     assert "The model lacks: curve" in more.verdict_lines[0]
@@ -165,24 +175,24 @@ def written(outcome: Outcome, tmp_path_factory: pytest.TempPathFactory) -> Path:
     assert replace(open_yet, standing=outcome.standing).verdict == "physics"
     assert replace(open_yet, finds=(far,)).verdict == "physics"
     assert replace(open_yet, finds=outcome.finds).verdict == "physics", "the rival is at the same place"
-    disputed = write_diagnosis(campaign, declared(experiment), open_yet, target, False, None)
+    disputed = unseen(campaign, declared(experiment), open_yet, target, False, None)
     assert disputed.verdict_lines[0].startswith("Nearest to what the model lacks, of the effects tried: curve over")
     assert "joint viscous (joint torque, el) does nearly the same" in disputed.verdict_lines[0]
     named = replace(open_yet, finds=(far,), ended=True)
-    strained = write_diagnosis(campaign, declared(experiment), named, target, False, None)
+    strained = unseen(campaign, declared(experiment), named, target, False, None)
     assert strained.verdict_lines[0].startswith("The model lacks: curve over")
     assert "In addition, nominal parameters are together farther from what" in strained.verdict_lines[0]
     assert "In addition" not in disputed.verdict_lines[0]
     assert "ended at its limit on simulations" in (target / "results.json").read_text()
-    write_diagnosis(campaign, declared(experiment), replace(outcome, ended=True), target, False, None)
+    unseen(campaign, declared(experiment), replace(outcome, ended=True), target, False, None)
     assert "ended at its limit on simulations" in (target / "results.json").read_text()
     assert campaign.topics.command is not None and "commanded one" not in (target / "results.json").read_text()
     without = replace(campaign, topics=replace(campaign.topics, angle=campaign.topics.command))
-    write_diagnosis(without, declared(experiment), outcome, target, False, None)
+    unseen(without, declared(experiment), outcome, target, False, None)
     assert "the motion is the commanded one" in (target / "results.json").read_text()
     assert "limit on simulations" not in (target / "results.json").read_text()
     faint = replace(outcome, finds=(), after=Detection((), -80.0, 1.02))
-    (little, *_) = write_diagnosis(campaign, declared(experiment), faint, target, False, None).verdict_lines
+    (little, *_) = unseen(campaign, declared(experiment), faint, target, False, None).verdict_lines
     assert (
         "all together by 2 % of its power: too little" in little
         and "Nearest is ground cable (external wrench, el), which" in little

@@ -95,7 +95,9 @@ def walk(buffer: Bytes, stop: np.uint64, chunk: bool) -> Words:
             break
         if count + 1 == table.shape[1]:
             larger = np.empty((5, 2 * table.shape[1]), dtype=np.uint64)
-            larger[:, :count] = table[:, :count]
+            for row in range(5):
+                for column in range(count):
+                    larger[row, column] = table[row, column]
             table = larger
         content = at + U(RECORD_HEAD)
         table[0, count] = opcode

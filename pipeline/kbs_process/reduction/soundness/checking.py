@@ -7,7 +7,7 @@ no requirement is met; what a simple fault would explain is said first.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import msgspec
@@ -42,7 +42,7 @@ from kbs_process.stages.gravity.equation import Equation
 from kbs_process.stages.gravity.equation import Prepared as Instants
 from kbs_process.stages.gravity.hypotheses import RATHER, Explained, explanations, shown_gains, turned
 from kbs_process.stages.gravity.model import GravityModel, Sample, prepared
-from kbs_process.stages.gravity.tension import KNOWN_S, TAKEN, Moved, lag, misread, tension
+from kbs_process.stages.gravity.tension import KNOWN_S, TAKEN, Moved, Shift, lag, misread, tension
 from kbs_process.stages.repeats import commanded
 
 LEFT = 0.1  # of the weight, and of the torque that it can make: a calibration leaves less, whatever rubs or pulls
@@ -119,16 +119,13 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
         lags = [(one, own) for one, data in zip(recordings, instants, strict=True) if (own := lag(model, data))]
         known = [max(KNOWN_S, late_sigma(one.run.clocks, amplifier, one.entry.clock_sigma)) for one, _ in lags]
         late = [own.moved(sigma) for (_, own), sigma in zip(lags, known, strict=True) if own.taken >= TAKEN]
-        off = {data.name: [(own, own.moved(FINEST)) for own in misread(model, data)] for data in instants}
-        fitted = {sample.name for sample, taring in tared if taring.fitted}
-        wrongly = [] if any(off[name] for name in fitted) else [pair for own in off.values() for pair in own]
+        wrongly = _misread_alone(model, instants, {sample.name for sample, taring in tared if taring.fitted})
         along = {name for own, _ in wrongly for name in own.zeros}
         gains = shown_gains(equation, instants)
         tested = {one.channel for one in conventions if one.testable and one.channel}
         read = tuple(_read_gains(equation, {key: of for key, of in gains.items() if key not in tested}))
-        found = tension(
-            model, {sample.name: taring for sample, taring in tared}, (*late, *(one for _, one in wrongly), *read)
-        )
+        more = (*late, *(one for _, one in wrongly), *read)
+        found = tension(model, {sample.name: taring for sample, taring in tared}, more)
         most = _most(equation)
         rounding = {key: x for one in recordings for key, x in measurable.rounding(campaign, one.readings).items()}
         channels = model.rig.transducer.channels
@@ -244,6 +241,14 @@ def _conventions(
             found += check_encoder_sense(angle, command)
         for check in found:
             yield msgspec.structs.replace(check, check=f"{check.check}, {one.entry.name}")
+
+
+def _misread_alone(
+    model: GravityModel, instants: Sequence[Instants], fitted: Collection[str]
+) -> list[tuple[Shift, Moved]]:
+    """What is misread in recordings that were not fitted, as long as none of the `fitted` ones is."""
+    found = {data.name: [(own, own.moved(FINEST)) for own in misread(model, data)] for data in instants}
+    return [] if any(found[name] for name in fitted) else [pair for own in found.values() for pair in own]
 
 
 def _moved_alone(equation: Equation, zeros: Array) -> Mask:

@@ -242,14 +242,16 @@ def _interpolate(u: Array, x: Array, gap: Mask, first: int, on_grid: float, rows
     for k in range(len(rows)):
         at = float(first + k)
         if at < u[0] - on_grid:  # the recording's first samples were unusable
-            rows[k] = x[0]
+            for c in range(x.shape[1]):
+                rows[k, c] = x[0, c]
             invented[k] = True
             continue
         while i < last and u[i + 1] <= at:
             i += 1
         near = i if at - u[i] <= on_grid or i == last else (i + 1 if u[i + 1] - at <= on_grid else -1)
         if near >= 0:
-            rows[k] = x[near]
+            for c in range(x.shape[1]):
+                rows[k, c] = x[near, c]
             continue
         step = u[i + 1] - u[i]
         regular = i >= 2 and i + 3 <= last

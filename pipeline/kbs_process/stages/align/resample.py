@@ -245,7 +245,8 @@ def _at(x: Array, weight: Array, position: Array, table: Array) -> tuple[Array, 
         start = whole - width // 2 + 1
         if start < 0 or start + width > x.shape[1]:
             # Beyond the extension: hold the last value there is, in full doubt.
-            y[n] = x[:, min(max(whole, 0), x.shape[1] - 1)]
+            for c in range(x.shape[0]):
+                y[n, c] = x[c, min(max(whole, 0), x.shape[1] - 1)]
             doubt[n] = 1.0
             continue
         lower, upper, invented = table[row], table[row + 1], weight[start : start + width]
