@@ -170,9 +170,9 @@ def test_forces_of_motion_show_which_way_a_joint_turns_that_vague_files_hide(tmp
 @pytest.mark.parametrize(
     ("fault", "told"),
     [
-        ({"zero": -0.1}, "the zero of arm's angle (degrees) in test is -5."),
-        ({"angle": -1.0}, "the sign of arm's angle in test is -1"),
-        ({"reads": np.diag([1.0, 1.0, 1.0, 1.0, 0.0, 1.0])}, "the gain of Ty in test is 0"),
+        ({"zero": -0.1}, "the zero of arm's angle (degrees) is -5."),
+        ({"angle": -1.0}, "the sign of arm's angle is -1 in test"),
+        ({"reads": np.diag([1.0, 1.0, 1.0, 1.0, 0.0, 1.0])}, "channel: Ty does not respond in test"),
         ({}, None),
     ],
 )

@@ -162,7 +162,7 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
         if reasons:
             shifted = [one for one in found.beyond if one in late]
             told = [words.SCALE for _ in timed[:1]] + [words.STUCK for _ in still[:1]]
-            misled = [one for _, one in wrongly if one in found.beyond]
+            misled = {one: own for own, one in wrongly if one in found.beyond}
             told += [words.LATE.format(one.value) for one in shifted[:1]] + [words.TWICE for _ in twice[:1]]
             right = not (timed or still or shifted or twice) and _calibrated(campaign, samples, model, most)
             off = [one for one in conventions if not one.ok]
@@ -171,9 +171,12 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
             regained = [one for one in off if single and one.followed > FOLLOWED]
             causes: tuple[Explained, ...] = ()
             if right and misled and all(one in (*misled, *read) or one.name in along for one in found.beyond):
-                told += [words.misread(one) for one in misled]
+                told += [words.misread(own, SILENT) for own in misled.values()]
             elif alone and regained:
-                told += [words.regained(one, SILENT) for one in regained]
+                told += [
+                    words.regained(one.channel, one.slope or 0.0, one.check.rpartition(", ")[2], SILENT)
+                    for one in regained
+                ]
             elif not twice and reasons != (*timed, *still, *words.far(shifted, 1.0)):
                 causes = explanations(equation, instants, most)
             told += [words.cause(one, equation) for one in causes]

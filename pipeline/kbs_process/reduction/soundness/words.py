@@ -8,12 +8,11 @@ import numpy as np
 
 from kbs_process.results.judged import Beyond
 from kbs_process.signals.records import Array
-from kbs_process.stages.conventions import SignCheck
 from kbs_process.stages.gravity.equation import Equation
 from kbs_process.stages.gravity.hypotheses import Explained
 from kbs_process.stages.gravity.model import GravityModel
 from kbs_process.stages.gravity.parameters import CROSS_COUPLING
-from kbs_process.stages.gravity.tension import BY_CHANCE, Moved
+from kbs_process.stages.gravity.tension import BY_CHANCE, Moved, Shift
 
 SCALE = "clock: the times of all streams run too fast or too slow, or rates are in another unit"
 STUCK = "encoder: it is not read, or does not turn with its joint"
@@ -21,6 +20,7 @@ TWICE = "mapping: one column is read for two channels"
 LATE = "clock: the wrench is {:+.2g} s late, or more, by its timestamps or a filter"
 GRAVITY = "unit: gravity.magnitude is {:.3g} m/s^2, which is nowhere on Earth"
 TURNED = "the recordings are {1:.0e} times as likely if {0} turns the other way"
+UNLESS = "unless a load that goes with the angle pulls there"
 UNEXPLAINED = (
     "no single simple fault (gain, unit, sign, axis, zero, swapped channels, one number) explains it: look for what "
     "else pulls or rubs, and compare the parameter files with the rig"
@@ -87,18 +87,17 @@ def cause(one: Explained, equation: Equation) -> str:
             return f"{fault.what} is {_values(found)}, for {_values(one.stated)} as stated"
 
 
-def regained(one: SignCheck, silent: float) -> str:
-    """The gain that a slope of one recording shows, or that it is less than `silent`."""
-    slope, recording = one.slope or 0.0, one.check.rpartition(", ")[2]
-    if abs(slope) < silent:
-        return f"channel: {one.channel} does not respond in {recording}"
-    return (
-        f"{gain(one.channel, [one.channel], slope)} in {recording}, unless a load that goes with the angle pulls there"
-    )
+def regained(channel: str, gain_there: float, recording: str, silent: float) -> str:
+    """The gain that one recording shows of a channel, or that it is less than `silent`."""
+    if abs(gain_there) < silent:
+        return f"channel: {channel} does not respond in {recording}"
+    return f"{gain(channel, [channel], gain_there)} in {recording}, {UNLESS}"
 
 
-def misread(one: Moved) -> str:
-    return f"{one.name} is {one.value:.3g}, unless a load that goes with the angle pulls there"
+def misread(one: Shift, silent: float) -> str:
+    if one.channel:
+        return regained(one.channel, one.value, one.recording, silent)
+    return f"{one.what} is {one.value:.3g} in {one.recording}, {UNLESS}"
 
 
 def gain(what: str, channels: Sequence[str], gain: float) -> str:

@@ -53,6 +53,7 @@ class Shift:
 
     what: str
     recording: str
+    channel: str  # that has another gain, or none
     value: float
     chance: float  # standard deviation, by what coloured residuals leave uncertain
     taken: float  # part of the power of what is left that it explains
@@ -117,7 +118,7 @@ def misread(model: GravityModel, data: Prepared) -> Iterator[Shift]:
     found = []
     for index, channel in enumerate(equation.channels):
         own = np.where(np.arange(len(equation.channels)) == index, expected, 0.0)
-        found.append(_shift(model, data, f"the gain of {channel}", own, right=1.0))
+        found.append(_shift(model, data, f"the gain of {channel}", own, right=1.0, channel=channel))
     for index, joint in enumerate(joints):
         sense = np.where(np.arange(len(joints)) == index, -1.0, 1.0)
         back = replace(data, q=data.q * sense, qd=data.qd * sense, qdd=data.qdd * sense, before=None, after=None)
@@ -129,7 +130,9 @@ def misread(model: GravityModel, data: Prepared) -> Iterator[Shift]:
     yield from sorted((one for one in found if one and one.taken > ALONE), key=lambda one: -one.taken)[:1]
 
 
-def _shift(model: GravityModel, data: Prepared, what: str, shape: Array, right: float = 0.0) -> Shift | None:
+def _shift(
+    model: GravityModel, data: Prepared, what: str, shape: Array, right: float = 0.0, channel: str = ""
+) -> Shift | None:
     """How much of a shape (n, c) the wrench holds that gravity leaves of a recording, beyond what is `right`."""
     equation = model.equation
     wrench = [at for at, channel in enumerate(equation.channels) if channel in WRENCH_CHANNELS]
@@ -151,7 +154,7 @@ def _shift(model: GravityModel, data: Prepared, what: str, shape: Array, right: 
     taken = 1.0 - float(np.sum(rest**2 * weight)) / max(float(np.sum(left**2 * weight)), 1e-300)
     moved = np.flatnonzero(np.abs(value * middle) > floor)
     zeros = tuple(f"{ZERO[0]}[{data.name}].{equation.channels[wrench[at]]}" for at in moved)
-    return Shift(what, data.name, right + value, chance, taken, right, zeros)
+    return Shift(what, data.name, channel, right + value, chance, taken, right, zeros)
 
 
 def by_chance(names: Sequence[str], prior: Array, value: Array, sigma: Array, covariance: Array) -> tuple[Moved, ...]:
