@@ -61,10 +61,9 @@ inertia = { value = [0.0, 0.0, 0.01, 0.0, 0.0, 0.0], unit = "kg m^2", sigma = 0.
 """
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("rate", [0.02, 0.05])  # rad/s for a minute: 3.8 and 9.5 periods
-def test_an_order_is_found_in_few_periods(tmp_path: Path, rate: float) -> None:
-    folder, rng = tmp_path / "motor", np.random.default_rng(1)
+def recorded(folder: Path, rate: float) -> kbs_process.Campaign:
+    """A minute at a rate (rad/s), twice."""
+    rng = np.random.default_rng(1)
     folder.mkdir()
     (folder / "campaign.toml").write_text(CAMPAIGN, encoding="utf-8")
     (folder / "rig.toml").write_text(RIG, encoding="utf-8")
@@ -74,7 +73,19 @@ def test_an_order_is_found_in_few_periods(tmp_path: Path, rate: float) -> None:
         effort = AMPLITUDE * np.sin(ORDER * angle) + NOISE * rng.standard_normal(len(stamp))
         values = np.column_stack([angle, np.zeros(len(stamp)), effort])
         write_mcap(folder / f"{role}.mcap", [OutStream("/motor", "joints", stamp, stamp, values, ("m",))])
-    found = kbs_process.diagnose(kbs_process.load_campaign(folder, checksums=False), tmp_path / "out")
+    return kbs_process.load_campaign(folder, checksums=False)
+
+
+@pytest.mark.slow
+def test_a_rig_of_which_all_is_known_is_processed(tmp_path: Path) -> None:
+    found = kbs_process.process(recorded(tmp_path / "motor", 0.02), tmp_path / "out")
+    assert "m.effort" in {one.channel for one in found.merit}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("rate", [0.02, 0.05])  # 3.8 and 9.5 periods
+def test_an_order_is_found_in_few_periods(tmp_path: Path, rate: float) -> None:
+    found = kbs_process.diagnose(recorded(tmp_path / "motor", rate), tmp_path / "out")
     (law,) = found.finds
     numbers = {one.name: one for one in law.parameters}
     assert (law.name, law.place.site) == ("motor_order", "m")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -40,6 +41,14 @@ def test_lists_that_belong_together_are_as_long_as_each_other(record: type[Any],
 def test_numbers_of_numpy_are_numbers() -> None:
     one = Curve(x=(np.float64(1.5),), y=(np.float32(2.5),), sigma=(0.1,), **OVER)
     assert msgspec.json.decode(encode(one))["y"] == [2.5]
+
+
+@pytest.mark.parametrize("value", [1e308, -(10**400)])
+def test_a_number_that_nothing_computes_is_told_with_its_place(tmp_path: Path, value: float) -> None:
+    stored = msgspec.json.decode((sample.one_channel(tmp_path / "out") / "results.json").read_bytes())
+    stored["recordings"][0]["clocks"][0]["skew"] = value
+    with pytest.raises(OutputError, match=r"no result is beyond 1e\+150.*recordings\[0\]\.clocks\[0\]\.skew"):
+        decode(json.dumps(stored).encode(), Results)
 
 
 def test_a_matrix_that_is_too_small_is_no_fault_of_the_program(tmp_path: Path) -> None:

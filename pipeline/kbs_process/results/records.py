@@ -17,6 +17,7 @@ from kbs_process.files import regular
 from kbs_process.results.versions import VERSION, upgraded
 
 FILE = "results.json"
+LARGEST = 1e150
 
 Status = Literal["pass", "fail", "undecided", "none"]
 Severity = Literal["info", "warning", "error"]
@@ -124,15 +125,25 @@ def encode(results: Record) -> bytes:
 def decode(content: bytes, record: type[R], where: str = FILE) -> R:
     """Return the results in `content`, of this or a former version, or say which field is wrong."""
     try:
-        if msgspec.json.decode(content, type=_Form).schema == VERSION:
-            return msgspec.json.decode(content, type=record)
-        return msgspec.convert(upgraded(msgspec.json.decode(content)), record)
+        current = msgspec.json.decode(content, type=_Form).schema == VERSION
+        stored = msgspec.json.decode(content)
+        _check_numbers(stored)
+        return msgspec.convert(stored if current else upgraded(stored), record)
     except (msgspec.ValidationError, msgspec.DecodeError) as error:
         raise OutputError(
             f"not a results file of this version: {error}",
             where=where,
             remedy="process the campaign again: kbs-process CAMPAIGN",
         ) from None
+
+
+def _check_numbers(stored: Any, path: str = "$") -> None:
+    """Refuse numbers whose square no number holds: none was computed, and what is drawn of them overflows."""
+    if isinstance(stored, dict | list):
+        for key, value in stored.items() if isinstance(stored, dict) else enumerate(stored):
+            _check_numbers(value, f"{path}.{key}" if isinstance(stored, dict) else f"{path}[{key}]")
+    elif isinstance(stored, int | float) and abs(stored) > LARGEST:
+        raise msgspec.ValidationError(f"no result is beyond {LARGEST:g} - at `{path}`")
 
 
 def load(folder: Path, record: type[R]) -> R:

@@ -83,7 +83,7 @@ def _gain_table(found: OnTransducer) -> Grid:
         (
             f"{number(math.degrees(pose))}°",
             *(
-                measure(by_key[pose, edge, channel].gain, by_key[pose, edge, channel].sigma)
+                "" if (one := by_key.get((pose, edge, channel))) is None else measure(one.gain, one.sigma)
                 for edge in edges
                 for channel in channels
             ),
