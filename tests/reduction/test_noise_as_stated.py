@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scipy.signal import lfilter
+from scipy.signal import butter, lfilter, sosfilt
 
 import archived
 from kbs_process.reduction.soundness.noise import unlike_stated
@@ -44,7 +44,8 @@ def told(change, *, stated: float = 1.0, frame: str = "S") -> list[str]:
     readings.push(Block(stamp, stamp, values))
     welch.push(values, None)
     run = SimpleNamespace(spectrum=welch.result(), rates={"wrench": RATE})
-    one = SimpleNamespace(entry=SimpleNamespace(name="test"), run=run, readings={"wrench": readings})
+    raw = SimpleNamespace(values=values, dt=1.0 / RATE)
+    one = SimpleNamespace(entry=SimpleNamespace(name="test"), raw=raw, run=run, readings={"wrench": readings})
     requirement = replace(campaign.requirements[0], frame=frame)
     return [doubt.why for doubt in unlike_stated(requirement, rig, [one])]
 
@@ -114,6 +115,23 @@ def alternating(size: float):
         return rounded(rig, found)
 
     return change
+
+
+def still(corner: float):
+    """Noise and a tone of 0.1 Hz in Ty alone, behind a high-pass of first order in all channels."""
+
+    def change(rig, values):
+        values = np.random.default_rng(3).standard_normal((20_000, 6)) * rig.transducer.noise.value
+        values[:, TY] += 0.06 * np.sin(0.2 * np.pi * np.arange(len(values)) / RATE)
+        return rounded(rig, sosfilt(butter(1, corner, "highpass", fs=RATE, output="sos"), values, axis=0))
+
+    return change
+
+
+def test_channels_that_pass_no_slow_load_are_told():
+    (why,) = told(still(0.3))
+    assert "in slow readings: AC-coupled" in why and "Tx has " in why and "Ty" not in why
+    assert told(still(1e-5)) == []
 
 
 def test_two_sources_by_turns_are_told_of_which_one_is_filtered():

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from math import comb
 
 import numpy as np
+from scipy.signal import periodogram
+from scipy.stats import chi2
 
 from kbs_process.campaign.config import Requirement
 from kbs_process.reduction import measurable
@@ -18,6 +21,9 @@ from kbs_process.stages.align.readings import white
 from kbs_process.stages.align.spectrum import OCTAVES, quietest
 from kbs_process.stages.conventions import BEYOND
 
+SLOW = 0.5  # share of its power that slow white noise may lose: rounding and bridged gaps take less
+BY_CHANCE = 1e-6  # probability of that
+_DETRENDED = 2  # lines of a periodogram that a straight line takes
 UNLIKE = 3.0  # times less noise than is stated, or more, however well it is known
 
 
@@ -38,8 +44,10 @@ def unlike_stated(requirement: Requirement, rig: Rig, recordings: Sequence[Prepa
     for one in recordings:
         less, more = measured_noise(rig, one, near)
         turns = np.full(len(own), np.nan) if one.run.spectrum is None else one.run.spectrum.alternating
+        slow = less * np.sqrt(slow_share(one, less, requirement.band))
         for off, read, why in (
             (factor * less < noise, less, "averaged or filtered before it was stored, or in another scale"),
+            ((slow < less) & np.isfinite(noise), slow, "in slow readings: AC-coupled, or behind a high-pass"),
             (more > factor * noise, more, "disturbed, or in another scale"),
             (
                 (turns > factor * noise) & ~(more > factor * noise),
@@ -53,6 +61,28 @@ def unlike_stated(requirement: Requirement, rig: Rig, recordings: Sequence[Prepa
             ]
             if told:
                 yield Doubt(f"the noise is not as stated in {one.entry.name}: {', '.join(told)}: {why}")
+
+
+def slow_share(one: Prepared, level: Array, band: tuple[float, float]) -> Array:
+    """Least share (c,) of a white noise's power, of `level` (c,) rms a sample, in readings from a band's low edge on.
+
+    It is 1 where that may be chance, in up to three channels together. Signals only add to noise: what takes slow noise
+    off takes slow loads off.
+    """
+    if one.run.spectrum is None:
+        return np.ones(len(level))
+    f, power = periodogram(one.raw.values, fs=1.0 / one.raw.dt, detrend="linear", axis=0)  # type: ignore[call-overload]
+    share, low, edge = np.ones(len(level)), max(band[0], f[min(_DETRENDED, len(f) - 1)]), band[1]
+    while edge > 2.0 * low:
+        ratio = power[(f >= low) & (f < edge)] * 0.5 * one.run.rates["wrench"] / level**2
+        mean = ratio.mean(axis=0)
+        chance = np.where(mean < SLOW, chi2.cdf(2.0 * ratio.sum(axis=0), 2 * len(ratio)), 1.0)
+        order = np.argsort(chance)
+        for count in range(1, min(3, len(order)) + 1):
+            if comb(len(order), count) * chance[order[count - 1]] ** count < BY_CHANCE:
+                share[order[:count]] = np.minimum(share, mean)[order[:count]]
+        edge /= 2.0
+    return share
 
 
 def measured_noise(rig: Rig, one: Prepared, near: float = np.inf) -> tuple[Array, Array]:
