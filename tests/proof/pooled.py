@@ -75,7 +75,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except (OSError, ValueError, msgspec.ValidationError) as error:
         parser.error(str(error))
     asked.output.mkdir(parents=True, exist_ok=True)
-    rows = msgspec.json.format(msgspec.json.encode(bench.rows, order="deterministic"), indent=1) + b"\n"
+    rows = msgspec.json.encode(bench.rows, order="deterministic") + b"\n"
     (asked.output / "rows.json").write_bytes(rows)  # truths and answers are in the sets' score.json
     write_page(bench, asked.output / "index.html")
     print("\n".join(table(bench.rows)))
