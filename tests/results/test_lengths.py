@@ -51,6 +51,11 @@ def test_a_number_that_nothing_computes_is_told_with_its_place(tmp_path: Path, v
         decode(json.dumps(stored).encode(), Results)
 
 
+def test_a_sigma_below_zero_is_told() -> None:
+    with pytest.raises(OutputError, match=r"no sigma is negative - at `\$\.a\[0\]\.sigma`"):
+        decode(b'{"schema": 1, "a": [{"sigma": -1}]}', Results)
+
+
 def test_a_matrix_that_is_too_small_is_no_fault_of_the_program(tmp_path: Path) -> None:
     stored = msgspec.json.decode((sample.one_channel(tmp_path / "out") / "results.json").read_bytes())
     stored["cross_coupling"] = {"channels": SIX, "matrix": [[0.0]], "sigma": [[0.1]], "largest": "none"}

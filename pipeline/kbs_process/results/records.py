@@ -138,12 +138,14 @@ def decode(content: bytes, record: type[R], where: str = FILE) -> R:
 
 
 def _check_numbers(stored: Any, path: str = "$") -> None:
-    """Refuse numbers whose square no number holds: none was computed, and what is drawn of them overflows."""
+    """Refuse numbers whose square no number holds, and negative sigmas: none was computed, and none can be drawn."""
     if isinstance(stored, dict | list):
         for key, value in stored.items() if isinstance(stored, dict) else enumerate(stored):
             _check_numbers(value, f"{path}.{key}" if isinstance(stored, dict) else f"{path}[{key}]")
     elif isinstance(stored, int | float) and abs(stored) > LARGEST:
         raise msgspec.ValidationError(f"no result is beyond {LARGEST:g} - at `{path}`")
+    elif path.endswith(".sigma") and isinstance(stored, int | float) and stored < 0:
+        raise msgspec.ValidationError(f"no sigma is negative - at `{path}`")
 
 
 def load(folder: Path, record: type[R]) -> R:
