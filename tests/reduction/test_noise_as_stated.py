@@ -140,5 +140,11 @@ def test_two_sources_by_turns_are_told_of_which_one_is_filtered():
     assert told(alternating(0.002)) == []
 
 
+def test_what_moves_a_slow_stream_does_not_alternate():
+    welch = Welch(2.5, 0.1, 100.0, ("Ty",))
+    welch.push(np.sin(2.0 * np.pi * 0.3 * np.arange(500) / 2.5)[:, None], None)
+    assert welch.result().alternating[0] < 0.01
+
+
 def test_noise_that_nobody_states_is_not_told():
     assert told(averaged, stated=0.0) == []

@@ -81,7 +81,8 @@ class Welch:
         x = (x - x.mean(axis=1, keepdims=True)) * self._window
         every = fft.rfft(x, axis=1)
         X = np.ascontiguousarray(every[:, : len(self._f)].T)
-        last, beside = np.split(np.abs(every[:, : -1 - 2 * _LAST : -1]) ** 2, [_LAST], axis=1)
+        count = min(_LAST, every.shape[1] // 3)  # of a slow stream they would reach its signals
+        last, beside = np.split(np.abs(every[:, : -1 - 2 * count : -1]) ** 2, [count], axis=1)
         scale = 2.0 / (len(self._window) * float(self._window @ self._window))
         self._fastest += scale * (last.sum(axis=1) - 0.5 * last[:, 0] - beside.sum(axis=1))
         self._sum += self._scale[:, None, None] * (X.conj()[:, :, None] * X[:, None, :])
