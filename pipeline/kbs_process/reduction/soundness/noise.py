@@ -66,11 +66,12 @@ def unlike_stated(requirement: Requirement, rig: Rig, recordings: Sequence[Prepa
 def slow_share(one: Prepared, level: Array, band: tuple[float, float]) -> Array:
     """Least share (c,) of a white noise's power, of `level` (c,) rms a sample, in readings from a band's low edge on.
 
-    It is 1 where that may be chance, in up to three channels together. Signals only add to noise: what takes slow noise
+    It is 1 where that may be chance, in up to three channels together, or where there is no noise. Signals only add to noise: what takes slow noise
     off takes slow loads off.
     """
     if one.run.spectrum is None:
         return np.ones(len(level))
+    level = np.where(level > 0.0, level, np.nan)
     f, power = periodogram(one.raw.values, fs=1.0 / one.raw.dt, detrend="linear", axis=0)  # type: ignore[call-overload]
     share, low, edge = np.ones(len(level)), max(band[0], f[min(_DETRENDED, len(f) - 1)]), band[1]
     while edge > 2.0 * low:

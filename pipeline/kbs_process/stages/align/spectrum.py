@@ -11,6 +11,7 @@ from kbs_process.signals.records import Array, Mask, Spectrum
 DOUBT = 0.01  # a segment with a larger share of invented samples is left out
 OCTAVES = 3  # in which a noise is looked for
 LINES = 8  # averages counted, that tell it
+_LEAST = 8  # samples of a segment
 _LAST = 16  # lines up to half the sampling rate, and as many beside them
 
 
@@ -26,7 +27,7 @@ class Welch:
         self._rate = rate
         self._limit = limit
         self._channels = channels
-        self._length = 1 << int(np.ceil(np.log2(max(rate / resolution, 2.0))))
+        self._length = 1 << int(np.ceil(np.log2(max(rate / resolution, _LEAST))))
         self._rows: Array = np.empty((self._length, len(channels)))
         self._flags: Mask = np.zeros(self._length, dtype=np.bool_)
         self._filled = 0
@@ -55,7 +56,7 @@ class Welch:
         if self._averages == 0:
             rows, flags = self._rows[: self._filled].copy(), self._flags[: self._filled].copy()
             length = 1 << int(np.log2(max(len(rows) // 4, 1)))
-            if length < 8:
+            if length < _LEAST:
                 return None
             self._setup(length)
             for start in range(0, len(rows) - length + 1, length // 2):
