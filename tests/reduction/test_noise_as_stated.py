@@ -117,19 +117,20 @@ def alternating(size: float):
     return change
 
 
-def still(corner: float):
-    """Noise and a tone of 0.1 Hz in Ty alone, behind a high-pass of first order in all channels."""
+def still(corner: float, level: float = 0.0):
+    """Noise, a level and a tone of 0.1 Hz in Ty alone, behind a high-pass of first order in all channels."""
 
     def change(rig, values):
-        values = np.random.default_rng(3).standard_normal((20_000, 6)) * rig.transducer.noise.value
+        values = (np.random.default_rng(3).standard_normal((20_000, 6)) + level) * rig.transducer.noise.value
         values[:, TY] += 0.06 * np.sin(0.2 * np.pi * np.arange(len(values)) / RATE)
         return rounded(rig, sosfilt(butter(1, corner, "highpass", fs=RATE, output="sos"), values, axis=0))
 
     return change
 
 
-def test_channels_that_pass_no_slow_load_are_told():
-    (why,) = told(still(0.3))
+@pytest.mark.parametrize("level", [0.0, 30.0])
+def test_channels_that_pass_no_slow_load_are_told(level):
+    (why,) = told(still(0.3, level))
     assert "in slow readings: AC-coupled" in why and "Tx has " in why and "Ty" not in why
     assert told(still(1e-5)) == []
 

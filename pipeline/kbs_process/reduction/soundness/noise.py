@@ -66,18 +66,19 @@ def unlike_stated(requirement: Requirement, rig: Rig, recordings: Sequence[Prepa
 def slow_share(one: Prepared, level: Array, band: tuple[float, float]) -> Array:
     """Least share (c,) of a white noise's power, of `level` (c,) rms a sample, in readings from a band's low edge on.
 
-    It is 1 where that may be chance, in up to three channels together, or where there is no noise. Signals only add to noise: what takes slow noise
-    off takes slow loads off.
+    It is 1 where that may be chance, in up to three channels together, or where there is no noise. Signals only add to
+    noise: what takes slow noise off takes slow loads off. The window keeps what a recording begins or ends with out of
+    quiet lines; of two of its lines one is new.
     """
     if one.run.spectrum is None:
         return np.ones(len(level))
     level = np.where(level > 0.0, level, np.nan)
-    f, power = periodogram(one.raw.values, fs=1.0 / one.raw.dt, detrend="linear", axis=0)  # type: ignore[call-overload]
+    f, power = periodogram(one.raw.values, 1.0 / one.raw.dt, "hann", detrend="linear", axis=0)  # type: ignore[call-overload]
     share, low, edge = np.ones(len(level)), max(band[0], f[min(_DETRENDED, len(f) - 1)]), band[1]
     while edge > 2.0 * low:
         ratio = power[(f >= low) & (f < edge)] * 0.5 * one.run.rates["wrench"] / level**2
         mean = ratio.mean(axis=0)
-        chance = np.where(mean < SLOW, chi2.cdf(2.0 * ratio.sum(axis=0), 2 * len(ratio)), 1.0)
+        chance = np.where(mean < SLOW, chi2.cdf(mean * len(ratio), len(ratio)), 1.0)
         order = np.argsort(chance)
         for count in range(1, min(3, len(order)) + 1):
             if comb(len(order), count) * chance[order[count - 1]] ** count < BY_CHANCE:
