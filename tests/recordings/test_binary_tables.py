@@ -565,3 +565,25 @@ def test_a_data_set_of_which_next_to_nothing_was_written_is_named_and_not_read(t
     table = read(tmp_path / "a.h5", "hdf5")
     assert names(table) == ["flat", "sound"]
     assert told(table, "hollow") == "hollow: next to none of its 10000000000 numbers was written"
+
+
+def test_numbers_of_hdf5_that_are_compressed_together_are_unpacked_once(tmp_path, monkeypatch):
+    h5py = pytest.importorskip("h5py")
+    rows = 150_000
+    values = np.arange(4 * rows, dtype=np.float64).reshape(rows, 4)
+    records = np.zeros(rows, dtype=[("Fx", "f8"), ("T", "f8", (3,))])
+    records["Fx"], records["T"] = values[:, 0], values[:, 1:]
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        for name, data in {"x": values[:, 0], "m": values, "w": values.T, "r": records}.items():
+            file.create_dataset(name, data=data, chunks=data.shape, compression="gzip", compression_opts=1)
+    table = read(tmp_path / "a.h5", "hdf5")
+    unpacked: list[Any] = []
+    get = h5py.Dataset.__getitem__
+    monkeypatch.setattr(h5py.Dataset, "__getitem__", lambda data, key: unpacked.append(key) or get(data, key))
+    stretches = list(table.chunks(names(table)))
+    found = dict(zip(names(table), (np.concatenate(one) for one in zip(*stretches, strict=True)), strict=True))
+    wide = {f"{name}[{1 + k}]": values[:, k] for name in ("m", "w") for k in range(4)}
+    fields = {"r[Fx]": values[:, 0]} | {f"r[T][{k}]": values[:, k] for k in (1, 2, 3)}
+    for name, right in ({"x": values[:, 0]} | wide | fields).items():
+        np.testing.assert_array_equal(found.pop(name), right)
+    assert not found and len(stretches) == 3 and len(unpacked) == 4

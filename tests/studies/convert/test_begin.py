@@ -51,6 +51,7 @@ LATE = 3.724  # s: the clock of the wrench began so much later
         ("t_ms", "", "time", "", "ms"),
         ("Time", "", "time", "", "?"),
         ("az_cmd_deg", "", "", "", "deg"),  # what was commanded is no angle that was measured
+        ("az_error(deg)", "", "", "", "deg"),
         ("probe A", "", "", "", "A"),
         ("diameter_mm", "", "", "", "mm"),
         ("status", "", "", "", "?"),

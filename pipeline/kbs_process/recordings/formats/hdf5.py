@@ -6,6 +6,7 @@ The conventions of netCDF are kept: what `scale_factor` and `add_offset` pack is
 
 from __future__ import annotations
 
+import math
 import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
@@ -37,7 +38,7 @@ _UNUSED = ("scale", "offset", "gain", "slope", "intercept")  # which no conventi
 # Classes of MATLAB; what others write has none.
 _MATLAB_NUMBERS = re.compile("|double|single|logical|u?int(8|16|32|64)")
 ELEMENTS = 1 << 16  # of an array of structures
-_BLOCK_CELLS = 1 << 22  # of a matrix, read together for its columns
+_BLOCK_BYTES = 1 << 25  # of a matrix, or of records, read together for their columns
 _UNWRITTEN = 1 << 26  # bytes of a data set that may be fill values alone
 
 
@@ -113,9 +114,10 @@ def _why_not(data: Any, classes: bool) -> str:
 def _columns(data: Any, name: str, classes: bool) -> Iterator[Item]:
     unit = _text(data.attrs.get("units", "")) if "unit" not in data.attrs else _text(data.attrs["unit"])
     if data.dtype.names and data.ndim == 1:
+        records = _Cached(data)
         for member in data.dtype.names:
             label, kind = f"{name}[{member}]", data.dtype[member]
-            cells = _Field(data, member, kind.base, (len(data), *kind.shape))
+            cells = _Field(records, member, kind.base, (len(data), *kind.shape))
             if len(kind.shape) == 1:
                 yield from matrix_of(cells, label, unit, upright=True)
             else:
@@ -134,7 +136,7 @@ def _columns(data: Any, name: str, classes: bool) -> Iterator[Item]:
     if data.ndim == 2:  # MATLAB's are transposed: of a square one, too
         yield from matrix_of(_Cached(data), name, unit, change, upright=data.shape[0] >= data.shape[1] + classes)
     else:
-        yield from series_of(data, name, unit, change)
+        yield from series_of(_Cached(data), name, unit, change)
 
 
 def _odd(data: Any, attribute: str, count: int) -> str:
@@ -159,7 +161,7 @@ def _words(data: Any) -> Slice:
 
 @dataclass(slots=True)
 class _Cached:
-    """A matrix in a file, whose columns are read one after the other: the stretch that was read last is kept."""
+    """A data set of numbers or records, whose columns are read one after the other: the stretch read last is kept."""
 
     data: Any
     at: tuple[int, int] = (0, 0)
@@ -170,30 +172,46 @@ class _Cached:
         return self.data.dtype
 
     @property
-    def shape(self) -> tuple[int, int]:
+    def shape(self) -> tuple[int, ...]:
         return self.data.shape  # type: ignore[no-any-return]
 
     @property
     def ndim(self) -> int:
-        return 2
+        return len(self.shape)
+
+    def __len__(self) -> int:
+        return self.shape[0]
 
     def __getitem__(self, key: Any) -> Cells:
-        upright = isinstance(key[0], slice)
-        stretch, column = key if upright else key[::-1]
-        first, end, _ = stretch.indices(self.shape[0 if upright else 1])
-        if (end - first) * self.shape[1 if upright else 0] > _BLOCK_CELLS:
-            return np.asarray(self.data[key])
-        if self.block is None or self.at != (first, end):
-            self.block = self.data[first:end] if upright else self.data[:, first:end].T
-            self.at = (first, end)
-        return np.asarray(self.block[:, column])
+        keys = key if isinstance(key, tuple) else (key,)
+        axis = next(place for place, one in enumerate(keys) if isinstance(one, slice))
+        block = self.stretch(keys[axis], axis)
+        column = [one for one in keys if not isinstance(one, slice)]
+        return np.asarray(self.data[key] if block is None else block[(slice(None), *column)])
+
+    def stretch(self, rows: slice, axis: int = 0) -> Any:
+        """Return all of some rows, which run along an axis; None where they are too many numbers to be held.
+
+        Numbers that were compressed together are unpacked together, and once.
+        """
+        first, end, _ = rows.indices(self.shape[axis])
+        if not self.at[0] <= first <= end <= self.at[1]:
+            together = self.data.chunks if self.data.id.get_create_plist().get_nfilters() else None
+            high = together[axis] if together else 1
+            start, stop = first - first % high, min(-(-end // high) * high, self.shape[axis])
+            held = self.data.dtype.itemsize * (stop - start) * (self.data.size // max(self.shape[axis], 1))
+            if held > max(_BLOCK_BYTES, 2 * self.data.dtype.itemsize * math.prod(together or ())):
+                return None
+            self.block = self.data[start:stop] if axis == 0 else self.data[:, start:stop].T
+            self.at = (start, stop)
+        return self.block[first - self.at[0] : end - self.at[0]]
 
 
 @dataclass(frozen=True, slots=True)
 class _Field:
     """A field of the records of a data set, of one number or several."""
 
-    data: Any
+    records: _Cached
     name: str
     dtype: Any
     shape: tuple[int, ...]
@@ -207,7 +225,9 @@ class _Field:
 
     def __getitem__(self, key: Any) -> Cells:
         rows, *column = key if isinstance(key, tuple) else (key,)
-        return np.asarray(self.data.fields(self.name)[rows])[(slice(None), *column)]
+        block = self.records.stretch(rows)
+        field = self.records.data.fields(self.name)[rows] if block is None else block[self.name]
+        return np.asarray(field)[(slice(None), *column)]
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,6 +15,7 @@ _PARTS = re.compile(r"[A-Za-z0-9]+")
 _LOAD = re.compile(r"(f|force|m|mom|moment|t|torque)([xyz])|([xyz])(force|moment|torque)", re.IGNORECASE)
 _TIMES = {"t", "time", "timestamp", "stamp", "zeit", "clock"}
 _COMMANDED = {"cmd", "command", "commanded", "demand", "desired", "ref", "reference", "set", "setpoint", "target"}
+_DERIVED = {"error", "err", "deviation", "difference"}
 _WORDS = {"angle", "angles", "position", "positions", "pos", "enc", "encoder", "winkel", "actual", "meas"}
 _ANGLES = _WORDS - {"actual", "meas"} | {"az", "el", "azimuth", "elevation", "joint"}
 _RATES = {"velocity", "velocities", "vel", "rate", "speed", "effort", "torque", "torques", "current", "acceleration"}
@@ -53,7 +54,7 @@ def meaning(column: Column) -> Meaning:
     if (turned := _ROTATION.fullmatch("".join(words))) and not kind:
         return Meaning(column.name, "orientation", next(filter(None, turned.groups())), "1")
     moved = kind == "angle" or (kind in ("length", "") and around & _ANGLES and not around & _RATES)
-    if set(words) & _COMMANDED or around & (_COMMANDED - {"set"} | {"field"}) or not moved:
+    if set(words) & (_COMMANDED | _DERIVED) or around & (_COMMANDED - {"set"} | {"field"}) or not moved:
         return Meaning(column.name, unit=unit)
     name = "_".join(word for word in words if word not in _WORDS)
     return Meaning(column.name, "encoder", name if name[:1].isalpha() else f"joint{name}", unit)
