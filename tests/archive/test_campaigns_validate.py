@@ -17,4 +17,4 @@ def test_validates(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     main(["validate", str(CAMPAIGNS / name)])  # exits where there is one
     told = capsys.readouterr().out
     assert told.startswith(f"{name}: ")
-    assert " 0 unreadable" in told
+    assert " 0 refused" in told

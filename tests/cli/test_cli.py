@@ -249,7 +249,7 @@ def test_validate_finds_sound_recordings_clean(processable: CampaignFolder, caps
     out = capsys.readouterr().out
     assert "EL089P00_1  fit          clean" in out
     assert "wrench 100 Hz" in out
-    assert "4 recordings: 0 unreadable, 0 with losses" in out
+    assert "4 recordings: 0 refused, 0 with losses" in out
 
 
 @pytest.mark.slow
@@ -298,7 +298,7 @@ def test_validate_tells_what_was_put_in_order_and_counts_no_loss(
     out = capsys.readouterr().out
     assert "EL089P00_2  held-out     clean" in out
     assert "EL089P00_2: 1 x put in order" in out
-    assert "4 recordings: 0 unreadable, 0 with losses" in out
+    assert "4 recordings: 0 refused, 0 with losses" in out
 
 
 @pytest.mark.slow
@@ -363,7 +363,7 @@ def test_validate_refuses_what_it_cannot_read(folder: CampaignFolder, capsys: py
     out = capsys.readouterr().out
     assert "the file is empty" in out
     assert "did you mean '/transducer/wrench'?" in out
-    assert "4 unreadable" in out
+    assert "4 refused" in out
     assert "cannot be processed" not in out
 
 

@@ -171,7 +171,7 @@ def test_forces_of_motion_show_which_way_a_joint_turns_that_vague_files_hide(tmp
     ("fault", "told"),
     [
         ({"zero": -0.1}, "the zero of arm's angle (degrees) is -5."),
-        ({"angle": -1.0}, "the sign of arm's angle is -1 in test"),
+        ({"angle": -1.0}, "the sign of arm's angle is reversed in test"),
         ({"reads": np.diag([1.0, 1.0, 1.0, 1.0, 0.0, 1.0])}, "channel: Ty does not respond in test"),
         ({}, None),
     ],

@@ -97,7 +97,8 @@ def regained(channel: str, gain_there: float, recording: str, silent: float) -> 
 def misread(one: Shift, silent: float) -> str:
     if one.channel:
         return regained(one.channel, one.value, one.recording, silent)
-    return f"{one.what} is {one.value:.3g} in {one.recording}, {UNLESS}"
+    how = "reversed" if one.right else f"{one.value:.3g}"
+    return f"{one.what} is {how} in {one.recording}, {UNLESS}"
 
 
 def gain(what: str, channels: Sequence[str], gain: float) -> str:

@@ -7,6 +7,7 @@ the model, a unit or a sign is wrong, or a stated sigma too small.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -14,6 +15,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from kbs_process.estimation.longrun import longrun_covariance
+from kbs_process.rig.model import Joint
 from kbs_process.signals.records import WRENCH_CHANNELS, Array
 from kbs_process.stages.gravity.equation import Prepared
 from kbs_process.stages.gravity.model import GravityModel, taring_error
@@ -25,7 +27,7 @@ BY_CHANCE = 1e-4
 KNOWN_S = 0.02  # to which a delay between two recorders can be known at best
 TAKEN = 0.25  # part of the power of what is left that a lag explains, or something else may follow the rates
 ALONE = 0.8  # the same of what is misread in one recording, or something else may follow the angles
-_ABOUT = 0.4  # of -1, a sign that is turned
+_ABOUT = 0.4  # of -1, a sign or an order that is reversed
 _LINEAR = 45.0  # degrees, to which an angle's zero is found in one step
 _ROUNDS = 4  # of weights
 _INFORMED = 0.1  # part of the prior's variance that the data take away: less says nothing of the prior
@@ -110,7 +112,8 @@ def lag(model: GravityModel, data: Prepared) -> Shift | None:
 def misread(model: GravityModel, data: Prepared) -> Iterator[Shift]:
     """What alone makes a recording one like those that were fitted, where it takes most of what gravity leaves of it.
 
-    A channel may read another share of what acts, an encoder count from another zero (degrees), or the other way.
+    A channel may read another share of what acts, an encoder count from another zero (degrees), or the other way, or
+    be taken for that of another joint.
     """
     equation, joints = model.equation, model.rig.joints
     theta = model.fit.value[: equation.size]
@@ -120,14 +123,25 @@ def misread(model: GravityModel, data: Prepared) -> Iterator[Shift]:
         own = np.where(np.arange(len(equation.channels)) == index, expected, 0.0)
         found.append(_shift(model, data, f"the gain of {channel}", own, right=1.0, channel=channel))
     for index, joint in enumerate(joints):
-        sense = np.where(np.arange(len(joints)) == index, -1.0, 1.0)
-        back = replace(data, q=data.q * sense, qd=data.qd * sense, qdd=data.qdd * sense, before=None, after=None)
-        turned = 0.5 * (expected - equation.predict(theta, back))
-        sign = _shift(model, data, f"the sign of {joint.name}'s angle", turned, right=1.0)
         zero = _shift(model, data, f"the zero of {joint.name}'s angle (degrees)", -np.radians(slopes[:, :, index]))
-        found += [sign] if sign and abs(sign.value + 1.0) < _ABOUT else []
         found += [zero] if zero and abs(zero.value) < _LINEAR else []
+    for what, matrix in _readings(joints):
+        q, qd, qdd = (each @ matrix for each in (data.q, data.qd, data.qdd))
+        other = equation.predict(theta, replace(data, q=q, qd=qd, qdd=qdd, before=None, after=None))
+        turned = _shift(model, data, what, 0.5 * (expected - other), right=1.0)
+        found += [turned] if turned and abs(turned.value + 1.0) < _ABOUT else []
     yield from sorted((one for one in found if one and one.taken > ALONE), key=lambda one: -one.taken)[:1]
+
+
+def _readings(joints: Sequence[Joint]) -> Iterator[tuple[str, Array]]:
+    """Other ways to read the angles, as symmetric matrices (joints, joints), and what each turns round."""
+    unit = np.eye(len(joints))
+    for joint, own in zip(joints, unit, strict=True):
+        yield f"the sign of {joint.name}'s angle", unit - 2.0 * np.outer(own, own)
+    for a, b in itertools.combinations(range(len(joints)), 2):
+        if joints[a].type == joints[b].type:
+            between = unit[a] - unit[b]
+            yield f"the order of the angles of {joints[a].name} and {joints[b].name}", unit - np.outer(between, between)
 
 
 def _shift(

@@ -114,7 +114,7 @@ def describe(campaign: Campaign, validation: Validation) -> Iterator[str]:
     )
     width = max((len(finding.name) for finding in findings), default=0)
     for finding in findings:
-        state = "unreadable" if finding.error else "lossy" if finding.lossy else "clean"
+        state = "refused" if finding.error else "lossy" if finding.lossy else "clean"
         rates = ", ".join(f"{key} {rate:.5g} Hz" for key, rate in sorted(finding.rates.items()))
         yield f"  {finding.name:<{width}}  {finding.role:<11}  {state:<10}  {rates}".rstrip()
     for finding in findings:
@@ -124,7 +124,7 @@ def describe(campaign: Campaign, validation: Validation) -> Iterator[str]:
     bad = sum(bool(finding.error) for finding in findings)
     lossy = sum(finding.lossy for finding in findings)
     recordings = "recording" if len(findings) == 1 else "recordings"
-    yield f"{len(findings)} {recordings}: {bad} unreadable, {lossy} with losses"
+    yield f"{len(findings)} {recordings}: {bad} refused, {lossy} with losses"
     if validation.day:
         yield validation.day
     if validation.refusal:
