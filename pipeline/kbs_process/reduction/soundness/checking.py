@@ -40,9 +40,9 @@ from kbs_process.stages.conventions import (
 from kbs_process.stages.gravity import model as gravity
 from kbs_process.stages.gravity.equation import Equation
 from kbs_process.stages.gravity.equation import Prepared as Instants
-from kbs_process.stages.gravity.hypotheses import RATHER, Explained, explanations, shown_gains, turned
+from kbs_process.stages.gravity.hypotheses import RATHER, explanations, shown_gains, turned
 from kbs_process.stages.gravity.model import GravityModel, Sample, prepared
-from kbs_process.stages.gravity.tension import KNOWN_S, TAKEN, Moved, Shift, lag, misread, tension
+from kbs_process.stages.gravity.tension import KNOWN_S, TAKEN, Moved, Shift, Tension, lag, misread, tension
 from kbs_process.stages.repeats import commanded
 
 LEFT = 0.1  # of the weight, and of the torque that it can make: a calibration leaves less, whatever rubs or pulls
@@ -101,6 +101,77 @@ class Checked:
                 )
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Evidence:
+    """What was found of the model of a rig, before anything is said of it."""
+
+    campaign: Campaign
+    model: GravityModel
+    samples: Sequence[Sample]
+    instants: Sequence[Instants]
+    conventions: Sequence[SignCheck]
+    most: Array  # (c,) rms that gravity may leave of a calibration
+    tension: Tension
+    late: Sequence[Moved]  # lags that explain a good part of what gravity leaves
+    misled: Mapping[Moved, Shift]  # what is misread in recordings that were not fitted
+    gains: Sequence[Moved]  # of channels, as the others show them
+    timed: Sequence[str]  # clocks and rates that are not as stated
+    still: Sequence[str]  # encoders that stop
+    twice: Sequence[str]  # recordings that are the same
+
+    def reasons(self) -> tuple[str, ...]:
+        """Return what contradicts the description, nothing where it is sound."""
+        turning = turned(self.model.equation, self.instants)
+        return (
+            *self.timed,
+            *self.still,
+            *self.twice,
+            *words.far(self.tension.beyond, self.tension.probability),
+            *(f"{one.check} is {one.found}, expected {one.expected}" for one in self.conventions if not one.ok),
+            *_left(self.model, self.most),
+            *(words.TURNED.format(joint, np.exp(min(0.5 * rather, 300.0))) for joint, rather in turning),
+        )
+
+    def suggestions(self, reasons: Sequence[str]) -> tuple[list[str], bool]:
+        """Return what explains the reasons; and whether the transducer is right all the same, by its calibration."""
+        beyond, equation = self.tension.beyond, self.model.equation
+        shifted = [one for one in beyond if one in self.late]
+        told = [words.SCALE for _ in self.timed[:1]] + [words.STUCK for _ in self.still[:1]]
+        told += [words.LATE.format(one.value) for one in shifted[:1]] + [words.TWICE for _ in self.twice[:1]]
+        misled = {one: self.misled[one] for one in beyond if one in self.misled}
+        along = {name for own in self.misled.values() for name in own.zeros}
+        right = not (self.timed or self.still or shifted or self.twice) and self._calibrated()
+        tests = [one.name for one in self.campaign.recordings if one.role != "calibration"]
+        off = [one for one in self.conventions if not one.ok]
+        alone = right and all(one.check.rpartition(", ")[2] in tests for one in off)
+        single = len({one.channel for one in off if one.channel}) == 1  # what pulls is read by several
+        regained = [one for one in off if single and one.followed > FOLLOWED]
+        if right and misled and all(one in (*misled, *self.gains) or one.name in along for one in beyond):
+            told += [words.misread(own, SILENT) for own in misled.values()]
+        elif alone and regained:
+            told += [
+                words.regained(one.channel, one.slope or 0.0, one.check.rpartition(", ")[2], SILENT) for one in regained
+            ]
+        elif not self.twice and tuple(reasons) != (*self.timed, *self.still, *words.far(shifted, 1.0)):
+            told += [words.cause(one, equation) for one in explanations(equation, self.instants, self.most)]
+        pull = float(self.model.rig.gravity.value)
+        if pull and not EARTH[0] < pull < EARTH[1]:
+            told.insert(0, words.GRAVITY.format(pull))
+        return told, alone and not misled and not regained and all(one.channel for one in off)
+
+    def _calibrated(self) -> bool:
+        """Whether there are calibrations, and they alone agree with what was known."""
+        names = {entry.name for entry in self.campaign.recordings if entry.role == "calibration"}
+        alone = [sample for sample in self.samples if sample.name in names]
+        if not alone:
+            return False
+        by_these, equation = self.model, self.model.equation
+        if names != set(self.model.taring):
+            rig, inertia = equation.elements.rig, equation.include_inertia
+            by_these = gravity.fit(alone, rig, include_inertia=inertia, settings=self.model.settings)
+        return tension(by_these, {}).sound and not any(_left(by_these, self.most))
+
+
 def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: GravityModel, progress: Progress) -> Checked:
     """Compare what was fitted with what was known, and look for what would explain a difference."""
     with progress.task("Comparing the rig with what was known of it"):
@@ -114,88 +185,62 @@ def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: Gravi
         instants = [prepared(sample, equation, model.settings, low_pass, theta) for sample in samples]
         constants = np.stack([taring.bias for _, taring in tared])
         shown = [_read_and_due(one, data, model) for one, data in zip(recordings, instants, strict=True)]
+        readings = [read for read, _, _ in shown]
         conventions = (*check_weight(campaign.rig), *_conventions(recordings, instants, model, constants, shown))
-        amplifier = campaign.rig.transducer.amplifier
-        lags = [(one, own) for one, data in zip(recordings, instants, strict=True) if (own := lag(model, data))]
-        known = [max(KNOWN_S, late_sigma(one.run.clocks, amplifier, one.entry.clock_sigma)) for one, _ in lags]
-        late = [own.moved(sigma) for (_, own), sigma in zip(lags, known, strict=True) if own.taken >= TAKEN]
-        wrongly = _misread_alone(model, instants, {sample.name for sample, taring in tared if taring.fitted})
-        along = {name for own, _ in wrongly for name in own.zeros}
-        gains = shown_gains(equation, instants)
         tested = {one.channel for one in conventions if one.testable and one.channel}
-        read = tuple(_read_gains(equation, {key: of for key, of in gains.items() if key not in tested}))
-        more = (*late, *(one for _, one in wrongly), *read)
-        found = tension(model, {sample.name: taring for sample, taring in tared}, more)
-        most = _most(equation)
-        rounding = {key: x for one in recordings for key, x in measurable.rounding(campaign, one.readings).items()}
-        channels = model.rig.transducer.channels
         white = [measured_noise(model.rig, one)[1] for one in recordings]
-        noise = {
-            one.entry.name: dict(zip(channels, rms.tolist(), strict=True))
-            for one, rms in zip(recordings, white, strict=True)
-        }
-        if not tested:  # what gravity leaves may be gravity about another axis
-            spread = np.max([read.std(axis=0) for read, _, _ in shown], axis=0)
-            floor = equation.elements.rig.loads.noise[equation.index]
-            floor[: len(channels)] = np.nanmax([floor[: len(channels)], *white], axis=0)  # stated, and as measured
-            most = np.minimum(most, np.maximum(LEFT * spread, BEYOND * floor))
-        hidden = {one.name: tuple(_hidden(campaign, one, recordings, model)) for one in campaign.requirements}
-        timed = tuple(mistimed(campaign, recordings))
-        still = tuple(stuck(recordings, instants, model))
-        twice = tuple(repeated(recordings))
-        reasons = (
-            *timed,
-            *still,
-            *twice,
-            *words.far(found.beyond, found.probability),
-            *(f"{one.check} is {one.found}, expected {one.expected}" for one in conventions if not one.ok),
-            *_left(model, most),
-            *(
-                words.TURNED.format(joint, np.exp(min(0.5 * rather, 300.0)))
-                for joint, rather in turned(equation, instants)
-            ),
+        lags = [(one, own) for one, data in zip(recordings, instants, strict=True) if (own := lag(model, data))]
+        late = [_late(campaign, one, own) for one, own in lags if own.taken >= TAKEN]
+        misled = _misread_alone(model, instants, {sample.name for sample, taring in tared if taring.fitted})
+        shows = shown_gains(equation, instants)
+        gains = tuple(_read_gains(equation, {key: of for key, of in shows.items() if key not in tested}))
+        evidence = _Evidence(
+            campaign,
+            model,
+            samples,
+            instants,
+            conventions,
+            _most(equation) if tested else _most_of_untested(equation, readings, white),
+            tension(model, {sample.name: taring for sample, taring in tared}, (*late, *misled, *gains)),
+            late,
+            misled,
+            gains,
+            timed=tuple(mistimed(campaign, recordings)),
+            still=tuple(stuck(recordings, instants, model)),
+            twice=tuple(repeated(recordings)),
+        )
+        reasons = evidence.reasons()
+        told, calibrated = evidence.suggestions(reasons) if reasons else ((), True)
+        soundness = Soundness(
+            sound=not reasons,
+            probability=evidence.tension.probability,
+            gains={key: sigma for key, (_, sigma, _) in shows.items()},
+            beyond=tuple(words.beyond(one, model) for one in evidence.tension.beyond) if reasons else (),
+            reasons=reasons,
+            suggestions=tuple(told),
+            calibrated=calibrated,
         )
         judged = {key for one in campaign.requirements for key in measurable.judged_channels(one, campaign.rig)}
-        mute = tuple(_mute(equation, [read for read, _, _ in shown]))
-        soundness = Soundness(probability=found.probability, gains={key: sigma for key, (_, sigma, _) in gains.items()})
-        tests = [one.entry.name for one in recordings if one.entry.role != "calibration"]
-        if reasons:
-            shifted = [one for one in found.beyond if one in late]
-            told = [words.SCALE for _ in timed[:1]] + [words.STUCK for _ in still[:1]]
-            misled = {one: own for own, one in wrongly if one in found.beyond}
-            told += [words.LATE.format(one.value) for one in shifted[:1]] + [words.TWICE for _ in twice[:1]]
-            right = not (timed or still or shifted or twice) and _calibrated(campaign, samples, model, most)
-            off = [one for one in conventions if not one.ok]
-            alone = right and all(one.check.rpartition(", ")[2] in tests for one in off)
-            single = len({one.channel for one in off if one.channel}) == 1  # what pulls is read by several
-            regained = [one for one in off if single and one.followed > FOLLOWED]
-            causes: tuple[Explained, ...] = ()
-            if right and misled and all(one in (*misled, *read) or one.name in along for one in found.beyond):
-                told += [words.misread(own, SILENT) for own in misled.values()]
-            elif alone and regained:
-                told += [
-                    words.regained(one.channel, one.slope or 0.0, one.check.rpartition(", ")[2], SILENT)
-                    for one in regained
-                ]
-            elif not twice and reasons != (*timed, *still, *words.far(shifted, 1.0)):
-                causes = explanations(equation, instants, most)
-            told += [words.cause(one, equation) for one in causes]
-            pull = float(model.rig.gravity.value)
-            if pull and not EARTH[0] < pull < EARTH[1]:
-                told.insert(0, words.GRAVITY.format(pull))
-            soundness = Soundness(
-                sound=False,
-                probability=found.probability,
-                gains=soundness.gains,
-                beyond=tuple(words.beyond(one, model) for one in found.beyond),
-                reasons=reasons,
-                suggestions=tuple(told),
-                calibrated=alone and not misled and not regained and all(one.channel for one in off),
-            )
-        silent = tuple(key for key in mute if key in judged)
-        unconfirmed = tuple(key for key in equation.channels if key not in tested)
-        lag_of = {own.recording: abs(own.value) for _, own in lags if abs(own.value) > BEYOND * own.chance}
-        return Checked(soundness, conventions, hidden, rounding, noise, silent, unconfirmed, lag_of)
+        channels = model.rig.transducer.channels
+        return Checked(
+            soundness,
+            conventions,
+            hidden={one.name: tuple(_hidden(campaign, one, recordings, model)) for one in campaign.requirements},
+            rounding={key: x for one in recordings for key, x in measurable.rounding(campaign, one.readings).items()},
+            noise={
+                one.entry.name: dict(zip(channels, rms.tolist(), strict=True))
+                for one, rms in zip(recordings, white, strict=True)
+            },
+            mute=tuple(key for key in _mute(equation, readings) if key in judged),
+            unconfirmed=tuple(key for key in equation.channels if key not in tested),
+            late={own.recording: abs(own.value) for _, own in lags if abs(own.value) > BEYOND * own.chance},
+        )
+
+
+def _late(campaign: Campaign, one: Prepared, own: Shift) -> Moved:
+    """A recording's lag next to what is known of its clocks."""
+    known = late_sigma(one.run.clocks, campaign.rig.transducer.amplifier, one.entry.clock_sigma)
+    return own.moved(max(KNOWN_S, known))
 
 
 def _hidden(
@@ -246,12 +291,10 @@ def _conventions(
             yield msgspec.structs.replace(check, check=f"{check.check}, {one.entry.name}")
 
 
-def _misread_alone(
-    model: GravityModel, instants: Sequence[Instants], fitted: Collection[str]
-) -> list[tuple[Shift, Moved]]:
+def _misread_alone(model: GravityModel, instants: Sequence[Instants], fitted: Collection[str]) -> dict[Moved, Shift]:
     """What is misread in recordings that were not fitted, as long as none of the `fitted` ones is."""
-    found = {data.name: [(own, own.moved(FINEST)) for own in misread(model, data)] for data in instants}
-    return [] if any(found[name] for name in fitted) else [pair for own in found.values() for pair in own]
+    found = {data.name: {own.moved(FINEST): own for own in misread(model, data)} for data in instants}
+    return {} if any(found[name] for name in fitted) else {key: own for of in found.values() for key, own in of.items()}
 
 
 def _moved_alone(equation: Equation, zeros: Array) -> Mask:
@@ -322,14 +365,11 @@ def _most(equation: Equation) -> Array:
     return most
 
 
-def _calibrated(campaign: Campaign, samples: Sequence[Sample], model: GravityModel, most: Array) -> bool:
-    """Whether there are calibrations, and they alone agree with what was known."""
-    names = {entry.name for entry in campaign.recordings if entry.role == "calibration"}
-    alone = [sample for sample in samples if sample.name in names]
-    if not alone:
-        return False
-    by_these, equation = model, model.equation
-    if names != set(model.taring):
-        rig, inertia = equation.elements.rig, equation.include_inertia
-        by_these = gravity.fit(alone, rig, include_inertia=inertia, settings=model.settings)
-    return tension(by_these, {}).sound and not any(_left(by_these, most))
+def _most_of_untested(equation: Equation, readings: Sequence[Array], white: Sequence[Array]) -> Array:
+    """The same where no load tests a channel: what gravity leaves may be gravity about another axis."""
+    spread = np.max([read.std(axis=0) for read in readings], axis=0)
+    floor = equation.elements.rig.loads.noise[equation.index]
+    channels = len(equation.elements.rig.transducer.channels)
+    floor[:channels] = np.nanmax([floor[:channels], *white], axis=0)  # stated, and as measured
+    most: Array = np.minimum(_most(equation), np.maximum(LEFT * spread, BEYOND * floor))
+    return most
