@@ -37,6 +37,11 @@ class LinkMotion(Pose):
     alpha: Array  # (n, 3) rad/s^2
     accel: Array  # (n, 3) of the origin, gravity taken off, m/s^2
 
+    @property
+    def turns(self) -> bool:
+        """At any time."""
+        return bool(self.omega.any() or self.alpha.any())
+
 
 Links = dict[str, LinkMotion]
 
@@ -202,6 +207,8 @@ def kinematics(rig: Rig, q: Array, qd: Array, qdd: Array) -> Links:
 
 def _accel_at(link: LinkMotion, d: Array) -> Array:
     """Acceleration of the link's point at `d` (n, 3) from its origin."""
+    if not link.turns:
+        return link.accel
     accel: Array = link.accel + cross(link.alpha, d) + cross(link.omega, cross(link.omega, d))
     return accel
 
@@ -225,11 +232,12 @@ def _reaction(rig: Rig, links: Links, beyond: frozenset[str], about: Array) -> t
         link = links[body.on]
         c = rotate(link.R, body.cog.value)
         F = -float(body.mass) * _accel_at(link, c)
-        inertia, R_t = inertia_matrix(body.inertia.value), np.swapaxes(link.R, 1, 2)
-        omega, alpha = rotate(R_t, link.omega), rotate(R_t, link.alpha)
-        spin = rotate(link.R, alpha @ inertia + cross(omega, omega @ inertia))
         force += F
-        moment += cross(link.r + c - about, F) - spin
+        moment += cross(link.r + c - about, F)
+        if link.turns:
+            inertia, R_t = inertia_matrix(body.inertia.value), np.swapaxes(link.R, 1, 2)
+            omega, alpha = rotate(R_t, link.omega), rotate(R_t, link.alpha)
+            moment -= rotate(link.R, alpha @ inertia + cross(omega, omega @ inertia))
     return force, moment + _rotors(rig, links, beyond)
 
 
@@ -262,6 +270,8 @@ def _rotors(rig: Rig, links: Links, beyond: frozenset[str]) -> Array:
         if joint.drive is None or joint.parent not in beyond:
             continue
         carrier, link = links[joint.parent], links[joint.name]
+        if not (carrier.turns or link.turns):
+            continue
         Jr, ratio = float(joint.drive.rotor_inertia), float(joint.drive.ratio)
         e = link.axis
         rate = _along(link.omega - carrier.omega, e)
