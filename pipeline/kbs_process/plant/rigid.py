@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kbs_process.rig.model import LAB, TRANSDUCER, Rig
-from kbs_process.signals.frames import about_axis, cross, from_rotation_vector, from_tilt, into_xyz, rotate, skew
+from kbs_process.signals.frames import about_axis, chain, cross, from_rotation_vector, from_tilt, into_xyz, rotate, skew
 from kbs_process.signals.records import Array
 
 INERTIAL = ("m", "mcx", "mcy", "mcz", "Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz")
@@ -37,40 +37,51 @@ class LinkMotion(Pose):
     alpha: Array  # (n, 3) rad/s^2
     accel: Array  # (n, 3) of the origin, gravity taken off, m/s^2
 
+    @property
+    def turns(self) -> bool:
+        """At any time."""
+        return bool(self.omega.any() or self.alpha.any())
 
-def inverse_dynamics(rig: Rig, q: Array, qd: Array, qdd: Array, *, sag: bool = True) -> Array:
+
+Links = dict[str, LinkMotion]
+
+
+def inverse_dynamics(
+    rig: Rig, q: Array, qd: Array, qdd: Array, *, sag: bool = True, links: Links | None = None
+) -> Array:
     """Wrench [F, M] (n, 6), N and N m, that all beyond T exerts on the transducer, about T's origin, in T.
 
     `q`, `qd`, `qdd` (n, joints) are the joints' true angles and their rates, in the order of `rig.joints`. At rest
     and level F = (0, 0, -weight). With `sag` an elastic transducer deflects quasi-statically, its angles
     being K^-1 times the torque, about x, then y, then z, and gravity turns in it; the deflection's own rates are
     left out (valid well below its resonance). Rotors turn with `ratio` times their joint's rate, on top of
-    their carrier's rotation.
+    their carrier's rotation. `links` is their `kinematics`, where known.
     """
-    links = kinematics(rig, q, qd, qdd)
+    links = links or kinematics(rig, q, qd, qdd)
     wrench = _wrench(rig, links)
     if not sag or rig.transducer.stiffness is None:
         return wrench
     return _sagged(wrench, rig, links, rig.transducer.stiffness.value)
 
 
-def loads(rig: Rig, q: Array, qd: Array, qdd: Array, *, sag: bool = True) -> Array:
+def loads(rig: Rig, q: Array, qd: Array, qdd: Array, *, sag: bool = True, links: Links | None = None) -> Array:
     """What the rig's instruments read (n, 6 + joints), in the order of `rig.loads`: wrench, then efforts.
 
     The effort of a joint that nobody measures is zero.
     """
+    links = links or kinematics(rig, q, qd, qdd)
     measured = [index for index, joint in enumerate(rig.joints) if joint.effort is not None]
     readings = np.zeros((len(q), len(rig.joints)))
     if measured:
-        efforts = joint_efforts(rig, q, qd, qdd)
+        efforts = joint_efforts(rig, q, qd, qdd, links)
         for index in measured:
             effort = rig.joints[index].effort
             assert effort is not None
             readings[:, index] = efforts[:, index] / float(effort.gain) + float(effort.bias)
-    return np.concatenate([inverse_dynamics(rig, q, qd, qdd, sag=sag), readings], axis=1)
+    return np.concatenate([inverse_dynamics(rig, q, qd, qdd, sag=sag, links=links), readings], axis=1)
 
 
-def joint_efforts(rig: Rig, q: Array, qd: Array, qdd: Array) -> Array:
+def joint_efforts(rig: Rig, q: Array, qd: Array, qdd: Array, links: Links | None = None) -> Array:
     r"""Efforts (n, joints), N m or N, that the drives put into the joints to make them move so.
 
     Equation: $\tau_j = s_j^T \sum_b w_b + b_j \dot q_j + R_j J_{r,j} (R_j \ddot q_j + e_j \cdot \alpha_c)$ with
@@ -78,7 +89,7 @@ def joint_efforts(rig: Rig, q: Array, qd: Array, qdd: Array) -> Array:
     included), $b_j$ its viscous friction, and the last term its own rotor's on its carrier's rotation.
     Validity: rigid bodies on a rigid base. Source: Featherstone, Rigid Body Dynamics Algorithms (2008), 5.3.
     """
-    links = kinematics(rig, q, qd, qdd)
+    links = links or kinematics(rig, q, qd, qdd)
     efforts = np.empty((len(q), len(rig.joints)))
     for index, joint in enumerate(rig.joints):
         link, carrier = links[joint.name], links[joint.parent]
@@ -142,7 +153,7 @@ def poses(rig: Rig, q: Array) -> dict[str, Pose]:
     links = {LAB: Pose(np.broadcast_to(np.eye(3), (n, 3, 3)), still, still, still)}
 
     def place_transducer(carrier: str) -> None:
-        R = links[carrier].R @ from_tilt(rig.transducer.tilt.value)
+        R = chain(links[carrier].R, from_tilt(rig.transducer.tilt.value))
         links[TRANSDUCER] = Pose(R, links[carrier].r, still, still)
 
     if rig.transducer.on == LAB:
@@ -153,7 +164,7 @@ def poses(rig: Rig, q: Array) -> dict[str, Pose]:
         axis = rotate(parent.R, R_J @ np.asarray(joint.axis))
         arm = rotate(parent.R, joint.origin.value) + slide * axis * q[:, index, None]
         links[joint.name] = Pose(
-            R=parent.R @ R_J @ about_axis(np.asarray(joint.axis, dtype=float), turn * q[:, index]),
+            R=chain(chain(parent.R, R_J), about_axis(np.asarray(joint.axis, dtype=float), turn * q[:, index])),
             r=parent.r + arm,
             arm=arm,
             axis=axis,
@@ -163,7 +174,7 @@ def poses(rig: Rig, q: Array) -> dict[str, Pose]:
     return links
 
 
-def kinematics(rig: Rig, q: Array, qd: Array, qdd: Array) -> dict[str, LinkMotion]:
+def kinematics(rig: Rig, q: Array, qd: Array, qdd: Array) -> Links:
     """Motion of every link, the transducer not deflected."""
     n = len(q)
     upward = np.broadcast_to([0.0, 0.0, float(rig.gravity)], (n, 3))
@@ -196,18 +207,20 @@ def kinematics(rig: Rig, q: Array, qd: Array, qdd: Array) -> dict[str, LinkMotio
 
 def _accel_at(link: LinkMotion, d: Array) -> Array:
     """Acceleration of the link's point at `d` (n, 3) from its origin."""
+    if not link.turns:
+        return link.accel
     accel: Array = link.accel + cross(link.alpha, d) + cross(link.omega, cross(link.omega, d))
     return accel
 
 
-def _wrench(rig: Rig, links: dict[str, LinkMotion]) -> Array:
+def _wrench(rig: Rig, links: Links) -> Array:
     T = links[TRANSDUCER]
     force, moment = _reaction(rig, links, links_beyond(rig), T.r)
     R_TL = np.swapaxes(T.R, 1, 2)
     return np.concatenate([rotate(R_TL, force), rotate(R_TL, moment)], axis=1)
 
 
-def _reaction(rig: Rig, links: dict[str, LinkMotion], beyond: frozenset[str], about: Array) -> tuple[Array, Array]:
+def _reaction(rig: Rig, links: Links, beyond: frozenset[str], about: Array) -> tuple[Array, Array]:
     """Force and moment (n, 3) that the bodies and rotors on the links `beyond` exert on what carries them.
 
     The moment is about points `about` (n, 3); all in the laboratory's axes.
@@ -219,15 +232,16 @@ def _reaction(rig: Rig, links: dict[str, LinkMotion], beyond: frozenset[str], ab
         link = links[body.on]
         c = rotate(link.R, body.cog.value)
         F = -float(body.mass) * _accel_at(link, c)
-        inertia, R_t = inertia_matrix(body.inertia.value), np.swapaxes(link.R, 1, 2)
-        omega, alpha = rotate(R_t, link.omega), rotate(R_t, link.alpha)
-        spin = rotate(link.R, alpha @ inertia + cross(omega, omega @ inertia))
         force += F
-        moment += cross(link.r + c - about, F) - spin
+        moment += cross(link.r + c - about, F)
+        if link.turns:
+            inertia, R_t = inertia_matrix(body.inertia.value), np.swapaxes(link.R, 1, 2)
+            omega, alpha = rotate(R_t, link.omega), rotate(R_t, link.alpha)
+            moment -= rotate(link.R, alpha @ inertia + cross(omega, omega @ inertia))
     return force, moment + _rotors(rig, links, beyond)
 
 
-def _sagged(wrench: Array, rig: Rig, links: dict[str, LinkMotion], stiffness: Array) -> Array:
+def _sagged(wrench: Array, rig: Rig, links: Links, stiffness: Array) -> Array:
     """The wrench once T has given way: in T's axes all is as before but the field of gravity, which turned.
 
     F changes by -m da and M by -(sum m c) x da, da the change of T's apparent acceleration. Exact for a transducer
@@ -249,13 +263,15 @@ def _sagged(wrench: Array, rig: Rig, links: dict[str, LinkMotion], stiffness: Ar
     return sagged
 
 
-def _rotors(rig: Rig, links: dict[str, LinkMotion], beyond: frozenset[str]) -> Array:
+def _rotors(rig: Rig, links: Links, beyond: frozenset[str]) -> Array:
     """Moment (n, 3) of the rotors' spin, h = Jr (omega . e + R qd) e with e fixed in the carrier: -dh/dt."""
     moment = np.zeros_like(links[TRANSDUCER].r)
     for joint in rig.joints:
         if joint.drive is None or joint.parent not in beyond:
             continue
         carrier, link = links[joint.parent], links[joint.name]
+        if not (carrier.turns or link.turns):
+            continue
         Jr, ratio = float(joint.drive.rotor_inertia), float(joint.drive.ratio)
         e = link.axis
         rate = _along(link.omega - carrier.omega, e)
@@ -267,7 +283,7 @@ def _rotors(rig: Rig, links: dict[str, LinkMotion], beyond: frozenset[str]) -> A
 
 
 def _along(a: Array, e: Array) -> Array:
-    component: Array = np.sum(a * e, axis=1, keepdims=True)
+    component: Array = np.einsum("ni,ni->n", a, e)[:, None]
     return component
 
 

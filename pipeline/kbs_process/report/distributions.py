@@ -24,7 +24,7 @@ def distributions(found: Sequence[tuple[str, Array, PointingEstimate]], title: s
             random = 1e3 * np.degrees(error - estimate.bias)
             deviation = 1e3 * np.degrees(estimate.random) / 2.0
             inside = float(np.quantile(np.abs(random), 0.95))
-            axis.hist(random, bins=_BINS, density=True, color=draw.MEASURED, alpha=0.55)
+            axis.hist(random, bins=_BINS, density=True, histtype="stepfilled", color=draw.MEASURED, alpha=0.55)
             reach = float(np.abs(random).max())
             x = np.linspace(-reach, reach, 400)
             normal = np.exp(-0.5 * (x / deviation) ** 2) / (deviation * np.sqrt(2.0 * np.pi))

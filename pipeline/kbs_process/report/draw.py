@@ -15,6 +15,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
@@ -134,6 +135,11 @@ def picture(figure: Figure, alt: str, title: str = "", form: Literal["svg", "png
     content = io.BytesIO()
     if form == "svg":
         nothing = dict.fromkeys(("Date", "Creator", "Format", "Type"))
+        FigureCanvasSVG(figure)
+        figure.dpi = 72
+        if (layout := figure.get_layout_engine()) is not None:  # else a first drawing is made for it
+            layout.execute(figure)
+            figure.set_layout_engine(None)
         figure.savefig(content, format="svg", metadata=nothing)
     else:
         figure.dpi = _DPI

@@ -1,4 +1,8 @@
-"""Rotations, vectorised over leading axes. `R_GT` maps the components of a vector from T's axes into G's."""
+"""Rotations, vectorised over leading axes. `R_GT` maps the components of a vector from T's axes into G's.
+
+Stacks of matrices made here lie in memory with the leading axis innermost, along which `chain` and `rotate` then run:
+several times faster than matrix by matrix.
+"""
 
 from __future__ import annotations
 
@@ -23,8 +27,9 @@ def about_axis(axis: Array, angle: Array | float) -> Array:
     Rodrigues: R = I + sin(q) S + (1 - cos(q)) S^2, S = skew(axis).
     """
     S = skew(np.asarray(axis, dtype=float))
-    q = np.asarray(angle, dtype=float)[..., None, None]
-    R: Array = np.eye(3) + np.sin(q) * S + 2.0 * np.sin(q / 2.0) ** 2 * (S @ S)
+    q = np.asarray(angle, dtype=float)
+    sine, versine = np.sin(q), 2.0 * np.sin(q / 2.0) ** 2
+    R: Array = np.eye(3) + _times(sine, S) + _times(versine, S @ S)
     return R
 
 
@@ -61,13 +66,18 @@ def into_xyz(angles: Array, a: Array) -> Array:
     y, z = c[..., 0] * y + s[..., 0] * z, c[..., 0] * z - s[..., 0] * y
     x, z = c[..., 1] * x - s[..., 1] * z, c[..., 1] * z + s[..., 1] * x
     x, y = c[..., 2] * x + s[..., 2] * y, c[..., 2] * y - s[..., 2] * x
-    turned: Array = np.stack([x, y, z], axis=-1)
-    return turned
+    return _vector(x, y, z)
+
+
+def chain(R: Array, S: Array) -> Array:
+    """R @ S for stacks of matrices (..., 3, 3)."""
+    RS: Array = np.einsum("...ij,...jk->...ik", R, S, order="F")
+    return RS
 
 
 def rotate(R: Array, a: Array) -> Array:
     """R @ a for stacks of matrices (..., 3, 3) and vectors (..., 3)."""
-    b: Array = np.einsum("...ij,...j->...i", R, a)
+    b: Array = np.einsum("...ij,...j->...i", R, a, order="F")
     return b
 
 
@@ -75,5 +85,14 @@ def cross(a: Array, b: Array) -> Array:
     """a x b over the last axis, broadcasting; several times faster than numpy's general one."""
     a0, a1, a2 = a[..., 0], a[..., 1], a[..., 2]
     b0, b1, b2 = b[..., 0], b[..., 1], b[..., 2]
-    product: Array = np.stack([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0], axis=-1)
+    return _vector(a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0)
+
+
+def _vector(x: Array, y: Array, z: Array) -> Array:
+    a: Array = np.einsum("i...->...i", np.array([x, y, z]))
+    return a
+
+
+def _times(a: Array, S: Array) -> Array:
+    product: Array = np.einsum("...,ij->...ij", a, S, order="F")
     return product

@@ -91,7 +91,8 @@ def _held_out(
     taring = gravity.tare(sample, model)
     static = gravity.apply(sample.motion, model, taring)
     wrong = static.wrench.derive(static.wrench.values - truth_of(campaign, drawn), "error")
-    stated = budget.total(gravity_error.entries(sample.motion, static, model, _cut))
+    slopes = gravity_error.Slopes.of(sample.motion, model)
+    stated = budget.total(gravity_error.entries(sample.motion, static, model, slopes, _cut))
     mean = wrong.values[wrong.valid].mean(axis=0)
     return mean / taring.noise, budget.rms(_cut(wrong)), stated
 

@@ -113,10 +113,11 @@ def test_the_budget_states_the_tarings_error_where_a_band_holds_the_constant(fit
     held_out = sample(record(truth, "held out", tracking(), rng, bias=BIAS))
     taring = gravity.tare(held_out, model)
     static = gravity.apply(held_out.motion, model, taring)
-    _, whole, _ = gravity_error.entries(held_out.motion, static, model, lambda signal: signal)
+    slopes = gravity_error.Slopes.of(held_out.motion, model)
+    _, whole, _ = gravity_error.entries(held_out.motion, static, model, slopes, lambda signal: signal)
     np.testing.assert_allclose(whole.sigma, taring.noise)
     _, varying, _ = gravity_error.entries(
-        held_out.motion, static, model, lambda s: s.derive(s.values - s.values.mean(axis=0), "no constant")
+        held_out.motion, static, model, slopes, lambda s: s.derive(s.values - s.values.mean(axis=0), "no constant")
     )
     np.testing.assert_allclose(varying.sigma, 0.0, atol=1e-12)
 

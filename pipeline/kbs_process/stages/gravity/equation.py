@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kbs_process.errors import RecordingError
-from kbs_process.plant.rigid import loads
+from kbs_process.plant.rigid import Links, kinematics, loads
 from kbs_process.rig.model import Rig
 from kbs_process.signals.records import Array, Mask, Signal
 from kbs_process.signals.smoothing import kernel_length, smooth
@@ -19,6 +19,7 @@ _RATE = 4.0  # samples kept in a period of the low-pass's corner: its stop band 
 _MOST = 2**14  # instants of a recording; of a longer one they are farther apart
 _BLOCK = 2**12  # instants that are worked on at a time, which bounds memory
 _ANGLE_STEP = 1e-5  # rad
+_STEP = 1e-3  # of a sigma
 RESPONSE = ("response.delay", "response.inertia")  # s, s^2
 
 Angles = tuple[Array, Array, Array]  # q, qd, qdd, (n, joints) each
@@ -39,6 +40,11 @@ class Prepared:
     sigma_q: Array
     rounding: Array  # (n, joints) rad, the encoders' part of sigma_q
     wrench: Array  # (n, c) wrench and efforts, low-passed
+
+    @property
+    def moments(self) -> list[Angles]:
+        """The angles at the instants and, where known, one sample before and after."""
+        return [(self.q, self.qd, self.qdd), *(angles for angles in (self.before, self.after) if angles is not None)]
 
     def rows(self, which: slice | Index) -> Prepared:
         """The same at some of the instants."""
@@ -259,20 +265,24 @@ class Equation:
 
     def predict(self, theta: Array, p: Prepared) -> Array:
         """(n, c) in the channels' units."""
-        values: Array = self._responded(theta, self._loads(theta, p), p.dt) @ self._mixing(theta)
+        rig = self.elements.rig_at(theta[: len(self.elements.names)])
+        values: Array = self._responded(theta, self._loads(rig, p, self._links(rig, p)), p.dt) @ self._mixing(theta)
         return values
 
     def jacobian(self, theta: Array, p: Prepared) -> Array:
         """(n c, size): rig elements by differences, the rest is linear."""
         n, c, count = len(p.q), len(self.channels), len(self.elements.names)
         J = np.zeros((n, c, self.size))
-        moments = self._loads(theta, p)
+        rig = self.elements.rig_at(theta[:count])
+        links = self._links(rig, p)
+        moments = self._loads(rig, p, links)
         W, mixing = self._responded(theta, moments, p.dt), self._mixing(theta)
         base = W @ mixing
-        for column, scale in enumerate(self.elements.sigma):
-            moved = theta.copy()
-            moved[column] += 1e-3 * scale
-            J[:, :, column] = (self.predict(moved, p) - base) / (1e-3 * scale)
+        for column, moved in enumerate(self.elements.moved(rig, theta, _STEP)):
+            turned = moved.joints is not rig.joints or moved.transducer.tilt is not rig.transducer.tilt
+            ahead = self._loads(moved, p, self._links(moved, p) if turned else links)
+            slope = (self._responded(theta, ahead, p.dt) @ mixing - base) / (_STEP * self.elements.sigma[column])
+            J[:, :, column] = slope
         for column, (i, j) in enumerate(zip(self.rows, self.columns, strict=True), start=count):
             J[:, self.index.index(i), column] = W[:, j]
         if self.response_sigma is not None:
@@ -314,12 +324,13 @@ class Equation:
         dX[:6, :6] = self.coupling(theta)
         return dX
 
-    def _loads(self, theta: Array, p: Prepared) -> tuple[Array, ...]:
-        """All loads at the instants and, where known, one sample before and after."""
-        rig = self.elements.rig_at(theta[: len(self.elements.names)])
-        offset = encoder_offsets(rig)
-        moments = [(p.q, p.qd, p.qdd)] + [angles for angles in (p.before, p.after) if angles is not None]
-        return tuple(loads(rig, q - offset, qd, qdd) for q, qd, qdd in moments)
+    def _links(self, rig: Rig, p: Prepared) -> list[Links]:
+        """The motion of the links at the instants and, where known, one sample before and after."""
+        return [kinematics(rig, q - encoder_offsets(rig), qd, qdd) for q, qd, qdd in p.moments]
+
+    def _loads(self, rig: Rig, p: Prepared, links: list[Links]) -> tuple[Array, ...]:
+        """All loads then."""
+        return tuple(loads(rig, *moment, links=one) for moment, one in zip(p.moments, links, strict=True))
 
     def _responded(self, theta: Array, moments: tuple[Array, ...], dt: float) -> Array:
         if self.response_sigma is None or len(moments) == 1:

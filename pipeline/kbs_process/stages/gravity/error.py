@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -18,7 +19,23 @@ _SLOW = 0.1  # of a recording's greatest rate, below which a joint counts as at 
 _NEGLIGIBLE = 1e-6  # part of the greatest eigenvalue from which a direction is left out
 
 
-def entries(motion: Motion, static: Static, model: GravityModel, band: Filter) -> tuple[Entry, Entry, Entry]:
+@dataclass(frozen=True, slots=True, eq=False)
+class Slopes:
+    """Derivatives of the modelled wrench along a recording, at some of its samples."""
+
+    at: Index  # (m,)
+    by_parameters: Array  # (m, c, p)
+    by_angles: Array  # (m, c, joints)
+
+    @classmethod
+    def of(cls, motion: Motion, model: GravityModel) -> Slopes:
+        at = np.unique(np.linspace(0, len(motion) - 1, min(len(motion), _POINTS)).astype(np.int64))
+        return cls(at, derivatives(motion, model, at), angle_slopes(motion, model, at))
+
+
+def entries(
+    motion: Motion, static: Static, model: GravityModel, slopes: Slopes, band: Filter
+) -> tuple[Entry, Entry, Entry]:
     """Budget entries of the fitted parameters' covariance and of the angles' error, within a band.
 
     The static wrench errs by J L z with J its derivatives along the motion, L L^T the parameters' covariance and z
@@ -30,9 +47,8 @@ def entries(motion: Motion, static: Static, model: GravityModel, band: Filter) -
     that time or over the rest, whichever is larger.
     """
     in_motion = moving(motion)
-    shapes = (
-        static.wrench.derive(shape, "error of the gravity model") for shape in _shapes(motion, model, static.taring)
-    )
+    histories = _shapes(len(motion), model, slopes, static.taring)
+    shapes = (static.wrench.derive(shape, "error of the gravity model") for shape in histories)
     parameters = from_shapes("gravity", "covariance of the fitted parameters", shapes, band, in_motion)
     constant = np.broadcast_to(static.taring.noise, static.wrench.values.shape)
     tared = from_shapes(
@@ -41,7 +57,8 @@ def entries(motion: Motion, static: Static, model: GravityModel, band: Filter) -
         [static.wrench.derive(constant.copy(), "error of the taring")],
         band,
     )
-    slope = _slope(motion, model)
+    flat = slopes.by_angles.reshape(len(slopes.at), -1)
+    slope = _whole(flat, slopes.at, len(motion)).reshape(len(motion), *slopes.by_angles.shape[1:])
     rounding = (
         static.wrench.derive(slope[:, :, joint] * history[:, None] / np.sqrt(len(motion.rounding)), "rounding")
         for phase in motion.rounding
@@ -61,29 +78,19 @@ def moving(motion: Motion) -> Mask:
     return mask
 
 
-def _slope(motion: Motion, model: GravityModel) -> Array:
-    """dW/dq (n, c, joints) along the motion."""
-    at = _sparse(motion)
-    sparse = angle_slopes(motion, model, at)
-    t = np.arange(len(motion))
-    columns = [np.interp(t, at, column) for column in sparse.reshape(len(at), -1).T]
-    return np.stack(columns, axis=1).reshape(len(motion), *sparse.shape[1:])
-
-
-def _sparse(motion: Motion) -> Index:
-    return np.unique(np.linspace(0, len(motion) - 1, min(len(motion), _POINTS)).astype(np.int64))
-
-
-def _shapes(motion: Motion, model: GravityModel, taring: Taring) -> Iterator[Array]:
+def _shapes(count: int, model: GravityModel, slopes: Slopes, taring: Taring) -> Iterator[Array]:
     """One-sigma error histories (n, c) of independent directions of the rig's fitted parameters; none fitted: zero."""
-    at = _sparse(motion)
     size = model.equation.size
     if size == 0:
-        yield np.zeros((len(motion), len(model.channels)))
+        yield np.zeros((count, len(model.channels)))
         return
-    J = derivatives(motion, model, at) + taring.slope
+    J = slopes.by_parameters + taring.slope
     variance, directions = np.linalg.eigh(model.fit.covariance[:size, :size])
-    t = np.arange(len(motion))
     for root, direction in zip(np.sqrt(np.maximum(variance, 0.0)), directions.T, strict=True):
         if root**2 > _NEGLIGIBLE * variance[-1]:
-            yield np.stack([np.interp(t, at, column) for column in (J @ direction * root).T], axis=1)
+            yield _whole(J @ direction * root, slopes.at, count)
+
+
+def _whole(sparse: Array, at: Index, count: int) -> Array:
+    """All `count` samples of what is known `at` some (m, c), by straight lines."""
+    return np.stack([np.interp(np.arange(count), at, column) for column in sparse.T], axis=1)

@@ -134,12 +134,14 @@ def fit(
     )
     theta = equation.start()
     data = [prepared(sample, equation, settings, settings.low_pass_Hz, theta) for sample in samples]
-    refuse_uninformed(Rows(equation, data))
+    rows = Rows(equation, data)
+    refuse_uninformed(rows)
     first = [p for p, s in zip(data, samples, strict=True) if s.calibration] or data
     theta = solve(Rows(equation, first), [first_sigma(p, rig) for p in first], theta).theta
     for _ in range(_ROUNDS):
-        data = [prepared(sample, equation, settings, settings.low_pass_Hz, theta) for sample in samples]
-        rows = Rows(equation, data)
+        if include_inertia:  # else instants at rest, which no parameter changes
+            data = [prepared(sample, equation, settings, settings.low_pass_Hz, theta) for sample in samples]
+            rows = Rows(equation, data)
         solution = solve(rows, [residual_sigma(equation, theta, p, rig) for p in data], theta)
         theta = solution.theta
     result, biases = solution.stated(settings.low_pass_Hz), solution.zeros[:, 0]

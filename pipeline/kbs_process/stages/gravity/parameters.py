@@ -63,6 +63,14 @@ class RigElements:
             start = stop
         return substitute(self.rig, values, sigmas)
 
+    def moved(self, rig: Rig, theta: Array, part: float) -> Iterator[Rig]:
+        """The rig at `theta`, with one free element after the other moved by `part` of its sigma; else it is `rig`."""
+        ends = np.cumsum([int(mask.sum()) for mask in self.masks])
+        for quantity, mask, end in zip(self.quantities, self.masks, ends, strict=True):
+            own = slice(end - int(mask.sum()), end)
+            for step in np.diag(part * self.sigma[own]):
+                yield substitute(rig, {quantity.name: _filled(quantity.value, mask, theta[own] + step)})
+
 
 def rig_elements(rig: Rig, *, include_inertia: bool) -> RigElements:
     """All elements with a prior sigma above zero of the quantities that shape the recorded loads."""

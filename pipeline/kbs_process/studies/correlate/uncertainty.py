@@ -42,8 +42,9 @@ def budgets(
     """
     lowest = min((mode.frequency_Hz for mode in resonances), default=None)
     spacecraft, own = campaign.rig.spacecraft, campaign.rig.frame
+    slopes = [gravity_error.Slopes.of(analysis.motion, model) for analysis in runs]
     for band in bands_of(campaign.bands)[1:]:
-        for analysis in runs:
+        for analysis, along in zip(runs, slopes, strict=True):
             measured = analysis.pairs[own, band.name].measured
             if not measured.valid.any():
                 continue
@@ -52,7 +53,7 @@ def budgets(
             shown = np.nan_to_num([noise.get(analysis.entry.name, {}).get(key, 0.0) for key in measured.channels])
             edges = statements[band.name]
             known = float(np.hypot(analysis.entry.clock_sigma, late.get(analysis.entry.name, 0.0)))
-            entries = _entries(campaign, analysis, model, decoupling, band, edges, shown, repeats, lowest, known)
+            entries = _entries(campaign, analysis, model, along, decoupling, band, edges, shown, repeats, lowest, known)
             frame: Frame = "joint" if own == "joint" else "T"
             yield from _rows(entries, frame, band.name, analysis.entry.name, measured)
             if spacecraft is not None and set(WRENCH_CHANNELS) <= set(measured.channels):
@@ -97,6 +98,7 @@ def _entries(
     campaign: Campaign,
     analysis: Analysis,
     model: GravityModel,
+    slopes: gravity_error.Slopes,
     decoupling: Decoupling,
     band: Band,
     stated: BandStatement,
@@ -122,7 +124,7 @@ def _entries(
     entries = [
         sensor,
         *([_cross_coupling(analysis, model, decoupling, band)] if rig.transducer.channels else []),
-        *gravity_error.entries(analysis.motion, analysis.static, model, cut),
+        *gravity_error.entries(analysis.motion, analysis.static, model, slopes, cut),
         budget.clock(analysis.static.wrench, late, cut, gravity_error.moving(analysis.motion)),
         *budget.filter_edges(
             measured, stated.edge_error, stated.edge_error_drift, budget.drifting_part(measured, band)
