@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from hashlib import blake2b
 from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
+from mcap.writer import CompressionType, Writer
 
 from kbs_process.errors import OutputError
 from kbs_process.recordings.mcap.messages.encoding import TYPES, OutStream, payloads, ros2_schema
-from kbs_process.recordings.mcap.outfile import OutFile, records
 from kbs_process.recordings.mcap.source import open_recording
 from kbs_process.recordings.mcap.streams import Stream
 from kbs_process.signals.records import Block
@@ -115,39 +115,54 @@ class _Topic:
 
 def _write(file: BinaryIO, pieces: Iterable[OutStream], hold: int) -> list[_Topic]:
     """Write the pieces; return their topics."""
-    out = OutFile(file, "ros2", CHUNK)
+    writer = Writer(file, chunk_size=CHUNK, compression=CompressionType.ZSTD, enable_data_crcs=True)
     topics: dict[str, _Topic] = {}
     waiting, due = 0, BATCH
     for piece in pieces:
+        if not topics:
+            writer.start(profile="ros2", library="kbs-process")
         if piece.topic not in topics:
-            topics[piece.topic] = _Topic(piece, out.register(piece.topic, TYPES[piece.kind], ros2_schema(piece.kind)))
+            topics[piece.topic] = _Topic(piece, _register(writer, piece))
         elif waiting >= due:  # only now: before a topic comes again, others may still be unknown
             limit = min(topic.latest for topic in topics.values())
             if waiting > hold:
                 logs = np.sort(np.concatenate([topic.logs() for topic in topics.values()]))
                 limit = max(limit, int(logs[len(logs) - hold // 2]))
-            waiting -= _flush(out, list(topics.values()), limit)
+            waiting -= _flush(writer, list(topics.values()), limit)
             due = waiting + BATCH
         topics[piece.topic].add(piece)
         waiting += len(piece.log)
-    _flush(out, list(topics.values()), (1 << 63) - 1)
-    out.finish()
+    if not topics:
+        writer.start(library="kbs-process")
+    _flush(writer, list(topics.values()), (1 << 63) - 1)
+    writer.finish()  # type: ignore[no-untyped-call]
     return list(topics.values())
 
 
-def _flush(out: OutFile, topics: Sequence[_Topic], limit: int) -> int:
+def _flush(writer: Writer, topics: Sequence[_Topic], limit: int) -> int:
     """Write the messages older than `limit`, of equal age in the order of the topics; return how many."""
     ready = [topic.take(limit) for topic in topics]
-    rows, log, channel = list[bytes](), [], []
+    order = np.argsort(np.concatenate([stream.log for stream in ready]), kind="stable") if ready else ()
+    which = np.repeat(np.arange(len(ready)), [len(stream.log) for stream in ready])[order].tolist()
+    rows = [_messages(stream, topic.written.count) for stream, topic in zip(ready, topics, strict=True)]
+    for number in which:
+        log, stamp, sequence, payload = next(rows[number])
+        writer.add_message(topics[number].number, log, payload, publish_time=stamp, sequence=sequence)
     for topic, stream in zip(topics, ready, strict=True):
-        rows += records(topic.number, topic.written.count, stream.log, stream.stamp, payloads(stream))
-        log.append(stream.log)
-        channel.append(np.full(len(stream.log), topic.number))
         topic.written.add(stream)
-    if rows:
-        order = np.argsort(np.concatenate(log), kind="stable")
-        out.add(np.concatenate(channel)[order], np.concatenate(log)[order], [rows[row] for row in order.tolist()])
-    return len(rows)
+    return len(which)
+
+
+def _messages(stream: OutStream, first: int) -> Iterator[tuple[int, int, int, bytes]]:
+    """Yield (log, stamp, sequence, payload); `first` is the sequence number of the first."""
+    rows = zip(stream.log.tolist(), stream.stamp.tolist(), payloads(stream), strict=True)
+    for sequence, (log, stamp, payload) in enumerate(rows, start=first):
+        yield log, stamp, sequence, payload
+
+
+def _register(writer: Writer, stream: OutStream) -> int:
+    schema = writer.register_schema(TYPES[stream.kind], "ros2msg", ros2_schema(stream.kind))
+    return writer.register_channel(stream.topic, "cdr", schema)
 
 
 def _verify(path: Path, topics: Sequence[_Topic]) -> None:
