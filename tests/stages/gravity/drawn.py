@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 from unittest.mock import patch
 
 import mujoco
@@ -81,8 +82,8 @@ class DrawnCampaign:
         rates = (50.0, 20.0) if trajectory == CALIBRATION else (100.0, 50.0)
         kept = []
 
-        def simulate(hardware: Hardware, commands: Commands, *, time_step: float) -> Dense:
-            dense = at_rest(hardware, commands) if still else integrate(hardware, commands, time_step=time_step)
+        def simulate(hardware: Hardware, commands: Commands, **how: Any) -> Dense:
+            dense = at_rest(hardware, commands) if still else integrate(hardware, commands, **how)
             kept.append(dense)
             return dense
 
