@@ -19,7 +19,7 @@ from kbs_process.signals.records import WRENCH_CHANNELS, Array
 from kbs_process.stages.gravity.equation import Angles, Equation, Prepared, joined
 from kbs_process.stages.gravity.parameters import CROSS_COUPLING, Index
 from kbs_process.stages.gravity.solve import ZERO, least_sigma, zero_priors, zero_slopes
-from kbs_process.stages.gravity.tension import BEYOND, BY_CHANCE, by_chance, together
+from kbs_process.stages.gravity.tension import BEYOND, BY_CHANCE, by_chance, exchanges, reversals, together
 
 Kind = Literal["gain", "silent", "swapped", "axes", "sense", "unit", "clock", "zero", "point", "bias", "number"]
 
@@ -97,7 +97,7 @@ def turned(equation: Equation, prepared: Sequence[Prepared]) -> Iterator[tuple[s
     data = _linear(equation, [p.rows(_spread(len(p.q))) for p in prepared[:_RECORDINGS]])
     most = np.full(len(equation.channels), np.inf)
     none = Fault("number", "")
-    for joint, matrix in _senses(equation):
+    for joint, matrix in reversals(equation.elements.rig.joints):
         both = none, Fault("sense", joint, angles=matrix)
         for anew in (False, True):  # the second takes its time
             stated, other = (_solve(data, one, most, anew=anew) for one in both)
@@ -105,13 +105,6 @@ def turned(equation: Equation, prepared: Sequence[Prepared]) -> Iterator[tuple[s
                 break
         else:
             yield joint, stated.cost - other.cost
-
-
-def _senses(equation: Equation) -> Iterator[tuple[str, Array]]:
-    """Each joint, and the matrix that turns its angle the other way."""
-    joints = equation.elements.rig.joints
-    unit = np.eye(len(joints))
-    yield from ((joint.name, unit - 2.0 * np.outer(own, own)) for joint, own in zip(joints, unit, strict=True))
 
 
 def _spread(count: int) -> Index:
@@ -123,9 +116,8 @@ def _faults(data: _Data) -> Iterator[Fault]:
     yield from _gains(channels)
     yield from _mixed(channels)
     unit = np.eye(len(joints))
-    yield from (Fault("sense", joint, angles=matrix) for joint, matrix in _senses(data.equation))
-    for a, b in itertools.combinations(range(len(joints)), 2):
-        yield Fault("swapped", f"the angles of {joints[a].name} and {joints[b].name}", angles=_exchange(unit, a, b))
+    yield from (Fault("sense", joint, angles=matrix) for joint, matrix in reversals(joints))
+    yield from (Fault("swapped", f"the angles of {pair}", angles=matrix) for pair, matrix in exchanges(joints))
     turning = [index for index, joint in enumerate(joints) if joint.type == "revolute"]
     for (name, factor), some in itertools.product(_ANGLES.items(), _any(turning)):
         scaled = unit.copy()

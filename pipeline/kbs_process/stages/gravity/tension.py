@@ -125,7 +125,9 @@ def misread(model: GravityModel, data: Prepared) -> Iterator[Shift]:
     for index, joint in enumerate(joints):
         zero = _shift(model, data, f"the zero of {joint.name}'s angle (degrees)", -np.radians(slopes[:, :, index]))
         found += [zero] if zero and abs(zero.value) < _LINEAR else []
-    for what, matrix in _readings(joints):
+    readings = [(f"the sign of {joint}'s angle", matrix) for joint, matrix in reversals(joints)]
+    readings += [(f"the order of the angles of {pair}", matrix) for pair, matrix in exchanges(joints)]
+    for what, matrix in readings:
         q, qd, qdd = (each @ matrix for each in (data.q, data.qd, data.qdd))
         other = equation.predict(theta, replace(data, q=q, qd=qd, qdd=qdd, before=None, after=None))
         turned = _shift(model, data, what, 0.5 * (expected - other), right=1.0)
@@ -133,15 +135,19 @@ def misread(model: GravityModel, data: Prepared) -> Iterator[Shift]:
     yield from sorted((one for one in found if one and one.taken > ALONE), key=lambda one: -one.taken)[:1]
 
 
-def _readings(joints: Sequence[Joint]) -> Iterator[tuple[str, Array]]:
-    """Other ways to read the angles, as symmetric matrices (joints, joints), and what each turns round."""
+def reversals(joints: Sequence[Joint]) -> Iterator[tuple[str, Array]]:
+    """Each joint, and the matrix (joints, joints) that turns its angle the other way."""
     unit = np.eye(len(joints))
-    for joint, own in zip(joints, unit, strict=True):
-        yield f"the sign of {joint.name}'s angle", unit - 2.0 * np.outer(own, own)
-    for a, b in itertools.combinations(range(len(joints)), 2):
-        if joints[a].type == joints[b].type:
+    yield from ((joint.name, unit - 2.0 * np.outer(own, own)) for joint, own in zip(joints, unit, strict=True))
+
+
+def exchanges(joints: Sequence[Joint]) -> Iterator[tuple[str, Array]]:
+    """Each pair of joints of one type, and the matrix (joints, joints) that exchanges their angles."""
+    unit = np.eye(len(joints))
+    for (a, one), (b, other) in itertools.combinations(enumerate(joints), 2):
+        if one.type == other.type:
             between = unit[a] - unit[b]
-            yield f"the order of the angles of {joints[a].name} and {joints[b].name}", unit - np.outer(between, between)
+            yield f"{one.name} and {other.name}", unit - np.outer(between, between)
 
 
 def _shift(
