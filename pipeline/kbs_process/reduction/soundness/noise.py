@@ -56,7 +56,8 @@ def unlike_stated(requirement: Requirement, rig: Rig, recordings: Sequence[Prepa
             ),
         ):
             told = [
-                f"{own[k]} has {read[k]:.2g} {rig.loads.units[index[k]]} rms, not {noise[k]:.2g} +- {sigma[k]:.2g}"
+                f"{own[k]} has {read[k]:.2g} {rig.loads.units[index[k]]} rms, not {noise[k]:.2g}"
+                + (f" +- {sigma[k]:.2g}" if sigma[k] else "")
                 for k in np.flatnonzero(off)
             ]
             if told:
