@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import pytest
 
-from archived import CAMPAIGNS
+from archived import CAMPAIGNS, each
 from kbs_process.cli import main
-
-pytestmark = pytest.mark.slow
 
 NAMES = sorted(path.parent.name for path in CAMPAIGNS.glob("*/campaign.toml"))
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", each(NAMES))
 def test_validates(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     main(["validate", str(CAMPAIGNS / name)])  # exits where there is one
     told = capsys.readouterr().out

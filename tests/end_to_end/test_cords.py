@@ -8,7 +8,7 @@ import pytest
 
 from end_to_end.archive_run import Processed
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.validation
 
 
 def torques(campaign: Processed, recording: str) -> dict[str, float]:

@@ -10,18 +10,17 @@ from collections.abc import Callable
 
 import pytest
 
+from archived import each
 from end_to_end.archive_run import Processed
 from end_to_end.expected import EXPECTED_FOLDER, differences, expected, extract
 from engine.campaigns import CAMPAIGNS
-
-pytestmark = pytest.mark.slow
 
 
 def test_every_campaign_has_them() -> None:
     assert {path.stem for path in EXPECTED_FOLDER.glob("*.json")} == set(CAMPAIGNS)
 
 
-@pytest.mark.parametrize("name", CAMPAIGNS)
+@pytest.mark.parametrize("name", each(CAMPAIGNS))
 def test_results(archived: Callable[[str], Processed], name: str) -> None:
     found = list(differences(extract(archived(name)), expected(name)))
     assert len(found) > 300

@@ -18,7 +18,7 @@ from kbs_process.signals.records import WRENCH_CHANNELS, WRENCH_UNITS, Signal
 from kbs_process.stages import bandpass
 from kbs_process.stages.bandpass import Band
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.validation
 
 # Four of those with an antenna and without a cord, for time.
 NAMES = ("EL089", "AZPS_ATA", "AESTPP00", "ACQ600")

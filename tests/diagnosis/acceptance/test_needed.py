@@ -23,7 +23,7 @@ from kbs_process.diagnosis.proposing.tryout import extra_of, identity
 from kbs_process.diagnosis.selection.race import own_of
 from kbs_process.plant.laws import CATALOGUE
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.validation
 
 LAG, CABLE, HARNESS = ("channel_lag", "Tx"), ("ground_cable", "el"), ("harness", "el")
 HARNESS_EFFECT = next(one for one in CATALOGUE if one.name == "harness")

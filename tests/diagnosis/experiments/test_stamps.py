@@ -24,7 +24,7 @@ from kbs_process.diagnosis.selection.each_recording import jump_gain, taken_off,
 from kbs_process.diagnosis.selection.effort import Effort
 from kbs_process.signals.records import Array
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.validation
 
 DT = 0.05
 T = np.arange(1200) * DT

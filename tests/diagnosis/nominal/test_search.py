@@ -22,7 +22,7 @@ from kbs_process.diagnosis.nominal.tangents import Step
 from kbs_process.identification.output_error import rig_at
 from kbs_process.rig.model import substitute
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.validation
 
 
 def searching(made: Experiment) -> Search:

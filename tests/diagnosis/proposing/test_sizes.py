@@ -26,7 +26,7 @@ from kbs_process.plant.laws import find
 from kbs_process.rig.model import TRANSDUCER
 from kbs_process.signals.records import Array
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.validation
 
 LOOP, ANGLE = 0.08, 3e-6  # N m about y, rad
 

@@ -15,7 +15,7 @@ from kbs_process.diagnosis.selection import explain
 from kbs_process.diagnosis.selection.explain import NEAR, eased
 from kbs_process.rig.model import substitute
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.validation
 
 OFF = {"body.antenna.cog": 2}  # elements; a short swing shows little of the others
 SIGMAS = 8.0
