@@ -587,3 +587,16 @@ def test_numbers_of_hdf5_that_are_compressed_together_are_unpacked_once(tmp_path
     for name, right in ({"x": values[:, 0]} | wide | fields).items():
         np.testing.assert_array_equal(found.pop(name), right)
     assert not found and len(stretches) == 3 and len(unpacked) == 4
+
+
+def test_data_sets_of_hdf5_that_are_empty_keep_no_other_from_being_read(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["x"], file["none"], file["wide"] = T, np.zeros(0), np.zeros((0, 3))
+        file["records"] = np.zeros(0, dtype=[("Fx", "f8")])
+    table = read(tmp_path / "a.h5", "hdf5")
+    lengths = dict.fromkeys(names(table), 0)
+    for stretch in table.chunks(names(table)):
+        for name, one in zip(names(table), stretch, strict=True):
+            lengths[name] += len(one)
+    assert lengths == dict.fromkeys(lengths, 0) | {"x": len(T)} and {"none", "records[Fx]"} < set(lengths)

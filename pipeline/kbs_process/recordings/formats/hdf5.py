@@ -195,7 +195,7 @@ class _Cached:
         Numbers that were compressed together are unpacked together, and once.
         """
         first, end, _ = rows.indices(self.shape[axis])
-        if not self.at[0] <= first <= end <= self.at[1]:
+        if self.block is None or not self.at[0] <= first <= end <= self.at[1]:
             together = self.data.chunks if self.data.id.get_create_plist().get_nfilters() else None
             high = together[axis] if together else 1
             start, stop = first - first % high, min(-(-end // high) * high, self.shape[axis])
