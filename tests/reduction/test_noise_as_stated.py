@@ -10,7 +10,7 @@ import pytest
 from scipy.signal import butter, lfilter, sosfilt
 
 import archived
-from kbs_process.reduction.soundness.noise import unlike_stated
+from kbs_process.reduction.soundness.noise import slow_share, unlike_stated
 from kbs_process.signals.records import Block
 from kbs_process.stages.align.readings import Readings
 from kbs_process.stages.align.spectrum import Welch
@@ -133,6 +133,14 @@ def test_channels_that_pass_no_slow_load_are_told(level):
     (why,) = told(still(0.3, level))
     assert "in slow readings: AC-coupled" in why and "Tx has " in why and "Ty" not in why
     assert told(still(1e-5)) == []
+
+
+def test_white_noise_lacks_nothing_slow():
+    rng, level = np.random.default_rng(5), np.ones(6)
+    for _ in range(500):
+        raw = SimpleNamespace(values=rng.standard_normal((800, 6)), dt=0.05)
+        one = SimpleNamespace(run=SimpleNamespace(spectrum=object(), rates={"wrench": 20.0}), raw=raw)
+        assert (slow_share(one, level, (0.05, 1.0)) == 1.0).all()
 
 
 def test_two_sources_by_turns_are_told_of_which_one_is_filtered():

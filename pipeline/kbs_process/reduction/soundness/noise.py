@@ -22,7 +22,7 @@ from kbs_process.stages.align.spectrum import OCTAVES, quietest
 from kbs_process.stages.conventions import BEYOND
 
 SLOW = 0.5  # share of its power that slow white noise may lose: rounding and bridged gaps take less
-BY_CHANCE = 1e-6  # probability of that
+_RARE = 1e-6  # probability that chance takes as much
 _DETRENDED = 2  # lines of a periodogram that a straight line takes
 UNLIKE = 3.0  # times less noise than is stated, or more, however well it is known
 
@@ -82,7 +82,7 @@ def slow_share(one: Prepared, level: Array, band: tuple[float, float]) -> Array:
         chance = np.where(mean < SLOW, chi2.cdf(mean * len(ratio), len(ratio)), 1.0)
         order = np.argsort(chance)
         for count in range(1, min(3, len(order)) + 1):
-            if comb(len(order), count) * chance[order[count - 1]] ** count < BY_CHANCE:
+            if comb(len(order), count) * chance[order[count - 1]] ** count < _RARE:
                 share[order[:count]] = np.minimum(share, mean)[order[:count]]
         edge /= 2.0
     return share
