@@ -5,8 +5,9 @@
 
 The trials are the same for ever, and count as development. Of every five, three conceal one effect that a catalogue
 names, one an effect that is in none, and one two effects at once; so the first of them are like all. No family of
-physics comes twice before all have come. Trials that FOLDER/score.json holds are not answered again: what was begun
-goes on, and what belongs to other code belongs into another folder.
+physics comes twice before all have come. With them come nulls, which conceal nothing: of every five, two whose numbers
+are those of the files, two that are off within their uncertainties and one beyond. Trials that FOLDER/score.json holds
+are not answered again: what was begun goes on, and what belongs to other code belongs into another folder.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ from proof.answer import Answer
 from proof.bundle import pack
 from proof.concealed import trials
 from proof.concealed.effects import BY_NAME, PHYSICS
-from proof.concealed.trials import Spec
+from proof.concealed.trials import Kind, Spec
 from proof.isolate import CHECKOUT
 from proof.methods import Job, answer_trial
 from proof.page import write_page
@@ -39,8 +40,10 @@ from proof.truth import Truth
 from proof.words import OURS
 
 SEED = 1996
-COUNT = 40
+COUNT, NULLS = 40, 100
 SMOOTHER = "smoother"  # a rival that is not part of sealed sets: proof.rivals.smoother
+_KINDS: tuple[Kind, ...] = ("within", "nothing", "within", "nothing", "beyond")  # of nulls in turn
+_FIRST_NULL = 1000  # index
 _LEVELS = (300.0, 100.0, 1000.0, 300.0)  # of the trials in turn, effects of one trial alike
 
 
@@ -68,6 +71,16 @@ def draw(count: int = COUNT) -> list[Spec]:
     return specs
 
 
+def nulls(count: int = NULLS) -> list[Spec]:
+    """Say what the first `count` nulls are."""
+    return [Spec("development", SEED, _FIRST_NULL + k, _KINDS[k % len(_KINDS)]) for k in range(count)]
+
+
+def name_of(spec: Spec) -> str:
+    """What a trial of the record is called."""
+    return f"R{spec.index:03d}" if spec.count else f"N{spec.index - _FIRST_NULL:03d}"
+
+
 def _by_family(names: Sequence[str], rng: np.random.Generator) -> list[str]:
     """Shuffle physics so that each family comes once before any comes again."""
     seen: dict[str, int] = {}
@@ -81,7 +94,7 @@ def _by_family(names: Sequence[str], rng: np.random.Generator) -> list[str]:
 
 def made(spec: Spec, cache: Path) -> tuple[bytes, Truth]:
     """Return a trial, packed, and its truth; from `cache`, if it was made before."""
-    name = f"R{spec.index:03d}"
+    name = name_of(spec)
     files = cache / f"{name}.tar", cache / f"{name}.json"
     if not all(file.is_file() for file in files):
         cache.mkdir(parents=True, exist_ok=True)
@@ -107,6 +120,7 @@ def main() -> None:
     options = argparse.ArgumentParser(prog="python -m proof.record", description=__doc__)
     options.add_argument("--output", "-o", type=Path, required=True, help="where score.json and the page go")
     options.add_argument("--trials", type=int, default=COUNT, help=f"the first so many [default: {COUNT}]")
+    options.add_argument("--nulls", type=int, default=NULLS, help=f"the first so many nulls [default: {NULLS}]")
     options.add_argument("--method", choices=(OURS, SMOOTHER), default=OURS, help=f"who answers [default: {OURS}]")
     options.add_argument("--cache", type=Path, default=CHECKOUT / ".proof" / "record", help="where made trials stay")
     options.add_argument("--jobs", type=int, default=len(os.sched_getaffinity(0)), help="processes")
@@ -116,7 +130,8 @@ def main() -> None:
     if file.is_file():
         before = msgspec.json.decode(file.read_bytes(), type=Bench)
         known = {truth.trial: (truth, said) for truth, said in zip(before.truths, before.answers, strict=True)}
-    todo = [spec for spec in draw(asked.trials) if f"R{spec.index:03d}" not in known]
+    wanted = [*draw(asked.trials), *nulls(asked.nulls)]
+    todo = [spec for spec in wanted if name_of(spec) not in known]
     task = partial(answered, cache=asked.cache, method=asked.method)
     with workers(asked.jobs, None) as pool:
         for done, (_, (truth, said)) in enumerate(each(pool, task, todo), start=1):

@@ -117,8 +117,11 @@ def prepare(spec: Spec, folder: Path) -> tuple[Bench, list[dict[str, Any]]]:
     trajectories = paths.draw(np.random.default_rng(motions), spec.split, 3)
     calibration = paths.calibration(np.random.default_rng(runs.spawn(2)[1]))
     noise = np.random.default_rng(chance)
-    bench = measure(hardware, trajectories, rates, calibration, laboratory_of(spec.split, noise), noise)
-    if spec.kind != "beyond":
+    laboratory = laboratory_of(spec.split, noise)
+    if spec.kind in ("nothing", "within"):  # of nothing there is no strength
+        return Bench(hardware, tuple(trajectories), calibration, rates, (), (), (), laboratory), []
+    bench = measure(hardware, trajectories, rates, calibration, laboratory, noise)
+    if spec.kind == "concealed":
         return bench, []
     hardware, moved = beyond(bench, nominal, np.random.default_rng(off), spec.split)
     return replace(bench, hardware=hardware), moved

@@ -9,7 +9,9 @@ from scipy.linalg import cho_solve_banded, cholesky_banded
 
 from proof.rivals.case import Array
 
-BAND_HZ = 8.0  # of what is compared: as many independent numbers twice a second
+# Of what is compared: whole up to the first, nothing from the second on. An edge would part what a resonance near it
+# shows while the mechanism turns, and its stiffness and damping with it.
+WHOLE_HZ, BAND_HZ = 6.0, 8.0
 LOCAL = 5  # coefficients that a sample sees
 # Of these a sample's value, and its rate and acceleration in samples: exact for what is slow, within 0.7 % up to 0.4 of
 # the sampling rate, where slopes of a spline of the fifth degree are wrong by 20 and 11 %.
@@ -23,7 +25,7 @@ _DIFFERENCES = np.array([
 
 
 def in_band(values: Array, dt: float, undo: Callable[[Array], Array] | None = None) -> Array:
-    """Values (n, ...), dt s apart, without what lies beyond the band; `undo` are factors over frequency, Hz.
+    """Values (n, ...), dt s apart, less what lies beyond the band; `undo` are factors over frequency, Hz.
 
     A line from the first to the last sample is taken apart, and what is left is mirrored. Whatever is compared goes
     through here: what a working rate's filter lets through beyond the band is in part another frequency's.
@@ -32,7 +34,8 @@ def in_band(values: Array, dt: float, undo: Callable[[Array], Array] | None = No
     line = values[:1] + (values[-1:] - values[:1]) * np.linspace(0.0, 1.0, n).reshape(-1, *rest)
     spectrum = np.fft.rfft(np.concatenate([values - line, (line - values)[::-1]]), axis=0)
     f = np.fft.rfftfreq(2 * n, dt)
-    factors = (f <= BAND_HZ) * (1.0 if undo is None else undo(f))
+    beyond = np.clip((f - WHOLE_HZ) / (BAND_HZ - WHOLE_HZ), 0.0, 1.0)
+    factors = 0.5 * (1.0 + np.cos(np.pi * beyond)) * (1.0 if undo is None else undo(f))
     return np.asarray(np.fft.irfft(spectrum * factors.reshape(-1, *rest), 2 * n, axis=0)[:n] + line)
 
 

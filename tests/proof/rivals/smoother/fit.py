@@ -96,11 +96,11 @@ class State:
         return Course(problem, k, self.x, self.ideal_motion(problem, k), self.ideal_torques[k])
 
     def weights(self, problem: Problem, k: int, sigma: Array | None = None) -> Array:
-        """(n, rows) one over the variance of each row, as far as samples are independent."""
+        """(n, rows) one over the variance of each row, were it white."""
         sigma = self.sigma if sigma is None else sigma
-        weights = np.outer(problem.recordings[k].weight, problem.independent / sigma**2)
+        weights = np.outer(problem.recordings[k].weight, sigma**-2.0)
         weights[:, problem.angles] *= problem.recordings[k].turning
-        weights[:, problem.forces] = problem.independent / sigma[problem.forces] ** 2  # they hold where nothing is read
+        weights[:, problem.forces] = sigma[problem.forces] ** -2.0  # they hold where nothing is read
         return weights
 
     def residuals(self, problem: Problem) -> list[Array]:

@@ -2,8 +2,9 @@
 
     S <- S sum over repeats (f - fbar)^2 / S / numbers,   numbers = rows less those that the motion has taken up
 
-to its fixed point (restricted maximum likelihood of a variance). What a fit takes up is the trace of its hat matrix,
-by one random probe a row (Hutchinson): as good as its rows are many.
+to its fixed point (restricted maximum likelihood of a variance). What numbers are left of a row that is white is told
+by one random probe, of which only what lies in the band is seen, as of the row itself: as good as its rows are many.
+Kind of estimate: M. Hutchinson, Commun. Stat. Simul. 19 (1990) 433.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from proof.rivals.case import Array
+from proof.rivals.smoother.basis import in_band
 from proof.rivals.smoother.fit import Quadratic, State
 from proof.rivals.smoother.problem import Problem
 
@@ -53,12 +55,14 @@ def powers(problem: Problem, state: State, quadratic: Quadratic) -> Powers:
 
 
 def _free(problem: Problem, quadratic: Quadratic, k: int) -> Array:
-    """Numbers (rows,) of each row that a recording's motion leaves."""
-    part, weight = quadratic.parts[k], problem.recordings[k].weight
+    """Numbers (rows,) of each row that the band and a recording's motion leave."""
+    part, recording = quadratic.parts[k], problem.recordings[k]
     rng = np.random.default_rng([_SEED, k])
+    white = in_band(rng.choice([-1.0, 1.0], part.root.shape), recording.dt)
+    whole = np.mean(white**2, axis=0) * recording.weight.sum()
     probes = np.zeros((*part.root.shape, problem.rows))
     every = np.arange(problem.rows)
-    probes[:, every, every] = rng.choice([-1.0, 1.0], part.root.shape) * (part.root > 0.0)
+    probes[:, every, every] = white * (part.root > 0.0)
     against = part.motion.against(probes.reshape(part.root.size, -1))
     taken = np.sum(against**2, axis=(0, 1))
-    return np.asarray(np.maximum(weight.sum() - taken, 1e-3 * weight.sum()))
+    return np.asarray(np.maximum(whole - taken, 1e-3 * whole))

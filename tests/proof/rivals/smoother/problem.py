@@ -102,7 +102,6 @@ class Problem:
         self.sigma = np.ones(self.rows)
         self.sigma[self.wrench] = noise / np.sqrt(rate * dt)
         self.sigma[self.angles] = [float(j.encoder.step) / np.sqrt(12) for j in self.rig.joints if j.encoder]
-        self.independent = 2 * BAND_HZ * dt  # numbers a sample
         self.given = present(self.rig, experiment.effects)
         self.found: list[Candidate] = []
         self._place_unknowns()
@@ -269,6 +268,7 @@ class Problem:
             torque = efforts[:, 3 + j]
             rotor = (field.angle[:, j] - self._behind(rig, k, x, j, torque, torques)) / ratio
             wound, winding = rotor - angle[:, FIRST_JOINT + j], field.rate[:, j] / ratio - rate[:, FIRST_JOINT + j]
+            winding /= 1.0 + float(numbers["Ka"]) / (ratio**2 * spring(joint.drive))
             out[:, self.joint.start + j] = float(numbers["Ka"]) * wound + float(numbers["fsv"]) * winding - torque
         out[:, self.floor] = angle[:, FLOOR]
         return out + self.acting[k] @ x[self.amplitudes[k]]

@@ -30,7 +30,7 @@ WIDER, OF_JOINT = 10.0, 3.0  # times a reading's noise that forces are, to begin
 SHAKEN = 25.0  # rad/s, at which the floor shakes a plate most
 STEPS = 25
 # Of a fit's phases: all is statics; forces are estimated; all is free. The share that forces have of a model by itself.
-STIFF = (0.1, 0.03, 0.01)
+STIFF = (0.1, 0.03, 0.001)
 SETTLED = 100.0  # sigmas of all unknowns together that a step goes, below which forces are estimated
 ARRIVED = 3.0  # below which it is the last
 LEAST = 1e-3  # of what they are to begin with: smaller ones are nothing beside a reading's noise
