@@ -135,7 +135,7 @@ def test_a_cold_start_follows_its_readings_after_three_steps(tmp_path: Path) -> 
     left = quadratic.parts[0].left(change[problem.local[0]])
     paid = np.sum(((state.x + change - problem.prior) / problem.spread) ** 2)
     assert np.sum(left**2) + paid == pytest.approx(quadratic.left - quadratic.pull @ change, rel=1e-3)
-    numbers = problem.recordings[0].weight.sum() * problem.independent * problem.rows
+    numbers = problem.recordings[0].weight.sum() * problem.rows
     assert cold > 1e3 * numbers
     assert state.cost(problem) < 0.5 * numbers  # forces this loose follow some of the noise
 
@@ -163,7 +163,7 @@ def test_an_effect_that_joins_is_nothing_until_it_has_a_size_and_then_its_torque
 def test_a_null_is_fitted_to_its_noise_and_forces_to_what_repeats_differ_by(tmp_path: Path) -> None:
     problem = _null(tmp_path, [1, 2])
     state = settled(problem)
-    left = powers(problem, state, Quadratic.of(problem, state))
+    left = powers(problem, state)
     assert left.of_repeats is not None
     # Repeats differ by what forces are said to be, and readings by their noise; encoders less than if all were rounded.
     assert left.of_repeats[problem.forces] == pytest.approx(1.0, abs=0.4)

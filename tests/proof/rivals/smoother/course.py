@@ -55,17 +55,24 @@ class Course:
         self._place_ports(motion[0][:, joints])
 
     def _place_ports(self, angles: Array) -> None:
-        problem, rig = self.problem, self.rig
+        rig = self.rig
         self._inlets = {inlet: column for column, inlet in enumerate(inlets_of(rig))}
-        outside = [effect for effect in select(problem.experiment.effects) if not effect.port.internal]
+        self._force, self._direct = self.recording.ports or self._ports(angles)
+        self.recording.ports = self._force, self._direct
+        drives = [joint.drive for joint in rig.joints if joint.drive is not None]
+        self._soft = np.array([float(d.parameters["Ka"]) / (float(d.ratio) ** 2 * spring(d)) for d in drives])
+
+    def _ports(self, angles: Array) -> tuple[Array, Array]:
+        """What a unit at each inlet is as forces and as a wrench along the motion, (n, ..., inlets)."""
+        rig = self.rig
+        outside = [effect for effect in select(self.problem.experiment.effects) if not effect.port.internal]
         n, every = len(angles), round(_KNOT_S / self.recording.dt)
         knots = np.unique(np.append(np.arange(0, n, every), n - 1))
         found = [generalised(rig, linearise(rig, outside, angles[at]), tuple(self._inlets), angles[at]) for at in knots]
-        self._force, self._direct = (
+        force, direct = (
             make_interp_spline(knots, np.stack([one[part] for one in found]), k=1)(np.arange(n)) for part in (0, 1)
         )
-        drives = [joint.drive for joint in rig.joints if joint.drive is not None]
-        self._soft = np.array([float(d.parameters["Ka"]) / (float(d.ratio) ** 2 * spring(d)) for d in drives])
+        return force, direct
 
     def columns(self, chosen: Sequence[Candidate]) -> Array:
         """What a unit of each amplitude of each candidate does to the rows, (n, rows, amplitudes of all)."""

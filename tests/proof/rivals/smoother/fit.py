@@ -16,7 +16,7 @@ from proof.rivals.smoother.basis import LOCAL
 from proof.rivals.smoother.course import Course
 from proof.rivals.smoother.problem import Problem
 
-_FAR = 4.0  # prior sigmas that a step goes at most
+_FAR = 4.0  # prior sigmas that a number of the rig goes in a step at most
 _RUNS = 2  # steps in which a motion follows unknowns that moved
 
 
@@ -102,6 +102,12 @@ class State:
         weights[:, problem.angles] *= problem.recordings[k].turning
         weights[:, problem.forces] = sigma[problem.forces] ** -2.0  # they hold where nothing is read
         return weights
+
+    def banded(self, problem: Problem, k: int) -> tuple[Banded, Array]:
+        """What a recording's rows say of its motion, and square roots of their weights (n, rows)."""
+        root = np.sqrt(self.weights(problem, k))
+        slopes = problem.by_motion(k, self.x, self.motion(problem, k), self.torques[k])
+        return Banded.of(slopes, problem.recordings[k].basis.values, root), root
 
     def residuals(self, problem: Problem) -> list[Array]:
         """Of every recording, (n, rows)."""
@@ -217,11 +223,8 @@ class Reduced:
     @classmethod
     def of(cls, problem: Problem, state: State, k: int) -> Reduced:
         """At a state; unknowns along the motion that the model has by itself, in which there is no noise."""
-        motion = state.motion(problem, k)
-        root = np.sqrt(state.weights(problem, k))
-        slopes = problem.by_motion(k, state.x, motion, state.torques[k])
-        banded = Banded.of(slopes, problem.recordings[k].basis.values, root)
-        left = problem.residual(k, state.x, motion, state.torques[k])
+        banded, root = state.banded(problem, k)
+        left = problem.residual(k, state.x, state.motion(problem, k), state.torques[k])
         by_unknown = problem.by_unknown(k, state.x, state.ideal_motion(problem, k), state.ideal_torques[k])
         columns = np.concatenate([by_unknown, left[:, :, None]], axis=2) * root[:, :, None]
         columns = columns.reshape(root.size, -1)
@@ -297,7 +300,8 @@ def step(problem: Problem, state: State, quadratic: Quadratic, free: NDArray[np.
     no noise is in both (instruments): the smoothed motion's own noise would pull all that scales a balance to nothing.
     """
     change = quadratic.solve(problem.spread, quadratic.pull, free)
-    change *= min(1.0, _FAR / max(float(np.abs(change / problem.spread).max()), 1e-300))
+    far = np.abs(change / problem.spread)[problem.of_rig]  # rows are linear in what is no number of the rig
+    change *= min(1.0, _FAR / max(float(far.max(initial=0.0)), 1e-300))
     bounded = state.x + change
     bounded[problem.of_rig] = np.maximum(bounded[problem.of_rig], problem.lower)
     change, state.x = bounded - state.x, bounded

@@ -15,7 +15,7 @@ import numpy as np
 
 from proof.rivals.case import Array
 from proof.rivals.smoother.basis import in_band
-from proof.rivals.smoother.fit import Quadratic, State
+from proof.rivals.smoother.fit import State
 from proof.rivals.smoother.problem import Problem
 
 _SEED = 1996
@@ -34,9 +34,9 @@ class Powers:
         return self.of_all if self.of_repeats is None else self.of_repeats
 
 
-def powers(problem: Problem, state: State, quadratic: Quadratic) -> Powers:
-    """Compare what rows leave with what their sigmas say; `quadratic` is that of the state."""
-    free = [_free(problem, quadratic, k) for k in range(len(problem.recordings))]
+def powers(problem: Problem, state: State) -> Powers:
+    """Compare what rows leave with what their sigmas say."""
+    free = [_free(problem, state, k) for k in range(len(problem.recordings))]
     left = [residual / state.sigma for residual in state.residuals(problem)]
     weight = [recording.weight[:, None] for recording in problem.recordings]
     every = sum((np.sum(z**2 * w, axis=0) for z, w in zip(left, weight, strict=True)), np.zeros(problem.rows))
@@ -54,15 +54,15 @@ def powers(problem: Problem, state: State, quadratic: Quadratic) -> Powers:
     return Powers(of_repeats, every / np.sum(free, axis=0))
 
 
-def _free(problem: Problem, quadratic: Quadratic, k: int) -> Array:
+def _free(problem: Problem, state: State, k: int) -> Array:
     """Numbers (rows,) of each row that the band and a recording's motion leave."""
-    part, recording = quadratic.parts[k], problem.recordings[k]
+    recording, (motion, root) = problem.recordings[k], state.banded(problem, k)
     rng = np.random.default_rng([_SEED, k])
-    white = in_band(rng.choice([-1.0, 1.0], part.root.shape), recording.dt)
+    white = in_band(rng.choice([-1.0, 1.0], root.shape), recording.dt)
     whole = np.mean(white**2, axis=0) * recording.weight.sum()
-    probes = np.zeros((*part.root.shape, problem.rows))
+    probes = np.zeros((*root.shape, problem.rows))
     every = np.arange(problem.rows)
-    probes[:, every, every] = white * (part.root > 0.0)
-    against = part.motion.against(probes.reshape(part.root.size, -1))
+    probes[:, every, every] = white * (root > 0.0)
+    against = motion.against(probes.reshape(root.size, -1))
     taken = np.sum(against**2, axis=(0, 1))
     return np.asarray(np.maximum(whole - taken, 1e-3 * whole))

@@ -47,7 +47,7 @@ _OF_RIG = ("body.", "transducer.tilt", "transducer.stiffness", "transducer.dampi
 _OF_JOINT = (".origin", ".misalignment", ".Ka", ".fsv", ".Tmax")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Recording:
     """A recording on its own samples."""
 
@@ -59,6 +59,7 @@ class Recording:
     turning: Array  # (n, joints) share of an angle's samples that are rounded apart: codes crossed in one of them
     field: Field
     basis: Basis
+    ports: tuple[Array, Array] | None = None  # of a course's, along the first motion that asked: poses hardly differ
 
     @property
     def n(self) -> int:

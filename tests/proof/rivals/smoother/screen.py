@@ -198,6 +198,10 @@ class Screen:
         for number, one in enumerate(chosen):
             places = np.flatnonzero(found.owner == number)
             gain, amplitudes, freedom = _best(square[np.ix_(places, places)], right[places], size[places])
+            held = _held(one, amplitudes)
+            if np.any(held != amplitudes):
+                amplitudes = held
+                gain = float(held @ (2.0 * right[places] - square[np.ix_(places, places)] @ held))
             each = amplitudes.reshape(-1, len(one.amplitudes))
             likely = _likely(one.amplitudes, np.sqrt(np.mean(each**2, axis=0)))
             yield Scored(one, gain, freedom, amplitudes[~found.own[places]], likely)
@@ -277,6 +281,14 @@ def _best(square: Array, right: Array, size: Array) -> tuple[float, Array, int]:
     along = vectors[:, seen].T @ (right / size)
     amplitudes = vectors[:, seen] @ (along / values[seen]) / size
     return float(np.sum(along**2 / values[seen])), amplitudes, int(seen.sum())
+
+
+def _held(candidate: Candidate, amplitudes: Array) -> Array:
+    """Amplitudes within their bounds; a dry friction alone takes energy out."""
+    entries = candidate.amplitudes
+    low = [0.0 if entry.dry and len(entries) == 1 else entry.bounds[0] for entry in entries]
+    high = [entry.bounds[1] for entry in entries]
+    return np.asarray(np.clip(amplitudes.reshape(-1, len(entries)), low, high).ravel())
 
 
 def _likely(entries: Sequence[Parameter], size: Array) -> float:

@@ -10,6 +10,7 @@ from time import monotonic
 
 import numpy as np
 from msgspec import structs
+from numpy.typing import NDArray
 
 from kbs_process.campaign.load import load_campaign
 from kbs_process.diagnosis.experiments.experiment import Experiment
@@ -29,7 +30,8 @@ METHOD = "smoother"
 WIDER, OF_JOINT = 10.0, 3.0  # times a reading's noise that forces are, to begin with; those of joints times as much
 SHAKEN = 25.0  # rad/s, at which the floor shakes a plate most
 STEPS = 25
-# Of a fit's phases: all is statics; forces are estimated; all is free. The share that forces have of a model by itself.
+# The share that forces have of a model by itself: at first, once forces are known, and when all is free. With more of
+# them, what rings for no reason but noise is in it, and stiffness and damping follow that.
 STIFF = (0.1, 0.03, 0.001)
 SETTLED = 100.0  # sigmas of all unknowns together that a step goes, below which forces are estimated
 ARRIVED = 3.0  # below which it is the last
@@ -77,31 +79,49 @@ def settled(problem: Problem, sigma: Array | None = None, begun: State | None = 
     has `begun` goes on from there, with forces as they are.
     """
     state = begun or State.of(problem, _forces(problem) if sigma is None else sigma)
-    known = sigma is not None or begun is not None
-    wrong, phase = (0.0, 2) if known else (np.inf, 0)
-    least = LEAST * _forces(problem)
-    reach, before = np.ones(problem.rows)[problem.forces], np.zeros(problem.rows)[problem.forces]
-    for _ in range(STEPS):
-        state.idealise(problem, STIFF[phase])
-        quadratic = Quadratic.of(problem, state)
-        if phase and not known:
-            ratio = np.sqrt(powers(problem, state, quadratic).noise[problem.forces])
-            ratio = np.maximum(ratio, least / state.sigma[problem.forces])
-            wrong = float(np.abs(np.log(np.clip(ratio, *CHANGE))).max())
-            reach *= np.where(np.log(ratio) * before < 0.0, *ONWARD)
-            before = np.log(ratio)
-            state.sigma[problem.forces] *= np.clip(ratio ** np.minimum(reach, BEYOND), *CHANGE)
-        if phase == 1 and wrong > KNOWN:
+    weighing = _Weighing.of(problem) if sigma is None and begun is None else None
+    if weighing is not None:
+        for _ in range(STEPS):
+            if _stepped(problem, state, STIFF[0], ~problem.dynamic) < SETTLED:
+                break
+        for _ in range(STEPS):
+            if weighing.weighed(problem, state) < KNOWN:
+                break
             state.smooth(problem)
-            continue
-        length = step(problem, state, quadratic, None if phase == 2 else ~problem.dynamic)
-        if phase == 0 and length < SETTLED:
-            phase = 1
-        elif phase == 1:
-            phase = 2
-        elif phase == 2 and length < ARRIVED and wrong < KNOWN:
+        _stepped(problem, state, STIFF[1], ~problem.dynamic)
+    for _ in range(STEPS):
+        wrong = 0.0 if weighing is None else weighing.weighed(problem, state)
+        if _stepped(problem, state, STIFF[2]) < ARRIVED and wrong < KNOWN:
             break
     return state
+
+
+def _stepped(problem: Problem, state: State, stiff: float, free: NDArray[np.bool_] | None = None) -> float:
+    state.idealise(problem, stiff)
+    return step(problem, state, Quadratic.of(problem, state), free)
+
+
+@dataclass(slots=True, eq=False)
+class _Weighing:
+    """How large forces are, found in steps: longer ones for as long as they go one way, shorter where they turn."""
+
+    least: Array  # (forces,)
+    reach: Array  # times a step of each's logarithm
+    before: Array  # the step before
+
+    @classmethod
+    def of(cls, problem: Problem) -> _Weighing:
+        least = LEAST * _forces(problem)
+        return cls(least, np.ones(len(least)), np.zeros(len(least)))
+
+    def weighed(self, problem: Problem, state: State) -> float:
+        """Take a step towards what repeats differ by; return by how much of its logarithm one was wrong at most."""
+        sigma = state.sigma[problem.forces]
+        ratio = np.maximum(np.sqrt(powers(problem, state).noise[problem.forces]), self.least / sigma)
+        self.reach *= np.where(np.log(ratio) * self.before < 0.0, *ONWARD)
+        self.before = np.log(ratio)
+        state.sigma[problem.forces] = sigma * np.clip(ratio ** np.minimum(self.reach, BEYOND), *CHANGE)
+        return float(np.abs(np.log(np.clip(ratio, *CHANGE))).max())
 
 
 def _forces(problem: Problem) -> Array:
@@ -120,7 +140,7 @@ def _finds(problem: Problem, state: State, judge: _Judge | None) -> tuple[Claim,
     finds: list[Claim] = []
     forces, noise = problem.forces, state.sigma.copy()
     while len(finds) < MOST:
-        excess = powers(problem, state, Quadratic.of(problem, state)).of_all
+        excess = powers(problem, state).of_all
         state.sigma[forces] = (noise * np.sqrt(np.maximum(excess, 1.0)))[forces]
         screen = Screen(problem, state)
         taken = {_suspect(one) for one in problem.found}  # another shape of one is no second effect
