@@ -87,6 +87,7 @@ class Answer(Part, frozen=True, kw_only=True):
     log10_p: float | None = None
     verdict: Verdict
     moved: tuple[Moved, ...] = ()
+    numbers: tuple[Moved, ...] = ()  # all known parameters as refitted; not kept with a score
     finds: tuple[Claim, ...] = ()
     held_out: HeldOut | None = None
     seconds: float

@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from engine.hardware import Hardware
+from proof.answer import Moved
 from proof.concealed import trials
 from proof.concealed.trials import Spec
 
@@ -63,13 +64,26 @@ def numbers(moved: Sequence[Mapping[str, Any]], nominal: Hardware, true: Hardwar
         prior, spread = entry["prior"], entry["prior_sigma"]
         if prior is None or spread is None or not spread > 0.0:
             continue
-        name = re.sub(r"(\.drive)\.", r"\1.parameters.", _ELEMENT.sub("", entry["name"]))
-        key = name if name in nominal.values else name.replace(".parameters", "")
-        at = tuple(map(int, _ELEMENT.findall(entry["name"])))
-        given, value = (np.asarray(one[key], dtype=float)[at] for one in (nominal, true))
-        if abs(float(given) - prior) > _EXACT * max(abs(prior), spread):
+        (given,) = _elements(entry["name"], nominal.values)
+        if abs(given - prior) > _EXACT * max(abs(prior), spread):
             raise ValueError(f"{entry['name']} is {prior} in the results, and {given} in the trial of that name")
-        yield Number(entry["name"], (entry["value"] - float(value)) / spread, entry["sigma"] / spread)
+        (value,) = _elements(entry["name"], true.values)
+        yield Number(entry["name"], (entry["value"] - value) / spread, entry["sigma"] / spread)
+
+
+def answered(refitted: Sequence[Moved], nominal: Hardware, true: Hardware) -> Iterator[Number]:
+    """The same of an answer's numbers."""
+    for one in refitted:
+        value, spread = _elements(one.name, true.values, nominal.sigmas)
+        yield Number(one.name, (one.value - value) / spread, one.sigma / spread)
+
+
+def _elements(name: str, *of: Mapping[str, Any]) -> tuple[float, ...]:
+    """What each has under the name that results give to a number."""
+    plain = re.sub(r"(\.drive)\.", r"\1.parameters.", _ELEMENT.sub("", name))
+    key = plain if plain in of[0] else plain.replace(".parameters", "")
+    at = tuple(map(int, _ELEMENT.findall(name)))
+    return tuple(float(np.asarray(one[key], dtype=float)[at]) for one in of)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

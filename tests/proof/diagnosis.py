@@ -29,10 +29,10 @@ def answer_of(content: bytes, trial: str, seconds: float) -> Answer:
 
 
 def _answer(said: DiagnosisResults, trial: str, seconds: float) -> Answer:
-    moved = tuple(
+    numbers = tuple(
         Moved(name=entry.name, value=entry.value, sigma=entry.sigma, sigmas=entry.sigmas)
         for entry in said.moved
-        if entry.sigmas is not None and abs(entry.sigmas) > _OFF
+        if entry.sigmas is not None
     )
     given = Answer(
         method=OURS,
@@ -40,7 +40,8 @@ def _answer(said: DiagnosisResults, trial: str, seconds: float) -> Answer:
         detected=said.answer in ("physics", "undecided"),
         log10_p=said.log10_p,
         verdict=said.answer,
-        moved=moved,
+        moved=tuple(one for one in numbers if abs(one.sigmas) > _OFF),
+        numbers=numbers,
         finds=tuple(_claim(find) for find in said.finds) or _place(said),
         held_out=_held_out(said),
         seconds=seconds,

@@ -20,11 +20,12 @@ from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from time import monotonic
+from typing import NamedTuple
 
 import msgspec
 import numpy as np
 
-from proof import answer
+from proof import answer, coverage
 from proof.__main__ import table
 from proof.answer import Answer
 from proof.bundle import pack
@@ -35,7 +36,7 @@ from proof.isolate import CHECKOUT
 from proof.methods import Job, answer_trial
 from proof.page import write_page
 from proof.prove import each, isolation, workers
-from proof.score import Bench, score
+from proof.score import ALL, Bench, score, share
 from proof.truth import Truth
 from proof.words import OURS
 
@@ -108,11 +109,24 @@ def made(spec: Spec, cache: Path) -> tuple[bytes, Truth]:
     return files[0].read_bytes(), msgspec.json.decode(files[1].read_bytes(), type=Truth)
 
 
-def answered(spec: Spec, cache: Path, method: str) -> tuple[Truth, Answer]:
+class Answered(NamedTuple):
+    """A trial and what a method says of it."""
+
+    truth: Truth
+    answer: Answer
+    # The rig's numbers whose intervals hold the truth, of those that are told; None where all may be off.
+    covered: tuple[int, int] | None
+
+
+def answered(spec: Spec, cache: Path, method: str) -> Answered:
     """Make a trial and let a method answer it, in a process that cannot see the truth."""
     content, truth = made(spec, cache)
-    given = answer_trial(Job(truth.trial, content, (method,), hidden=(cache,)))
-    return truth, answer.decode(given[method])
+    given = answer.decode(answer_trial(Job(truth.trial, content, (method,), hidden=(cache,)))[method])
+    kept = msgspec.structs.replace(given, numbers=())
+    if spec.kind == "beyond" or not given.numbers:
+        return Answered(truth, kept, None)
+    told = [one for one in coverage.answered(given.numbers, *coverage.hardware(spec)) if one.told]
+    return Answered(truth, kept, (sum(one.covered for one in told), len(told)))
 
 
 def main() -> None:
@@ -126,35 +140,44 @@ def main() -> None:
     options.add_argument("--jobs", type=int, default=len(os.sched_getaffinity(0)), help="processes")
     asked = options.parse_args()
     file, begin = asked.output / "score.json", monotonic()
-    known: dict[str, tuple[Truth, Answer]] = {}
+    known: dict[str, Answered] = {}
     if file.is_file():
         before = msgspec.json.decode(file.read_bytes(), type=Bench)
-        known = {truth.trial: (truth, said) for truth, said in zip(before.truths, before.answers, strict=True)}
+        known = {
+            truth.trial: Answered(truth, said, before.coverage.get(truth.trial))
+            for truth, said in zip(before.truths, before.answers, strict=True)
+        }
     wanted = [*draw(asked.trials), *nulls(asked.nulls)]
     todo = [spec for spec in wanted if name_of(spec) not in known]
     task = partial(answered, cache=asked.cache, method=asked.method)
     with workers(asked.jobs, None) as pool:
-        for done, (_, (truth, said)) in enumerate(each(pool, task, todo), start=1):
-            known[truth.trial] = truth, said
+        for done, (_, one) in enumerate(each(pool, task, todo), start=1):
+            known[one.truth.trial] = one
             bench = _bench([known[name] for name in sorted(known)])
             asked.output.mkdir(parents=True, exist_ok=True)
             content = msgspec.json.format(msgspec.json.encode(bench, order="deterministic"), indent=1) + b"\n"
             file.write_bytes(content)
             write_page(bench, asked.output / "index.html")
-            print(f"{monotonic() - begin:7.1f} s  {truth.trial}, {done} of {len(todo)}", file=sys.stderr, flush=True)
+            print(
+                f"{monotonic() - begin:7.1f} s  {one.truth.trial}, {done} of {len(todo)}", file=sys.stderr, flush=True
+            )
     print("\n".join(table(msgspec.json.decode(file.read_bytes(), type=Bench).rows)))
 
 
-def _bench(pairs: Sequence[tuple[Truth, Answer]]) -> Bench:
-    truths, answers = zip(*pairs, strict=True)
+def _bench(every: Sequence[Answered]) -> Bench:
+    truths, answers = tuple(one.truth for one in every), tuple(one.answer for one in every)
+    covered = {one.truth.trial: one.covered for one in every if one.covered is not None}
+    held, told = (sum(one[k] for one in covered.values()) for k in (0, 1))
+    numbers = (share(answers[0].method, "interval of a rig's number covers", ALL, held, told),) if told else ()
     return Bench(
         split="development",
         seed=str(SEED),
         command="python -m proof.record",
         isolation=isolation(None),
-        rows=score(truths, answers),
+        rows=(*score(truths, answers), *numbers),
         truths=truths,
         answers=answers,
+        coverage=covered,
     )
 
 

@@ -10,6 +10,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+import msgspec
+
 from proof.answer import Answer, Part
 from proof.match import Judged, covered, error_over_bound, match, same_place, superfluous
 from proof.rates import CUT_LOG10_P, clopper_pearson, decibels_from_clairvoyant, median_interval
@@ -53,6 +55,8 @@ class Bench(Part, frozen=True, kw_only=True):
     rows: tuple[Row, ...]
     truths: tuple[Truth, ...]
     answers: tuple[Answer, ...]
+    # By trial: the rig's numbers that recordings tell, and of how many of these the interval holds the truth.
+    coverage: dict[str, tuple[int, int]] = msgspec.field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)

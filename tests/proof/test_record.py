@@ -6,10 +6,11 @@ from collections import Counter
 
 import pytest
 
-from proof.answer import Answer, Claim
+from proof import coverage
+from proof.answer import Answer, Claim, Moved
 from proof.concealed.effects import BY_NAME
 from proof.paired import paired
-from proof.record import COUNT, draw
+from proof.record import COUNT, NULLS, draw, name_of, nulls
 from proof.score import Bench
 from proof.truth import Concealed, Truth
 
@@ -25,6 +26,27 @@ def test_the_trials_are_of_all_kinds_from_the_first_on() -> None:
     singles = Counter(BY_NAME[spec.physics[0]].family for k, spec in enumerate(specs) if k % 5 < 3)
     assert len(singles) >= 22 and max(singles.values()) <= 2
     assert {level for spec in specs for level in spec.levels} == {100.0, 300.0, 1000.0}
+
+
+def test_nulls_are_of_all_kinds_and_no_trial_of_the_others() -> None:
+    specs = nulls()
+    assert len(specs) == NULLS and specs[:10] == nulls(10)
+    kinds = Counter(spec.kind for spec in specs)
+    assert kinds == {"within": 40, "nothing": 40, "beyond": 20}
+    names = [name_of(spec) for spec in (*draw(), *specs)]
+    assert len(set(names)) == COUNT + NULLS and names[0] == "R000" and names[COUNT] == "N000"
+    assert not {spec.index for spec in specs} & {spec.index for spec in draw()}
+
+
+def test_numbers_of_an_answer_are_held_against_the_hardware_of_its_trial() -> None:
+    (spec,) = nulls(1)
+    nominal, true = coverage.hardware(spec)
+    name, key = "joint.el.drive.parameters.Ka", "joint.el.drive.Ka"
+    spread, value = float(nominal.sigmas[key]), float(true[key])
+    said = [Moved(name=name, value=value + k * spread, sigma=0.1 * spread, sigmas=0.0) for k in (0.0, 0.15, 0.25)]
+    found = list(coverage.answered(said, nominal, true))
+    assert [one.error for one in found] == pytest.approx([0.0, 0.15, 0.25], abs=1e-9)
+    assert [one.covered for one in found] == [True, True, False] and all(one.told for one in found)
 
 
 def truth(trial: str) -> Truth:

@@ -59,14 +59,16 @@ def solve(folder: Path) -> Answer:
     experiment = experiment_of(load_campaign(folder, checksums=False), SilentProgress())
     fitted = Problem(experiment, list(experiment.fit))
     state = settled(fitted)
-    moved = _moved(fitted, state)
-    finds = _finds(fitted, state, _Judge.of(experiment, fitted, state))
+    alone = refitted(fitted, state)
+    moved = tuple(one for one in alone if abs(one.sigmas) > OFF)
+    finds, numbers = _finds(fitted, state, _Judge.of(experiment, fitted, state))
     return Answer(
         method=METHOD,
         trial=folder.name,
         detected=bool(finds),
         verdict="physics" if finds else "parameters off" if moved else "none",
         moved=() if finds else moved,
+        numbers=numbers,
         finds=finds,
         seconds=monotonic() - begin,
     )
@@ -131,11 +133,11 @@ def _forces(problem: Problem) -> Array:
     return WIDER * np.repeat([torque, OF_JOINT * torque, force / mass / SHAKEN], [3, problem.joints, 3])
 
 
-def _finds(problem: Problem, state: State, judge: _Judge | None) -> tuple[Claim, ...]:
-    """Effects, one after the other: each the one that recordings of the fit and those held out together show most.
+def _finds(problem: Problem, state: State, judge: _Judge | None) -> tuple[tuple[Claim, ...], tuple[Moved, ...]]:
+    """Effects, one after the other, and the rig's numbers beside them.
 
-    Beside each that is found all numbers settle again. What comes again and no number takes up counts as noise until an
-    effect explains it.
+    Each is the one that recordings of the fit and those held out together show most. Beside each that is found all
+    numbers settle again. What comes again and no number takes up counts as noise until an effect explains it.
     """
     finds: list[Claim] = []
     forces, noise = problem.forces, state.sigma.copy()
@@ -161,7 +163,7 @@ def _finds(problem: Problem, state: State, judge: _Judge | None) -> tuple[Claim,
         alike = [one.scored for one in every if one.cost < every[0].cost + ALIKE]
         finds.append(_claim(best, leaders, alike, screen.estimated(best)))
         judge = None if judge is None else judge.joined(best.candidate, problem, state)
-    return _as_fitted(finds, problem, state)
+    return _as_fitted(finds, problem, state), refitted(problem, state)
 
 
 def _as_fitted(finds: Sequence[Claim], problem: Problem, state: State) -> tuple[Claim, ...]:
@@ -289,12 +291,12 @@ def _suspect(candidate: Candidate) -> Suspect:
     return Suspect(port=law.port_word, axis=axis, channels=channels, family=law.family)
 
 
-def _moved(problem: Problem, state: State) -> tuple[Moved, ...]:
-    """Numbers of the rig that had to move."""
-    off = ((state.x - problem.prior) / problem.spread)[problem.of_rig]
-    entries = zip(problem.elements.names, state.x[problem.of_rig], problem.spread[problem.of_rig], off, strict=True)
+def refitted(problem: Problem, state: State) -> tuple[Moved, ...]:
+    """Numbers of the rig, as fitted."""
+    at = problem.of_rig
+    sigma = Quadratic.of(problem, state).sigma(problem.spread)[at]
+    off = ((state.x - problem.prior) / problem.spread)[at]
     return tuple(
-        Moved(name=name, value=float(value), sigma=float(sigma), sigmas=float(by))
-        for name, value, sigma, by in entries
-        if abs(by) > OFF
+        Moved(name=name, value=float(value), sigma=float(known), sigmas=float(by))
+        for name, value, known, by in zip(problem.elements.names, state.x[at], sigma, off, strict=True)
     )
