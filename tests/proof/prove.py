@@ -12,12 +12,10 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import TypeVar
 
-import msgspec
-
 from proof import isolate
 from proof.methods import Job, answer_trial
 from proof.page import write_page
-from proof.score import Bench, Row, score
+from proof.score import Bench, Row, encode, score
 from proof.trials import make_sealed
 from proof.work import BenchError, Work
 
@@ -104,8 +102,7 @@ def judge(work: Work, methods: tuple[str, ...], target: Path, *, command: str, t
         answers=tuple(answers),
     )
     target.mkdir(parents=True, exist_ok=True)
-    content = msgspec.json.format(msgspec.json.encode(bench, order="deterministic"), indent=1) + b"\n"
-    (target / "score.json").write_bytes(content)
+    (target / "score.json").write_bytes(encode(bench))
     (target / "ledger.json").write_bytes((work.folder / "ledger.json").read_bytes())
     write_page(bench, target / "index.html")
     return rows

@@ -36,7 +36,7 @@ from proof.isolate import CHECKOUT
 from proof.methods import Job, answer_trial
 from proof.page import write_page
 from proof.prove import each, isolation, workers
-from proof.score import ALL, Bench, score, share
+from proof.score import ALL, Bench, encode, score, share
 from proof.truth import Truth
 from proof.words import OURS
 
@@ -155,8 +155,7 @@ def main() -> None:
             known[one.truth.trial] = one
             bench = _bench([known[name] for name in sorted(known)])
             asked.output.mkdir(parents=True, exist_ok=True)
-            content = msgspec.json.format(msgspec.json.encode(bench, order="deterministic"), indent=1) + b"\n"
-            file.write_bytes(content)
+            file.write_bytes(encode(bench))
             write_page(bench, asked.output / "index.html")
             print(
                 f"{monotonic() - begin:7.1f} s  {one.truth.trial}, {done} of {len(todo)}", file=sys.stderr, flush=True

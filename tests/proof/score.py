@@ -59,6 +59,11 @@ class Bench(Part, frozen=True, kw_only=True):
     coverage: dict[str, tuple[int, int]] = msgspec.field(default_factory=dict)
 
 
+def encode(bench: Bench) -> bytes:
+    """Return a bench as it is stored."""
+    return msgspec.json.encode(bench, order="deterministic") + b"\n"
+
+
 @dataclass(frozen=True, slots=True)
 class Trial:
     """A truth and one method's answer to it."""
