@@ -8,17 +8,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.interpolate import make_interp_spline
 
 from kbs_process.campaign.load import load_campaign
 from kbs_process.diagnosis.screening.suspects import Candidate
-from kbs_process.plant.laws import CATALOGUE
+from kbs_process.plant.laws import CATALOGUE, SENSING
 from kbs_process.plant.rigid import inverse_dynamics, joint_efforts, kinematics, static_wrench
 from kbs_process.progress import SilentProgress
 from kbs_process.studies.diagnose.reading import experiment_of
 from proof.rivals.smoother.balance import FIRST_JOINT, FLOOR, PLATE, STILL, needed
-from proof.rivals.smoother.basis import Basis
+from proof.rivals.smoother.basis import BAND_HZ, WHOLE_HZ, Basis, in_band
 from proof.rivals.smoother.fit import Quadratic, State, step
 from proof.rivals.smoother.intensities import powers
+from proof.rivals.smoother.jumps import place_jumps
 from proof.rivals.smoother.lines import orders_in, tones_in
 from proof.rivals.smoother.problem import Problem
 from proof.rivals.smoother.screen import evidence
@@ -52,6 +54,19 @@ def test_rates_and_accelerations_are_right_up_to_the_band_s_end() -> None:
         assert values[inside, 0] == pytest.approx(np.sin(w * t)[inside], abs=1e-4)
         assert rates[inside, 0] == pytest.approx(w * np.cos(w * t)[inside], abs=0.007 * w)
         assert accelerations[inside, 0] == pytest.approx(-(w**2) * np.sin(w * t)[inside], abs=0.007 * w**2)
+
+
+def test_the_band_ends_so_softly_that_an_equation_holds_of_what_drifts_through_its_end() -> None:
+    dt, n = 0.05, 3000
+    t, inside = dt * np.arange(n), slice(100, -100)
+    f = BAND_HZ - 0.1 + 0.2 * np.sin(2.0 * np.pi * t / 60.0)
+    ringing, stiffness = np.sin(2.0 * np.pi * dt * np.cumsum(f))[:, None], (f**2)[:, None]
+    left = in_band(stiffness * ringing, dt) - stiffness * in_band(ringing, dt)
+    # A hundredth of what a Q of 50 loses; an edge there would leave as much as that.
+    assert np.std(left[inside]) < 1e-2 * np.std(stiffness * ringing) / 50.0
+    slow, beyond = np.sin(2.0 * np.pi * WHOLE_HZ * t)[:, None], np.sin(2.0 * np.pi * (BAND_HZ + 0.5) * t)[:, None]
+    assert in_band(slow, dt)[inside] == pytest.approx(slow[inside], abs=0.01)
+    assert np.abs(in_band(beyond, dt)[inside]).max() < 0.01
 
 
 def test_lines_are_found_at_their_orders_whatever_the_rates_and_at_their_frequencies_whatever_the_phases() -> None:
@@ -157,6 +172,36 @@ def test_an_effect_that_joins_is_nothing_until_it_has_a_size_and_then_its_torque
     rate, inside = motion[1][:, FIRST_JOINT + 1], slice(30, -30)
     assert np.abs(rate).max() > 1e-3
     assert change[inside, wider.joint.start + 1] == pytest.approx(-2.0 * rate[inside], abs=0.02 * np.abs(rate).max())
+
+
+@pytest.mark.slow
+def test_a_clock_that_jumps_is_told_by_its_time_and_all_its_lateness_is_shown(tmp_path: Path) -> None:
+    problem = _null(tmp_path, [1])
+    state = State.of(problem, np.repeat([0.05, 0.2, 0.01], [3, 2, 3]))
+    for _ in range(2):
+        state.idealise(problem, 0.1)
+        step(problem, state, Quadratic.of(problem, state), ~problem.dynamic)
+    state.idealise(problem, 0.01)
+    course, recording = state.course(problem, 0), problem.recordings[0]
+    t, lost, at = problem.experiment.dt * np.arange(len(course.shown)), 0.4, 31.0
+    late = make_interp_spline(t, course.shown)(np.clip(t + lost * (t > at), 0.0, t[-1]))
+    trial = problem.experiment.trials[1]
+    measured = trial.measured.copy()
+    measured[: len(late), problem.wrench] = late[:, problem.wrench]
+    trials = tuple(replace(one, measured=measured) if one is trial else one for one in problem.experiment.trials)
+    problem.experiment = replace(problem.experiment, trials=trials)
+    place_jumps(problem, [course])
+    assert recording.jumps["wrench"] == pytest.approx(at, abs=0.5)
+    (drops,) = (law for law in SENSING if law.jumps)
+    wider = problem.joined(Candidate(drops, "wrench", ()))
+    joined = state.joined(problem, wider)
+    (own,) = wider.amplitudes[0]
+    joined.x[own] = lost
+    recording.jumps["wrench"] = at
+    column = joined.course(wider, 0).columns(wider.found)[:, wider.wrench, 0]
+    expected = in_band((late - course.shown)[recording.first :][: recording.n, wider.wrench], recording.dt)
+    inside = slice(40, -40)
+    assert lost * column[inside] == pytest.approx(expected[inside], abs=1e-3 * np.abs(expected).max())
 
 
 @pytest.mark.validation

@@ -10,11 +10,12 @@ from scipy.interpolate import make_interp_spline
 from kbs_process.diagnosis.experiments.hypothesis import Tapped
 from kbs_process.diagnosis.screening.inlets import Inlet, generalised, inlets_of
 from kbs_process.diagnosis.screening.scene import courses
-from kbs_process.diagnosis.screening.signature import inputs, reduced, sensed
+from kbs_process.diagnosis.screening.signature import inputs, reduced, sensed, stamped, unit_values
 from kbs_process.diagnosis.screening.suspects import Candidate
 from kbs_process.plant.compiled.taps import tap_columns
 from kbs_process.plant.laws import select
 from kbs_process.plant.linear.linearise import linearise
+from kbs_process.plant.sensing import SensingPort
 from kbs_process.stages.align.resample import resample
 from proof.rivals.case import Array
 from proof.rivals.smoother.balance import FIRST_JOINT, PLATE, Motion
@@ -23,6 +24,7 @@ from proof.rivals.smoother.drive import spring
 from proof.rivals.smoother.problem import Problem
 
 _TAPS_HZ = 100.0
+_ON_TIME = 1e-5  # s, by which readings that are late have the slope at their instant
 _KNOT_S = 1.0  # between poses at which ports are worked out
 
 
@@ -47,7 +49,14 @@ class Course:
         turning = np.gradient(rotor, axis=0) * _TAPS_HZ
         joints = slice(FIRST_JOINT, None)
         values = [whole, rotor, turning, angle[:, joints], rate[:, joints], angle[:, PLATE], rate[:, PLATE]]
-        shown = problem.predicted(k, x, motion, torques)[:, : problem.angles.stop]
+        ends = np.cumsum([0, *(len(one.amplitudes) for one in problem.present)])
+        amplitudes = x[problem.amplitudes[k]]
+        self._sizes = {one: amplitudes[a:b] for one, a, b in zip(problem.present, ends, ends[1:], strict=False)}
+        shown = problem.predicted(k, x, motion, torques)
+        for one, a, b in zip(problem.present, ends, ends[1:], strict=False):
+            if not one.effect.in_plant:  # what sensors add: others act on what there is without
+                shown -= problem.acting[k][:, :, a:b] @ amplitudes[a:b]
+        shown = shown[:, : problem.angles.stop]
         readings = make_interp_spline(own, shown, k=3)(inside)
         self.tapped = Tapped(_TAPS_HZ, tap_columns(problem.rig), np.hstack(values), readings)
         self.shown = np.vstack([np.repeat(shown[:1], first, axis=0), shown])
@@ -117,10 +126,30 @@ class Course:
             shown = reduced(
                 candidate, self.tapped, experiment.channels, self.rig, experiment.dt, len(self.shown)
             )  # fmt: skip
+        elif candidate.effect.port is SensingPort.STREAM:
+            shown = self._late(candidate)
         else:
             t = experiment.dt * np.arange(len(self.shown))
             shown = sensed(candidate, t, self.shown, experiment.channels, self.rig)
         out = np.zeros((self.recording.n, problem.rows, shown.shape[2]))
         acted = np.flatnonzero(shown.any(axis=(0, 2)))  # of the readings, which are the first rows
         out[:, acted] = in_band(shown[self.recording.first :][: self.recording.n, acted], self.recording.dt)
+        return out
+
+    def _late(self, candidate: Candidate) -> Array:
+        """What a unit of each amplitude of a clock's lateness does, (n, channels, amplitudes).
+
+        It is the readings' mean slope over the lateness that the clock is known to have: so that all of them together
+        show what was read then.
+        """
+        channels, dt = self.problem.experiment.channels, self.problem.experiment.dt
+        t = dt * np.arange(len(self.shown))
+        units = unit_values(candidate, t, {"drop_time": self.recording.jumps.get(candidate.site, 0.0)})
+        late = (units @ self._sizes.get(candidate, np.zeros(units.shape[1])))[:, None]
+        acted = stamped(candidate.site, channels, self.rig)
+        spline, known = make_interp_spline(t, self.shown[:, acted], k=3), np.abs(late) > _ON_TIME
+        read = spline(np.clip(t - late[:, 0], 0.0, t[-1]))
+        mean = (self.shown[:, acted] - read) / np.where(known, late, 1.0)
+        out = np.zeros((*self.shown.shape[:1], len(channels), units.shape[1]))
+        out[:, acted] = -np.where(known, mean, spline(t, 1))[:, :, None] * units[:, None, :]
         return out
