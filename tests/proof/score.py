@@ -55,7 +55,7 @@ class Bench(Part, frozen=True, kw_only=True):
     rows: tuple[Row, ...]
     truths: tuple[Truth, ...]
     answers: tuple[Answer, ...]
-    # By trial: the rig's numbers that recordings tell, and of how many of these the interval holds the truth.
+    # By trial: of how many of the rig's numbers the interval holds the truth, and how many the recordings tell.
     coverage: dict[str, tuple[int, int]] = msgspec.field(default_factory=dict)
 
 

@@ -20,7 +20,6 @@ from proof.rivals.smoother.balance import FIRST_JOINT, FLOOR, PLATE, STILL, need
 from proof.rivals.smoother.basis import BAND_HZ, WHOLE_HZ, Basis, in_band
 from proof.rivals.smoother.fit import Quadratic, State, step
 from proof.rivals.smoother.intensities import powers
-from proof.rivals.smoother.jumps import place_jumps
 from proof.rivals.smoother.lines import orders_in, tones_in
 from proof.rivals.smoother.problem import Problem
 from proof.rivals.smoother.screen import evidence
@@ -175,7 +174,7 @@ def test_an_effect_that_joins_is_nothing_until_it_has_a_size_and_then_its_torque
 
 
 @pytest.mark.slow
-def test_a_clock_that_jumps_is_told_by_its_time_and_all_its_lateness_is_shown(tmp_path: Path) -> None:
+def test_a_clock_shows_all_that_it_is_late_by(tmp_path: Path) -> None:
     problem = _null(tmp_path, [1])
     state = State.of(problem, np.repeat([0.05, 0.2, 0.01], [3, 2, 3]))
     for _ in range(2):
@@ -183,25 +182,17 @@ def test_a_clock_that_jumps_is_told_by_its_time_and_all_its_lateness_is_shown(tm
         step(problem, state, Quadratic.of(problem, state), ~problem.dynamic)
     state.idealise(problem, 0.01)
     course, recording = state.course(problem, 0), problem.recordings[0]
-    t, lost, at = problem.experiment.dt * np.arange(len(course.shown)), 0.4, 31.0
-    late = make_interp_spline(t, course.shown)(np.clip(t + lost * (t > at), 0.0, t[-1]))
-    trial = problem.experiment.trials[1]
-    measured = trial.measured.copy()
-    measured[: len(late), problem.wrench] = late[:, problem.wrench]
-    trials = tuple(replace(one, measured=measured) if one is trial else one for one in problem.experiment.trials)
-    problem.experiment = replace(problem.experiment, trials=trials)
-    place_jumps(problem, [course])
-    assert recording.jumps["wrench"] == pytest.approx(at, abs=0.5)
-    (drops,) = (law for law in SENSING if law.jumps)
-    wider = problem.joined(Candidate(drops, "wrench", ()))
+    t, by = problem.experiment.dt * np.arange(len(course.shown)), 0.4
+    late = make_interp_spline(t, course.shown)(np.clip(t - by, 0.0, t[-1]))
+    (offset,) = (law for law in SENSING if law.name == "clock_offset")
+    wider = problem.joined(Candidate(offset, "wrench", ()))
     joined = state.joined(problem, wider)
     (own,) = wider.amplitudes[0]
-    joined.x[own] = lost
-    recording.jumps["wrench"] = at
+    joined.x[own] = by
     column = joined.course(wider, 0).columns(wider.found)[:, wider.wrench, 0]
     expected = in_band((late - course.shown)[recording.first :][: recording.n, wider.wrench], recording.dt)
     inside = slice(40, -40)
-    assert lost * column[inside] == pytest.approx(expected[inside], abs=1e-3 * np.abs(expected).max())
+    assert by * column[inside] == pytest.approx(expected[inside], abs=1e-3 * np.abs(expected).max())
 
 
 @pytest.mark.validation

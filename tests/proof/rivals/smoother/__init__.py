@@ -14,7 +14,6 @@ factorisation, beside all numbers.
     problem.py    rows, unknowns, priors of a campaign
     fit.py        Gauss and Newton
     intensities.py  how large the forces are, from what repeats differ by
-    jumps.py      when clocks seem to jump
     screen.py     effects as columns: what each would take of the cost
     solve.py      the answer
 """

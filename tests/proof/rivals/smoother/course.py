@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
@@ -49,13 +50,13 @@ class Course:
         turning = np.gradient(rotor, axis=0) * _TAPS_HZ
         joints = slice(FIRST_JOINT, None)
         values = [whole, rotor, turning, angle[:, joints], rate[:, joints], angle[:, PLATE], rate[:, PLATE]]
-        ends = np.cumsum([0, *(len(one.amplitudes) for one in problem.present)])
-        amplitudes = x[problem.amplitudes[k]]
-        self._sizes = {one: amplitudes[a:b] for one, a, b in zip(problem.present, ends, ends[1:], strict=False)}
+        self._sizes: dict[Candidate, Array] = {}  # amplitudes of what is present
         shown = problem.predicted(k, x, motion, torques)
-        for one, a, b in zip(problem.present, ends, ends[1:], strict=False):
-            if not one.effect.in_plant:  # what sensors add: others act on what there is without
-                shown -= problem.acting[k][:, :, a:b] @ amplitudes[a:b]
+        ends = np.cumsum([0, *(len(one.amplitudes) for one in problem.present)])
+        for one, (a, b) in zip(problem.present, pairwise(ends), strict=True):
+            self._sizes[one] = x[problem.amplitudes[k]][a:b]
+            if not one.effect.in_plant:  # what a sensor adds: others act on what there is without
+                shown -= problem.acting[k][:, :, a:b] @ self._sizes[one]
         shown = shown[:, : problem.angles.stop]
         readings = make_interp_spline(own, shown, k=3)(inside)
         self.tapped = Tapped(_TAPS_HZ, tap_columns(problem.rig), np.hstack(values), readings)
@@ -144,7 +145,7 @@ class Course:
         """
         channels, dt = self.problem.experiment.channels, self.problem.experiment.dt
         t = dt * np.arange(len(self.shown))
-        units = unit_values(candidate, t, {"drop_time": self.recording.jumps.get(candidate.site, 0.0)})
+        units = unit_values(candidate, t, {})
         late = (units @ self._sizes.get(candidate, np.zeros(units.shape[1])))[:, None]
         acted = stamped(candidate.site, channels, self.rig)
         spline, known = make_interp_spline(t, self.shown[:, acted], k=3), np.abs(late) > _ON_TIME

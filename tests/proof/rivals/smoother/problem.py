@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from copy import copy
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 
@@ -60,7 +60,6 @@ class Recording:
     field: Field
     basis: Basis
     ports: tuple[Array, Array] | None = None  # of a course's, along the first motion that asked: poses hardly differ
-    jumps: dict[str, float] = field(default_factory=dict)  # s, when the clock of a stream seems to jump
 
     @property
     def n(self) -> int:

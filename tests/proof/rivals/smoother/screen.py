@@ -17,7 +17,6 @@ from proof.rivals.case import Array
 from proof.rivals.smoother.basis import BAND_HZ
 from proof.rivals.smoother.course import Course
 from proof.rivals.smoother.fit import Quadratic, State
-from proof.rivals.smoother.jumps import place_jumps
 from proof.rivals.smoother.lines import proposed
 from proof.rivals.smoother.problem import Problem
 
@@ -103,8 +102,6 @@ class Screen:
     ) -> None:
         self.problem, self.state = problem, state
         self.courses = courses or [state.course(problem, k) for k in range(len(problem.recordings))]
-        if not courses:
-            place_jumps(problem, self.courses)
         self.quadratic = quadratic or Quadratic.of(problem, state)
         self._own = self.quadratic.solve(problem.spread, self.quadratic.pull)
 
@@ -114,13 +111,14 @@ class Screen:
         return Screen(self.problem, self.state, self.courses, Quadratic.over(self.problem, self.state, chosen))
 
     def candidates(self) -> list[Candidate]:
-        """Every effect that the model leaves out, with each shape."""
+        """Every effect that the model leaves out, with each shape, but those that need a recording's own times."""
         problem, experiment = self.problem, self.problem.experiment
         tapped = [course.tapped for course in self.courses]
         lines = proposed(problem, self.state, self.unexplained())
         shown = [course.shown for course in self.courses]
         ranges = ranges_of(tapped, shown, experiment.channels, experiment.dt, proposed=lines)
-        return candidates(problem.rig, experiment.effects, ranges, tap_columns(problem.rig), experiment.channels)
+        every = candidates(problem.rig, experiment.effects, ranges, tap_columns(problem.rig), experiment.channels)
+        return [one for one in every if not one.effect.jumps]
 
     def unexplained(self) -> list[Array]:
         """What motion and numbers leave of each recording's rows (n, rows), over their sigmas."""

@@ -29,7 +29,7 @@ from proof.rivals.smoother.screen import Scored, Screen, estimate
 METHOD = "smoother"
 WIDER, OF_JOINT = 10.0, 3.0  # times a reading's noise that forces are, to begin with; those of joints times as much
 SHAKEN = 25.0  # rad/s, at which the floor shakes a plate most
-STEPS, FREE = 25, 8  # of a fit at most; once all is free: numbers that go on from there bend to what is left out
+STEPS = 25
 # The share that forces have of a model by itself: at first, once forces are known, and when all is free. With more of
 # them, what rings for no reason but noise is in it, and stiffness and damping follow that.
 STIFF = (0.1, 0.03, 0.001)
@@ -91,7 +91,7 @@ def settled(problem: Problem, sigma: Array | None = None, begun: State | None = 
                 break
             state.smooth(problem)
         _stepped(problem, state, STIFF[1], ~problem.dynamic)
-    for _ in range(FREE):
+    for _ in range(STEPS):
         wrong = 0.0 if weighing is None else weighing.weighed(problem, state)
         if _stepped(problem, state, STIFF[2]) < ARRIVED and wrong < KNOWN:
             break
