@@ -67,3 +67,15 @@ def test_where_nothing_can_be_kept_it_is_compiled(tmp_path: Path) -> None:
         path.unlink()
         path.mkdir()
     assert run(tmp_path) == ["42.0", "42.0", "0", "0"]
+
+
+@pytest.mark.slow
+def test_what_others_compile_is_kept_as_numba_keeps_it(tmp_path: Path) -> None:
+    """Whoever imports the package may not find a cache later that numba alone cannot load."""
+    alone = KERNEL.replace("from kbs_process.machine_code import njit", "from numba import njit")
+    (tmp_path / "kernel.py").write_text(alone)
+    beside = "import kbs_process.machine_code, kernel"
+    environment = os.environ | {"PYTHONPATH": str(tmp_path)}
+    environment.pop("NUMBA_CACHE_DIR", None)
+    subprocess.check_call([sys.executable, "-c", beside], env=environment)
+    assert run(tmp_path) == ["42.0", "42.0", "1", "1"]

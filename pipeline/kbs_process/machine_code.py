@@ -3,18 +3,19 @@
 A cache is damaged by a full disk, a copy that ends early or a kill at the wrong time; numba raises whatever unpickling
 raises then, at every later start, and runs machine code as it finds it. So code is kept with its SHA-256. Whoever
 compiles takes `njit` from here, and copies arrays number by number: for an assignment of slices numba compiles the
-text of its error as well, for ten seconds of a first start.
+text of its error as well, for ten seconds of a first start. Functions of others are cached as numba does it: what one
+has kept, the other could not load.
 """
 
 from __future__ import annotations
 
 import pickle
+from collections.abc import Callable
 from contextlib import suppress
 from hashlib import sha256
 from typing import Any
 
-from numba import njit
-from numba.core import dispatcher
+import numba
 from numba.core.caching import CompileResultCacheImpl, FunctionCache
 from numba.core.serialize import dumps
 
@@ -60,4 +61,17 @@ class _RenewedCache(FunctionCache):
             super().save_overload(sig, data)  # type: ignore[no-untyped-call]
 
 
-dispatcher.FunctionCache = _RenewedCache  # type: ignore[attr-defined]
+def njit(*signatures: Any, cache: bool = False, **options: Any) -> Callable[[Callable[..., Any]], Any]:
+    """Compile a function as `numba.njit` does, at once for `signatures`."""
+
+    def compiled(function: Callable[..., Any]) -> Any:
+        dispatcher = numba.njit(**options)(function)
+        if cache:
+            dispatcher._cache = _RenewedCache(function)  # type: ignore[no-untyped-call]
+        for signature in signatures:
+            dispatcher.compile(signature)
+        if signatures:
+            dispatcher.disable_compile()
+        return dispatcher
+
+    return compiled
