@@ -50,13 +50,13 @@ class Course:
         turning = np.gradient(rotor, axis=0) * _TAPS_HZ
         joints = slice(FIRST_JOINT, None)
         values = [whole, rotor, turning, angle[:, joints], rate[:, joints], angle[:, PLATE], rate[:, PLATE]]
-        self._sizes: dict[Candidate, Array] = {}  # amplitudes of what is present
+        self.sizes: dict[tuple[str, str], Array] = {}  # amplitudes, as far as they are known, of effects at a place
         shown = problem.predicted(k, x, motion, torques)
         ends = np.cumsum([0, *(len(one.amplitudes) for one in problem.present)])
         for one, (a, b) in zip(problem.present, pairwise(ends), strict=True):
-            self._sizes[one] = x[problem.amplitudes[k]][a:b]
+            self.sizes[one.name, one.site] = x[problem.amplitudes[k]][a:b]
             if not one.effect.in_plant:  # what a sensor adds: others act on what there is without
-                shown -= problem.acting[k][:, :, a:b] @ self._sizes[one]
+                shown -= problem.acting[k][:, :, a:b] @ x[problem.amplitudes[k]][a:b]
         shown = shown[:, : problem.angles.stop]
         readings = make_interp_spline(own, shown, k=3)(inside)
         self.tapped = Tapped(_TAPS_HZ, tap_columns(problem.rig), np.hstack(values), readings)
@@ -146,7 +146,7 @@ class Course:
         channels, dt = self.problem.experiment.channels, self.problem.experiment.dt
         t = dt * np.arange(len(self.shown))
         units = unit_values(candidate, t, {})
-        late = (units @ self._sizes.get(candidate, np.zeros(units.shape[1])))[:, None]
+        late = (units @ self.sizes.get((candidate.name, candidate.site), np.zeros(units.shape[1])))[:, None]
         acted = stamped(candidate.site, channels, self.rig)
         spline, known = make_interp_spline(t, self.shown[:, acted], k=3), np.abs(late) > _ON_TIME
         read = spline(np.clip(t - late[:, 0], 0.0, t[-1]))

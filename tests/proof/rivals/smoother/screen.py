@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import cycle
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +39,7 @@ class Scored:
     gain: float
     freedom: int  # amplitudes that make a difference
     amplitudes: Array  # that all recordings share
+    each: Array  # (recordings or 1, amplitudes)
     likely: float = 0.0  # of amplitudes of this size, beforehand; see `_likely`
     foreseen: float = 0.0  # what these amplitudes take on recordings held out
 
@@ -130,13 +132,14 @@ class Screen:
         return sorted(found, key=lambda one: -one.worth)
 
     def refined(self, one: Scored) -> Scored:
-        """The same with its shape where it takes most, one number after the other."""
+        """The same with its shape where it takes most, one number after the other, and of the size that it has there."""
         free = {
             entry.name: entry for entry in one.candidate.effect.parameters if entry.role == "shape" and not entry.whole
         }
         places = [place for place, (name, _) in enumerate(one.candidate.shape) if name in free]
-        for _ in range(_ROUNDS if len(places) > 1 else 1):
+        for _ in range(_ROUNDS):
             before = one.gain
+            one = self._sized(one)
             for place in places:
                 entry = free[one.candidate.shape[place][0]]
                 low, high = entry.bounds
@@ -144,6 +147,13 @@ class Screen:
             if one.gain < (1.0 + _SETTLED) * before:
                 break
         return one
+
+    def _sized(self, one: Scored) -> Scored:
+        """The same about the size that it has: readings that are late by more than they turn in are no slope."""
+        for course, size in zip(self.courses, cycle(one.each)):
+            course.sizes[one.candidate.name, one.candidate.site] = size
+        (found,) = self.scored([one.candidate])
+        return found
 
     def _along(self, one: Scored, place: int, bounds: tuple[float, float]) -> Scored:
         def at(value: float) -> Scored:
@@ -204,7 +214,7 @@ class Screen:
                 gain = float(held @ (2.0 * right[places] - square[np.ix_(places, places)] @ held))
             each = amplitudes.reshape(-1, len(one.amplitudes))
             likely = _likely(one.amplitudes, np.sqrt(np.mean(each**2, axis=0)))
-            yield Scored(one, gain, freedom, amplitudes[~found.own[places]], likely)
+            yield Scored(one, gain, freedom, amplitudes[~found.own[places]], each, likely)
 
     def _beside(self, found: _Products) -> tuple[Array, Array]:
         """Squares and products with the residual, once all numbers have had their part."""
