@@ -13,7 +13,7 @@ import pickle
 from collections.abc import Callable
 from contextlib import suppress
 from hashlib import sha256
-from typing import Any
+from typing import Any, TypeVar, cast
 
 import numba
 from numba.core.caching import CompileResultCacheImpl, FunctionCache
@@ -22,6 +22,7 @@ from numba.core.serialize import dumps
 from kbs_process import interruption
 
 __all__ = ["njit"]
+Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 class _Proven(CompileResultCacheImpl):
@@ -61,17 +62,17 @@ class _RenewedCache(FunctionCache):
             super().save_overload(sig, data)  # type: ignore[no-untyped-call]
 
 
-def njit(*signatures: Any, cache: bool = False, **options: Any) -> Callable[[Callable[..., Any]], Any]:
+def njit(*signatures: Any, cache: bool = False, **options: Any) -> Callable[[Function], Function]:
     """Compile a function as `numba.njit` does, at once for `signatures`."""
 
-    def compiled(function: Callable[..., Any]) -> Any:
-        dispatcher = numba.njit(**options)(function)
+    def compiled(function: Function) -> Function:
+        dispatcher: Any = numba.njit(**options)(function)
         if cache:
             dispatcher._cache = _RenewedCache(function)  # type: ignore[no-untyped-call]
         for signature in signatures:
             dispatcher.compile(signature)
         if signatures:
             dispatcher.disable_compile()
-        return dispatcher
+        return cast("Function", dispatcher)
 
     return compiled

@@ -5,6 +5,8 @@ from __future__ import annotations
 import tarfile
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -16,13 +18,14 @@ from kbs_process.plant.laws import CATALOGUE, SENSING
 from kbs_process.plant.rigid import inverse_dynamics, joint_efforts, kinematics, static_wrench
 from kbs_process.progress import SilentProgress
 from kbs_process.studies.diagnose.reading import experiment_of
+from proof.rivals.case import Array
 from proof.rivals.smoother.balance import FIRST_JOINT, FLOOR, PLATE, STILL, needed
 from proof.rivals.smoother.basis import BAND_HZ, WHOLE_HZ, Basis, in_band
-from proof.rivals.smoother.fit import Quadratic, State, step
+from proof.rivals.smoother.fit import Quadratic, State, restrained, step
 from proof.rivals.smoother.intensities import powers
 from proof.rivals.smoother.lines import orders_in, tones_in
 from proof.rivals.smoother.problem import Problem
-from proof.rivals.smoother.screen import evidence
+from proof.rivals.smoother.screen import Screen, evidence
 from proof.rivals.smoother.solve import settled
 
 CAMPAIGN = Path(__file__).parents[2] / "campaigns" / "EL089"
@@ -181,18 +184,61 @@ def test_a_clock_shows_all_that_it_is_late_by(tmp_path: Path) -> None:
         state.idealise(problem, 0.1)
         step(problem, state, Quadratic.of(problem, state), ~problem.dynamic)
     state.idealise(problem, 0.01)
-    course, recording = state.course(problem, 0), problem.recordings[0]
-    t, by = problem.experiment.dt * np.arange(len(course.shown)), 0.4
-    late = make_interp_spline(t, course.shown)(np.clip(t - by, 0.0, t[-1]))
+    recording, by = problem.recordings[0], 0.4
+    t = problem.experiment.dt * np.arange(recording.n)
+    then = make_interp_spline(t, recording.reading)(np.clip(t + by, 0.0, t[-1]))
     (offset,) = (law for law in SENSING if law.name == "clock_offset")
     wider = problem.joined(Candidate(offset, "wrench", ()))
-    joined = state.joined(problem, wider)
-    (own,) = wider.amplitudes[0]
-    joined.x[own] = by
-    column = joined.course(wider, 0).columns(wider.found)[:, wider.wrench, 0]
-    expected = in_band((late - course.shown)[recording.first :][: recording.n, wider.wrench], recording.dt)
-    inside = slice(40, -40)
-    assert by * column[inside] == pytest.approx(expected[inside], abs=1e-3 * np.abs(expected).max())
+    (own,), wrench, inside = wider.amplitudes[0], wider.wrench, slice(40, -40)
+
+    def shown(by: float) -> tuple[Array, Array]:
+        joined = state.joined(problem, wider)
+        joined.x[own] = by
+        slopes, beyond = joined.course(wider, 0).acting()
+        return by * slopes[inside, wrench, 0] + beyond[inside, wrench], slopes[inside, wrench, 0]
+
+    # What is read at its own time is what is read so much later, by this clock.
+    expected = in_band((recording.reading - then)[:, wrench], recording.dt)[inside]
+    assert shown(by)[0] == pytest.approx(expected, abs=1e-3 * np.abs(expected).max())
+    change, slope = (shown(by + 1e-3)[0] - shown(by - 1e-3)[0]) / 2e-3, shown(by)[1]
+    assert change == pytest.approx(slope, abs=0.01 * np.abs(slope).max())
+
+
+def test_a_step_takes_numbers_as_far_as_it_may_and_the_rest_all_the_way() -> None:
+    spread, rig = np.array([2.0, 0.1, 5.0]), slice(0, 2)
+    problem = cast("Problem", SimpleNamespace(spread=spread, of_rig=rig))
+    rows = np.array([[1.0, 2.0, 0.3], [0.4, 30.0, 0.1], [0.5, 4.0, 0.2]])
+    right = np.array([30.0, 7.0, -40.0])
+    quadratic = Quadratic({}, np.diag(spread**-2.0) + rows.T @ rows, rows.T @ right, 0.0)
+    free = restrained(problem, quadratic, 1e9, None)
+    assert quadratic.normal @ free == pytest.approx(quadratic.pull)
+    near = restrained(problem, quadratic, 0.5, None)
+    assert np.abs(near / spread)[rig].max() == pytest.approx(0.5, rel=1e-3)
+    # Whatever the numbers do, what is linear is at its best beside them.
+    assert (quadratic.normal @ near - quadratic.pull)[2] == pytest.approx(0.0, abs=1e-9 * np.abs(quadratic.pull).max())
+    held = restrained(problem, quadratic, 0.5, np.array([True, False, True]))
+    assert held[1] == 0.0
+
+
+@pytest.mark.slow
+def test_an_effect_takes_of_its_own_recording_what_it_was_said_to_take(tmp_path: Path) -> None:
+    problem = _null(tmp_path, [1])
+    recording = problem.recordings[0]
+    t = problem.experiment.dt * np.arange(recording.n)
+    recording.reading[:, problem.wrench] = make_interp_spline(t, recording.reading[:, problem.wrench])(t - 0.2)
+    state = settled(problem, np.repeat([0.05, 0.2, 0.01], [3, 2, 3]))
+    (offset,) = (law for law in SENSING if law.name == "clock_offset")
+    common = problem.own[0].start
+    problem.prior[:common] = state.x[:common]  # as of recordings held out
+    screen = Screen(problem, state)
+    (first,) = screen.scored([Candidate(offset, "wrench", ())])
+    one = screen.sized(first)
+    assert one.gain > 1.5 * first.gain > 30.0  # so late that the readings' slopes do not show it
+    stay = replace(one, moved=0.0 * one.moved)
+    assert screen.foreseen(stay) == pytest.approx((one.gain, one.gain), rel=0.1)
+    assert screen.foreseen(one)[0] == pytest.approx(one.gain, rel=0.1)
+    none = replace(one, amplitudes=-one.amplitudes, each=-one.each, moved=-one.moved)
+    assert screen.foreseen(none)[0] < -one.gain
 
 
 @pytest.mark.validation

@@ -26,6 +26,7 @@ from proof.rivals.smoother.problem import Problem
 
 _TAPS_HZ = 100.0
 _ON_TIME = 1e-5  # s, by which readings that are late have the slope at their instant
+_STEEP = 5e-3  # s, by which readings may be late and have one slope
 _KNOT_S = 1.0  # between poses at which ports are worked out
 
 
@@ -51,7 +52,7 @@ class Course:
         joints = slice(FIRST_JOINT, None)
         values = [whole, rotor, turning, angle[:, joints], rate[:, joints], angle[:, PLATE], rate[:, PLATE]]
         self.sizes: dict[tuple[str, str], Array] = {}  # amplitudes, as far as they are known, of effects at a place
-        shown = problem.predicted(k, x, motion, torques)
+        shown = problem.predicted(k, x, motion, torques) - problem.beyond[k]
         ends = np.cumsum([0, *(len(one.amplitudes) for one in problem.present)])
         for one, (a, b) in zip(problem.present, pairwise(ends), strict=True):
             self.sizes[one.name, one.site] = x[problem.amplitudes[k]][a:b]
@@ -84,9 +85,19 @@ class Course:
         )
         return force, direct
 
-    def columns(self, chosen: Sequence[Candidate]) -> Array:
-        """What a unit of each amplitude of each candidate does to the rows, (n, rows, amplitudes of all)."""
-        shown = [self._sensed(one) if not one.effect.in_plant else self._entered(one) for one in chosen]
+    def acting(self) -> tuple[Array, Array]:
+        """Slopes (n, rows, amplitudes) of what is present at its size, and what it does beyond them (n, rows)."""
+        present = self.problem.present
+        slopes, whole = self.columns(present, local=True), self.columns(present)
+        size = np.concatenate([self.sizes[one.name, one.site] for one in present])
+        return slopes, (whole - slopes) @ size
+
+    def columns(self, chosen: Sequence[Candidate], local: bool = False) -> Array:
+        """What a unit of each amplitude of each candidate does to the rows, (n, rows, amplitudes of all).
+
+        Of a clock that is known to be late this is all that it does over its lateness; its slope there, if `local`.
+        """
+        shown = [self._sensed(one, local) if not one.effect.in_plant else self._entered(one) for one in chosen]
         entered = [column for one in shown if isinstance(one, list) for column in one]
         slow = iter(self._slow([means for column in entered for means in column.values()]))
         rows = iter([self._rows({inlet: next(slow) for inlet in column}) for column in entered])
@@ -121,36 +132,44 @@ class Course:
             out[:, problem.joint] += force[:, 3 : 3 + problem.joints] + self._soft * force[:, 3 + problem.joints :]
         return out
 
-    def _sensed(self, candidate: Candidate) -> Array:
+    def _sensed(self, candidate: Candidate, local: bool) -> Array:
         problem, experiment = self.problem, self.problem.experiment
+        own = slice(self.recording.first, self.recording.first + self.recording.n)
         if candidate.effect.whole_band:
             shown = reduced(
                 candidate, self.tapped, experiment.channels, self.rig, experiment.dt, len(self.shown)
-            )  # fmt: skip
+            )[own]  # fmt: skip
         elif candidate.effect.port is SensingPort.STREAM:
-            shown = self._late(candidate)
+            shown = self._late(candidate, local)
         else:
             t = experiment.dt * np.arange(len(self.shown))
-            shown = sensed(candidate, t, self.shown, experiment.channels, self.rig)
+            shown = sensed(candidate, t, self.shown, experiment.channels, self.rig)[own]
         out = np.zeros((self.recording.n, problem.rows, shown.shape[2]))
         acted = np.flatnonzero(shown.any(axis=(0, 2)))  # of the readings, which are the first rows
-        out[:, acted] = in_band(shown[self.recording.first :][: self.recording.n, acted], self.recording.dt)
+        out[:, acted] = in_band(shown[:, acted], self.recording.dt)
         return out
 
-    def _late(self, candidate: Candidate) -> Array:
-        """What a unit of each amplitude of a clock's lateness does, (n, channels, amplitudes).
+    def turned(self, candidate: Candidate, size: Array) -> bool:
+        """Whether an effect of some size (amplitudes,) is beyond what its columns say of it to first order."""
+        if candidate.effect.port is not SensingPort.STREAM:
+            return False
+        units = unit_values(candidate, self.recording.dt * np.arange(len(self.shown)), {})
+        return bool(np.abs(units @ size).max() > _STEEP)
 
-        It is the readings' mean slope over the lateness that the clock is known to have: so that all of them together
-        show what was read then.
+    def _late(self, candidate: Candidate, local: bool) -> Array:
+        """What a unit of each amplitude of a clock's lateness does to readings, (n, channels, amplitudes).
+
+        It is their mean slope over the lateness that the clock is known to have: so that all of them together bring
+        back what was read at its own time. Their slope then, if `local`.
         """
-        channels, dt = self.problem.experiment.channels, self.problem.experiment.dt
-        t = dt * np.arange(len(self.shown))
+        recording, channels = self.recording, self.problem.experiment.channels
+        t = recording.dt * (recording.first + np.arange(recording.n))
         units = unit_values(candidate, t, {})
         late = (units @ self.sizes.get((candidate.name, candidate.site), np.zeros(units.shape[1])))[:, None]
         acted = stamped(candidate.site, channels, self.rig)
-        spline, known = make_interp_spline(t, self.shown[:, acted], k=3), np.abs(late) > _ON_TIME
-        read = spline(np.clip(t - late[:, 0], 0.0, t[-1]))
-        mean = (self.shown[:, acted] - read) / np.where(known, late, 1.0)
-        out = np.zeros((*self.shown.shape[:1], len(channels), units.shape[1]))
-        out[:, acted] = -np.where(known, mean, spline(t, 1))[:, :, None] * units[:, None, :]
+        spline, known = make_interp_spline(t, recording.reading[:, acted], k=3), np.abs(late) > _ON_TIME
+        then = np.clip(t + late[:, 0], t[0], t[-1])
+        mean = (spline(then) - recording.reading[:, acted]) / np.where(known, late, 1.0)
+        out = np.zeros((recording.n, len(channels), units.shape[1]))
+        out[:, acted] = -np.where(known & (not local), mean, spline(then, 1))[:, :, None] * units[:, None, :]
         return out

@@ -16,7 +16,11 @@ from proof.rivals.smoother.basis import LOCAL
 from proof.rivals.smoother.course import Course
 from proof.rivals.smoother.problem import Problem
 
-_FAR = 4.0  # prior sigmas that a number of the rig goes in a step at most
+# Prior sigmas that a number of the rig goes in a step at most: to begin with, at most, at least; and by what it grows
+# where a step made the cost less, and shrinks where it did not.
+REACH, _FAR, NEAR, _ONWARD, _BACK = 2.0, 4.0, 0.1, 2.0, 0.4
+_HELD = (-3.0, 12.0)  # powers of ten: of what holds the rig's numbers where they are, over what priors do
+_HALVINGS = 24
 _RUNS = 2  # steps in which a motion follows unknowns that moved
 
 
@@ -30,6 +34,8 @@ class State:
     torques: list[Array] = field(default_factory=list)  # of the rotors along each motion
     ideal: list[Array] = field(default_factory=list)  # coefficients of the motion that the model has by itself
     ideal_torques: list[Array] = field(default_factory=list)
+    reach: float = REACH
+    lowest: float = np.inf  # cost where the last step began
 
     @classmethod
     def of(cls, problem: Problem, forces: Array) -> State:
@@ -51,7 +57,7 @@ class State:
             x[new.stop - 2 : new.stop] = self.x[clocks : old.stop]
         return replace(
             self, x=x, coefficients=[*self.coefficients], sigma=self.sigma.copy(), torques=[*self.torques],
-            ideal=[*self.ideal], ideal_torques=[*self.ideal_torques],
+            ideal=[*self.ideal], ideal_torques=[*self.ideal_torques], reach=REACH, lowest=np.inf,
         )  # fmt: skip
 
     def motion(self, problem: Problem, k: int) -> Motion:
@@ -74,7 +80,7 @@ class State:
         sigma[problem.forces] *= stiff
         for k in range(len(self.ideal)):
             if problem.present:
-                problem.acting[k] = self.course(problem, k).columns(problem.present)
+                problem.acting[k], problem.beyond[k] = self.course(problem, k).acting()
             for _ in range(_RUNS):
                 self.ideal[k], self.ideal_torques[k] = _moved(
                     problem, k, self.x, self.ideal[k], self.ideal_torques[k], self.weights(problem, k, sigma)
@@ -86,6 +92,19 @@ class State:
             self.coefficients[k], self.torques[k] = _moved(
                 problem, k, self.x, self.coefficients[k], self.torques[k], self.weights(problem, k)
             )
+
+    def adapt(self, problem: Problem) -> None:
+        """Go farther where the last step made the cost less, and less far where it did not."""
+        cost = self.cost(problem)
+        if np.isfinite(self.lowest):
+            self.reach = float(np.clip(self.reach * (_BACK if cost > self.lowest else _ONWARD), NEAR, _FAR))
+        self.lowest = cost
+
+    def weigh(self, problem: Problem, forces: Array) -> None:
+        """Take other sigmas of forces (their rows,)."""
+        before = self.cost(problem)
+        self.sigma[problem.forces] = forces
+        self.lowest += self.cost(problem) - before
 
     def ideal_motion(self, problem: Problem, k: int) -> Motion:
         """The motion that the model has by itself."""
@@ -281,10 +300,12 @@ class Quadratic:
             left += float(whole[-1, -1])
         return cls(parts, normal, pull, left)
 
-    def solve(self, spread: Array, right: Array, free: NDArray[np.bool_] | None = None) -> Array:
-        """normal^-1 right, of the free unknowns; zero of the others."""
+    def solve(
+        self, spread: Array, right: Array, free: NDArray[np.bool_] | None = None, held: Array | float = 0.0
+    ) -> Array:
+        """normal^-1 right, of the free unknowns; zero of the others. `held` is added to the normal's diagonal."""
         scale = spread if free is None else np.where(free, spread, 0.0)
-        factor = cho_factor(self.normal * np.outer(scale, scale) + np.diag((scale == 0.0).astype(float)))
+        factor = cho_factor(self.normal * np.outer(scale, scale) + np.diag((scale == 0.0) + held * np.ones(len(scale))))
         found = cho_solve(factor, right.reshape(len(spread), -1) * scale[:, None]) * scale[:, None]
         return np.asarray(found.reshape(right.shape))
 
@@ -299,11 +320,12 @@ def step(problem: Problem, state: State, quadratic: Quadratic, free: NDArray[np.
     What pulls an unknown is what the residual has of its slopes along the motion that the model has by itself, so that
     no noise is in both (instruments): the smoothed motion's own noise would pull all that scales a balance to nothing.
     """
-    change = quadratic.solve(problem.spread, quadratic.pull, free)
-    far = np.abs(change / problem.spread)[problem.of_rig]  # rows are linear in what is no number of the rig
-    change *= min(1.0, _FAR / max(float(far.max(initial=0.0)), 1e-300))
+    numbers = problem.of_rig
+    free = np.ones(len(state.x), dtype=bool) if free is None else free.copy()
+    free[numbers] &= (state.x[numbers] > problem.lower) | (quadratic.pull[numbers] > 0.0)
+    change = restrained(problem, quadratic, state.reach, free)
     bounded = state.x + change
-    bounded[problem.of_rig] = np.maximum(bounded[problem.of_rig], problem.lower)
+    bounded[numbers] = np.maximum(bounded[numbers], problem.lower)
     change, state.x = bounded - state.x, bounded
     state.coefficients = [
         c + part.motion.coefficients(part.against @ np.append(-change[local], 1.0))
@@ -312,3 +334,24 @@ def step(problem: Problem, state: State, quadratic: Quadratic, free: NDArray[np.
     state.follow(problem)
     state.smooth(problem)
     return float(np.sqrt(change @ quadratic.normal @ change))
+
+
+def restrained(problem: Problem, quadratic: Quadratic, reach: float, free: NDArray[np.bool_] | None) -> Array:
+    """The change of unknowns that lessens the cost most while no number of the rig goes farther than `reach` sigmas.
+
+    Rows are linear in all others, which go as far as they like. Source: J. J. More, The Levenberg-Marquardt algorithm:
+    implementation and theory, Lecture Notes in Mathematics 630 (1978) 105.
+    """
+    own, numbers = np.zeros(len(problem.spread)), problem.of_rig
+    own[numbers] = 1.0
+
+    def held(by: float) -> tuple[Array, bool]:
+        change = quadratic.solve(problem.spread, quadratic.pull, free, by * own)
+        return change, bool(np.abs(change / problem.spread)[numbers].max(initial=0.0) <= reach)
+
+    change, near = held(0.0)
+    low, high = _HELD
+    for _ in range(0 if near else _HALVINGS):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if held(10.0**middle)[1] else (middle, high)
+    return change if near else held(10.0**high)[0]

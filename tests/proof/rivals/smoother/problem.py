@@ -179,6 +179,8 @@ class Problem:
         self.acting = [
             np.zeros((r.n, self.rows, len(own))) for r, own in zip(self.recordings, self.amplitudes, strict=True)
         ]
+        # What clocks do beyond these slopes.
+        self.beyond = [np.zeros((r.n, self.rows)) for r in self.recordings]
         scales = (".Ka", ".fsv", ".Tmax", ".inertia[0]", ".inertia[1]", ".inertia[2]")
         positive = [
             name.endswith(scales) or name.startswith(("transducer.stiffness", "transducer.damping"))
@@ -272,7 +274,7 @@ class Problem:
             winding /= 1.0 + float(numbers["Ka"]) / (ratio**2 * spring(joint.drive))
             out[:, self.joint.start + j] = float(numbers["Ka"]) * wound + float(numbers["fsv"]) * winding - torque
         out[:, self.floor] = angle[:, FLOOR]
-        return out + self.acting[k] @ x[self.amplitudes[k]]
+        return out + self.acting[k] @ x[self.amplitudes[k]] + self.beyond[k]
 
     def residual(self, k: int, x: Array, motion: Motion, torques: Array) -> Array:
         """Measured less predicted (n, rows); the balances' measured is zero."""

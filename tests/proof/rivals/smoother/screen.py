@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from itertools import cycle
 
@@ -27,6 +28,9 @@ _FIRST_STEP = 0.1  # of a shape's value
 _HALVINGS = 12
 _ROUNDS, _SETTLED = 4, 0.02  # through all shapes, at most, and while the gain grows by such a share
 _BEND = 1e-3  # of a shape's value: step of its slope
+_SIZES = 10  # passes to the size of an effect whose columns it changes
+_KNOWN = 4.0  # of the cost, for which a shape is not changed
+_MOST = 0.5  # of its value, that a shape goes at once
 _NORMAL = 1.96  # sigmas of an interval of 95 %
 _NEAR = 0.7  # of the gain, beside the best shape, from which on a parabola leads there
 
@@ -40,6 +44,7 @@ class Scored:
     freedom: int  # amplitudes that make a difference
     amplitudes: Array  # that all recordings share
     each: Array  # (recordings or 1, amplitudes)
+    moved: Array  # by which unknowns that all recordings share go elsewhere beside it
     likely: float = 0.0  # of amplitudes of this size, beforehand; see `_likely`
     foreseen: float = 0.0  # what these amplitudes take on recordings held out
 
@@ -132,14 +137,13 @@ class Screen:
         return sorted(found, key=lambda one: -one.worth)
 
     def refined(self, one: Scored) -> Scored:
-        """The same with its shape where it takes most, one number after the other, and of the size that it has there."""
+        """The same with its shape where it takes most, one number after the other."""
         free = {
             entry.name: entry for entry in one.candidate.effect.parameters if entry.role == "shape" and not entry.whole
         }
         places = [place for place, (name, _) in enumerate(one.candidate.shape) if name in free]
-        for _ in range(_ROUNDS):
+        for _ in range(_ROUNDS if len(places) > 1 else 1):
             before = one.gain
-            one = self._sized(one)
             for place in places:
                 entry = free[one.candidate.shape[place][0]]
                 low, high = entry.bounds
@@ -148,18 +152,39 @@ class Screen:
                 break
         return one
 
-    def _sized(self, one: Scored) -> Scored:
+    def sized(self, one: Scored) -> Scored:
         """The same about the size that it has: readings that are late by more than they turn in are no slope."""
-        for course, size in zip(self.courses, cycle(one.each)):
-            course.sizes[one.candidate.name, one.candidate.site] = size
-        (found,) = self.scored([one.candidate])
-        return found
+        for _ in range(_SIZES):
+            if not any(course.turned(one.candidate, size) for course, size in self._each(one)):
+                break
+            before = one.gain
+            with self._about(one):
+                (one,) = self.scored([one.candidate])
+            if one.gain < (1.0 + _SETTLED) * before:
+                break
+        return one
+
+    def _each(self, one: Scored) -> Iterator[tuple[Course, Array]]:
+        return zip((self.courses[k] for k in self.quadratic.parts), cycle(one.each))
+
+    @contextmanager
+    def _about(self, one: Scored) -> Iterator[None]:
+        """Take its columns about the size that it has."""
+        place = one.candidate.name, one.candidate.site
+        for course, size in self._each(one):
+            course.sizes[place] = size
+        try:
+            yield
+        finally:
+            for course in self.courses:
+                course.sizes.pop(place, None)
 
     def _along(self, one: Scored, place: int, bounds: tuple[float, float]) -> Scored:
         def at(value: float) -> Scored:
             shape = list(one.candidate.shape)
             shape[place] = (shape[place][0], float(np.clip(value, *bounds)))
-            (found,) = self.scored([replace(one.candidate, shape=tuple(shape))])
+            with self._about(one):
+                (found,) = self.scored([replace(one.candidate, shape=tuple(shape))])
             return found
 
         step, best = _FIRST_STEP * max(abs(one.candidate.shape[place][1]), _FIRST_STEP), one
@@ -176,34 +201,37 @@ class Screen:
             best = max(best, low, high, key=lambda found: found.gain)
         return best
 
-    def predicted(self, one: Scored) -> float:
-        """What an effect takes of the cost with the amplitudes that it has, which were found elsewhere.
+    def foreseen(self, one: Scored) -> tuple[float, float]:
+        """What an effect takes of the cost as it was found elsewhere; and what it would take if that were right.
 
-        Amplitudes of each recording's own are free, and count as `evidence`.
+        Numbers that all recordings share go where they go beside it. Amplitudes of each recording's own are free, and
+        count as `evidence`: of these nothing is foretold.
         """
-        found = self._products([one.candidate])
-        square, right = self._beside(found)
-        given, free = one.amplitudes, found.own
-        gained = float(2.0 * given @ right[~free] - given @ square[np.ix_(~free, ~free)] @ given)
+        with nullcontext() if one.candidate.effect.each_trial else self._about(one):
+            found = self._products([one.candidate])
+        quadratic, spread, free = self.quadratic, self.problem.spread, found.own
+        size, moved = np.zeros(len(free)), np.zeros(len(spread))
+        size[~free], moved[: len(one.moved)] = one.amplitudes, one.moved
+        squares = quadratic.normal - np.diag(spread**-2.0)
+        there = found.unknowns @ size + squares @ moved
+        left = quadratic.pull - there
+        solved = quadratic.solve(spread, np.stack([left, there], axis=1))
+        entered = size @ found.squares @ size + moved @ (there + found.unknowns @ size)
+        taken = 2.0 * (size @ found.residual + moved @ quadratic.pull) - entered
+        taken += left @ solved[:, 0] - quadratic.pull @ self._own
         if free.any():
-            rest = right[free] - square[np.ix_(free, ~free)] @ given
-            size = np.sqrt(np.maximum(np.diag(found.squares)[free], 1e-300))
-            most, _, freedom = _best(square[np.ix_(free, free)], rest, size)
-            gained += evidence(most, freedom)
-        return gained
-
-    def foretold(self, one: Scored) -> float:
-        """What an effect of common amplitudes would take, if they were right."""
-        found = self._products([one.candidate])
-        if found.own.any():
-            return 0.0
-        square, _ = self._beside(found)
-        given = one.amplitudes[-len(square) :]
-        return float(given @ square @ given)
+            square, _ = self._beside(found)
+            right = found.residual - found.squares @ size - found.unknowns.T @ (moved + solved[:, 0])
+            width = np.sqrt(np.maximum(np.diag(found.squares)[free], 1e-300))
+            most, _, freedom = _best(square[np.ix_(free, free)], right[free], width)
+            taken += evidence(most, freedom)
+        return float(taken), 0.0 if free.any() else float(entered - there @ solved[:, 1])
 
     def _scored(self, chosen: Sequence[Candidate]) -> Iterator[Scored]:
         found = self._products(chosen)
+        solved = self.quadratic.solve(self.problem.spread, found.unknowns)
         square, right = self._beside(found)
+        common = self.problem.own[0].start
         size = np.sqrt(np.maximum(np.diag(found.squares), 1e-300))
         for number, one in enumerate(chosen):
             places = np.flatnonzero(found.owner == number)
@@ -214,12 +242,37 @@ class Screen:
                 gain = float(held @ (2.0 * right[places] - square[np.ix_(places, places)] @ held))
             each = amplitudes.reshape(-1, len(one.amplitudes))
             likely = _likely(one.amplitudes, np.sqrt(np.mean(each**2, axis=0)))
-            yield Scored(one, gain, freedom, amplitudes[~found.own[places]], each, likely)
+            moved = -solved[:common, places] @ amplitudes
+            yield Scored(one, gain, freedom, amplitudes[~found.own[places]], each, moved, likely)
 
     def _beside(self, found: _Products) -> tuple[Array, Array]:
         """Squares and products with the residual, once all numbers have had their part."""
         solved = self.quadratic.solve(self.problem.spread, found.unknowns)
         return found.squares - found.unknowns.T @ solved, found.residual - found.unknowns.T @ self._own
+
+    def reshaped(self, candidate: Candidate, each: Array) -> Candidate:
+        """An effect that is present, of amplitudes `each` (recordings, amplitudes), with its shape where it fits best.
+
+        It is the same if its shape is known no better than what is gained.
+        """
+        names = _bending(candidate)
+        if not names:
+            return candidate
+        found = self._products([candidate], _Bends(names, each))
+        bent = found.owner > 0
+        square, right = (part[..., bent] for part in self._beside(found))
+        square = square[bent]
+        size = np.sqrt(np.maximum(np.diag(found.squares)[bent], 1e-300))
+        gain, change, _ = _best(square, right, size)
+        if gain < _KNOWN:
+            return candidate
+        by = dict(zip(names, change, strict=True))
+        bounds = {entry.name: entry.bounds for entry in candidate.effect.parameters}
+        shape = []
+        for name, value in candidate.shape:
+            most = _MOST * abs(value)
+            shape.append((name, float(np.clip(value + np.clip(by.get(name, 0.0), -most, most), *bounds[name]))))
+        return replace(candidate, shape=tuple(shape))
 
     def estimated(self, one: Scored) -> tuple[Estimate, ...]:
         """Amplitudes and shapes of an effect beside all numbers, with intervals of 95 %.
@@ -228,11 +281,12 @@ class Screen:
         """
         candidate, chosen = one.candidate, dict(one.candidate.shape)
         entries = {entry.name: entry for entry in candidate.effect.parameters}
-        bends = [name for name in chosen if entries[name].role == "shape" and not entries[name].whole]
-        found = self._products([candidate])
+        bends = _bending(candidate)
+        with self._about(one):
+            found = self._products([candidate])
         square, right = self._beside(found)
         _, amplitudes, _ = _best(square, right, np.sqrt(np.maximum(np.diag(found.squares), 1e-300)))
-        found = self._products([candidate], _Bends(tuple(bends), amplitudes.reshape(-1, len(candidate.amplitudes))))
+        found = self._products([candidate], _Bends(bends, amplitudes.reshape(-1, len(candidate.amplitudes))))
         square, right = self._beside(found)
         size = np.sqrt(np.maximum(np.diag(found.squares), 1e-300))
         covariance = np.linalg.pinv(square / np.outer(size, size), rcond=_DEPENDENT, hermitian=True)
@@ -277,6 +331,12 @@ class Screen:
             residual[there] += mixed[taken, -1]
             squares[np.ix_(there, there)] += square[np.ix_(taken, taken)]
         return _Products(unknowns, residual, squares, owner[source], recording >= 0)
+
+
+def _bending(candidate: Candidate) -> tuple[str, ...]:
+    """Shapes that may have any value."""
+    free = {entry.name for entry in candidate.effect.parameters if entry.role == "shape" and not entry.whole}
+    return tuple(name for name, _ in candidate.shape if name in free)
 
 
 def estimate(name: str, unit: str, value: float, sigma: float) -> Estimate:

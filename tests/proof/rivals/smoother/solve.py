@@ -21,7 +21,7 @@ from kbs_process.studies.diagnose.reading import experiment_of
 from proof.answer import Answer, Claim, Estimate, Moved, Suspect
 from proof.answer import Candidate as Claimed
 from proof.rivals.case import Array
-from proof.rivals.smoother.fit import Quadratic, State, step
+from proof.rivals.smoother.fit import NEAR, REACH, Quadratic, State, step
 from proof.rivals.smoother.intensities import powers
 from proof.rivals.smoother.problem import Problem
 from proof.rivals.smoother.screen import Scored, Screen, estimate
@@ -42,14 +42,17 @@ ONWARD = (0.5, 1.2)
 KNOWN = 0.2  # of its logarithm, below which a force's sigma is known
 DETECTED = 400.0  # of the cost, that an effect takes of all recordings: what the equations here leave out takes less
 SHARE = 0.25  # of its gain for each sample, that an effect of each recording's own has on recordings held out
-FORETOLD = 0.5  # of what another would take there, that it takes
+FORETOLD = 0.25  # of what another would take there, that it takes: what is not there takes as much less than nothing
 MOST = 3  # effects
+RESHAPED = 3  # times that a shape goes on beside all numbers
 OFF = 4.0  # sigmas
 LEADERS = 12  # laws at a place, of which shapes are refined and recordings held out are asked
 BEHIND = 0.2  # of the first's worth, with less of which one is no leader
 NEXT = 2  # alternatives that are named
 ALIKE = 9.0  # of the cost: what differs by less is not told apart
-INEXACT = 0.02  # of what an effect is worth: what differs by less is fitted, as columns are right to first order
+# Of what an effect is worth: what differs by less is fitted, as columns are right to first order; and what is worth
+# less beside it may be what its law lacks.
+INEXACT = 0.02
 RIVALS = 3  # of other places or physics, that are
 
 
@@ -93,13 +96,14 @@ def settled(problem: Problem, sigma: Array | None = None, begun: State | None = 
         _stepped(problem, state, STIFF[1], ~problem.dynamic)
     for _ in range(STEPS):
         wrong = 0.0 if weighing is None else weighing.weighed(problem, state)
-        if _stepped(problem, state, STIFF[2]) < ARRIVED and wrong < KNOWN:
+        if (_stepped(problem, state, STIFF[2]) < ARRIVED or state.reach == NEAR) and wrong < KNOWN:
             break
     return state
 
 
 def _stepped(problem: Problem, state: State, stiff: float, free: NDArray[np.bool_] | None = None) -> float:
     state.idealise(problem, stiff)
+    state.adapt(problem)
     return step(problem, state, Quadratic.of(problem, state), free)
 
 
@@ -122,7 +126,7 @@ class _Weighing:
         ratio = np.maximum(np.sqrt(powers(problem, state).noise[problem.forces]), self.least / sigma)
         self.reach *= np.where(np.log(ratio) * self.before < 0.0, *ONWARD)
         self.before = np.log(ratio)
-        state.sigma[problem.forces] = sigma * np.clip(ratio ** np.minimum(self.reach, BEYOND), *CHANGE)
+        state.weigh(problem, sigma * np.clip(ratio ** np.minimum(self.reach, BEYOND), *CHANGE))
         return float(np.abs(np.log(np.clip(ratio, *CHANGE))).max())
 
 
@@ -140,22 +144,23 @@ def _finds(problem: Problem, state: State, judge: _Judge | None) -> tuple[tuple[
     numbers settle again. What comes again and no number takes up counts as noise until an effect explains it.
     """
     finds: list[Claim] = []
-    forces, noise = problem.forces, state.sigma.copy()
+    forces, noise, most = problem.forces, state.sigma.copy(), 0.0
     while len(finds) < MOST:
         excess = powers(problem, state).of_all
         state.sigma[forces] = (noise * np.sqrt(np.maximum(excess, 1.0)))[forces]
         screen = Screen(problem, state)
         taken = {_suspect(one) for one in problem.found}  # another shape of one is no second effect
         chosen = [one for one in screen.candidates() if _suspect(one) not in taken]
-        seen = [one.candidate for one in _first_of_each(screen.survey().scored(chosen))]
-        leaders = [screen.refined(one) for one in screen.scored(seen)]
+        survey = screen.survey()
+        seen = [one.candidate for one in _first_of_each([survey.sized(one) for one in survey.scored(chosen)])]
+        leaders = [screen.refined(screen.sized(one)) for one in screen.scored(seen)]
         if judge is not None:
             held = judge.screen(state.sigma[forces])
-            leaders = [replace(one, foreseen=held.predicted(one)) for one in leaders]
-            leaders = [one for one in leaders if judge.confirms(one, held)]
+            leaders = [told for one in leaders if (told := judge.confirmed(one, held))]
         leaders.sort(key=lambda one: -one.worth)
-        if not leaders or leaders[0].worth < DETECTED:
+        if not leaders or leaders[0].worth < max(DETECTED, INEXACT * most):
             break
+        most = max(most, leaders[0].worth)
         state.sigma[forces] = noise[forces]
         tried = Counter((one.name, one.site) for one in chosen)
         every = sorted((_beside(problem, state, one, tried) for one in _alike(leaders)), key=lambda one: one.cost)
@@ -201,9 +206,17 @@ class _Fitted:
 
 
 def _beside(problem: Problem, state: State, one: Scored, tried: Mapping[tuple[str, str], int]) -> _Fitted:
-    """All numbers settled beside an effect; what was tried more often is less likely beforehand."""
+    """All numbers settled beside an effect and its shape; what was tried more often is less likely beforehand."""
     wider = problem.joined(one.candidate)
     begun = settled(wider, begun=state.joined(problem, wider))
+    for _ in range(RESHAPED):
+        each = np.stack([begun.x[own][-len(one.candidate.amplitudes) :] for own in wider.amplitudes])
+        candidate = Screen(wider, begun).reshaped(one.candidate, each)
+        if candidate == one.candidate:
+            break
+        one = replace(one, candidate=candidate)
+        wider = problem.joined(candidate)
+        begun = settled(wider, begun=replace(begun, reach=REACH, lowest=np.inf))
     often = tried[one.candidate.name, one.candidate.site]
     return _Fitted(one, wider, begun, begun.cost(wider) + 2.0 * float(np.log(often)) - one.likely)
 
@@ -211,7 +224,7 @@ def _beside(problem: Problem, state: State, one: Scored, tried: Mapping[tuple[st
 def _first_of_each(scored: Sequence[Scored]) -> list[Scored]:
     """The best shape of each law at each place, of the first few."""
     first: dict[tuple[str, str], Scored] = {}
-    for one in scored:
+    for one in sorted(scored, key=lambda one: -one.worth):
         first.setdefault((one.candidate.name, one.candidate.site), one)
     leaders = list(first.values())[:LEADERS]
     return [one for one in leaders if one.worth > BEHIND * leaders[0].worth]
@@ -251,12 +264,14 @@ class _Judge:
         self.state.sigma[self.problem.forces] = forces
         return Screen(self.problem, self.state)
 
-    def confirms(self, one: Scored, held: Screen) -> bool:
-        """Whether they show an effect, as far as it shows there."""
+    def confirmed(self, one: Scored, held: Screen) -> Scored | None:
+        """An effect with what it takes there, if they show it as far as it shows there."""
+        taken, foretold = held.foreseen(one)
         if one.candidate.effect.each_trial:
-            return one.foreseen > SHARE * self.samples * one.gain
-        foretold = held.foretold(one)
-        return foretold < ALIKE or one.foreseen > FORETOLD * foretold
+            shown = taken > SHARE * self.samples * one.gain
+        else:
+            shown = foretold < ALIKE or taken > FORETOLD * foretold
+        return replace(one, foreseen=taken) if shown else None
 
 
 def _know(problem: Problem, fitted: Problem, state: State) -> None:
