@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -98,3 +99,23 @@ print(os.path.exists({str(work / "key")!r}))
 def test_a_method_that_does_not_end_is_ended(tmp_path: Path) -> None:
     with pytest.raises(subprocess.TimeoutExpired):
         isolate.run([sys.executable, "-c", "import time; time.sleep(60)"], tmp_path, hidden=(), timeout_s=0.5)
+
+
+@pytest.mark.skipif(isolate.level() != "namespace", reason="there are no user namespaces here")
+def test_a_method_ends_with_the_bench_that_is_killed(tmp_path: Path) -> None:
+    beat = "import time\nwhile True: open('beat', 'a').write('.'); time.sleep(0.02)"
+    bench = f"""
+from pathlib import Path
+from proof import isolate
+isolate.run([{sys.executable!r}, "-c", {beat!r}], Path({str(tmp_path)!r}), hidden=(), timeout_s=60.0)
+"""
+    beats = tmp_path / "beat"
+    with subprocess.Popen([sys.executable, "-c", bench], cwd=Path(__file__).parents[1]) as process:
+        while not beats.exists():
+            assert process.poll() is None
+            time.sleep(0.02)
+        process.kill()
+    time.sleep(0.3)
+    last = beats.stat().st_size
+    time.sleep(0.3)
+    assert beats.stat().st_size == last
