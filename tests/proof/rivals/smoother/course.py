@@ -27,6 +27,7 @@ from proof.rivals.smoother.problem import Problem
 _TAPS_HZ = 100.0
 _ON_TIME = 1e-5  # s, by which readings that are late have the slope at their instant
 _STEEP = 5e-3  # s, by which readings may be late and have one slope
+_PASSES = 3
 _KNOT_S = 1.0  # between poses at which ports are worked out
 
 
@@ -165,7 +166,10 @@ class Course:
         recording, channels = self.recording, self.problem.experiment.channels
         t = recording.dt * (recording.first + np.arange(recording.n))
         units = unit_values(candidate, t, {})
-        late = (units @ self.sizes.get((candidate.name, candidate.site), np.zeros(units.shape[1])))[:, None]
+        size = self.sizes.get((candidate.name, candidate.site), np.zeros(units.shape[1]))
+        for _ in range(_PASSES if size.any() else 0):  # what was read then was late by what its clock was late then
+            units = unit_values(candidate, t + units @ size, {})
+        late = (units @ size)[:, None]
         acted = stamped(candidate.site, channels, self.rig)
         spline, known = make_interp_spline(t, recording.reading[:, acted], k=3), np.abs(late) > _ON_TIME
         then = np.clip(t + late[:, 0], t[0], t[-1])

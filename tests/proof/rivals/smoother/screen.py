@@ -22,6 +22,7 @@ from proof.rivals.smoother.fit import Quadratic, State
 from proof.rivals.smoother.lines import proposed
 from proof.rivals.smoother.problem import Problem
 
+Places = NDArray[np.intp]
 _BATCH = 200  # columns at once
 _DEPENDENT = 1e-5  # of a column that all numbers leave
 _FIRST_STEP = 0.1  # of a shape's value
@@ -250,19 +251,12 @@ class Screen:
         solved = self.quadratic.solve(self.problem.spread, found.unknowns)
         return found.squares - found.unknowns.T @ solved, found.residual - found.unknowns.T @ self._own
 
-    def reshaped(self, candidate: Candidate, each: Array) -> Candidate:
-        """An effect that is present, of amplitudes `each` (recordings, amplitudes), with its shape where it fits best.
+    def reshaped(self, candidate: Candidate, places: Places) -> Candidate:
+        """An effect that is present with its shape where it fits best beside all numbers; the same, if that is little.
 
-        It is the same if its shape is known no better than what is gained.
+        `places` (recordings, amplitudes) are those of its amplitudes among the unknowns.
         """
-        names = _bending(candidate)
-        if not names:
-            return candidate
-        found = self._products([candidate], _Bends(names, each))
-        bent = found.owner > 0
-        square, right = (part[..., bent] for part in self._beside(found))
-        square = square[bent]
-        size = np.sqrt(np.maximum(np.diag(found.squares)[bent], 1e-300))
+        names, square, right, size, _ = self._bent(candidate, places)
         gain, change, _ = _best(square, right, size)
         if gain < _KNOWN:
             return candidate
@@ -274,31 +268,36 @@ class Screen:
             shape.append((name, float(np.clip(value + np.clip(by.get(name, 0.0), -most, most), *bounds[name]))))
         return replace(candidate, shape=tuple(shape))
 
-    def estimated(self, one: Scored) -> tuple[Estimate, ...]:
-        """Amplitudes and shapes of an effect beside all numbers, with intervals of 95 %.
+    def estimated(self, candidate: Candidate, places: Places) -> tuple[Estimate, ...]:
+        """Amplitudes and shapes of an effect that is present beside all numbers, with intervals of 95 %.
 
-        Of amplitudes of each recording's own, those of the first. A shape that was chosen from a grid has no interval.
+        Of amplitudes of each recording's own, those of the first. `places` as above.
         """
-        candidate, chosen = one.candidate, dict(one.candidate.shape)
-        entries = {entry.name: entry for entry in candidate.effect.parameters}
-        bends = _bending(candidate)
-        with self._about(one):
-            found = self._products([candidate])
-        square, right = self._beside(found)
-        _, amplitudes, _ = _best(square, right, np.sqrt(np.maximum(np.diag(found.squares), 1e-300)))
-        found = self._products([candidate], _Bends(bends, amplitudes.reshape(-1, len(candidate.amplitudes))))
-        square, right = self._beside(found)
-        size = np.sqrt(np.maximum(np.diag(found.squares), 1e-300))
+        names, square, _, size, solved = self._bent(candidate, places)
         covariance = np.linalg.pinv(square / np.outer(size, size), rcond=_DEPENDENT, hermitian=True)
-        values, sigmas = covariance @ (right / size) / size, np.sqrt(np.maximum(np.diag(covariance), 0.0)) / size
-        first = np.arange(len(candidate.amplitudes))
-        told = [(entry, values[k], sigmas[k]) for entry, k in zip(candidate.amplitudes, first, strict=True)]
-        bent = np.flatnonzero(found.owner > 0)
-        told += [
-            (entries[name], chosen[name] + float(np.clip(values[k], -3.0 * sigmas[k], 3.0 * sigmas[k])), sigmas[k])
-            for name, k in zip(bends, bent, strict=True)
-        ]
-        return tuple(estimate(entry.name, entry.unit, float(value), float(sigma)) for entry, value, sigma in told)
+        covariance /= np.outer(size, size)
+        own, alone = places[0], np.eye(len(self.problem.spread))[:, places[0]]
+        variance = np.diag(self.quadratic.solve(self.problem.spread, alone)[own])
+        variance = variance + np.einsum("ij,jk,ik->i", solved[own], covariance, solved[own])
+        entries = {entry.name: entry for entry in candidate.effect.parameters}
+        bent = dict(zip(names, np.diag(covariance), strict=True))
+        told = [*zip(candidate.amplitudes, self.state.x[own], variance, strict=True)]
+        told += [(entries[name], value, bent[name]) for name, value in candidate.shape if name in bent]
+        return tuple(estimate(one.name, one.unit, float(v), float(np.sqrt(max(var, 0.0)))) for one, v, var in told)
+
+    def _bent(self, candidate: Candidate, places: Places) -> tuple[tuple[str, ...], Array, Array, Array, Array]:
+        """Shapes that may have any value; products of a unit of each with each other and the residual, beside numbers.
+
+        And sizes of their columns, and what numbers do for a unit of each.
+        """
+        free = {entry.name for entry in candidate.effect.parameters if entry.role == "shape" and not entry.whole}
+        names = tuple(name for name, _ in candidate.shape if name in free)
+        found = self._products([candidate], _Bends(names, self.state.x[places]))
+        bent = found.owner > 0
+        square, right = self._beside(found)
+        solved = self.quadratic.solve(self.problem.spread, found.unknowns[:, bent])
+        size = np.sqrt(np.maximum(np.diag(found.squares)[bent], 1e-300))
+        return names, square[np.ix_(bent, bent)], right[bent], size, solved
 
     def _products(self, every: Sequence[Candidate], bends: _Bends | None = None) -> _Products:
         sizes = [len(one.amplitudes) for one in every]
@@ -331,12 +330,6 @@ class Screen:
             residual[there] += mixed[taken, -1]
             squares[np.ix_(there, there)] += square[np.ix_(taken, taken)]
         return _Products(unknowns, residual, squares, owner[source], recording >= 0)
-
-
-def _bending(candidate: Candidate) -> tuple[str, ...]:
-    """Shapes that may have any value."""
-    free = {entry.name for entry in candidate.effect.parameters if entry.role == "shape" and not entry.whole}
-    return tuple(name for name, _ in candidate.shape if name in free)
 
 
 def estimate(name: str, unit: str, value: float, sigma: float) -> Estimate:

@@ -18,13 +18,13 @@ from kbs_process.diagnosis.screening.suspects import Candidate
 from kbs_process.plant.sensing import BY
 from kbs_process.progress import SilentProgress
 from kbs_process.studies.diagnose.reading import experiment_of
-from proof.answer import Answer, Claim, Estimate, Moved, Suspect
+from proof.answer import Answer, Claim, Moved, Suspect
 from proof.answer import Candidate as Claimed
 from proof.rivals.case import Array
 from proof.rivals.smoother.fit import NEAR, REACH, Quadratic, State, step
 from proof.rivals.smoother.intensities import powers
 from proof.rivals.smoother.problem import Problem
-from proof.rivals.smoother.screen import Scored, Screen, estimate
+from proof.rivals.smoother.screen import Scored, Screen
 
 METHOD = "smoother"
 WIDER, OF_JOINT = 10.0, 3.0  # times a reading's noise that forces are, to begin with; those of joints times as much
@@ -166,26 +166,21 @@ def _finds(problem: Problem, state: State, judge: _Judge | None) -> tuple[tuple[
         every = sorted((_beside(problem, state, one, tried) for one in _alike(leaders)), key=lambda one: one.cost)
         best, problem, state = every[0].scored, every[0].problem, every[0].state
         alike = [one.scored for one in every if one.cost < every[0].cost + ALIKE]
-        finds.append(_claim(best, leaders, alike, screen.estimated(best)))
+        finds.append(_claim(best, leaders, alike))
         judge = None if judge is None else judge.joined(best.candidate, problem, state)
     return _as_fitted(finds, problem, state), refitted(problem, state)
 
 
 def _as_fitted(finds: Sequence[Claim], problem: Problem, state: State) -> tuple[Claim, ...]:
-    """Finds with their amplitudes as all numbers together have them; those of a recording's own are the first's."""
-    sigma = Quadratic.of(problem, state).sigma(problem.spread)
-    places = iter(problem.amplitudes[0][sum(len(one.amplitudes) for one in problem.given) :])
-    told = []
-    for claim, candidate in zip(finds, problem.found, strict=True):
-        own = {entry.name: next(places) for entry in candidate.amplitudes}
-        numbers = [
-            estimate(one.name, one.unit, float(state.x[own[one.name]]), float(sigma[own[one.name]]))
-            if one.name in own
-            else one
-            for one in claim.parameters
-        ]
-        told.append(structs.replace(claim, parameters=tuple(numbers)))
-    return tuple(told)
+    """Finds with their numbers as all together have them."""
+    if not finds:
+        return ()
+    screen, ends = Screen(problem, state), np.cumsum([len(one.amplitudes) for one in problem.present])
+    places = np.split(np.stack(problem.amplitudes), ends[:-1], axis=1)[len(problem.given) :]
+    return tuple(
+        structs.replace(claim, parameters=screen.estimated(candidate, own))
+        for claim, candidate, own in zip(finds, problem.found, places, strict=True)
+    )
 
 
 def _alike(leaders: Sequence[Scored]) -> list[Scored]:
@@ -210,8 +205,8 @@ def _beside(problem: Problem, state: State, one: Scored, tried: Mapping[tuple[st
     wider = problem.joined(one.candidate)
     begun = settled(wider, begun=state.joined(problem, wider))
     for _ in range(RESHAPED):
-        each = np.stack([begun.x[own][-len(one.candidate.amplitudes) :] for own in wider.amplitudes])
-        candidate = Screen(wider, begun).reshaped(one.candidate, each)
+        places = np.stack(wider.amplitudes)[:, -len(one.candidate.amplitudes) :]
+        candidate = Screen(wider, begun).reshaped(one.candidate, places)
         if candidate == one.candidate:
             break
         one = replace(one, candidate=candidate)
@@ -281,7 +276,7 @@ def _know(problem: Problem, fitted: Problem, state: State) -> None:
     problem.prior[:common], problem.spread[:common] = state.x[:common], known[:common]
 
 
-def _claim(best: Scored, leaders: Sequence[Scored], alike: Sequence[Scored], numbers: tuple[Estimate, ...]) -> Claim:
+def _claim(best: Scored, leaders: Sequence[Scored], alike: Sequence[Scored]) -> Claim:
     """What is claimed of an effect, with the next best of other places or physics, and what is not told from it."""
     own = _suspect(best.candidate)
     others = list(dict.fromkeys(told for one in leaders if (told := _suspect(one.candidate)) != own))
@@ -293,7 +288,6 @@ def _claim(best: Scored, leaders: Sequence[Scored], alike: Sequence[Scored], num
         channels=own.channels,
         family=own.family,
         law=best.candidate.name,
-        parameters=numbers,
         alternatives=tuple(Claimed(**structs.asdict(one)) for one in following),
         indistinguishable_from=tuple(told for told in others if told in same),
     )
