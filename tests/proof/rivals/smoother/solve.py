@@ -35,6 +35,7 @@ STEPS = 25
 STIFF = (0.1, 0.03, 0.001)
 SETTLED = 100.0  # sigmas of all unknowns together that a step goes, below which forces are estimated
 ARRIVED = 3.0  # below which it is the last
+PATIENCE = 3  # steps that gain no more than such a one
 LEAST = 1e-3  # of what they are to begin with: smaller ones are nothing beside a reading's noise
 CHANGE = (0.3, 1.5)  # of a force's sigma in a step
 BEYOND = 1.6  # times a step of its logarithm, at most; and by what it changes where a step went beyond, and else
@@ -94,9 +95,15 @@ def settled(problem: Problem, sigma: Array | None = None, begun: State | None = 
                 break
             state.smooth(problem)
         _stepped(problem, state, STIFF[1], ~problem.dynamic)
+    least, idle = np.inf, 0
     for _ in range(STEPS):
         wrong = 0.0 if weighing is None else weighing.weighed(problem, state)
-        if (_stepped(problem, state, STIFF[2]) < ARRIVED or state.reach == NEAR) and wrong < KNOWN:
+        length = _stepped(problem, state, STIFF[2])
+        if wrong > KNOWN:
+            continue
+        idle = 0 if state.lowest < least - ARRIVED**2 else idle + 1
+        least = min(least, state.lowest)
+        if length < ARRIVED or state.reach == NEAR or idle == PATIENCE:
             break
     return state
 
