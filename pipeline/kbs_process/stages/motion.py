@@ -96,7 +96,8 @@ def estimate(run: Run, rig: Rig, settings: MotionSettings = MotionSettings()) ->
         )
     angles = [_joint_angle(run, joint, settings) for joint in rig.joints]
     q = np.stack([angle.q for angle in angles], axis=1)
-    offset = np.array([_offset(joint) for joint in rig.joints])
+    encoders = [joint.encoder for joint in rig.joints]
+    offset = np.array([0.0 if encoder is None else float(encoder.offset) for encoder in encoders])
     delay = 0.0 if rig.transducer.amplifier is None else rig.transducer.amplifier.delay
     rates = [_column(run.rate, joint.name) if settings.source == "auto" else None for joint in rig.joints]
     each = [_derivatives(angle, rate, grid.dt, settings.band_Hz) for angle, rate in zip(angles, rates, strict=True)]
@@ -171,10 +172,6 @@ def _later(values: Array, dt: float, delay: float) -> Array:
     t = dt * np.arange(len(values))
     delayed: Array = CubicSpline(t, values)(np.maximum(t - delay, 0.0))
     return delayed
-
-
-def _offset(joint: Joint) -> float:
-    return 0.0 if joint.encoder is None else float(joint.encoder.offset)
 
 
 def _joint_angle(run: Run, joint: Joint, settings: MotionSettings) -> _Angle:

@@ -65,7 +65,7 @@ def find_of(
     for found in taken.screening.candidates:
         if found.suspect.family in simulated or found.absorbed or len(alternatives) >= 5:
             continue
-        if identity(found.suspect) in refused or (_of_clock(suspect) and _of_clock(found.suspect)):
+        if identity(found.suspect) in refused or (of_clock(suspect) and of_clock(found.suspect)):
             continue  # what a clock does to first order is nothing to compare with what one does at its size
         # Along the linear plant the distance is what the best leaves of the other's lack of gain.
         rho = float(np.sqrt(max(taken.found.score.gain - found.score.gain, 0.0)))
@@ -104,7 +104,7 @@ def _alike_likely(chance: float, others: Sequence[Alternative]) -> tuple[float, 
     return even, [replace(one, probability=even) if one in alike else one for one in others]
 
 
-def _of_clock(suspect: Suspect) -> bool:
+def of_clock(suspect: Suspect) -> bool:
     return isinstance(suspect, Catalogued) and suspect.of_clock
 
 

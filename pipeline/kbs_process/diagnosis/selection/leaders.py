@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import TypeGuard
 
 from kbs_process.diagnosis.acceptance.finding import Tried
 from kbs_process.diagnosis.acceptance.rivals import probabilities
@@ -105,7 +104,8 @@ def _covered(view: View, among: Callable[[Found], bool]) -> list[Found]:
 
 
 def _uncovered(view: View, found: Found) -> Found:
-    return uncovered(view.bench, found, [one for one in view.suspects if _same(one, found.suspect)])
+    alike = [one for one in view.suspects if isinstance(one, Catalogued) and one.family == found.suspect.family]
+    return uncovered(view.bench, found, alike)
 
 
 def _pulls(found: Found) -> bool:
@@ -114,10 +114,6 @@ def _pulls(found: Found) -> bool:
 
 def _anywhere(found: Found) -> bool:
     return isinstance(found.suspect, Catalogued) and found.suspect.candidate.effect.anywhere
-
-
-def _same(one: Suspect, other: Suspect) -> TypeGuard[Catalogued]:
-    return isinstance(one, Catalogued) and one.family == other.family
 
 
 def various(chosen: Sequence[Found]) -> list[Found]:

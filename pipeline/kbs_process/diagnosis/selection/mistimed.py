@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import partial
 
+from kbs_process.diagnosis.acceptance.finding import of_clock
 from kbs_process.diagnosis.experiments.experiment import Experiment
 from kbs_process.diagnosis.experiments.floor import Floor
 from kbs_process.diagnosis.experiments.hypothesis import Hypothesis, Simulate
@@ -19,7 +20,7 @@ from kbs_process.diagnosis.nominal.joint import Standing
 from kbs_process.diagnosis.nominal.known import NEAR, Known, as_it_is, confined, refit
 from kbs_process.diagnosis.proposing.clocks import by_a_right_clock, height_of, timed
 from kbs_process.diagnosis.proposing.view import View
-from kbs_process.diagnosis.screening.screen import Catalogued, Found, Suspect
+from kbs_process.diagnosis.screening.screen import Catalogued, Found
 from kbs_process.diagnosis.selection.each_recording import gained_by_chance, taken_off, unread_only
 from kbs_process.diagnosis.side_by_side import side_by_side
 
@@ -55,17 +56,13 @@ def _stamped_anew(known: Known) -> Experiment | None:
 
     The error is the same in all recordings, or a jump or a wandering, which each has of its own; None, if none does so.
     """
-    view = View.of(Standing(known, known.shown, {}), _of_a_clock, linear=False)
+    view = View.of(Standing(known, known.shown, {}), of_clock, linear=False)
     bench = view.bench
     # Beside numbers refitted to first order, which do a part of what is to be done in any case.
     alone = height_of(bench, bench.background.z) + known.prior_chi2 - known.fit_rows
     stamped = side_by_side(partial(_stamped, view), view.screening.candidates)
     gain, experiment = max(stamped, key=lambda one: one[0], default=(0.0, known.experiment))
     return experiment if alone > 0.0 and alone - gain <= MOST * alone else None
-
-
-def _of_a_clock(suspect: Suspect) -> bool:
-    return isinstance(suspect, Catalogued) and suspect.of_clock
 
 
 def _stamped(view: View, found: Found) -> tuple[float, Experiment]:

@@ -133,6 +133,7 @@ def condense(
     }
     encoder = sampled["angle"].samples() if "angle" in sampled else None
     loaded = None if load is None else sampled.get(load)
+    unread = [Loss("missing", s.line.where, 0, detail="not one sample") for s in slow.values() if not s.line.samples]
     return Run(
         name=name,
         wrench=signals.get("wrench"),
@@ -147,7 +148,7 @@ def condense(
         epoch_ns=present[reference].first_stamp,
         log_epoch_ns=present[reference].clock().first_log,
         rates={key: line.grid.rate for key, line in present.items() if line.grid is not None},
-        losses=(*_losses(present, clocks), *(_missing(s.line) for s in slow.values() if not s.line.samples)),
+        losses=(*_losses(present, clocks), *unread),
         clocks=clocks,
         pointing=signals.get("pointing"),
         effort=signals.get("effort"),
@@ -194,10 +195,6 @@ def _check_overlap(
 
 def _losses(lines: dict[str, Timeline], clocks: dict[str, Clock]) -> list[Loss]:
     return [loss for key, line in lines.items() for loss in line.losses(clocks[key].offset_s, 1.0 + clocks[key].skew)]
-
-
-def _missing(line: Timeline) -> Loss:
-    return Loss("missing", line.where, 0, detail="not one sample")
 
 
 def _stream(

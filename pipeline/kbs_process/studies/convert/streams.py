@@ -250,7 +250,8 @@ def _pieces(
             values |= zip(attitude.orientation.fields, attitude.angles(cells_of, str(table.path)).T, strict=True)
         if mapping.turn and any(stream.key == "wrench" for stream in streams):
             _turn(values, mapping.turn)
-        yield {stream.key: _select(Block(stamp, log, _matrix(stream, values)), known & ~again) for stream in streams}
+        matrix = {stream.key: np.column_stack([values[field] for field in stream.units]) for stream in streams}
+        yield {key: _select(Block(stamp, log, columns), known & ~again) for key, columns in matrix.items()}
 
 
 def _check_unit(table: Table, column: Column, given: str, scale: float, findings: Findings) -> None:
@@ -319,10 +320,6 @@ def _turn(values: dict[str, Array], turn: Turn) -> None:
         along = (v @ k)[:, None] * k
         turned = (v - along) * np.cos(angle) + np.cross(k, v) * np.sin(angle) + along
         values.update(zip(fields, turned.T, strict=True))
-
-
-def _matrix(stream: StreamMap, values: dict[str, Array]) -> Array:
-    return np.column_stack([values[field] for field in stream.units])
 
 
 def _select(block: Block, mask: Mask) -> Block:
