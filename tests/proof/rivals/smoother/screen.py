@@ -221,7 +221,7 @@ class Screen:
         taken = 2.0 * (size @ found.residual + moved @ quadratic.pull) - entered
         taken += left @ solved[:, 0] - quadratic.pull @ self._own
         if free.any():
-            square, _ = self._beside(found)
+            square, _, _ = self._beside(found)
             right = found.residual - found.squares @ size - found.unknowns.T @ (moved + solved[:, 0])
             width = np.sqrt(np.maximum(np.diag(found.squares)[free], 1e-300))
             most, _, freedom = _best(square[np.ix_(free, free)], right[free], width)
@@ -230,8 +230,7 @@ class Screen:
 
     def _scored(self, chosen: Sequence[Candidate]) -> Iterator[Scored]:
         found = self._products(chosen)
-        solved = self.quadratic.solve(self.problem.spread, found.unknowns)
-        square, right = self._beside(found)
+        square, right, solved = self._beside(found)
         common = self.problem.own[0].start
         size = np.sqrt(np.maximum(np.diag(found.squares), 1e-300))
         for number, one in enumerate(chosen):
@@ -246,10 +245,10 @@ class Screen:
             moved = -solved[:common, places] @ amplitudes
             yield Scored(one, gain, freedom, amplitudes[~found.own[places]], each, moved, likely)
 
-    def _beside(self, found: _Products) -> tuple[Array, Array]:
-        """Squares and products with the residual, once all numbers have had their part."""
+    def _beside(self, found: _Products) -> tuple[Array, Array, Array]:
+        """Squares and products with the residual, once all numbers have had their part; what they do for a unit."""
         solved = self.quadratic.solve(self.problem.spread, found.unknowns)
-        return found.squares - found.unknowns.T @ solved, found.residual - found.unknowns.T @ self._own
+        return found.squares - found.unknowns.T @ solved, found.residual - found.unknowns.T @ self._own, solved
 
     def reshaped(self, candidate: Candidate, places: Places) -> Candidate:
         """An effect that is present with its shape where it fits best beside all numbers; the same, if that is little.
@@ -294,10 +293,9 @@ class Screen:
         names = tuple(name for name, _ in candidate.shape if name in free)
         found = self._products([candidate], _Bends(names, self.state.x[places]))
         bent = found.owner > 0
-        square, right = self._beside(found)
-        solved = self.quadratic.solve(self.problem.spread, found.unknowns[:, bent])
+        square, right, solved = self._beside(found)
         size = np.sqrt(np.maximum(np.diag(found.squares)[bent], 1e-300))
-        return names, square[np.ix_(bent, bent)], right[bent], size, solved
+        return names, square[np.ix_(bent, bent)], right[bent], size, solved[:, bent]
 
     def _products(self, every: Sequence[Candidate], bends: _Bends | None = None) -> _Products:
         sizes = [len(one.amplitudes) for one in every]
