@@ -62,7 +62,7 @@ def numbers(moved: Sequence[Mapping[str, Any]], nominal: Hardware, true: Hardwar
     """Refitted numbers, as results tell them, beside the truth; phases, which have no prior, are left out."""
     for entry in moved:
         prior, spread = entry["prior"], entry["prior_sigma"]
-        if prior is None or spread is None or not spread > 0.0:
+        if prior is None or spread is None or not spread > 0.0 or not _has(nominal, entry["name"]):
             continue
         (given,) = _elements(entry["name"], nominal.values)
         if abs(given - prior) > _EXACT * max(abs(prior), spread):
@@ -72,18 +72,28 @@ def numbers(moved: Sequence[Mapping[str, Any]], nominal: Hardware, true: Hardwar
 
 
 def answered(refitted: Sequence[Moved], nominal: Hardware, true: Hardware) -> Iterator[Number]:
-    """The same of an answer's numbers."""
+    """The same of an answer's numbers; those of an effect that it found are none of the rig's."""
     for one in refitted:
+        if not _has(nominal, one.name):
+            continue
         value, spread = _elements(one.name, true.values, nominal.sigmas)
         yield Number(one.name, (one.value - value) / spread, one.sigma / spread)
 
 
 def _elements(name: str, *of: Mapping[str, Any]) -> tuple[float, ...]:
     """What each has under the name that results give to a number."""
-    plain = re.sub(r"(\.drive)\.", r"\1.parameters.", _ELEMENT.sub("", name))
-    key = plain if plain in of[0] else plain.replace(".parameters", "")
-    at = tuple(map(int, _ELEMENT.findall(name)))
+    key, at = _key(name, of[0]), tuple(map(int, _ELEMENT.findall(name)))
     return tuple(float(np.asarray(one[key], dtype=float)[at]) for one in of)
+
+
+def _has(hardware: Hardware, name: str) -> bool:
+    return _key(name, hardware.values) in hardware.values
+
+
+def _key(name: str, of: Mapping[str, Any]) -> str:
+    """What hardware calls a number of results."""
+    plain = re.sub(r"(\.drive)\.", r"\1.parameters.", _ELEMENT.sub("", name))
+    return plain if plain in of else plain.replace(".parameters", "")
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

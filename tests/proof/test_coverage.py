@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from proof import coverage
+from proof.answer import Moved
 from proof.concealed import trials
 from proof.concealed.trials import Spec
 
@@ -39,6 +40,13 @@ def test_errors_are_told_in_sigmas_of_the_files(moved: list[dict[str, Any]]) -> 
     found = list(coverage.numbers(moved, *coverage.hardware(SPEC)))
     assert [one.error for one in found] == pytest.approx([0.1, 0.3, 0.0], abs=1e-9)
     assert [(one.told, one.covered) for one in found] == [(True, True), (True, False), (False, True)]
+
+
+def test_numbers_of_an_effect_that_was_found_are_none_of_the_rig(moved: list[dict[str, Any]]) -> None:
+    found = entry("joint.el.drive.kinematic_sin", 0.0, 1e-2, 3e-4, 1e-6)
+    assert len(list(coverage.numbers([*moved, found], *coverage.hardware(SPEC)))) == len(moved)
+    told = Moved(name=found["name"], value=3e-4, sigma=1e-6, sigmas=0.03)
+    assert not list(coverage.answered([told], *coverage.hardware(SPEC)))
 
 
 def test_results_of_another_trial_are_refused(moved: list[dict[str, Any]]) -> None:
