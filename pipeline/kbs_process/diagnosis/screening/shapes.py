@@ -121,7 +121,7 @@ def _bend(entry: Parameter, value: float, step: float, last: float) -> Bend:
     low, high = value - _STEPS * step, value + _STEPS * step
     if ratio:
         low, high = value / _FARTHEST, value * _FARTHEST
-    low, high = max(low, entry.bounds[0]), min(high, entry.bounds[1], last)
+    low, high = max(low, entry.bounds[0]), min(high, entry.bounds[1], max(last, value))
     return Bend(entry.name, value, step, low, high, alike=entry.over != "" and not ratio, ratio=ratio)
 
 
