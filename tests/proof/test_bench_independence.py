@@ -18,6 +18,13 @@ ALLOWED = {
         "kbs_process.signals",
         "kbs_process.studies",
     },
+    "smoother.py": {  # a part of the diagnosis, answering by itself
+        "kbs_process.campaign",
+        "kbs_process.diagnosis",
+        "kbs_process.plant",
+        "kbs_process.progress",
+        "kbs_process.studies",
+    },
 }
 
 

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from kbs_process.campaign.load import load_campaign
+from kbs_process.diagnosis.smoothing.problem import Problem
+from kbs_process.diagnosis.smoothing.search import Fitted, moved, settled
 from kbs_process.progress import SilentProgress
 from kbs_process.studies.diagnose.reading import experiment_of
 from proof import coverage, record
 from proof.concealed import trials
-from proof.rivals.smoother.problem import Problem
-from proof.rivals.smoother.solve import refitted, settled
 
 
 @pytest.mark.validation
@@ -23,7 +23,7 @@ def test_numbers_of_a_null_hold_the_truth_in_their_intervals(index: int, tmp_pat
     trials.make(spec, tmp_path / "T")
     experiment = experiment_of(load_campaign(tmp_path / "T", checksums=False), SilentProgress())
     problem = Problem(experiment, list(experiment.fit))
-    told = list(coverage.answered(refitted(problem, settled(problem)), *coverage.hardware(spec)))
+    told = list(coverage.answered(moved(Fitted(problem, settled(problem))), *coverage.hardware(spec)))
     off = np.array([one.error / one.sigma for one in told])
     assert len(off) > 50
     assert np.sqrt(np.mean(off**2)) < 1.2

@@ -7,10 +7,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 from proof.answer import Answer, write
-from proof.rivals import boosting, gaussian, greybox, parameters, sparse
+from proof.rivals import boosting, gaussian, greybox, parameters, smoother, sparse
 from proof.rivals.case import Case
 from proof.rivals.prepare import prepare
-from proof.rivals.smoother import solve as smoother
 
 RIVALS: dict[str, Callable[[Case], Answer]] = {
     "parameters": parameters.solve,

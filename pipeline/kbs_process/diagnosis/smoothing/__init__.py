@@ -11,9 +11,15 @@ factorisation, beside all numbers.
     basis.py      motion by local coefficients
     balance.py    readings and forces that a motion needs, by inverse dynamics
     drive.py      what motor and gear give for a field
+    columns.py    columns of rows that are zero in most of them
     problem.py    rows, unknowns, priors of a campaign
+    course.py     a motion as signals of the plant, and what effects along it do
     fit.py        Gauss and Newton
     intensities.py  how large the forces are, from what repeats differ by
+    lines.py      tones and orders to try
     screen.py     effects as columns: what each would take of the cost
-    solve.py      the answer
+    search.py     effects that recordings show, fitted and held out
+    as_plant.py   the numbers as the plant has them
+
+Begin with `search.py`. What it proposes is judged in the plant (`selection/rounds.py`).
 """

@@ -16,7 +16,7 @@ from kbs_process.machine_code import njit
 from kbs_process.plant.rigid import inertia_matrix
 from kbs_process.rig.model import LAB, TRANSDUCER, Rig
 from kbs_process.signals.frames import from_rotation_vector, from_tilt
-from proof.rivals.case import Array
+from kbs_process.signals.records import Array
 
 FLOOR, PLATE = slice(0, 3), slice(3, 6)
 STILL = 2.0 * np.pi  # rad/s: above it a floor shakes with velocities of one density, below with accelerations
@@ -72,11 +72,11 @@ def needed(rig: Rig, motion: Motion, rotors: tuple[Array, Array]) -> Loads:
     angle, rate, acceleration = motion
     shaken = angle.copy()
     shaken[:, FLOOR] = rate[:, FLOOR] + STILL * angle[:, FLOOR]
-    return _needed(*chain(rig), shaken, rate, acceleration, *rotors)  # type: ignore[no-any-return]
+    return _needed(*chain(rig), shaken, rate, acceleration, *rotors)
 
 
 @njit(cache=True, inline="always")
-def _add_cross(out, a, b, k):  # type: ignore[no-untyped-def]
+def _add_cross(out: Array, a: Array, b: Array, k: float) -> None:
     """Add k a x b."""
     out[0] += k * (a[1] * b[2] - a[2] * b[1])
     out[1] += k * (a[2] * b[0] - a[0] * b[2])
@@ -84,28 +84,43 @@ def _add_cross(out, a, b, k):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, inline="always")
-def _turn(out, R, a):  # type: ignore[no-untyped-def]
+def _turn(out: Array, R: Array, a: Array) -> None:
     """R a."""
     for i in range(3):
         out[i] = R[i, 0] * a[0] + R[i, 1] * a[1] + R[i, 2] * a[2]
 
 
 @njit(cache=True, inline="always")
-def _turn_back(out, R, a):  # type: ignore[no-untyped-def]
+def _turn_back(out: Array, R: Array, a: Array) -> None:
     """R^T a."""
     for i in range(3):
         out[i] = R[0, i] * a[0] + R[1, i] * a[1] + R[2, i] * a[2]
 
 
 @njit(cache=True, inline="always")
-def _dot(a, b):  # type: ignore[no-untyped-def]
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+def _dot(a: Array, b: Array) -> float:
+    return float(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
 
 
-@njit(cache=True)
-def _needed(  # type: ignore[no-untyped-def]
-    upward, parent, fixed, axis, origin, slides, spin, on, mass, cog, inertia, x, rate, acceleration, turn, hasten
-):  # fmt: skip
+@njit(cache=True, nogil=True)
+def _needed(
+    upward: Array,
+    parent: NDArray[np.int64],
+    fixed: Array,
+    axis: Array,
+    origin: Array,
+    slides: NDArray[np.bool_],
+    spin: Array,
+    on: NDArray[np.int64],
+    mass: Array,
+    cog: Array,
+    inertia: Array,
+    x: Array,
+    rate: Array,
+    acceleration: Array,
+    turn: Array,
+    hasten: Array,
+) -> Loads:
     """Newton and Euler: outwards for motions in the laboratory's axes, inwards for what they need."""
     n, joints = len(x), len(parent)
     wrench, efforts = np.zeros((n, 6)), np.zeros((n, joints))
@@ -113,13 +128,17 @@ def _needed(  # type: ignore[no-untyped-def]
     R, r = np.zeros((joints + 1, 3, 3)), np.zeros((joints + 1, 3))
     e, w, a, g = np.zeros((joints, 3)), np.zeros((joints + 1, 3)), np.zeros((joints + 1, 3)), np.zeros((joints + 1, 3))
     force, moment = np.zeros((joints + 1, 3)), np.zeros((joints + 1, 3))
-    R[joints] = np.eye(3)
+    for u in range(3):
+        R[joints, u, u] = 1.0
     turned, arm, c, F, one, other, spun = (
         np.zeros((3, 3)), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3),
     )  # fmt: skip
     for i in range(n):
-        force[:], moment[:] = 0.0, 0.0
-        g[joints] = upward + x[i, :3]
+        for j in range(joints + 1):
+            for u in range(3):
+                force[j, u] = moment[j, u] = 0.0
+        for u in range(3):
+            g[joints, u] = upward[u] + x[i, u]
         for j in range(joints):
             p, q, qd, qdd = parent[j], x[i, 3 + j], rate[i, 3 + j], acceleration[i, 3 + j]
             for u in range(3):
@@ -127,18 +146,21 @@ def _needed(  # type: ignore[no-untyped-def]
             _turn(e[j], turned, axis[j])
             _turn(arm, R[p], origin[j])
             if slides[j]:
-                R[j] = turned
                 for u in range(3):
                     arm[u] += e[j, u] * q
+                    for v in range(3):
+                        R[j, u, v] = turned[u, v]
             else:
                 sine, rest = np.sin(q), 2.0 * np.sin(q / 2) ** 2
                 for u in range(3):  # rows times Rodrigues' turn: v + sin q v x axis + (1 - cos q) (v x axis) x axis
-                    one[:], other[:] = 0.0, 0.0
+                    for v in range(3):
+                        one[v] = other[v] = 0.0
                     _add_cross(one, turned[u], axis[j], 1.0)
                     _add_cross(other, one, axis[j], 1.0)
                     for v in range(3):
                         R[j, u, v] = turned[u, v] + sine * one[v] + rest * other[v]
-            one[:] = 0.0
+            for u in range(3):
+                one[u] = 0.0
             _add_cross(one, w[p], arm, 1.0)
             for u in range(3):
                 r[j, u] = r[p, u] + arm[u]
@@ -162,9 +184,9 @@ def _needed(  # type: ignore[no-untyped-def]
         for b in range(len(on)):
             j = on[b]
             _turn(c, R[j], cog[b])
-            one[:] = 0.0
+            for u in range(3):
+                one[u], F[u] = 0.0, g[j, u]
             _add_cross(one, w[j], c, 1.0)
-            F[:] = g[j]
             _add_cross(F, a[j], c, 1.0)
             _add_cross(F, w[j], one, 1.0)
             for u in range(3):

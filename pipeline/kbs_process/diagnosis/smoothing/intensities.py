@@ -13,10 +13,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from proof.rivals.case import Array
-from proof.rivals.smoother.basis import in_band
-from proof.rivals.smoother.fit import State
-from proof.rivals.smoother.problem import Problem
+from kbs_process.diagnosis.smoothing.basis import in_band
+from kbs_process.diagnosis.smoothing.columns import Columns
+from kbs_process.diagnosis.smoothing.fit import State
+from kbs_process.diagnosis.smoothing.problem import Problem
+from kbs_process.signals.records import Array
 
 _SEED = 1996
 
@@ -36,7 +37,9 @@ class Powers:
 
 def powers(problem: Problem, state: State) -> Powers:
     """Compare what rows leave with what their sigmas say."""
-    free = [_free(problem, state, k) for k in range(len(problem.recordings))]
+    free: dict[int, Array] = {}
+    for g, members in enumerate(problem.groups):
+        free |= dict.fromkeys(members, _free(problem, state, g))
     left = [residual / state.sigma for residual in state.residuals(problem)]
     weight = [recording.weight[:, None] for recording in problem.recordings]
     every = sum((np.sum(z**2 * w, axis=0) for z, w in zip(left, weight, strict=True)), np.zeros(problem.rows))
@@ -51,18 +54,16 @@ def powers(problem: Problem, state: State) -> Powers:
         share = np.mean([free[k] / weight[k].sum() for k in own], axis=0)
         numbers = numbers + (len(own) - 1) * common.sum() * share
     of_repeats = power / numbers if problem.repeats else None
-    return Powers(of_repeats, every / np.sum(free, axis=0))
+    return Powers(of_repeats, every / sum(free.values()))
 
 
-def _free(problem: Problem, state: State, k: int) -> Array:
-    """Numbers (rows,) of each row that the band and a recording's motion leave."""
-    recording, (motion, root) = problem.recordings[k], state.banded(problem, k)
-    rng = np.random.default_rng([_SEED, k])
+def _free(problem: Problem, state: State, g: int) -> Array:
+    """Numbers (rows,) of each row that the band and a motion leave, of each recording of a group."""
+    recording, (motion, root) = problem.recordings[problem.groups[g][0]], state.banded(problem, g)
+    rng = np.random.default_rng([_SEED, g])
     white = in_band(rng.choice([-1.0, 1.0], root.shape), recording.dt)
     whole = np.mean(white**2, axis=0) * recording.weight.sum()
-    probes = np.zeros((*root.shape, problem.rows))
-    every = np.arange(problem.rows)
-    probes[:, every, every] = white * (root > 0.0)
-    against = motion.against(probes.reshape(root.size, -1))
+    probes = Columns.of(len(white), problem.rows, ((row, row, one) for row, one in enumerate((white * (root > 0.0)).T)))
+    against = motion.against(probes)
     taken = np.sum(against**2, axis=(0, 1))
     return np.asarray(np.maximum(whole - taken, 1e-3 * whole))

@@ -19,18 +19,21 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.fft import prev_fast_len
 from scipy.ndimage import binary_erosion
 
 from kbs_process.diagnosis.experiments.experiment import Experiment
 from kbs_process.diagnosis.experiments.hypothesis import decoupling
 from kbs_process.diagnosis.screening.suspects import Candidate, own_values
+from kbs_process.diagnosis.smoothing.balance import FIRST_JOINT, FLOOR, PLATE, Loads, Motion, needed
+from kbs_process.diagnosis.smoothing.basis import BAND_HZ, Basis, in_band
+from kbs_process.diagnosis.smoothing.columns import Columns
+from kbs_process.diagnosis.smoothing.drive import WRITTEN, Field, priors, spring
 from kbs_process.plant.laws import select
+from kbs_process.plant.sensing import SensingPort
 from kbs_process.rig.model import Amplifier, Rig
+from kbs_process.signals.records import Array
 from kbs_process.stages.gravity.parameters import RigElements
-from proof.rivals.case import Array
-from proof.rivals.smoother.balance import FIRST_JOINT, FLOOR, PLATE, Loads, Motion, needed
-from proof.rivals.smoother.basis import BAND_HZ, Basis, in_band
-from proof.rivals.smoother.drive import WRITTEN, Field, priors, spring
 
 _ENDS = 1.0  # s left out at a recording's ends, and half of it beside gaps
 _LINES = 3  # first terms of a channel's zero: constant, slope, curvature
@@ -39,6 +42,7 @@ _PINK_HZ = 0.1  # up to which a channel's noise may be 1/f, as large as its whit
 _WAVES = 24  # of a zero at most: of a long recording the slowest, where 1/f noise is most
 _CLOCK = 3e-3  # s, of a clock against the field's
 _LEAST = 0.1  # of its value: what a stiffness, a damping or an inertia is at least
+_ALIKE = 5e-3  # rad of the motor, by which fields differ that have one set of slopes: closed loops bring up to 4.5e-3
 _STEPS = (1e-6, 1e-6, 1e-4)  # of values, rates and accelerations, for slopes
 _FLOOR_STEP = 1e-3  # m/s
 _EXACT = 1e-6  # of an amplitude that is known without a sigma: its sigma, of itself
@@ -59,11 +63,17 @@ class Recording:
     turning: Array  # (n, joints) share of an angle's samples that are rounded apart: codes crossed in one of them
     field: Field
     basis: Basis
+    temperature: Array | None  # (first + n,) degC
     ports: tuple[Array, Array] | None = None  # of a course's, along the first motion that asked: poses hardly differ
 
     @property
     def n(self) -> int:
         return len(self.reading)
+
+    @cached_property
+    def slope(self) -> Array:
+        """Slopes of its readings (n, 6 + joints), 1/s."""
+        return np.asarray(np.gradient(self.reading, self.dt, axis=0))
 
     @cached_property
     def zero(self) -> Array:
@@ -76,6 +86,11 @@ class Recording:
     @property
     def _waves(self) -> NDArray[np.int_]:
         return np.arange(_LINES, min(int(2 * _PINK_HZ * self.n * self.dt), _WAVES) + 1)
+
+    def moves_like(self, other: Recording) -> bool:
+        """Whether fields turned nearly alike, and the same samples count."""
+        there = (self.first, self.n) == (other.first, other.n) and np.array_equal(self.weight, other.weight)
+        return there and bool(np.abs(self.field.angle - other.field.angle).max() < _ALIKE)
 
     def spread(self, bias: Array, white: Array) -> Array:
         """Sigmas (channels, terms) of a zero: `bias` is the constant's, `white` the noise, one-sided, per Hz."""
@@ -90,7 +105,7 @@ class Problem:
         self.experiment, self.rig = experiment, experiment.rig
         self.joints = len(self.rig.joints)
         self.freedoms = FIRST_JOINT + self.joints
-        self.recordings = [_recording(experiment, k) for k in trials]
+        self.recordings = [_recording(experiment, k, *span) for k, span in _spans(experiment, trials).items()]
         self._undone = decoupling(experiment)
         self.wrench, self.angles = slice(0, 6), slice(6, 6 + self.joints)
         self.plate = slice(self.angles.stop, self.angles.stop + 3)
@@ -122,19 +137,29 @@ class Problem:
     @cached_property
     def repeats(self) -> list[list[int]]:
         """Recordings of one trajectory, of each that was recorded more than once."""
-        return [own for own in self._of_trajectories if len(own) > 1]
-
-    @property
-    def first_of_each(self) -> list[int]:
-        """A recording of each trajectory."""
-        return [own[0] for own in self._of_trajectories]
-
-    @cached_property
-    def _of_trajectories(self) -> list[list[int]]:
+        trials = self.experiment.trials
         by_trajectory: dict[int, list[int]] = {}
         for k, recording in enumerate(self.recordings):
-            by_trajectory.setdefault(self.experiment.trials[recording.trial].trajectory, []).append(k)
-        return list(by_trajectory.values())
+            by_trajectory.setdefault(trials[recording.trial].trajectory, []).append(k)
+        return [own for own in by_trajectory.values() if len(own) > 1]
+
+    @cached_property
+    def _driven_alike(self) -> list[list[int]]:
+        groups: list[list[int]] = []
+        for k, one in enumerate(self.recordings):
+            near = [own for own in groups if one.moves_like(self.recordings[own[0]])]
+            near[0].append(k) if near else groups.append([k])
+        return groups
+
+    @property
+    def groups(self) -> list[list[int]]:
+        """Recordings that were driven alike: the model by itself moves alike in them, and rows have the same slopes.
+
+        Beside what acts by a recording's own readings each is alone.
+        """
+        if any(by_recording(one) for one in self.present):
+            return [[k] for k in range(len(self.recordings))]
+        return self._driven_alike
 
     @property
     def forces(self) -> slice:
@@ -256,8 +281,7 @@ class Problem:
         out[:, self.wrench] = wrench @ (np.eye(6) + self._undone @ dX).T
         out[:, self.wrench] += recording.zero @ own[: 6 * recording.zero.shape[1]].reshape(6, -1).T
         out[:, self.angles] = angle[:, FIRST_JOINT:] + x[self.offsets]
-        slope = np.gradient(recording.reading, recording.dt, axis=0)
-        out[:, self.wrench] -= own[-2] * slope[:, self.wrench]
+        out[:, self.wrench] -= own[-2] * recording.slope[:, self.wrench]
         out[:, self.angles] -= own[-1] * rate[:, FIRST_JOINT:]
         out[:, self.plate] = efforts[:, :3]
         if rig.transducer.stiffness is not None:
@@ -299,28 +323,60 @@ class Problem:
                 slopes[:, :, d, order] = (shown - base) / step
         return slopes
 
-    def by_unknown(self, k: int, x: Array, motion: Motion, torques: Array) -> Array:
-        """Slopes of a recording's rows by its unknowns (n, rows, local)."""
-        rig, local = self.rig_at(x), self.local[k]
-        loads = needed(rig, motion, self.recordings[k].field.rotors)
+    def by_unknown(self, k: int, x: Array, motion: Motion, torques: Array) -> Columns:
+        """Slopes of a recording's rows by its unknowns; differences of those of the rig, all others are exact."""
+        rig, recording = self.rig_at(x), self.recordings[k]
+        loads = needed(rig, motion, recording.field.rotors)
         base = self.predicted(k, x, motion, torques, rig, loads)
-        slopes = np.zeros((self.recordings[k].n, self.rows, len(local)))
-        zero, common = self.recordings[k].zero, self.own[0].start
-        linear = np.arange(common, common + 6 * zero.shape[1])
-        for channel, of_channel in enumerate(np.split(linear, 6)):
-            slopes[:, channel, of_channel] = zero
-        acting = np.searchsorted(local, self.amplitudes[k])
-        slopes[:, :, acting] = self.acting[k]
-        exact = {*linear.tolist(), *acting.tolist()}
-        for column, place in enumerate(local):
-            if column in exact:
-                continue
+        at = self.of_rig
+        differences = np.zeros((recording.n, self.rows, at.stop - at.start))
+        for column, place in enumerate(range(at.start, at.stop)):
             step = _SHARE * self.spread[place]
-            moved_x = x.copy()
-            moved_x[place] += step
-            same = (None, None) if place < self.of_rig.stop else (rig, loads)
-            slopes[:, :, column] = (self.predicted(k, moved_x, motion, torques, *same) - base) / step
-        return slopes
+            moved = x.copy()
+            moved[place] += step
+            differences[:, :, column] = (self.predicted(k, moved, motion, torques) - base) / step
+        found = [Columns.of_dense(differences), self._by_numbers(rig, recording, loads[0], torques)]
+        zero, own = recording.zero, self.own[k]
+        every = np.arange(zero.shape[1])
+        zeros = [(channel, every + channel * len(every), zero) for channel in range(6)]
+        late = [
+            *((row, 0, -recording.slope[:, row]) for row in range(6)),
+            *((6 + j, 1, -motion[1][:, FIRST_JOINT + j]) for j in range(self.joints)),
+        ]
+        found += [
+            Columns(recording.n, 6 * len(every), tuple(zeros)),
+            Columns.of(recording.n, 2, late),
+            Columns.of_dense(self.acting[k]),
+        ]
+        places = [
+            np.arange(at.start, self.offsets.stop),
+            np.arange(own.start, own.start + 6 * len(every)),
+            np.arange(own.stop - 2, own.stop),
+            self.amplitudes[k],
+        ]
+        return Columns.beside(found).placed(np.searchsorted(self.local[k], np.concatenate(places)), len(self.local[k]))
+
+    def _by_numbers(self, rig: Rig, recording: Recording, wrench: Array, torques: Array) -> Columns:
+        """What drives' numbers, the cross-coupling and encoders' offsets do, in which rows are linear."""
+        entries, place = [], 0
+        for j, joint in enumerate(rig.joints):
+            assert joint.drive is not None
+            of_rotor = float(joint.drive.parameters["Ka"]) / (spring(joint.drive) * float(joint.drive.ratio))
+            for number in range(torques.shape[2]):
+                entries.append((self.joint.start + j, place, of_rotor * torques[:, j, number]))
+                place += 1
+        for i, acts in self.coupled:
+            entries += [(row, place, self._undone[row, i] * wrench[:, acts]) for row in range(6)]
+            place += 1
+        for j in range(self.joints):
+            entries.append((self.angles.start + j, place, np.ones(recording.n)))
+            place += 1
+        return Columns.of(recording.n, place, entries)
+
+
+def by_recording(candidate: Candidate) -> bool:
+    """Whether what it does differs between recordings that were driven alike: by when they were read, or how warm."""
+    return candidate.effect.port is SensingPort.STREAM or "temperature" in candidate.effect.arguments
 
 
 def present(rig: Rig, effects: Sequence[str]) -> list[Candidate]:
@@ -335,7 +391,8 @@ def present(rig: Rig, effects: Sequence[str]) -> list[Candidate]:
         for site in sites:
             own = own_values(rig, site)
             load = next((one for one in rig.external if one.name == effect.name), None)
-            point = None if load is None or load.point is None else tuple(map(float, load.point.value))
+            at = None if load is None or load.point is None else load.point.value
+            point = None if at is None else (float(at[0]), float(at[1]), float(at[2]))
             shape = tuple((one.name, own[one.name]) for one in effect.parameters if one.role != "amplitude")
             found.append(Candidate(effect, site, shape, point))
     return found
@@ -362,10 +419,24 @@ def _widths(candidate: Candidate) -> Array:
     return np.array([max(abs(bound) for bound in entry.bounds) for entry in candidate.amplitudes])
 
 
-def _recording(experiment: Experiment, k: int) -> Recording:
+def _spans(experiment: Experiment, trials: Sequence[int]) -> dict[int, tuple[int, int]]:
+    """First sample and end of each trial: what is common to those of a trajectory that cover nearly the same."""
+    own = {k: np.flatnonzero(experiment.trials[k].valid)[[0, -1]] + [0, 1] for k in trials}
+    ends, spans = round(_ENDS / experiment.dt), {}
+    for k in trials:
+        near = [
+            other
+            for j, other in own.items()
+            if experiment.trials[j].trajectory == experiment.trials[k].trajectory
+            and np.abs(other - own[k]).max() <= ends
+        ]
+        first, end = int(max(one[0] for one in near)), int(min(one[1] for one in near))
+        spans[k] = first, first + prev_fast_len(end - first, real=True)
+    return spans
+
+
+def _recording(experiment: Experiment, k: int, first: int, end: int) -> Recording:
     trial = experiment.trials[k]
-    there = np.flatnonzero(trial.valid)
-    first, end = int(there[0]), int(there[-1]) + 1
     reading, n, dt = trial.measured[first:end].copy(), end - first, experiment.dt
     amplifier = experiment.rig.transducer.amplifier
     reading[:, 6:] = in_band(reading[:, 6:], dt)
@@ -380,8 +451,9 @@ def _recording(experiment: Experiment, k: int) -> Recording:
     field = Field.of(experiment.rig, schedule, first, n, dt)
     steps = np.array([float(j.encoder.step) for j in experiment.rig.joints if j.encoder is not None])
     ratios = np.array([float(j.drive.ratio) for j in experiment.rig.joints if j.drive is not None])
+    temperature = None if trial.temperature is None else trial.temperature[:end]
     turning = np.clip(np.abs(field.rate) / ratios / steps / (2 * BAND_HZ), 0.0, 1.0)
-    return Recording(k, first, dt, reading, weight, turning, field, Basis(n, dt))
+    return Recording(k, first, dt, reading, weight, turning, field, Basis(n, dt), temperature)
 
 
 def _undone(wrench: Array, amplifier: Amplifier | None, dt: float) -> Array:
@@ -389,5 +461,5 @@ def _undone(wrench: Array, amplifier: Amplifier | None, dt: float) -> Array:
     if amplifier is None:
         return in_band(wrench, dt)
     corner = float(amplifier.corner)
-    late = np.sqrt(2) / (2 * np.pi * corner) * (wrench[-1:] - wrench[:1]) / (dt * (len(wrench) - 1))
+    late: Array = np.sqrt(2) / (2 * np.pi * corner) * (wrench[-1:] - wrench[:1]) / (dt * (len(wrench) - 1))
     return in_band(wrench, dt, lambda f: 1 + np.sqrt(2) * 1j * f / corner - (f / corner) ** 2) + late

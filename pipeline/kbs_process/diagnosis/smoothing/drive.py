@@ -12,11 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
+from kbs_process.diagnosis.smoothing.basis import in_band
 from kbs_process.plant.schedule import Schedule, covering
 from kbs_process.rig.model import Drive, Rig
+from kbs_process.signals.records import Array
 from kbs_process.stages.align.resample import resample
-from proof.rivals.case import Array
-from proof.rivals.smoother.basis import in_band
 
 FINE = 1000.0  # Hz, at which torques along the field are taken
 _PARTS = 8  # of a fine step, over which whole microsteps are averaged
@@ -25,6 +25,7 @@ WRITTEN = frozenset(
     {"synchronous_motor", "cogging", "motor_viscous", "dynamic_friction", "tooth_stiction", "flexspline"}
 )
 NUMBERS = ("b_m", "d0", "cog s", "cog c", "dyn s", "dyn c", "stat s", "stat c", "stat 2s", "stat 2c", "stat")
+NEEDED = frozenset({"Tmax", "Kangle", "Ka", "fsv", "b_m", "d0", "d1", "w_dyn", "tcog", "Ts0", "delta"})
 
 
 @dataclass(frozen=True, slots=True, eq=False)

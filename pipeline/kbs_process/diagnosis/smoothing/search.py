@@ -1,32 +1,25 @@
-"""The answer of the smoother: forces at ports first, then the effects that explain them on recordings held out."""
+"""What smoothing finds: forces at ports first, then the effects that explain them on recordings held out."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
-from time import monotonic
 
 import numpy as np
-from msgspec import structs
 from numpy.typing import NDArray
 
-from kbs_process.campaign.load import load_campaign
 from kbs_process.diagnosis.experiments.experiment import Experiment
+from kbs_process.diagnosis.facts import Estimate, Moved
 from kbs_process.diagnosis.screening.suspects import Candidate
-from kbs_process.plant.sensing import BY
-from kbs_process.progress import SilentProgress
-from kbs_process.studies.diagnose.reading import experiment_of
-from proof.answer import Answer, Claim, Moved, Suspect
-from proof.answer import Candidate as Claimed
-from proof.rivals.case import Array
-from proof.rivals.smoother.fit import NEAR, REACH, Quadratic, State, step
-from proof.rivals.smoother.intensities import powers
-from proof.rivals.smoother.problem import Problem
-from proof.rivals.smoother.screen import Scored, Screen
+from kbs_process.diagnosis.smoothing.basis import BAND_HZ
+from kbs_process.diagnosis.smoothing.drive import NEEDED
+from kbs_process.diagnosis.smoothing.fit import NEAR, REACH, Quadratic, State, step
+from kbs_process.diagnosis.smoothing.intensities import powers
+from kbs_process.diagnosis.smoothing.problem import Problem
+from kbs_process.diagnosis.smoothing.screen import Scored, Screen
+from kbs_process.signals.records import Array
 
-METHOD = "smoother"
 WIDER, OF_JOINT = 10.0, 3.0  # times a reading's noise that forces are, to begin with; those of joints times as much
 SHAKEN = 25.0  # rad/s, at which the floor shakes a plate most
 STEPS = 25
@@ -42,14 +35,14 @@ BEYOND = 1.6  # times a step of its logarithm, at most; and by what it changes w
 ONWARD = (0.5, 1.2)
 KNOWN = 0.2  # of its logarithm, below which a force's sigma is known
 DETECTED = 400.0  # of the cost, that an effect takes of all recordings: what the equations here leave out takes less
-SHARE = 0.25  # of its gain for each sample, that an effect of each recording's own has on recordings held out
+# Of its gain for each sample, or of all that is left there, that an effect of each recording's own takes of recordings
+# held out.
+SHARE = 0.25
 FORETOLD = 0.25  # of what another would take there, that it takes: what is not there takes as much less than nothing
 MOST = 3  # effects
-RESHAPED = 3  # times that a shape goes on beside all numbers
-OFF = 4.0  # sigmas
+RESHAPED = 8  # times that a shape goes on beside all numbers, at most
 LEADERS = 12  # laws at a place, of which shapes are refined and recordings held out are asked
 BEHIND = 0.2  # of the first's worth, with less of which one is no leader
-NEXT = 2  # alternatives that are named
 ALIKE = 9.0  # of the cost: what differs by less is not told apart
 # Of what an effect is worth: what differs by less is fitted, as columns are right to first order; and what is worth
 # less beside it may be what its law lacks.
@@ -57,25 +50,59 @@ INEXACT = 0.02
 RIVALS = 3  # of other places or physics, that are
 
 
-def solve(folder: Path) -> Answer:
-    """Answer a trial; see the package."""
-    begin = monotonic()
-    experiment = experiment_of(load_campaign(folder, checksums=False), SilentProgress())
+@dataclass(frozen=True, slots=True, eq=False)
+class Fitted:
+    """A fit that has settled."""
+
+    problem: Problem
+    state: State
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Proposal:
+    """An effect that recordings show, fitted and held out."""
+
+    candidate: Candidate
+    others: tuple[Candidate, ...]  # of other places or physics, best first
+    alike: tuple[Candidate, ...]  # of them, what is not told from it
+    estimates: tuple[Estimate, ...]
+    size: Array  # (amplitudes,), of each recording's own the first's
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Smoothed:
+    """What smoothing finds: effects, with the rig's numbers beside them and without any."""
+
+    proposals: tuple[Proposal, ...]
+    beside: Fitted
+    alone: Fitted
+
+
+def can_smooth(experiment: Experiment) -> bool:
+    """Whether there is all that `Problem` needs.
+
+    Drives, all six channels and angles, fields that are known, the band; effects that act in all recordings.
+    """
+    rig = experiment.rig
+    driven = all(
+        joint.encoder is not None and joint.drive is not None and joint.drive.parameters.keys() >= NEEDED
+        for joint in rig.joints
+    )
+    fields = all(
+        drive.schedule is not None and (rig.controller is None or drive.schedule.field is not None) and not drive.absent
+        for drive in experiment.drives
+    )
+    whole = experiment.wrench_channels == 6 and len(experiment.channels) == 6 + len(rig.joints)
+    return driven and fields and whole and rig.transducer.stiffness is not None and experiment.highest_Hz >= BAND_HZ
+
+
+def search(experiment: Experiment) -> Smoothed:
+    """Look for what a model leaves out of recordings that `Problem` can describe."""
     fitted = Problem(experiment, list(experiment.fit))
     state = settled(fitted)
-    alone = refitted(fitted, state)
-    moved = tuple(one for one in alone if abs(one.sigmas) > OFF)
-    finds, numbers = _finds(fitted, state, _Judge.of(experiment, fitted, state))
-    return Answer(
-        method=METHOD,
-        trial=folder.name,
-        detected=bool(finds),
-        verdict="physics" if finds else "parameters off" if moved else "none",
-        moved=() if finds else moved,
-        numbers=numbers,
-        finds=finds,
-        seconds=monotonic() - begin,
-    )
+    alone = Fitted(fitted, replace(state, x=state.x.copy(), sigma=state.sigma.copy()))
+    found = _found(fitted, state, _Judge.of(experiment, fitted, state))
+    return Smoothed(*found, alone)
 
 
 def settled(problem: Problem, sigma: Array | None = None, begun: State | None = None) -> State:
@@ -144,70 +171,91 @@ def _forces(problem: Problem) -> Array:
     return WIDER * np.repeat([torque, OF_JOINT * torque, force / mass / SHAKEN], [3, problem.joints, 3])
 
 
-def _finds(problem: Problem, state: State, judge: _Judge | None) -> tuple[tuple[Claim, ...], tuple[Moved, ...]]:
-    """Effects, one after the other, and the rig's numbers beside them.
+def _found(problem: Problem, state: State, judge: _Judge | None) -> tuple[tuple[Proposal, ...], Fitted]:
+    """Effects, one after the other, and the fit beside them.
 
     Each is the one that recordings of the fit and those held out together show most. Beside each that is found all
     numbers settle again. What comes again and no number takes up counts as noise until an effect explains it.
     """
-    finds: list[Claim] = []
+    found: list[Proposal] = []
     forces, noise, most = problem.forces, state.sigma.copy(), 0.0
-    while len(finds) < MOST:
+    while len(found) < MOST:
         excess = powers(problem, state).of_all
         state.sigma[forces] = (noise * np.sqrt(np.maximum(excess, 1.0)))[forces]
         screen = Screen(problem, state)
         taken = {_suspect(one) for one in problem.found}  # another shape of one is no second effect
         chosen = [one for one in screen.candidates() if _suspect(one) not in taken]
-        survey = screen.survey()
-        seen = [one.candidate for one in _first_of_each([survey.sized(one) for one in survey.scored(chosen)])]
-        leaders = [screen.refined(screen.sized(one)) for one in screen.scored(seen)]
+        leaders = [screen.refined(one) for one in _leading([screen.sized(one) for one in screen.scored(chosen)])]
         if judge is not None:
             held = judge.screen(state.sigma[forces])
             leaders = [told for one in leaders if (told := judge.confirmed(one, held))]
         leaders.sort(key=lambda one: -one.worth)
         if not leaders or leaders[0].worth < max(DETECTED, INEXACT * most):
             break
-        most = max(most, leaders[0].worth)
         state.sigma[forces] = noise[forces]
+        most = max(most, leaders[0].worth)
         tried = Counter((one.name, one.site) for one in chosen)
-        every = sorted((_beside(problem, state, one, tried) for one in _alike(leaders)), key=lambda one: one.cost)
-        best, problem, state = every[0].scored, every[0].problem, every[0].state
-        alike = [one.scored for one in every if one.cost < every[0].cost + ALIKE]
-        finds.append(_claim(best, leaders, alike))
+        contenders = _contenders(leaders, screen)
+        every = [_beside(problem, state, one, tried) for one, _ in contenders]
+        first = min(every, key=lambda one: one.cost)
+        best, problem, state = first.scored, first.problem, first.state
+        alike = [
+            told
+            for fitted, (one, same) in zip(every, contenders, strict=True)
+            if fitted.cost < first.cost + ALIKE
+            for told in (one, *same)
+        ]
+        found.append(_proposal(best, leaders, alike))
         judge = None if judge is None else judge.joined(best.candidate, problem, state)
-    return _as_fitted(finds, problem, state), refitted(problem, state)
+    return _as_fitted(found, problem, state), Fitted(problem, state)
 
 
-def _as_fitted(finds: Sequence[Claim], problem: Problem, state: State) -> tuple[Claim, ...]:
-    """Finds with their numbers as all together have them."""
-    if not finds:
+def _as_fitted(found: Sequence[Proposal], problem: Problem, state: State) -> tuple[Proposal, ...]:
+    """Proposals with their numbers as all together have them."""
+    if not found:
         return ()
     screen, ends = Screen(problem, state), np.cumsum([len(one.amplitudes) for one in problem.present])
     places = np.split(np.stack(problem.amplitudes), ends[:-1], axis=1)[len(problem.given) :]
     return tuple(
-        structs.replace(claim, parameters=screen.estimated(candidate, own))
-        for claim, candidate, own in zip(finds, problem.found, places, strict=True)
+        replace(one, candidate=candidate, estimates=screen.estimated(candidate, own), size=state.x[own[0]])
+        for one, candidate, own in zip(found, problem.found, places, strict=True)
     )
 
 
-def _alike(leaders: Sequence[Scored]) -> list[Scored]:
-    """The first, and those of other places or physics that columns do not tell from it."""
-    first: dict[Suspect, Scored] = {}
+def _contenders(leaders: Sequence[Scored], screen: Screen) -> list[tuple[Scored, list[Scored]]]:
+    """The first, and those of other places or physics that are worth nearly as much; each with what does the same.
+
+    No fit tells apart what does the same beside all numbers: of these the likeliest beforehand stands for all.
+    """
+    every: list[tuple[Scored, list[Scored]]] = []
     for one in leaders:
-        if one.worth > leaders[0].worth - max(ALIKE, INEXACT * leaders[0].worth):
-            first.setdefault(_suspect(one.candidate), one)
-    return list(first.values())[:RIVALS]
+        if not one.worth > leaders[0].worth - max(ALIKE, INEXACT * leaders[0].worth):
+            break
+        if any(_suspect(one.candidate) == _suspect(first.candidate) for first, _ in every):
+            continue
+        same = next((own for first, own in every if screen.same(first, one)), None)
+        if same is not None:
+            same.append(one)
+        elif len(every) < RIVALS:
+            every.append((one, []))
+    return [_likeliest([one, *same]) for one, same in every]
+
+
+def _likeliest(alike: list[Scored]) -> tuple[Scored, list[Scored]]:
+    """The likeliest, and the others."""
+    first = max(alike, key=lambda one: one.likely)
+    return first, [one for one in alike if one is not first]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Fitted:
+class _Beside:
     scored: Scored
     problem: Problem
     state: State
     cost: float  # twice the negative logarithm of its odds, less a constant
 
 
-def _beside(problem: Problem, state: State, one: Scored, tried: Mapping[tuple[str, str], int]) -> _Fitted:
+def _beside(problem: Problem, state: State, one: Scored, tried: Mapping[tuple[str, str], int]) -> _Beside:
     """All numbers settled beside an effect and its shape; what was tried more often is less likely beforehand."""
     wider = problem.joined(one.candidate)
     begun = settled(wider, begun=state.joined(problem, wider))
@@ -220,11 +268,11 @@ def _beside(problem: Problem, state: State, one: Scored, tried: Mapping[tuple[st
         wider = problem.joined(candidate)
         begun = settled(wider, begun=replace(begun, reach=REACH, lowest=np.inf))
     often = tried[one.candidate.name, one.candidate.site]
-    return _Fitted(one, wider, begun, begun.cost(wider) + 2.0 * float(np.log(often)) - one.likely)
+    return _Beside(one, wider, begun, begun.cost(wider) + 2.0 * float(np.log(often)) - one.likely)
 
 
-def _first_of_each(scored: Sequence[Scored]) -> list[Scored]:
-    """The best shape of each law at each place, of the first few."""
+def _leading(scored: Sequence[Scored]) -> list[Scored]:
+    """The best shape of each law at each place, of the first few, and none that is worth far less than the first."""
     first: dict[tuple[str, str], Scored] = {}
     for one in sorted(scored, key=lambda one: -one.worth):
         first.setdefault((one.candidate.name, one.candidate.site), one)
@@ -270,7 +318,7 @@ class _Judge:
         """An effect with what it takes there, if they show it as far as it shows there."""
         taken, foretold = held.foreseen(one)
         if one.candidate.effect.each_trial:
-            shown = taken > SHARE * self.samples * one.gain
+            shown = taken > SHARE * min(self.samples * one.gain, held.left)
         else:
             shown = foretold < ALIKE or taken > FORETOLD * foretold
         return replace(one, foreseen=taken) if shown else None
@@ -283,36 +331,40 @@ def _know(problem: Problem, fitted: Problem, state: State) -> None:
     problem.prior[:common], problem.spread[:common] = state.x[:common], known[:common]
 
 
-def _claim(best: Scored, leaders: Sequence[Scored], alike: Sequence[Scored]) -> Claim:
-    """What is claimed of an effect, with the next best of other places or physics, and what is not told from it."""
-    own = _suspect(best.candidate)
-    others = list(dict.fromkeys(told for one in leaders if (told := _suspect(one.candidate)) != own))
+def _proposal(best: Scored, leaders: Sequence[Scored], alike: Sequence[Scored]) -> Proposal:
+    """What is said of an effect, with the next best of other places or physics, and what is not told from it."""
+    first: dict[object, Candidate] = {}
+    for one in leaders:
+        first.setdefault(_suspect(one.candidate), one.candidate)
+    first.pop(_suspect(best.candidate), None)
     same = {_suspect(one.candidate) for one in alike}
-    following = others[:NEXT]
-    return Claim(
-        port=own.port,
-        axis=own.axis,
-        channels=own.channels,
-        family=own.family,
-        law=best.candidate.name,
-        alternatives=tuple(Claimed(**structs.asdict(one)) for one in following),
-        indistinguishable_from=tuple(told for told in others if told in same),
-    )
+    others, own = tuple(first.values()), best.candidate
+    return Proposal(own, others, tuple(one for one in others if _suspect(one) in same), (), best.amplitudes)
 
 
-def _suspect(candidate: Candidate) -> Suspect:
+def _suspect(candidate: Candidate) -> tuple[object, ...]:
+    """Where it acts, and what physics it is."""
     law = candidate.effect
-    channels = tuple(candidate.site.split(BY)) if law.port.of_channel else ()
-    axis = "" if law.port.of_channel or law.port.beneath else candidate.site
-    return Suspect(port=law.port_word, axis=axis, channels=channels, family=law.family)
+    beneath = not law.port.of_channel and law.port.beneath
+    return law.port_word, "" if beneath else candidate.site, law.family
 
 
-def refitted(problem: Problem, state: State) -> tuple[Moved, ...]:
+def moved(fitted: Fitted) -> tuple[Moved, ...]:
     """Numbers of the rig, as fitted."""
-    at = problem.of_rig
-    sigma = Quadratic.of(problem, state).sigma(problem.spread)[at]
-    off = ((state.x - problem.prior) / problem.spread)[at]
+    problem, state = fitted.problem, fitted.state
+    at, units = problem.of_rig, {name: quantity.unit for name, quantity in problem.rig.quantities().items()}
+    sigma = Quadratic.of(problem, state).sigma(problem.spread)
     return tuple(
-        Moved(name=name, value=float(value), sigma=float(known), sigmas=float(by))
-        for name, value, known, by in zip(problem.elements.names, state.x[at], sigma, off, strict=True)
+        Moved(
+            name=name,
+            unit=units[name.partition("[")[0]],
+            prior=float(prior),
+            prior_sigma=float(spread),
+            value=float(value),
+            sigma=float(known),
+            sigmas=float((value - prior) / spread),
+        )
+        for name, prior, spread, value, known in zip(
+            problem.elements.names, problem.prior[at], problem.spread[at], state.x[at], sigma[at], strict=True
+        )
     )

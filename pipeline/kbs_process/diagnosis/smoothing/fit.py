@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -10,17 +10,20 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 from scipy.linalg.lapack import dtrtri
 
-from proof.rivals.case import Array
-from proof.rivals.smoother.balance import Motion
-from proof.rivals.smoother.basis import LOCAL
-from proof.rivals.smoother.course import Course
-from proof.rivals.smoother.problem import Problem
+from kbs_process.diagnosis.side_by_side import side_by_side
+from kbs_process.diagnosis.smoothing.balance import Motion
+from kbs_process.diagnosis.smoothing.basis import LOCAL
+from kbs_process.diagnosis.smoothing.columns import Columns, Places, within
+from kbs_process.diagnosis.smoothing.course import Course
+from kbs_process.diagnosis.smoothing.problem import Problem
+from kbs_process.signals.records import Array
 
 # Prior sigmas that a number of the rig goes in a step at most: to begin with, at most, at least; and by what it grows
 # where a step made the cost less, and shrinks where it did not.
 REACH, _FAR, NEAR, _ONWARD, _BACK = 2.0, 4.0, 0.1, 2.0, 0.4
 _HELD = (-3.0, 12.0)  # powers of ten: of what holds the rig's numbers where they are, over what priors do
 _HALVINGS = 24
+_MANY = 3  # rows, of a column that acts on more of which all are taken at once
 _RUNS = 2  # steps in which a motion follows unknowns that moved
 
 
@@ -32,7 +35,7 @@ class State:
     coefficients: list[Array]
     sigma: Array  # (rows,)
     torques: list[Array] = field(default_factory=list)  # of the rotors along each motion
-    ideal: list[Array] = field(default_factory=list)  # coefficients of the motion that the model has by itself
+    ideal: list[Array] = field(default_factory=list)  # coefficients of the motion that the model of a group has
     ideal_torques: list[Array] = field(default_factory=list)
     reach: float = REACH
     lowest: float = np.inf  # cost where the last step began
@@ -42,7 +45,10 @@ class State:
         """Before any step, with forces of `forces` (their rows,)."""
         sigma = problem.sigma.copy()
         sigma[problem.forces] = forces
-        state = cls(problem.prior.copy(), [problem.start(k) for k in range(len(problem.recordings))], sigma)
+        begun: dict[int, Array] = {}
+        for members in problem.groups:
+            begun |= dict.fromkeys(members, problem.start(members[0]))
+        state = cls(problem.prior.copy(), [begun[k] for k in range(len(begun))], sigma)
         state.follow(problem)
         return state
 
@@ -55,9 +61,12 @@ class State:
             clocks = old.stop - 2
             x[new.start : new.start + clocks - old.start] = self.x[old.start : clocks]
             x[new.stop - 2 : new.stop] = self.x[clocks : old.stop]
+        of = {k: g for g, members in enumerate(before.groups) for k in members}
+        first = [of[members[0]] for members in problem.groups] if self.ideal else []
         return replace(
             self, x=x, coefficients=[*self.coefficients], sigma=self.sigma.copy(), torques=[*self.torques],
-            ideal=[*self.ideal], ideal_torques=[*self.ideal_torques], reach=REACH, lowest=np.inf,
+            ideal=[self.ideal[g] for g in first], ideal_torques=[self.ideal_torques[g] for g in first],
+            reach=REACH, lowest=np.inf,
         )  # fmt: skip
 
     def motion(self, problem: Problem, k: int) -> Motion:
@@ -66,32 +75,52 @@ class State:
 
     def follow(self, problem: Problem) -> None:
         """Take the rotors' torques where the motion is now."""
-        before = self.torques or [None] * len(problem.recordings)
-        self.torques = [_torques(problem, k, self.x, self.motion(problem, k), before[k]) for k in range(len(before))]
+        before: Sequence[Array | None] = self.torques or [None] * len(problem.recordings)
+        self.torques = [_torques(problem, k, self.x, self.motion(problem, k), one) for k, one in enumerate(before)]
 
     def idealise(self, problem: Problem, stiff: float) -> None:
         """Let the model run by itself: forces that it lacks are `stiff` times as large, and readings hardly count."""
         if not self.ideal:
-            self.ideal = [problem.start(k) for k in range(len(problem.recordings))]
+            self.ideal = [problem.start(members[0]) for members in problem.groups]
             self.ideal_torques = [
-                _torques(problem, k, self.x, self.ideal_motion(problem, k), None) for k in range(len(self.ideal))
+                _torques(problem, members[0], self.x, self.ideal_motion(problem, g), None)
+                for g, members in enumerate(problem.groups)
             ]
         sigma = self.sigma.copy()
         sigma[problem.forces] *= stiff
-        for k in range(len(self.ideal)):
+
+        def run(g: int) -> tuple[Array, Array]:
+            members = problem.groups[g]
+            first, coefficients, torques = members[0], self.ideal[g], self.ideal_torques[g]
             if problem.present:
-                problem.acting[k], problem.beyond[k] = self.course(problem, k).acting()
+                acting, beyond = self.course(problem, g).acting()
+                for k in members:
+                    problem.acting[k], problem.beyond[k] = acting, beyond
+            root = np.sqrt(self.weights(problem, first, sigma))
+            banded = _banded(problem, first, self.x, self.ideal_motion(problem, g), torques, root)
             for _ in range(_RUNS):
-                self.ideal[k], self.ideal_torques[k] = _moved(
-                    problem, k, self.x, self.ideal[k], self.ideal_torques[k], self.weights(problem, k, sigma)
-                )
+                motion = problem.recordings[first].basis.motion(coefficients)
+                left = np.mean([problem.residual(k, self.x, motion, torques) for k in members], axis=0)
+                coefficients = coefficients + banded.taken(left * root)
+                torques = _torques(
+                    problem, first, self.x, problem.recordings[first].basis.motion(coefficients), torques
+                )  # fmt: skip
+            return coefficients, torques
+
+        found = side_by_side(run, range(len(problem.groups)))
+        self.ideal, self.ideal_torques = [one for one, _ in found], [one for _, one in found]
 
     def smooth(self, problem: Problem) -> None:
         """Bring the motion to where it is best for the unknowns as they are."""
-        for k in range(len(self.coefficients)):
-            self.coefficients[k], self.torques[k] = _moved(
-                problem, k, self.x, self.coefficients[k], self.torques[k], self.weights(problem, k)
-            )
+
+        def follow(g: int) -> None:
+            banded, root = self.banded(problem, g)
+            for k in problem.groups[g]:
+                left = problem.residual(k, self.x, self.motion(problem, k), self.torques[k]) * root
+                self.coefficients[k] = self.coefficients[k] + banded.taken(left)
+                self.torques[k] = _torques(problem, k, self.x, self.motion(problem, k), self.torques[k])
+
+        side_by_side(follow, range(len(problem.groups)))
 
     def adapt(self, problem: Problem) -> None:
         """Go farther where the last step made the cost less, and less far where it did not."""
@@ -106,13 +135,13 @@ class State:
         self.sigma[problem.forces] = forces
         self.lowest += self.cost(problem) - before
 
-    def ideal_motion(self, problem: Problem, k: int) -> Motion:
-        """The motion that the model has by itself."""
-        return problem.recordings[k].basis.motion(self.ideal[k])
+    def ideal_motion(self, problem: Problem, g: int) -> Motion:
+        """The motion that the model of a group of recordings has by itself."""
+        return problem.recordings[problem.groups[g][0]].basis.motion(self.ideal[g])
 
-    def course(self, problem: Problem, k: int) -> Course:
+    def course(self, problem: Problem, g: int) -> Course:
         """What effects do along that motion."""
-        return Course(problem, k, self.x, self.ideal_motion(problem, k), self.ideal_torques[k])
+        return Course(problem, problem.groups[g], self.x, self.ideal_motion(problem, g), self.ideal_torques[g])
 
     def weights(self, problem: Problem, k: int, sigma: Array | None = None) -> Array:
         """(n, rows) one over the variance of each row, were it white."""
@@ -122,11 +151,14 @@ class State:
         weights[:, problem.forces] = sigma[problem.forces] ** -2.0  # they hold where nothing is read
         return weights
 
-    def banded(self, problem: Problem, k: int) -> tuple[Banded, Array]:
-        """What a recording's rows say of its motion, and square roots of their weights (n, rows)."""
-        root = np.sqrt(self.weights(problem, k))
-        slopes = problem.by_motion(k, self.x, self.motion(problem, k), self.torques[k])
-        return Banded.of(slopes, problem.recordings[k].basis.values, root), root
+    def banded(self, problem: Problem, g: int) -> tuple[Banded, Array]:
+        """What rows of a group say of a recording's motion, and square roots of their weights (n, rows).
+
+        Along the motion that the model has by itself: what a recording's own differs by bends no slope.
+        """
+        first = problem.groups[g][0]
+        root = np.sqrt(self.weights(problem, first))
+        return _banded(problem, first, self.x, self.ideal_motion(problem, g), self.ideal_torques[g], root), root
 
     def residuals(self, problem: Problem) -> list[Array]:
         """Of every recording, (n, rows)."""
@@ -141,6 +173,10 @@ class State:
         return total
 
 
+def _banded(problem: Problem, k: int, x: Array, motion: Motion, torques: Array, root: Array) -> Banded:
+    return Banded.of(problem.by_motion(k, x, motion, torques), problem.recordings[k].basis.values, root)
+
+
 def _torques(problem: Problem, k: int, x: Array, motion: Motion, before: Array | None) -> Array:
     return problem.recordings[k].field.torques(problem.rig, problem.behind(k, x, motion, before))
 
@@ -153,7 +189,7 @@ class Banded:
     triangles, and what couples a block to the one before.
     """
 
-    seen: Array  # (blocks, LOCAL rows, 2 width) slopes by coefficients, over sigmas as all below
+    seen: Array  # (blocks, rows, LOCAL, 2 width) slopes by coefficients, over sigmas as all below
     inverse: Array  # (blocks + 1, width, width) of the triangles
     coupled: Array  # (blocks, width, width) of each but the first
     shape: tuple[int, int]  # samples, rows
@@ -165,11 +201,11 @@ class Banded:
         (n, rows), freedoms = root.shape, by_motion.shape[2]
         local = np.matmul(bases.T, (by_motion * root[:, :, None, None]).swapaxes(2, 3))
         blocks, width = -(-n // LOCAL), LOCAL * freedoms
-        seen = np.zeros((blocks, LOCAL, rows, 2 * LOCAL, freedoms))
+        seen = np.zeros((blocks, rows, LOCAL, 2 * LOCAL, freedoms))
         for i in range(LOCAL):
             own = local[i::LOCAL]
-            seen[: len(own), i, :, i : i + LOCAL] = own
-        seen = seen.reshape(blocks, LOCAL * rows, 2 * width)
+            seen[: len(own), :, i, i : i + LOCAL] = own
+        seen = seen.reshape(blocks, rows * LOCAL, 2 * width)
         products = seen.swapaxes(1, 2) @ seen
         own = np.concatenate([products[:, :width, :width], np.zeros((1, width, width))])
         own[1:] += products[:, width:, width:]
@@ -181,18 +217,34 @@ class Banded:
                 coupled[b - 1] = coupled[b - 1] @ inverse[b - 1].T
                 own[b] -= coupled[b - 1] @ coupled[b - 1].T
             inverse[b] = np.tril(dtrtri(np.linalg.cholesky(own[b]), lower=1)[0])
-        return cls(seen, inverse, coupled.copy(), (n, rows), freedoms)
+        return cls(seen.reshape(blocks, rows, LOCAL, 2 * width), inverse, coupled.copy(), (n, rows), freedoms)
 
-    def against(self, columns: Array) -> Array:
-        """R^-1 times products of columns (n rows, m) with what the motion does, (blocks + 1, width, m)."""
-        blocks, samples, width = len(self.seen), self.seen.shape[1], self.seen.shape[2] // 2
-        padded = columns
-        if len(columns) < blocks * samples:
-            padded = np.concatenate([columns, np.zeros((blocks * samples - len(columns), columns.shape[1]))])
-        products = self.seen.swapaxes(1, 2) @ padded.reshape(blocks, samples, -1)
-        out = np.zeros((blocks + 1, width, columns.shape[1]))
-        out[:-1] = products[:, :width]
-        out[1:] += products[:, width:]
+    def against(self, columns: Columns) -> Array:
+        """R^-1 times products of columns with what the motion does, (blocks + 1, width, columns)."""
+        blocks, rows, samples, width = self.seen.shape
+        width //= 2
+        out = np.zeros((blocks + 1, width, columns.count))
+
+        def enter(places: Places, products: Array) -> None:
+            first, end = places[0], places[-1] + 1
+            whole = slice(first, end) if end - first == len(places) else places
+            out[:-1, :, whole] += products[:, :width]
+            out[1:, :, whole] += products[:, width:]
+
+        def blockwise(values: Array) -> Array:
+            padded = np.zeros((blocks * samples, values.shape[1]))
+            padded[: len(values)] = values
+            return padded.reshape(blocks, samples, -1)
+
+        rest, many = columns.divided(_MANY)
+        if len(many):
+            dense = np.zeros((blocks, rows, samples, len(many)))
+            for row, places, values in columns.chosen(many).parts:
+                dense[:, row, :, places] = np.moveaxis(blockwise(values), 2, 0)
+            whole = self.seen.reshape(blocks, rows * samples, -1)
+            enter(many, whole.swapaxes(1, 2) @ dense.reshape(blocks, rows * samples, -1))
+        for row, places, values in columns.chosen(rest).parts:
+            enter(rest[places], self.seen[:, row].swapaxes(1, 2) @ blockwise(values))
         out[0] = self.inverse[0] @ out[0]
         for b in range(blocks):
             out[b + 1] = self.inverse[b + 1] @ (out[b + 1] - self.coupled[b] @ out[b])
@@ -206,6 +258,10 @@ class Banded:
             out[b] = (against[b] - out[b + 1] @ self.coupled[b]) @ self.inverse[b]
         return out.reshape(-1, self.freedoms)[: self.shape[0] - 1 + LOCAL]
 
+    def taken(self, left: Array) -> Array:
+        """Coefficients of the motion that take up what is left of rows (n, rows)."""
+        return self.coefficients(self.against(Columns.of_dense(left[:, :, None]))[:, :, 0])
+
     def shown(self, against: Array) -> Array:
         """What the motion takes up of a column (n, rows), of its `against` (blocks + 1, width)."""
         every = np.zeros((len(self.inverse) * LOCAL, self.freedoms))
@@ -214,59 +270,58 @@ class Banded:
         each = every.reshape(len(self.inverse), -1)
         both = np.concatenate([each[:-1], each[1:]], axis=1)[:, :, None]
         n, rows = self.shape
-        return np.asarray((self.seen @ both).reshape(-1, rows)[:n])
-
-
-def _moved(
-    problem: Problem, k: int, x: Array, coefficients: Array, torques: Array, weights: Array
-) -> tuple[Array, Array]:
-    """Coefficients after a step of Gauss and Newton in the motion alone, and the rotors' torques there."""
-    basis, root = problem.recordings[k].basis, np.sqrt(weights)
-    motion = basis.motion(coefficients)
-    banded = Banded.of(problem.by_motion(k, x, motion, torques), basis.values, root)
-    left = problem.residual(k, x, motion, torques) * root
-    coefficients = coefficients + banded.coefficients(banded.against(left.reshape(-1, 1))[:, :, 0])
-    return coefficients, _torques(problem, k, x, basis.motion(coefficients), torques)
+        return np.asarray((self.seen @ both[:, None]).swapaxes(1, 2).reshape(-1, rows)[:n])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reduced:
-    """A recording's rows with its motion taken out of them: columns are projected by `gram`."""
+    """Rows of recordings that were driven alike, with their motion taken out: columns are projected by `gram`."""
 
+    members: tuple[int, ...]  # recordings
     motion: Banded
     root: Array  # (n, rows) square roots of the weights
-    columns: Array  # (n rows, local + 1) unknowns, then the residual
-    against: Array  # (blocks + 1, width, local + 1) of them
-    whole: Array  # (local + 1, local + 1) their products
+    columns: Columns  # unknowns, then residuals of members
+    against: Array  # (blocks + 1, width, local + members) of them
+    whole: Array  # (local + members, local + members) their products
 
     @classmethod
-    def of(cls, problem: Problem, state: State, k: int) -> Reduced:
+    def of(cls, problem: Problem, state: State, g: int) -> Reduced:
         """At a state; unknowns along the motion that the model has by itself, in which there is no noise."""
-        banded, root = state.banded(problem, k)
-        left = problem.residual(k, state.x, state.motion(problem, k), state.torques[k])
-        by_unknown = problem.by_unknown(k, state.x, state.ideal_motion(problem, k), state.ideal_torques[k])
-        columns = np.concatenate([by_unknown, left[:, :, None]], axis=2) * root[:, :, None]
-        columns = columns.reshape(root.size, -1)
+        banded, root = state.banded(problem, g)
+        members = problem.groups[g]
+        left = [problem.residual(k, state.x, state.motion(problem, k), state.torques[k]) for k in members]
+        by_unknown = problem.by_unknown(
+            members[0], state.x, state.ideal_motion(problem, g), state.ideal_torques[g]
+        )  # fmt: skip
+        columns = Columns.beside([by_unknown, Columns.of_dense(np.stack(left, axis=2))]).weighed(root)
         against = banded.against(columns)
-        return cls(banded, root, columns, against, columns.T @ columns - _flat(against).T @ _flat(against))
+        whole = columns.products(columns) - _flat(against).T @ _flat(against)
+        return cls(tuple(members), banded, root, columns, against, whole)
 
-    def left(self, change: Array, column: Array | float = 0.0) -> Array:
-        """What is left of the rows (n, rows), over their sigmas, after the motion and a change of unknowns (local,).
+    @property
+    def unknowns(self) -> int:
+        return len(self.whole) - len(self.members)
 
-        `column` (n, rows) is what is known to be in them.
+    def of_member(self, k: int, change: Array) -> Array:
+        """(local + members,) of columns: a recording's residual less what a change of its unknowns (local,) does."""
+        own = np.zeros(len(self.members))
+        own[self.members.index(k)] = 1.0
+        return np.concatenate([-change, own])
+
+    def left(self, k: int, change: Array) -> Array:
+        """What is left of a recording's rows (n, rows), over their sigmas, after motion and a change of unknowns."""
+        own = self.of_member(k, change)
+        return self.columns.times(own, self.root.shape[1]) - self.motion.shown(self.against @ own)
+
+    def gram(self, columns: Columns, owner: Places) -> tuple[Array, Array]:
+        """Products of columns with unknowns and residuals (columns, local + members), and with each other.
+
+        The latter (columns, columns) between those of one `owner` (columns,); both with the motion taken out.
         """
-        rest = self.columns @ np.append(-change, 1.0) - np.reshape(column, -1)
-        return np.asarray(
-            rest.reshape(self.root.shape) - self.motion.shown(self.motion.against(rest[:, None])[:, :, 0])
-        )
-
-    def gram(self, columns: Array) -> tuple[Array, Array]:
-        """Products of columns (n rows, m) with the unknowns and the residual (m, local + 1), and with each other.
-
-        The latter (m, m), both with the motion taken out.
-        """
+        columns = columns.weighed(self.root)
         against = _flat(self.motion.against(columns))
-        return columns.T @ self.columns - against.T @ _flat(self.against), columns.T @ columns - against.T @ against
+        mixed = columns.products(self.columns) - against.T @ _flat(self.against)
+        return mixed, columns.squares(owner) - within(against, owner)
 
 
 def _flat(against: Array) -> Array:
@@ -277,7 +332,7 @@ def _flat(against: Array) -> Array:
 class Quadratic:
     """The cost about a state, in the unknowns alone."""
 
-    parts: Mapping[int, Reduced]  # by recording
+    parts: tuple[Reduced, ...]  # by groups of recordings
     normal: Array  # (p, p), priors included
     pull: Array  # (p,)
     left: float  # cost at the best motion for these unknowns
@@ -285,25 +340,24 @@ class Quadratic:
     @classmethod
     def of(cls, problem: Problem, state: State) -> Quadratic:
         """At a state."""
-        every = range(len(problem.recordings))
-        return cls.over(problem, state, {k: Reduced.of(problem, state, k) for k in every})
-
-    @classmethod
-    def over(cls, problem: Problem, state: State, parts: Mapping[int, Reduced]) -> Quadratic:
-        """Of some recordings."""
+        parts = side_by_side(lambda g: Reduced.of(problem, state, g), range(len(problem.groups)))
         off = (state.x - problem.prior) / problem.spread
         normal, pull, left = np.diag(problem.spread**-2.0), -off / problem.spread, float(off @ off)
-        for k, part in parts.items():
-            local, whole = problem.local[k], part.whole
-            normal[np.ix_(local, local)] += whole[:-1, :-1]
-            pull[local] += whole[:-1, -1]
-            left += float(whole[-1, -1])
-        return cls(parts, normal, pull, left)
+        for part in parts:
+            p = part.unknowns
+            for residual, k in enumerate(part.members, start=p):
+                local = problem.local[k]
+                normal[np.ix_(local, local)] += part.whole[:p, :p]
+                pull[local] += part.whole[:p, residual]
+                left += float(part.whole[residual, residual])
+        return cls(tuple(parts), normal, pull, left)
 
     def solve(
         self, spread: Array, right: Array, free: NDArray[np.bool_] | None = None, held: Array | float = 0.0
     ) -> Array:
         """normal^-1 right, of the free unknowns; zero of the others. `held` is added to the normal's diagonal."""
+        if not np.isfinite(self.normal).all():
+            raise np.linalg.LinAlgError("rows have no values there")
         scale = spread if free is None else np.where(free, spread, 0.0)
         factor = cho_factor(self.normal * np.outer(scale, scale) + np.diag((scale == 0.0) + held * np.ones(len(scale))))
         found = cho_solve(factor, right.reshape(len(spread), -1) * scale[:, None]) * scale[:, None]
@@ -327,10 +381,10 @@ def step(problem: Problem, state: State, quadratic: Quadratic, free: NDArray[np.
     bounded = state.x + change
     bounded[numbers] = np.maximum(bounded[numbers], problem.lower)
     change, state.x = bounded - state.x, bounded
-    state.coefficients = [
-        c + part.motion.coefficients(part.against @ np.append(-change[local], 1.0))
-        for c, part, local in zip(state.coefficients, quadratic.parts.values(), problem.local, strict=True)
-    ]
+    for part in quadratic.parts:
+        for k in part.members:
+            own = part.of_member(k, change[problem.local[k]])
+            state.coefficients[k] = state.coefficients[k] + part.motion.coefficients(part.against @ own)
     state.follow(problem)
     state.smooth(problem)
     return float(np.sqrt(change @ quadratic.normal @ change))

@@ -5,34 +5,34 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, replace
-from itertools import cycle
 
 import numpy as np
 from numpy.typing import NDArray
 
+from kbs_process.diagnosis.facts import Estimate
 from kbs_process.diagnosis.screening.ranges import ranges_of
 from kbs_process.diagnosis.screening.suspects import Candidate, candidates
+from kbs_process.diagnosis.side_by_side import side_by_side
+from kbs_process.diagnosis.smoothing.basis import BAND_HZ
+from kbs_process.diagnosis.smoothing.columns import Columns, Places
+from kbs_process.diagnosis.smoothing.course import Course
+from kbs_process.diagnosis.smoothing.fit import Quadratic, State
+from kbs_process.diagnosis.smoothing.lines import proposed
+from kbs_process.diagnosis.smoothing.problem import Problem, by_recording
 from kbs_process.plant.compiled.taps import tap_columns
 from kbs_process.plant.effect import Parameter
-from proof.answer import Estimate
-from proof.rivals.case import Array
-from proof.rivals.smoother.basis import BAND_HZ
-from proof.rivals.smoother.course import Course
-from proof.rivals.smoother.fit import Quadratic, State
-from proof.rivals.smoother.lines import proposed
-from proof.rivals.smoother.problem import Problem
+from kbs_process.signals.records import Array
 
-Places = NDArray[np.intp]
 _BATCH = 200  # columns at once
 _DEPENDENT = 1e-5  # of a column that all numbers leave
 _FIRST_STEP = 0.1  # of a shape's value
 _HALVINGS = 12
 _ROUNDS, _SETTLED = 4, 0.02  # through all shapes, at most, and while the gain grows by such a share
 _BEND = 1e-3  # of a shape's value: step of its slope
+_SAME = 0.002  # of the gain, which two effects that do the same differ by, and gain together
 _SIZES = 10  # passes to the size of an effect whose columns it changes
 _KNOWN = 4.0  # of the cost, for which a shape is not changed
 _MOST = 0.5  # of its value, that a shape goes at once
-_NORMAL = 1.96  # sigmas of an interval of 95 %
 _NEAR = 0.7  # of the gain, beside the best shape, from which on a parabola leads there
 
 
@@ -77,7 +77,7 @@ class _Products:
     unknowns: Array
     residual: Array
     squares: Array
-    owner: NDArray[np.intp]
+    owner: Places
     own: NDArray[np.bool_]  # (m,) of one recording alone
 
 
@@ -88,7 +88,7 @@ class _Bends:
     names: tuple[str, ...]
     amplitudes: Array
 
-    def columns(self, course: Course, candidate: Candidate, amplitudes: Array) -> Array:
+    def columns(self, course: Course, member: int, candidate: Candidate, amplitudes: Array) -> Array:
         """What a unit of each shape does to the rows, (n, rows, shapes)."""
         out = []
         for name in self.names:
@@ -97,7 +97,7 @@ class _Bends:
                 replace(candidate, shape=tuple((n, v + by * (n == name)) for n, v in candidate.shape))
                 for by in (step, -step)
             )
-            shown = course.columns([more, less])
+            shown = course.columns([more, less], member=member).dense(course.problem.rows)
             out.append((shown[:, :, : len(amplitudes)] - shown[:, :, len(amplitudes) :]) @ amplitudes / (2.0 * step))
         return np.stack(out, axis=2) if out else np.zeros((course.recording.n, course.problem.rows, 0))
 
@@ -109,14 +109,9 @@ class Screen:
         self, problem: Problem, state: State, courses: Sequence[Course] = (), quadratic: Quadratic | None = None
     ) -> None:
         self.problem, self.state = problem, state
-        self.courses = courses or [state.course(problem, k) for k in range(len(problem.recordings))]
+        self.courses = courses or side_by_side(lambda g: state.course(problem, g), range(len(problem.groups)))
         self.quadratic = quadratic or Quadratic.of(problem, state)
         self._own = self.quadratic.solve(problem.spread, self.quadratic.pull)
-
-    def survey(self) -> Screen:
-        """The same on one recording of each trajectory: enough to find the few that are worth more."""
-        chosen = {k: self.quadratic.parts[k] for k in self.problem.first_of_each}
-        return Screen(self.problem, self.state, self.courses, Quadratic.over(self.problem, self.state, chosen))
 
     def candidates(self) -> list[Candidate]:
         """Every effect that the model leaves out, with each shape, but those that need a recording's own times."""
@@ -124,13 +119,24 @@ class Screen:
         tapped = [course.tapped for course in self.courses]
         lines = proposed(problem, self.state, self.unexplained())
         shown = [course.shown for course in self.courses]
-        ranges = ranges_of(tapped, shown, experiment.channels, experiment.dt, proposed=lines)
+        ranges = ranges_of(
+            tapped, shown, experiment.channels, experiment.dt, proposed=lines,
+            temperature=all(recording.temperature is not None for recording in problem.recordings),
+        )  # fmt: skip
         every = candidates(problem.rig, experiment.effects, ranges, tap_columns(problem.rig), experiment.channels)
         return [one for one in every if not one.effect.jumps]
 
+    @property
+    def left(self) -> float:
+        """The cost that motion and numbers leave."""
+        return self.quadratic.left - float(self.quadratic.pull @ self._own)
+
     def unexplained(self) -> list[Array]:
         """What motion and numbers leave of each recording's rows (n, rows), over their sigmas."""
-        return [part.left(self._own[self.problem.local[k]]) for k, part in self.quadratic.parts.items()]
+        left = {
+            k: part.left(k, self._own[self.problem.local[k]]) for part in self.quadratic.parts for k in part.members
+        }
+        return [left[k] for k in sorted(left)]
 
     def scored(self, chosen: Sequence[Candidate]) -> list[Scored]:
         """What each takes of the cost beside all numbers; best first."""
@@ -156,7 +162,7 @@ class Screen:
     def sized(self, one: Scored) -> Scored:
         """The same about the size that it has: readings that are late by more than they turn in are no slope."""
         for _ in range(_SIZES):
-            if not any(course.turned(one.candidate, size) for course, size in self._each(one)):
+            if not any(course.turned(one.candidate, size) for course, sizes in self._each(one) for size in sizes):
                 break
             before = one.gain
             with self._about(one):
@@ -165,15 +171,29 @@ class Screen:
                 break
         return one
 
+    def same(self, one: Scored, other: Scored) -> bool:
+        """Whether two effects do the same beside all numbers: neither takes more of the cost, nor do both together."""
+        least, most = sorted((one.gain, other.gain))
+        if most > (1.0 + _SAME) * least:
+            return False
+        with self._about(one), self._about(other):
+            found = self._products([one.candidate, other.candidate], together=True)
+        square, right, _ = self._beside(found)
+        gain, _, _ = _best(square, right, np.sqrt(np.maximum(np.diag(found.squares), 1e-300)))
+        return gain < (1.0 + _SAME) * most
+
     def _each(self, one: Scored) -> Iterator[tuple[Course, Array]]:
-        return zip((self.courses[k] for k in self.quadratic.parts), cycle(one.each))
+        """Every group's course, with amplitudes of its members (members, amplitudes)."""
+        every = np.broadcast_to(one.each, (len(self.problem.recordings), one.each.shape[1]))
+        for course, part in zip(self.courses, self.quadratic.parts, strict=True):
+            yield course, every[list(part.members)]
 
     @contextmanager
     def _about(self, one: Scored) -> Iterator[None]:
         """Take its columns about the size that it has."""
         place = one.candidate.name, one.candidate.site
-        for course, size in self._each(one):
-            course.sizes[place] = size
+        for course, sizes in self._each(one):
+            course.sizes[place] = sizes
         try:
             yield
         finally:
@@ -282,7 +302,7 @@ class Screen:
         bent = dict(zip(names, np.diag(covariance), strict=True))
         told = [*zip(candidate.amplitudes, self.state.x[own], variance, strict=True)]
         told += [(entries[name], value, bent[name]) for name, value in candidate.shape if name in bent]
-        return tuple(estimate(one.name, one.unit, float(v), float(np.sqrt(max(var, 0.0)))) for one, v, var in told)
+        return tuple(Estimate(one.name, one.unit, float(v), float(np.sqrt(max(var, 0.0)))) for one, v, var in told)
 
     def _bent(self, candidate: Candidate, places: Places) -> tuple[tuple[str, ...], Array, Array, Array, Array]:
         """Shapes that may have any value; products of a unit of each with each other and the residual, beside numbers.
@@ -297,13 +317,16 @@ class Screen:
         size = np.sqrt(np.maximum(np.diag(found.squares)[bent], 1e-300))
         return names, square[np.ix_(bent, bent)], right[bent], size, solved[:, bent]
 
-    def _products(self, every: Sequence[Candidate], bends: _Bends | None = None) -> _Products:
+    def _products(
+        self, every: Sequence[Candidate], bends: _Bends | None = None, *, together: bool = False
+    ) -> _Products:
+        """Products of columns; of those of different effects only `together`, or with `bends` of the last."""
         sizes = [len(one.amplitudes) for one in every]
         each = [one.effect.each_trial for one in every]
         if bends is not None:
             sizes, each = [*sizes, *[1] * len(bends.names)], [*each, *[False] * len(bends.names)]
         owner = np.repeat(np.arange(len(sizes)), sizes)
-        count = len(self.quadratic.parts)
+        count = len(self.problem.recordings)
         recording = np.concatenate([
             np.repeat(np.arange(count), size) if alone else np.full(size, -1)
             for alone, size in zip(each, sizes, strict=True)
@@ -314,25 +337,38 @@ class Screen:
         ])  # fmt: skip
         m = len(source)
         unknowns, residual, squares = np.zeros((len(self.problem.spread), m)), np.zeros(m), np.zeros((m, m))
-        for place, (k, part) in enumerate(self.quadratic.parts.items()):
-            local = self.problem.local[k]
-            whole = self.courses[k].columns(every)
-            if bends is not None:
-                own = bends.amplitudes[place % len(bends.amplitudes)]
-                whole = np.concatenate([whole, bends.columns(self.courses[k], every[-1], own)], axis=2)
-            whole = whole * part.root[:, :, None]
-            mixed, square = part.gram(whole.reshape(-1, whole.shape[2]))
-            there = np.flatnonzero((recording < 0) | (recording == place))
-            taken = source[there]
-            unknowns[np.ix_(local, there)] += mixed[taken, :-1].T
-            residual[there] += mixed[taken, -1]
-            squares[np.ix_(there, there)] += square[np.ix_(taken, taken)]
+        of_column = np.zeros(ends[-1], dtype=np.intp) if together or bends is not None else owner
+        for seen in side_by_side(lambda g: self._seen(g, every, bends, of_column), range(len(self.courses))):
+            for k, mixed, square in seen:
+                there = np.flatnonzero((recording < 0) | (recording == k))
+                taken = source[there]
+                unknowns[np.ix_(self.problem.local[k], there)] += mixed[taken, :-1].T
+                residual[there] += mixed[taken, -1]
+                squares[np.ix_(there, there)] += square[np.ix_(taken, taken)]
         return _Products(unknowns, residual, squares, owner[source], recording >= 0)
 
+    def _seen(
+        self, g: int, every: Sequence[Candidate], bends: _Bends | None, owner: Places
+    ) -> list[tuple[int, Array, Array]]:
+        """Products with each recording of a group: it, with its unknowns and residual, and with each other.
 
-def estimate(name: str, unit: str, value: float, sigma: float) -> Estimate:
-    """Return a number with its interval of 95 %."""
-    return Estimate(name=name, unit=unit, value=value, low=value - _NORMAL * sigma, high=value + _NORMAL * sigma)
+        All that differs between its recordings is what `by_recording` says, and an amplitude of each one's own.
+        """
+        course, part = self.courses[g], self.quadratic.parts[g]
+        p, differs = (
+            part.unknowns,
+            any(map(by_recording, every)) or (bends is not None and np.ptp(bends.amplitudes, axis=0).any()),
+        )
+        found = []
+        for at, k in enumerate(part.members):
+            if differs or at == 0:
+                whole = course.columns(every, member=at)
+                if bends is not None:
+                    own = bends.amplitudes[k % len(bends.amplitudes)]
+                    whole = Columns.beside([whole, Columns.of_dense(bends.columns(course, at, every[-1], own))])
+                mixed, square = part.gram(whole, owner)
+            found.append((k, mixed[:, [*range(p), p + at]], square))
+        return found
 
 
 def _best(square: Array, right: Array, size: Array) -> tuple[float, Array, int]:
@@ -363,11 +399,15 @@ def _likely(entries: Sequence[Parameter], size: Array) -> float:
 
 
 def _batches(chosen: Sequence[Candidate]) -> Iterator[list[Candidate]]:
-    batch: list[Candidate] = []
-    for one in chosen:
-        batch.append(one)
-        if sum(len(entry.amplitudes) for entry in batch) >= _BATCH:
+    """Some at once; those that differ between recordings by themselves."""
+    for differing in (False, True):
+        batch: list[Candidate] = []
+        for one in chosen:
+            if by_recording(one) != differing:
+                continue
+            batch.append(one)
+            if sum(len(entry.amplitudes) for entry in batch) >= _BATCH:
+                yield batch
+                batch = []
+        if batch:
             yield batch
-            batch = []
-    if batch:
-        yield batch

@@ -8,12 +8,12 @@ import numpy as np
 from scipy.fft import fft, next_fast_len
 from scipy.ndimage import median_filter
 
+from kbs_process.diagnosis.smoothing.balance import FIRST_JOINT
+from kbs_process.diagnosis.smoothing.basis import BAND_HZ
+from kbs_process.diagnosis.smoothing.fit import State
+from kbs_process.diagnosis.smoothing.problem import Problem
 from kbs_process.plant.laws import CATALOGUE, SENSING
-from proof.rivals.case import Array
-from proof.rivals.smoother.balance import FIRST_JOINT
-from proof.rivals.smoother.basis import BAND_HZ
-from proof.rivals.smoother.fit import State
-from proof.rivals.smoother.problem import Problem
+from kbs_process.signals.records import Array
 
 _LINES = 3  # of each kind and joint
 _CELLS = 20  # of an angle to a turn of the highest order
@@ -34,7 +34,8 @@ def proposed(problem: Problem, state: State, left: Sequence[Array]) -> dict[str,
     for j, joint in enumerate(problem.rig.joints):
         assert joint.drive is not None
         assert joint.encoder is not None
-        angles = [state.ideal_motion(problem, k)[0][:, FIRST_JOINT + j] for k in range(len(left))]
+        alike = {k: g for g, members in enumerate(problem.groups) for k in members}
+        angles = [state.ideal_motion(problem, alike[k])[0][:, FIRST_JOINT + j] for k in range(len(left))]
         fields = [recording.field.angle[:, j] for recording in problem.recordings]
         forces, readings = (
             [part[:, place.start + j] for part in left] for place in (problem.joint, problem.angles)
@@ -69,7 +70,7 @@ def tones_in(left: Sequence[Array], dt: float) -> tuple[float, ...]:
     """Frequencies, Hz, that stand out of their neighbours in any row; their phases are each recording's own."""
     longest = max(len(part) for part in left)
     n = next_fast_len(int(_FINE) * longest)
-    f = np.fft.rfftfreq(n, dt)
+    f = np.asarray(np.fft.rfftfreq(n, dt), dtype=np.float64)
     power = sum(np.abs(np.fft.rfft(part, n, axis=0)) ** 2 for part in left)
     usual = median_filter(power, size=(_AROUND * int(_FINE), 1))
     inside = (f > _TONE_TURNS / (dt * longest)) & (f < BAND_HZ)

@@ -1,8 +1,9 @@
-"""The smoother's parts against closed forms, and a null that it fits from a cold start."""
+"""The parts of smoothing against closed forms, and a null that it fits from a cold start."""
 
 from __future__ import annotations
 
 import tarfile
+from copy import copy
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -14,22 +15,22 @@ from scipy.interpolate import make_interp_spline
 
 from kbs_process.campaign.load import load_campaign
 from kbs_process.diagnosis.screening.suspects import Candidate
+from kbs_process.diagnosis.smoothing.balance import FIRST_JOINT, FLOOR, PLATE, STILL, needed
+from kbs_process.diagnosis.smoothing.basis import BAND_HZ, WHOLE_HZ, Basis, in_band
+from kbs_process.diagnosis.smoothing.fit import Quadratic, State, restrained, step
+from kbs_process.diagnosis.smoothing.intensities import powers
+from kbs_process.diagnosis.smoothing.lines import orders_in, tones_in
+from kbs_process.diagnosis.smoothing.problem import Problem
+from kbs_process.diagnosis.smoothing.screen import Scored, Screen, evidence
+from kbs_process.diagnosis.smoothing.search import settled
 from kbs_process.plant.laws import CATALOGUE, SENSING
 from kbs_process.plant.rigid import inverse_dynamics, joint_efforts, kinematics, static_wrench
 from kbs_process.progress import SilentProgress
+from kbs_process.signals.records import Array
 from kbs_process.studies.diagnose.reading import experiment_of
-from proof.rivals.case import Array
-from proof.rivals.smoother.balance import FIRST_JOINT, FLOOR, PLATE, STILL, needed
-from proof.rivals.smoother.basis import BAND_HZ, WHOLE_HZ, Basis, in_band
-from proof.rivals.smoother.fit import Quadratic, State, restrained, step
-from proof.rivals.smoother.intensities import powers
-from proof.rivals.smoother.lines import orders_in, tones_in
-from proof.rivals.smoother.problem import Problem
-from proof.rivals.smoother.screen import Screen, evidence
-from proof.rivals.smoother.solve import settled
 
-CAMPAIGN = Path(__file__).parents[2] / "campaigns" / "EL089"
-NULL = Path(__file__).with_name("small") / "T00000000A1.tar"
+CAMPAIGN = Path(__file__).parents[3] / "campaigns" / "EL089"
+NULL = Path(__file__).parents[2] / "proof" / "small" / "T00000000A1.tar"
 
 
 def test_splines_give_values_rates_and_accelerations() -> None:
@@ -149,7 +150,7 @@ def test_a_cold_start_follows_its_readings_after_three_steps(tmp_path: Path) -> 
     quadratic = Quadratic.of(problem, state)
     # What is left is the cost once motion and unknowns have followed, less what priors pay.
     change = quadratic.solve(problem.spread, quadratic.pull)
-    left = quadratic.parts[0].left(change[problem.local[0]])
+    left = quadratic.parts[0].left(0, change[problem.local[0]])
     paid = np.sum(((state.x + change - problem.prior) / problem.spread) ** 2)
     assert np.sum(left**2) + paid == pytest.approx(quadratic.left - quadratic.pull @ change, rel=1e-3)
     numbers = problem.recordings[0].weight.sum() * problem.rows
@@ -209,7 +210,7 @@ def test_a_step_takes_numbers_as_far_as_it_may_and_the_rest_all_the_way() -> Non
     problem = cast("Problem", SimpleNamespace(spread=spread, of_rig=rig))
     rows = np.array([[1.0, 2.0, 0.3], [0.4, 30.0, 0.1], [0.5, 4.0, 0.2]])
     right = np.array([30.0, 7.0, -40.0])
-    quadratic = Quadratic({}, np.diag(spread**-2.0) + rows.T @ rows, rows.T @ right, 0.0)
+    quadratic = Quadratic((), np.diag(spread**-2.0) + rows.T @ rows, rows.T @ right, 0.0)
     free = restrained(problem, quadratic, 1e9, None)
     assert quadratic.normal @ free == pytest.approx(quadratic.pull)
     near = restrained(problem, quadratic, 0.5, None)
@@ -253,3 +254,42 @@ def test_a_null_is_fitted_to_its_noise_and_forces_to_what_repeats_differ_by(tmp_
     assert np.all(left.of_all[problem.wrench] < 1.5)
     off = np.abs(state.x - problem.prior)[problem.of_rig] / problem.spread[problem.of_rig]
     assert off.max() < 10.0
+
+
+@pytest.mark.slow
+def test_recordings_that_were_driven_alike_have_one_set_of_slopes(tmp_path: Path) -> None:
+    problem = _null(tmp_path, [1, 2])
+    state = State.of(problem, np.repeat([0.05, 0.2, 0.01], [3, 2, 3]))
+    state.idealise(problem, 0.1)
+    (offset,) = (law for law in SENSING if law.name == "clock_offset")
+    assert problem.groups == [[0, 1]]
+    assert problem.joined(Candidate(offset, "wrench", ())).groups == [[0], [1]]
+    apart = copy(problem)
+    apart.__dict__["_driven_alike"] = [[0], [1]]
+    shared, own = Quadratic.of(problem, state), Quadratic.of(apart, state.joined(problem, apart))
+    size = np.sqrt(np.diag(own.normal))
+    assert (shared.normal - own.normal) / np.outer(size, size) == pytest.approx(0.0, abs=0.01)
+    assert shared.left == pytest.approx(own.left, rel=1e-3)
+    step, other = (one.solve(problem.spread, one.pull) for one in (shared, own))
+    assert (step - other) @ own.normal @ (step - other) < 1e-3 * other @ own.normal @ other
+
+
+@pytest.mark.slow
+def test_effects_that_do_the_same_beside_all_numbers_are_found_to(tmp_path: Path) -> None:
+    problem = _null(tmp_path, [1])
+    field = problem.recordings[0].field
+    field.angle[:, 1] += 0.05 * np.sin(2.0 * field.angle[:, 1])  # which the gear has not followed
+    state = settled(problem, np.repeat([0.05, 0.2, 0.01], [3, 2, 3]))
+    screen = Screen(problem, state)
+
+    def scored(name: str, site: str, **shape: float) -> Scored:
+        (law,) = (one for one in CATALOGUE if one.name == name)
+        (found,) = screen.scored([Candidate(law, site, tuple(shape.items()))])
+        return found
+
+    # An error of the gear turns the output as a torque of the rotor turns the rotor.
+    gear = scored("kinematic_error", "el", kinematic_order=2.0)
+    assert gear.gain > 100.0
+    assert screen.same(gear, scored("motor_order", "el", order=2.0))
+    assert not screen.same(gear, scored("kinematic_error", "az", kinematic_order=2.0))
+    assert not screen.same(gear, scored("kinematic_error", "el", kinematic_order=1.0))

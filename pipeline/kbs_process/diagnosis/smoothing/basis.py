@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.linalg import cho_solve_banded, cholesky_banded
 
-from proof.rivals.case import Array
+from kbs_process.signals.records import Array
 
 # Of what is compared: whole up to the first, nothing from the second on. An edge would part what a resonance near it
 # shows while the mechanism turns, and its stiffness and damping with it.
@@ -35,7 +35,7 @@ def in_band(values: Array, dt: float, undo: Callable[[Array], Array] | None = No
     spectrum = np.fft.rfft(np.concatenate([values - line, (line - values)[::-1]]), axis=0)
     f = np.fft.rfftfreq(2 * n, dt)
     beyond = np.clip((f - WHOLE_HZ) / (BAND_HZ - WHOLE_HZ), 0.0, 1.0)
-    factors = 0.5 * (1.0 + np.cos(np.pi * beyond)) * (1.0 if undo is None else undo(f))
+    factors = 0.5 * (1.0 + np.cos(np.pi * beyond)) * (1.0 if undo is None else undo(np.asarray(f, dtype=np.float64)))
     return np.asarray(np.fft.irfft(spectrum * factors.reshape(-1, *rest), 2 * n, axis=0)[:n] + line)
 
 
