@@ -21,6 +21,7 @@ from kbs_process.diagnosis.nominal.joint import Own, Standing
 from kbs_process.diagnosis.nominal.known import Known
 from kbs_process.diagnosis.selection import rounds
 from kbs_process.diagnosis.selection.effort import Effort
+from kbs_process.diagnosis.selection.proposed import Round
 
 pytestmark = pytest.mark.slow
 
@@ -94,7 +95,7 @@ def test_each_of_a_pair_has_to_be_found_beside_the_other(
 
     def look(
         here: Standing, seen: Standing, _: object, __: object, accepted: Sequence[Accepted], least: float = 0.0
-    ) -> rounds._Round:
+    ) -> Round:
         asked.append([one.find.identity.law for one in accepted])
         wanted = wanting(known, here.known) if len(asked) == 1 else 0.0
         assert least == pytest.approx(wanted)
@@ -103,12 +104,12 @@ def test_each_of_a_pair_has_to_be_found_beside_the_other(
         there = replace(here, known=leaving(known, share))
         told = rounds.find_of([one], np.ones(1), cable, None)
         found = None if alone and len(asked) == 2 else Accepted(replace(one, standing=there), told, here)
-        return rounds._Round(found, there, seen, one.screening, Noted(), None)
+        return Round(found, there, seen, one.screening, Noted(), None)
 
     monkeypatch.setattr(rounds, "_round", look)
     for name in ("without", "bare"):
         monkeypatch.setattr(rounds, name, lambda here, *_: here)
-    empty = rounds._Round(None, cable, cable, first.screening, noted, None)
+    empty = Round(None, cable, cable, first.screening, noted, None)
     over = Effort(bench.serial(made), known)
     monkeypatch.setattr(over, "goes_on", lambda: False)
     assert rounds._pair(empty, declared(made), over, []) == () and not asked

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -36,6 +37,7 @@ from kbs_process.diagnosis.selection import believed, effort, rounds
 from kbs_process.diagnosis.selection.as_suspect import sigma_of, suspect_of
 from kbs_process.diagnosis.selection.effort import Effort
 from kbs_process.diagnosis.selection.race import own_of
+from kbs_process.diagnosis.smoothing.search import Smoothed
 from kbs_process.identification.output_error import Scalar
 from kbs_process.plant.attach import attach
 from kbs_process.plant.laws import CATALOGUE, SENSING, select
@@ -298,7 +300,7 @@ def test_the_second_law_that_passed_is_believed_where_the_first_falls(
     assert first.standing.known.cost < second.standing.known.cost
     seen = SimpleNamespace(scene=scene, bench=tried, screening=found)
     monkeypatch.setattr(rounds.View, "of", lambda _: seen)
-    monkeypatch.setattr(rounds, "_place", lambda *_: None)
+    monkeypatch.setattr(rounds, "place_of", lambda *_: None)
     monkeypatch.setattr(believed, "named_first", list)
     monkeypatch.setattr(rounds, "_passed", lambda *_: iter([[first, second]]))
     monkeypatch.setattr(believed, "_settled", lambda one, *_: replace(one, gate=replace(one.gate, reasons=())))
@@ -336,7 +338,7 @@ def test_what_numbers_gain_where_they_were_drawn_back_is_no_law_s(
     monkeypatch.setattr(
         rounds.View, "of", lambda one: SimpleNamespace(standing=one, scene=scene, bench=tried, screening=found)
     )
-    monkeypatch.setattr(rounds, "_place", lambda *_: None)
+    monkeypatch.setattr(rounds, "place_of", lambda *_: None)
     monkeypatch.setattr(rounds, "_passed", none_passed)
     experiment = cable.known.experiment
     floor, search = declared(experiment), Effort(bench.serial(experiment), cable.known)
@@ -362,15 +364,15 @@ def test_a_search_that_has_cost_too_much_ends_with_what_it_has_found(
     told = find_of([first], np.ones(1), cable, None)
     asked: list[int] = []
 
-    def look(here: Standing, seen: Standing, _: object, __: object, accepted: list[Accepted]) -> rounds._Round:
+    def look(here: Standing, seen: Standing, _: object, __: object, accepted: list[Accepted]) -> rounds.Round:
         asked.append(len(accepted))
         law = None if accepted else Accepted(first, told, cable)
-        return rounds._Round(law, first.standing if law else here, seen, found, Noted(), None)
+        return rounds.Round(law, first.standing if law else here, seen, found, Noted(), None)
 
     monkeypatch.setattr(rounds, "_round", look)
     monkeypatch.setattr(rounds, "drawn_back", lambda one, *_: one)
     monkeypatch.setattr(rounds, "_goes_on", lambda *_: True)
-    monkeypatch.setattr(rounds, "_place", lambda *_: None)
+    monkeypatch.setattr(rounds, "place_of", lambda *_: None)
     monkeypatch.setattr(rounds, "needed", lambda accepted, here, *_: (accepted, here, ()))
     if costly:
         monkeypatch.setattr(effort, "EFFORT", -1.0)
@@ -381,6 +383,47 @@ def test_a_search_that_has_cost_too_much_ends_with_what_it_has_found(
     assert asked == ([0] if costly else [0, 1])
     assert done.ended == costly
     assert [one.identity.law for one in done.finds] == ["ground_cable"]
+
+
+@pytest.mark.parametrize(("count", "believes", "left", "looks"), [
+    (1, True, True, 0),  # what smoothing proposes and the plant believes is all
+    (1, False, True, 1),
+    (0, False, True, 1),
+    (0, False, False, 0),  # nothing is proposed, and nothing is left
+])  # fmt: skip
+def test_the_plant_s_own_search_is_for_what_smoothing_does_not_find(
+    cable: Standing, monkeypatch: pytest.MonkeyPatch, count: int, believes: bool, left: bool, looks: int
+) -> None:
+    tried, scene, found = screened(cable)
+    first = passed(cable, tried, scene, found, "ground_cable")
+    law = Accepted(first, find_of([first], np.ones(1), cable, None), cable)
+    asked: list[int] = []
+
+    def look(here: Standing, seen: Standing, *_: object) -> rounds.Round:
+        asked.append(1)
+        return rounds.Round(None, here, seen, found, Noted(), None)
+
+    def judge(_: object, here: Standing, seen: Standing, *__: object) -> rounds.Round:
+        return rounds.Round(
+            law if believes else None, first.standing if believes else here, seen, found, Noted(), None
+        )  # fmt: skip
+
+    monkeypatch.setattr(rounds, "_round", look)
+    monkeypatch.setattr(rounds, "_pair", lambda *_: ())
+    monkeypatch.setattr(rounds, "proposed", judge)
+    monkeypatch.setattr(rounds, "beside", lambda *_: cable)
+    monkeypatch.setattr(rounds, "nothing", lambda *_: rounds.Round(None, cable, cable, found, Noted(), None))
+    monkeypatch.setattr(rounds, "drawn_back", lambda one, *_: one)
+    monkeypatch.setattr(rounds, "_goes_on", lambda *_: left)
+    monkeypatch.setattr(rounds, "place_of", lambda *_: None)
+    monkeypatch.setattr(rounds, "needed", lambda accepted, here, *_: (accepted, here, ()))
+    smoothed = cast("Smoothed", SimpleNamespace(proposals=(None,) * count))
+    experiment = cable.known.experiment
+    floor, search = declared(experiment), Effort(bench.serial(experiment), cable.known)
+    before = detected(cable, floor, experiment.fit)
+    done = rounds._diagnosed(cable.known, floor, search, before, smoothed)
+    assert len(asked) == looks
+    assert len(done.finds) == (1 if believes else 0)
 
 
 def _lower(standing: Standing, share: float) -> Standing:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from kbs_process.diagnosis.experiments.thresholds import MOSTLY_DONE, ORDERED
@@ -12,7 +12,7 @@ from kbs_process.diagnosis.proposing.proposals import proposed
 from kbs_process.diagnosis.screening.ranges import swept
 from kbs_process.diagnosis.screening.scene import Scene
 from kbs_process.diagnosis.screening.screen import Bench, Catalogued, Found, Screening, Suspect, screen
-from kbs_process.diagnosis.screening.suspects import candidates
+from kbs_process.diagnosis.screening.suspects import Candidate, candidates
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -28,11 +28,19 @@ class View:
     @classmethod
     def of(cls, standing: Standing, among: Callable[[Suspect], bool] = lambda _: True, *, linear: bool = True) -> View:
         """Of all suspects, or of those for which `among` is true; none of the plant's, if it is not made `linear`."""
-        known = standing.known
-        scene = Scene.of(known.experiment, standing.hypothesis, standing.predicted, linear=linear)
-        bench = Bench.of(known, scene)
-        chosen = tuple(suspect for suspect in suspects_of(standing, scene) if among(suspect))
-        return cls(standing, bench, scene, chosen, screen(bench, chosen))
+        scene = _scene(standing, linear=linear)
+        return cls._seen(standing, scene, [one for one in suspects_of(standing, scene) if among(one)])
+
+    @classmethod
+    def at(cls, standing: Standing, candidates: Sequence[Candidate]) -> View:
+        """Of candidates whose shapes are known already."""
+        scene = _scene(standing, linear=True)
+        return cls._seen(standing, scene, [Catalogued(candidate, scene) for candidate in candidates])
+
+    @classmethod
+    def _seen(cls, standing: Standing, scene: Scene, suspects: Sequence[Suspect]) -> View:
+        bench = Bench.of(standing.known, scene)
+        return cls(standing, bench, scene, tuple(suspects), screen(bench, suspects))
 
     @property
     def able(self) -> list[Found]:
@@ -66,6 +74,10 @@ class View:
         able, known = self.able, self.standing.known
         share = MOSTLY_DONE if known.gross else ORDERED
         return bool(able and able[0].score.gain >= share * known.excess)
+
+
+def _scene(standing: Standing, *, linear: bool) -> Scene:
+    return Scene.of(standing.known.experiment, standing.hypothesis, standing.predicted, linear=linear)
 
 
 def suspects_of(standing: Standing, scene: Scene) -> list[Suspect]:

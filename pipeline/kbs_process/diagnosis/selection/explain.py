@@ -29,6 +29,8 @@ from kbs_process.diagnosis.nominal.parameters import prior
 from kbs_process.diagnosis.nominal.search import LITTLE, SLIGHT
 from kbs_process.diagnosis.nominal.settling import searched
 from kbs_process.diagnosis.selection.mistimed import by_another_clock
+from kbs_process.diagnosis.smoothing.as_plant import hypothesis_of
+from kbs_process.diagnosis.smoothing.search import Smoothed, can_smooth, search
 from kbs_process.signals.records import Array
 
 LEAPS = 4  # after a descent
@@ -47,10 +49,13 @@ class Explained:
     near: Known | None
     beside: bool  # whether `near` are such numbers: they leave much, and nothing has pulled them
     after: Detection  # with the refitted numbers, over the recordings that these were fitted to
+    smoothed: Smoothed | None = None  # what smoothing finds, where it can
 
 
 def explain(experiment: Experiment, simulate: Simulate, task: Task) -> Explained:
     """Floor, refit of the known parameters, detection of what they leave."""
+    if can_smooth(experiment) and (smoothed := _smoothed(experiment, simulate, task)) is not None:
+        return smoothed
     nominal = Hypothesis(experiment.rig, experiment.effects)
     with task("Repeatability"):
         begun = predicted_by(experiment, nominal, simulate)
@@ -106,6 +111,29 @@ def explain(experiment: Experiment, simulate: Simulate, task: Task) -> Explained
             near = replace(beside, chi2_before=_squares(beside, begun))
     known = replace(stood.known, chi2_before=_squares(stood.known, begun))
     return Explained(floor, known, near, beside is not None, stood.after)
+
+
+def _smoothed(experiment: Experiment, simulate: Simulate, task: Task) -> Explained | None:
+    """The same from where smoothing ends, no phases left to look for; None, where it or the plant has no values."""
+    with task("Motion, numbers and forces of all recordings"):
+        try:
+            found = search(experiment)
+        except np.linalg.LinAlgError:
+            return None
+    fitted = found.beside if found.proposals else found.alone
+    with task("Repeatability"):
+        start = hypothesis_of(fitted.problem, fitted.state.x)
+        there = predicted_by(experiment, start, simulate)
+        if not all(np.isfinite(one.values).all() for one in there.values()):
+            return None
+        begun = predicted_by(experiment, Hypothesis(experiment.rig, experiment.effects), simulate)
+        floor = floor_of(experiment, there)
+    with task("Refitting nominal parameters"):
+        # What is left out pulls numbers that are free.
+        reach = NEAR if found.proposals else np.inf
+        stood = _stood(refit(experiment, start, floor, simulate, reach=reach, leaps=0), floor)
+    known = replace(stood.known, chi2_before=_squares(stood.known, begun))
+    return Explained(floor, known, None, False, stood.after, found)
 
 
 def _rephased(stood: _Stood, floor: Floor, simulate: Simulate) -> _Stood:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from kbs_process.diagnosis.acceptance.finding import Tried, as_it_stands, find_of, merged, trusted
 from kbs_process.diagnosis.acceptance.needed import Accepted, in_the_shade, needed
-from kbs_process.diagnosis.acceptance.outcome import Absorbed, Location, Outcome
+from kbs_process.diagnosis.acceptance.outcome import Absorbed, Outcome
 from kbs_process.diagnosis.acceptance.remains import promises_little
 from kbs_process.diagnosis.acceptance.supposed import Noted, enough, supposed, wanting
 from kbs_process.diagnosis.experiments.floor import Floor
@@ -34,8 +34,6 @@ from kbs_process.diagnosis.proposing.clocks import timed
 from kbs_process.diagnosis.proposing.sizes import in_the_way, of_mounting, springs
 from kbs_process.diagnosis.proposing.tryout import identity, of_every_clock
 from kbs_process.diagnosis.proposing.view import View
-from kbs_process.diagnosis.screening.localise import cells_and_ports
-from kbs_process.diagnosis.screening.ports import port_test
 from kbs_process.diagnosis.screening.scene import Scene
 from kbs_process.diagnosis.screening.screen import Catalogued, Found, Screening
 from kbs_process.diagnosis.screening.shapes import possible
@@ -43,17 +41,9 @@ from kbs_process.diagnosis.selection.believed import believed
 from kbs_process.diagnosis.selection.each_recording import jump_gain
 from kbs_process.diagnosis.selection.effort import Effort
 from kbs_process.diagnosis.selection.leaders import leaders, tried
+from kbs_process.diagnosis.selection.proposed import Round, beside, nothing, place_of, proposed
 from kbs_process.diagnosis.side_by_side import side_by_side
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Round:
-    accepted: Accepted | None
-    standing: Standing
-    seen: Standing  # from where laws were looked for, and `place` is
-    screening: Screening
-    noted: Noted
-    place: Location | None
+from kbs_process.diagnosis.smoothing.search import Smoothed
 
 
 def diagnose(
@@ -64,6 +54,7 @@ def diagnose(
     near: Known | None = None,
     *,
     beside: bool = False,
+    smoothed: Smoothed | None = None,
 ) -> Outcome:
     """Find the laws that the refitted known parameters leave out; `before` is what detection says of these.
 
@@ -81,7 +72,7 @@ def diagnose(
                 return replace(instead, otherwise=_moved(alone))
             if alone is not known:
                 known, before = alone, detected(standing_of(alone, {}), floor, alone.experiment.fit)
-    return _diagnosed(known, floor, effort, before)
+    return _diagnosed(known, floor, effort, before, smoothed)
 
 
 def _alone(known: Known, near: Known, beside: Known, floor: Floor, simulate: Simulate) -> Known:
@@ -99,7 +90,14 @@ def _alone(known: Known, near: Known, beside: Known, floor: Floor, simulate: Sim
 
 
 def _diagnosed(
-    known: Known, floor: Floor, simulate: Effort, before: Detection, *, at_once: bool = False, pulled: bool = True
+    known: Known,
+    floor: Floor,
+    simulate: Effort,
+    before: Detection,
+    smoothed: Smoothed | None = None,
+    *,
+    at_once: bool = False,
+    pulled: bool = True,
 ) -> Outcome:
     """Find what one refit of the known parameters leaves out.
 
@@ -109,8 +107,19 @@ def _diagnosed(
     begun = Standing(known, known.shown, {})
     standing = begun
     accepted: list[Accepted] = []
-    rounds: list[_Round] = []
-    for _ in range(ROUNDS):
+    rounds: list[Round] = []
+    proposals = () if smoothed is None else smoothed.proposals
+    for proposal in proposals:
+        seen = standing if accepted or smoothed is None else beside(known, smoothed, simulate)
+        rounds.append(proposed(proposal, standing, seen, floor, simulate, accepted))
+        if rounds[-1].accepted is not None:
+            accepted.append(rounds[-1].accepted)
+            standing = rounds[-1].standing
+    if not proposals and smoothed is not None and not _goes_on(standing, floor):
+        rounds.append(nothing(standing, floor))
+    # What smoothing finds, and be it nothing, is all that there is, where the plant says so too.
+    done = bool(rounds) and len(accepted) == len(proposals)
+    for _ in range(0 if done else ROUNDS):
         seen = drawn_back(standing, floor, simulate) if pulled or accepted else standing
         looked = [_round(standing, seen, floor, simulate, accepted)]
         if looked[0].accepted is None and not at_once:
@@ -127,7 +136,7 @@ def _diagnosed(
     kept, standing, fallen = needed(accepted, standing, floor, simulate)
     left = last.place
     if standing is not last.seen:
-        left = _place(standing, floor, Scene.of(known.experiment, standing.hypothesis, standing.predicted))
+        left = place_of(standing, floor, Scene.of(known.experiment, standing.hypothesis, standing.predicted))
     same = standing is begun
     after = before if same else detected(standing, floor, known.experiment.fit)
     held_out = None
@@ -174,7 +183,7 @@ def _mismatch(before: Detection, first: Screening, kept: Sequence[Accepted]) -> 
 
 def _round(
     standing: Standing, seen: Standing, floor: Floor, simulate: Effort, accepted: Sequence[Accepted], least: float = 0.0
-) -> _Round:
+) -> Round:
     """Look for one more law from where numbers are `seen` at, which may have been drawn back.
 
     The best has to promise to gain `least`, of -2 log likelihood.
@@ -183,15 +192,15 @@ def _round(
         # Numbers had ended in a worse place: what they do alone, once they have settled, is no law's.
         standing = resettled(seen, floor, simulate, leaps=1)
     view = View.of(seen)
-    place = _place(seen, floor, view.scene)
+    place = place_of(seen, floor, view.scene)
     noted = Noted()
     for passed in _passed(view, standing, floor, simulate, accepted, noted, least):
         if found := believed(passed, view, standing, place, floor, simulate, accepted, noted):
-            return _Round(found, found.tried.standing, seen, view.screening, noted, place)
-    return _Round(None, standing, seen, view.screening, noted, place)
+            return Round(found, found.tried.standing, seen, view.screening, noted, place)
+    return Round(None, standing, seen, view.screening, noted, place)
 
 
-def _pair(last: _Round, floor: Floor, simulate: Effort, accepted: Sequence[Accepted]) -> tuple[_Round, ...]:
+def _pair(last: Round, floor: Floor, simulate: Effort, accepted: Sequence[Accepted]) -> tuple[Round, ...]:
     """Two rounds that find two laws, of which neither passes without the other, where the `last` one found none.
 
     One that did not pass is supposed; if another passes beside it, the supposed one is taken out of the plant, and has
@@ -334,16 +343,6 @@ def _hopeless(first: Sequence[Found], least: float) -> bool:
     """Whether the best of some leaders would gain far less than `least`; of a mounting's law no first order tells."""
     most = max((found.score.gain for found in first), default=0.0)
     return PROMISED * most < least and not any(of_mounting(found) for found in first)
-
-
-def _place(standing: Standing, floor: Floor, scene: Scene) -> Location | None:
-    if not scene.paths:
-        return None
-    cells, models, names = cells_and_ports(standing, floor, scene.paths)
-    if not len(cells.z):
-        return None
-    test = port_test(cells, models)
-    return Location(test, cells, tuple(names[port] for port in test.only))
 
 
 def _moved(known: Known) -> tuple[Moved, ...]:

@@ -34,7 +34,13 @@ def diagnose(
         explained = explain(experiment, simulate, progress.task)
         with progress.task("Candidate effects for the residual"):
             outcome = rounds.diagnose(
-                explained.known, explained.floor, simulate, explained.after, explained.near, beside=explained.beside
+                explained.known,
+                explained.floor,
+                simulate,
+                explained.after,
+                explained.near,
+                beside=explained.beside,
+                smoothed=explained.smoothed,
             )
     with progress.task("Next test"):
         proposal = propose(outcome.standing, outcome.finds, explained.floor, simulating)
