@@ -11,9 +11,9 @@ from kbs_process.diagnosis.experiments.thresholds import LINE_ALPHA, LINES
 from kbs_process.diagnosis.nominal.known import Known
 from kbs_process.diagnosis.proposing.folding import periods
 from kbs_process.diagnosis.proposing.sweeps import sweeping
+from kbs_process.diagnosis.screening.ranges import by_parameter
 from kbs_process.diagnosis.screening.scene import Scene
 from kbs_process.diagnosis.side_by_side import side_by_side
-from kbs_process.plant.laws import CATALOGUE, SENSING
 from kbs_process.signals.records import Array
 
 _HIGHEST_ORDER = 420.0  # of a motor: twice the teeth's passing and what lies around it
@@ -54,14 +54,7 @@ def proposed(known: Known, scene: Scene) -> dict[str, tuple[float, ...]]:
     for joint, (angle, width) in _local(known, scene).items():
         # What has been passed rings on for a while.
         found |= {("place", joint): (angle - width, angle, angle + width), ("width", joint): (width,)}
-    return {
-        f"{entry.name}.{joint}" if joint else entry.name: values
-        for (kind, joint), values in found.items()
-        if values
-        for law in (*CATALOGUE, *SENSING)
-        for entry in law.parameters
-        if entry.proposed == kind
-    }
+    return by_parameter(found)
 
 
 def _sweep(known: Known) -> tuple[float, float] | None:

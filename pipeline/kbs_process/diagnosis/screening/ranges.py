@@ -10,11 +10,24 @@ import numpy as np
 from kbs_process.diagnosis.experiments.hypothesis import Tapped
 from kbs_process.diagnosis.screening.scene import Scene
 from kbs_process.plant.effect import Parameter
+from kbs_process.plant.laws import CATALOGUE, SENSING
 from kbs_process.signals.records import Array
 
 SPECTRUM = "spectrum"  # grid of a parameter that only tones of a residual give
 TURNS = "turns"  # kind of one which is an order, of what a signal sweeps
 WHILE_RECORDED = "time.span"  # that of one which is a time, in lengths of the longest recording
+
+
+def by_parameter(found: Mapping[tuple[str, str], tuple[float, ...]]) -> dict[str, tuple[float, ...]]:
+    """Values of parameters, "name" or "name.joint", of what was `found` of a kind that proposes them, at a joint."""
+    return {
+        f"{entry.name}.{joint}" if joint else entry.name: values
+        for (kind, joint), values in found.items()
+        if values
+        for law in (*CATALOGUE, *SENSING)
+        for entry in law.parameters
+        if entry.proposed == kind
+    }
 
 
 def is_place(entry: Parameter) -> bool:

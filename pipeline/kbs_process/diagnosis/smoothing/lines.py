@@ -8,11 +8,11 @@ import numpy as np
 from scipy.fft import fft, next_fast_len
 from scipy.ndimage import median_filter
 
+from kbs_process.diagnosis.screening.ranges import by_parameter
 from kbs_process.diagnosis.smoothing.balance import FIRST_JOINT
 from kbs_process.diagnosis.smoothing.basis import BAND_HZ
 from kbs_process.diagnosis.smoothing.fit import State
 from kbs_process.diagnosis.smoothing.problem import Problem
-from kbs_process.plant.laws import CATALOGUE, SENSING
 from kbs_process.signals.records import Array
 
 _LINES = 3  # of each kind and joint
@@ -56,14 +56,7 @@ def proposed(problem: Problem, state: State, left: Sequence[Array]) -> dict[str,
         found["disc bits", joint.name] = tuple(
             float(np.log2(2.0 * np.pi / (code * order))) for order in disc if order > _OF_ITS_SHAPE
         )
-    return {
-        f"{entry.name}.{joint}" if joint else entry.name: values
-        for (kind, joint), values in found.items()
-        if values
-        for law in (*CATALOGUE, *SENSING)
-        for entry in law.parameters
-        if entry.proposed == kind
-    }
+    return by_parameter(found)
 
 
 def tones_in(left: Sequence[Array], dt: float) -> tuple[float, ...]:
