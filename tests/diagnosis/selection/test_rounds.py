@@ -411,7 +411,7 @@ def test_the_plant_s_own_search_is_for_what_smoothing_does_not_find(
     monkeypatch.setattr(rounds, "_round", look)
     monkeypatch.setattr(rounds, "_pair", lambda *_: ())
     monkeypatch.setattr(rounds, "proposed", judge)
-    monkeypatch.setattr(rounds, "beside", lambda *_: cable)
+    monkeypatch.setattr(rounds, "numbers_beside", lambda *_: cable)
     monkeypatch.setattr(rounds, "nothing", lambda *_: rounds.Round(None, cable, cable, found, Noted(), None))
     monkeypatch.setattr(rounds, "drawn_back", lambda one, *_: one)
     monkeypatch.setattr(rounds, "_goes_on", lambda *_: left)

@@ -12,7 +12,7 @@ from kbs_process.campaign.load import load_campaign
 from kbs_process.diagnosis.experiments.experiment import Experiment, Trial
 from kbs_process.diagnosis.experiments.hypothesis import Hypothesis, Tapped, tapped
 from kbs_process.diagnosis.nominal.known import Known
-from kbs_process.diagnosis.selection.explain import explain
+from kbs_process.diagnosis.selection.explain import fitted_alone
 from kbs_process.progress import SilentProgress
 from kbs_process.signals.records import WRENCH_CHANNELS
 from kbs_process.studies.diagnose.reading import experiment_of
@@ -29,7 +29,7 @@ def prepare(folder: Path) -> Case:
     begin = monotonic()
     experiment = experiment_of(load_campaign(folder, checksums=False), SilentProgress())
     with simulating(experiment) as simulate:
-        explained = explain(experiment, simulate, SilentProgress().task)
+        explained = fitted_alone(experiment, simulate, SilentProgress().task)
     found, predicted = explained.known, explained.known.shown
     signals = {drive: _signals(experiment, found.hypothesis, drive, seen.wrench) for drive, seen in predicted.items()}
     left = [trial.measured - predicted[trial.drive].values for trial in experiment.trials]

@@ -56,6 +56,11 @@ def explain(experiment: Experiment, simulate: Simulate, task: Task) -> Explained
     """Floor, refit of the known parameters, detection of what they leave."""
     if can_smooth(experiment) and (smoothed := _smoothed(experiment, simulate, task)) is not None:
         return smoothed
+    return fitted_alone(experiment, simulate, task)
+
+
+def fitted_alone(experiment: Experiment, simulate: Simulate, task: Task) -> Explained:
+    """The same by the plant alone, which has phases to look for."""
     nominal = Hypothesis(experiment.rig, experiment.effects)
     with task("Repeatability"):
         begun = predicted_by(experiment, nominal, simulate)

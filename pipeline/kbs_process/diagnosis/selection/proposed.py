@@ -41,7 +41,7 @@ class Round:
     place: Location | None
 
 
-def beside(known: Known, smoothed: Smoothed, simulate: Effort) -> Standing:
+def numbers_beside(known: Known, smoothed: Smoothed, simulate: Effort) -> Standing:
     """Known numbers where they are beside the effects that smoothing found: what these do is left."""
     there = hypothesis_of(smoothed.beside.problem, smoothed.beside.state.x)
     limits = known.parameters

@@ -41,7 +41,7 @@ from kbs_process.diagnosis.selection.believed import believed
 from kbs_process.diagnosis.selection.each_recording import jump_gain
 from kbs_process.diagnosis.selection.effort import Effort
 from kbs_process.diagnosis.selection.leaders import leaders, tried
-from kbs_process.diagnosis.selection.proposed import Round, beside, nothing, place_of, proposed
+from kbs_process.diagnosis.selection.proposed import Round, nothing, numbers_beside, place_of, proposed
 from kbs_process.diagnosis.side_by_side import side_by_side
 from kbs_process.diagnosis.smoothing.search import Smoothed
 
@@ -110,7 +110,7 @@ def _diagnosed(
     rounds: list[Round] = []
     proposals = () if smoothed is None else smoothed.proposals
     for proposal in proposals:
-        seen = standing if accepted or smoothed is None else beside(known, smoothed, simulate)
+        seen = standing if accepted or smoothed is None else numbers_beside(known, smoothed, simulate)
         rounds.append(proposed(proposal, standing, seen, floor, simulate, accepted))
         if rounds[-1].accepted is not None:
             accepted.append(rounds[-1].accepted)
