@@ -9,11 +9,12 @@ import pytest
 
 from kbs_process.campaign.load import load_campaign
 from kbs_process.diagnosis.smoothing.problem import Problem
-from kbs_process.diagnosis.smoothing.search import Fitted, moved, settled
+from kbs_process.diagnosis.smoothing.search import Fitted, settled
 from kbs_process.progress import SilentProgress
 from kbs_process.studies.diagnose.reading import experiment_of
 from proof import coverage, record
 from proof.concealed import trials
+from proof.rivals.smoother import moved
 
 
 @pytest.mark.validation

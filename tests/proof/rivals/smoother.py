@@ -5,11 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 from time import monotonic
 
+import numpy as np
 from msgspec import structs
 
 from kbs_process.campaign.load import load_campaign
 from kbs_process.diagnosis.screening.suspects import Candidate
-from kbs_process.diagnosis.smoothing.search import Fitted, Proposal, moved, search
+from kbs_process.diagnosis.smoothing.fit import Quadratic
+from kbs_process.diagnosis.smoothing.screen import Screen
+from kbs_process.diagnosis.smoothing.search import Fitted, Proposal, Smoothed, search
 from kbs_process.plant.sensing import BY
 from kbs_process.progress import SilentProgress
 from kbs_process.studies.diagnose.reading import experiment_of
@@ -25,28 +28,48 @@ def solve(folder: Path) -> Answer:
     """Answer a trial."""
     begin = monotonic()
     found = search(experiment_of(load_campaign(folder, checksums=False), SilentProgress()))
-    off = tuple(one for one in _moved(found.alone) if abs(one.sigmas) > OFF)
-    finds = tuple(_claim(one) for one in found.proposals)
+    off = tuple(one for one in moved(found.alone) if abs(one.sigmas) > OFF)
+    finds = tuple(map(_claim, found.proposals, _estimates(found)))
     return Answer(
         method=METHOD,
         trial=folder.name,
         detected=bool(finds),
         verdict="physics" if finds else "parameters off" if off else "none",
         moved=() if finds else off,
-        numbers=_moved(found.beside),
+        numbers=moved(found.beside),
         finds=finds,
         seconds=monotonic() - begin,
     )
 
 
-def _moved(fitted: Fitted) -> tuple[Moved, ...]:
-    numbers = [(one, one.sigmas) for one in moved(fitted)]
+def moved(fitted: Fitted) -> tuple[Moved, ...]:
+    """Numbers of the rig, as fitted."""
+    problem, state, at = fitted.problem, fitted.state, fitted.problem.of_rig
+    sigma = Quadratic.of(problem, state).sigma(problem.spread)[at]
+    off = ((state.x - problem.prior) / problem.spread)[at]
     return tuple(
-        Moved(name=one.name, value=one.value, sigma=one.sigma, sigmas=by) for one, by in numbers if by is not None
+        Moved(name=name, value=float(value), sigma=float(known), sigmas=float(by))
+        for name, value, known, by in zip(problem.elements.names, state.x[at], sigma, off, strict=True)
     )
 
 
-def _claim(one: Proposal) -> Claim:
+def _estimates(found: Smoothed) -> list[tuple[Estimate, ...]]:
+    """Numbers of each effect as all together have them."""
+    problem, state = found.beside.problem, found.beside.state
+    if not problem.found:
+        return []
+    screen, ends = Screen(problem, state), np.cumsum([len(one.amplitudes) for one in problem.present])
+    places = np.split(np.stack(problem.amplitudes), ends[:-1], axis=1)[len(problem.given) :]
+    return [
+        tuple(
+            Estimate(name=e.name, unit=e.unit, value=e.value, low=e.low, high=e.high)
+            for e in screen.estimated(candidate, own)
+        )
+        for candidate, own in zip(problem.found, places, strict=True)
+    ]
+
+
+def _claim(one: Proposal, estimates: tuple[Estimate, ...]) -> Claim:
     own = _suspect(one.candidate)
     following = [_suspect(other) for other in one.others[:NEXT]]
     return Claim(
@@ -55,9 +78,7 @@ def _claim(one: Proposal) -> Claim:
         channels=own.channels,
         family=own.family,
         law=one.candidate.name,
-        parameters=tuple(
-            Estimate(name=e.name, unit=e.unit, value=e.value, low=e.low, high=e.high) for e in one.estimates
-        ),
+        parameters=estimates,
         alternatives=tuple(Claimed(**structs.asdict(other)) for other in following),
         indistinguishable_from=tuple(_suspect(other) for other in one.alike),
     )
