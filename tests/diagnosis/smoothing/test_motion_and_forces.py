@@ -22,10 +22,11 @@ from kbs_process.diagnosis.smoothing.intensities import powers
 from kbs_process.diagnosis.smoothing.lines import orders_in, tones_in
 from kbs_process.diagnosis.smoothing.problem import Problem
 from kbs_process.diagnosis.smoothing.screen import Scored, Screen, evidence
-from kbs_process.diagnosis.smoothing.search import settled
+from kbs_process.diagnosis.smoothing.search import can_smooth, settled
 from kbs_process.plant.laws import CATALOGUE, SENSING
 from kbs_process.plant.rigid import inverse_dynamics, joint_efforts, kinematics, static_wrench
 from kbs_process.progress import SilentProgress
+from kbs_process.rig.model import substitute
 from kbs_process.signals.records import Array
 from kbs_process.studies.diagnose.reading import experiment_of
 
@@ -293,3 +294,31 @@ def test_effects_that_do_the_same_beside_all_numbers_are_found_to(tmp_path: Path
     assert screen.same(gear, scored("motor_order", "el", order=2.0))
     assert not screen.same(gear, scored("kinematic_error", "az", kinematic_order=2.0))
     assert not screen.same(gear, scored("kinematic_error", "el", kinematic_order=1.0))
+
+
+@pytest.mark.slow
+def test_rigs_that_rows_do_not_describe_are_left_to_the_plant(tmp_path: Path) -> None:
+    made = _null(tmp_path, [1]).experiment
+    assert can_smooth(made)
+    none = np.zeros(6)
+    silent = substitute(made.rig, {"transducer.noise": none, "transducer.resolution": none})
+    smooth = substitute(made.rig, {"joint.el.encoder.step": 0.0})
+    elsewhere = replace(made.rig, transducer=replace(made.rig.transducer, on="az"))
+    for rig in (silent, smooth, elsewhere):
+        assert not can_smooth(replace(made, rig=rig))
+    # A friction that the model has not is none of its numbers.
+    assert not can_smooth(replace(made, effects=tuple(one for one in made.effects if one != "dynamic_friction")))
+
+
+@pytest.mark.slow
+def test_what_is_known_exactly_stays(tmp_path: Path) -> None:
+    made = _null(tmp_path, [1]).experiment
+    names = {"joint.el.encoder.offset": 0.0, "joint.el.drive.b_m": 0.0}
+    own = made.rig.quantities()
+    rig = substitute(made.rig, {name: own[name].value for name in names}, dict(names))
+    problem = Problem(replace(made, rig=rig), [1])
+    state = State.of(problem, np.repeat([0.05, 0.2, 0.01], [3, 2, 3]))
+    state.idealise(problem, 0.1)
+    step(problem, state, Quadratic.of(problem, state), ~problem.dynamic)
+    assert np.isfinite(state.x).all()
+    assert state.x[problem.offsets][1] == pytest.approx(0.0, abs=1e-9)

@@ -193,7 +193,8 @@ class Problem:
             (np.zeros(len(common)), common),
             *[(np.zeros(len(one)), one) for one in own],
         ]
-        self.prior, self.spread = (np.concatenate([block[k] for block in blocks]) for k in (0, 1))
+        self.prior, spread = (np.concatenate([block[k] for block in blocks]) for k in (0, 1))
+        self.spread = np.where(spread > 0.0, spread, _EXACT**2)  # what is known exactly hardly moves
         ends = np.cumsum([0, *(len(value) for value, _ in blocks)])
         of_rig, numbers, coupling, offset, given, found, *owned = (slice(a, b) for a, b in pairwise(ends))
         self.of_rig, self.numbers, self.coupling, self.offsets, self.own = of_rig, numbers, coupling, offset, owned

@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kbs_process.diagnosis.experiments.experiment import Experiment
-from kbs_process.diagnosis.facts import Estimate, Moved
 from kbs_process.diagnosis.screening.suspects import Candidate
 from kbs_process.diagnosis.smoothing.basis import BAND_HZ
-from kbs_process.diagnosis.smoothing.drive import NEEDED
+from kbs_process.diagnosis.smoothing.drive import NEEDED, WRITTEN
 from kbs_process.diagnosis.smoothing.fit import NEAR, REACH, Quadratic, State, step
 from kbs_process.diagnosis.smoothing.intensities import powers
 from kbs_process.diagnosis.smoothing.problem import Problem
 from kbs_process.diagnosis.smoothing.screen import Scored, Screen
+from kbs_process.rig.model import LAB
 from kbs_process.signals.records import Array
 
 WIDER, OF_JOINT = 10.0, 3.0  # times a reading's noise that forces are, to begin with; those of joints times as much
@@ -65,8 +65,6 @@ class Proposal:
     candidate: Candidate
     others: tuple[Candidate, ...]  # of other places or physics, best first
     alike: tuple[Candidate, ...]  # of them, what is not told from it
-    estimates: tuple[Estimate, ...]
-    size: Array  # (amplitudes,), of each recording's own the first's
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -81,11 +79,16 @@ class Smoothed:
 def can_smooth(experiment: Experiment) -> bool:
     """Whether there is all that `Problem` needs.
 
-    Drives, all six channels and angles, fields that are known, the band; effects that act in all recordings.
+    A transducer in the laboratory whose plate turns and whose noise is stated, with all six channels; drives with all
+    effects that are written here, encoders that round, fields that are known; the band; effects that act in all
+    recordings.
     """
-    rig = experiment.rig
-    driven = all(
-        joint.encoder is not None and joint.drive is not None and joint.drive.parameters.keys() >= NEEDED
+    rig, transducer = experiment.rig, experiment.rig.transducer
+    driven = set(experiment.effects) >= WRITTEN and all(
+        joint.encoder is not None
+        and float(joint.encoder.step) > 0.0
+        and joint.drive is not None
+        and joint.drive.parameters.keys() >= NEEDED
         for joint in rig.joints
     )
     fields = all(
@@ -93,7 +96,9 @@ def can_smooth(experiment: Experiment) -> bool:
         for drive in experiment.drives
     )
     whole = experiment.wrench_channels == 6 and len(experiment.channels) == 6 + len(rig.joints)
-    return driven and fields and whole and rig.transducer.stiffness is not None and experiment.highest_Hz >= BAND_HZ
+    turns = transducer.stiffness is not None and transducer.on == LAB
+    stated = bool(np.all(np.hypot(transducer.noise.value, transducer.resolution.value) > 0.0))
+    return driven and fields and whole and turns and stated and experiment.highest_Hz >= BAND_HZ
 
 
 def search(experiment: Experiment) -> Smoothed:
@@ -207,19 +212,7 @@ def _found(problem: Problem, state: State, judge: _Judge | None) -> tuple[tuple[
         ]
         found.append(_proposal(best, leaders, alike))
         judge = None if judge is None else judge.joined(best.candidate, problem, state)
-    return _as_fitted(found, problem, state), Fitted(problem, state)
-
-
-def _as_fitted(found: Sequence[Proposal], problem: Problem, state: State) -> tuple[Proposal, ...]:
-    """Proposals with their numbers as all together have them."""
-    if not found:
-        return ()
-    screen, ends = Screen(problem, state), np.cumsum([len(one.amplitudes) for one in problem.present])
-    places = np.split(np.stack(problem.amplitudes), ends[:-1], axis=1)[len(problem.given) :]
-    return tuple(
-        replace(one, candidate=candidate, estimates=screen.estimated(candidate, own), size=state.x[own[0]])
-        for one, candidate, own in zip(found, problem.found, places, strict=True)
-    )
+    return tuple(found), Fitted(problem, state)
 
 
 def _contenders(leaders: Sequence[Scored], screen: Screen) -> list[tuple[Scored, list[Scored]]]:
@@ -339,7 +332,7 @@ def _proposal(best: Scored, leaders: Sequence[Scored], alike: Sequence[Scored]) 
     first.pop(_suspect(best.candidate), None)
     same = {_suspect(one.candidate) for one in alike}
     others, own = tuple(first.values()), best.candidate
-    return Proposal(own, others, tuple(one for one in others if _suspect(one) in same), (), best.amplitudes)
+    return Proposal(own, others, tuple(one for one in others if _suspect(one) in same))
 
 
 def _suspect(candidate: Candidate) -> tuple[object, ...]:
@@ -347,24 +340,3 @@ def _suspect(candidate: Candidate) -> tuple[object, ...]:
     law = candidate.effect
     beneath = not law.port.of_channel and law.port.beneath
     return law.port_word, "" if beneath else candidate.site, law.family
-
-
-def moved(fitted: Fitted) -> tuple[Moved, ...]:
-    """Numbers of the rig, as fitted."""
-    problem, state = fitted.problem, fitted.state
-    at, units = problem.of_rig, {name: quantity.unit for name, quantity in problem.rig.quantities().items()}
-    sigma = Quadratic.of(problem, state).sigma(problem.spread)
-    return tuple(
-        Moved(
-            name=name,
-            unit=units[name.partition("[")[0]],
-            prior=float(prior),
-            prior_sigma=float(spread),
-            value=float(value),
-            sigma=float(known),
-            sigmas=float((value - prior) / spread),
-        )
-        for name, prior, spread, value, known in zip(
-            problem.elements.names, problem.prior[at], problem.spread[at], state.x[at], sigma[at], strict=True
-        )
-    )
