@@ -127,7 +127,7 @@ def _smoothed(experiment: Experiment, simulate: Simulate, task: Task) -> Explain
             return None
     fitted = found.beside if found.proposals else found.alone
     with task("Repeatability"):
-        start = hypothesis_of(fitted.problem, fitted.state.x)
+        start = hypothesis_of(fitted.problem, fitted.state)
         there = predicted_by(experiment, start, simulate)
         if not all(np.isfinite(one.values).all() for one in there.values()):
             return None

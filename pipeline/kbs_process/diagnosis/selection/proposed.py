@@ -43,7 +43,7 @@ class Round:
 
 def numbers_beside(known: Known, smoothed: Smoothed, simulate: Effort) -> Standing:
     """Known numbers where they are beside the effects that smoothing found: what these do is left."""
-    there = hypothesis_of(smoothed.beside.problem, smoothed.beside.state.x)
+    there = hypothesis_of(smoothed.beside.problem, smoothed.beside.state)
     limits = known.parameters
     value = np.clip(there.values(known.free), limits.lower, limits.upper)
     moved = replace(known, hypothesis=known.hypothesis.at(known.free, value), value=value, shown={})
