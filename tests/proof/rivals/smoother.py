@@ -10,9 +10,9 @@ from msgspec import structs
 
 from kbs_process.campaign.load import load_campaign
 from kbs_process.diagnosis.screening.suspects import Candidate
-from kbs_process.diagnosis.smoothing.fit import Quadratic
+from kbs_process.diagnosis.smoothing.fit import Fitted
 from kbs_process.diagnosis.smoothing.screen import Screen
-from kbs_process.diagnosis.smoothing.search import Fitted, Proposal, Smoothed, search
+from kbs_process.diagnosis.smoothing.search import Proposal, Smoothed, search
 from kbs_process.plant.sensing import BY
 from kbs_process.progress import SilentProgress
 from kbs_process.studies.diagnose.reading import experiment_of
@@ -45,7 +45,7 @@ def solve(folder: Path) -> Answer:
 def moved(fitted: Fitted) -> tuple[Moved, ...]:
     """Numbers of the rig, as fitted."""
     problem, state, at = fitted.problem, fitted.state, fitted.problem.of_rig
-    sigma = Quadratic.of(problem, state).sigma(problem.spread)[at]
+    sigma = np.sqrt(np.diag(fitted.covariance))[at]
     off = ((state.x - problem.prior) / problem.spread)[at]
     return tuple(
         Moved(name=name, value=float(value), sigma=float(known), sigmas=float(by))

@@ -21,7 +21,7 @@ from kbs_process.diagnosis.experiments.floor import declared
 from kbs_process.diagnosis.facts import Estimate, Identity, Moved, Place, Planned
 from kbs_process.diagnosis.nominal.detection import Detection
 from kbs_process.diagnosis.nominal.joint import standing_of
-from kbs_process.diagnosis.nominal.known import MOVED, NEAR
+from kbs_process.diagnosis.nominal.known import MOVED, NEAR, Strain
 from kbs_process.diagnosis.proposing.curves import basis
 from kbs_process.diagnosis.proposing.measured import inserted
 from kbs_process.diagnosis.selection.next_test import Proposal
@@ -103,6 +103,7 @@ def outcome() -> Outcome:
         place=None,
         left=None,
         known=known,
+        strain=Strain(0.0, 0),
         standing=standing_of(found, before.laws),
     )
 
@@ -135,7 +136,7 @@ def written(outcome: Outcome, tmp_path_factory: pytest.TempPathFactory) -> Path:
     assert command == "kbs-process campaign/EL089", "of a diagnosis at the end of processing"
     assert told_off.verdict_lines[0].startswith("Nominal parameters are off (joint.el.drive.Ka +5.0 sigma): with that")
     assert "would look the same" in told_off.verdict_lines[0] and "{" not in told_off.verdict_lines[0]
-    hidden = replace(outcome, finds=(), bent=True)
+    hidden = replace(outcome, finds=(), strain=Strain(1000.0, 10))
     assert hidden.verdict == "undecided" and replace(hidden, moved=off.moved).verdict == "parameters off"
     told_hidden = unseen(campaign, declared(experiment), hidden, target, False, None, "")
     assert "together farther from what the files say" in told_hidden.verdict_lines[0]

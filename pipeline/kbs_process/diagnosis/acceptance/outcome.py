@@ -9,7 +9,7 @@ from kbs_process.diagnosis.experiments.thresholds import DISPUTED
 from kbs_process.diagnosis.facts import Answer, Estimate, Identity, Moved, Place
 from kbs_process.diagnosis.nominal.detection import Detection
 from kbs_process.diagnosis.nominal.joint import Standing
-from kbs_process.diagnosis.nominal.known import Known
+from kbs_process.diagnosis.nominal.known import Known, Strain
 from kbs_process.diagnosis.screening.ports import Cells, PortTest
 from kbs_process.plant.laws.position.measured_law import Measured
 from kbs_process.plant.sensing import Sensing
@@ -113,7 +113,7 @@ class Outcome:
     left: Location | None  # after all finds
     known: Known  # refitted, without any law: what stood before the first find
     standing: Standing  # the corrected model
-    bent: bool = False  # whether known numbers leave nothing, but are farther off together than chance has them
+    strain: Strain  # of all known numbers together
     otherwise: tuple[Moved, ...] = ()  # known parameters that would have to be off if there were no law
     ended: bool = False  # whether the search had cost so much that no more laws were looked for
 
@@ -132,8 +132,11 @@ class Outcome:
 
     @property
     def hidden(self) -> bool:
-        """Whether known numbers, none of which is off by itself, may have taken up physics that was left out."""
-        return self.bent and not self.moved
+        """Whether known numbers, none of which is off by itself, may have taken up physics that was left out.
+
+        They leave nothing, but are all together farther off than chance has them.
+        """
+        return self.strain.strained and not self.after.left and not self.moved
 
     @property
     def untried(self) -> bool:

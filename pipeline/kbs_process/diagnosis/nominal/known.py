@@ -20,7 +20,7 @@ from kbs_process.diagnosis.experiments.metric import Metric, metrics, softened
 from kbs_process.diagnosis.facts import Moved
 from kbs_process.diagnosis.nominal.costs import ALL, GROSS, Found, Laws, information
 from kbs_process.diagnosis.nominal.parameters import Slopes, known_parameters, prior, within
-from kbs_process.diagnosis.nominal.search import EARLY, Search
+from kbs_process.diagnosis.nominal.search import EARLY, LITTLE, Search
 from kbs_process.estimation.fit import Check, Parameters
 from kbs_process.identification.output_error import Scalar
 from kbs_process.signals.records import Array, Mask
@@ -41,6 +41,28 @@ class Strain:
 
     squares: float
     count: int
+
+    @property
+    def strained(self) -> bool:
+        """Whether numbers are together farther from their priors than chance has them."""
+        return self.count > 0 and bool(chi2.sf(self.squares, self.count) < STRAINED)
+
+
+def strain_of(moved: Array, covariance: Array) -> Strain:
+    """How far numbers (p,) are from their priors together, as far as recordings tell; all in prior sigmas.
+
+    Where recordings are made by such numbers, and nothing is left out, a fit moves them by N(0, 1 - C): C (p, p) is
+    their covariance after it (the law of total variance). Along the principal directions of that squares over variances
+    add up to chi square. Validity: a descent that has arrived; along directions that recordings hardly tell (`LEARNT`)
+    what a floor is wrong by counts most.
+    """
+    learnt = np.eye(len(moved)) - covariance
+    if not np.isfinite(learnt).all():
+        return Strain(0.0, 0)
+    variance, directions = np.linalg.eigh(learnt)
+    told = variance > LEARNT
+    along = directions.T[told] @ moved
+    return Strain(float(np.sum(along**2 / variance[told])), int(told.sum()))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -146,28 +168,15 @@ class Known:
 
     @property
     def strain(self) -> Strain:
-        """How far numbers with a stated prior are from it together, as far as recordings tell.
-
-        Where these are made by such numbers, and nothing is left out, a refit moves them by N(0, S - C): S is the
-        prior's covariance, C that after it (the law of total variance). In prior sigmas, along the principal directions
-        of that, squares over variances add up to chi square. Validity: a descent that has arrived; along directions
-        that recordings hardly tell (`LEARNT`) what a floor is wrong by counts most.
-        """
+        """Of numbers with a stated prior."""
         chosen = self.stated
-        sigma, moved = self.parameters.sigma[chosen], self.moved[chosen]
-        learnt = np.eye(len(sigma)) - self.covariance[np.ix_(chosen, chosen)] / np.outer(sigma, sigma)
-        if not np.isfinite(learnt).all():
-            return Strain(0.0, 0)
-        variance, directions = np.linalg.eigh(learnt)
-        told = variance > LEARNT
-        along = directions.T[told] @ moved
-        return Strain(float(np.sum(along**2 / variance[told])), int(told.sum()))
+        sigma = self.parameters.sigma[chosen]
+        return strain_of(self.moved[chosen], self.covariance[np.ix_(chosen, chosen)] / np.outer(sigma, sigma))
 
     @property
     def strained(self) -> bool:
         """Whether these numbers are together farther from their priors than chance has them."""
-        strain = self.strain
-        return strain.count > 0 and bool(chi2.sf(strain.squares, strain.count) < STRAINED)
+        return self.strain.strained
 
     @property
     def numbers(self) -> tuple[Moved, ...]:
@@ -216,11 +225,13 @@ def refit(
     reach: float = np.inf,
     slopes: dict[int, Slopes] | None = None,
     leaps: int,
+    near: bool = False,
 ) -> Known:
     """Refit all known parameters from `hypothesis` on, whose phases are near their right values (see `phasing`).
 
     No number goes farther than `reach` sigmas from its prior. Phases and edges are looked for all round up to `leaps`
-    times; `slopes` at the hypothesis need not be taken again.
+    times; `slopes` at the hypothesis need not be taken again. Begun `near` the best, what promises
+    less than chance moves all numbers by, one each, brings them no nearer.
     """
     free = known_parameters(experiment.rig, experiment.effects)
     parameters = within(prior(hypothesis.rig, experiment.rig, hypothesis.effects, free), reach)
@@ -230,7 +241,7 @@ def refit(
     search = Search(experiment, metric, simulate, hypothesis, free, parameters)
     begun = search.begin(hypothesis.values(free), slopes, predicted)
     before = np.array([float(z @ z) for z in residuals(search, begun)])
-    return known_of(search, search.run(begun, leaps=leaps), before)
+    return known_of(search, search.run(begun, leaps=leaps, least=len(free) if near else LITTLE), before)
 
 
 def settled(known: Known, simulate: Simulate, *, leaps: int, laws: Laws | None = None) -> Known:

@@ -36,7 +36,7 @@ _ROUNDS = 10  # steps of a descent at most
 class Search(Tangents):
     """How the cost of one experiment under one floor is lowered."""
 
-    def run(self, found: Found, *, leaps: int) -> Found:
+    def run(self, found: Found, *, leaps: int, least: float = LITTLE) -> Found:
         """Descend; leap to better phases and edges while there are any, at most `leaps` times, and descend again.
 
         The first leap is made early: what is left out, or a wrong phase, has not yet pulled the others far then. One
@@ -49,17 +49,20 @@ class Search(Tangents):
             if moved is not None:
                 left.append(found)
                 found = moved
-        ended = self.descend(found, giving_up=True)
+        ended = self.descend(found, giving_up=True, least=least)
         before = min(left, key=self.height, default=ended)
         if not self.height(ended) > self.height(before):
             return ended
         return min(ended, self.descend(before, giving_up=True), key=self.height)
 
-    def descend(self, found: Found, rounds: int = _ROUNDS, *, most: int = ALL, giving_up: bool = False) -> Found:
+    def descend(
+        self, found: Found, rounds: int = _ROUNDS, *, most: int = ALL, giving_up: bool = False, least: float = LITTLE
+    ) -> Found:
         """Steps until slopes that are all taken anew promise little, or do not keep what they promise.
 
-        All of them, or only those of suspects' own numbers, as `most` says. When `giving_up`, also until a step does
-        little of what is to be done: no number here does it then, and more steps only bend them towards it.
+        All of them, or only those of suspects' own numbers, as `most` says; little is the `least`, or little of what is
+        left. When `giving_up`, also until a step does little of what is to be done: no number here does it then, and
+        more steps only bend them towards it.
         """
         fresh = found.due if found.due != OLD else min(GEARS, most)
         idle = 0
@@ -68,7 +71,7 @@ class Search(Tangents):
             ground = self.ground(found)
             step = self.step(found, ground)
             self.settle(ground.information, np.abs(step.theta - found.theta))
-            little = max(LITTLE, SLIGHT * self.left(found))
+            little = max(least, SLIGHT * self.left(found))
             arrived = step.gained < max(little, _STALLED * step.promised)
             kept = step.gained > _AGREED * step.promised
             if step.gained > 0.0:

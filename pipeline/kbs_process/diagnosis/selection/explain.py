@@ -127,7 +127,7 @@ def _smoothed(experiment: Experiment, simulate: Simulate, task: Task) -> Explain
             return None
     fitted = found.beside if found.proposals else found.alone
     with task("Repeatability"):
-        start = hypothesis_of(fitted.problem, fitted.state)
+        start = hypothesis_of(fitted)
         there = predicted_by(experiment, start, simulate)
         if not all(np.isfinite(one.values).all() for one in there.values()):
             return None
@@ -136,7 +136,7 @@ def _smoothed(experiment: Experiment, simulate: Simulate, task: Task) -> Explain
     with task("Refitting nominal parameters"):
         # What is left out pulls numbers that are free.
         reach = NEAR if found.proposals else np.inf
-        stood = _stood(refit(experiment, start, floor, simulate, reach=reach, leaps=0), floor)
+        stood = _stood(refit(experiment, start, floor, simulate, reach=reach, leaps=0, near=True), floor)
     known = replace(stood.known, chi2_before=_squares(stood.known, begun))
     return Explained(floor, known, None, False, stood.after, found)
 

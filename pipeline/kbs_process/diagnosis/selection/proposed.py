@@ -43,7 +43,7 @@ class Round:
 
 def numbers_beside(known: Known, smoothed: Smoothed, simulate: Effort) -> Standing:
     """Known numbers where they are beside the effects that smoothing found: what these do is left."""
-    there = hypothesis_of(smoothed.beside.problem, smoothed.beside.state)
+    there = hypothesis_of(smoothed.beside)
     limits = known.parameters
     value = np.clip(there.values(known.free), limits.lower, limits.upper)
     moved = replace(known, hypothesis=known.hypothesis.at(known.free, value), value=value, shown={})
@@ -51,7 +51,7 @@ def numbers_beside(known: Known, smoothed: Smoothed, simulate: Effort) -> Standi
 
 
 def nothing(standing: Standing, floor: Floor) -> Round:
-    """Smoothing found nothing, and numbers leave nothing."""
+    """Smoothing found nothing: what numbers leave, if anything, enters at a place."""
     view = View.at(standing, [])
     return Round(None, standing, standing, view.screening, Noted(), place_of(standing, floor, view.scene))
 

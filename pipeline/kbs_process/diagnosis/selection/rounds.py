@@ -115,11 +115,10 @@ def _diagnosed(
         if rounds[-1].accepted is not None:
             accepted.append(rounds[-1].accepted)
             standing = rounds[-1].standing
-    if not proposals and smoothed is not None and not _goes_on(standing, floor):
+    if not proposals and smoothed is not None:
         rounds.append(nothing(standing, floor))
-    # What smoothing finds, and be it nothing, is all that there is, where the plant says so too.
-    done = bool(rounds) and len(accepted) == len(proposals)
-    for _ in range(0 if done else ROUNDS):
+    # Where smoothing has looked there is nothing else to look for: what the plant refuses, or leaves, has no name.
+    for _ in range(ROUNDS if smoothed is None else 0):
         seen = drawn_back(standing, floor, simulate) if pulled or accepted else standing
         looked = [_round(standing, seen, floor, simulate, accepted)]
         if looked[0].accepted is None and not at_once:
@@ -158,7 +157,7 @@ def _diagnosed(
         left=left,
         known=known,
         standing=told,
-        bent=bent(standing, floor),
+        strain=standing.known.strain if smoothed is None else (smoothed.beside if accepted else smoothed.alone).strain,
         ended=simulate.ended,
     )
     return replace(outcome, finds=trusted(outcome.finds, TRUST_PART if outcome.verdict == "undecided" else TRUST))

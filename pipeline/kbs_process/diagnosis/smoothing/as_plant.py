@@ -7,8 +7,7 @@ from scipy.optimize import least_squares
 
 from kbs_process.diagnosis.experiments.hypothesis import Hypothesis
 from kbs_process.diagnosis.smoothing.drive import NUMBERS, priors
-from kbs_process.diagnosis.smoothing.fit import Quadratic, State
-from kbs_process.diagnosis.smoothing.problem import Problem
+from kbs_process.diagnosis.smoothing.fit import Fitted
 from kbs_process.plant.effect import Effect
 from kbs_process.rig.model import Drive, substitute
 from kbs_process.signals.records import Array
@@ -23,18 +22,19 @@ _EXACT = 1e-6  # of a number that is known exactly: its sigma, of itself
 _NARROWEST = 1e-3  # rad, of a tooth's contact
 
 
-def hypothesis_of(problem: Problem, state: State) -> Hypothesis:
+def hypothesis_of(fit: Fitted) -> Hypothesis:
     """The rig's numbers of a fit, and the effects that the model has: those that were found are left out."""
+    problem = fit.problem
     drives = [joint.drive for joint in problem.rig.joints if joint.drive is not None]
-    across = Quadratic.of(problem, state).solve(problem.spread, np.eye(len(state.x))[:, problem.numbers])
-    covariance, fitted, count = across[problem.numbers], state.x[problem.numbers], len(NUMBERS)
+    across, x = fit.covariance[:, problem.numbers], fit.state.x.copy()
+    covariance, fitted, count = across[problem.numbers], x[problem.numbers], len(NUMBERS)
     blocks = [slice(k * count, (k + 1) * count) for k in range(len(drives))]
     of_drives = [
         parameters_of(drive, fitted[own], covariance[own, own]) for drive, own in zip(drives, blocks, strict=True)
     ]
     # All others go to where they are likeliest beside numbers that such parameters have.
     moved = np.concatenate([numbers_of(own) for own in of_drives]) - fitted
-    x = state.x + across @ np.linalg.solve(covariance, moved)
+    x[: len(across)] += across @ np.linalg.solve(covariance, moved)
     rig = problem.rig_at(x)
     values: dict[str, Array | float] = {}
     for joint, own in zip(rig.joints, of_drives, strict=True):

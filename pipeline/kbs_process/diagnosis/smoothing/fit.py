@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 from scipy.linalg.lapack import dtrtri
 
+from kbs_process.diagnosis.nominal.known import Strain, strain_of
 from kbs_process.diagnosis.side_by_side import side_by_side
 from kbs_process.diagnosis.smoothing.balance import Motion
 from kbs_process.diagnosis.smoothing.basis import LOCAL
@@ -366,6 +367,30 @@ class Quadratic:
     def sigma(self, spread: Array) -> Array:
         """Standard deviation of each unknown."""
         return np.asarray(np.sqrt(np.diag(self.solve(spread, np.eye(len(spread))))))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fitted:
+    """A fit that has settled."""
+
+    problem: Problem
+    state: State
+    covariance: Array  # (p, p) of what recordings have in common
+
+    @classmethod
+    def of(cls, problem: Problem, state: State) -> Fitted:
+        """Where a state is."""
+        common = problem.own[0].start
+        chosen = np.eye(len(problem.prior), common)
+        return cls(problem, state, Quadratic.of(problem, state).solve(problem.spread, chosen)[:common])
+
+    @property
+    def strain(self) -> Strain:
+        """Of all numbers that files state."""
+        problem, own = self.problem, self.problem.stated
+        spread = problem.spread[own]
+        moved = (self.state.x - problem.prior)[own] / spread
+        return strain_of(moved, self.covariance[own, own] / np.outer(spread, spread))
 
 
 def step(problem: Problem, state: State, quadratic: Quadratic, free: NDArray[np.bool_] | None = None) -> float:

@@ -198,6 +198,7 @@ class Problem:
         ends = np.cumsum([0, *(len(value) for value, _ in blocks)])
         of_rig, numbers, coupling, offset, given, found, *owned = (slice(a, b) for a, b in pairwise(ends))
         self.of_rig, self.numbers, self.coupling, self.offsets, self.own = of_rig, numbers, coupling, offset, owned
+        self.stated = slice(0, given.stop)  # what files say something of
         shared = np.arange(owned[0].start)
         self.local = [np.concatenate([shared, np.arange(one.start, one.stop)]) for one in owned]
         # Amplitudes of what is present, of each recording, and what a unit of each does to its rows along its motion.

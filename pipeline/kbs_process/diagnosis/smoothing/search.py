@@ -13,7 +13,7 @@ from kbs_process.diagnosis.experiments.experiment import Experiment
 from kbs_process.diagnosis.screening.suspects import Candidate
 from kbs_process.diagnosis.smoothing.basis import BAND_HZ
 from kbs_process.diagnosis.smoothing.drive import NEEDED, WRITTEN
-from kbs_process.diagnosis.smoothing.fit import NEAR, REACH, Quadratic, State, step
+from kbs_process.diagnosis.smoothing.fit import NEAR, REACH, Fitted, Quadratic, State, step
 from kbs_process.diagnosis.smoothing.intensities import powers
 from kbs_process.diagnosis.smoothing.problem import Problem
 from kbs_process.diagnosis.smoothing.screen import Scored, Screen
@@ -48,14 +48,6 @@ ALIKE = 9.0  # of the cost: what differs by less is not told apart
 # less beside it may be what its law lacks.
 INEXACT = 0.02
 RIVALS = 3  # of other places or physics, that are
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Fitted:
-    """A fit that has settled."""
-
-    problem: Problem
-    state: State
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -105,7 +97,7 @@ def search(experiment: Experiment) -> Smoothed:
     """Look for what a model leaves out of recordings that `Problem` can describe."""
     fitted = Problem(experiment, list(experiment.fit))
     state = settled(fitted)
-    alone = Fitted(fitted, replace(state, x=state.x.copy(), sigma=state.sigma.copy()))
+    alone = Fitted.of(fitted, replace(state, x=state.x.copy(), sigma=state.sigma.copy()))
     found = _found(fitted, state, _Judge.of(experiment, fitted, state))
     return Smoothed(*found, alone)
 
@@ -212,7 +204,7 @@ def _found(problem: Problem, state: State, judge: _Judge | None) -> tuple[tuple[
         ]
         found.append(_proposal(best, leaders, alike))
         judge = None if judge is None else judge.joined(best.candidate, problem, state)
-    return tuple(found), Fitted(problem, state)
+    return tuple(found), Fitted.of(problem, state)
 
 
 def _contenders(leaders: Sequence[Scored], screen: Screen) -> list[tuple[Scored, list[Scored]]]:

@@ -68,7 +68,7 @@ def _facts(
     """What the answer and the paragraph both tell."""
     undecided = outcome.verdict == "undecided"
     known = outcome.standing.known if outcome.finds else outcome.known
-    strain, after = known.strain, outcome.after
+    strain, after = outcome.strain, outcome.after
     cell = min(after.cells, key=lambda one: one.log_p, default=None)
     unplaced = undecided and not outcome.finds and not outcome.unforeseen and outcome.left is not None
     ports = outcome.left.test.ports if unplaced and outcome.left is not None else ()
@@ -83,7 +83,7 @@ def _facts(
         "strain": {
             "squares": strain.squares,
             "count": strain.count,
-            "strained": known.strained,
+            "strained": strain.strained,
             "p": chi2.sf(strain.squares, strain.count),
             "most": _farthest(known),
         },
