@@ -7,6 +7,7 @@ rig's joints. Compiled, as slopes ask for it hundreds of times.
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -41,6 +42,7 @@ class Chain(NamedTuple):
     inertia: Array  # (b, 3, 3) kg m^2
 
 
+@lru_cache(maxsize=8)  # slopes by the motion ask for one rig many times
 def chain(rig: Rig) -> Chain:
     """The rig on three turns of its plate; bodies that rest on the floor show nowhere."""
     order = {joint.name: 3 + k for k, joint in enumerate(rig.joints)} | {TRANSDUCER: 2, LAB: -1}

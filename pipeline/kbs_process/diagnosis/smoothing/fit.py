@@ -40,6 +40,8 @@ class State:
     ideal_torques: list[Array] = field(default_factory=list)
     reach: float = REACH
     lowest: float = np.inf  # cost where the last step began
+    # What rows of a group said of its motion when last asked, and what that was asked for.
+    _asked: dict[int, tuple[tuple[object, ...], Banded, Array]] = field(default_factory=dict, init=False, repr=False)
 
     @classmethod
     def of(cls, problem: Problem, forces: Array) -> State:
@@ -157,9 +159,14 @@ class State:
 
         Along the motion that the model has by itself: what a recording's own differs by bends no slope.
         """
-        first = problem.groups[g][0]
-        root = np.sqrt(self.weights(problem, first))
-        return _banded(problem, first, self.x, self.ideal_motion(problem, g), self.ideal_torques[g], root), root
+        here = problem, self.x.tobytes(), self.sigma.tobytes(), self.ideal[g].tobytes()
+        asked = self._asked.get(g)
+        if asked is None or asked[0] != here:
+            first = problem.groups[g][0]
+            root = np.sqrt(self.weights(problem, first))
+            motion, torques = self.ideal_motion(problem, g), self.ideal_torques[g]
+            asked = self._asked[g] = here, _banded(problem, first, self.x, motion, torques, root), root
+        return asked[1], asked[2]
 
     def residuals(self, problem: Problem) -> list[Array]:
         """Of every recording, (n, rows)."""
@@ -382,7 +389,7 @@ class Fitted:
         """Where a state is."""
         common = problem.own[0].start
         chosen = np.eye(len(problem.prior), common)
-        return cls(problem, state, Quadratic.of(problem, state).solve(problem.spread, chosen)[:common])
+        return cls(problem, replace(state), Quadratic.of(problem, state).solve(problem.spread, chosen)[:common])
 
     @property
     def strain(self) -> Strain:

@@ -23,6 +23,7 @@ from kbs_process.signals.records import Array
 WIDER, OF_JOINT = 10.0, 3.0  # times a reading's noise that forces are, to begin with; those of joints times as much
 SHAKEN = 25.0  # rad/s, at which the floor shakes a plate most
 STEPS = 25
+TRIED = 4  # steps beside an effect that is compared with others, or of which the shape goes on; all, once it is chosen
 # The share that forces have of a model by itself: at first, once forces are known, and when all is free. With more of
 # them, what rings for no reason but noise is in it, and stiffness and damping follow that.
 STIFF = (0.1, 0.03, 0.001)
@@ -102,11 +103,11 @@ def search(experiment: Experiment) -> Smoothed:
     return Smoothed(*found, alone)
 
 
-def settled(problem: Problem, sigma: Array | None = None, begun: State | None = None) -> State:
+def settled(problem: Problem, sigma: Array | None = None, begun: State | None = None, most: int = STEPS) -> State:
     """Fit with forces of `sigma`; without, with large ones first, then with those that repeats differ by.
 
     What shows while the rig moves alone is held until forces are known: beside large ones nothing tells it. A fit that
-    has `begun` goes on from there, with forces as they are.
+    has `begun` goes on from there, with forces as they are, for `most` steps at most.
     """
     state = begun or State.of(problem, _forces(problem) if sigma is None else sigma)
     weighing = _Weighing.of(problem) if sigma is None and begun is None else None
@@ -120,7 +121,7 @@ def settled(problem: Problem, sigma: Array | None = None, begun: State | None = 
             state.smooth(problem)
         _stepped(problem, state, STIFF[1], ~problem.dynamic)
     least, idle = np.inf, 0
-    for _ in range(STEPS):
+    for _ in range(most):
         wrong = 0.0 if weighing is None else weighing.weighed(problem, state)
         length = _stepped(problem, state, STIFF[2])
         if wrong > KNOWN:
@@ -195,7 +196,7 @@ def _found(problem: Problem, state: State, judge: _Judge | None) -> tuple[tuple[
         contenders = _contenders(leaders, screen)
         every = [_beside(problem, state, one, tried) for one, _ in contenders]
         first = min(every, key=lambda one: one.cost)
-        best, problem, state = first.scored, first.problem, first.state
+        best, problem, state = first.scored, first.problem, settled(first.problem, begun=first.state)
         alike = [
             told
             for fitted, (one, same) in zip(every, contenders, strict=True)
@@ -241,9 +242,9 @@ class _Beside:
 
 
 def _beside(problem: Problem, state: State, one: Scored, tried: Mapping[tuple[str, str], int]) -> _Beside:
-    """All numbers settled beside an effect and its shape; what was tried more often is less likely beforehand."""
+    """All numbers as good as settled beside an effect and its shape; what was tried more often is less likely."""
     wider = problem.joined(one.candidate)
-    begun = settled(wider, begun=state.joined(problem, wider))
+    begun = settled(wider, begun=state.joined(problem, wider), most=TRIED)
     for _ in range(RESHAPED):
         places = np.stack(wider.amplitudes)[:, -len(one.candidate.amplitudes) :]
         candidate = Screen(wider, begun).reshaped(one.candidate, places)
@@ -251,7 +252,7 @@ def _beside(problem: Problem, state: State, one: Scored, tried: Mapping[tuple[st
             break
         one = replace(one, candidate=candidate)
         wider = problem.joined(candidate)
-        begun = settled(wider, begun=replace(begun, reach=REACH, lowest=np.inf))
+        begun = settled(wider, begun=replace(begun, reach=REACH, lowest=np.inf), most=TRIED)
     often = tried[one.candidate.name, one.candidate.site]
     return _Beside(one, wider, begun, begun.cost(wider) + 2.0 * float(np.log(often)) - one.likely)
 
