@@ -163,17 +163,14 @@ def written(outcome: Outcome, tmp_path_factory: pytest.TempPathFactory) -> Path:
     )
     assert f"{shown:.3g} times the repeatability (rms) is left: more is missing, or" in much.verdict_lines[0]
     assert "<strong>Undecided</strong>" in (target / "index.html").read_text()
-    there = outcome.standing.known
-    stated = np.where(there.stated, there.parameters.sigma, 0.0)
-    pulled = replace(there, value=there.value + 8.0 * stated, covariance=0.01 * there.covariance)
     near, far = (
         replace(find, alternatives=(Alternative(DRAG, 0.1, share * find.rho_eff, False, True),))
         for find in outcome.finds
         for share in (0.1, 0.5)
     )
-    open_yet = replace(outcome, standing=replace(outcome.standing, known=pulled), finds=(near,))
+    open_yet = replace(outcome, strain=Strain(1000.0, 10), finds=(near,))
     assert open_yet.verdict == "undecided"
-    assert replace(open_yet, standing=outcome.standing).verdict == "physics"
+    assert replace(open_yet, strain=outcome.strain).verdict == "physics"
     assert replace(open_yet, finds=(far,)).verdict == "physics"
     assert replace(open_yet, finds=outcome.finds).verdict == "physics", "the rival is at the same place"
     disputed = unseen(campaign, declared(experiment), open_yet, target, False, None)

@@ -164,7 +164,7 @@ class Outcome:
 
         Where a search leaves these then decides which of the laws does more.
         """
-        if not self.standing.known.strained:
+        if not self.strain.strained:
             return ()
         return tuple(
             other.identity
