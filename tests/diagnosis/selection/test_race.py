@@ -238,7 +238,8 @@ def test_the_next_law_looks_for_phases_too_while_something_is_left(
     made = view.standing.known.experiment
     looked: list[float] = []
 
-    def unmoved(standing: Standing, _: object) -> Standing:
+    def unmoved(standing: Standing, _: object, *, leaps: bool) -> Standing:
+        assert leaps
         looked.append(standing.known.cost)
         return standing
 

@@ -127,12 +127,15 @@ def entered(standing: Standing, extra: Extra, simulate: Simulate) -> Entered:
     return Entered(search, search.begin(theta, dict(known.slopes), predicted), known.chi2_before)
 
 
-def moved_on(standing: Standing, simulate: Simulate) -> Standing:
-    """The refit of `with_extra` taken to its end: to better phases first, which made up for what was left out."""
+def moved_on(standing: Standing, simulate: Simulate, *, leaps: bool = True) -> Standing:
+    """The refit of `with_extra` taken to its end: to better phases first, which made up for what was left out.
+
+    Without `leaps` phases are taken to be right.
+    """
     known = standing.known
     if not np.isfinite(known.cost):
         return standing
-    moved = resumed(known, simulate, laws=standing.laws)
+    moved = resumed(known, simulate, laws=standing.laws, leaps=leaps)
     return standing_of(moved, standing.laws) if moved.cost < known.cost else standing
 
 

@@ -286,10 +286,10 @@ def confined(known: Known, simulate: Simulate, reach: float, *, laws: Laws | Non
     return known_of(plain, replace(found, converged=False), known.chi2_before)
 
 
-def resumed(known: Known, simulate: Simulate, *, laws: Laws | None = None) -> Known:
-    """Go on with the refit of a suspect's numbers and all others: from better phases, where there are any."""
+def resumed(known: Known, simulate: Simulate, *, laws: Laws | None = None, leaps: bool = True) -> Known:
+    """Go on with the refit of a suspect's numbers and all others: from better phases, if `leaps` find any."""
     search, begun = _again(known, simulate, laws)
-    moved = search.leapt(begun, smooth=True)
+    moved = search.leapt(begun, smooth=True) if leaps else None
     begun = moved or replace(begun, gradients=search.slopes(begun.theta, begun.gradients))
     return known_of(search, search.descend(begun, giving_up=True), known.chi2_before)
 

@@ -145,19 +145,19 @@ def _way(found: Found) -> tuple[str, ...]:
 
 
 def tried(
-    chosen: Sequence[Found], view: View, before: Standing, floor: Floor, simulate: Effort
+    chosen: Sequence[Found], view: View, before: Standing, floor: Floor, simulate: Effort, *, leaps: bool = True
 ) -> tuple[list[Tried], list[Tried]]:
     """Leaders of a view refitted and gated against what was believed `before`: those that passed, and those that did
-    not.
+    not. Better phases are looked for if `leaps`.
     """
     judged = [taken_off(found, view) for found in chosen if found.suspect.each_trial]
-    runners = raced([found for found in chosen if not found.suspect.each_trial], view, floor, simulate)
+    runners = raced([found for found in chosen if not found.suspect.each_trial], view, floor, simulate, leaps=leaps)
     for number, runner in enumerate(runners):
         own = own_of(runner.found, before, runner.standing)
         verdict = gated(runner.found, before, runner.standing, own, simulate)
         if number == 0 and not (verdict.passed or runner.leapt) and at_floor(runner, floor):
             # It left nothing after its first steps. What other numbers lack there may be all that speaks against it.
-            runner = replace(runner, standing=moved_on(runner.standing, simulate), leapt=True)
+            runner = replace(runner, standing=moved_on(runner.standing, simulate, leaps=leaps), leapt=True)
             verdict = gated(runner.found, before, runner.standing, own, simulate)
         judged.append(Tried(runner.found, runner.standing, verdict, view.screening, own, runner.leapt))
     return [one for one in judged if one.gate.passed], [one for one in judged if not one.gate.passed]

@@ -69,7 +69,7 @@ def proposed(
         if isinstance(one.suspect, Catalogued) and one.suspect.candidate in chosen
     ]
     worth = [timed(view.bench, one, view.suspects) if of_every_clock(one) else one for one in worth]
-    passed, fallen = tried(worth, view, seen, floor, simulate)
+    passed, fallen = tried(worth, view, seen, floor, simulate, leaps=False)
     noted.fell(*fallen)
     found = believed(passed, view, standing, place, floor, simulate, accepted, noted) if passed else None
     return Round(found, standing if found is None else found.tried.standing, seen, view.screening, noted, place)

@@ -41,10 +41,10 @@ class Runner:
         return float(np.nan_to_num(self.standing.known.cost, nan=np.inf))
 
 
-def raced(chosen: Sequence[Found], view: View, floor: Floor, simulate: Effort) -> list[Runner]:
+def raced(chosen: Sequence[Found], view: View, floor: Floor, simulate: Effort, *, leaps: bool = True) -> list[Runner]:
     """Suspects refitted, best first. Those that the first steps leave far behind go no farther.
 
-    A search that has cost too much is told so before each look for better phases.
+    A search that has cost too much is told so before each look for better phases, which there is if `leaps`.
     """
 
     def begun(found: Found) -> Entered:
@@ -80,7 +80,7 @@ def raced(chosen: Sequence[Found], view: View, floor: Floor, simulate: Effort) -
         next_one = next((one for one in near if not one.leapt), None)
         if next_one is None or at_floor(near[0], floor) or not simulate.goes_on():
             break
-        first = replace(next_one, standing=moved_on(next_one.standing, simulate), leapt=True)
+        first = replace(next_one, standing=moved_on(next_one.standing, simulate, leaps=leaps), leapt=True)
         way = bare(first.standing, own_of(first.found, view.standing, first.standing), simulate)
         others = [one for one in near if one is not next_one]
         near = [first, *side_by_side(partial(led, way), others)]
