@@ -174,6 +174,15 @@ def _topics(named: TopicsTable, rig: Rig) -> Topics:
         field=topic(named.field, "field", position, dict.fromkeys(joints, "rad")),
         temperature=topic(named.temperature, "temperature", ("temperature",), {"temperature": "degC"}),
         pointing=topic(named.pointing, "pointing", position, joints),
+        accelerometer=topic(
+            named.accelerometer,
+            "accelerometer",
+            tuple(f"linear_acceleration.{axis}" for axis in "xyz"),
+            dict.fromkeys("xyz", "m/s^2"),
+        ),
+        gyro=topic(
+            named.gyro, "gyro", tuple(f"angular_velocity.{axis}" for axis in "xyz"), dict.fromkeys("xyz", "rad/s")
+        ),
     )
 
 

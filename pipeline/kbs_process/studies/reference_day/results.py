@@ -19,6 +19,30 @@ class PublishedSection(Record, frozen=True, kw_only=True):
     end_s: float
 
 
+class Spread(Record, frozen=True, kw_only=True):
+    """What units that the parameters' uncertainties allow differ by in a figure, in its unit."""
+
+    mean: float
+    sigma: float
+    least: float
+    greatest: float
+
+
+class Without(Record, frozen=True, kw_only=True):
+    """A torque as it is without something, in its unit."""
+
+    name: str
+    value: float
+
+
+class Cause(Record, frozen=True, kw_only=True):
+    """What makes a torque."""
+
+    frequency_Hz: float  # the strongest about its moment
+    mode_Hz: float | None  # the nearest mode of gears and rotors, where it is near
+    without: tuple[Without, ...]  # the greatest of its section, least first
+
+
 class Torque(Record, frozen=True, kw_only=True):
     """Greatest disturbance torque at the spacecraft's centre of mass, over all axes."""
 
@@ -27,6 +51,8 @@ class Torque(Record, frozen=True, kw_only=True):
     value: float  # N m
     axis: str
     time_s: float
+    units: Spread | None = None
+    cause: Cause | None = None  # of what is above the other bands
 
 
 class Section(Record, frozen=True, kw_only=True):
@@ -41,7 +67,14 @@ class Section(Record, frozen=True, kw_only=True):
     azimuth: PointingEstimate
     elevation: PointingEstimate
     torques: tuple[Torque, ...]  # narrowest band first
+    azimuth_units: Spread | None = None  # of its 95 %
+    elevation_units: Spread | None = None
     published: PublishedSection | None = None
+
+    @property
+    def axes(self) -> tuple[PointingEstimate, PointingEstimate]:
+        """Azimuth and elevation."""
+        return self.azimuth, self.elevation
 
 
 class Judged(Record, frozen=True, kw_only=True):
@@ -94,6 +127,9 @@ class ReferenceDayResults(ResultsFile, frozen=True, kw_only=True):
     sections: tuple[Section, ...]
     requirements: tuple[Judged, ...]
     boresight: tuple[PointingEstimate, ...]  # over the whole day
+    samples: int = 0  # units beside the nominal one
+    failed: int = 0  # that could not be simulated
+    seed: int = 0
     discussion: tuple[str, ...] = ()
     parameters: tuple[Constant, ...] = ()
     notes: tuple[str, ...] = ()
