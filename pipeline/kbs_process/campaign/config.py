@@ -154,6 +154,7 @@ class Campaign:
     rig: Rig
     inputs: tuple[Path, ...]  # files of the description: campaign.toml, parameter files, CSV matrices
     mission: Path | None = None  # orbit, relay satellites and limits of a reference day
+    mast: Path | None = None  # modes of the unit on its mast; None: rigid
     pointing: tuple[PointingRequirement, ...] = ()  # of recordings
     flight_pointing: tuple[PointingRequirement, ...] = ()  # of the flight model alone
     document: dict[str, str] = field(default_factory=dict)  # number, revision, operator, serial_number, date

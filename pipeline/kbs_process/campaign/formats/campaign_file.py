@@ -128,6 +128,10 @@ class MissionTable(Table):
         description="orbit, relay satellites and limits, relative to the campaign's folder; with it, a campaign may "
         "have no recordings"
     )
+    mast: Text | None = Field(
+        None,
+        description="modes of the unit on its mast, a modal file, relative to the campaign's folder; left out: rigid",
+    )
 
 
 class SensingTable(Table):

@@ -49,7 +49,7 @@ def with_causes(
     sections = []
     for index, section in enumerate(found.sections):
         *narrow, widest = section.torques
-        left = {name: day.sections[index].torques[-1].value for name, day in without.items() if day is not None}
+        left = {name: day.sections[index].torques[-1].rms for name, day in without.items() if day is not None}
         told = _cause(campaign, planned, torque, widest, least, left)
         sections.append(
             msgspec.structs.replace(section, torques=(*narrow, msgspec.structs.replace(widest, cause=told)))

@@ -14,13 +14,14 @@ from kbs_process.reduction.analysis import bands_of, passband
 from kbs_process.reduction.pointing import estimate
 from kbs_process.results.pointing import PointingEstimate
 from kbs_process.signals.grid import overlap
-from kbs_process.signals.records import Signal
+from kbs_process.signals.records import Array, Signal
 from kbs_process.stages import bandpass, pointing
 from kbs_process.stages.bandpass import Band
 from kbs_process.stages.pointing import PointingStatistics
 from kbs_process.stages.to_cog import to_spacecraft
 from kbs_process.studies.reference_day.flying import CORNER, TORQUES, Flown
-from kbs_process.studies.reference_day.results import PublishedSection, Section, Torque
+from kbs_process.studies.reference_day.on_mast import answer, off_boresight
+from kbs_process.studies.reference_day.results import MastIn, PublishedSection, Section, Torque
 
 WIDEST = "widest"  # band, of which no table is kept
 
@@ -39,10 +40,12 @@ class Assessed:
 
 def assess(campaign: Campaign, day: Day, planned: Plan, flown: Flown) -> Assessed:
     """Cut the day into its sections, and take the statistics of each."""
-    angle, wrench = overlap(flown.angle, flown.wrench)
+    angle, rigid = overlap(flown.angle, flown.wrench)
     error = pointing.error(angle, planned.t, planned.q)
     boresight = pointing.line_of_sight(error, angle.values[:, 1])
-    torques = _torques(campaign, wrench)
+    mast = None if day.mast is None else answer(rigid, angle, day.mast)
+    torques = _torques(campaign, rigid if mast is None else mast.wrench)
+    changed = None if mast is None else (_torques(campaign, rigid), off_boresight(mast.turn.values, angle.values))
     period = day.mission.orbit.nodal_period
     sections = []
     for entry, start, end in boundaries(day, planned):
@@ -68,6 +71,7 @@ def assess(campaign: Campaign, day: Day, planned: Plan, flown: Flown) -> Assesse
                 published=PublishedSection(**entry.published.model_dump(), end_s=entry.near)
                 if entry.published
                 else None,
+                mast=changed and _of_mast(*changed, error.t, start, end),
             )
         )
     return Assessed(
@@ -78,6 +82,12 @@ def assess(campaign: Campaign, day: Day, planned: Plan, flown: Flown) -> Assesse
         joints=pointing.statistics(error, period, day.smoothing),
         whole=tuple(map(estimate, pointing.statistics(boresight, period, day.smoothing))),
     )
+
+
+def _of_mast(rigid: dict[Band, Signal], turned: Array, t: Array, start: float, end: float) -> MastIn:
+    across, along = np.abs(turned[(t >= start) & (t < end)]).max(axis=0)
+    peaks = tuple(_greatest(band.name, 0.0, signal, start, end).value for band, signal in rigid.items())
+    return MastIn(rigid=peaks, cross_elevation=float(across), elevation=float(along))
 
 
 def _modes(planned: Plan, start: float, end: float) -> tuple[str, ...]:
@@ -114,4 +124,5 @@ def _greatest(name: str, highest: float, signal: Signal, start: float, end: floa
         value=float(x[row, column]),
         axis=TORQUES[int(column)],
         time_s=float(signal.t[first + row]),
+        rms=float(np.sqrt(np.mean(np.sum(x**2, axis=1)))),
     )

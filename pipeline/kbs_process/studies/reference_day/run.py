@@ -12,6 +12,7 @@ from kbs_process.campaign.config import Campaign
 from kbs_process.campaign.mission import Day, load_day
 from kbs_process.mission import orbit
 from kbs_process.mission.planner import Plan, plan
+from kbs_process.plant.linear.modal import ModalTable
 from kbs_process.plant.sampling import values
 from kbs_process.progress import Progress
 from kbs_process.report.build import publish
@@ -30,7 +31,7 @@ from kbs_process.studies.reference_day.discussion import discussion
 from kbs_process.studies.reference_day.files import write_tables
 from kbs_process.studies.reference_day.flying import fly
 from kbs_process.studies.reference_day.report import DOCUMENT
-from kbs_process.studies.reference_day.results import Geometry, Judged, Phase, ReferenceDayResults
+from kbs_process.studies.reference_day.results import Geometry, Judged, Mast, Phase, ReferenceDayResults
 from kbs_process.studies.reference_day.units import Units, draw_units, fly_days, units_of, with_spread
 from kbs_process.studies.reference_day.verdicts import judged
 
@@ -99,14 +100,23 @@ def _results(
         sections=found.sections,
         requirements=requirements,
         boresight=found.whole,
+        mast=None if day.mast is None else _mast(day.mast),
         samples=samples,
         failed=units.failed,
         seed=seed,
         warnings=tuple(_warnings(units)),
         discussion=tuple(discussion(campaign.rig, found.sections)),
         parameters=(*_constants(day), *provenance.constants(campaign.rig)),
-        notes=(_SAYS("orbit"), _SAYS("error"), _SAYS("uncertainty", samples=samples), ASSUMPTION),
+        notes=(_SAYS("orbit", mast=day.mast), _SAYS("error"), _SAYS("uncertainty", samples=samples), ASSUMPTION),
     )
+
+
+def _mast(table: ModalTable) -> Mast:
+    def ranges(name: str) -> tuple[tuple[float, float], ...]:
+        over = np.stack([getattr(model, name) for model in table.models])
+        return tuple((float(low), float(high)) for low, high in zip(over.min(axis=0), over.max(axis=0), strict=True))
+
+    return Mast(source=table.source, frequency_Hz=ranges("frequency"), damping=ranges("damping"))
 
 
 def _warnings(units: Units) -> Iterator[Notice]:

@@ -34,16 +34,10 @@ def panel(results: ReferenceDayResults, tables: Tables) -> Panel:
     causes = tuple(_row(section.name, one) for section in results.sections for one in section.torques if one.cause)
     if causes:
         head = (
-            "Section",
-            "Band",
-            "Greatest / N\u00a0m",
-            "Axis",
-            "Time / s",
-            "Frequency / Hz",
-            "Mode / Hz",
-            "Lines there",
-        )
-        blocks.append(Grid("Torque above the bands", head, causes, "klrlrrrl", _SAYS("causes")))
+            "Section", "Band", "Greatest / N\u00a0m", "Axis", "Time / s", "Frequency / Hz", "Mode / Hz", "Rms / mN\u00a0m",
+            "Rms without / mN\u00a0m",
+        )  # fmt: skip
+        blocks.append(Grid("Torque above the bands", head, causes, "klrlrrrrl", _SAYS("causes")))
     return Panel("torque", "Torque", "What torque does the unit exert on the spacecraft?", tuple(blocks))
 
 
@@ -57,7 +51,8 @@ def _row(section: str, one: Torque) -> tuple[str, ...]:
         f"{one.time_s:.1f}",
         number(one.cause.frequency_Hz),
         number(one.cause.mode_Hz),
-        ", ".join(f"{left.name} {number(left.value, 2)}" for left in one.cause.without[:_SHOWN]) or MISSING,
+        number(1e3 * one.rms, 2),
+        ", ".join(f"{left.name} {number(1e3 * left.value, 2)}" for left in one.cause.without[:_SHOWN]) or MISSING,
     )
 
 
