@@ -34,8 +34,8 @@ def panel(results: ReferenceDayResults, tables: Tables) -> Panel:
     causes = tuple(_row(section.name, one) for section in results.sections for one in section.torques if one.cause)
     if causes:
         head = (
-            "Section", "Band", "Greatest / N\u00a0m", "Axis", "Time / s", "Frequency / Hz", "Mode / Hz", "Rms / mN\u00a0m",
-            "Rms without / mN\u00a0m",
+            "Section", "Band", "Greatest / N\u00a0m", "Axis", "Time / s", "Frequency / Hz", "Mode / Hz",
+            "Rms / mN\u00a0m", "Rms without / mN\u00a0m",
         )  # fmt: skip
         blocks.append(Grid("Torque above the bands", head, causes, "klrlrrrrl", _SAYS("causes")))
     return Panel("torque", "Torque", "What torque does the unit exert on the spacecraft?", tuple(blocks))
