@@ -63,7 +63,8 @@ def simulate_day(
         numbers, drawn = draw_units(campaign, samples, seed)
         rigs = [substitute(campaign.rig, values(campaign.rig, numbers, row)) for row in drawn]
         changed = without_each(campaign) if rigs else {}
-        with progress.task(f"Flying {len(rigs)} units, and {len(changed)} without an effect") as task:
+        what = f"Flying {len(rigs)} units, and {len(changed)} without an effect" if rigs else "Flying no other units"
+        with progress.task(what) as task:
             reached = fly_days(campaign, day, planned, [*rigs, *changed.values()], task.update, processes)
         units = units_of(numbers, drawn, reached[: len(rigs)])
         with progress.task("Judging pointing and torque"):
